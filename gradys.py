@@ -1,0 +1,1 @@
+from mavproxy_gradys.module import init as init

@@ -1,0 +1,1 @@
+"""MAVProxy module `gradys`: pushes position and readings to the GrADyS ground station."""

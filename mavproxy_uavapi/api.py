@@ -1,0 +1,63 @@
+"""The API as one thing that is started and stopped: its server and its watch over the telemetry."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+
+from mavproxy_uavapi.host.host import Host
+from mavproxy_uavapi.http.app import Server
+from mavproxy_uavapi.http.call import Service
+from mavproxy_uavapi.settings import Settings
+from mavproxy_uavapi.vehicle.freshness import Freshness
+from mavproxy_uavapi.vehicle.hangar import Hangar
+from mavproxy_uavapi.vehicle.jobs import JobBook
+
+
+class Api:
+    """Everything of uavapi that lives in the asyncio thread; so do all its methods but `filenos`."""
+
+    def __init__(self, host: Host) -> None:
+        self.host = host
+        self.hangar = Hangar(host)
+        self.jobs = JobBook()
+        self._server: Server | None = None
+        self._freshness: asyncio.Task[None] | None = None
+
+    @property
+    def listening(self) -> bool:
+        """Whether the server is up."""
+        return self._server is not None
+
+    async def start(self, settings: Settings) -> None:
+        """Listen as the settings say; does nothing when it listens already.
+
+        Raises:
+            OSError: the port is taken, or there is no such address.
+        """
+        if self._server is not None:
+            return
+        self.host.link_timeout = settings.link_timeout
+        server = Server(Service(self.host, self.hangar, self.jobs, settings))
+        try:
+            await server.start()
+        except OSError:
+            await server.stop()
+            raise
+        self._server = server
+        self._freshness = asyncio.create_task(Freshness(self.hangar, settings.sysid).run())
+
+    async def stop(self) -> None:
+        """Close the port and end what is in flight."""
+        server, self._server = self._server, None
+        if server is None:
+            return
+        if self._freshness is not None:
+            self._freshness.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await self._freshness
+        await server.stop()
+
+    def filenos(self) -> list[int]:
+        """Descriptors that a forked child must close."""
+        return [] if self._server is None else self._server.filenos()

@@ -1,0 +1,46 @@
+"""What the prompt shows of the API. Pure."""
+
+from __future__ import annotations
+
+from mavproxy_uavapi.api import Api
+from mavproxy_uavapi.errors import UavApiError
+from mavproxy_uavapi.host.state import VehicleState
+from mavproxy_uavapi.settings import Settings
+from mavproxy_uavapi.vehicle.modes import kind_of, mode_name
+
+
+def report(api: Api, settings: Settings) -> str:
+    """A few lines: the address, the vehicle, the calls in flight."""
+    address = f"http://{settings.host}:{settings.port}"
+    lines = [f"uavapi: {'listening on' if api.listening else 'not listening; it would be'} {address}"]
+    try:
+        lines.append(describe(api, api.hangar.find(settings.sysid).state))
+    except UavApiError as error:
+        lines.append(str(error))
+    running = api.jobs.running()
+    lines.append(f"{len(running)} call{'' if len(running) == 1 else 's'} in flight")
+    lines += [f"  {job.id}: {job.verb} {_progress(job.progress)}".rstrip() for job in running]
+    return "\n".join(lines)
+
+
+def vehicles(api: Api) -> str:
+    """A line for each vehicle that was heard."""
+    fleet = api.host.fleet.vehicles
+    if not fleet:
+        return "uavapi: no vehicle was heard yet"
+    return "\n".join(describe(api, state) for _, state in sorted(fleet.items()))
+
+
+def describe(api: Api, state: VehicleState) -> str:
+    """One vehicle in a line."""
+    armed = {True: "armed", False: "disarmed", None: "armed or not: unknown"}[state.armed]
+    link = "link ok" if api.host.is_alive(state) else "LINK LOST"
+    age = api.host.clock() - state.heartbeat_at
+    kind = kind_of(state.vehicle_type)
+    mode = mode_name(state.vehicle_type, state.mode)
+    loss = 100 * state.packet_loss
+    return f"vehicle {state.system}: {kind}, {mode}, {armed}, {link} (heartbeat {age:.1f} s ago, {loss:.1f} % lost)"
+
+
+def _progress(progress: dict[str, float]) -> str:
+    return ", ".join(f"{name.replace('_', ' ')} {value:.1f} m" for name, value in progress.items())

@@ -1,0 +1,186 @@
+"""The one error tree; each error names its machine code and its HTTP status.
+
+    UavApiError                500 internal
+    |- BadRequest              400 bad_request
+    |- Unauthorized            401 unauthorized
+    |- Forbidden               403 forbidden
+    |- NotFound                404 not_found
+    |  `- NotSupported         404 not_supported
+    |- Conflict                409 (one of its children)
+    |  |- Superseded           409 superseded     a newer command took over
+    |  |- ModeChanged          409 mode_changed   the pilot or a failsafe has the vehicle
+    |  |- Busy                 409 busy           the state forbids it just now
+    |  |- NotArmed             409 not_armed
+    |  `- Aborted              409 aborted
+    |- Invalid                 422 invalid        nothing was sent
+    |- Rejected                500 rejected       the autopilot refused
+    |- Unavailable             503 (one of its children)
+    |  |- LinkLost             503 link_lost
+    |  |- NoVehicle            503 no_vehicle
+    |  `- Stale                503 stale
+    `- TimedOut                504 timeout
+
+An error's text is a sentence that a pilot understands. `http/responses.py` turns any of them into an
+answer; nothing else knows about statuses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+
+class UavApiError(Exception):
+    """Base of all errors of this project: a sentence, a machine code and an HTTP status."""
+
+    status = 500
+    code = "internal"
+
+    @property
+    def detail(self) -> str | list[dict[str, Any]]:
+        """What the answer's `detail` says."""
+        return str(self)
+
+    def extras(self) -> dict[str, Any]:
+        """Further members of the answer's body."""
+        return {}
+
+
+class BadRequest(UavApiError):
+    """The request's body or an argument of it makes no sense."""
+
+    status, code = 400, "bad_request"
+
+
+class Unauthorized(UavApiError):
+    """A token is needed and is missing or wrong."""
+
+    status, code = 401, "unauthorized"
+
+
+class Forbidden(UavApiError):
+    """A foreign origin or host, or a feature that is switched off."""
+
+    status, code = 403, "forbidden"
+
+
+class NotFound(UavApiError):
+    """No such path, script, job, or message."""
+
+    status, code = 404, "not_found"
+
+
+class NotSupported(NotFound):
+    """A verb that this type of vehicle does not have."""
+
+    code = "not_supported"
+
+
+class Conflict(UavApiError):
+    """The state of the vehicle, or another commander, stands against it."""
+
+    status, code = 409, "conflict"
+
+
+class Superseded(Conflict):
+    """A newer movement or flight command took over."""
+
+    code = "superseded"
+
+
+class ModeChanged(Conflict):
+    """The vehicle left the mode that the verb needs; whoever did that has it now."""
+
+    code = "mode_changed"
+
+
+class Busy(Conflict):
+    """The vehicle's state forbids it just now."""
+
+    code = "busy"
+
+
+class NotArmed(Conflict):
+    """The verb needs an armed vehicle."""
+
+    code = "not_armed"
+
+
+class Aborted(Conflict):
+    """The verb was ended before it was done."""
+
+    code = "aborted"
+
+
+class Invalid(UavApiError):
+    """A value of the wrong type or out of range; nothing was sent.
+
+    `problems` are `{"loc": [...], "msg": str, "type": str}`, as web clients of typed APIs know them.
+    """
+
+    status, code = 422, "invalid"
+
+    def __init__(self, problems: Sequence[dict[str, Any]] | str, *loc: str) -> None:
+        if isinstance(problems, str):
+            problems = [{"loc": list(loc), "msg": problems, "type": "value_error"}]
+        self.problems = list(problems)
+        super().__init__("; ".join(f"{'.'.join(map(str, p['loc']))}: {p['msg']}" for p in self.problems))
+
+    @property
+    def detail(self) -> list[dict[str, Any]]:
+        """The list of problems."""
+        return self.problems
+
+
+class Rejected(UavApiError):
+    """The autopilot refused: `ack` is the MAV_RESULT name, `statustext` what it said since it was asked."""
+
+    status, code = 500, "rejected"
+
+    def __init__(self, sentence: str, ack: str | None = None, statustext: Sequence[str] = ()) -> None:
+        super().__init__(sentence)
+        self.ack = ack
+        self.statustext = list(statustext)
+
+    def extras(self) -> dict[str, Any]:
+        """`ack` where there was one, and `statustext`."""
+        ack = {} if self.ack is None else {"ack": self.ack}
+        return {**ack, "statustext": self.statustext}
+
+
+class Unavailable(UavApiError):
+    """There is nobody to ask, or nothing fresh to tell."""
+
+    status, code = 503, "unavailable"
+
+
+class LinkLost(Unavailable):
+    """No heartbeat from the vehicle within the link timeout."""
+
+    code = "link_lost"
+
+
+class NoVehicle(Unavailable):
+    """No vehicle on the link yet."""
+
+    code = "no_vehicle"
+
+
+class Stale(Unavailable):
+    """The data asked for is older than its limit."""
+
+    code = "stale"
+
+
+class TimedOut(UavApiError):
+    """No acknowledgement, or not arrived in time."""
+
+    status, code = 504, "timeout"
+
+    def __init__(self, sentence: str, statustext: Sequence[str] = ()) -> None:
+        super().__init__(sentence)
+        self.statustext = list(statustext)
+
+    def extras(self) -> dict[str, Any]:
+        """`statustext`, where the autopilot said something meanwhile."""
+        return {"statustext": self.statustext} if self.statustext else {}

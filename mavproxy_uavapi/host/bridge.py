@@ -1,0 +1,150 @@
+"""MAVProxy's select loop <-> one asyncio loop in one thread.
+
+Two queues, one each way. In: the main loop hands over what it received (`feed`); out: the asyncio side
+hands calls to the main loop (`on_main`), which is the only thread that sends.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import weakref
+from collections import deque
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from mavproxy_uavapi.host.loop_thread import LoopThread
+from mavproxy_uavapi.host.outbox import Outbox
+
+T = TypeVar("T")
+
+_bridges: weakref.WeakSet[Bridge] = weakref.WeakSet()
+
+
+class Bridge:
+    """The only place where MAVProxy's main loop and our asyncio thread meet.
+
+    Args:
+        select_extra: MAVProxy's table of further descriptors for its select().
+        receive: called in the asyncio thread with each message that was fed.
+    """
+
+    def __init__(
+        self, select_extra: dict[int, tuple[Callable[..., None], Any]], receive: Callable[[Any], None]
+    ) -> None:
+        self._select_extra = select_extra
+        self._receive = receive
+        self._inbox: deque[Any] = deque()
+        self._outbox = Outbox()
+        self._thread = LoopThread("uavapi-loop")
+        self._open_sockets: list[Callable[[], list[int]]] = [self._outbox.filenos]
+        _bridges.add(self)
+
+    @property
+    def loop(self) -> asyncio.AbstractEventLoop:
+        """The asyncio loop of the one thread."""
+        return self._thread.loop
+
+    @property
+    def running(self) -> bool:
+        """Whether the asyncio thread is alive."""
+        return self._thread.running
+
+    def start(self) -> None:
+        """Start the asyncio thread and be woken by MAVProxy's select(). Main loop only."""
+        self._select_extra[self._outbox.fileno()] = (self._outbox.on_readable, None)
+        self._thread.start()
+
+    def feed(self, message: Any) -> None:
+        """Hand a received message over. Main loop only; never blocks, never raises."""
+        first = not self._inbox
+        self._inbox.append(message)
+        if first and not self._thread.call_soon(self._deliver):
+            self._inbox.clear()  # the loop has ended: nobody will read
+
+    def _deliver(self) -> None:
+        for _ in range(len(self._inbox)):
+            message = self._inbox.popleft()
+            try:
+                self._receive(message)
+            except Exception as error:  # noqa: BLE001  one bad message must not stop the next
+                context = {"message": f"uavapi: defect on {message.get_type()}", "exception": error}
+                self.loop.call_exception_handler(context)
+        if self._inbox:
+            self.loop.call_soon(self._deliver)
+
+    def drain(self) -> None:
+        """Run what the asyncio side asked for. Main loop only."""
+        self._outbox.drain()
+
+    def post(self, call: Callable[[], None]) -> None:
+        """Have the main loop run `call`, which must not raise, and do not wait for it. Any thread."""
+        self._outbox.put(call)
+
+    async def on_main(self, call: Callable[[], T]) -> T:
+        """Have the main loop run `call`; its result, or what it raised.
+
+        Cancelled before the main loop came to it, it is never run.
+        """
+        future: asyncio.Future[T] = self.loop.create_future()
+
+        def settle(result: T | None, error: Exception | None) -> None:
+            if future.done():
+                return
+            if error is not None:
+                future.set_exception(error)
+            else:
+                future.set_result(result)  # type: ignore[arg-type]
+
+        def run() -> None:
+            if future.cancelled():
+                return
+            try:
+                outcome = call(), None
+            except Exception as error:  # noqa: BLE001  it belongs to whoever awaits, not to MAVProxy
+                self._thread.call_soon(settle, None, error)
+            else:
+                self._thread.call_soon(settle, *outcome)
+
+        self._outbox.put(run)
+        return await future
+
+    def run(self, coroutine: Any, timeout: float = 4.0) -> Any:
+        """Run a coroutine in the asyncio loop and wait for it. Any thread but the loop's own."""
+        return self._thread.run(coroutine, timeout)
+
+    def call_soon(self, call: Callable[..., object], *args: Any) -> bool:
+        """Run `call` in the asyncio loop, without waiting; False when that has ended. Any thread."""
+        return self._thread.call_soon(call, *args)
+
+    def close_in_children(self, filenos: Callable[[], list[int]]) -> None:
+        """Name descriptors that a forked child must close, so that it does not keep our port."""
+        self._open_sockets.append(filenos)
+
+    def keep_in_children(self, filenos: Callable[[], list[int]]) -> None:
+        """Take back what `close_in_children` named: whoever had those descriptors has closed them."""
+        self._open_sockets.remove(filenos)
+
+    def close_inherited(self) -> None:
+        """In a forked child: close our sockets, touching neither the loop nor its epoll (both are shared)."""
+        for filenos in self._open_sockets:
+            for fd in filenos():
+                if fd >= 0:
+                    os.close(fd)
+
+    def stop(self) -> None:
+        """End the thread and take our descriptor out of MAVProxy's select(). Any thread but the loop's."""
+        self._select_extra.pop(self._outbox.fileno(), None)
+        self._thread.stop()
+        self._outbox.close()
+        _bridges.discard(self)
+
+
+def _close_inherited_sockets() -> None:
+    for bridge in list(_bridges):
+        bridge.close_inherited()
+
+
+# MAVProxy forks children (map, console) that would keep our port open after an unload; close-on-exec does
+# not help a fork. Registered once per process: Python has no way to take such a hook back.
+os.register_at_fork(after_in_child=_close_inherited_sockets)

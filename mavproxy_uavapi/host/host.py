@@ -1,0 +1,112 @@
+"""One host per MAVProxy: whichever of our modules loads first makes it, the last to unload ends it."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable
+from typing import Any
+
+from mavproxy_uavapi.errors import LinkLost
+from mavproxy_uavapi.host.bridge import Bridge
+from mavproxy_uavapi.host.link import MavproxyLink
+from mavproxy_uavapi.host.pending import Pending
+from mavproxy_uavapi.host.state import Fleet, VehicleState
+
+ATTRIBUTE = "uavapi_host"  # on MAVProxy's state, so that a module loaded anew finds it
+
+
+class Host:
+    """The shared half of our modules: bridge, link, fleet, waits.
+
+    Everything but `bridge` belongs to the asyncio thread.
+
+    Args:
+        mpstate: MAVProxy's state.
+        clock: monotonic seconds.
+    """
+
+    def __init__(self, mpstate: Any, clock: Callable[[], float] = time.monotonic) -> None:
+        self.clock = clock
+        self.fleet = Fleet()
+        self.pending = Pending()
+        self.bridge = Bridge(mpstate.select_extra, self._receive)
+        self.link = MavproxyLink(self.bridge, mpstate)
+        self.link_timeout = 5.0
+        self.target = 0  # the system id that MAVProxy's own commands go to; 0 before it knows one
+        self.listeners: list[Callable[[VehicleState, Any, float], None]] = []
+        self.members: list[Any] = []
+        self._mpstate = mpstate
+        self._told_target = 0
+        self._link_timers: dict[int, asyncio.TimerHandle] = {}
+
+    # -- MAVProxy's main loop ---------------------------------------------------------------------------
+
+    def feed(self, member: Any, message: Any) -> None:
+        """Hand a message over; of several loaded modules only the first one's counts."""
+        if self.members[0] is member:
+            self.bridge.feed(message)
+
+    def idle(self, member: Any) -> None:
+        """MAVProxy's idle task: start at the first one, then send what is to be sent."""
+        if self.members[0] is not member:
+            return
+        if not self.bridge.running:
+            self.bridge.start()
+        target = self._mpstate.settings.target_system
+        if target != self._told_target:
+            self._told_target = target
+            self.bridge.call_soon(setattr, self, "target", target)
+        self.bridge.drain()
+
+    # -- the asyncio thread -----------------------------------------------------------------------------
+
+    def is_alive(self, state: VehicleState) -> bool:
+        """Whether a heartbeat came within the link timeout."""
+        return self.clock() - state.heartbeat_at < self.link_timeout
+
+    def _receive(self, message: Any) -> None:
+        now = self.clock()
+        state = self.fleet.update(message, now)
+        if state is None:
+            return
+        self.pending.feed(state.system, message.get_type(), message)
+        if state.system not in self._link_timers:
+            self._watch_link(state)
+        for listener in list(self.listeners):
+            listener(state, message, now)
+
+    def _watch_link(self, state: VehicleState) -> None:
+        """End the waits on a vehicle when its heartbeats have been missing for the link timeout."""
+        silent_for = self.clock() - state.heartbeat_at
+        if silent_for >= self.link_timeout:
+            self.pending.fail(state.system, lambda: link_lost(state, silent_for))
+            delay = self.link_timeout / 5
+        else:
+            delay = self.link_timeout - silent_for
+        timer = self.bridge.loop.call_later(max(delay, 0.05), self._watch_link, state)
+        self._link_timers[state.system] = timer
+
+
+def link_lost(state: VehicleState, silent_for: float) -> LinkLost:
+    """The error for a vehicle that has been silent for that many seconds."""
+    return LinkLost(f"no heartbeat from vehicle {state.system} for {silent_for:.1f} s")
+
+
+def join(mpstate: Any, member: Any) -> Host:
+    """The host of this MAVProxy, made if need be; `member` is the module that uses it."""
+    host = getattr(mpstate, ATTRIBUTE, None)
+    if host is None:
+        host = Host(mpstate)
+        setattr(mpstate, ATTRIBUTE, host)
+    host.members.append(member)
+    return host
+
+
+def leave(mpstate: Any, member: Any) -> None:
+    """Give the host back; the last one ends it."""
+    host: Host = getattr(mpstate, ATTRIBUTE)
+    host.members.remove(member)
+    if not host.members:
+        delattr(mpstate, ATTRIBUTE)
+        host.bridge.stop()

@@ -1,0 +1,83 @@
+"""The only way out: one MAVLink message to one vehicle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple, Protocol
+
+from mavproxy_uavapi.errors import LinkLost
+from mavproxy_uavapi.host.bridge import Bridge
+
+
+class Address(NamedTuple):
+    """A MAVLink system id and component id."""
+
+    system: int
+    component: int
+
+
+class Link(Protocol):
+    """Sends messages to vehicles."""
+
+    @property
+    def source(self) -> Address:
+        """Who we are on the link; acknowledgements come back to this address."""
+
+    async def send(self, message: Any, system: int) -> None:
+        """Send `message` by the best link to vehicle `system`; returns when it has been written.
+
+        Raises:
+            LinkLost: there is no link, or writing failed.
+        """
+
+
+class MavproxyLink:
+    """Sends through MAVProxy's own links, in MAVProxy's main loop.
+
+    Args:
+        bridge: the way into the main loop.
+        mpstate: MAVProxy's state; touched in the main loop only.
+    """
+
+    def __init__(self, bridge: Bridge, mpstate: Any) -> None:
+        self._bridge = bridge
+        self._mpstate = mpstate
+
+    @property
+    def source(self) -> Address:
+        """MAVProxy's own address (its settings source_system and source_component)."""
+        settings = self._mpstate.settings
+        return Address(settings.source_system, settings.source_component)
+
+    async def send(self, message: Any, system: int) -> None:
+        """See `Link.send`."""
+        await self._bridge.on_main(lambda: self._write(message, system))
+
+    def _write(self, message: Any, system: int) -> None:
+        master = self._mpstate.master(system)
+        if master is None:
+            raise LinkLost("MAVProxy has no link; add one with `link add`")
+        try:
+            master.mav.send(message)
+        except OSError as error:
+            raise LinkLost(f"MAVProxy could not write to its link: {error}") from error
+
+
+class FakeLink:
+    """For tests: remembers what was sent, and lets a test answer it.
+
+    Args:
+        on_send: called with each message and the system it goes to.
+    """
+
+    source = Address(255, 230)
+
+    def __init__(self, on_send: Callable[[Any, int], None] | None = None) -> None:
+        self.sent: list[Any] = []
+        self.on_send = on_send
+
+    async def send(self, message: Any, system: int) -> None:
+        """Remember `message` and tell the test."""
+        self.sent.append(message)
+        if self.on_send is not None:
+            self.on_send(message, system)

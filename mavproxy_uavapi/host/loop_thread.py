@@ -1,0 +1,78 @@
+"""One asyncio loop in one thread."""
+
+from __future__ import annotations
+
+import asyncio
+import concurrent.futures
+import threading
+from collections.abc import Callable, Coroutine
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+
+
+class LoopThread:
+    """Runs an asyncio loop in a daemon thread from `start` to `stop`; both are called from other threads."""
+
+    def __init__(self, name: str) -> None:
+        self.loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+
+    def start(self) -> None:
+        """Start the thread."""
+        self._thread.start()
+
+    def _run(self) -> None:
+        asyncio.set_event_loop(self.loop)
+        try:
+            self.loop.run_forever()
+            self._cancel_what_is_left()
+        finally:
+            asyncio.set_event_loop(None)
+            self.loop.close()
+
+    def _cancel_what_is_left(self) -> None:
+        tasks = asyncio.all_tasks(self.loop)
+        for task in tasks:
+            task.cancel()
+        if tasks:
+            self.loop.run_until_complete(asyncio.gather(*tasks, return_exceptions=True))
+        self.loop.run_until_complete(self.loop.shutdown_asyncgens())
+        self.loop.run_until_complete(self.loop.shutdown_default_executor())
+
+    @property
+    def running(self) -> bool:
+        """Whether the thread is alive."""
+        return self._thread.is_alive()
+
+    def call_soon(self, call: Callable[..., object], *args: Any) -> bool:
+        """Run `call(*args)` in the loop; False when the loop has ended."""
+        try:
+            self.loop.call_soon_threadsafe(call, *args)
+        except RuntimeError:  # asyncio's word for a closed loop
+            return False
+        return True
+
+    def run(self, coroutine: Coroutine[Any, Any, T], timeout: float) -> T:
+        """Run `coroutine` in the loop and wait for its result, at most `timeout` seconds.
+
+        Not for the loop's own thread.
+
+        Raises:
+            TimeoutError: it took longer; the coroutine is cancelled.
+        """
+        future = asyncio.run_coroutine_threadsafe(coroutine, self.loop)
+        try:
+            return future.result(timeout)
+        except concurrent.futures.TimeoutError as error:
+            future.cancel()
+            raise TimeoutError(f"no answer from the loop within {timeout:g} s") from error
+
+    def stop(self, timeout: float = 4.0) -> bool:
+        """Cancel all tasks and end the thread; whether it ended within `timeout` seconds."""
+        if not self._thread.ident:
+            self.loop.close()
+            return True
+        self.call_soon(self.loop.stop)
+        self._thread.join(timeout)
+        return not self._thread.is_alive()

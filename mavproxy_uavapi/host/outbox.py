@@ -1,0 +1,61 @@
+"""Work that the asyncio thread hands to MAVProxy's main loop, and the wake-up for its select()."""
+
+from __future__ import annotations
+
+import socket
+from collections import deque
+from collections.abc import Callable
+
+WAKE = b"\0"
+
+
+class Outbox:
+    """A queue of calls: anybody puts, only MAVProxy's main loop drains.
+
+    Thread safe: `put` may be called from any thread; deque's append and popleft are atomic.
+    """
+
+    def __init__(self) -> None:
+        self._calls: deque[Callable[[], None]] = deque()
+        self._reader, self._writer = socket.socketpair()
+        self._reader.setblocking(False)
+        self._writer.setblocking(False)
+
+    def fileno(self) -> int:
+        """The descriptor that becomes readable when there is work: for `mpstate.select_extra`."""
+        return self._reader.fileno()
+
+    def filenos(self) -> list[int]:
+        """Both descriptors, which a forked child must close."""
+        return [self._reader.fileno(), self._writer.fileno()]
+
+    def put(self, call: Callable[[], None]) -> None:
+        """Queue `call` and wake the main loop. `call` must not raise."""
+        self._calls.append(call)
+        try:
+            self._writer.send(WAKE)
+        except BlockingIOError:
+            pass  # the pipe is full of wake-ups that were not read yet: it wakes all the same
+        except OSError:
+            self._calls.clear()  # closed: MAVProxy is unloading us, nobody will drain any more
+
+    def drain(self) -> None:
+        """Run what is queued now. Main loop only; what a call queues in turn waits for the next time."""
+        for _ in range(len(self._calls)):
+            self._calls.popleft()()
+
+    def on_readable(self, _args: object = None) -> None:
+        """The `select_extra` handler: swallow the wake-ups, then drain."""
+        try:
+            self._reader.recv(4096)
+        except BlockingIOError:
+            pass  # a spurious wake-up; the queue decides
+        except OSError:
+            return  # closed between select() and here
+        self.drain()
+
+    def close(self) -> None:
+        """Drop what is queued and close both ends."""
+        self._calls.clear()
+        self._reader.close()
+        self._writer.close()

@@ -1,0 +1,229 @@
+"""Message in -> what we know of each vehicle, with the time it arrived. Pure: the clock is an argument."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+from typing import Any
+
+from pymavlink import mavutil
+
+from mavproxy_uavapi.host.timeratio import TimeRatio
+
+mavlink = mavutil.mavlink
+
+RATE_SMOOTHING = 0.2  # weight of the newest interval in the smoothed rate
+STATUSTEXTS_KEPT = 200
+SEQUENCE_REORDER = 128  # a step back of less than this is a message out of order, not a loss
+ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+NOT_VEHICLES = {
+    mavlink.MAV_TYPE_GCS,
+    mavlink.MAV_TYPE_ADSB,
+    mavlink.MAV_TYPE_GIMBAL,
+    mavlink.MAV_TYPE_ONBOARD_CONTROLLER,
+    mavlink.MAV_TYPE_CAMERA,
+    mavlink.MAV_TYPE_ODID,
+}
+# What a reboot makes worthless; the rest is overwritten soon enough.
+FORGOTTEN_AT_REBOOT = ("HOME_POSITION", "HEARTBEAT", "EXTENDED_SYS_STATE", "SYS_STATUS", "EKF_STATUS_REPORT")
+
+
+@dataclass
+class Received:
+    """The newest message of one name: the message, when it arrived (s), how many came, and how often."""
+
+    message: Any
+    at: float
+    count: int = 1
+    interval: float | None = None
+
+    def renew(self, message: Any, now: float) -> None:
+        """Take a newer message."""
+        elapsed = now - self.at
+        if self.interval is None:
+            self.interval = elapsed
+        else:
+            self.interval += RATE_SMOOTHING * (elapsed - self.interval)
+        self.message, self.at, self.count = message, now, self.count + 1
+
+    def rate(self, now: float) -> float:
+        """Messages per second (Hz) of late; falls by itself when they stop coming."""
+        if self.interval is None:
+            return 0.0
+        return 1.0 / max(self.interval, now - self.at, 1e-3)
+
+
+@dataclass(frozen=True)
+class StatusText:
+    """What the autopilot said: when it arrived (s), MAV_SEVERITY, text."""
+
+    at: float
+    severity: int
+    text: str
+
+
+@dataclass
+class VehicleState:
+    """What we know of one vehicle: the autopilot component of one system id.
+
+    Attributes:
+        system, component: its MAVLink address.
+        vehicle_type: MAV_TYPE of its heartbeat.
+        armed: None until a heartbeat since the last boot said so.
+        mode: the heartbeat's custom_mode; None likewise.
+        system_status: MAV_STATE of the heartbeat; None likewise.
+        heartbeat_at: arrival of the newest heartbeat (s).
+        messages: newest message by name, and by `NAME[instance]` for those that come for several devices.
+        others: newest message by (component, name), of the system's other components.
+        parameters: values that PARAM_VALUE told, by name.
+    """
+
+    system: int
+    component: int
+    vehicle_type: int
+    heartbeat_at: float
+    armed: bool | None = None
+    mode: int | None = None
+    system_status: int | None = None
+    messages: dict[str, Received] = field(default_factory=dict)
+    others: dict[tuple[int, str], Received] = field(default_factory=dict)
+    parameters: dict[str, float] = field(default_factory=dict)
+    statustexts: deque[StatusText] = field(default_factory=lambda: deque(maxlen=STATUSTEXTS_KEPT))
+    reboots: int = 0
+    received: int = 0
+    lost: int = 0
+    time_ratio: TimeRatio = field(default_factory=TimeRatio)
+    _sequence: int | None = None
+    _chunks: dict[int, list[str]] = field(default_factory=dict)
+
+    def newest(self, name: str) -> Received | None:
+        """The newest message of that name; the autopilot's own before another component's."""
+        if name in self.messages:
+            return self.messages[name]
+        found = [received for (_, n), received in self.others.items() if n == name]
+        return max(found, key=lambda received: received.at, default=None)
+
+    def field(self, name: str, attribute: str) -> Any:
+        """One field of the autopilot's newest message of that name; None when there is none yet."""
+        received = self.messages.get(name)
+        return None if received is None else getattr(received.message, attribute)
+
+    def age(self, name: str, now: float) -> float | None:
+        """Seconds since a message of that name arrived; None when none did."""
+        received = self.messages.get(name)
+        return None if received is None else now - received.at
+
+    def said_since(self, at: float) -> list[str]:
+        """What the autopilot said since `at` (s), oldest first."""
+        return [said.text for said in self.statustexts if said.at >= at]
+
+    @property
+    def landed(self) -> bool | None:
+        """Whether it stands on the ground; None while unknown.
+
+        EXTENDED_SYS_STATE says so where it comes; else the heartbeat: ArduCopter's system_status is
+        STANDBY on the ground and ACTIVE in the air.
+        """
+        landed_state = self.field("EXTENDED_SYS_STATE", "landed_state")
+        if landed_state:
+            return bool(landed_state == mavlink.MAV_LANDED_STATE_ON_GROUND)
+        if self.system_status is None:
+            return None
+        flying = {mavlink.MAV_STATE_ACTIVE, mavlink.MAV_STATE_CRITICAL, mavlink.MAV_STATE_EMERGENCY}
+        return not (self.armed and self.system_status in flying)
+
+    @property
+    def packet_loss(self) -> float:
+        """Share of its messages that never arrived, 0 to 1, by their sequence numbers."""
+        sent = self.received + self.lost
+        return self.lost / sent if sent else 0.0
+
+    def update(self, message: Any, now: float) -> None:
+        """Take a message of this system that arrived at `now` (s)."""
+        name = message.get_type()
+        if message.get_srcComponent() != self.component:
+            _keep(self.others, (message.get_srcComponent(), name), message, now)
+            return
+        self._count_loss(message.get_seq())
+        if self.time_ratio.update(getattr(message, "time_boot_ms", None), name, now):
+            self._forget_what_a_reboot_changes()
+        _keep(self.messages, name, message, now)
+        instance = getattr(message, "_instance_field", None)
+        if instance is not None:  # one message each for several batteries, compasses, servos …
+            _keep(self.messages, f"{name}[{getattr(message, instance)}]", message, now)
+        if name == "HEARTBEAT":
+            self._take_heartbeat(message, now)
+        elif name == "STATUSTEXT":
+            self._take_statustext(message, now)
+        elif name == "PARAM_VALUE":
+            self.parameters[message.param_id] = message.param_value
+
+    def _take_heartbeat(self, message: Any, now: float) -> None:
+        self.heartbeat_at = now
+        self.vehicle_type = message.type
+        self.mode = message.custom_mode
+        self.armed = bool(message.base_mode & ARMED)
+        self.system_status = message.system_status
+
+    def _take_statustext(self, message: Any, now: float) -> None:
+        if not message.id:
+            self.statustexts.append(StatusText(now, message.severity, message.text))
+            return
+        chunks = self._chunks.setdefault(message.id, [])
+        if message.chunk_seq != len(chunks):  # a chunk was lost: what there is will have to do
+            chunks.append("…")
+        chunks.append(message.text)
+        if len(message.text) < 50:  # the last chunk is the one that is not full
+            self.statustexts.append(StatusText(now, message.severity, "".join(chunks)))
+            del self._chunks[message.id]
+
+    def _count_loss(self, sequence: int) -> None:
+        if self._sequence is not None:
+            step = (sequence - self._sequence) % 256
+            if not 0 < step < SEQUENCE_REORDER:
+                return
+            self.lost += step - 1
+        self._sequence = sequence
+        self.received += 1
+
+    def _forget_what_a_reboot_changes(self) -> None:
+        self.reboots += 1
+        self.armed = self.mode = self.system_status = None
+        self._chunks.clear()
+        for name in FORGOTTEN_AT_REBOOT:
+            self.messages.pop(name, None)
+
+
+def _keep(store: dict[Any, Received], key: Any, message: Any, now: float) -> None:
+    if key in store:
+        store[key].renew(message, now)
+    else:
+        store[key] = Received(message, now)
+
+
+class Fleet:
+    """Every vehicle that was ever heard on the links, by system id."""
+
+    def __init__(self) -> None:
+        self.vehicles: dict[int, VehicleState] = {}
+
+    def update(self, message: Any, now: float) -> VehicleState | None:
+        """Take a message; the state of the vehicle it came from, None when it came from no vehicle."""
+        system = message.get_srcSystem()
+        state = self.vehicles.get(system)
+        if state is None:
+            if not is_vehicle_heartbeat(message):
+                return None
+            state = VehicleState(system, message.get_srcComponent(), message.type, now)
+            self.vehicles[system] = state
+        state.update(message, now)
+        return state
+
+
+def is_vehicle_heartbeat(message: Any) -> bool:
+    """Whether `message` is the heartbeat of an autopilot, rather than of a gimbal or a ground station."""
+    return bool(
+        message.get_type() == "HEARTBEAT"
+        and message.autopilot != mavlink.MAV_AUTOPILOT_INVALID
+        and message.type not in NOT_VEHICLES
+    )

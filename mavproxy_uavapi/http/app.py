@@ -1,0 +1,97 @@
+"""The aiohttp application, and the server that listens for it."""
+
+from __future__ import annotations
+
+import socket
+from typing import Any
+
+from aiohttp import web
+
+from mavproxy_uavapi.http.call import SERVICE, Call, Service, parameters
+from mavproxy_uavapi.http.responses import Handler, errors_as_answers, success
+from mavproxy_uavapi.http.routes import ROUTES, Route
+from mavproxy_uavapi.http.security import only_for_us
+
+MAX_BODY = 1024 * 1024  # bytes
+SHUTDOWN_TIMEOUT = 1.0  # s for answers that are being written when we stop
+
+
+def make_app(service: Service) -> web.Application:
+    """The application with every route, each with and without a trailing slash."""
+    app = web.Application(middlewares=[errors_as_answers, only_for_us], client_max_size=MAX_BODY)
+    app[SERVICE] = service
+    for route in ROUTES:
+        handler = _handler(route)
+        for method in route.methods:
+            for path in (route.path, route.path + "/"):
+                app.router.add_route(method, path, handler)
+    return app
+
+
+def _handler(route: Route) -> Handler:
+    async def handle(request: web.Request) -> web.StreamResponse:
+        params = await parameters(request, route.model, body=request.method == "POST")
+        answer = await route.action(Call(request.app[SERVICE], request, params))
+        return answer if isinstance(answer, web.StreamResponse) else success(answer)
+
+    return handle
+
+
+class Server:
+    """A listening server; all methods belong to the asyncio thread."""
+
+    def __init__(self, service: Service) -> None:
+        self.service = service
+        # A handler is cancelled when its client hangs up: that is how a verb learns that nobody awaits it.
+        self._runner = web.AppRunner(
+            make_app(service), access_log=None, handler_cancellation=True, shutdown_timeout=SHUTDOWN_TIMEOUT
+        )
+        self._socket: socket.socket | None = None
+
+    async def start(self) -> None:
+        """Listen.
+
+        Raises:
+            OSError: the port is taken, or there is no such address.
+        """
+        settings = self.service.settings
+        await self._runner.setup()
+        self._socket = listening_socket(settings.host, settings.port)
+        await web.SockSite(self._runner, self._socket).start()
+
+    async def stop(self) -> None:
+        """End the verbs in flight, answer their clients, and close the port."""
+        self.service.jobs.abort_all("the API is stopping")
+        await self._runner.cleanup()
+        if self._socket is not None:
+            self._socket.close()
+
+    def filenos(self) -> list[int]:
+        """Descriptors of the port and of every connection."""
+        found = [] if self._socket is None else [self._socket.fileno()]
+        server: Any = self._runner.server
+        for connection in [] if server is None else server.connections:
+            transport = connection.transport
+            peer = None if transport is None else transport.get_extra_info("socket")
+            if peer is not None:
+                found.append(peer.fileno())
+        return found
+
+
+def listening_socket(host: str, port: int) -> socket.socket:
+    """A bound TCP socket that can be bound again at once after we close it.
+
+    Raises:
+        OSError: taken, or no such address.
+    """
+    family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+    listening = socket.socket(family, kind, protocol)
+    try:
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listening.bind(address)
+        listening.listen(128)
+    except OSError:
+        listening.close()
+        raise
+    listening.setblocking(False)
+    return listening

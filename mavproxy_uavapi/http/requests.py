@@ -1,0 +1,170 @@
+"""Request models: one for each set of parameters, for queries and JSON bodies alike.
+
+Unknown members are ignored. NaN and infinities are refused everywhere: they must never reach an autopilot.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+
+from mavproxy_uavapi.errors import Invalid
+
+NED_REACH = 100_000.0  # m; farther than that NED is no flat patch any more
+
+
+def _number(value: Any) -> Any:
+    """Keep what the client wrote: `30` stays an int and `30.5` is a float, so that answers repeat it."""
+    if isinstance(value, bool):
+        raise ValueError("Input should be a valid number")
+    if isinstance(value, str):
+        try:
+            return int(value)
+        except ValueError:
+            value = float(value)
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ValueError("Input should be a finite number")
+    return value
+
+
+Number = Annotated[int | float, BeforeValidator(_number)]
+Speed = Annotated[Number, Field(gt=0, le=50, description="m/s")]
+Timeout = Annotated[float | None, Field(gt=0, le=86400, description="s that the call may take")]
+Tolerance = Annotated[float, Field(gt=0, le=100, description="m, horizontally and vertically")]
+
+
+class Request(BaseModel):
+    """Base of all request models."""
+
+    model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
+
+
+class Empty(Request):
+    """No parameters."""
+
+
+class Blocking(Request):
+    """A call that waits."""
+
+    timeout: Timeout = None
+
+
+class Disarm(Request):
+    """`force` stops the motors in flight too."""
+
+    force: bool = False
+
+
+class Takeoff(Blocking):
+    """`alt`: m above home."""
+
+    alt: Annotated[Number, Field(gt=0, le=500, description="m above home")] = 15
+
+
+class ModeName(Request):
+    """`mode`: a name of the vehicle's mode map."""
+
+    mode: Annotated[str, Field(min_length=1, max_length=32)]
+
+
+class NewSpeed(Request):
+    """`new_v`: m/s."""
+
+    new_v: Speed
+
+
+class SimFactor(Request):
+    """`sim_factor`: simulated seconds per second."""
+
+    sim_factor: Annotated[Number, Field(gt=0, le=1000)]
+
+
+class GpsTarget(Blocking):
+    """A place: degrees, and m above home."""
+
+    lat: Annotated[Number, Field(ge=-90, le=90, description="degrees")]
+    long: Annotated[Number, Field(ge=-180, le=180, description="degrees")]
+    alt: Annotated[Number, Field(ge=0, le=10_000, description="m above home")]
+    look_at_target: bool = False
+    tolerance: Tolerance = 1.0
+
+
+class NedPlace(Blocking):
+    """North, east, down in m: from the EKF origin, or from here, as the path says."""
+
+    x: Annotated[Number, Field(ge=-NED_REACH, le=NED_REACH, description="m north")]
+    y: Annotated[Number, Field(ge=-NED_REACH, le=NED_REACH, description="m east")]
+    z: Annotated[Number, Field(ge=-10_000, le=10_000, description="m down")]
+    look_at_target: bool = False
+    tolerance: Tolerance = 1.0
+
+
+class BodyOffset(Blocking):
+    """Front, right, down in m from here, in the body's frame."""
+
+    front: Annotated[Number, Field(ge=-NED_REACH, le=NED_REACH, description="m")]
+    right: Annotated[Number, Field(ge=-NED_REACH, le=NED_REACH, description="m")]
+    down: Annotated[Number, Field(ge=-10_000, le=10_000, description="m")] = 0
+    look_at_target: bool = False
+    tolerance: Tolerance = 1.0
+
+
+class NedVelocity(Request):
+    """North, east, down in m/s; `duration` in s of the vehicle's clock."""
+
+    vx: Annotated[Number, Field(ge=-50, le=50, description="m/s north")]
+    vy: Annotated[Number, Field(ge=-50, le=50, description="m/s east")]
+    vz: Annotated[Number, Field(ge=-50, le=50, description="m/s down")]
+    look_at_target: bool = False
+    duration: Annotated[float | None, Field(gt=0, le=3600, description="s")] = None
+
+
+class Heading(Request):
+    """`heading`: degrees clockwise from north."""
+
+    heading: Annotated[Number, Field(ge=0, le=360)]
+
+
+class YawRate(Request):
+    """`yaw_rate`: deg/s, clockwise positive."""
+
+    yaw_rate: Annotated[Number, Field(ge=-360, le=360)]
+
+
+class Servo(Request):
+    """`channel` from 1, `pwm` in microseconds."""
+
+    channel: Annotated[int, Field(ge=1, le=16)]
+    pwm: Annotated[int, Field(ge=800, le=2200)]
+
+
+class Read(Request):
+    """A telemetry read: `max_age` is the age (s) up to which the answer is wanted."""
+
+    max_age: Annotated[float | None, Field(gt=0, le=86400)] = None
+
+
+class StreamFilter(Request):
+    """What a telemetry stream carries: message names by comma, a system id, and at most `rate` Hz of each name."""
+
+    names: str = ""
+    sysid: Annotated[int | None, Field(ge=1, le=255)] = None
+    rate: Annotated[float | None, Field(gt=0, le=1000)] = None
+
+
+def parse(model: type[Request], source: str, values: dict[str, Any]) -> Request:
+    """Validate `values`, which came by `source` (query or body).
+
+    Raises:
+        Invalid: with one entry for each problem.
+    """
+    try:
+        return model.model_validate(values)
+    except ValidationError as error:
+        problems = [
+            {"loc": [source, *problem["loc"]], "msg": problem["msg"], "type": problem["type"]}
+            for problem in error.errors(include_url=False, include_context=False, include_input=False)
+        ]
+        raise Invalid(problems) from error

@@ -1,0 +1,78 @@
+"""The one table of paths."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mavproxy_uavapi.http import command, movement, peripherical, requests, stream, telemetry
+from mavproxy_uavapi.http.call import Action
+
+
+@dataclass(frozen=True)
+class Route:
+    """A path: who may ask how, what is validated, and who answers. The action's docstring is its summary."""
+
+    path: str
+    action: Action
+    model: type[requests.Request]
+    methods: tuple[str, ...] = ("GET",)
+
+
+EITHER = ("GET", "POST")
+POST = ("POST",)
+
+COMMAND = [
+    Route("/command/arm", command.arm, requests.Blocking, EITHER),
+    Route("/command/disarm", command.disarm, requests.Disarm, EITHER),
+    Route("/command/takeoff", command.takeoff, requests.Takeoff, EITHER),
+    Route("/command/land", command.land, requests.Blocking, EITHER),
+    Route("/command/rtl", command.rtl, requests.Blocking, EITHER),
+    Route("/command/brake", command.brake, requests.Empty, EITHER),
+    Route("/command/guided", command.guided, requests.Empty, EITHER),
+    Route("/command/set_mode", command.set_mode, requests.ModeName, EITHER),
+    Route("/command/set_air_speed", command.set_air_speed, requests.NewSpeed, EITHER),
+    Route("/command/set_ground_speed", command.set_ground_speed, requests.NewSpeed, EITHER),
+    Route("/command/set_climb_speed", command.set_climb_speed, requests.NewSpeed, EITHER),
+    Route("/command/set_descent_speed", command.set_descent_speed, requests.NewSpeed, EITHER),
+    Route("/command/set_sim_speedup", command.set_sim_speedup, requests.SimFactor, EITHER),
+    Route("/command/set_home", command.set_home, requests.Empty, EITHER),
+]
+
+MOVEMENT = [
+    Route("/movement/go_to_gps", movement.go_to_gps, requests.GpsTarget, POST),
+    Route("/movement/go_to_gps_wait", movement.go_to_gps_wait, requests.GpsTarget, POST),
+    Route("/movement/go_to_ned", movement.go_to_ned, requests.NedPlace, POST),
+    Route("/movement/go_to_ned_wait", movement.go_to_ned_wait, requests.NedPlace, POST),
+    Route("/movement/drive", movement.drive, requests.NedPlace, POST),
+    Route("/movement/drive_wait", movement.drive_wait, requests.NedPlace, POST),
+    Route("/movement/drive_body", movement.drive_body, requests.BodyOffset, POST),
+    Route("/movement/drive_body_wait", movement.drive_body_wait, requests.BodyOffset, POST),
+    Route("/movement/travel_at_ned", movement.travel_at_ned, requests.NedVelocity, POST),
+    Route("/movement/set_heading", movement.set_heading, requests.Heading, EITHER),
+    Route("/movement/set_yaw_rate", movement.set_yaw_rate, requests.YawRate, EITHER),
+    Route("/movement/stop", movement.stop, requests.Empty, EITHER),
+    Route("/movement/resume", movement.resume, requests.Empty, EITHER),
+]
+
+TELEMETRY = [
+    Route("/telemetry/general", telemetry.general, requests.Read),
+    Route("/telemetry/gps", telemetry.gps, requests.Read),
+    Route("/telemetry/gps_raw", telemetry.gps_raw, requests.Read),
+    Route("/telemetry/ned", telemetry.ned, requests.Read),
+    Route("/telemetry/compass", telemetry.compass, requests.Read),
+    Route("/telemetry/sys_status", telemetry.sys_status, requests.Read),
+    Route("/telemetry/sensor_status", telemetry.sensor_status, requests.Read),
+    Route("/telemetry/battery_info", telemetry.battery_info, requests.Read),
+    Route("/telemetry/error_info", telemetry.error_info, requests.Read),
+    Route("/telemetry/home_info", telemetry.home_info, requests.Read),
+    Route("/telemetry/attitude", telemetry.attitude, requests.Read),
+    Route("/telemetry/status", telemetry.status, requests.Read),
+    Route("/telemetry/message/{name}", telemetry.message, requests.Read),
+    Route("/telemetry/stream", stream.stream, requests.StreamFilter),
+]
+
+PERIPHERICAL = [
+    Route("/peripherical/servo_output", peripherical.servo_output, requests.Servo, POST),
+]
+
+ROUTES = [*COMMAND, *MOVEMENT, *TELEMETRY, *PERIPHERICAL]

@@ -1,0 +1,145 @@
+"""/telemetry: what the vehicle last told, with its age; old data is never passed off as new."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from mavproxy_uavapi.errors import NotFound, Rejected, Stale, TimedOut
+from mavproxy_uavapi.host.state import Received
+from mavproxy_uavapi.http import telemetry_views as views
+from mavproxy_uavapi.http.call import Call
+from mavproxy_uavapi.http.requests import Read
+from mavproxy_uavapi.vehicle.flyable import status as status_of
+from mavproxy_uavapi.vehicle.messages import MESSAGE_IDS, request_message
+
+FIRST_TIMEOUT = 2.0  # s for a message that was never told and is asked for
+HOME_AGE = 1.0  # s for which a home position that was asked for serves further readers
+
+
+async def _newest(call: Call, name: str) -> Received:
+    """The newest message of that name, young enough; one that was never told is asked for.
+
+    Raises:
+        Stale: it is too old, or did not come.
+    """
+    vehicle = call.seen
+    max_age = call.params(Read).max_age or call.service.settings.max_age
+    received = vehicle.state.newest(name)
+    if received is None:
+        await _ask_for(call, name)
+        received = vehicle.state.newest(name)
+        assert received is not None
+    age = vehicle.clock() - received.at
+    if age > max_age:
+        raise Stale(f"vehicle {vehicle.state.system} last told {name} {age:.1f} s ago (max_age is {max_age:g} s)")
+    return received
+
+
+async def _ask_for(call: Call, name: str) -> None:
+    vehicle = call.vehicle
+    with vehicle.waiting.expecting({name}, lambda message: message) as told:
+        try:
+            await vehicle.commands.send(request_message(MESSAGE_IDS[name]))
+            await told.within(FIRST_TIMEOUT, f"tell {name}")
+        except (Rejected, TimedOut) as error:
+            raise Stale(f"vehicle {vehicle.state.system} has not told {name} yet") from error
+
+
+def _age(call: Call, received: Received) -> float:
+    return round(max(call.service.host.clock() - received.at, 0.0), 3)
+
+
+async def _info(
+    call: Call, name: str, view: Callable[[Any], dict[str, Any]], result: str = "Success", member: str = "info"
+) -> dict[str, Any]:
+    received = await _newest(call, name)
+    return call.answer(result, **{member: view(received.message)}, age_s=_age(call, received))
+
+
+async def general(call: Call) -> dict[str, Any]:
+    """Speeds, heading, throttle, altitude AMSL."""
+    return await _info(call, "VFR_HUD", views.general)
+
+
+async def gps(call: Call) -> dict[str, Any]:
+    """Fused global position and velocity."""
+    return await _info(call, "GLOBAL_POSITION_INT", views.gps)
+
+
+async def gps_raw(call: Call) -> dict[str, Any]:
+    """The GPS receiver's own position."""
+    return await _info(call, "GPS_RAW_INT", views.gps_raw)
+
+
+async def ned(call: Call) -> dict[str, Any]:
+    """Fused local position and velocity."""
+    return await _info(call, "LOCAL_POSITION_NED", views.ned)
+
+
+async def attitude(call: Call) -> dict[str, Any]:
+    """Roll, pitch, yaw and their rates."""
+    return await _info(call, "ATTITUDE", views.attitude)
+
+
+async def sys_status(call: Call) -> dict[str, Any]:
+    """SYS_STATUS as it is."""
+    return await _info(call, "SYS_STATUS", views.fields, "success", "status")
+
+
+async def sensor_status(call: Call) -> dict[str, Any]:
+    """Which sensors are present, enabled, healthy."""
+    return await _info(call, "SYS_STATUS", views.sensors, "success", "status")
+
+
+async def battery_info(call: Call) -> dict[str, Any]:
+    """Voltage, current, charge."""
+    return await _info(call, "SYS_STATUS", views.battery, "success")
+
+
+async def error_info(call: Call) -> dict[str, Any]:
+    """Communication and autopilot errors."""
+    return await _info(call, "SYS_STATUS", views.errors, "success")
+
+
+async def compass(call: Call) -> dict[str, Any]:
+    """The result of the last compass calibration since MAVProxy started."""
+    messages = call.seen.state.messages
+    newest = messages.get("MAG_CAL_REPORT")
+    if newest is None:
+        raise NotFound("no compass calibration was reported; MAG_CAL_REPORT comes during a calibration only")
+    per_compass = [messages.get(f"MAG_CAL_REPORT[{number}]") for number in range(3)]
+    fitness = [None if one is None else one.message.fitness for one in per_compass]
+    return call.answer("Success", info=views.compass(newest.message, fitness), age_s=_age(call, newest))
+
+
+async def home_info(call: Call) -> dict[str, Any]:
+    """The home position, asked of the vehicle."""
+    vehicle = call.vehicle
+    age = vehicle.state.age("HOME_POSITION", vehicle.clock())
+    if age is None or age > HOME_AGE:
+        await vehicle.home()
+    received = vehicle.state.messages["HOME_POSITION"]
+    return call.answer("Success", **views.home(received.message), age_s=_age(call, received))
+
+
+async def status(call: Call) -> dict[str, Any]:
+    """Whether the vehicle is flyable, and why not."""
+    vehicle, host = call.seen, call.service.host
+    now = host.clock()
+    info = status_of(vehicle, host.is_alive(vehicle.state), now)
+    return call.answer("Success", info=info, age_s=round(max(now - vehicle.state.heartbeat_at, 0.0), 3))
+
+
+async def message(call: Call) -> dict[str, Any]:
+    """Any MAVLink message: its fields, how many came, and how often."""
+    name = call.request.match_info["name"].upper()
+    if name.partition("[")[0] not in MESSAGE_IDS:
+        raise NotFound(f"there is no MAVLink message {name}")
+    state = call.seen.state
+    if state.newest(name) is None:
+        raise NotFound(f"vehicle {state.system} has not sent {name}")
+    received = await _newest(call, name)
+    info = {**views.fields(received.message), "count": received.count}
+    info["rate"] = round(received.rate(call.service.host.clock()), 2)
+    return call.answer("Success", info=info, age_s=_age(call, received))

@@ -1,0 +1,113 @@
+"""The MAVProxy module `uavapi`: commands, settings and hooks; a thin adapter, no logic."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from typing import Any
+
+from mavproxy_uavapi.api import Api
+from mavproxy_uavapi.console import report, vehicles
+from mavproxy_uavapi.host.member import HostedModule
+from mavproxy_uavapi.settings import ModuleSettings, SettingError
+
+NAME = "uavapi"
+COMPLETION = "(UAVAPISETTING)"
+COMPLETIONS = ["<status|start|stop|vehicles|help>", f"set {COMPLETION}"]
+HELP = """\
+uavapi status            what it listens on, the vehicle that it flies, and the calls in flight
+uavapi start             listen (it does so by itself when the module is loaded)
+uavapi stop              close the port; calls in flight end
+uavapi set               show the settings
+uavapi set NAME VALUE    change one; it takes effect at once
+uavapi vehicles          every vehicle that was heard
+uavapi help              this"""
+
+
+class UavApiModule(HostedModule):
+    """`module load uavapi`."""
+
+    def __init__(self, mpstate: Any, given: dict[str, Any]) -> None:
+        self.api_settings = ModuleSettings(given)
+        actions: dict[str, Callable[[list[str]], None]] = {
+            "status": self._status,
+            "start": lambda _: self._start(),
+            "stop": lambda _: self._stop(),
+            "set": self._set,
+            "vehicles": lambda _: self._tell(vehicles),
+            "help": lambda _: print(HELP),
+        }
+        super().__init__(mpstate, NAME, "HTTP API to fly and watch vehicles", actions, COMPLETIONS)
+        self.add_completion_function(COMPLETION, self.api_settings.mp.completion)
+        self.api = Api(self.host)
+        self.host.bridge.close_in_children(self.api.filenos)
+
+    def begin(self) -> None:
+        """Listen."""
+        self._start()
+
+    async def end(self) -> None:
+        """Stop listening."""
+        await self.api.stop()
+
+    def unload(self) -> None:
+        """Give back what is ours alone, then the rest."""
+        self.mpstate.completion_functions.pop(COMPLETION, None)
+        try:
+            super().unload()
+        finally:
+            self.host.bridge.keep_in_children(self.api.filenos)
+
+    def _status(self, _args: list[str]) -> None:
+        settings = self.api_settings.snapshot()
+        self._tell(lambda api: report(api, settings))
+
+    def _tell(self, tell: Callable[[Api], str]) -> None:
+        """Print what `tell` makes of the state, which belongs to the asyncio thread."""
+
+        async def told() -> str:
+            return tell(self.api)
+
+        print(self.host.bridge.run(told()))
+
+    def _start(self) -> None:
+        settings = self.api_settings.snapshot()
+        address = f"http://{settings.host}:{settings.port}"
+        try:
+            self.host.bridge.run(self.api.start(settings))
+        except OSError as error:
+            why = os.strerror(error.errno) if error.errno else str(error)
+            print(f"uavapi: cannot listen on {address}: {why}; `uavapi set port N` takes another port")
+        else:
+            print(f"uavapi: listening on {address}")
+
+    def _stop(self) -> None:
+        self.host.bridge.run(self.api.stop())
+        print("uavapi: stopped")
+
+    def _set(self, args: list[str]) -> None:
+        if len(args) < 2:
+            self.api_settings.mp.show_pattern(args[0] if args else "*")
+            return
+        before = self.api_settings.snapshot()
+        try:
+            self.api_settings.set(args[0], args[1])
+        except SettingError as error:
+            print(f"uavapi: {error}")
+            return
+        if self.api_settings.snapshot() != before and self._begun:
+            self.host.bridge.run(self.api.stop())
+            self._start()
+
+
+def init(mpstate: Any, **kwargs: Any) -> UavApiModule:
+    """MAVProxy calls this on `module load uavapi`, or `uavapi:{"port":8001}`.
+
+    Raises:
+        ImportError: a setting that does not exist or a value that it does not take; MAVProxy reports this
+            kind of error in one line, and goes on.
+    """
+    try:
+        return UavApiModule(mpstate, kwargs)
+    except SettingError as error:
+        raise ImportError(f"uavapi: {error}") from error

@@ -1,0 +1,1 @@
+"""The verbs: what a pilot may ask of a vehicle, and how each one knows that it was done."""

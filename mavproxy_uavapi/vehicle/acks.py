@@ -1,0 +1,93 @@
+"""A command and its acknowledgement.
+
+An ack counts only from the vehicle and component that was asked, for the command that was asked, to us,
+after we asked. Silence means sending again, for commands that may be repeated.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections import defaultdict
+from typing import Any
+
+from pymavlink import mavutil
+
+from mavproxy_uavapi.errors import Rejected, TimedOut
+from mavproxy_uavapi.host.link import Address, Link
+from mavproxy_uavapi.host.state import VehicleState
+from mavproxy_uavapi.vehicle.messages import Command
+from mavproxy_uavapi.vehicle.waiting import Waiting
+
+mavlink = mavutil.mavlink
+
+ACK_TIMEOUT = 1.5  # s until a command is sent again
+SENDINGS = 4  # the first one and three more
+IN_PROGRESS_TIMEOUT = 10.0  # s that each IN_PROGRESS buys
+PATIENCE_PAUSE = 1.0  # s before a patient command is asked again
+LAST_WORDS = 0.5  # s that a refusal's STATUSTEXT may come after its ack
+WORTH_ASKING_AGAIN = {mavlink.MAV_RESULT_TEMPORARILY_REJECTED, mavlink.MAV_RESULT_FAILED}
+
+
+class Commands:
+    """Sends commands to one vehicle and waits for their acks; identical ones go one after the other."""
+
+    def __init__(self, state: VehicleState, link: Link, waiting: Waiting) -> None:
+        self._state = state
+        self._link = link
+        self._waiting = waiting
+        self._locks: defaultdict[int, asyncio.Lock] = defaultdict(asyncio.Lock)
+
+    async def send(self, command: Command, patience: float = 20.0) -> None:
+        """Send `command`; returns when the vehicle has accepted it.
+
+        Args:
+            command: what to send.
+            patience: how long (s) a patient command is asked again while it is refused.
+
+        Raises:
+            Rejected: refused, with MAV_RESULT and the STATUSTEXTs since it was asked.
+            TimedOut: no ack, also after sending again.
+            LinkLost: no heartbeat meanwhile, or nothing to send through.
+        """
+        async with self._locks[command.number]:
+            started = self._waiting.clock()
+            while True:
+                result = await self._ask(command)
+                if result == mavlink.MAV_RESULT_ACCEPTED:
+                    return
+                again = command.patient and result in WORTH_ASKING_AGAIN
+                if not again or self._waiting.clock() + PATIENCE_PAUSE > started + patience:
+                    raise await self._refusal(command, result, started)
+                await asyncio.sleep(PATIENCE_PAUSE)
+
+    async def _ask(self, command: Command) -> int:
+        """One exchange: the MAV_RESULT that ends it."""
+        address = Address(self._state.system, self._state.component)
+        sendings = SENDINGS if command.repeatable else 1
+        for confirmation in range(sendings):
+            with self._waiting.acks(command.number, self._link.source) as acks:
+                await self._link.send(command.to(address, confirmation), self._state.system)
+                result = await acks.next(ACK_TIMEOUT)
+                while result == mavlink.MAV_RESULT_IN_PROGRESS:
+                    result = await acks.next(IN_PROGRESS_TIMEOUT)
+            if result is not None:
+                return result
+        times = "" if sendings == 1 else f", sent {sendings} times"
+        raise TimedOut(f"vehicle {self._state.system} did not acknowledge {command.name}{times}")
+
+    async def _refusal(self, command: Command, result: int, started: float) -> Rejected:
+        said = self._state.said_since(started)
+        if not said:  # ArduPilot queues its texts, so that they may come after the ack
+            with contextlib.suppress(TimedOut):
+                await self._waiting.message({"STATUSTEXT"}, lambda text: text, LAST_WORDS, "say why")
+            said = self._state.said_since(started)
+        ack = result_name(result)
+        because = f": {'; '.join(said)}" if said else ""
+        return Rejected(f"the vehicle refused {command.name} ({ack}){because}", ack, said)
+
+
+def result_name(result: int) -> str:
+    """MAV_RESULT's name, such as `MAV_RESULT_FAILED`."""
+    entry: Any = mavlink.enums["MAV_RESULT"].get(result)
+    return entry.name if entry else f"MAV_RESULT_{result}"

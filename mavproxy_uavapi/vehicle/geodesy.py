@@ -1,0 +1,24 @@
+"""Short distances on the Earth, as ArduPilot reckons them: a flat patch around the vehicle. Pure."""
+
+from __future__ import annotations
+
+import math
+
+# One degree of latitude in metres on a sphere of the WGS 84 equatorial radius, 6378100 m: ArduPilot's
+# LATITUDE_SCALE (Location.h), so that our distances agree with the autopilot's.
+METRES_PER_DEGREE = 111318.84502145034
+
+
+def offset(from_lat: float, from_lon: float, to_lat: float, to_lon: float) -> tuple[float, float]:
+    """Metres north and east from one place to another, both in degrees; good to some kilometres."""
+    north = (to_lat - from_lat) * METRES_PER_DEGREE
+    delta_lon = (to_lon - from_lon + 180.0) % 360.0 - 180.0
+    east = delta_lon * METRES_PER_DEGREE * math.cos(math.radians((from_lat + to_lat) / 2))
+    return north, east
+
+
+def rotate(front: float, right: float, heading: float) -> tuple[float, float]:
+    """North and east of a body-frame offset, for a `heading` in rad clockwise from north."""
+    north = front * math.cos(heading) - right * math.sin(heading)
+    east = front * math.sin(heading) + right * math.cos(heading)
+    return north, east

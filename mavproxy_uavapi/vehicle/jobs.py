@@ -1,0 +1,150 @@
+"""Verbs in flight: every blocking call is a job that somebody awaits.
+
+A vehicle has one seat for a commander. A newer movement or flight command that takes it supersedes the job
+that had it; an identical request joins that job instead.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+from collections.abc import Awaitable, Callable, Mapping
+from typing import Any
+
+from mavproxy_uavapi.errors import Aborted, Superseded, UavApiError
+
+FINISHED_KEPT = 100
+
+
+class Job:
+    """One verb in flight.
+
+    Attributes:
+        id: its number, as text.
+        verb: the path that was called, `/movement/go_to_ned_wait`.
+        request: the validated parameters.
+        outlives_client: whether it goes on when its client hangs up (land, rtl).
+        progress: what it last said of itself, such as distance_to_go (m) and altitude (m above home).
+        result: the text of its success.
+        error: why it failed.
+    """
+
+    def __init__(self, number: int, verb: str, request: Mapping[str, Any], outlives_client: bool) -> None:
+        self.id = str(number)
+        self.verb = verb
+        self.request = dict(request)
+        self.outlives_client = outlives_client
+        self.progress: dict[str, float] = {}
+        self.result: str | None = None
+        self.error: UavApiError | None = None
+        self._task: asyncio.Task[None] | None = None
+        self._finished = asyncio.Event()
+        self._clients = 0
+
+    @property
+    def running(self) -> bool:
+        """Whether it has no outcome yet."""
+        return not self._finished.is_set()
+
+    def is_for(self, verb: str, request: Mapping[str, Any]) -> bool:
+        """Whether it does just what another request asks for."""
+        return self.verb == verb and self.request == dict(request)
+
+    def start(self, body: Callable[[Job], Awaitable[str]]) -> None:
+        """Run `body`, whose text is the result."""
+        self._task = asyncio.get_running_loop().create_task(self._run(body))
+
+    async def _run(self, body: Callable[[Job], Awaitable[str]]) -> None:
+        try:
+            result = await body(self)
+        except UavApiError as error:
+            self._finish(error=error)
+        except asyncio.CancelledError:
+            self._finish(error=Aborted(f"{self.verb} was aborted"))
+            raise
+        except Exception as error:  # a defect of ours: its client learns of it, and the log has the trace
+            self._finish(error=UavApiError(f"{self.verb} failed by a defect of this program: {error!r}"))
+            raise
+        else:
+            self._finish(result)
+
+    def abort(self, error: UavApiError) -> None:
+        """End it now with that error: its clients know at once, and it sends nothing more."""
+        self._finish(error=error)
+        if self._task is not None:
+            self._task.cancel()
+
+    def _finish(self, result: str | None = None, error: UavApiError | None = None) -> None:
+        if self.running:
+            self.result, self.error = result, error
+            self._finished.set()
+
+    async def outcome(self) -> str:
+        """Await its result for a client; when the last client hangs up, the job ends too.
+
+        Raises:
+            UavApiError: what the job failed with.
+        """
+        self._clients += 1
+        try:
+            await self._finished.wait()
+        finally:
+            self._clients -= 1
+            if self.running and not self._clients and not self.outlives_client:
+                self.abort(Aborted(f"{self.verb}: its client hung up"))
+        if self.error is not None:
+            raise self.error
+        assert self.result is not None
+        return self.result
+
+
+class Seat:
+    """Who commands a vehicle just now."""
+
+    def __init__(self) -> None:
+        self.job: Job | None = None
+
+    def take(self, job: Job) -> None:
+        """Give `job` the command; whoever had it learns which verb took over."""
+        before, self.job = self.job, job
+        if before is not None and before is not job and before.running:
+            before.abort(Superseded(f"{before.verb} was superseded by {job.verb}"))
+
+
+class JobBook:
+    """All jobs, the running ones and the last finished ones."""
+
+    def __init__(self) -> None:
+        self._jobs: dict[str, Job] = {}
+        self._numbers = itertools.count(1)
+
+    def begin(
+        self,
+        seat: Seat,
+        verb: str,
+        request: Mapping[str, Any],
+        body: Callable[[Job], Awaitable[str]],
+        outlives_client: bool = False,
+    ) -> Job:
+        """Start a job, or join the one in the seat when it does just the same."""
+        if seat.job is not None and seat.job.running and seat.job.is_for(verb, request):
+            return seat.job
+        job = Job(next(self._numbers), verb, request, outlives_client)
+        self._jobs[job.id] = job
+        self._forget_old()
+        job.start(body)
+        return job
+
+    def running(self) -> list[Job]:
+        """The jobs without an outcome, oldest first."""
+        return [job for job in self._jobs.values() if job.running]
+
+    def abort_all(self, reason: str) -> None:
+        """End every running job."""
+        for job in self.running():
+            job.abort(Aborted(f"{job.verb}: {reason}"))
+
+    def _forget_old(self) -> None:
+        finished = [job for job in self._jobs.values() if not job.running]
+        for job in finished[: max(0, len(finished) - FINISHED_KEPT)]:
+            del self._jobs[job.id]

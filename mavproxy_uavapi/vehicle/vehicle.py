@@ -1,0 +1,324 @@
+"""The verbs that every type of vehicle has, and what all verbs are made of."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Callable, Iterable
+from typing import Any, TypeVar
+
+from pymavlink import mavutil
+
+from mavproxy_uavapi.errors import (
+    Busy,
+    ModeChanged,
+    NotArmed,
+    NotFound,
+    NotSupported,
+    Rejected,
+    Stale,
+    TimedOut,
+)
+from mavproxy_uavapi.host.link import Address, Link
+from mavproxy_uavapi.host.pending import Pending
+from mavproxy_uavapi.host.state import VehicleState
+from mavproxy_uavapi.vehicle import deadlines, messages
+from mavproxy_uavapi.vehicle.acks import Commands
+from mavproxy_uavapi.vehicle.geodesy import offset
+from mavproxy_uavapi.vehicle.jobs import Job, Seat
+from mavproxy_uavapi.vehicle.modes import kind_of, mode_name, mode_number
+from mavproxy_uavapi.vehicle.waiting import Waiting
+
+T = TypeVar("T")
+mavlink = mavutil.mavlink
+
+ARM_TIMEOUT = 90.0  # s until an estimator that does not settle is reported
+HEARTBEAT_TIMEOUT = 5.0  # s until a heartbeat must show what was acknowledged
+PARAMETER_TIMEOUT = 1.0  # s; ArduPilot answers a known name at once and an unknown one not at all
+FRESH = 3.0  # s; older positions are not flown by
+
+
+class Vehicle:
+    """One vehicle, and the verbs that all types have.
+
+    Verbs raise errors of `errors.py`: `Rejected` when the autopilot refuses, `TimedOut`, `LinkLost`,
+    `ModeChanged` when the pilot or a failsafe takes the vehicle, `Busy` and `NotArmed` when its state
+    stands against it; then nothing has been sent.
+
+    Args:
+        state: what is known of it; kept up to date by the host.
+        link: the way out.
+        pending: the host's waits.
+        clock: monotonic seconds, the clock of arrivals.
+    """
+
+    def __init__(self, state: VehicleState, link: Link, pending: Pending, clock: Callable[[], float]) -> None:
+        self.state = state
+        self.link = link
+        self.clock = clock
+        self.seat = Seat()
+        self.waiting = Waiting(state, pending, clock)
+        self.commands = Commands(state, link, self.waiting)
+        self.speeds: dict[str, float] = {}
+
+    # -- what it is ---------------------------------------------------------------------------------------
+
+    @property
+    def address(self) -> Address:
+        """Its autopilot's MAVLink address."""
+        return Address(self.state.system, self.state.component)
+
+    @property
+    def kind(self) -> str:
+        """`copter`, `plane`, `rover` or `other`, by its own heartbeat."""
+        return kind_of(self.state.vehicle_type)
+
+    @property
+    def mode(self) -> str:
+        """The name of its flight mode; UNKNOWN before a heartbeat since the last boot."""
+        return mode_name(self.state.vehicle_type, self.state.mode)
+
+    @property
+    def is_ready_to_arm(self) -> bool:
+        """Whether its pre-arm checks pass, by SYS_STATUS; an autopilot that does not report them may try."""
+        present = self.state.field("SYS_STATUS", "onboard_control_sensors_present")
+        health = self.state.field("SYS_STATUS", "onboard_control_sensors_health")
+        if present is None:
+            return False
+        return not present & mavlink.MAV_SYS_STATUS_PREARM_CHECK or bool(health & mavlink.MAV_SYS_STATUS_PREARM_CHECK)
+
+    @property
+    def has_position(self) -> bool:
+        """Whether its estimator has an absolute horizontal position, by EKF_STATUS_REPORT.
+
+        An autopilot that sends no such report is taken at its pre-arm word. The pre-arm bit alone is not
+        enough: in STABILIZE ArduCopter sets it 20 s before its position is good for GUIDED.
+        """
+        flags = self.state.field("EKF_STATUS_REPORT", "flags")
+        if flags is None:
+            return self.is_ready_to_arm
+        return bool(flags & mavlink.EKF_POS_HORIZ_ABS) and not flags & mavlink.EKF_CONST_POS_MODE
+
+    @property
+    def height(self) -> float:
+        """Metres above home; 0 before it said so."""
+        relative_alt = self.state.field("GLOBAL_POSITION_INT", "relative_alt")
+        return 0.0 if relative_alt is None else relative_alt / 1000.0
+
+    def distance_home(self) -> float | None:
+        """Horizontal metres to home; None while either place is unknown."""
+        home = self.state.messages.get("HOME_POSITION")
+        here = self.state.messages.get("GLOBAL_POSITION_INT")
+        if home is None or here is None:
+            return None
+        h, p = home.message, here.message
+        return math.hypot(*offset(p.lat / 1e7, p.lon / 1e7, h.latitude / 1e7, h.longitude / 1e7))
+
+    # -- what verbs are made of ---------------------------------------------------------------------------
+
+    def fresh(self, name: str) -> Any:
+        """The newest message of that name, to fly by.
+
+        Raises:
+            Stale: there is none, or it is older than FRESH.
+        """
+        age = self.state.age(name, self.clock())
+        if age is None or age > FRESH:
+            told = "never told" if age is None else f"told {age:.1f} s ago"
+            raise Stale(f"vehicle {self.state.system} does not tell where it is ({name}: {told})")
+        return self.state.messages[name].message
+
+    def require_armed(self) -> None:
+        """Raises NotArmed unless it is armed."""
+        if not self.state.armed:
+            raise NotArmed("the vehicle is not armed; /command/arm first")
+
+    def require_mode(self, mode: str) -> None:
+        """Raises ModeChanged unless it is in that mode."""
+        if self.mode != mode:
+            raise ModeChanged(f"the vehicle is in {self.mode}, not in {mode}; /command/{mode.lower()} gets it there")
+
+    def held_by(self, mode: str) -> None:
+        """A guard for waits: raises when the vehicle was disarmed, or somebody else took it out of `mode`."""
+        if self.state.mode is not None and self.mode != mode:
+            raise ModeChanged(f"the vehicle left {mode}: it is in {self.mode} now, and whoever switched it has it")
+        if self.state.armed is False:
+            raise NotArmed("the vehicle was disarmed meanwhile")
+        if self.state.armed is None:
+            raise NotArmed("the autopilot rebooted meanwhile")
+
+    async def flown(
+        self, mode: str, names: Iterable[str], done: Callable[[], T | None], timeout: float, what: str
+    ) -> T:
+        """Wait until `done` holds while the vehicle stays armed and in `mode`.
+
+        Args:
+            mode: the mode that the verb needs.
+            names: messages after which `done` is looked at; heartbeats always are.
+            done: looks at the state.
+            timeout: in s.
+            what: ends the sentence "vehicle 1 did not …".
+        """
+
+        def guarded() -> T | None:
+            self.held_by(mode)
+            return done()
+
+        return await self.waiting.until({"HEARTBEAT", *names}, guarded, timeout, what)
+
+    async def switch_to(self, mode: str) -> None:
+        """Switch the flight mode and wait until a heartbeat shows it.
+
+        Raises:
+            Invalid: no such mode.
+            Rejected, TimedOut, LinkLost.
+        """
+        number = mode_number(self.state.vehicle_type, mode)
+        await self.commands.send(messages.set_mode(number))
+        await self.waiting.until(
+            {"HEARTBEAT"},
+            lambda: True if self.state.mode == number else None,
+            HEARTBEAT_TIMEOUT,
+            f"show mode {mode.upper()}",
+        )
+
+    async def parameters(self, names: Iterable[str]) -> dict[str, float]:
+        """Values of those of the named parameters that the vehicle has, asked for once and then remembered."""
+        names = list(names)
+        known = self.state.parameters
+        missing = [name for name in names if name not in known]
+        if missing:
+            with self.waiting.expecting(
+                {"PARAM_VALUE"}, lambda _: True if all(name in known for name in missing) else None
+            ) as told:
+                for name in missing:
+                    await self.link.send(messages.read_parameter(self.address, name), self.state.system)
+                with contextlib.suppress(TimedOut):
+                    await told.within(PARAMETER_TIMEOUT, f"tell {', '.join(missing)}")
+        return {name: known[name] for name in names if name in known}
+
+    async def limits(self) -> deadlines.Limits:
+        """Its speeds and heights, for deadlines."""
+        return deadlines.limits(await self.parameters(deadlines.DEFAULTS), self.speeds)
+
+    def allowed(self, expected: float, timeout: float | None) -> float:
+        """Seconds that a verb may take: the client's `timeout`, or what the flight should need."""
+        return timeout or deadlines.allowed(expected, self.state.time_ratio.ratio)
+
+    # -- verbs --------------------------------------------------------------------------------------------
+
+    async def arm(self, job: Job, timeout: float | None = None) -> None:
+        """Wait until it is ready, switch to GUIDED, arm, and wait until it is armed.
+
+        A vehicle that flies in another mode than GUIDED belongs to its pilot: `ModeChanged`.
+
+        Raises:
+            Rejected: it did not get ready, or refused; with the reasons that it gave.
+        """
+        if self.state.armed and self.mode == "GUIDED":
+            return
+        if self.state.armed and not self.state.landed:
+            raise ModeChanged(f"the vehicle is flying in {self.mode}; /command/guided takes it over")
+        self.seat.take(job)
+        deadline = self.clock() + (timeout or ARM_TIMEOUT)
+        await self._get_ready(lambda: self.has_position, deadline)
+        if self.mode != "GUIDED":
+            await self.switch_to("GUIDED")
+        await self._get_ready(lambda: self.is_ready_to_arm, deadline)
+        self.require_mode("GUIDED")
+        await self.commands.send(messages.arm())
+        await self._until_armed(True)
+
+    async def _get_ready(self, is_ready: Callable[[], bool], deadline: float) -> None:
+        if is_ready() or self.state.armed:
+            return
+        mode = self.mode
+
+        def ready() -> bool | None:
+            self.require_mode(mode)
+            return True if is_ready() else None
+
+        remaining = max(deadline - self.clock(), 0.1)
+        try:
+            await self.waiting.until({"SYS_STATUS", "EKF_STATUS_REPORT", "HEARTBEAT"}, ready, remaining, "get ready")
+        except TimedOut:
+            raise await self._why_not_ready(remaining) from None
+
+    async def _why_not_ready(self, waited: float) -> Rejected:
+        asked = self.clock()
+        with contextlib.suppress(Rejected, TimedOut):  # the texts that it makes the autopilot say are what counts
+            await self.commands.send(messages.check_prearm())
+        with contextlib.suppress(TimedOut):
+            await self.waiting.message({"STATUSTEXT"}, lambda text: text, 1.0, "say why it is not ready")
+        said = self.state.said_since(asked)
+        because = "; ".join(said) or "it does not say why"
+        return Rejected(f"not ready to arm after {waited:.0f} s: {because}", statustext=said)
+
+    async def _until_armed(self, armed: bool) -> None:
+        await self.waiting.until(
+            {"HEARTBEAT"},
+            lambda: True if self.state.armed is armed else None,
+            HEARTBEAT_TIMEOUT,
+            "show that it is armed" if armed else "show that it is disarmed",
+        )
+
+    async def disarm(self, job: Job, force: bool = False) -> None:
+        """Disarm and wait until a heartbeat shows it. In flight it is refused, unless `force`: then it falls."""
+        if self.state.armed is False:
+            return
+        if not force and self.state.landed is False:
+            raise Busy("the vehicle is flying; land it first (force=true stops its motors in the air)")
+        self.seat.take(job)
+        await self.commands.send(messages.disarm(force))
+        await self._until_armed(False)
+
+    async def set_mode(self, job: Job, mode: str) -> None:
+        """Switch to any mode of the vehicle's type."""
+        mode_number(self.state.vehicle_type, mode)
+        self.seat.take(job)
+        await self.switch_to(mode)
+
+    async def set_speed(self, kind: str, speed: float) -> None:
+        """Set the `kind` of speed (air, ground, climb, descent) to `speed` m/s; the ack is the proof."""
+        await self.commands.send(messages.change_speed(kind, speed))
+        self.speeds[kind] = speed
+
+    async def set_home(self) -> None:
+        """Make the current position home; asked again while the estimator settles."""
+        await self.commands.send(messages.set_home_here())
+        await self.home()
+
+    async def home(self) -> Any:
+        """HOME_POSITION, asked for.
+
+        Raises:
+            NotFound: the vehicle has no home yet.
+        """
+        with self.waiting.expecting({"HOME_POSITION"}, lambda message: message) as told:
+            try:
+                await self.commands.send(messages.request_message(messages.MESSAGE_IDS["HOME_POSITION"]))
+            except Rejected as error:
+                raise NotFound(f"the vehicle has no home position yet ({error.ack})") from error
+            return await told.within(HEARTBEAT_TIMEOUT, "tell its home position")
+
+    async def set_servo(self, channel: int, pwm: int) -> None:
+        """Set servo output `channel` (from 1) to `pwm` microseconds."""
+        await self.commands.send(messages.set_servo(channel, pwm))
+
+    async def set_sim_speedup(self, factor: float) -> None:
+        """Set SIM_SPEEDUP and read it back.
+
+        Raises:
+            NotSupported: the vehicle has no such parameter: it is no simulation.
+        """
+        name = "SIM_SPEEDUP"
+        if name not in await self.parameters([name]):
+            raise NotSupported("the vehicle is not a simulation: it has no parameter SIM_SPEEDUP")
+
+        def read_back(message: Any) -> float | None:
+            told = message.param_id == name and math.isclose(message.param_value, factor, rel_tol=1e-5)
+            return factor if told else None
+
+        with self.waiting.expecting({"PARAM_VALUE"}, read_back) as told:
+            await self.link.send(messages.set_parameter(self.address, name, factor), self.state.system)
+            await told.within(HEARTBEAT_TIMEOUT, f"take {name} = {factor:g}")

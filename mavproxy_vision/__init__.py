@@ -1,0 +1,1 @@
+"""MAVProxy module `vision`: camera, AprilTags, search and precise landing on a tag."""

@@ -1,0 +1,46 @@
+"""Install the three MAVProxy modules: uavapi, vision and gradys."""
+
+from pathlib import Path
+
+from setuptools import find_packages, setup
+
+TEST = ["pytest>=8", "requests>=2.31"]
+LINT = ["ruff>=0.6", "mypy>=1.11", "types-requests"]
+
+setup(
+    name="mavproxy-uavapi",
+    version="0.1.0",
+    description="MAVProxy modules: an HTTP API, AprilTag landing and ground-station push for ArduPilot vehicles",
+    long_description=Path(__file__).with_name("README.md").read_text(encoding="utf-8"),
+    long_description_content_type="text/markdown",
+    license="GPL-3.0-or-later",
+    python_requires=">=3.10",
+    packages=find_packages(include=["mavproxy_*"]),
+    package_data={"": ["py.typed"]},
+    # MAVProxy's `module load NAME` imports the top-level module of that name.
+    py_modules=["uavapi", "vision", "gradys"],
+    install_requires=[
+        "MAVProxy>=1.8.71",
+        "pymavlink>=2.4.42",
+        "aiohttp>=3.10",
+        "pydantic>=2.7",
+    ],
+    extras_require={
+        "vision": ["opencv-python-headless>=4.10", "numpy>=1.26"],
+        "test": TEST,
+        "lint": LINT,
+        "dev": TEST + LINT,
+    },
+    entry_points={"console_scripts": ["mavproxy-uavapi = mavproxy_uavapi.launcher:main"]},
+    classifiers=[
+        "Development Status :: 4 - Beta",
+        "Intended Audience :: Science/Research",
+        "Operating System :: POSIX :: Linux",
+        "Programming Language :: Python :: 3",
+        "Programming Language :: Python :: 3.10",
+        "Programming Language :: Python :: 3.11",
+        "Programming Language :: Python :: 3.12",
+        "Programming Language :: Python :: 3.13",
+        "Topic :: Scientific/Engineering",
+    ],
+)

@@ -1,0 +1,1 @@
+from mavproxy_uavapi.module import init as init

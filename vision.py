@@ -1,0 +1,1 @@
+from mavproxy_vision.module import init as init
