@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
+import configparser
 import difflib
 import ipaddress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from MAVProxy.modules.lib.mp_settings import MPSetting, MPSettings
+
+# Keys that an INI file of the original service, or of the launcher, may have and that are not the module's:
+# MAVProxy has the link, the launcher starts what is simulated.
+NOT_OURS = {
+    "api": {"uav_connection", "connection_type", "gradys_gs", "scripts_path", "python_path", "vehicle"},
+    "simulated": {"simulated", "ardupilot_path", "location", "gs_connection", "speedup", "headless"},
+    "logs": {"log_console", "log_path", "debug", "script_logs"},
+}
+UNSET = {"", "None", "[]"}
 
 
 class SettingError(ValueError):
@@ -48,9 +59,42 @@ class ModuleSettings:
     """The settings of the loaded module: validated, whichever way they come in."""
 
     def __init__(self, given: dict[str, Any] | None = None) -> None:
+        """Take `given` settings; those of an INI file that it names as `config` yield to the others.
+
+        Raises:
+            SettingError: as `set` and `load`.
+        """
         self.mp = MPSettings(table())
-        for name, value in (given or {}).items():
+        given = dict(given or {})
+        config = given.pop("config", None)
+        if config is not None:
+            self.load(Path(config).expanduser())
+        for name, value in given.items():
             self.set(name, value)
+
+    def load(self, file: Path) -> None:
+        """Read an INI file: section [api] has the settings, by their names.
+
+        Raises:
+            SettingError: it cannot be read, or has a key or a value that means nothing.
+        """
+        parser = configparser.ConfigParser(interpolation=None)
+        try:
+            with file.open(encoding="utf-8") as stream:
+                parser.read_file(stream)
+        except OSError as error:
+            raise SettingError(f"{file}: {error.strerror}") from error
+        except (configparser.Error, UnicodeDecodeError) as error:
+            raise SettingError(f"{file}: {' '.join(str(error).split())}") from error
+        for section in parser.sections():
+            if section not in NOT_OURS:
+                raise SettingError(f"{file}: no section [{section}]; there are {', '.join(NOT_OURS)}")
+            for name, value in parser[section].items():
+                if name in NOT_OURS[section] or value in UNSET:
+                    continue
+                if section != "api" or name not in self.mp.list():
+                    raise SettingError(f"{file}: no key {name!r} in [{section}]")
+                self.set(name, value)
 
     def set(self, name: str, value: Any) -> None:
         """Set one.

@@ -1,0 +1,21 @@
+"""The console script `mavproxy-uavapi`: MAVProxy with our modules and, on request, a simulated vehicle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the console script.
+
+    Args:
+        argv: the arguments after the program's name; those of the process by default.
+
+    Returns:
+        0 after a clean shutdown, 1 when something did not start or crashed, 2 for a wrong option; 128 plus
+        the signal's number when a signal that we did not send killed MAVProxy.
+    """
+    # The watchdog is a module of this package too: it must not carry argparse and asyncio about.
+    from mavproxy_uavapi.launcher.command import run  # noqa: PLC0415
+
+    return run(argv)

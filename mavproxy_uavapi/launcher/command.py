@@ -1,0 +1,88 @@
+"""The console script from the arguments to the exit status."""
+
+from __future__ import annotations
+
+import asyncio
+import dataclasses
+import os
+import sys
+import termios
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+
+from mavproxy_uavapi.launcher import commands, directories, instances
+from mavproxy_uavapi.launcher.errors import LaunchError, OptionError
+from mavproxy_uavapi.launcher.locations import Home, resolve
+from mavproxy_uavapi.launcher.options import Options, parse
+from mavproxy_uavapi.launcher.supervisor import Supervisor
+
+# sim_vehicle.py first kills whatever it takes for its own vehicles when it is instance 0.
+FIRST_SITL_INSTANCE = 1
+
+
+def run(argv: Sequence[str] | None = None) -> int:
+    """Start everything, wait, end everything; an error is one line on stderr."""
+    try:
+        options = prepare(parse(sys.argv[1:] if argv is None else argv))
+        return launch(options)
+    except LaunchError as error:
+        print(f"mavproxy-uavapi: {error}", file=sys.stderr)
+        return error.status
+    except OSError as error:
+        print(f"mavproxy-uavapi: {error}", file=sys.stderr)
+        return LaunchError.status
+
+
+def prepare(options: Options) -> Options:
+    """Settle what depends on the terminal, and refuse what cannot work on this machine.
+
+    Raises:
+        OptionError: the copy of ArduPilot is not one, or not built.
+        LaunchError: the API's port is taken.
+    """
+    if options.simulated and options.ardupilot_path is not None:
+        script = commands.sim_vehicle(options.ardupilot_path)
+        if not script.is_file():
+            raise OptionError(f"--ardupilot_path: there is no {script}")
+        binary = commands.sitl_binary(options)
+        if not binary.is_file():
+            raise OptionError(f"--ardupilot_path: {binary} is missing, build it first")
+    if not instances.is_free(options.port, options.host):
+        raise LaunchError(f"--port: {options.host}:{options.port} is taken by another program")
+    return dataclasses.replace(options, headless=options.headless or not has_terminal())
+
+
+def has_terminal() -> bool:
+    """Whether there is a terminal to own; one that we may not read from, after `&`, does not count."""
+    return sys.stdin is not None and sys.stdin.isatty() and os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
+
+
+def launch(options: Options) -> int:
+    """Give the run its directory and its simulated vehicle a number, and supervise it to its end."""
+    root, log_file = directories.split_log_path(options.log_path, options.sysid)
+    options = dataclasses.replace(options, log_path=log_file)
+    home: Home | None = None
+    if options.simulated:
+        home = resolve(options.location, options.ardupilot_path)
+    run_dir = directories.new_run(root, options)
+    with ExitStack() as stack:
+        instance = None
+        if options.simulated:
+            locks = directories.state_root()
+            locks.mkdir(parents=True, exist_ok=True, mode=0o700)
+            first = FIRST_SITL_INSTANCE if options.ardupilot_path is not None else 0
+            instance = stack.enter_context(instances.reserved(locks, first))
+        if not options.headless:
+            stack.enter_context(terminal_kept())
+        return asyncio.run(Supervisor(options, run_dir, instance, home).run())
+
+
+@contextmanager
+def terminal_kept() -> Iterator[None]:
+    """Put the terminal back as it was: a MAVProxy that was killed at its prompt leaves it without echo."""
+    descriptor = sys.stdin.fileno()
+    before = termios.tcgetattr(descriptor)
+    try:
+        yield
+    finally:
+        termios.tcsetattr(descriptor, termios.TCSADRAIN, before)

@@ -1,0 +1,170 @@
+"""Options -> the command lines of the processes and the files and lines that go with them (pure).
+
+A token never appears here: the modules read it from the environment variable UAVAPI_TOKEN.
+"""
+
+from __future__ import annotations
+
+import configparser
+import io
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from mavproxy_uavapi.launcher.locations import Home
+from mavproxy_uavapi.launcher.options import Options
+
+# What makes run_in_terminal_window.sh put the vehicle into a window, a tmux server or a screen that is not
+# our child. Without them it runs in the background, where we can end it.
+WINDOW_VARIABLES = ("DISPLAY", "SITL_RITW_TERMINAL", "TMUX", "STY", "ZELLIJ")
+ARDUPILOT_VEHICLES = {"copter": "ArduCopter", "plane": "ArduPlane", "rover": "Rover"}
+
+# SITL opens its port only after reading its parameters; MAVProxy tries once a second.
+SITL_RETRIES = 30
+
+
+def mavproxy_command(
+    options: Options, program: Sequence[str], run_dir: Path, instance: int | None, config: Path | None
+) -> list[str]:
+    """MAVProxy's command line.
+
+    Args:
+        options: what the user asked for; `headless` already says whether there is a prompt.
+        program: how MAVProxy itself is started.
+        run_dir: where its telemetry log and parameters go.
+        instance: the number of the simulated vehicle; None for a real one.
+        config: the file with those settings of the API that have no keyword argument.
+    """
+    command = [
+        *program,
+        f"--master={master(options, instance)}",
+        f"--target-system={options.sysid}",
+        f"--logfile={run_dir / 'mav.tlog'}",
+    ]
+    if instance is not None and options.ardupilot_path is not None:
+        # As sim_vehicle.py does it: `rc` at the prompt reaches SITL on this port.
+        command += [f"--retries={SITL_RETRIES}", f"--sitl=127.0.0.1:{5501 + 10 * instance}"]
+    if options.headless:
+        # Otherwise MAVProxy quits as soon as its stdin ends.
+        command.append("--daemon")
+    command += [f"--out={address}" for address in options.gs_connection]
+    command += [f"--cmd={load}" for load in module_loads(options, config)]
+    return command + list(options.mavproxy_args)
+
+
+def master(options: Options, instance: int | None) -> str:
+    """The link to the vehicle in MAVProxy's notation."""
+    if instance is not None:
+        return f"tcp:127.0.0.1:{5760 + 10 * instance}"
+    if options.connection_type == "usb":
+        return options.uav_connection
+    return f"{options.connection_type}:{options.uav_connection}"
+
+
+def module_loads(options: Options, config: Path | None) -> list[str]:
+    """One `module load` command per module."""
+    settings: dict[str, object] = {"host": options.host, "port": options.port, "sysid": options.sysid}
+    if config is not None:
+        settings["config"] = str(config)
+    loads = [module_load("uavapi", settings)]
+    if options.gradys_gs is not None:
+        loads.append(module_load("gradys", {"gs": options.gradys_gs}))
+    return loads + [f"module load {name}" for name in options.module]
+
+
+def module_load(name: str, settings: Mapping[str, object]) -> str:
+    """`module load NAME:{…}`, safe from MAVProxy's splitting.
+
+    MAVProxy splits `--cmd` at `;` and the command at white space. JSON may write both as escapes.
+    """
+    text = json.dumps(settings, separators=(",", ":"))
+    return f"module load {name}:{text.replace(' ', chr(92) + 'u0020').replace(';', chr(92) + 'u003b')}"
+
+
+def settings_file(options: Options) -> str | None:
+    """The INI text with what the `uavapi` module takes by file only; None where the user set none of it."""
+    parser = configparser.ConfigParser(interpolation=None)
+    for section, names in {
+        "api": ("scripts_path", "python_path"),
+        "logs": ("log_console", "log_path", "debug", "script_logs"),
+    }.items():
+        texts = {name: _ini_text(getattr(options, name)) for name in names if getattr(options, name)}
+        if texts:
+            parser[section] = texts
+    if not parser.sections():
+        return None
+    text = io.StringIO()
+    parser.write(text)
+    return text.getvalue()
+
+
+def _ini_text(value: str | tuple[str, ...]) -> str:
+    return f"[{', '.join(value)}]" if isinstance(value, tuple) else value
+
+
+def embedded_command(options: Options, instance: int, home: Home) -> list[str]:
+    """The embedded vehicle's command line."""
+    return [
+        sys.executable,
+        "-m",
+        "mavproxy_uavapi.sim",
+        f"--instance={instance}",
+        f"--sysid={options.sysid}",
+        f"--speedup={options.speedup:g}",
+        f"--home={home}",
+    ]
+
+
+def sim_vehicle_command(
+    options: Options, python: str, instance: int, home: Home, use_dir: Path
+) -> list[str]:
+    """The command line of ArduPilot's sim_vehicle.py, for the vehicle alone.
+
+    MAVProxy is ours to start (`--no-mavproxy`): it keeps the terminal, and its arguments need not survive
+    sim_vehicle.py, which splits them at spaces and `=`.
+    """
+    assert options.ardupilot_path is not None
+    return [
+        python,
+        str(sim_vehicle(options.ardupilot_path)),
+        "--vehicle=" + ARDUPILOT_VEHICLES[options.vehicle],
+        f"--instance={instance}",
+        f"--sysid={options.sysid}",
+        f"--speedup={options.speedup:.0f}",
+        f"--custom-location={home}",
+        f"--use-dir={use_dir}",
+        "--no-rebuild",
+        "--no-mavproxy",
+    ]
+
+
+def sim_vehicle(ardupilot_path: str) -> Path:
+    """Where a copy of ArduPilot keeps the script."""
+    return Path(ardupilot_path, "Tools", "autotest", "sim_vehicle.py")
+
+
+def sitl_binary(options: Options) -> Path:
+    """The vehicle that sim_vehicle.py will start."""
+    assert options.ardupilot_path is not None
+    return Path(options.ardupilot_path, "build", "sitl", "bin", "ardu" + options.vehicle)
+
+
+def api_url(options: Options) -> str:
+    """Where to reach the API from this machine."""
+    host = {"0.0.0.0": "127.0.0.1", "::": "::1", "": "127.0.0.1"}.get(options.host, options.host)
+    return f"http://[{host}]:{options.port}" if ":" in host else f"http://{host}:{options.port}"
+
+
+def greeting(options: Options, with_token: bool) -> str:
+    """What is printed once the API answers: its address and, with a simulated vehicle, three lines to try."""
+    url = api_url(options)
+    lines = [f"API of vehicle {options.sysid}: {url}"]
+    if options.simulated:
+        curl = 'curl -H "Authorization: Bearer $UAVAPI_TOKEN"' if with_token else "curl"
+        lines += [
+            f"  {curl} {url}/command/arm",
+            f"  {curl} '{url}/command/takeoff?alt=10'",
+            f"  {curl} {url}/telemetry/gps",
+        ]
+    return "\n".join(lines)

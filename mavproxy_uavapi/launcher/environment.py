@@ -1,0 +1,65 @@
+"""Where MAVProxy is, and the environment variables that the processes get."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shutil
+import sys
+import sysconfig
+from collections.abc import Mapping
+from pathlib import Path
+
+import mavproxy_uavapi
+from mavproxy_uavapi.launcher.commands import WINDOW_VARIABLES
+from mavproxy_uavapi.launcher.errors import LaunchError
+
+
+def mavproxy_program() -> list[str]:
+    """How to start MAVProxy: that of this Python's environment, which need not be in PATH, else PATH's.
+
+    Raises:
+        LaunchError: there is none.
+    """
+    for directory in (sysconfig.get_path("scripts"), os.path.dirname(sys.executable)):
+        script = Path(directory, "mavproxy.py")
+        if script.is_file():
+            return [sys.executable, str(script)]
+    found = shutil.which("mavproxy.py")
+    if found is None:
+        raise LaunchError("mavproxy.py is neither beside this Python nor in PATH (pip install MAVProxy)")
+    return [found]
+
+
+def ardupilot_python() -> str:
+    """The Python for sim_vehicle.py: this one where it has what ArduPilot's tools need, else PATH's."""
+    return sys.executable if importlib.util.find_spec("pexpect") else "python3"
+
+
+def for_python(environ: Mapping[str, str]) -> dict[str, str]:
+    """The environment for MAVProxy, the embedded vehicle and the watchdog.
+
+    Out of a checkout that is not installed they would not find our modules. What they print must reach
+    their logs at once: that is where we look for the vehicle's being ready.
+    """
+    env = {**environ, "PYTHONUNBUFFERED": "1"}
+    root = Path(mavproxy_uavapi.__file__).resolve().parent.parent
+    if (root / "setup.py").is_file():
+        env["PYTHONPATH"] = os.pathsep.join(filter(None, (str(root), environ.get("PYTHONPATH"))))
+    return env
+
+
+def for_sim_vehicle(environ: Mapping[str, str], run_dir: Path) -> dict[str, str]:
+    """The environment for sim_vehicle.py: no windows, and a `pkill` that does nothing.
+
+    Where psutil is missing, sim_vehicle.py tidies up with `pkill arducopter`, that is, it kills everybody's.
+    What it started we end ourselves.
+    """
+    env = {name: value for name, value in environ.items() if name not in WINDOW_VARIABLES}
+    tools = run_dir / "bin"
+    tools.mkdir(exist_ok=True)
+    (tools / "pkill").write_text("#!/bin/sh\nexit 1\n", encoding="ascii")
+    (tools / "pkill").chmod(0o755)
+    env["PATH"] = os.pathsep.join((str(tools), environ.get("PATH", os.defpath)))
+    env["PYTHONUNBUFFERED"] = "1"
+    return env

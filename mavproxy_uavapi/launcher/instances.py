@@ -1,0 +1,64 @@
+"""Simulated vehicles on one machine: each has a number that spreads their ports, 10 apart."""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from mavproxy_uavapi.launcher.errors import LaunchError
+
+HIGHEST = 99
+
+# Offsets from 5760 + 10 * instance: SITL's three serial ports over TCP; the embedded vehicle has the first.
+SERIAL_PORTS = (0, 2, 3)
+
+
+def is_free(port: int, host: str = "127.0.0.1", kind: socket.SocketKind = socket.SOCK_STREAM) -> bool:
+    """Whether a server could listen on the port now. Raises OSError where the host is not ours."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with socket.socket(family, kind) as probe:
+        if kind == socket.SOCK_STREAM:
+            # A server that ended a moment ago does not count.
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, port))
+        except OSError as error:
+            if error.errno == errno.EADDRINUSE:
+                return False
+            raise
+    return True
+
+
+def ports_are_free(instance: int) -> bool:
+    """Whether no other simulation uses this number's ports."""
+    tcp = all(is_free(5760 + 10 * instance + offset) for offset in SERIAL_PORTS)
+    return tcp and is_free(5501 + 10 * instance, kind=socket.SOCK_DGRAM)
+
+
+@contextmanager
+def reserved(directory: Path, first: int) -> Iterator[int]:
+    """The first free instance from `first` on, reserved against other launchers of this user meanwhile.
+
+    The ports alone would not do: between looking at them and the vehicle's opening them lie seconds.
+
+    Args:
+        directory: where the lock files are; the kernel releases a lock with the process that held it.
+        first: the lowest number to consider.
+
+    Raises:
+        LaunchError: all numbers are taken.
+    """
+    for instance in range(first, HIGHEST + 1):
+        with (directory / f"instance-{instance}.lock").open("w", encoding="ascii") as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                continue
+            if ports_are_free(instance):
+                yield instance
+                return
+    raise LaunchError(f"no free instance for a simulated vehicle from {first} to {HIGHEST}")

@@ -1,0 +1,35 @@
+"""Asks the API whether it is there."""
+
+from __future__ import annotations
+
+import asyncio
+from urllib.parse import urlsplit
+
+from mavproxy_uavapi.launcher.commands import api_url
+from mavproxy_uavapi.launcher.options import Options
+
+TIMEOUT_S = 2.0
+
+
+async def answers(options: Options) -> int | None:
+    """The HTTP status of `/telemetry/status`; None while nothing answers. 401 is an answer too: no token is
+    sent, for it is not certain who listens on the port.
+    """
+    try:
+        return await asyncio.wait_for(_status(api_url(options)), TIMEOUT_S)
+    except (OSError, asyncio.TimeoutError, EOFError, ValueError):
+        return None
+
+
+async def _status(url: str) -> int:
+    where = urlsplit(url)
+    reader, writer = await asyncio.open_connection(where.hostname, where.port)
+    try:
+        request = f"GET /telemetry/status HTTP/1.1\r\nHost: {where.netloc}\r\nConnection: close\r\n\r\n"
+        writer.write(request.encode("ascii"))
+        protocol, status = (await reader.readline()).split(maxsplit=2)[:2]
+        if not protocol.startswith(b"HTTP/"):
+            raise ValueError("not an HTTP server")
+        return int(status)
+    finally:
+        writer.close()

@@ -1,0 +1,311 @@
+"""Starts the processes of a run, waits for the first that ends or for a signal, and ends them all."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import sys
+import uuid
+from asyncio.subprocess import DEVNULL, PIPE, STDOUT, Process
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from mavproxy_uavapi.launcher import commands, environment, processes
+from mavproxy_uavapi.launcher.errors import LaunchError
+from mavproxy_uavapi.launcher.locations import Home
+from mavproxy_uavapi.launcher.options import Options
+from mavproxy_uavapi.launcher.probe import answers
+
+VEHICLE_START_S = 30.0
+API_START_S = 90.0
+
+# Unloading our module ends uploaded scripts, which may be landing the vehicle; see its own grace period.
+MAVPROXY_GRACE_S = 15.0
+MAVPROXY_FORCED_S = 2.0
+VEHICLE_GRACE_S = 3.0
+STRAY_GRACE_S = 1.0
+
+# Two Ctrl-C at the prompt within this time are meant for the launcher too.
+INSIST_S = 3.0
+
+_READY = b" listening on "
+_UNLOADING = b"Unloading module "
+_API_FAILED = ("Failed to load module: ", "ERROR in command ", "uavapi: cannot listen on ")
+_DEBUG_HINT = " Use 'set moddebug"
+
+
+class Supervisor:
+    """One run: a MAVProxy, perhaps a vehicle, and the watchdog."""
+
+    def __init__(self, options: Options, run_dir: Path, instance: int | None, home: Home | None) -> None:
+        self.options = options
+        self.run_dir = run_dir
+        self.instance = instance
+        self.home = home
+        self.tag = uuid.uuid4().hex
+        self.sessions: set[int] = set()
+        self.watchdog: Process | None = None
+        self.vehicle: Process | None = None
+        self.mavproxy: Process | None = None
+        self.came_up = False
+        self.interrupted_at = -INSIST_S
+        self.stop = asyncio.Event()
+        self.hurry = asyncio.Event()
+
+    async def run(self) -> int:
+        """The whole life of the run.
+
+        Returns:
+            The exit status: 0 when it was ended by a signal to us, or by the user at the prompt.
+
+        Raises:
+            LaunchError: something did not start, or ended on its own.
+        """
+        self._watch_signals()
+        work = asyncio.create_task(self._work())
+        stop = asyncio.create_task(self.stop.wait())
+        try:
+            await asyncio.wait({work, stop}, return_when=asyncio.FIRST_COMPLETED)
+            return work.result() if work.done() else 0
+        finally:
+            for task in (work, stop):
+                task.cancel()
+            await asyncio.wait({work, stop})
+            await self._end()
+
+    # Signals
+
+    def _watch_signals(self) -> None:
+        loop = asyncio.get_running_loop()
+        for signum in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            # nohup and shells ignore a signal on purpose.
+            if signal.getsignal(signum) is not signal.SIG_IGN:
+                loop.add_signal_handler(signum, self._on_signal, signum)
+
+    def _on_signal(self, signum: signal.Signals) -> None:
+        if self.stop.is_set():
+            self.hurry.set()
+        elif signum == signal.SIGINT and self._mavproxy_has_terminal():
+            # The terminal sent it to MAVProxy as well, which may be set to stay (`set requireexit`).
+            now = asyncio.get_running_loop().time()
+            if now - self.interrupted_at < INSIST_S:
+                self.stop.set()
+            self.interrupted_at = now
+        else:
+            self.stop.set()
+
+    def _mavproxy_has_terminal(self) -> bool:
+        return not self.options.headless and self.mavproxy is not None and self.mavproxy.returncode is None
+
+    # Starting and waiting
+
+    async def _work(self) -> int:
+        await self._start_watchdog()
+        if self.instance is not None:
+            await self._start_vehicle(self.instance)
+        await self._start_mavproxy()
+        assert self.mavproxy is not None
+        ends = {asyncio.create_task(self.mavproxy.wait())}
+        if self.vehicle is not None:
+            ends.add(asyncio.create_task(self.vehicle.wait()))
+        announced = asyncio.create_task(self._announce())
+        waiting = ends | {announced}
+        try:
+            while not any(task.done() for task in ends):
+                done, waiting = await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
+                if announced in done:
+                    announced.result()
+        finally:
+            for task in waiting:
+                task.cancel()
+        return self._verdict()
+
+    async def _start_watchdog(self) -> None:
+        self.watchdog = await asyncio.create_subprocess_exec(
+            *(sys.executable, "-m", "mavproxy_uavapi.launcher.watchdog", self.tag),
+            stdin=PIPE,
+            env=environment.for_python(os.environ),
+            start_new_session=True,
+        )
+
+    async def _start_vehicle(self, instance: int) -> None:
+        assert self.home is not None
+        if self.options.ardupilot_path is None:
+            command = commands.embedded_command(self.options, instance, self.home)
+            self.vehicle = await self._start(command, environment.for_python(os.environ), "vehicle.log")
+            await self._vehicle_ready()
+        else:
+            env = environment.for_sim_vehicle(os.environ, self.run_dir)
+            command = commands.sim_vehicle_command(
+                self.options, environment.ardupilot_python(), instance, self.home, self.run_dir / "vehicle"
+            )
+            self.vehicle = await self._start(command, env, "vehicle.log")
+
+    async def _vehicle_ready(self) -> None:
+        """Wait for the line that the embedded vehicle prints once its port is open."""
+        assert self.vehicle is not None
+        log = self.run_dir / "vehicle.log"
+        deadline = asyncio.get_running_loop().time() + VEHICLE_START_S
+        while _READY not in log.read_bytes():
+            if self.vehicle.returncode is not None:
+                raise LaunchError(f"the vehicle did not start: {last_line(log)} (log: {log})")
+            if asyncio.get_running_loop().time() > deadline:
+                raise LaunchError(f"the vehicle was not ready within {VEHICLE_START_S:.0f} s (log: {log})")
+            await asyncio.sleep(0.05)
+
+    async def _start_mavproxy(self) -> None:
+        config = None
+        text = commands.settings_file(self.options)
+        if text is not None:
+            config = self.run_dir / "uavapi.ini"
+            config.write_text(text, encoding="utf-8")
+        command = commands.mavproxy_command(
+            self.options, environment.mavproxy_program(), self.run_dir, self.instance, config
+        )
+        # With components logging to the console the console is where MAVProxy's output belongs.
+        to_file = self.options.headless and not self.options.log_console
+        self.mavproxy = await self._start(
+            command,
+            environment.for_python(os.environ),
+            "mavproxy.log" if to_file else None,
+            own_terminal=not self.options.headless,
+        )
+
+    async def _start(
+        self, command: Sequence[str], env: Mapping[str, str], log: str | None, own_terminal: bool = False
+    ) -> Process:
+        """Start a process of this run; one that owns the terminal stays in our session and process group."""
+        output = None if log is None else (self.run_dir / log).open("wb")
+        try:
+            process = await asyncio.create_subprocess_exec(
+                *command,
+                stdin=None if own_terminal else DEVNULL,
+                stdout=output,
+                stderr=None if output is None else STDOUT,
+                env={**env, processes.TAG: self.tag},
+                start_new_session=not own_terminal,
+            )
+        finally:
+            if output is not None:
+                output.close()
+        session = os.getsid(0) if own_terminal else process.pid
+        self.sessions.add(session)
+        assert self.watchdog is not None and self.watchdog.stdin is not None
+        self.watchdog.stdin.write(f"{session}\n".encode())
+        return process
+
+    async def _announce(self) -> None:
+        """Say where the API is once it answers. Without a prompt to look at, not answering is the end."""
+        url = commands.api_url(self.options)
+        deadline = asyncio.get_running_loop().time() + API_START_S
+        status = await answers(self.options)
+        while status is None or (status == 503 and self.options.simulated):
+            self._check_api_loaded()
+            if asyncio.get_running_loop().time() > deadline:
+                what = "does not answer" if status is None else "does not see the vehicle"
+                problem = f"the API at {url} {what} after {API_START_S:.0f} s (log: {self._where()})"
+                if self.options.headless:
+                    raise LaunchError(problem)
+                complain(problem)
+                return
+            await asyncio.sleep(0.2)
+            status = await answers(self.options)
+        self.came_up = True
+        print("\n" + commands.greeting(self.options, bool(os.environ.get("UAVAPI_TOKEN"))), flush=True)
+
+    def _check_api_loaded(self) -> None:
+        """Do not wait for an API whose module MAVProxy could not load: it says so, and goes on without.
+
+        Raises:
+            LaunchError: in MAVProxy's own words.
+        """
+        log = self.run_dir / "mavproxy.log"
+        for line in read_lines(log) if log.exists() else []:
+            if "uavapi" in line and any(words in line for words in _API_FAILED):
+                raise LaunchError(f"{line.partition(_DEBUG_HINT)[0]} (log: {log})")
+
+    def _where(self) -> str:
+        log = self.run_dir / "mavproxy.log"
+        return str(log) if log.exists() else "above"
+
+    # What an end means
+
+    def _verdict(self) -> int:
+        """The exit status after a process has ended that we did not end.
+
+        MAVProxy exits with status 1 whatever happened. It was shut down on purpose when it said so in its
+        log, or, at a prompt, when it had come up or was interrupted.
+
+        Raises:
+            LaunchError: the vehicle ended, or MAVProxy crashed or never came up.
+        """
+        assert self.mavproxy is not None
+        status = self.mavproxy.returncode
+        log = self.run_dir / "mavproxy.log"
+        if status is None:
+            vehicle_log = self.run_dir / "vehicle.log"
+            raise LaunchError(f"the simulated vehicle ended: {last_line(vehicle_log)} (log: {vehicle_log})")
+        if status < 0:
+            complain(f"MAVProxy died of signal {-status} (log: {self._where()})")
+            return 128 - status
+        interrupted = self.interrupted_at > 0
+        on_purpose = _UNLOADING in log.read_bytes() if log.exists() else self.came_up or interrupted
+        if status > 1 or not on_purpose:
+            said = f": {last_line(log)}" if log.exists() else ""
+            raise LaunchError(f"MAVProxy ended with status {status}{said} (log: {self._where()})")
+        return 0
+
+    # Ending
+
+    async def _end(self) -> None:
+        """End what is left, MAVProxy first: while it unloads its modules the vehicle must still be there."""
+        self.stop.set()
+        if self.mavproxy is not None:
+            await self._end_mavproxy(self.mavproxy)
+        if self.vehicle is not None:
+            await asyncio.to_thread(processes.end_members, self.tag, {self.vehicle.pid}, VEHICLE_GRACE_S)
+        # The log writer and the windows of MAVProxy, should it have died before them.
+        gone = await asyncio.to_thread(processes.end_members, self.tag, self.sessions, STRAY_GRACE_S)
+        if not gone:
+            left = ", ".join(map(str, processes.members(self.tag, self.sessions)))
+            complain(f"these processes would not end: {left}")
+        for process in (self.mavproxy, self.vehicle, self.watchdog):
+            if process is not None:
+                if process.stdin is not None:
+                    process.stdin.close()
+                await process.wait()
+
+    async def _end_mavproxy(self, mavproxy: Process) -> None:
+        """SIGTERM, which it takes as `exit`; a second one, at which it leaves at once; then SIGKILL."""
+        for signum, grace_s in (
+            (signal.SIGTERM, MAVPROXY_GRACE_S),
+            (signal.SIGTERM, MAVPROXY_FORCED_S),
+            (signal.SIGKILL, MAVPROXY_FORCED_S),
+        ):
+            if mavproxy.returncode is not None:
+                return
+            with suppress(ProcessLookupError):
+                mavproxy.send_signal(signum)
+            ended = asyncio.create_task(mavproxy.wait())
+            hurried = asyncio.create_task(self.hurry.wait())
+            await asyncio.wait({ended, hurried}, timeout=grace_s, return_when=asyncio.FIRST_COMPLETED)
+            self.hurry.clear()
+            for task in (ended, hurried):
+                task.cancel()
+
+
+def complain(problem: str) -> None:
+    """One line to stderr, below whatever MAVProxy's prompt shows."""
+    print(f"\nmavproxy-uavapi: {problem}", file=sys.stderr)
+
+
+def last_line(log: Path) -> str:
+    """The last line with something on it, for an error that fits one line."""
+    return next((line for line in reversed(read_lines(log)) if line), "it said nothing")
+
+
+def read_lines(log: Path) -> list[str]:
+    """The log so far, line by line, without the white space at the ends."""
+    return [line.strip() for line in log.read_text(encoding="utf-8", errors="replace").splitlines()]

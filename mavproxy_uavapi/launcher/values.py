@@ -1,0 +1,105 @@
+"""Text from the command line or an INI file -> a value; a ValueError says what was expected."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+
+TRUE = frozenset({"true", "yes", "on", "1"})
+FALSE = frozenset({"false", "no", "off", "0"})
+UNSET = frozenset({"", "none", "[]"})
+
+# The names of the original service on the left, those of the logs here on the right.
+LOG_COMPONENTS = {
+    "COPTER": "COPTER",
+    "VEHICLE": "COPTER",
+    "API": "API",
+    "UVICORN": "API",
+    "GRADYS_GS": "GRADYS_GS",
+}
+_MODULE = re.compile(r"[A-Za-z_]\w*(:\{[^;\s]*\})?")
+
+
+def is_unset(text: str) -> bool:
+    """Whether the text stands for "not given": nothing, `None` or `[]`."""
+    return text.strip().lower() in UNSET
+
+
+def boolean(text: str) -> bool:
+    """`true`, `yes`, `on`, `1` and their opposites, in any case; anything else is an error, not a guess."""
+    lowered = text.strip().lower()
+    if lowered in TRUE:
+        return True
+    if lowered in FALSE:
+        return False
+    raise ValueError("expected true or false")
+
+
+def port(text: str) -> int:
+    """A TCP port, 1 to 65535."""
+    return _integer(text, 1, 65535)
+
+
+def system_id(text: str) -> int:
+    """A MAVLink system id, 1 to 255."""
+    return _integer(text, 1, 255)
+
+
+def _integer(text: str, low: int, high: int) -> int:
+    if not text.strip().isascii() or not text.strip().isdigit() or not low <= int(text) <= high:
+        raise ValueError(f"expected a whole number from {low} to {high}")
+    return int(text)
+
+
+def factor(text: str) -> float:
+    """A finite number above 0 (how many times faster than the clock a simulation runs)."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not (math.isfinite(number) and number > 0):
+        raise ValueError("expected a number above 0")
+    return number
+
+
+def words(text: str) -> tuple[str, ...]:
+    """`[a, b]`, `a,b` or `a b` -> ("a", "b")."""
+    return tuple(re.findall(r"[^\s,\[\]]+", text))
+
+
+def components(text: str) -> tuple[str, ...]:
+    """Log components by their names here or in the original service, each once."""
+    found = dict.fromkeys(LOG_COMPONENTS.get(word.upper(), "") for word in words(text))
+    if "" in found:
+        raise ValueError(f"expected some of {', '.join(LOG_COMPONENTS)}")
+    return tuple(found)
+
+
+def host_port(text: str) -> str:
+    """`HOST:PORT` with a port from 1 to 65535."""
+    host, _, number = text.strip().rpartition(":")
+    if not host or re.search(r"[\s/]", host):
+        raise ValueError("expected HOST:PORT")
+    port(number)
+    return text.strip()
+
+
+def modules(text: str) -> tuple[str, ...]:
+    """One MAVProxy module, `NAME` or `NAME:{"key":value}`, or several names with commas between."""
+    names = (text,) if "{" in text else tuple(part for part in text.split(",") if part)
+    # MAVProxy splits a command line at `;` and at white space: nothing may slip in behind a name.
+    if not names or not all(_MODULE.fullmatch(name) for name in names):
+        raise ValueError('expected NAME or NAME:{"key":value} without spaces')
+    return names
+
+
+def one_of(*choices: str) -> Callable[[str], str]:
+    """A converter that accepts these words only."""
+
+    def choice(text: str) -> str:
+        if text.strip() not in choices:
+            raise ValueError(f"expected {', '.join(choices[:-1])} or {choices[-1]}")
+        return text.strip()
+
+    return choice

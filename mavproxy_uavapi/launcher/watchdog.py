@@ -1,0 +1,30 @@
+"""The process that ends the others when the launcher cannot: it died of SIGKILL, or of a defect.
+
+It holds the reading end of a pipe whose only writing end is the launcher's, so the pipe ends with the
+launcher, however that happens. PR_SET_PDEATHSIG would reach direct children only, and ArduPilot's vehicle is
+a grandchild; it also depends on the thread that started the child.
+
+    python -m mavproxy_uavapi.launcher.watchdog TAG     (session numbers on stdin, one per line)
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+
+from mavproxy_uavapi.launcher.processes import end_members
+
+GRACE_S = 5.0
+
+
+def main() -> int:
+    """Read sessions until the pipe ends, then end what is left of the run."""
+    # A service manager may send SIGTERM to all of a service's processes: this one goes after the launcher.
+    for signum in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(signum, signal.SIG_IGN)
+    sessions = {int(line) for line in sys.stdin}
+    return 0 if end_members(sys.argv[1], sessions, GRACE_S) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,119 @@
+"""Command line of the simulated vehicle."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+import time
+from collections.abc import Callable
+from typing import TypeVar
+
+from .options import SITL_BASE_PORT, Home, Options, Wind
+from .server import Server
+from .simulator import Simulator
+
+Value = TypeVar("Value")
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run a vehicle until SIGINT or SIGTERM; the exit status (1 when a port is taken)."""
+    chosen = _parser().parse_args(arguments)
+    options = Options(
+        sysid=chosen.sysid,
+        speedup=chosen.speedup,
+        home=chosen.home,
+        seed=chosen.seed,
+        wind=chosen.wind,
+        gps_noise=chosen.gps_noise,
+        ready_after=chosen.ready_after,
+    )
+    port = chosen.port if chosen.port is not None else SITL_BASE_PORT + 10 * chosen.instance
+    server = Server(Simulator(options, epoch=time.time()))
+    try:
+        port = server.listen(chosen.host, port)
+        for host, udp_port in chosen.udp:
+            server.add_udp(host, udp_port)
+        control = None if chosen.control is None else server.listen_control(chosen.host, chosen.control)
+    except OSError as error:
+        print(f"sim: cannot listen on {chosen.host}:{port}: {error.strerror or error}", file=sys.stderr)
+        return 1
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: server.stop())
+    home = options.home
+    place = f"{home.latitude:.6f},{home.longitude:.6f},{home.altitude:g}"
+    print(f"sim: vehicle {options.sysid} at {place} listening on tcp:{chosen.host}:{port}", flush=True)
+    if control is not None:
+        print(f"sim: control on tcp:{chosen.host}:{control}", flush=True)
+    server.run()
+    server.close()
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m mavproxy_uavapi.sim", description="An ArduCopter-like vehicle to fly out of the box."
+    )
+    add = parser.add_argument
+    add("--instance", type=_natural, default=0, metavar="N", help="TCP port 5760 + 10*N (default 0)")
+    add("--sysid", type=_system, default=1, metavar="N", help="MAVLink system id (default 1)")
+    add("--speedup", type=_positive, default=1.0, metavar="X", help="simulated seconds per second (default 1)")
+    add("--home", type=_parsed(Home.parse), default=Home(), metavar="LAT,LON,ALT,HEADING")
+    add("--seed", type=int, default=0, metavar="N", help="seed of all randomness (default 0)")
+    add("--wind", type=_parsed(Wind.parse), default=Wind(), metavar="SPEED,DIRECTION", help="m/s, degrees from")
+    add("--gps-noise", type=_not_negative, default=0.0, metavar="METRES", help="1 sigma, slowly wandering")
+    add("--udp", type=_address, action="append", default=[], metavar="HOST:PORT", help="also send there")
+    add("--host", default="127.0.0.1", help="address to listen on (default 127.0.0.1)")
+    add("--port", type=_natural, default=None, metavar="PORT", help="TCP port, overrides --instance")
+    add("--control", type=_natural, default=None, metavar="PORT", help="TCP port for tests: faults and truth")
+    add("--ready-after", type=_not_negative, default=5.0, metavar="SECONDS", help="until armable (default 5)")
+    return parser
+
+
+def _parsed(parse: Callable[[str], Value]) -> Callable[[str], Value]:
+    def checked(text: str) -> Value:
+        try:
+            return parse(text)
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
+
+    return checked
+
+
+def _positive(text: str) -> float:
+    value = float(text)
+    if not 0 < value < float("inf"):
+        raise argparse.ArgumentTypeError("must be more than 0")
+    return value
+
+
+def _not_negative(text: str) -> float:
+    value = float(text)
+    if not 0 <= value < float("inf"):
+        raise argparse.ArgumentTypeError("must not be negative")
+    return value
+
+
+def _natural(text: str) -> int:
+    value = int(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError("must not be negative")
+    return value
+
+
+def _system(text: str) -> int:
+    value = int(text)
+    if not 1 <= value <= 255:
+        raise argparse.ArgumentTypeError("must be between 1 and 255")
+    return value
+
+
+def _address(text: str) -> tuple[str, int]:
+    host, _, port = text.rpartition(":")
+    if not host or not port.isdigit():
+        raise argparse.ArgumentTypeError("must be HOST:PORT")
+    return host, int(port)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

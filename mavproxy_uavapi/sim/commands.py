@@ -1,0 +1,335 @@
+"""MAV_CMD to MAV_RESULT: one handler for each command that ArduCopter takes from the ground.
+
+COMMAND_LONG and COMMAND_INT meet here in one shape, as in ArduPilot; commands not in the table are
+MAV_RESULT_UNSUPPORTED.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from . import arming
+from .frames import AMSL_FRAMES, GLOBAL_FRAMES, global_target, valid_location
+from .geodesy import Location
+from .modes import Guided
+from .modes.auto import Auto
+from .position_control import SPEED_KINDS
+from .streams import HEARTBEAT_INTERVAL, RATE_PARAMETERS, group_of
+
+if TYPE_CHECKING:
+    from .link import Link
+    from .simulator import Simulator
+
+ACCEPTED: int = mavlink.MAV_RESULT_ACCEPTED
+DENIED: int = mavlink.MAV_RESULT_DENIED
+FAILED: int = mavlink.MAV_RESULT_FAILED
+BUSY: int = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
+UNSUPPORTED: int = mavlink.MAV_RESULT_UNSUPPORTED
+FORCE_REBOOT = 20190226
+FASTEST_INTERVAL = 0.001
+LONGEST_INTERVAL = 60.0
+LOCATION_COMMANDS = {
+    # The frame that COMMAND_LONG means, for commands whose x and y are a location; None: COMMAND_INT only.
+    mavlink.MAV_CMD_DO_SET_HOME: mavlink.MAV_FRAME_GLOBAL,
+    mavlink.MAV_CMD_DO_SET_ROI: mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+    mavlink.MAV_CMD_DO_SET_ROI_LOCATION: mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+    mavlink.MAV_CMD_DO_REPOSITION: None,
+}
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command as COMMAND_INT has it: x, y in 1e-7 degrees for a location, z in metres of its frame."""
+
+    command: int
+    frame: int
+    param1: float
+    param2: float
+    param3: float
+    param4: float
+    x: int
+    y: int
+    z: float
+    sender: tuple[int, int]
+
+
+def from_message(message: Any) -> Command | None:
+    """COMMAND_LONG or COMMAND_INT as a Command; None for a COMMAND_LONG that ArduPilot takes as INT only."""
+    sender = (message.get_srcSystem(), message.get_srcComponent())
+    parameters = (message.param1, message.param2, message.param3, message.param4)
+    if message.get_type() == "COMMAND_INT":
+        return Command(message.command, message.frame, *parameters, message.x, message.y, message.z, sender)
+    frame = LOCATION_COMMANDS.get(message.command, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT)
+    if frame is None:
+        return None
+    scale = 1e7 if message.command in LOCATION_COMMANDS else 1.0
+    x = 0 if math.isnan(message.param5) else int(message.param5 * scale)
+    y = 0 if math.isnan(message.param6) else int(message.param6 * scale)
+    return Command(message.command, frame, *parameters, x, y, message.param7, sender)
+
+
+class Commands:
+    """Carries out commands on the vehicle of a simulator."""
+
+    def __init__(self, simulator: Simulator) -> None:
+        self._simulator = simulator
+        self._handlers: dict[int, Callable[[Command, Link], int]] = {
+            mavlink.MAV_CMD_COMPONENT_ARM_DISARM: self._arm_disarm,
+            mavlink.MAV_CMD_RUN_PREARM_CHECKS: self._run_prearm_checks,
+            mavlink.MAV_CMD_DO_SET_MODE: self._set_mode,
+            mavlink.MAV_CMD_NAV_TAKEOFF: self._take_off,
+            mavlink.MAV_CMD_NAV_LAND: self._mode_command(9),
+            mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: self._mode_command(6),
+            mavlink.MAV_CMD_NAV_LOITER_UNLIM: self._mode_command(5),
+            mavlink.MAV_CMD_DO_REPOSITION: self._reposition,
+            mavlink.MAV_CMD_MISSION_START: self._mission_start,
+            mavlink.MAV_CMD_DO_SET_MISSION_CURRENT: self._set_mission_current,
+            mavlink.MAV_CMD_CONDITION_YAW: self._condition_yaw,
+            mavlink.MAV_CMD_DO_CHANGE_SPEED: self._change_speed,
+            mavlink.MAV_CMD_DO_PAUSE_CONTINUE: self._pause_continue,
+            mavlink.MAV_CMD_DO_SET_HOME: self._set_home,
+            mavlink.MAV_CMD_GET_HOME_POSITION: self._get_home,
+            mavlink.MAV_CMD_DO_SET_ROI: self._set_roi,
+            mavlink.MAV_CMD_DO_SET_ROI_LOCATION: self._set_roi,
+            mavlink.MAV_CMD_DO_SET_ROI_NONE: self._clear_roi,
+            mavlink.MAV_CMD_DO_SET_SERVO: self._set_servo,
+            mavlink.MAV_CMD_DO_FLIGHTTERMINATION: self._terminate,
+            mavlink.MAV_CMD_REQUEST_MESSAGE: self._request_message,
+            mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_interval,
+            mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: self._get_interval,
+            mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: self._capabilities,
+            mavlink.MAV_CMD_DO_SEND_BANNER: self._banner,
+            mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._reboot,
+        }
+
+    def run(self, command: Command, link: Link) -> int:
+        """Carry the command out; its MAV_RESULT. link is where answers beyond the ack go."""
+        handler = self._handlers.get(command.command)
+        return UNSUPPORTED if handler is None else handler(command, link)
+
+    def _arm_disarm(self, command: Command, link: Link) -> int:
+        del link
+        copter = self._simulator.copter
+        if command.param1 == 1:
+            forced = command.param2 in (arming.FORCE, arming.FORCE_ARM)
+            return ACCEPTED if copter.arm(forced=forced) else FAILED
+        if command.param1 == 0:
+            return ACCEPTED if copter.disarm(forced=command.param2 == arming.FORCE) else FAILED
+        return UNSUPPORTED
+
+    def _run_prearm_checks(self, command: Command, link: Link) -> int:
+        del command, link
+        copter = self._simulator.copter
+        if copter.armed:
+            return BUSY
+        copter.report_prearm()
+        return ACCEPTED
+
+    def _set_mode(self, command: Command, link: Link) -> int:
+        del link
+        return self._simulator.set_mode(int(command.param1), int(command.param2))
+
+    def _mode_command(self, number: int) -> Callable[[Command, Link], int]:
+        def handler(command: Command, link: Link) -> int:
+            del command, link
+            return ACCEPTED if self._simulator.copter.set_mode(number) else FAILED
+
+        return handler
+
+    def _take_off(self, command: Command, link: Link) -> int:
+        del link
+        copter = self._simulator.copter
+        if command.frame not in (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT):
+            return DENIED
+        if not copter.armed or not copter.landed:
+            return FAILED
+        return ACCEPTED if copter.mode.take_off(command.z) else FAILED
+
+    def _reposition(self, command: Command, link: Link) -> int:
+        del link
+        copter = self._simulator.copter
+        change = bool(int(command.param2) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
+        if copter.mode is not copter.guided and not change:
+            return DENIED
+        if not valid_location(command.x, command.y, command.z):
+            return DENIED
+        target = global_target(copter, command.frame, command.x, command.y, command.z)
+        if target is None:
+            return DENIED
+        if not copter.set_mode(Guided.number):
+            return FAILED
+        copter.guided.go_to(target)
+        return ACCEPTED
+
+    def _mission_start(self, command: Command, link: Link) -> int:
+        del link
+        copter = self._simulator.copter
+        if command.param1 != 0 or command.param2 != 0:
+            return DENIED
+        if not copter.set_mode(Auto.number):
+            return FAILED
+        # Without this a vehicle on the ground waits for the pilot to raise the throttle.
+        copter.auto_armed = copter.armed
+        return ACCEPTED
+
+    def _set_mission_current(self, command: Command, link: Link) -> int:
+        del link
+        if not self._simulator.copter.current_item(int(command.param1)):
+            return DENIED
+        self._simulator.broadcast("MISSION_CURRENT")
+        return ACCEPTED
+
+    def _condition_yaw(self, command: Command, link: Link) -> int:
+        del link
+        if not 0 <= command.param1 <= 360 or command.param4 not in (0, 1):
+            return FAILED
+        self._simulator.copter.fix_yaw(
+            command.param1, command.param2, int(command.param3), command.param4 == 1
+        )
+        return ACCEPTED
+
+    def _change_speed(self, command: Command, link: Link) -> int:
+        del link
+        kind = SPEED_KINDS.get(int(command.param1))
+        if not command.param2 > 0 or kind is None:
+            return DENIED
+        changed = self._simulator.copter.mode.set_speed(kind, command.param2)
+        return ACCEPTED if changed else FAILED
+
+    def _pause_continue(self, command: Command, link: Link) -> int:
+        del link
+        copter = self._simulator.copter
+        if int(command.param1) not in (0, 1):
+            return DENIED
+        pause = int(command.param1) == 0
+        if copter.mode.pause() if pause else copter.mode.resume():
+            return ACCEPTED
+        copter.say(mavlink.MAV_SEVERITY_INFO, "Failed to pause" if pause else "Failed to resume")
+        return FAILED
+
+    def _set_home(self, command: Command, link: Link) -> int:
+        del link
+        copter = self._simulator.copter
+        if command.param1 == 1 or (command.x == 0 and command.y == 0):
+            return ACCEPTED if copter.set_home_here(lock=True) else FAILED
+        if command.param1 != 0:
+            return FAILED
+        if command.frame not in GLOBAL_FRAMES or not valid_location(command.x, command.y, command.z):
+            return DENIED
+        altitude = command.z if command.frame in AMSL_FRAMES else command.z + copter.home_altitude
+        home = Location(command.x / 1e7, command.y / 1e7, altitude)
+        return ACCEPTED if copter.set_home(home, lock=True) else FAILED
+
+    def _get_home(self, command: Command, link: Link) -> int:
+        del command
+        if self._simulator.copter.home is None:
+            return FAILED
+        self._simulator.send(link, "HOME_POSITION")
+        self._simulator.send(link, "GPS_GLOBAL_ORIGIN")
+        return ACCEPTED
+
+    def _set_roi(self, command: Command, link: Link) -> int:
+        if not (command.x or command.y or command.z):
+            return self._clear_roi(command, link)
+        copter = self._simulator.copter
+        target = global_target(copter, command.frame, command.x, command.y, command.z)
+        if target is None or not valid_location(command.x, command.y, command.z):
+            return FAILED
+        copter.yaw.look_at(target.north, target.east)
+        return ACCEPTED
+
+    def _clear_roi(self, command: Command, link: Link) -> int:
+        del command, link
+        copter = self._simulator.copter
+        copter.yaw.roi = None
+        copter.yaw.by_parameter(int(copter.parameters["WP_YAW_BEHAVIOR"]), returning=False)
+        return ACCEPTED
+
+    def _set_servo(self, command: Command, link: Link) -> int:
+        del link
+        done = self._simulator.copter.set_servo(int(command.param1), int(command.param2))
+        return ACCEPTED if done else FAILED
+
+    def _terminate(self, command: Command, link: Link) -> int:
+        del link
+        if command.param1 <= 0.5:
+            return FAILED
+        self._simulator.copter.disarm_landed()
+        return ACCEPTED
+
+    def _request_message(self, command: Command, link: Link) -> int:
+        wanted = int(command.param1)
+        if wanted == mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
+            return self._send_interval(int(command.param2), link)
+        name = self._name_of(wanted)
+        if name is None:
+            return FAILED
+        self._simulator.send(link, name)
+        return ACCEPTED
+
+    def _set_interval(self, command: Command, link: Link) -> int:
+        copter = self._simulator.copter
+        name = self._name_of(int(command.param1))
+        if name is None:
+            text = f"No ap_message for mavlink id ({int(command.param1)})"
+            copter.say(mavlink.MAV_SEVERITY_INFO, text)
+            return DENIED
+        if command.param3 != 0 or command.param2 < -1:
+            return DENIED
+        interval: float | None = max(FASTEST_INTERVAL, min(LONGEST_INTERVAL, command.param2 / 1e6))
+        if command.param2 == -1:
+            interval = None
+        elif command.param2 == 0:
+            interval = self._default_interval(name)
+        link.streams.set(name, interval, copter.now)
+        return ACCEPTED
+
+    def _default_interval(self, name: str) -> float | None:
+        if name == "HEARTBEAT":
+            return HEARTBEAT_INTERVAL
+        group = group_of(name)
+        rate = self._simulator.parameters[RATE_PARAMETERS[group]] if group is not None else 0.0
+        return 1 / rate if rate > 0 else None
+
+    def _get_interval(self, command: Command, link: Link) -> int:
+        return self._send_interval(int(command.param1), link)
+
+    def _send_interval(self, message_id: int, link: Link) -> int:
+        name = self._name_of(message_id)
+        if name is None:
+            link.send(mavlink.MAVLink_message_interval_message(message_id & 0xFFFF, 0))
+            return FAILED
+        interval = link.streams.interval(name)
+        microseconds = -1 if interval is None else round(interval * 1e6)
+        link.send(mavlink.MAVLink_message_interval_message(message_id, microseconds))
+        return ACCEPTED
+
+    def _name_of(self, message_id: int) -> str | None:
+        kind = mavlink.mavlink_map.get(message_id)
+        name = None if kind is None else str(kind.msgname)
+        return name if name is not None and self._simulator.telemetry.knows(name) else None
+
+    def _capabilities(self, command: Command, link: Link) -> int:
+        if command.param1 != 1:
+            return FAILED
+        self._simulator.send(link, "AUTOPILOT_VERSION")
+        return ACCEPTED
+
+    def _banner(self, command: Command, link: Link) -> int:
+        del command, link
+        self._simulator.copter.say_banner()
+        return ACCEPTED
+
+    def _reboot(self, command: Command, link: Link) -> int:
+        del link
+        if self._simulator.copter.armed and command.y != FORCE_REBOOT:
+            return FAILED
+        if command.param1 not in (1, 3):
+            return UNSUPPORTED
+        self._simulator.reboot_soon()
+        return ACCEPTED

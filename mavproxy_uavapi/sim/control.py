@@ -1,0 +1,186 @@
+"""The control protocol for tests: a JSON object per line in, one per line out.
+
+Operations::
+
+    {"op": "fault", "name": NAME, ...}   NAME and its fields below
+    {"op": "clear"}                      end all faults
+    {"op": "state"}                      the truth about the vehicle
+    {"op": "received", "since": N}       what ground links have sent, after index N
+
+Faults: `silence` (seconds, sending, receiving), `lose_acks` (command, count), `delay_acks` (command, count,
+seconds), `foreign_ack` (command, count, result, system, component), `refuse` (command, count, result, text),
+`in_progress` (command, count, seconds), `freeze_gps` (seconds), `low_battery` (voltage), `pilot_mode` (mode),
+`pilot_sticks` (roll, pitch, throttle, yaw in microseconds), `pilot_disarm`, `reboot`, `ekf_bad` (seconds).
+`command` is a MAV_CMD number or "all", seconds are simulated ones and default to "until cleared".
+
+Every answer has "ok"; with false there is an "error" that says why.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from .faults import FaultError
+from .geodesy import from_ned
+from .simulator import Received, Simulator
+
+LOW_VOLTAGE = 9.9
+
+
+class Control:
+    """Executes the operations on one simulator."""
+
+    def __init__(self, simulator: Simulator) -> None:
+        self._simulator = simulator
+        self._operations: dict[str, Callable[[Mapping[str, Any]], dict[str, Any]]] = {
+            "fault": self._fault,
+            "clear": self._clear,
+            "state": self._state,
+            "received": self._received,
+        }
+        self._faults: dict[str, Callable[[Mapping[str, Any]], None]] = {
+            "silence": self._silence,
+            "freeze_gps": self._freeze_gps,
+            "low_battery": self._low_battery,
+            "pilot_mode": self._pilot_mode,
+            "pilot_sticks": self._pilot_sticks,
+            "pilot_disarm": self._pilot_disarm,
+            "reboot": self._reboot,
+            "ekf_bad": self._ekf_bad,
+        }
+
+    def handle_line(self, line: str) -> str:
+        """Answer one line (without its end); never raises for what the line says."""
+        try:
+            request = json.loads(line)
+            operation = self._operations[request["op"]]
+            answer = {"ok": True, **operation(request)}
+        except (KeyError, TypeError, ValueError) as error:
+            answer = {"ok": False, "error": f"{type(error).__name__}: {error}"}
+        return json.dumps(answer, default=_as_json)
+
+    def _fault(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        name = request["name"]
+        if name in self._faults:
+            self._faults[name](request)
+        else:
+            self._simulator.faults.add(name, request)
+        return {}
+
+    def _clear(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        del request
+        self._simulator.faults.clear()
+        self._simulator.copter.battery.forced_voltage = None
+        self._simulator.copter.estimator.blind_until = -math.inf
+        return {}
+
+    def _silence(self, request: Mapping[str, Any]) -> None:
+        self._simulator.faults.silence(
+            self._simulator.copter.now,
+            _seconds(request),
+            sending=bool(request.get("sending", True)),
+            receiving=bool(request.get("receiving", True)),
+        )
+
+    def _freeze_gps(self, request: Mapping[str, Any]) -> None:
+        self._simulator.faults.freeze_gps(self._simulator.copter.now, _seconds(request))
+
+    def _low_battery(self, request: Mapping[str, Any]) -> None:
+        self._simulator.copter.battery.forced_voltage = float(request.get("voltage", LOW_VOLTAGE))
+
+    def _pilot_mode(self, request: Mapping[str, Any]) -> None:
+        copter = self._simulator.copter
+        wanted = str(request["mode"]).upper()
+        numbers = [number for number, mode in copter.modes.items() if mode.name == wanted]
+        if not numbers:
+            raise FaultError(f"no mode is called {wanted}")
+        if not copter.landed:
+            # A pilot who takes over holds the throttle in the middle, not at the bottom.
+            copter.sticks.move(3, 1500)
+        if not copter.set_mode(numbers[0]):
+            raise FaultError(f"the vehicle refused {wanted}")
+
+    def _pilot_sticks(self, request: Mapping[str, Any]) -> None:
+        for channel, name in enumerate(("roll", "pitch", "throttle", "yaw"), start=1):
+            if name in request:
+                self._simulator.copter.sticks.move(channel, int(request[name]))
+
+    def _pilot_disarm(self, request: Mapping[str, Any]) -> None:
+        del request
+        self._simulator.copter.disarm_landed()
+
+    def _reboot(self, request: Mapping[str, Any]) -> None:
+        del request
+        self._simulator.reboot_soon()
+
+    def _ekf_bad(self, request: Mapping[str, Any]) -> None:
+        copter = self._simulator.copter
+        copter.estimator.blind_until = copter.now + _seconds(request)
+
+    def _state(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        del request
+        copter = self._simulator.copter
+        body = copter.body
+        place = from_ned(copter.estimator.start, body.position)
+        home = copter.home
+        return {
+            "mode": copter.mode.name,
+            "armed": copter.armed,
+            "landed": copter.landed,
+            "ready": copter.estimator.ready,
+            "position": body.position,
+            "velocity": body.velocity,
+            "latitude": place.latitude,
+            "longitude": place.longitude,
+            "altitude_amsl": place.altitude,
+            "altitude_above_home": place.altitude - copter.home_altitude,
+            "yaw_degrees": math.degrees(body.yaw) % 360,
+            "time_boot_ms": round(copter.now * 1000),
+            "speedup": self._simulator.speedup,
+            "battery": {
+                "voltage": copter.battery.voltage,
+                "current": copter.battery.current,
+                "remaining": copter.battery.remaining,
+            },
+            "home": None if home is None else home._asdict(),
+            "servos": copter.servos.pulses(1000),
+            "mission": {"items": len(copter.mission.items), "current": copter.mission.current},
+        }
+
+    def _received(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        since, heartbeats = int(request.get("since", 0)), bool(request.get("heartbeats", False))
+        entries = [entry for entry in self._simulator.received if entry.index > since]
+        last = entries[-1].index if entries else since
+        wanted = [entry for entry in entries if heartbeats or entry.message.get_type() != "HEARTBEAT"]
+        return {"last": last, "messages": [_describe(entry) for entry in wanted]}
+
+
+def _describe(entry: Received) -> dict[str, Any]:
+    fields = entry.message.to_dict()
+    name = fields.pop("mavpackettype")
+    return {
+        "index": entry.index,
+        "time": entry.time,
+        "wall": entry.wall,
+        "link": entry.link,
+        "system": entry.message.get_srcSystem(),
+        "component": entry.message.get_srcComponent(),
+        "name": name,
+        "fields": fields,
+    }
+
+
+def _seconds(request: Mapping[str, Any]) -> float:
+    seconds = float(request.get("seconds", math.inf))
+    if math.isnan(seconds) or seconds < 0:
+        raise FaultError("seconds must not be negative")
+    return seconds
+
+
+def _as_json(value: Any) -> Any:
+    if isinstance(value, (bytes, bytearray)):
+        return list(value)
+    raise TypeError(f"cannot tell {type(value).__name__} as JSON")

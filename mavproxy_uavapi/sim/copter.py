@@ -1,0 +1,402 @@
+"""The vehicle without its radio: flight state, failsafes and the control loop of one ArduCopter."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections import deque
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from . import arming
+from .battery import Battery
+from .channels import Servos, Sticks
+from .estimator import Estimator
+from .events import Broadcast, Event, StatusText
+from .geodesy import Location, Ned, to_ned
+from .mission import Mission, State
+from .modes import Guided, Mode, build
+from .modes.base import Demand
+from .options import Options
+from .parameters import Parameters
+from .physics import Body
+from .position_control import Limits, PositionController, Speed
+from .yaw_control import AutoYaw
+
+ARMING_DELAY = 2.0
+"""Seconds after arming in which the motors do not spool up yet (ARMING_DELAY_SEC)."""
+LANDED_AFTER = 1.0
+MAYBE_LANDED_AFTER = 0.2
+"""Seconds of standing still with low thrust that the land detector wants (LAND_DETECTOR_TRIGGER_SEC)."""
+PUSHING_DOWN = 2.0
+"""Thrust in m/s/s below weight from which the detector takes the throttle for low."""
+ARRIVAL_DISTANCE = 0.1
+ARRIVAL_SPEED = 0.1
+EKF_FAILSAFE_AFTER = 1.0
+FIRMWARE = "ArduCopter V4.6.0 (embedded)"
+
+
+class Copter:
+    """All state of one vehicle between two boots.
+
+    Time is `now`, seconds since boot on the simulated clock. The flight code tells the ground through
+    `events`, which the owner empties.
+    """
+
+    def __init__(self, options: Options, parameters: Parameters, mission: Mission, seed: int) -> None:
+        self.options = options
+        self.parameters = parameters
+        self.mission = mission
+        self.events: deque[Event] = deque()
+        self.now = 0.0
+        self._steps = 0
+        home = options.home
+        start = Location(home.latitude, home.longitude, home.altitude)
+        self.body = Body.at_rest(home.heading, options.wind)
+        self.estimator = Estimator(start, options.ready_after, options.gps_noise, random.Random(seed))
+        self.position = PositionController()
+        self.yaw = AutoYaw()
+        self.battery = Battery(parameters)
+        self.sticks = Sticks()
+        self.servos = Servos(parameters)
+        self.home: Location | None = None
+        self._home_locked = False
+        self.armed = False
+        self.auto_armed = False
+        self.landed = True
+        self.failsafe = False
+        self._spool = 0.0
+        self._armed_since = 0.0
+        self._still_for = 0.0
+        self._idle_since = 0.0
+        self._blind_for = 0.0
+        self._last_report = -arming.REPORT_INTERVAL + 1.0
+        self._switch: int | None = None
+        self._boot_texts = deque(_BOOT_TEXTS)
+        self.modes = build(self)
+        self.mode: Mode = self.modes[0]
+        self.mode.enter(checked=False)
+        mission.reset()
+
+    # What the ground is told.
+
+    def tell(self, event: Event) -> None:
+        """Queue an event for the ground."""
+        self.events.append(event)
+
+    def say(self, severity: int, text: str) -> None:
+        """Queue a STATUSTEXT of a MAV_SEVERITY."""
+        self.events.append(StatusText(severity, text))
+
+    def say_banner(self) -> None:
+        """The firmware and frame, as at boot."""
+        self.say(mavlink.MAV_SEVERITY_INFO, FIRMWARE)
+        self.say(mavlink.MAV_SEVERITY_INFO, "Frame: QUAD/PLUS")
+
+    # Derived state.
+
+    @property
+    def guided(self) -> Guided:
+        """The GUIDED mode, current or not."""
+        mode = self.modes[Guided.number]
+        assert isinstance(mode, Guided)
+        return mode
+
+    @property
+    def home_offset(self) -> Ned:
+        """Home in NED metres from the EKF origin; the origin itself before home is set."""
+        if self.home is None or self.estimator.origin is None:
+            return Ned(0.0, 0.0, 0.0)
+        return to_ned(self.estimator.origin, self.home)
+
+    @property
+    def altitude(self) -> float:
+        """Estimated metres above home."""
+        return self.home_offset.down - self.estimator.position.down
+
+    @property
+    def grounded(self) -> bool:
+        """Whether modes must keep the motors at idle: ArduCopter's is_disarmed_or_landed."""
+        return not self.armed or not self.auto_armed or self.landed
+
+    @property
+    def spooled_up(self) -> bool:
+        """Whether the motors give full thrust."""
+        return self._spool >= 1.0
+
+    @property
+    def spooled_down(self) -> bool:
+        """Whether the motors are at ground idle."""
+        return self._spool <= 0.0
+
+    @property
+    def maybe_landed(self) -> bool:
+        """Whether the land detector has its first suspicion."""
+        return self.landed or self._still_for >= MAYBE_LANDED_AFTER
+
+    def arrived(self, target: Ned) -> bool:
+        """Whether the trajectory has stopped at target and the vehicle is within WPNAV_RADIUS of it."""
+        control = self.position
+        radius = self.parameters["WPNAV_RADIUS"] / 100
+        return (
+            math.dist(control.position, target) < ARRIVAL_DISTANCE
+            and math.hypot(*control.velocity) < ARRIVAL_SPEED
+            and math.dist(self.estimator.position, target) < radius
+        )
+
+    def default_limits(self) -> Limits:
+        """Speeds and accelerations of the WPNAV parameters, in SI units."""
+        parameters = self.parameters
+        return Limits(
+            speed=max(parameters["WPNAV_SPEED"], 10) / 100,
+            speed_up=max(parameters["WPNAV_SPEED_UP"], 10) / 100,
+            speed_down=max(parameters["WPNAV_SPEED_DN"], 10) / 100,
+            acceleration=max(parameters["WPNAV_ACCEL"], 10) / 100,
+            acceleration_z=max(parameters["WPNAV_ACCEL_Z"], 10) / 100,
+            lean=math.radians(max(parameters["ANGLE_MAX"], 1000) / 100),
+        )
+
+    def change_limit(self, kind: Speed, speed: float) -> None:
+        """Set a speed limit in m/s until the mode or its submode resets them."""
+        self.position.limits.change(kind, speed)
+
+    # What the ground or the flight code can do.
+
+    def relax(self) -> None:
+        """Bring all targets to where the vehicle is."""
+        self.position.start_at(self.estimator.position, self.estimator.velocity)
+
+    def lift_off(self) -> None:
+        """The vehicle leaves the ground now."""
+        self.landed = False
+        self.auto_armed = True
+        self._still_for = 0.0
+        self.relax()
+
+    def fix_yaw(self, angle: float, speed: float, direction: int, relative: bool) -> None:
+        """MAV_CMD_CONDITION_YAW with angle in degrees and speed in deg/s."""
+        self.yaw.fix(math.radians(angle), math.radians(speed), direction, relative, self.body.yaw)
+
+    def set_servo(self, channel: int, pulse: int) -> bool:
+        """Drive a free servo output; says so when it is not free."""
+        if self.servos.set(channel, pulse):
+            return True
+        self.say(mavlink.MAV_SEVERITY_INFO, f"ServoRelayEvent: Channel {channel} is already in use")
+        return False
+
+    def set_home(self, home: Location, *, lock: bool) -> bool:
+        """Move home; False before there is an EKF origin. A locked home is not moved by arming."""
+        if self.estimator.origin is None:
+            return False
+        self.home = home
+        self._home_locked = self._home_locked or lock
+        self.tell(Broadcast("HOME_POSITION"))
+        self.tell(Broadcast("GPS_GLOBAL_ORIGIN"))
+        return True
+
+    def set_home_here(self, *, lock: bool) -> bool:
+        """Make the present place home; False without a position."""
+        return self.estimator.ready and self.set_home(self.estimator.location, lock=lock)
+
+    def set_mode(self, number: int) -> bool:
+        """Change the flight mode; False with a STATUSTEXT that says why. While disarmed nothing is checked."""
+        if number == self.mode.number:
+            return True
+        mode = self.modes.get(number)
+        if mode is None:
+            self.say(mavlink.MAV_SEVERITY_WARNING, f"No such mode {number}")
+            return False
+        reason = self._mode_refusal(mode)
+        if reason is not None:
+            self.say(mavlink.MAV_SEVERITY_WARNING, f"Mode change to {mode.name} failed: {reason}")
+            return False
+        self.mode.leave()
+        if not self.mode.positions:
+            self.relax()
+        self.mode = mode
+        self.tell(Broadcast("HEARTBEAT"))
+        return True
+
+    def _mode_refusal(self, mode: Mode) -> str | None:
+        if self.armed:
+            throttle = self.sticks.throttle(self.now)
+            if self.landed and mode.manual_throttle and not self.mode.manual_throttle and throttle > 0.2:
+                return "throttle too high"
+            if mode.needs_position and not self.estimator.ready:
+                return "requires position"
+        return None if mode.enter(checked=self.armed) else "init failed"
+
+    def arm(self, *, forced: bool) -> bool:
+        """Arm the motors; False with STATUSTEXTs that say why not."""
+        if self.armed:
+            return True
+        if not (forced and not arming.mandatory_failures(self)):
+            failures = arming.prearm_failures(self) or arming.arm_failures(self)
+            for failure in failures:
+                self.say(mavlink.MAV_SEVERITY_CRITICAL, f"Arm: {failure}")
+            if failures:
+                return False
+        self.say(mavlink.MAV_SEVERITY_INFO, "Arming motors")
+        self.yaw.armed_yaw = self.body.yaw
+        if self.home is not None and not self._home_locked:
+            self.set_home_here(lock=False)
+        self.armed = True
+        self._armed_since = self._idle_since = self.now
+        self._spool = 0.0
+        return True
+
+    def disarm(self, *, forced: bool) -> bool:
+        """Disarm for the ground station; refused (False) in the air unless forced."""
+        if self.armed and not self.landed and not forced:
+            return False
+        self.disarm_landed()
+        return True
+
+    def disarm_landed(self) -> None:
+        """Stop the motors, whatever the vehicle is doing."""
+        if not self.armed:
+            return
+        self.say(mavlink.MAV_SEVERITY_INFO, "Disarming motors")
+        self.armed = self.auto_armed = False
+        self.landed = True
+        self._spool = 0.0
+        self.mission.reset()
+
+    def report_prearm(self) -> None:
+        """Tell the ground what keeps the vehicle from arming."""
+        for failure in arming.prearm_failures(self):
+            self.say(mavlink.MAV_SEVERITY_CRITICAL, f"PreArm: {failure}")
+
+    # The control loop.
+
+    def step(self, dt: float) -> None:
+        """Advance the vehicle by dt seconds. Call it with the same dt always: time is counted in steps."""
+        self._steps += 1
+        self.now = self._steps * dt
+        self.estimator.update(self.now, self.body, dt)
+        self._housekeeping()
+        self._check_failsafes(dt)
+        self._update_auto_armed()
+        demand = self.mode.step(dt)
+        self._update_motors(demand, dt)
+        self._detect_landing(demand, dt)
+        self._disarm_when_forgotten()
+
+    def _housekeeping(self) -> None:
+        """Boot texts, origin and home, the periodic pre-arm report, the mode switch."""
+        while self._boot_texts and self.now >= self._boot_texts[0][0] * self.estimator.ready_after:
+            self.say(mavlink.MAV_SEVERITY_INFO, self._boot_texts.popleft()[1])
+        if self.estimator.origin is None and self.estimator.ready:
+            self.estimator.origin = self.estimator.start
+            self.set_home_here(lock=False)
+            self.say(mavlink.MAV_SEVERITY_INFO, f"Field Elevation Set: {self.home_altitude:.0f}m")
+        if self.now - self._last_report >= arming.REPORT_INTERVAL:
+            self._last_report = self.now
+            self.report_prearm()
+        position = self.sticks.mode_switch(int(self.parameters["FLTMODE_CH"]), self.now)
+        if self._switch is not None and position != self._switch:
+            self.set_mode(int(self.parameters[f"FLTMODE{position}"]))
+        self._switch = position
+
+    @property
+    def home_altitude(self) -> float:
+        """Metres AMSL of home; of the start before home is set."""
+        return (self.home or self.estimator.start).altitude
+
+    def _check_failsafes(self, dt: float) -> None:
+        if self.armed and self.battery.becomes_low(self.now):
+            self._battery_failsafe()
+        self._blind_for = 0.0 if self.estimator.ready else self._blind_for + dt
+        lost = self._blind_for >= EKF_FAILSAFE_AFTER and self.estimator.origin is not None
+        if lost and self.armed and not self.landed and self.mode.needs_position:
+            self.say(mavlink.MAV_SEVERITY_CRITICAL, "EKF Failsafe")
+            self.failsafe = True
+            self.set_mode(9)
+            self.say(mavlink.MAV_SEVERITY_CRITICAL, f"EKF Failsafe: changed to {self.mode.name} Mode")
+        if self.failsafe and not self.armed and self.estimator.ready and not self.battery.low:
+            self.failsafe = False
+
+    def _battery_failsafe(self) -> None:
+        """BATT_FS_LOW_ACT: 0 only warns, 1 lands, 2 to 4 return (SmartRTL is not flown here) or land."""
+        battery = self.battery
+        text = f"Battery 1 is low {battery.voltage:.2f}V used {battery.consumed:.0f} mAh"
+        self.say(mavlink.MAV_SEVERITY_WARNING, text)
+        action = int(self.parameters["BATT_FS_LOW_ACT"])
+        self.failsafe = True
+        if action == 0:
+            return
+        self.say(mavlink.MAV_SEVERITY_WARNING, "Battery Failsafe")
+        if self.landed:
+            self.disarm_landed()
+        elif action == 1 or not self.set_mode(6):
+            self.set_mode(9)
+
+    def _update_auto_armed(self) -> None:
+        throttle = self.sticks.throttle(self.now)
+        if not self.armed:
+            self.auto_armed = False
+        elif throttle > 0:
+            self.auto_armed = True
+        elif self.mode.manual_throttle and self.landed:
+            self.auto_armed = False
+
+    def _update_motors(self, demand: Demand, dt: float) -> None:
+        change = dt / max(self.parameters["MOT_SPOOL_TIME"], 0.05)
+        if not self.armed:
+            self._spool = 0.0
+        elif demand.idle:
+            self._spool = max(0.0, self._spool - change)
+        elif self.now - self._armed_since >= ARMING_DELAY:
+            self._spool = min(1.0, self._spool + change)
+        lifting = self.armed and not self.landed and not demand.idle
+        thrust = demand.thrust if lifting else Demand().thrust
+        self.body.step(thrust, demand.yaw_rate if lifting else 0.0, dt)
+        self.battery.drain(self.throttle, dt)
+
+    @property
+    def throttle(self) -> float:
+        """Thrust as a share of the thrust that hovers; a little at ground idle, zero disarmed."""
+        if not self.armed:
+            return 0.0
+        return self.body.throttle_share if not self.landed else 0.1 * self._spool
+
+    def _detect_landing(self, demand: Demand, dt: float) -> None:
+        if not self.armed:
+            self.landed = True
+        elif not self.landed:
+            still = self.body.on_ground and demand.thrust.down > PUSHING_DOWN
+            self._still_for = self._still_for + dt if still else 0.0
+            if self._still_for >= LANDED_AFTER:
+                self.landed = True
+
+    def _disarm_when_forgotten(self) -> None:
+        """DISARM_DELAY: armed, on the ground, motors at idle and the throttle stick down."""
+        delay = self.parameters["DISARM_DELAY"]
+        waiting = self.armed and self.landed and self.spooled_down and self.sticks.throttle(self.now) == 0
+        if not waiting or delay <= 0:
+            self._idle_since = self.now
+        elif self.now - self._idle_since >= delay:
+            self.disarm_landed()
+
+    def current_item(self, seq: int) -> bool:
+        """Make seq the current mission item, at once when the mission is being flown."""
+        if not self.mission.select(seq):
+            return False
+        auto = self.modes[3]
+        if self.mode is auto and self.armed and self.mission.state is State.RUNNING:
+            auto.jump_to(seq)  # type: ignore[attr-defined]
+        return True
+
+
+_BOOT_TEXTS = (
+    # Share of the time until the estimator is ready, and what SITL says then.
+    (0.05, FIRMWARE),
+    (0.05, "Frame: QUAD/PLUS"),
+    (0.1, "EKF3 IMU0 initialised"),
+    (0.3, "AHRS: EKF3 active"),
+    (0.4, "EKF3 IMU0 tilt alignment complete"),
+    (0.4, "EKF3 IMU0 MAG0 initial yaw alignment complete"),
+    (0.8, "GPS 1: detected u-blox"),
+    (1.0, "EKF3 IMU0 origin set"),
+    (1.0, "EKF3 IMU0 is using GPS"),
+)

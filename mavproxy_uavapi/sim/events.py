@@ -1,0 +1,30 @@
+"""What the flight code wants told to the ground, without knowing how."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class StatusText:
+    """A line for people; severity is a MAV_SEVERITY."""
+
+    severity: int
+    text: str
+
+
+@dataclass(frozen=True)
+class Broadcast:
+    """A message, by its MAVLink name, that goes to all links now instead of in its stream."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class ItemReached:
+    """The mission item with this number is done."""
+
+    seq: int
+
+
+Event = StatusText | Broadcast | ItemReached

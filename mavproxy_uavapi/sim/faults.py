@@ -1,0 +1,134 @@
+"""Misbehaviour on command: everything that a test wants to go wrong, decided in one place.
+
+Names of faults and their fields are those of the control line protocol (`control`). Times are simulated
+seconds. The simulator asks here before it sends, receives and acknowledges.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+ALL_COMMANDS = -1
+FOREIGN_SYSTEM = 99
+FOREIGN_COMPONENT = 190
+
+
+class FaultError(ValueError):
+    """A fault that does not exist or lacks a field; the text says which."""
+
+
+@dataclass
+class CommandFault:
+    """A fault that concerns commands: command id or ALL_COMMANDS, how often it still happens."""
+
+    command: int
+    count: float = math.inf
+    seconds: float = 0.0
+    result: int = 0
+    text: str = ""
+    system: int = FOREIGN_SYSTEM
+    component: int = FOREIGN_COMPONENT
+
+    def take(self, command: int) -> bool:
+        """Whether it happens to this command; counts it."""
+        if self.count <= 0 or self.command not in (ALL_COMMANDS, command):
+            return False
+        self.count -= 1
+        return True
+
+
+@dataclass(frozen=True)
+class PlannedAck:
+    """A COMMAND_ACK to send at a time, from a system and component (None: the vehicle itself)."""
+
+    at: float
+    result: int
+    source: tuple[int, int] | None = None
+
+
+class Faults:
+    """Which faults are active."""
+
+    KINDS = ("lose_acks", "delay_acks", "foreign_ack", "refuse", "in_progress")
+
+    def __init__(self) -> None:
+        self.clear()
+
+    def clear(self) -> None:
+        """Everything works again."""
+        self._mute_until = self._deaf_until = -math.inf
+        self.gps_frozen_until = -math.inf
+        self._command: dict[str, list[CommandFault]] = {kind: [] for kind in self.KINDS}
+
+    def silence(self, now: float, seconds: float, *, sending: bool, receiving: bool) -> None:
+        """Send nothing and/or hear nothing for seconds (inf: until cleared)."""
+        if sending:
+            self._mute_until = now + seconds
+        if receiving:
+            self._deaf_until = now + seconds
+
+    def freeze_gps(self, now: float, seconds: float) -> None:
+        """Report the present position for seconds, whatever the vehicle does."""
+        self.gps_frozen_until = now + seconds
+
+    def add(self, kind: str, fields: Mapping[str, Any]) -> None:
+        """Make a fault of commands active; FaultError when the fields make no sense."""
+        if kind not in self._command:
+            raise FaultError(f"no fault is called {kind!r}")
+        try:
+            command = fields.get("command", "all")
+            fault = CommandFault(ALL_COMMANDS if command == "all" else int(command))
+            fault.count = float(fields.get("count", math.inf))
+            fault.seconds = float(fields.get("seconds", 0.0))
+            fault.result = int(fields.get("result", mavlink.MAV_RESULT_FAILED))
+            fault.text = str(fields.get("text", ""))
+            fault.system = int(fields.get("system", FOREIGN_SYSTEM))
+            fault.component = int(fields.get("component", FOREIGN_COMPONENT))
+        except (TypeError, ValueError) as error:
+            raise FaultError(f"{kind}: {error}") from error
+        self._command[kind].append(fault)
+
+    def mute(self, now: float) -> bool:
+        """Whether nothing may be sent now."""
+        return now < self._mute_until
+
+    def deaf(self, now: float) -> bool:
+        """Whether nothing is heard now."""
+        return now < self._deaf_until
+
+    def refusal(self, command: int) -> CommandFault | None:
+        """The fault that refuses this command instead of doing it, if any."""
+        return self._taken("refuse", command)
+
+    def acks(self, command: int, result: int, now: float) -> list[PlannedAck]:
+        """What is sent as acknowledgement of a command that ended with result."""
+        planned = []
+        foreign = self._taken("foreign_ack", command)
+        if foreign is not None:
+            planned.append(PlannedAck(now, foreign.result, (foreign.system, foreign.component)))
+        at = now
+        progress = self._taken("in_progress", command)
+        if progress is not None:
+            # As often as a long command reports: twice a second.
+            reports = max(1, int(progress.seconds / 0.5))
+            planned += [
+                PlannedAck(now + 0.5 * report, mavlink.MAV_RESULT_IN_PROGRESS) for report in range(reports)
+            ]
+            at += progress.seconds
+        delay = self._taken("delay_acks", command)
+        if delay is not None:
+            at += delay.seconds
+        if self._taken("lose_acks", command) is None:
+            planned.append(PlannedAck(at, result))
+        return planned
+
+    def _taken(self, kind: str, command: int) -> CommandFault | None:
+        for fault in self._command[kind]:
+            if fault.take(command):
+                return fault
+        return None

@@ -1,0 +1,56 @@
+"""One MAVLink link of the vehicle: its stream rates, its sequence numbers and what waits to be sent."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from .streams import Streams
+
+COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
+
+
+class Link:
+    """Messages for one peer; the owner of the socket takes them with `drain` or `messages`."""
+
+    def __init__(self, system: int, name: str = "") -> None:
+        self.name = name
+        self.streams = Streams()
+        self.parameter_cursor: int | None = None
+        """Next index of a running PARAM_REQUEST_LIST, or None."""
+        self._encoder = mavlink.MAVLink(None, srcSystem=system, srcComponent=COMPONENT)
+        self._outbox: list[tuple[Any, tuple[int, int] | None]] = []
+        self.muted = False
+
+    def restart(self) -> None:
+        """The vehicle has booted: streams are back to heartbeats only."""
+        self.streams = Streams()
+        self.parameter_cursor = None
+
+    def send(self, message: Any, source: tuple[int, int] | None = None) -> None:
+        """Queue a message; source makes it come from another system and component."""
+        if not self.muted:
+            self._outbox.append((message, source))
+
+    def messages(self) -> list[Any]:
+        """Take what is queued as messages."""
+        queued, self._outbox = self._outbox, []
+        return [message for message, _ in queued]
+
+    def drain(self) -> bytes:
+        """Take what is queued as bytes."""
+        if not self._outbox:
+            return b""
+        queued, self._outbox = self._outbox, []
+        return b"".join(self._pack(message, source) for message, source in queued)
+
+    def _pack(self, message: Any, source: tuple[int, int] | None) -> bytes:
+        encoder = self._encoder
+        own = (encoder.srcSystem, encoder.srcComponent)
+        if source is not None:
+            encoder.srcSystem, encoder.srcComponent = source
+        data = bytes(message.pack(encoder))
+        encoder.srcSystem, encoder.srcComponent = own
+        encoder.seq = (encoder.seq + 1) % 256
+        return data

@@ -1,0 +1,130 @@
+"""The mission list and its marker. How it is flown is in `modes.auto`, how it is sent in `mission_protocol`."""
+
+from __future__ import annotations
+
+from enum import Enum, auto
+from typing import NamedTuple
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+NAVIGATION = frozenset(
+    {
+        mavlink.MAV_CMD_NAV_WAYPOINT,
+        mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT,
+        mavlink.MAV_CMD_NAV_LOITER_UNLIM,
+        mavlink.MAV_CMD_NAV_LOITER_TIME,
+        mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH,
+        mavlink.MAV_CMD_NAV_LAND,
+        mavlink.MAV_CMD_NAV_TAKEOFF,
+        mavlink.MAV_CMD_NAV_DELAY,
+    }
+)
+CONDITION = frozenset(
+    {
+        mavlink.MAV_CMD_CONDITION_DELAY,
+        mavlink.MAV_CMD_CONDITION_DISTANCE,
+        mavlink.MAV_CMD_CONDITION_YAW,
+    }
+)
+IMMEDIATE = frozenset(
+    {
+        mavlink.MAV_CMD_DO_JUMP,
+        mavlink.MAV_CMD_DO_CHANGE_SPEED,
+        mavlink.MAV_CMD_DO_SET_HOME,
+        mavlink.MAV_CMD_DO_SET_SERVO,
+        mavlink.MAV_CMD_DO_SET_ROI,
+        mavlink.MAV_CMD_DO_SET_ROI_LOCATION,
+        mavlink.MAV_CMD_DO_SET_ROI_NONE,
+        mavlink.MAV_CMD_DO_LAND_START,
+        mavlink.MAV_CMD_DO_DIGICAM_CONTROL,
+        mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST,
+    }
+)
+SUPPORTED = NAVIGATION | CONDITION | IMMEDIATE
+
+
+class Item(NamedTuple):
+    """One mission item: x and y are 1e-7 degrees for a location, z metres in its frame."""
+
+    command: int
+    frame: int
+    param1: float
+    param2: float
+    param3: float
+    param4: float
+    x: int
+    y: int
+    z: float
+
+
+class State(Enum):
+    """Where the mission stands; STOPPED is one that was left and can be resumed."""
+
+    NOT_STARTED = auto()
+    RUNNING = auto()
+    STOPPED = auto()
+    COMPLETE = auto()
+
+
+MAVLINK_STATE = {
+    State.NOT_STARTED: mavlink.MISSION_STATE_NOT_STARTED,
+    State.RUNNING: mavlink.MISSION_STATE_ACTIVE,
+    State.STOPPED: mavlink.MISSION_STATE_NOT_STARTED,
+    State.COMPLETE: mavlink.MISSION_STATE_COMPLETE,
+}
+
+
+class Mission:
+    """Items 0..n-1, of which item 0 is home and never flown."""
+
+    def __init__(self) -> None:
+        self.items: list[Item] = []
+        self.state = State.NOT_STARTED
+        self.current = 0
+        self.changes = 0
+        """Grows with each change of the items, so that a running mission notices."""
+        self.jumps_left: dict[int, int] = {}
+
+    @property
+    def present(self) -> bool:
+        """Whether there is anything beyond home."""
+        return len(self.items) > 1
+
+    @property
+    def starts_with_takeoff(self) -> bool:
+        """Whether the first navigation item lifts off."""
+        for item in self.items[1:]:
+            if item.command in NAVIGATION and item.command != mavlink.MAV_CMD_NAV_DELAY:
+                return bool(item.command == mavlink.MAV_CMD_NAV_TAKEOFF)
+        return False
+
+    def replace(self, items: list[Item]) -> None:
+        """A complete upload takes the place of the old list."""
+        self.items = items
+        self.changes += 1
+        if self.current >= len(items):
+            self.reset()
+
+    def clear(self) -> bool:
+        """Forget everything; refused (False) while the mission runs, as ArduPilot does."""
+        if self.state is State.RUNNING:
+            return False
+        self.items = []
+        self.changes += 1
+        self.reset()
+        return True
+
+    def reset(self) -> None:
+        """Back to the start."""
+        self.current = 0
+        self.state = State.NOT_STARTED
+        self.jumps_left = {}
+
+    def select(self, seq: int) -> bool:
+        """Make seq the current item; False when there is none such. 0 stands for the first real item."""
+        if not 0 <= seq < len(self.items):
+            return False
+        self.current = seq
+        if self.state is State.COMPLETE:
+            self.state = State.STOPPED
+        return True

@@ -1,0 +1,253 @@
+"""MAVLink's mission protocol: upload, download, clear and set current, for missions, fences and rally points.
+
+Only missions are flown; fence and rally lists are kept so that a ground station finds what it stored.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from .events import StatusText
+from .mission import SUPPORTED, Item
+
+if TYPE_CHECKING:
+    from .copter import Copter
+    from .link import Link
+
+LIMIT = 724
+"""What ArduCopter can store in SITL."""
+RETRY_AFTER = 1.0
+GIVE_UP_AFTER = 8.0
+MISSION = mavlink.MAV_MISSION_TYPE_MISSION
+OTHER_LISTS = (mavlink.MAV_MISSION_TYPE_FENCE, mavlink.MAV_MISSION_TYPE_RALLY)
+
+
+@dataclass
+class Upload:
+    """An upload under way from one sender; next and last are item numbers, times simulated seconds."""
+
+    link: Link
+    sender: tuple[int, int]
+    kind: int
+    next: int
+    last: int
+    items: list[Item]
+    heard_at: float = 0.0
+    asked_at: float = 0.0
+
+
+class MissionProtocol:
+    """Answers MISSION_* messages for one vehicle."""
+
+    def __init__(self, copter: Copter) -> None:
+        self.copter = copter
+        self._lists: dict[int, list[Item]] = {kind: [] for kind in OTHER_LISTS}
+        self._upload: Upload | None = None
+        self._handlers = {
+            "MISSION_COUNT": self._count,
+            "MISSION_WRITE_PARTIAL_LIST": self._partial,
+            "MISSION_ITEM_INT": self._item,
+            "MISSION_ITEM": self._item,
+            "MISSION_REQUEST_LIST": self._request_list,
+            "MISSION_REQUEST_INT": self._request,
+            "MISSION_REQUEST": self._request,
+            "MISSION_CLEAR_ALL": self._clear,
+        }
+
+    def handle(self, link: Link, message: Any) -> bool:
+        """Answer a message on its link; False when it is not of this protocol."""
+        handler = self._handlers.get(message.get_type())
+        if handler is None:
+            return False
+        if message.mission_type not in (MISSION, *OTHER_LISTS):
+            self._ack(link, message, mavlink.MAV_MISSION_UNSUPPORTED)
+        else:
+            handler(link, message)
+        return True
+
+    def step(self) -> None:
+        """Ask again for an item that does not come; give up in the end."""
+        upload, now = self._upload, self.copter.now
+        if upload is None:
+            return
+        if now - upload.heard_at > GIVE_UP_AFTER:
+            self._upload = None
+            upload.link.send(
+                mavlink.MAVLink_mission_ack_message(
+                    *upload.sender, mavlink.MAV_MISSION_OPERATION_CANCELLED, upload.kind
+                )
+            )
+        elif now - upload.asked_at > RETRY_AFTER:
+            self._ask()
+
+    def items(self, kind: int) -> list[Item]:
+        """The stored list; item 0 of a mission is home as it is now."""
+        if kind != MISSION:
+            return self._lists[kind]
+        items = self.copter.mission.items
+        home = self.copter.home
+        if not items or home is None:
+            return items
+        place = (round(home.latitude * 1e7), round(home.longitude * 1e7), home.altitude)
+        return [Item(mavlink.MAV_CMD_NAV_WAYPOINT, mavlink.MAV_FRAME_GLOBAL, 0, 0, 0, 0, *place), *items[1:]]
+
+    def _ack(self, link: Link, message: Any, result: int) -> None:
+        link.send(mavlink.MAVLink_mission_ack_message(*_sender(message), result, message.mission_type))
+
+    def _busy(self, link: Link, message: Any) -> bool:
+        if self._upload is None:
+            return False
+        self._ack(link, message, mavlink.MAV_MISSION_DENIED)
+        return True
+
+    def _foreign_upload(self, link: Link, message: Any) -> bool:
+        """Somebody else's upload must not be disturbed; the own one may be started anew."""
+        if self._upload is not None and self._upload.sender != _sender(message):
+            return self._busy(link, message)
+        self._upload = None
+        return False
+
+    def _count(self, link: Link, message: Any) -> None:
+        if self._foreign_upload(link, message):
+            return
+        if message.count > LIMIT:
+            self._ack(link, message, mavlink.MAV_MISSION_NO_SPACE)
+        elif message.count == 0:
+            self._store(message.mission_type, [])
+            self._ack(link, message, mavlink.MAV_MISSION_ACCEPTED)
+        else:
+            self._begin(Upload(link, _sender(message), message.mission_type, 0, message.count - 1, []))
+
+    def _partial(self, link: Link, message: Any) -> None:
+        if self._busy(link, message):
+            return
+        items = list(self.items(message.mission_type))
+        first, last = message.start_index, message.end_index
+        if not 0 <= first <= last < len(items):
+            self.copter.tell(StatusText(mavlink.MAV_SEVERITY_WARNING, "Flight plan update rejected"))
+            self._ack(link, message, mavlink.MAV_MISSION_ERROR)
+            return
+        self._begin(Upload(link, _sender(message), message.mission_type, first, last, items))
+
+    def _begin(self, upload: Upload) -> None:
+        upload.heard_at = self.copter.now
+        self._upload = upload
+        self._ask()
+
+    def _ask(self) -> None:
+        upload = self._upload
+        if upload is not None:
+            upload.asked_at = self.copter.now
+            upload.link.send(mavlink.MAVLink_mission_request_message(*upload.sender, upload.next, upload.kind))
+
+    def _item(self, link: Link, message: Any) -> None:
+        if message.current == 2 and message.get_type() == "MISSION_ITEM":
+            # The old way to send a guided waypoint, which nobody should use any more.
+            self._ack(link, message, mavlink.MAV_MISSION_UNSUPPORTED)
+            return
+        upload = self._upload
+        if upload is None or upload.kind != message.mission_type:
+            self._ack(link, message, mavlink.MAV_MISSION_ERROR)
+        elif message.seq != upload.next:
+            self._ack(link, message, mavlink.MAV_MISSION_INVALID_SEQUENCE)
+        elif _sender(message) != upload.sender:
+            self._ack(link, message, mavlink.MAV_MISSION_DENIED)
+        else:
+            self._take(link, message, upload)
+
+    def _take(self, link: Link, message: Any, upload: Upload) -> None:
+        refusal = _refusal(message) if upload.kind == MISSION and message.seq > 0 else None
+        if refusal is not None:
+            self._upload = None
+            self._ack(link, message, refusal)
+            return
+        upload.items[message.seq : message.seq + 1] = [_as_item(message)]
+        upload.heard_at = self.copter.now
+        upload.next += 1
+        if upload.next <= upload.last:
+            self._ask()
+            return
+        self._upload = None
+        self._store(upload.kind, upload.items)
+        self._ack(link, message, mavlink.MAV_MISSION_ACCEPTED)
+        if upload.kind == MISSION:
+            self.copter.say(mavlink.MAV_SEVERITY_INFO, "Flight plan received")
+
+    def _store(self, kind: int, items: list[Item]) -> None:
+        if kind == MISSION:
+            self.copter.mission.replace(items)
+        else:
+            self._lists[kind] = items
+
+    def _request_list(self, link: Link, message: Any) -> None:
+        if not self._busy(link, message):
+            self._send_count(link, message)
+
+    def _send_count(self, link: Link, message: Any) -> None:
+        count = len(self.items(message.mission_type))
+        link.send(mavlink.MAVLink_mission_count_message(*_sender(message), count, message.mission_type))
+
+    def _request(self, link: Link, message: Any) -> None:
+        if self._busy(link, message):
+            return
+        items = self.items(message.mission_type)
+        if message.seq >= len(items):
+            self._send_count(link, message)
+            self._ack(link, message, mavlink.MAV_MISSION_INVALID_SEQUENCE)
+            return
+        link.send(_as_message(items[message.seq], message))
+
+    def _clear(self, link: Link, message: Any) -> None:
+        if self._foreign_upload(link, message):
+            return
+        cleared = True
+        if message.mission_type == MISSION:
+            cleared = self.copter.mission.clear()
+        else:
+            self._lists[message.mission_type] = []
+        self._ack(link, message, mavlink.MAV_MISSION_ACCEPTED if cleared else mavlink.MAV_MISSION_ERROR)
+
+
+def _sender(message: Any) -> tuple[int, int]:
+    return message.get_srcSystem(), message.get_srcComponent()
+
+
+def _refusal(message: Any) -> int | None:
+    if message.command not in SUPPORTED:
+        return int(mavlink.MAV_MISSION_UNSUPPORTED)
+    scale = 1e7 if message.get_type() == "MISSION_ITEM_INT" else 1.0
+    if abs(message.x) > 90 * scale:
+        return int(mavlink.MAV_MISSION_INVALID_PARAM5_X)
+    if abs(message.y) > 180 * scale:
+        return int(mavlink.MAV_MISSION_INVALID_PARAM6_Y)
+    return None
+
+
+def _as_item(message: Any) -> Item:
+    scale = 1 if message.get_type() == "MISSION_ITEM_INT" else 10_000_000
+    return Item(
+        message.command,
+        message.frame,
+        message.param1,
+        message.param2,
+        message.param3,
+        message.param4,
+        round(message.x * scale),
+        round(message.y * scale),
+        message.z,
+    )
+
+
+def _as_message(item: Item, request: Any) -> Any:
+    head = (*_sender(request), request.seq, item.frame, item.command, int(request.seq == 0), 1)
+    parameters = (item.param1, item.param2, item.param3, item.param4)
+    if request.get_type() == "MISSION_REQUEST_INT":
+        return mavlink.MAVLink_mission_item_int_message(
+            *head, *parameters, item.x, item.y, item.z, request.mission_type
+        )
+    return mavlink.MAVLink_mission_item_message(
+        *head, *parameters, item.x / 1e7, item.y / 1e7, item.z, request.mission_type
+    )

@@ -1,0 +1,105 @@
+"""What all flight modes have in common."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+from ..geodesy import Ned
+from ..physics import GRAVITY
+from ..position_control import Speed
+
+if TYPE_CHECKING:
+    from ..copter import Copter
+
+NO_LIFT = Ned(0.0, 0.0, GRAVITY)
+
+
+@dataclass(frozen=True)
+class Demand:
+    """What a mode asks of the airframe.
+
+    thrust is m/s/s beyond weight, yaw_rate rad/s; idle lets the motors spool down to ground idle.
+    """
+
+    thrust: Ned = NO_LIFT
+    yaw_rate: float = 0.0
+    idle: bool = False
+
+
+IDLE = Demand(idle=True)
+SPOOLING = Demand()
+
+
+class Mode:
+    """A flight mode; `step` is called at the control rate while it is the current one."""
+
+    name: ClassVar[str] = ""
+    number: ClassVar[int] = -1
+    needs_position: ClassVar[bool] = True
+    manual_throttle: ClassVar[bool] = False
+    armable: ClassVar[bool] = True
+    positions: ClassVar[bool] = True
+    """Whether the horizontal position is under the controller, which base_mode's guided bit tells."""
+
+    def __init__(self, copter: Copter) -> None:
+        self.copter = copter
+
+    def enter(self, checked: bool) -> bool:
+        """Prepare to fly; False refuses the mode ("init failed"). checked is False while disarmed."""
+        raise NotImplementedError
+
+    def leave(self) -> None:
+        """Another mode takes over."""
+
+    def step(self, dt: float) -> Demand:
+        """One control step of dt seconds."""
+        raise NotImplementedError
+
+    def take_off(self, altitude: float) -> bool:
+        """MAV_CMD_NAV_TAKEOFF to altitude metres above home; False where the mode cannot."""
+        del altitude
+        return False
+
+    def set_speed(self, kind: Speed, speed: float) -> bool:
+        """MAV_CMD_DO_CHANGE_SPEED in m/s; False where the mode has no speed of its own."""
+        del kind, speed
+        return False
+
+    def pause(self) -> bool:
+        """Stop and wait; False where there is nothing to pause."""
+        return False
+
+    def resume(self) -> bool:
+        """Go on after a pause; False where there is nothing to resume."""
+        return False
+
+    @property
+    def landing(self) -> bool:
+        """Whether the mode is on its way to the ground."""
+        return False
+
+    @property
+    def taking_off(self) -> bool:
+        """Whether a takeoff is under way."""
+        return False
+
+    @property
+    def target(self) -> Ned | None:
+        """Where the vehicle is going, metres NED from the EKF origin, or None."""
+        return None
+
+    def fly(self, dt: float) -> Demand:
+        """Follow the position controller's trajectory and the automatic yaw."""
+        copter = self.copter
+        control, estimate = copter.position, copter.estimator
+        course = (control.velocity[0], control.velocity[1])
+        rate = copter.yaw.rate(
+            copter.body.yaw, course, control.limits.speed, (estimate.position.north, estimate.position.east), dt
+        )
+        return Demand(control.thrust(estimate.position, estimate.velocity, dt), rate)
+
+    def wait_on_ground(self) -> Demand:
+        """Motors at ground idle, targets where the vehicle stands."""
+        self.copter.relax()
+        return IDLE

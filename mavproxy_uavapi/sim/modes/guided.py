@@ -1,0 +1,163 @@
+"""GUIDED: the companion computer or the ground says where to go, and the vehicle goes there."""
+
+from __future__ import annotations
+
+from enum import Enum, auto
+
+from ..geodesy import Ned
+from ..position_control import Speed
+from .base import Demand, Mode
+from .takeoff import Takeoff
+
+ZERO = Ned(0.0, 0.0, 0.0)
+SHORTEST_TIMEOUT = 0.1
+"""Seconds; a smaller GUID_TIMEOUT counts as this."""
+
+
+class Submode(Enum):
+    """Which kind of setpoint came last."""
+
+    TAKEOFF = auto()
+    POSITION = auto()
+    TRACKING = auto()
+    VELOCITY = auto()
+    ACCELERATION = auto()
+
+
+class YawSetpoint:
+    """The yaw fields of a setpoint: angle in radians, rate in rad/s; None where the mask ignores them."""
+
+    def __init__(self, angle: float | None = None, rate: float | None = None, relative: bool = False) -> None:
+        self.angle, self.rate, self.relative = angle, rate, relative
+
+
+NO_YAW = YawSetpoint()
+
+
+class Guided(Mode):
+    """Setpoints in NED metres from the EKF origin; ArduCopter's submodes and their timeouts."""
+
+    name = "GUIDED"
+    number = 4
+
+    submode = Submode.VELOCITY
+    paused = False
+    position_target = ZERO
+    velocity_target = ZERO
+    acceleration_target = ZERO
+    _updated = 0.0
+
+    def enter(self, checked: bool) -> bool:
+        del checked
+        self.takeoff = Takeoff(self.copter)
+        self.stop()
+        return True
+
+    def stop(self) -> None:
+        """Brake and hold: on entry, and what ArduCopter does with a setpoint that makes no sense."""
+        self._start(Submode.VELOCITY)
+        self.velocity_target = self.acceleration_target = ZERO
+        self.paused = False
+
+    def _start(self, submode: Submode) -> None:
+        """Change the submode. Limits go back to the parameters: DO_CHANGE_SPEED does not outlive it."""
+        self.submode = submode
+        self.copter.position.limits = self.copter.default_limits()
+        self.copter.yaw.by_parameter(int(self.copter.parameters["WP_YAW_BEHAVIOR"]), returning=False)
+
+    def _accept(self, submode: Submode, yaw: YawSetpoint) -> None:
+        if self.submode is not submode:
+            self._start(submode)
+        copter = self.copter
+        behaviour = int(copter.parameters["WP_YAW_BEHAVIOR"])
+        copter.yaw.setpoint(yaw.angle, yaw.rate, yaw.relative, behaviour, copter.body.yaw)
+        self._updated = copter.now
+
+    def go_to(self, target: Ned, yaw: YawSetpoint = NO_YAW) -> None:
+        """Fly to target and hold there."""
+        self._accept(Submode.POSITION, yaw)
+        self.position_target = target
+        self.velocity_target = self.acceleration_target = ZERO
+
+    def track(self, target: Ned, velocity: Ned, acceleration: Ned, yaw: YawSetpoint = NO_YAW) -> None:
+        """Follow a target that is at a position and moves with velocity; repeat within GUID_TIMEOUT."""
+        self._accept(Submode.TRACKING, yaw)
+        self.position_target, self.velocity_target, self.acceleration_target = target, velocity, acceleration
+
+    def fly_at(self, velocity: Ned, acceleration: Ned, yaw: YawSetpoint = NO_YAW) -> None:
+        """Fly with velocity (m/s) until GUID_TIMEOUT passes without another setpoint."""
+        self._accept(Submode.VELOCITY, yaw)
+        self.velocity_target, self.acceleration_target = velocity, acceleration
+
+    def accelerate_at(self, acceleration: Ned, yaw: YawSetpoint = NO_YAW) -> None:
+        """Accelerate (m/s/s) until GUID_TIMEOUT passes without another setpoint."""
+        self._accept(Submode.ACCELERATION, yaw)
+        self.velocity_target, self.acceleration_target = ZERO, acceleration
+
+    def take_off(self, altitude: float) -> bool:
+        copter = self.copter
+        if altitude <= copter.altitude:
+            return False
+        self.submode = Submode.TAKEOFF
+        self.takeoff.start(copter.home_offset.down - altitude)
+        here = copter.estimator.position
+        self.position_target = Ned(here.north, here.east, self.takeoff.target_down)
+        copter.auto_armed = True
+        return True
+
+    def step(self, dt: float) -> Demand:
+        copter = self.copter
+        if self.submode is Submode.TAKEOFF and not self.paused:
+            return self.takeoff.step(self, dt)
+        if copter.grounded:
+            return self.wait_on_ground()
+        if self.paused:
+            copter.position.fly_at(0.0, 0.0, dt)
+            copter.position.climb_at(0.0, dt)
+            return Demand(self.fly(dt).thrust)
+        if copter.now - self._updated > max(copter.parameters["GUID_TIMEOUT"], SHORTEST_TIMEOUT):
+            self._expire()
+        self._move(dt)
+        return self.fly(dt)
+
+    def _expire(self) -> None:
+        """Nobody has renewed the setpoint: stop moving and turning. A position stays the target."""
+        self.copter.yaw.stop_turning()
+        self.velocity_target = self.acceleration_target = ZERO
+        if self.submode is Submode.ACCELERATION:
+            self.submode = Submode.VELOCITY
+
+    def _move(self, dt: float) -> None:
+        control = self.copter.position
+        if self.submode is Submode.POSITION:
+            control.go_to(self.position_target, dt)
+        elif self.submode is Submode.TRACKING:
+            self.position_target = Ned(
+                *(p + v * dt for p, v in zip(self.position_target, self.velocity_target, strict=True))
+            )
+            control.track(self.position_target, self.velocity_target, self.acceleration_target, dt)
+        elif self.submode is Submode.ACCELERATION:
+            control.accelerate_at(self.acceleration_target, dt)
+        else:
+            control.fly_at(self.velocity_target.north, self.velocity_target.east, dt)
+            control.climb_at(self.velocity_target.down, dt)
+
+    def set_speed(self, kind: Speed, speed: float) -> bool:
+        self.copter.change_limit(kind, speed)
+        return True
+
+    def pause(self) -> bool:
+        self.paused = True
+        return True
+
+    def resume(self) -> bool:
+        self.paused = False
+        return True
+
+    @property
+    def taking_off(self) -> bool:
+        return self.submode is Submode.TAKEOFF and not self.takeoff.complete
+
+    @property
+    def target(self) -> Ned | None:
+        return self.position_target if self.submode is Submode.POSITION else None

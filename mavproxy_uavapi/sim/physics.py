@@ -1,0 +1,116 @@
+"""The truth: a body pushed by its thrust, gravity and the wind over flat ground.
+
+Everything is NED metres from the place the vehicle stood at boot, with down = 0 on the ground, radians and
+seconds. Attitude follows from the thrust that is asked for: a multicopter leans to accelerate.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from .geodesy import Ned, wrap_pi
+from .options import Wind
+
+GRAVITY = 9.80665
+DRAG = 0.1
+"""Deceleration per airspeed, 1/s: at 10 m/s a lean of about six degrees, as SITL's quad."""
+THRUST_LAG = 0.1
+"""Time constant in seconds in which thrust and lean follow what is asked for."""
+YAW_ACCELERATION = math.radians(270)
+"""ATC_ACCEL_Y_MAX of a default quad, rad/s/s."""
+
+
+@dataclass
+class Body:
+    """Position, velocity, attitude and rates, as they truly are."""
+
+    north: float = 0.0
+    east: float = 0.0
+    down: float = 0.0
+    velocity_north: float = 0.0
+    velocity_east: float = 0.0
+    velocity_down: float = 0.0
+    roll: float = 0.0
+    pitch: float = 0.0
+    yaw: float = 0.0
+    roll_rate: float = 0.0
+    pitch_rate: float = 0.0
+    yaw_rate: float = 0.0
+    # Acceleration that the propellers give beyond holding up the weight, which is what a controller asks for.
+    thrust_north: float = 0.0
+    thrust_east: float = 0.0
+    thrust_down: float = GRAVITY
+    wind_north: float = 0.0
+    wind_east: float = 0.0
+
+    @classmethod
+    def at_rest(cls, heading: float, wind: Wind) -> Body:
+        """Standing at the start, heading in degrees."""
+        from_direction = math.radians(wind.direction)
+        return cls(
+            yaw=wrap_pi(math.radians(heading)),
+            wind_north=-wind.speed * math.cos(from_direction),
+            wind_east=-wind.speed * math.sin(from_direction),
+        )
+
+    @property
+    def position(self) -> Ned:
+        """Metres from the start."""
+        return Ned(self.north, self.east, self.down)
+
+    @property
+    def velocity(self) -> Ned:
+        """Metres per second over ground."""
+        return Ned(self.velocity_north, self.velocity_east, self.velocity_down)
+
+    @property
+    def on_ground(self) -> bool:
+        """Whether the skids touch."""
+        return self.down >= 0.0
+
+    @property
+    def throttle_share(self) -> float:
+        """Thrust divided by the thrust that hovers; zero with the motors off."""
+        lift = GRAVITY - self.thrust_down
+        return math.sqrt(lift * lift + self.thrust_north**2 + self.thrust_east**2) / GRAVITY
+
+    def step(self, thrust: Ned, yaw_rate: float, dt: float) -> None:
+        """Advance by dt seconds with the asked-for thrust (m/s/s beyond weight) and yaw rate (rad/s)."""
+        share = min(1.0, dt / THRUST_LAG)
+        self.thrust_north += (thrust.north - self.thrust_north) * share
+        self.thrust_east += (thrust.east - self.thrust_east) * share
+        self.thrust_down += (thrust.down - self.thrust_down) * share
+        acceleration_down = self.thrust_down - DRAG * self.velocity_down
+        if self.on_ground and acceleration_down >= 0:
+            self._rest()
+            return
+        self.velocity_north += (self.thrust_north - DRAG * (self.velocity_north - self.wind_north)) * dt
+        self.velocity_east += (self.thrust_east - DRAG * (self.velocity_east - self.wind_east)) * dt
+        self.velocity_down += acceleration_down * dt
+        self.north += self.velocity_north * dt
+        self.east += self.velocity_east * dt
+        self.down += self.velocity_down * dt
+        if self.down > 0:
+            self._rest()
+            return
+        self._turn(yaw_rate, dt)
+
+    def _turn(self, yaw_rate: float, dt: float) -> None:
+        change = YAW_ACCELERATION * dt
+        self.yaw_rate += max(-change, min(change, yaw_rate - self.yaw_rate))
+        self.yaw = wrap_pi(self.yaw + self.yaw_rate * dt)
+        cos_yaw, sin_yaw = math.cos(self.yaw), math.sin(self.yaw)
+        forward = self.thrust_north * cos_yaw + self.thrust_east * sin_yaw
+        right = self.thrust_east * cos_yaw - self.thrust_north * sin_yaw
+        lift = max(GRAVITY - self.thrust_down, 1.0)
+        pitch, roll = math.atan2(-forward, lift), math.atan2(right, lift)
+        self.roll_rate, self.pitch_rate = (roll - self.roll) / dt, (pitch - self.pitch) / dt
+        self.roll, self.pitch = roll, pitch
+
+    def _rest(self) -> None:
+        """The ground takes all motion; the airframe stands level on it."""
+        self.down = 0.0
+        self.velocity_north = self.velocity_east = self.velocity_down = 0.0
+        self.roll = self.pitch = self.roll_rate = self.pitch_rate = self.yaw_rate = 0.0
+        self.thrust_north = self.thrust_east = 0.0

@@ -1,0 +1,304 @@
+"""The vehicle with its MAVLink links: messages in, simulated time on, messages out. No sockets, no clock.
+
+Typical use, in a test::
+
+    simulator = Simulator(Options(seed=1))
+    link = simulator.open_link()
+    simulator.receive(link, message)
+    simulator.step()
+    for message in link.messages(): ...
+
+The same options and the same inputs at the same simulated times give the same states and messages.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections import deque
+from dataclasses import dataclass
+from itertools import count
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from . import setpoints
+from .commands import ACCEPTED, DENIED, FAILED, UNSUPPORTED, Commands, from_message
+from .copter import Copter
+from .events import Broadcast, Event, ItemReached, StatusText
+from .faults import Faults, PlannedAck
+from .link import COMPONENT, Link
+from .mission import Mission
+from .mission_protocol import MissionProtocol
+from .options import Options
+from .parameters import Parameter, Parameters
+from .telemetry import Telemetry
+
+STEP = 0.01
+"""Seconds of simulated time in one step, at any speedup."""
+PARAMETERS_PER_STEP = 5
+UNKNOWN_INDEX = 65535
+TEXT_LENGTH = 50
+REMEMBERED_MESSAGES = 50000
+FTP_NAK = 129
+FTP_UNKNOWN_COMMAND = 7
+FTP_HEADER = 12
+
+
+@dataclass(frozen=True)
+class Received:
+    """A message that came from a ground link: simulated seconds since boot, wall time as given."""
+
+    index: int
+    time: float
+    wall: float
+    link: str
+    message: Any
+
+
+class Simulator:
+    """One vehicle and its links; epoch is the unix time in seconds at which it boots."""
+
+    def __init__(self, options: Options, epoch: float = 0.0) -> None:
+        self.options = options
+        self.parameters = Parameters()
+        self.parameters.set("SIM_SPEEDUP", options.speedup)
+        self.parameters.set("SYSID_THISMAV", options.sysid)
+        self.parameters.set("SIM_WIND_SPD", options.wind.speed)
+        self.parameters.set("SIM_WIND_DIR", options.wind.direction)
+        self.faults = Faults()
+        self.links: list[Link] = []
+        self.received: deque[Received] = deque(maxlen=REMEMBERED_MESSAGES)
+        self._received_count = 0
+        self._boots = 0
+        self._epoch = epoch
+        self._reboot_wanted = False
+        self._handlers = {
+            "COMMAND_LONG": self._command,
+            "COMMAND_INT": self._command,
+            "SET_MODE": self._set_mode,
+            "REQUEST_DATA_STREAM": self._request_stream,
+            "PARAM_REQUEST_LIST": self._parameter_list,
+            "PARAM_REQUEST_READ": self._parameter_read,
+            "PARAM_SET": self._parameter_set,
+            "MISSION_SET_CURRENT": self._mission_set_current,
+            "SET_POSITION_TARGET_LOCAL_NED": self._local_setpoint,
+            "SET_POSITION_TARGET_GLOBAL_INT": self._global_setpoint,
+            "RC_CHANNELS_OVERRIDE": self._sticks,
+            "TIMESYNC": self._timesync,
+            "FILE_TRANSFER_PROTOCOL": self._file_transfer,
+        }
+        self._boot(Mission())
+
+    def _boot(self, mission: Mission) -> None:
+        """Start from nothing: time zero, disarmed, where the vehicle began. Parameters and mission stay."""
+        self._boots += 1
+        self.copter = Copter(self.options, self.parameters, mission, self.options.seed + self._boots - 1)
+        self.telemetry = Telemetry(self.copter, self._epoch)
+        self.missions = MissionProtocol(self.copter)
+        self.commands = Commands(self)
+        self._planned: list[tuple[float, int, Link, Any, tuple[int, int] | None]] = []
+        self._order = count()
+        self._reboot_wanted = False
+        for link in self.links:
+            link.restart()
+
+    def reboot_soon(self) -> None:
+        """Boot again after the present step, so that an acknowledgement still goes out."""
+        self._reboot_wanted = True
+
+    @property
+    def speedup(self) -> float:
+        """Simulated seconds that should pass in a wall second (SIM_SPEEDUP); always positive."""
+        wanted = self.parameters["SIM_SPEEDUP"]
+        return wanted if wanted > 0 else 1.0
+
+    # Links.
+
+    def open_link(self, name: str = "") -> Link:
+        """A new link; it gets heartbeats at once and streams when it asks for them."""
+        link = Link(self.options.sysid, name)
+        link.muted = self.faults.mute(self.copter.now)
+        self.links.append(link)
+        return link
+
+    def close_link(self, link: Link) -> None:
+        """The peer has gone."""
+        self.links.remove(link)
+
+    def send(self, link: Link, name: str) -> None:
+        """Queue a message about the present state for one link, if there is something to say."""
+        message = self.telemetry.build(name)
+        if message is not None:
+            link.send(message)
+
+    def broadcast(self, name: str) -> None:
+        """Queue a message about the present state for all links."""
+        for link in self.links:
+            self.send(link, name)
+
+    # Time.
+
+    def step(self) -> None:
+        """Advance by STEP seconds and queue what the links get in that time."""
+        copter = self.copter
+        for link in self.links:
+            link.muted = self.faults.mute(copter.now)
+        self.telemetry.freeze_position(copter.now < self.faults.gps_frozen_until)
+        copter.step(STEP)
+        self.missions.step()
+        self._tell_events()
+        while self._planned and self._planned[0][0] <= copter.now:
+            _, _, link, message, source = heapq.heappop(self._planned)
+            link.send(message, source)
+        for link in self.links:
+            for name in link.streams.due(copter.now):
+                self.send(link, name)
+            if link.parameter_cursor is not None:
+                self._send_parameters(link)
+        if self._reboot_wanted:
+            self._epoch += copter.now
+            self._boot(copter.mission)
+
+    def run(self, seconds: float) -> None:
+        """Advance by about seconds of simulated time."""
+        for _ in range(round(seconds / STEP)):
+            self.step()
+
+    def _tell_events(self) -> None:
+        while self.copter.events:
+            self._tell(self.copter.events.popleft())
+
+    def _tell(self, event: Event) -> None:
+        if isinstance(event, Broadcast):
+            self.broadcast(event.name)
+            return
+        for link in self.links:
+            if isinstance(event, StatusText):
+                text = event.text.encode()[:TEXT_LENGTH]
+                link.send(mavlink.MAVLink_statustext_message(event.severity, text))
+            elif isinstance(event, ItemReached):
+                link.send(mavlink.MAVLink_mission_item_reached_message(event.seq))
+
+    # What comes in.
+
+    def receive(self, link: Link, message: Any, wall: float = 0.0) -> None:
+        """Take a decoded message from a link; wall is the caller's clock, kept for `received` only."""
+        copter = self.copter
+        if self.faults.deaf(copter.now) or not self._for_us(message):
+            return
+        self._received_count += 1
+        self.received.append(Received(self._received_count, copter.now, wall, link.name, message))
+        if self.missions.handle(link, message):
+            return
+        handler = self._handlers.get(message.get_type())
+        if handler is not None:
+            handler(link, message)
+
+    def _for_us(self, message: Any) -> bool:
+        system = getattr(message, "target_system", 0)
+        component = getattr(message, "target_component", 0)
+        return system in (0, self.options.sysid) and component in (0, COMPONENT)
+
+    def _command(self, link: Link, message: Any) -> None:
+        fault = self.faults.refusal(message.command)
+        if fault is not None:
+            result = fault.result
+            if fault.text:
+                self.copter.say(mavlink.MAV_SEVERITY_WARNING, fault.text)
+        else:
+            command = from_message(message)
+            result = UNSUPPORTED if command is None else self.commands.run(command, link)
+        # ArduPilot's texts about a command come before its acknowledgement, so that they can explain it.
+        self._tell_events()
+        sender = (message.get_srcSystem(), message.get_srcComponent())
+        for ack in self.faults.acks(message.command, result, self.copter.now):
+            self._plan_ack(link, message.command, ack, sender)
+
+    def _plan_ack(self, link: Link, command: int, planned: PlannedAck, sender: tuple[int, int]) -> None:
+        ack = mavlink.MAVLink_command_ack_message(command, planned.result, 0, 0, *sender)
+        if planned.at <= self.copter.now:
+            link.send(ack, planned.source)
+        else:
+            heapq.heappush(self._planned, (planned.at, next(self._order), link, ack, planned.source))
+
+    def set_mode(self, base_mode: int, custom_mode: int) -> int:
+        """Change the mode as MAV_CMD_DO_SET_MODE and SET_MODE ask; a MAV_RESULT."""
+        if not base_mode & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
+            return int(DENIED)
+        return int(ACCEPTED if self.copter.set_mode(custom_mode) else FAILED)
+
+    def _set_mode(self, link: Link, message: Any) -> None:
+        """SET_MODE is answered like a command: MAVProxy and ArduPilot acknowledge it as MAV_CMD 11."""
+        del link
+        self.set_mode(message.base_mode, message.custom_mode)
+
+    def _request_stream(self, link: Link, message: Any) -> None:
+        rate = message.req_message_rate if message.start_stop == 1 else 0
+        link.streams.request_group(message.req_stream_id, rate, self.copter.now)
+
+    def _parameter_list(self, link: Link, message: Any) -> None:
+        del message
+        link.parameter_cursor = 0
+
+    def _send_parameters(self, link: Link) -> None:
+        start = link.parameter_cursor or 0
+        for parameter in self.parameters.ordered[start : start + PARAMETERS_PER_STEP]:
+            link.send(self._parameter_value(parameter, parameter.index))
+        following = start + PARAMETERS_PER_STEP
+        link.parameter_cursor = following if following < len(self.parameters) else None
+
+    def _parameter_value(self, parameter: Parameter, index: int) -> Any:
+        name = parameter.name.encode()
+        return mavlink.MAVLink_param_value_message(
+            name, parameter.value, parameter.kind, len(self.parameters), index
+        )
+
+    def _parameter_read(self, link: Link, message: Any) -> None:
+        parameter = self.parameters.find(message.param_id, message.param_index)
+        if parameter is not None:
+            index = message.param_index if message.param_index >= 0 else UNKNOWN_INDEX
+            link.send(self._parameter_value(parameter, index))
+
+    def _parameter_set(self, link: Link, message: Any) -> None:
+        """An unknown name is not answered; a new value is told to all links."""
+        del link
+        value = message.param_value
+        if not math.isfinite(value):
+            return
+        parameter = self.parameters.set(message.param_id, value)
+        if parameter is not None:
+            for link in self.links:
+                link.send(self._parameter_value(parameter, UNKNOWN_INDEX))
+
+    def _mission_set_current(self, link: Link, message: Any) -> None:
+        if self.copter.current_item(message.seq):
+            link.send(self.telemetry.mission_current(message.seq))
+
+    def _local_setpoint(self, link: Link, message: Any) -> None:
+        del link
+        setpoints.apply_local(self.copter, message)
+
+    def _global_setpoint(self, link: Link, message: Any) -> None:
+        del link
+        setpoints.apply_global(self.copter, message)
+
+    def _sticks(self, link: Link, message: Any) -> None:
+        del link
+        pulses = [getattr(message, f"chan{channel}_raw") for channel in range(1, 9)]
+        self.copter.sticks.override(pulses, self.copter.now)
+
+    def _timesync(self, link: Link, message: Any) -> None:
+        if message.tc1 == 0:
+            link.send(mavlink.MAVLink_timesync_message(int(self.copter.now * 1e9), message.ts1))
+
+    def _file_transfer(self, link: Link, message: Any) -> None:
+        """There is no file system: a NAK lets MAVProxy fall back to PARAM_REQUEST_LIST at once."""
+        request = bytes(message.payload)
+        sequence = (int.from_bytes(request[0:2], "little") + 1) & 0xFFFF
+        reply = bytearray(251)
+        reply[0:2] = sequence.to_bytes(2, "little")
+        reply[2], reply[3], reply[4], reply[5] = request[2], FTP_NAK, 1, request[3]
+        reply[FTP_HEADER] = FTP_UNKNOWN_COMMAND
+        sender = (message.get_srcSystem(), message.get_srcComponent())
+        link.send(mavlink.MAVLink_file_transfer_protocol_message(0, *sender, list(reply)))
