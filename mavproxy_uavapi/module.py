@@ -6,7 +6,10 @@ import os
 from collections.abc import Callable
 from typing import Any
 
-from mavproxy_uavapi.api import Api
+try:
+    from mavproxy_uavapi.api import Api
+except ModuleNotFoundError as missing:  # MAVProxy prints the text of an ImportError as one line
+    raise ImportError(f"uavapi needs {missing.name}: pip install mavproxy-uavapi") from missing
 from mavproxy_uavapi.console import report, vehicles
 from mavproxy_uavapi.host.member import HostedModule
 from mavproxy_uavapi.settings import ModuleSettings, SettingError

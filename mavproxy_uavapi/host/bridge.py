@@ -57,9 +57,8 @@ class Bridge:
 
     def feed(self, message: Any) -> None:
         """Hand a received message over. Main loop only; never blocks, never raises."""
-        first = not self._inbox
-        self._inbox.append(message)
-        if first and not self._thread.call_soon(self._deliver):
+        self._inbox.append(message)  # before its length is looked at: the loop empties the inbox meanwhile
+        if len(self._inbox) == 1 and not self._thread.call_soon(self._deliver):
             self._inbox.clear()  # the loop has ended: nobody will read
 
     def _deliver(self) -> None:

@@ -170,8 +170,9 @@ class VehicleState:
             self.statustexts.append(StatusText(now, message.severity, message.text))
             return
         chunks = self._chunks.setdefault(message.id, [])
-        if message.chunk_seq != len(chunks):  # a chunk was lost: what there is will have to do
-            chunks.append("…")
+        lost = message.chunk_seq - len(chunks)
+        if lost > 0:  # what there is will have to do
+            chunks += ["…", *[""] * (lost - 1)]
         chunks.append(message.text)
         if len(message.text) < 50:  # the last chunk is the one that is not full
             self.statustexts.append(StatusText(now, message.severity, "".join(chunks)))

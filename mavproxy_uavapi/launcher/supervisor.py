@@ -24,6 +24,9 @@ API_START_S = 90.0
 # Unloading our module ends uploaded scripts, which may be landing the vehicle; see its own grace period.
 MAVPROXY_GRACE_S = 15.0
 MAVPROXY_FORCED_S = 2.0
+
+# At its prompt MAVProxy takes note of a SIGTERM but then waits for a line; there is nothing to wait for.
+PROMPT_GRACE_S = 1.0
 VEHICLE_GRACE_S = 3.0
 STRAY_GRACE_S = 1.0
 
@@ -280,7 +283,7 @@ class Supervisor:
     async def _end_mavproxy(self, mavproxy: Process) -> None:
         """SIGTERM, which it takes as `exit`; a second one, at which it leaves at once; then SIGKILL."""
         for signum, grace_s in (
-            (signal.SIGTERM, MAVPROXY_GRACE_S),
+            (signal.SIGTERM, MAVPROXY_GRACE_S if self.options.headless else PROMPT_GRACE_S),
             (signal.SIGTERM, MAVPROXY_FORCED_S),
             (signal.SIGKILL, MAVPROXY_FORCED_S),
         ):

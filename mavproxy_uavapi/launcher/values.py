@@ -16,6 +16,7 @@ LOG_COMPONENTS = {
     "VEHICLE": "COPTER",
     "API": "API",
     "UVICORN": "API",
+    "SCRIPT": "API",
     "GRADYS_GS": "GRADYS_GS",
 }
 _MODULE = re.compile(r"[A-Za-z_]\w*(:\{[^;\s]*\})?")

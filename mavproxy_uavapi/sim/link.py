@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -12,16 +13,19 @@ COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
 
 
 class Link:
-    """Messages for one peer; the owner of the socket takes them with `drain` or `messages`."""
+    """Messages for one peer; the owner of the socket takes them with `drain` or `messages`.
 
-    def __init__(self, system: int, name: str = "") -> None:
+    While muted() is true what is to be sent is lost, as on a link that is down.
+    """
+
+    def __init__(self, system: int, name: str = "", muted: Callable[[], bool] = lambda: False) -> None:
         self.name = name
+        self._muted = muted
         self.streams = Streams()
         self.parameter_cursor: int | None = None
         """Next index of a running PARAM_REQUEST_LIST, or None."""
         self._encoder = mavlink.MAVLink(None, srcSystem=system, srcComponent=COMPONENT)
         self._outbox: list[tuple[Any, tuple[int, int] | None]] = []
-        self.muted = False
 
     def restart(self) -> None:
         """The vehicle has booted: streams are back to heartbeats only."""
@@ -30,7 +34,7 @@ class Link:
 
     def send(self, message: Any, source: tuple[int, int] | None = None) -> None:
         """Queue a message; source makes it come from another system and component."""
-        if not self.muted:
+        if not self._muted():
             self._outbox.append((message, source))
 
     def messages(self) -> list[Any]:

@@ -117,8 +117,7 @@ class Simulator:
 
     def open_link(self, name: str = "") -> Link:
         """A new link; it gets heartbeats at once and streams when it asks for them."""
-        link = Link(self.options.sysid, name)
-        link.muted = self.faults.mute(self.copter.now)
+        link = Link(self.options.sysid, name, lambda: self.faults.mute(self.copter.now))
         self.links.append(link)
         return link
 
@@ -142,12 +141,11 @@ class Simulator:
     def step(self) -> None:
         """Advance by STEP seconds and queue what the links get in that time."""
         copter = self.copter
-        for link in self.links:
-            link.muted = self.faults.mute(copter.now)
         self.telemetry.freeze_position(copter.now < self.faults.gps_frozen_until)
         copter.step(STEP)
         self.missions.step()
-        self._tell_events()
+        while copter.events:
+            self._tell(copter.events.popleft())
         while self._planned and self._planned[0][0] <= copter.now:
             _, _, link, message, source = heapq.heappop(self._planned)
             link.send(message, source)
@@ -164,10 +162,6 @@ class Simulator:
         """Advance by about seconds of simulated time."""
         for _ in range(round(seconds / STEP)):
             self.step()
-
-    def _tell_events(self) -> None:
-        while self.copter.events:
-            self._tell(self.copter.events.popleft())
 
     def _tell(self, event: Event) -> None:
         if isinstance(event, Broadcast):
@@ -209,8 +203,8 @@ class Simulator:
         else:
             command = from_message(message)
             result = UNSUPPORTED if command is None else self.commands.run(command, link)
-        # ArduPilot's texts about a command come before its acknowledgement, so that they can explain it.
-        self._tell_events()
+        # As in SITL the acknowledgement goes out at once; texts that explain it and the heartbeat of a new mode
+        # wait for the next step, so they come after it.
         sender = (message.get_srcSystem(), message.get_srcComponent())
         for ack in self.faults.acks(message.command, result, self.copter.now):
             self._plan_ack(link, message.command, ack, sender)
@@ -229,7 +223,6 @@ class Simulator:
         return int(ACCEPTED if self.copter.set_mode(custom_mode) else FAILED)
 
     def _set_mode(self, link: Link, message: Any) -> None:
-        """SET_MODE is answered like a command: MAVProxy and ArduPilot acknowledge it as MAV_CMD 11."""
         del link
         self.set_mode(message.base_mode, message.custom_mode)
 

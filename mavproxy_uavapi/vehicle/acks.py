@@ -77,11 +77,11 @@ class Commands:
         raise TimedOut(f"vehicle {self._state.system} did not acknowledge {command.name}{times}")
 
     async def _refusal(self, command: Command, result: int, started: float) -> Rejected:
+        with contextlib.suppress(TimedOut):  # ArduPilot queues its texts, so that they may come after the ack
+            await self._waiting.until(
+                {"STATUSTEXT"}, lambda: self._state.said_since(started) or None, LAST_WORDS, "say why"
+            )
         said = self._state.said_since(started)
-        if not said:  # ArduPilot queues its texts, so that they may come after the ack
-            with contextlib.suppress(TimedOut):
-                await self._waiting.message({"STATUSTEXT"}, lambda text: text, LAST_WORDS, "say why")
-            said = self._state.said_since(started)
         ack = result_name(result)
         because = f": {'; '.join(said)}" if said else ""
         return Rejected(f"the vehicle refused {command.name} ({ack}){because}", ack, said)

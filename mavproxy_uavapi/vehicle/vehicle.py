@@ -249,7 +249,7 @@ class Vehicle:
         with contextlib.suppress(Rejected, TimedOut):  # the texts that it makes the autopilot say are what counts
             await self.commands.send(messages.check_prearm())
         with contextlib.suppress(TimedOut):
-            await self.waiting.message({"STATUSTEXT"}, lambda text: text, 1.0, "say why it is not ready")
+            await self.waiting.message({"STATUSTEXT"}, lambda _: None, 1.0, "fall silent")  # it has several reasons
         said = self.state.said_since(asked)
         because = "; ".join(said) or "it does not say why"
         return Rejected(f"not ready to arm after {waited:.0f} s: {because}", statustext=said)

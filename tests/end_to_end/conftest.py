@@ -146,7 +146,7 @@ class Control:
         self._lines.write(json.dumps({"op": op, **arguments}) + "\n")
         self._lines.flush()
         answer: dict[str, Any] = json.loads(self._lines.readline())
-        assert "error" not in answer, answer
+        assert answer["ok"], answer
         return answer
 
     def fault(self, name: str, **arguments: Any) -> None:
@@ -296,3 +296,9 @@ def embedded_rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
     made = embedded(tmp_path_factory.mktemp("embedded"))
     yield made
     made.stop()
+
+
+@pytest.fixture(scope="session")
+def harness() -> Any:
+    """This module, for tests that start processes of their own."""
+    return sys.modules[__name__]

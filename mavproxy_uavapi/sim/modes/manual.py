@@ -148,6 +148,8 @@ class Brake(Mode):
         limits.acceleration = BRAKE_DECELERATION
         limits.speed = max(limits.speed, math.hypot(*self.copter.position.velocity[:2]))
         self.copter.position.limits = limits
+        # Braking begins now, not after a started acceleration has run out.
+        self.copter.position.acceleration[:2] = [0.0, 0.0]
         self.copter.yaw.hold()
         return True
 
