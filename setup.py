@@ -4,7 +4,7 @@ from pathlib import Path
 
 from setuptools import find_packages, setup
 
-TEST = ["pytest>=8", "requests>=2.31"]
+TEST = ["pytest>=8", "pytest-xdist>=3.5", "requests>=2.31", "setuptools>=70.1"]
 LINT = ["ruff>=0.6", "mypy>=1.11", "types-requests"]
 
 setup(

@@ -73,6 +73,7 @@ class VehicleState:
         mode: the heartbeat's custom_mode; None likewise.
         system_status: MAV_STATE of the heartbeat; None likewise.
         heartbeat_at: arrival of the newest heartbeat (s).
+        mode_since: arrival of the heartbeat that first showed the mode (s).
         messages: newest message by name, and by `NAME[instance]` for those that come for several devices.
         others: newest message by (component, name), of the system's other components.
         parameters: values that PARAM_VALUE told, by name.
@@ -85,6 +86,7 @@ class VehicleState:
     armed: bool | None = None
     mode: int | None = None
     system_status: int | None = None
+    mode_since: float = 0.0
     messages: dict[str, Received] = field(default_factory=dict)
     others: dict[tuple[int, str], Received] = field(default_factory=dict)
     parameters: dict[str, float] = field(default_factory=dict)
@@ -161,7 +163,8 @@ class VehicleState:
     def _take_heartbeat(self, message: Any, now: float) -> None:
         self.heartbeat_at = now
         self.vehicle_type = message.type
-        self.mode = message.custom_mode
+        if message.custom_mode != self.mode:
+            self.mode, self.mode_since = message.custom_mode, now
         self.armed = bool(message.base_mode & ARMED)
         self.system_status = message.system_status
 

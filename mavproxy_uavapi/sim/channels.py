@@ -11,6 +11,7 @@ OVERRIDE_TIMEOUT = 3.0
 MODE_SWITCH_EDGES = (1231, 1361, 1491, 1621, 1750)
 """Pulse widths between the six positions of the flight mode switch."""
 STICK_DEADZONE = 20
+CHANNEL_COUNT = 16
 SERVO_COUNT = 16
 MOTOR_FUNCTIONS = (33, 34, 35, 36)
 DISABLED_OUTPUT = 0
@@ -20,12 +21,12 @@ class Sticks:
     """The radio channels 1..16 with overrides from MAVLink on top."""
 
     def __init__(self) -> None:
-        self._radio = [*NEUTRAL, *([0] * 8)]
+        self._radio = [*NEUTRAL, *([0] * (CHANNEL_COUNT - len(NEUTRAL)))]
         self._override: dict[int, tuple[int, float]] = {}
 
     def override(self, pulses: list[int], now: float) -> None:
         """RC_CHANNELS_OVERRIDE: 0 releases a channel, 65535 leaves it as it is."""
-        for channel, pulse in enumerate(pulses[:16]):
+        for channel, pulse in enumerate(pulses[:CHANNEL_COUNT]):
             if pulse == 0:
                 self._override.pop(channel, None)
             elif pulse != 65535:
@@ -54,8 +55,10 @@ class Sticks:
         """The throttle stick as 0..1."""
         return max(0.0, min(1.0, (self.pulses(now)[2] - 1000) / 1000))
 
-    def mode_switch(self, channel: int, now: float) -> int:
-        """Position 1..6 of the flight mode switch on channel."""
+    def mode_switch(self, channel: int, now: float) -> int | None:
+        """Position 1..6 of the flight mode switch on channel; None when FLTMODE_CH names no channel."""
+        if not 1 <= channel <= CHANNEL_COUNT:
+            return None
         pulse = self.pulses(now)[channel - 1]
         return 1 + sum(pulse >= edge for edge in MODE_SWITCH_EDGES)
 
@@ -75,7 +78,7 @@ class Servos:
         """Drive a free output; False when the channel does not exist or something else drives it."""
         if not 1 <= channel <= SERVO_COUNT or self.function(channel) not in (0, 1):
             return False
-        self._pulses[channel - 1] = pulse
+        self._pulses[channel - 1] = pulse & 0xFFFF
         return True
 
     def pulses(self, motor_pulse: int) -> list[int]:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from . import arming
-from .frames import AMSL_FRAMES, GLOBAL_FRAMES, global_target, valid_location
+from .frames import AMSL_FRAMES, GLOBAL_FRAMES, HIGHEST_ALTITUDE, global_target, valid_location
 from .geodesy import Location
 from .modes import Guided
 from .modes.auto import Auto
@@ -59,18 +59,30 @@ class Command:
 
 
 def from_message(message: Any) -> Command | None:
-    """COMMAND_LONG or COMMAND_INT as a Command; None for a COMMAND_LONG that ArduPilot takes as INT only."""
+    """COMMAND_LONG or COMMAND_INT as a Command; None for a COMMAND_LONG that ArduPilot takes as INT only.
+
+    A parameter that is not a finite number stands for "not given" and reads as 0; z is left as it is, for an
+    altitude must not become 0 by mistake.
+    """
     sender = (message.get_srcSystem(), message.get_srcComponent())
-    parameters = (message.param1, message.param2, message.param3, message.param4)
+    parameters = (
+        _finite(message.param1),
+        _finite(message.param2),
+        _finite(message.param3),
+        _finite(message.param4),
+    )
     if message.get_type() == "COMMAND_INT":
         return Command(message.command, message.frame, *parameters, message.x, message.y, message.z, sender)
     frame = LOCATION_COMMANDS.get(message.command, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT)
     if frame is None:
         return None
     scale = 1e7 if message.command in LOCATION_COMMANDS else 1.0
-    x = 0 if math.isnan(message.param5) else int(message.param5 * scale)
-    y = 0 if math.isnan(message.param6) else int(message.param6 * scale)
+    x, y = int(_finite(message.param5) * scale), int(_finite(message.param6) * scale)
     return Command(message.command, frame, *parameters, x, y, message.param7, sender)
+
+
+def _finite(value: float) -> float:
+    return value if math.isfinite(value) else 0.0
 
 
 class Commands:
@@ -146,7 +158,7 @@ class Commands:
         copter = self._simulator.copter
         if command.frame not in (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT):
             return DENIED
-        if not copter.armed or not copter.landed:
+        if not copter.armed or not copter.landed or not abs(command.z) <= HIGHEST_ALTITUDE:
             return FAILED
         return ACCEPTED if copter.mode.take_off(command.z) else FAILED
 
@@ -237,8 +249,10 @@ class Commands:
         if not (command.x or command.y or command.z):
             return self._clear_roi(command, link)
         copter = self._simulator.copter
+        if not valid_location(command.x, command.y, command.z):
+            return FAILED
         target = global_target(copter, command.frame, command.x, command.y, command.z)
-        if target is None or not valid_location(command.x, command.y, command.z):
+        if target is None:
             return FAILED
         copter.yaw.look_at(target.north, target.east)
         return ACCEPTED

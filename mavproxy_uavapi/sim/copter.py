@@ -13,7 +13,9 @@ from .battery import Battery
 from .channels import Servos, Sticks
 from .estimator import Estimator
 from .events import Broadcast, Event, StatusText
+from .failsafes import Failsafes
 from .geodesy import Location, Ned, to_ned
+from .land_detector import LandDetector
 from .mission import Mission, State
 from .modes import Guided, Mode, build
 from .modes.base import Demand
@@ -25,14 +27,8 @@ from .yaw_control import AutoYaw
 
 ARMING_DELAY = 2.0
 """Seconds after arming in which the motors do not spool up yet (ARMING_DELAY_SEC)."""
-LANDED_AFTER = 1.0
-MAYBE_LANDED_AFTER = 0.2
-"""Seconds of standing still with low thrust that the land detector wants (LAND_DETECTOR_TRIGGER_SEC)."""
-PUSHING_DOWN = 2.0
-"""Thrust in m/s/s below weight from which the detector takes the throttle for low."""
 ARRIVAL_DISTANCE = 0.1
 ARRIVAL_SPEED = 0.1
-EKF_FAILSAFE_AFTER = 1.0
 FIRMWARE = "ArduCopter V4.6.0 (embedded)"
 
 
@@ -64,12 +60,11 @@ class Copter:
         self.armed = False
         self.auto_armed = False
         self.landed = True
-        self.failsafe = False
+        self.failsafes = Failsafes(self)
         self._spool = 0.0
         self._armed_since = 0.0
-        self._still_for = 0.0
+        self._detector = LandDetector()
         self._idle_since = 0.0
-        self._blind_for = 0.0
         self._last_report = -arming.REPORT_INTERVAL + 1.0
         self._switch: int | None = None
         self._boot_texts = deque(_BOOT_TEXTS)
@@ -132,7 +127,7 @@ class Copter:
     @property
     def maybe_landed(self) -> bool:
         """Whether the land detector has its first suspicion."""
-        return self.landed or self._still_for >= MAYBE_LANDED_AFTER
+        return self.landed or self._detector.suspects
 
     def arrived(self, target: Ned) -> bool:
         """Whether the trajectory has stopped at target and the vehicle is within WPNAV_RADIUS of it."""
@@ -153,7 +148,7 @@ class Copter:
             speed_down=max(parameters["WPNAV_SPEED_DN"], 10) / 100,
             acceleration=max(parameters["WPNAV_ACCEL"], 10) / 100,
             acceleration_z=max(parameters["WPNAV_ACCEL_Z"], 10) / 100,
-            lean=math.radians(max(parameters["ANGLE_MAX"], 1000) / 100),
+            lean=math.radians(max(1000, min(8000, parameters["ANGLE_MAX"])) / 100),
         )
 
     def change_limit(self, kind: Speed, speed: float) -> None:
@@ -170,7 +165,7 @@ class Copter:
         """The vehicle leaves the ground now."""
         self.landed = False
         self.auto_armed = True
-        self._still_for = 0.0
+        self._detector.restart()
         self.relax()
 
     def fix_yaw(self, angle: float, speed: float, direction: int, relative: bool) -> None:
@@ -275,7 +270,7 @@ class Copter:
         self.now = self._steps * dt
         self.estimator.update(self.now, self.body, dt)
         self._housekeeping()
-        self._check_failsafes(dt)
+        self.failsafes.update(dt)
         self._update_auto_armed()
         demand = self.mode.step(dt)
         self._update_motors(demand, dt)
@@ -294,7 +289,7 @@ class Copter:
             self._last_report = self.now
             self.report_prearm()
         position = self.sticks.mode_switch(int(self.parameters["FLTMODE_CH"]), self.now)
-        if self._switch is not None and position != self._switch:
+        if self._switch is not None and position is not None and position != self._switch:
             self.set_mode(int(self.parameters[f"FLTMODE{position}"]))
         self._switch = position
 
@@ -302,34 +297,6 @@ class Copter:
     def home_altitude(self) -> float:
         """Metres AMSL of home; of the start before home is set."""
         return (self.home or self.estimator.start).altitude
-
-    def _check_failsafes(self, dt: float) -> None:
-        if self.armed and self.battery.becomes_low(self.now):
-            self._battery_failsafe()
-        self._blind_for = 0.0 if self.estimator.ready else self._blind_for + dt
-        lost = self._blind_for >= EKF_FAILSAFE_AFTER and self.estimator.origin is not None
-        if lost and self.armed and not self.landed and self.mode.needs_position:
-            self.say(mavlink.MAV_SEVERITY_CRITICAL, "EKF Failsafe")
-            self.failsafe = True
-            self.set_mode(9)
-            self.say(mavlink.MAV_SEVERITY_CRITICAL, f"EKF Failsafe: changed to {self.mode.name} Mode")
-        if self.failsafe and not self.armed and self.estimator.ready and not self.battery.low:
-            self.failsafe = False
-
-    def _battery_failsafe(self) -> None:
-        """BATT_FS_LOW_ACT: 0 only warns, 1 lands, 2 to 4 return (SmartRTL is not flown here) or land."""
-        battery = self.battery
-        text = f"Battery 1 is low {battery.voltage:.2f}V used {battery.consumed:.0f} mAh"
-        self.say(mavlink.MAV_SEVERITY_WARNING, text)
-        action = int(self.parameters["BATT_FS_LOW_ACT"])
-        self.failsafe = True
-        if action == 0:
-            return
-        self.say(mavlink.MAV_SEVERITY_WARNING, "Battery Failsafe")
-        if self.landed:
-            self.disarm_landed()
-        elif action == 1 or not self.set_mode(6):
-            self.set_mode(9)
 
     def _update_auto_armed(self) -> None:
         throttle = self.sticks.throttle(self.now)
@@ -354,6 +321,11 @@ class Copter:
         self.battery.drain(self.throttle, dt)
 
     @property
+    def hover_throttle(self) -> float:
+        """Motor output 0..1 that hovers, MOT_THST_HOVER within what AP_Motors allows."""
+        return max(0.125, min(0.6875, self.parameters["MOT_THST_HOVER"]))
+
+    @property
     def throttle(self) -> float:
         """Thrust as a share of the thrust that hovers; a little at ground idle, zero disarmed."""
         if not self.armed:
@@ -361,13 +333,8 @@ class Copter:
         return self.body.throttle_share if not self.landed else 0.1 * self._spool
 
     def _detect_landing(self, demand: Demand, dt: float) -> None:
-        if not self.armed:
+        if not self.armed or (not self.landed and self._detector.update(self.body.on_ground, demand.thrust, dt)):
             self.landed = True
-        elif not self.landed:
-            still = self.body.on_ground and demand.thrust.down > PUSHING_DOWN
-            self._still_for = self._still_for + dt if still else 0.0
-            if self._still_for >= LANDED_AFTER:
-                self.landed = True
 
     def _disarm_when_forgotten(self) -> None:
         """DISARM_DELAY: armed, on the ground, motors at idle and the throttle stick down."""

@@ -5,12 +5,14 @@ Only missions are flown; fence and rally lists are kept so that a ground station
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from .events import StatusText
+from .frames import HIGHEST_ALTITUDE
 from .mission import SUPPORTED, Item
 
 if TYPE_CHECKING:
@@ -219,22 +221,30 @@ def _refusal(message: Any) -> int | None:
     if message.command not in SUPPORTED:
         return int(mavlink.MAV_MISSION_UNSUPPORTED)
     scale = 1e7 if message.get_type() == "MISSION_ITEM_INT" else 1.0
-    if abs(message.x) > 90 * scale:
+    # Written so that NaN fails, too.
+    if not abs(message.x) <= 90 * scale:
         return int(mavlink.MAV_MISSION_INVALID_PARAM5_X)
-    if abs(message.y) > 180 * scale:
+    if not abs(message.y) <= 180 * scale:
         return int(mavlink.MAV_MISSION_INVALID_PARAM6_Y)
+    if not abs(message.z) <= HIGHEST_ALTITUDE:
+        return int(mavlink.MAV_MISSION_INVALID_PARAM7)
     return None
 
 
 def _as_item(message: Any) -> Item:
     scale = 1 if message.get_type() == "MISSION_ITEM_INT" else 10_000_000
+    # NaN stands for "not given", mostly in the yaw of a waypoint.
+    param1, param2, param3, param4 = (
+        value if math.isfinite(value) else 0.0
+        for value in (message.param1, message.param2, message.param3, message.param4)
+    )
     return Item(
         message.command,
         message.frame,
-        message.param1,
-        message.param2,
-        message.param3,
-        message.param4,
+        param1,
+        param2,
+        param3,
+        param4,
         round(message.x * scale),
         round(message.y * scale),
         message.z,

@@ -195,6 +195,8 @@ class Server:
     def _accept_control(self, server: socket.socket) -> None:
         with contextlib.suppress(BlockingIOError):
             sock, _ = server.accept()
+            # A test that does not read its answers must not stop the vehicle for long.
+            sock.settimeout(1.0)
             peer = ControlPeer(sock)
             self._selector.register(sock, selectors.EVENT_READ, lambda: self._read_control(peer))
 

@@ -109,7 +109,10 @@ def _velocity(copter: Copter, message: Any) -> Ned:
 
 
 def _acceleration(copter: Copter, message: Any) -> Ned:
-    return _rotated(copter, message, (message.afx, message.afy, message.afz))
+    acceleration = (message.afx, message.afy, message.afz)
+    if not all(map(math.isfinite, acceleration)):
+        raise InvalidSetpoint
+    return _rotated(copter, message, acceleration)
 
 
 def _rotated(copter: Copter, message: Any, vector: tuple[float, float, float]) -> Ned:
@@ -121,9 +124,9 @@ def _rotated(copter: Copter, message: Any, vector: tuple[float, float, float]) -
 
 
 def _yaw(message: Any) -> YawSetpoint:
+    yaw = None if message.type_mask & YAW_IGNORE else message.yaw
+    rate = None if message.type_mask & YAW_RATE_IGNORE else message.yaw_rate
+    if not all(value is None or math.isfinite(value) for value in (yaw, rate)):
+        raise InvalidSetpoint
     local = message.get_type() == "SET_POSITION_TARGET_LOCAL_NED"
-    return YawSetpoint(
-        None if message.type_mask & YAW_IGNORE else message.yaw,
-        None if message.type_mask & YAW_RATE_IGNORE else message.yaw_rate,
-        local and message.coordinate_frame in BODY_FRAMES,
-    )
+    return YawSetpoint(yaw, rate, local and message.coordinate_frame in BODY_FRAMES)

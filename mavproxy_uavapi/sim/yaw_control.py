@@ -114,6 +114,7 @@ class AutoYaw:
             return max(-self.slew * 3, min(self.slew * 3, self._rate))
         if self.mode is YawMode.COURSE:
             if math.hypot(*course) <= speed_limit * MIN_COURSE_SHARE:
+                self._target = yaw
                 return 0.0
             self._target = math.atan2(course[1], course[0])
         elif self.mode is YawMode.FIXED:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections import defaultdict
+from collections.abc import Callable
 from typing import Any
 
 from pymavlink import mavutil
@@ -38,12 +39,16 @@ class Commands:
         self._waiting = waiting
         self._locks: defaultdict[int, asyncio.Lock] = defaultdict(asyncio.Lock)
 
-    async def send(self, command: Command, patience: float = 20.0) -> None:
+    async def send(
+        self, command: Command, patience: float = 20.0, shown: Callable[[], bool] = lambda: False
+    ) -> None:
         """Send `command`; returns when the vehicle has accepted it.
 
         Args:
             command: what to send.
             patience: how long (s) a patient command is asked again while it is refused.
+            shown: looked at before it is sent again: whether the vehicle shows that it was heard although its
+                ack was lost; what it raises ends the command.
 
         Raises:
             Rejected: refused, with MAV_RESULT and the STATUSTEXTs since it was asked.
@@ -53,7 +58,7 @@ class Commands:
         async with self._locks[command.number]:
             started = self._waiting.clock()
             while True:
-                result = await self._ask(command)
+                result = await self._ask(command, shown)
                 if result == mavlink.MAV_RESULT_ACCEPTED:
                     return
                 again = command.patient and result in WORTH_ASKING_AGAIN
@@ -61,7 +66,7 @@ class Commands:
                     raise await self._refusal(command, result, started)
                 await asyncio.sleep(PATIENCE_PAUSE)
 
-    async def _ask(self, command: Command) -> int:
+    async def _ask(self, command: Command, shown: Callable[[], bool]) -> int:
         """One exchange: the MAV_RESULT that ends it."""
         address = Address(self._state.system, self._state.component)
         sendings = SENDINGS if command.repeatable else 1
@@ -73,6 +78,8 @@ class Commands:
                     result = await acks.next(IN_PROGRESS_TIMEOUT)
             if result is not None:
                 return result
+            if shown():
+                return int(mavlink.MAV_RESULT_ACCEPTED)
         times = "" if sendings == 1 else f", sent {sendings} times"
         raise TimedOut(f"vehicle {self._state.system} did not acknowledge {command.name}{times}")
 

@@ -34,7 +34,7 @@ class Copter(Vehicle):
         super().__init__(state, link, pending, clock)
         self._setpoint: Target | None = None  # what set_yaw_rate repeats, while GUIDED flies it
         self._setpoint_at = 0.0
-        self._paused = False  # by our stop; a new target would wait until it is resumed
+        self._paused_at: float | None = None  # by our stop; a new target would wait until it is resumed
 
     # -- flight -------------------------------------------------------------------------------------------
 
@@ -48,8 +48,9 @@ class Copter(Vehicle):
         if self.state.landed is False:
             raise Busy("the vehicle is flying already")
         self.seat.take(job)
-        self._setpoint, self._paused = None, False
+        self._setpoint = self._paused_at = None
         limits = await self.limits()
+        self.held_by("GUIDED")  # the pilot may have switched it meanwhile
         await self._lift_off(alt)
         low, high = TAKEOFF_TOLERANCE
         tolerance = min(max(TAKEOFF_SHARE * alt, low), high)
@@ -88,11 +89,18 @@ class Copter(Vehicle):
     async def rtl(self, job: Job, timeout: float | None = None) -> None:
         """Return to launch; done when the vehicle has landed there and disarmed.
 
-        On the ground and disarmed nothing is sent: at home it is done, elsewhere `NotArmed`.
+        On the ground and disarmed it is not switched: at home it is done, elsewhere `NotArmed`.
+
+        Raises:
+            NotFound: disarmed, and it has no home yet.
         """
         distance = self.distance_home()
         if self.state.armed is False:
-            if distance is not None and distance > HOME_RADIUS:
+            if distance is None:
+                await self.home()
+                self.fresh("GLOBAL_POSITION_INT")
+                distance = self.distance_home() or 0.0
+            if distance > HOME_RADIUS:
                 raise NotArmed(f"the vehicle is disarmed, {distance:.0f} m from home")
             return
         self.seat.take(job)
@@ -214,8 +222,9 @@ class Copter(Vehicle):
     async def _take_up(self, target: Target, yaw: Yaw) -> None:
         """Begin a movement; a pause that is in force would hold it back, so it ends."""
         await self._send_setpoint(target, yaw)
-        if self._paused:  # in this order, so that it does not take up the old movement for a moment
-            self._paused = False
+        paused_at, self._paused_at = self._paused_at, None
+        if paused_at is not None and paused_at >= self.state.mode_since:
+            # In this order, so that it does not take up the old movement for a moment.
             await self.commands.send(messages.pause(False))
 
     # -- velocity and yaw ---------------------------------------------------------------------------------
@@ -243,7 +252,7 @@ class Copter(Vehicle):
         while remaining > 0:
             stretch = min(period, remaining)
             await self._travelled(stretch)
-            remaining -= stretch
+            remaining = round(remaining - stretch, 6)  # what is left of a float is no setpoint
             await self._send_setpoint(velocity if remaining > 0 else VelocityTarget(0, 0, 0), yaw)
 
     async def _travelled(self, seconds: float) -> None:
@@ -270,10 +279,16 @@ class Copter(Vehicle):
         """
         self.require_guided_flight()
         target = await self._flown_setpoint() or self.ned_from_here(0, 0, 0)
+        self.held_by("GUIDED")  # the pilot may have switched it meanwhile
         await self._send_setpoint(target, Yaw(rate=math.radians(rate)))
 
     async def _flown_setpoint(self) -> Target | None:
-        """The setpoint that the autopilot still flies: a velocity is dropped after GUID_TIMEOUT."""
+        """The setpoint that the autopilot still flies.
+
+        A velocity is dropped after GUID_TIMEOUT, and everything when GUIDED is left.
+        """
+        if self._setpoint_at < self.state.mode_since:
+            return None
         if not isinstance(self._setpoint, VelocityTarget):
             return self._setpoint
         timeout = (await self.limits()).guided_timeout
@@ -285,16 +300,11 @@ class Copter(Vehicle):
         self.require_armed()
         self.require_mode("GUIDED")
         await self.commands.send(messages.pause(True))
-        self._paused = True
+        self._paused_at = self.clock()
 
     async def resume(self) -> None:
         """Continue the movement that `pause` stopped."""
         self.require_armed()
         self.require_mode("GUIDED")
         await self.commands.send(messages.pause(False))
-        self._paused = False
-
-    def on_message(self, message: Any) -> None:
-        """Learn from a heartbeat that GUIDED was left: what was being flown is void then."""
-        if message.get_type() == "HEARTBEAT" and self.mode != "GUIDED":
-            self._setpoint, self._paused = None, False
+        self._paused_at = None

@@ -23,16 +23,20 @@ class Job:
         id: its number, as text.
         verb: the path that was called, `/movement/go_to_ned_wait`.
         request: the validated parameters.
+        seat: the vehicle's, which it takes.
         outlives_client: whether it goes on when its client hangs up (land, rtl).
         progress: what it last said of itself, such as distance_to_go (m) and altitude (m above home).
         result: the text of its success.
         error: why it failed.
     """
 
-    def __init__(self, number: int, verb: str, request: Mapping[str, Any], outlives_client: bool) -> None:
+    def __init__(
+        self, number: int, verb: str, request: Mapping[str, Any], seat: Seat, outlives_client: bool
+    ) -> None:
         self.id = str(number)
         self.verb = verb
         self.request = dict(request)
+        self.seat = seat
         self.outlives_client = outlives_client
         self.progress: dict[str, float] = {}
         self.result: str | None = None
@@ -126,10 +130,11 @@ class JobBook:
         body: Callable[[Job], Awaitable[str]],
         outlives_client: bool = False,
     ) -> Job:
-        """Start a job, or join the one in the seat when it does just the same."""
-        if seat.job is not None and seat.job.running and seat.job.is_for(verb, request):
-            return seat.job
-        job = Job(next(self._numbers), verb, request, outlives_client)
+        """Start a job, or join the one for that seat that does just the same."""
+        for job in self.running():  # not the one in the seat: a job takes that when it has begun
+            if job.seat is seat and job.is_for(verb, request):
+                return job
+        job = Job(next(self._numbers), verb, request, seat, outlives_client)
         self._jobs[job.id] = job
         self._forget_old()
         job.start(body)

@@ -171,15 +171,21 @@ class Vehicle:
 
         Raises:
             Invalid: no such mode.
+            ModeChanged: somebody else switched it meanwhile.
             Rejected, TimedOut, LinkLost.
         """
         number = mode_number(self.state.vehicle_type, mode)
-        await self.commands.send(messages.set_mode(number))
+        before = self.state.mode
+
+        def shown() -> bool:
+            if self.state.mode not in (before, number, None):
+                raise ModeChanged(f"the vehicle is in {self.mode} now: somebody else switched it meanwhile")
+            return self.state.mode == number
+
+        await self.commands.send(messages.set_mode(number), shown=shown)
+        before = self.state.mode  # as it was when the vehicle answered
         await self.waiting.until(
-            {"HEARTBEAT"},
-            lambda: True if self.state.mode == number else None,
-            HEARTBEAT_TIMEOUT,
-            f"show mode {mode.upper()}",
+            {"HEARTBEAT"}, lambda: shown() or None, HEARTBEAT_TIMEOUT, f"show mode {mode.upper()}"
         )
 
     async def parameters(self, names: Iterable[str]) -> dict[str, float]:
@@ -226,7 +232,12 @@ class Vehicle:
             await self.switch_to("GUIDED")
         await self._get_ready(lambda: self.is_ready_to_arm, deadline)
         self.require_mode("GUIDED")
-        await self.commands.send(messages.arm())
+
+        def shown() -> bool:
+            self.require_mode("GUIDED")
+            return bool(self.state.armed)
+
+        await self.commands.send(messages.arm(), shown=shown)
         await self._until_armed(True)
 
     async def _get_ready(self, is_ready: Callable[[], bool], deadline: float) -> None:

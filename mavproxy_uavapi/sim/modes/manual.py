@@ -30,20 +30,24 @@ class PilotMode(Mode):
         """Metres per second upwards; the middle of the throttle stick (THR_DZ wide) holds the altitude."""
         copter = self.copter
         offset = copter.sticks.throttle(copter.now) - 0.5
-        deadzone = copter.parameters["THR_DZ"] / 1000
+        deadzone = max(0.0, min(0.3, copter.parameters["THR_DZ"] / 1000))
         if abs(offset) <= deadzone:
             return 0.0
-        up = copter.parameters["PILOT_SPEED_UP"] / 100
-        down = copter.parameters["PILOT_SPEED_DN"] / 100 or up
+        up, down = self._pilot_speeds()
         share = (abs(offset) - deadzone) / (0.5 - deadzone)
         return share * up if offset > 0 else -share * down
+
+    def _pilot_speeds(self) -> tuple[float, float]:
+        """Fastest climb and descent, m/s; PILOT_SPEED_DN 0 means the same as up."""
+        parameters = self.copter.parameters
+        up = max(parameters["PILOT_SPEED_UP"], 10) / 100
+        return up, max(parameters["PILOT_SPEED_DN"], 0) / 100 or up
 
     def _apply_pilot_limits(self) -> None:
         copter = self.copter
         limits = copter.default_limits()
-        limits.speed_up = copter.parameters["PILOT_SPEED_UP"] / 100
-        limits.speed_down = copter.parameters["PILOT_SPEED_DN"] / 100 or limits.speed_up
-        limits.acceleration_z = copter.parameters["PILOT_ACCEL_Z"] / 100
+        limits.speed_up, limits.speed_down = self._pilot_speeds()
+        limits.acceleration_z = max(copter.parameters["PILOT_ACCEL_Z"], 10) / 100
         copter.position.limits = limits
 
     def _still_on_ground(self) -> bool:
@@ -77,7 +81,7 @@ class Stabilize(PilotMode):
         if not copter.armed or (copter.landed and throttle == 0):
             return self.wait_on_ground()
         copter.relax()
-        hover = copter.parameters["MOT_THST_HOVER"]
+        hover = copter.hover_throttle
         # Half stick hovers: below it thrust is linear to nothing, above it linear to full.
         share = throttle / 0.5 if throttle <= 0.5 else 1 + (throttle - 0.5) / 0.5 * (1 / hover - 1)
         if copter.landed and copter.spooled_up and share > 0.9:
@@ -127,7 +131,7 @@ class Loiter(AltHold):
         if self._still_on_ground():
             return self._wait()
         control = copter.position
-        speed = copter.parameters["LOIT_SPEED"] / 100
+        speed = max(copter.parameters["LOIT_SPEED"], 20) / 100
         control.limits.speed = speed
         forward, right = -copter.sticks.axis(2, copter.now) * speed, copter.sticks.axis(1, copter.now) * speed
         control.fly_at(*rotate_to_ne(forward, right, copter.body.yaw), dt)

@@ -43,7 +43,7 @@ class Rtl(Mode):
         if checked and self.copter.home is None:
             return False
         limits = self.copter.default_limits()
-        limits.speed = self.copter.parameters["RTL_SPEED"] / 100 or limits.speed
+        limits.speed = max(self.copter.parameters["RTL_SPEED"], 0) / 100 or limits.speed
         self.copter.position.limits = limits
         self.stage, self._planned = Stage.CLIMB, False
         return True

@@ -40,7 +40,7 @@ class Takeoff:
             if not copter.spooled_up:
                 return SPOOLING
             self._throttle += dt / max(copter.parameters["TKOFF_SLEW_TIME"], 0.1)
-            if self._throttle < copter.parameters["MOT_THST_HOVER"]:
+            if self._throttle < copter.hover_throttle:
                 return SPOOLING
             copter.lift_off()
         control = copter.position

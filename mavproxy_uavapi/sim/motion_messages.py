@@ -1,0 +1,215 @@
+"""Where the vehicle is and how it moves, as MAVLink messages."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from .geodesy import Ned, from_ned
+from .message_source import MessageSource
+from .physics import GRAVITY
+
+IGNORE_ALL_BUT_POSITION = 0x0FF8
+IGNORE_ALL_BUT_VELOCITY = 0x0C07
+UNKNOWN_QUATERNION = [math.nan] * 4
+
+
+class MotionMessages(MessageSource):
+    """Position, attitude and targets. Positions are the estimate, SIMSTATE is the truth."""
+
+    def _heading(self) -> float:
+        return math.degrees(self.copter.body.yaw) % 360
+
+    def _build_gps_raw_int(self) -> Any:
+        estimator = self.copter.estimator
+        time, _, velocity, place = self._position()
+        fix = estimator.has_fix
+        speed = math.hypot(velocity.north, velocity.east)
+        course = math.degrees(math.atan2(velocity.east, velocity.north)) % 360
+        return mavlink.MAVLink_gps_raw_int_message(
+            int(time * 1e6),
+            mavlink.GPS_FIX_TYPE_RTK_FIXED if fix else mavlink.GPS_FIX_TYPE_NO_GPS,
+            round(place.latitude * 1e7) if fix else 0,
+            round(place.longitude * 1e7) if fix else 0,
+            round(place.altitude * 1000) if fix else 0,
+            121 if fix else 9999,
+            200 if fix else 9999,
+            round(speed * 100),
+            round(course * 100) % 36000,
+            10 if fix else 0,
+            round(place.altitude * 1000) if fix else 0,
+            300,
+            300,
+            40,
+            0,
+            0,
+        )
+
+    def _build_nav_controller_output(self) -> Any:
+        copter = self.copter
+        target, position = copter.mode.target, copter.estimator.position
+        distance, bearing = 0.0, 0.0
+        if target is not None:
+            distance = math.hypot(target.north - position.north, target.east - position.east)
+            bearing = math.degrees(math.atan2(target.east - position.east, target.north - position.north))
+        return mavlink.MAVLink_nav_controller_output_message(
+            math.degrees(copter.body.roll),
+            math.degrees(copter.body.pitch),
+            round(math.degrees(copter.body.yaw)),
+            round(bearing),
+            min(round(distance), 65535),
+            position.down - copter.position.position[2],
+            0.0,
+            0.0,
+        )
+
+    def _build_position_target_global_int(self) -> Any | None:
+        copter = self.copter
+        target, origin = copter.mode.target, copter.estimator.origin
+        if target is None or origin is None:
+            return None
+        place = from_ned(origin, target)
+        if abs(place.latitude) > 90:
+            return None
+        return mavlink.MAVLink_position_target_global_int_message(
+            self._milliseconds(),
+            mavlink.MAV_FRAME_GLOBAL,
+            0xF000 | IGNORE_ALL_BUT_POSITION,
+            round(place.latitude * 1e7),
+            round(place.longitude * 1e7),
+            place.altitude,
+            *([0.0] * 8),
+        )
+
+    def _build_position_target_local_ned(self) -> Any | None:
+        copter = self.copter
+        guided = copter.guided
+        if copter.mode is not guided:
+            return None
+        velocity_only = guided.submode.name in ("VELOCITY", "ACCELERATION")
+        position = Ned(0.0, 0.0, 0.0) if velocity_only else guided.position_target
+        return mavlink.MAVLink_position_target_local_ned_message(
+            self._milliseconds(),
+            mavlink.MAV_FRAME_LOCAL_NED,
+            IGNORE_ALL_BUT_VELOCITY if velocity_only else IGNORE_ALL_BUT_POSITION,
+            *position,
+            *guided.velocity_target,
+            *guided.acceleration_target,
+            0.0,
+            0.0,
+        )
+
+    def _build_global_position_int(self) -> Any | None:
+        copter = self.copter
+        if copter.estimator.origin is None:
+            return None
+        time, _, velocity, place = self._position()
+        return mavlink.MAVLink_global_position_int_message(
+            int(time * 1000 + 0.5),
+            round(place.latitude * 1e7),
+            round(place.longitude * 1e7),
+            round(place.altitude * 1000),
+            round((place.altitude - copter.home_altitude) * 1000),
+            round(velocity.north * 100),
+            round(velocity.east * 100),
+            round(velocity.down * 100),
+            round(self._heading() * 100) % 36000,
+        )
+
+    def _build_local_position_ned(self) -> Any | None:
+        if self.copter.estimator.origin is None:
+            return None
+        time, position, velocity, _ = self._position()
+        return mavlink.MAVLink_local_position_ned_message(int(time * 1000 + 0.5), *position, *velocity)
+
+    def _build_attitude(self) -> Any:
+        body = self.copter.body
+        return mavlink.MAVLink_attitude_message(
+            self._milliseconds(),
+            body.roll,
+            body.pitch,
+            body.yaw,
+            body.roll_rate,
+            body.pitch_rate,
+            body.yaw_rate,
+        )
+
+    def _build_simstate(self) -> Any:
+        copter = self.copter
+        body = copter.body
+        place = from_ned(copter.estimator.start, body.position)
+        return mavlink.MAVLink_simstate_message(
+            body.roll,
+            body.pitch,
+            body.yaw,
+            body.thrust_north,
+            body.thrust_east,
+            body.thrust_down - GRAVITY,
+            body.roll_rate,
+            body.pitch_rate,
+            body.yaw_rate,
+            round(place.latitude * 1e7),
+            round(place.longitude * 1e7),
+        )
+
+    def _build_vfr_hud(self) -> Any:
+        copter = self.copter
+        body = copter.body
+        _, _, velocity, place = self._position()
+        ground_speed = math.hypot(velocity.north, velocity.east)
+        air_speed = math.hypot(velocity.north - body.wind_north, velocity.east - body.wind_east)
+        throttle = round(100 * min(copter.throttle * copter.hover_throttle, 1.0))
+        return mavlink.MAVLink_vfr_hud_message(
+            air_speed, ground_speed, int(self._heading()), throttle, place.altitude, -velocity.down
+        )
+
+    def _build_ahrs(self) -> Any:
+        return mavlink.MAVLink_ahrs_message(0.0, 0.0, 0.0, 0.0, 0.0, 0.001, 0.001)
+
+    def _build_raw_imu(self) -> Any:
+        body = self.copter.body
+        rates = (body.roll_rate, body.pitch_rate, body.yaw_rate)
+        return mavlink.MAVLink_raw_imu_message(
+            self._microseconds(),
+            0,
+            0,
+            -1000,
+            *(max(-32768, min(32767, round(rate * 1000))) for rate in rates),
+            231,
+            104,
+            -533,
+        )
+
+    def _build_scaled_pressure(self) -> Any:
+        altitude = self.copter.estimator.location.altitude
+        pressure = 1013.25 * max(1 - 2.25577e-5 * altitude, 0.01) ** 5.25588
+        return mavlink.MAVLink_scaled_pressure_message(self._milliseconds(), pressure, 0.0, 2500)
+
+    def _build_home_position(self) -> Any | None:
+        home = self.copter.home
+        if home is None:
+            return None
+        return mavlink.MAVLink_home_position_message(
+            round(home.latitude * 1e7),
+            round(home.longitude * 1e7),
+            round(home.altitude * 1000),
+            *self.copter.home_offset,
+            UNKNOWN_QUATERNION,
+            0.0,
+            0.0,
+            0.0,
+            self._microseconds(),
+        )
+
+    def _build_gps_global_origin(self) -> Any | None:
+        origin = self.copter.estimator.origin
+        if origin is None:
+            return None
+        return mavlink.MAVLink_gps_global_origin_message(
+            round(origin.latitude * 1e7),
+            round(origin.longitude * 1e7),
+            round(origin.altitude * 1000),
+            self._microseconds(),
+        )

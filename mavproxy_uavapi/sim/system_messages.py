@@ -1,0 +1,176 @@
+"""The state of the vehicle's systems as MAVLink messages."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from . import arming
+from .message_source import MessageSource
+from .mission import MAVLINK_STATE
+
+SENSORS = (
+    mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO
+    | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL
+    | mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG
+    | mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
+    | mavlink.MAV_SYS_STATUS_SENSOR_GPS
+    | mavlink.MAV_SYS_STATUS_SENSOR_ANGULAR_RATE_CONTROL
+    | mavlink.MAV_SYS_STATUS_SENSOR_ATTITUDE_STABILIZATION
+    | mavlink.MAV_SYS_STATUS_SENSOR_YAW_POSITION
+    | mavlink.MAV_SYS_STATUS_SENSOR_Z_ALTITUDE_CONTROL
+    | mavlink.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
+    | mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
+    | mavlink.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
+    | mavlink.MAV_SYS_STATUS_AHRS
+    | mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
+    | mavlink.MAV_SYS_STATUS_GEOFENCE
+    | mavlink.MAV_SYS_STATUS_PREARM_CHECK
+)
+CAPABILITIES = (
+    mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
+    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+)
+"""Without FTP: MAVProxy then loads the parameters one by one, at once."""
+FIRMWARE_VERSION = (4 << 24) | (6 << 16) | (0 << 8) | mavlink.FIRMWARE_VERSION_TYPE_OFFICIAL
+GPS_EPOCH = 315964800
+"""1980-01-06 in unix seconds; before it a clock has never been set."""
+
+
+class SystemMessages(MessageSource):
+    """Mode, health, battery, mission progress, sticks and outputs."""
+
+    def _build_heartbeat(self) -> Any:
+        copter = self.copter
+        base = mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED | mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
+        base |= mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+        base |= mavlink.MAV_MODE_FLAG_GUIDED_ENABLED if copter.mode.positions else 0
+        base |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED if copter.armed else 0
+        if copter.failsafes.active:
+            status = mavlink.MAV_STATE_CRITICAL
+        else:
+            status = mavlink.MAV_STATE_STANDBY if copter.landed else mavlink.MAV_STATE_ACTIVE
+        return mavlink.MAVLink_heartbeat_message(
+            mavlink.MAV_TYPE_QUADROTOR,
+            mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA,
+            base,
+            copter.mode.number,
+            status,
+            3,
+        )
+
+    def _build_sys_status(self) -> Any:
+        copter = self.copter
+        battery = copter.battery
+        health = SENSORS
+        if arming.prearm_failures(copter):
+            health &= ~mavlink.MAV_SYS_STATUS_PREARM_CHECK
+        if not copter.estimator.aligned:
+            health &= ~mavlink.MAV_SYS_STATUS_AHRS
+        if not copter.estimator.has_fix:
+            health &= ~mavlink.MAV_SYS_STATUS_SENSOR_GPS
+        enabled = SENSORS & ~mavlink.MAV_SYS_STATUS_GEOFENCE
+        if not copter.armed:
+            enabled &= ~mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
+        return mavlink.MAVLink_sys_status_message(
+            SENSORS,
+            enabled,
+            health,
+            150,
+            round(battery.voltage * 1000),
+            round(battery.current * 100),
+            battery.remaining,
+            0,
+            0,
+            0,
+            0,
+            0,
+            0,
+        )
+
+    def _build_power_status(self) -> Any:
+        return mavlink.MAVLink_power_status_message(5000, 0, 0)
+
+    def _build_meminfo(self) -> Any:
+        return mavlink.MAVLink_meminfo_message(0, 0xFFFF, 0x1FFFF)
+
+    def _build_mission_current(self) -> Any:
+        return self.mission_current(self.copter.mission.current)
+
+    def mission_current(self, seq: int) -> Any:
+        """MISSION_CURRENT for a sequence number, which confirms a MISSION_SET_CURRENT."""
+        copter = self.copter
+        mission = copter.mission
+        state = MAVLINK_STATE[mission.state] if mission.present else mavlink.MISSION_STATE_NO_MISSION
+        if copter.mode.number == 3 and getattr(copter.mode, "paused", False):
+            state = mavlink.MISSION_STATE_PAUSED
+        total = max(len(mission.items) - 1, 0)
+        return mavlink.MAVLink_mission_current_message(seq, total, state, int(copter.mode.number == 3))
+
+    def _build_servo_output_raw(self) -> Any:
+        copter = self.copter
+        motor = 1000 + round(1000 * min(copter.throttle * copter.hover_throttle, 1.0))
+        pulses = copter.servos.pulses(motor)
+        return mavlink.MAVLink_servo_output_raw_message(
+            self._microseconds() & 0xFFFFFFFF, 0, *pulses[:8], *pulses[8:]
+        )
+
+    def _build_rc_channels(self) -> Any:
+        copter = self.copter
+        pulses = copter.sticks.pulses(copter.now)
+        return mavlink.MAVLink_rc_channels_message(self._milliseconds(), 16, *pulses, 0, 0, 254)
+
+    def _build_system_time(self) -> Any:
+        unix = self.unix_epoch + self.copter.now
+        return mavlink.MAVLink_system_time_message(
+            int(unix * 1e6) if unix > GPS_EPOCH else 0, self._milliseconds()
+        )
+
+    def _build_battery_status(self) -> Any:
+        battery = self.copter.battery
+        return mavlink.MAVLink_battery_status_message(
+            0,
+            mavlink.MAV_BATTERY_FUNCTION_UNKNOWN,
+            mavlink.MAV_BATTERY_TYPE_UNKNOWN,
+            32767,
+            [round(battery.voltage * 1000)] + [65535] * 9,
+            round(battery.current * 100),
+            round(battery.consumed),
+            round(battery.consumed_wh * 36),
+            battery.remaining,
+            0,
+            mavlink.MAV_BATTERY_CHARGE_STATE_LOW if battery.low else mavlink.MAV_BATTERY_CHARGE_STATE_OK,
+        )
+
+    def _build_ekf_status_report(self) -> Any:
+        estimator = self.copter.estimator
+        variance = 0.01 if estimator.ready else 1.0
+        return mavlink.MAVLink_ekf_status_report_message(
+            estimator.flags, variance, variance, 0.01, 0.01, 0.0
+        )
+
+    def _build_vibration(self) -> Any:
+        return mavlink.MAVLink_vibration_message(self._microseconds(), 0.0, 0.0, 0.0, 0, 0, 0)
+
+    def _build_autopilot_version(self) -> Any:
+        return mavlink.MAVLink_autopilot_version_message(
+            CAPABILITIES, FIRMWARE_VERSION, 0, 0, 0, list(b"embedded"), [0] * 8, [0] * 8, 0, 0, 0
+        )
+
+    def _build_extended_sys_state(self) -> Any:
+        copter = self.copter
+        if copter.landed:
+            landed = mavlink.MAV_LANDED_STATE_ON_GROUND
+        elif copter.mode.landing:
+            landed = mavlink.MAV_LANDED_STATE_LANDING
+        elif copter.mode.taking_off:
+            landed = mavlink.MAV_LANDED_STATE_TAKEOFF
+        else:
+            landed = mavlink.MAV_LANDED_STATE_IN_AIR
+        return mavlink.MAVLink_extended_sys_state_message(mavlink.MAV_VTOL_STATE_MC, landed)

@@ -1,0 +1,211 @@
+from __future__ import annotations
+
+import asyncio
+import os
+import subprocess
+import sys
+import threading
+from collections import deque
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from mavproxy_uavapi.host.bridge import Bridge
+
+
+class Received(list[Any]):
+    """What the asyncio side received; messages that are exceptions are raised."""
+
+    def take(self, message: Any) -> None:
+        if isinstance(message, Exception):
+            raise message
+        self.append((message, threading.current_thread().name))
+
+
+class BadMessage(Exception):
+    def get_type(self) -> str:
+        return "BAD"
+
+
+@pytest.fixture
+def received() -> Received:
+    return Received()
+
+
+@pytest.fixture
+def bridge(mpstate: Any, received: Received) -> Iterator[Bridge]:
+    bridge = Bridge(mpstate.select_extra, received.take)
+    bridge.start()
+    yield bridge
+    bridge.stop()
+
+
+def in_loop(bridge: Bridge) -> None:
+    """Wait until the loop has done what was queued before."""
+
+    async def nothing() -> None:
+        await asyncio.sleep(0)
+
+    bridge.run(nothing())
+
+
+def test_fed_messages_arrive_in_order_in_the_asyncio_thread(bridge: Bridge, received: Received) -> None:
+    for number in range(100):
+        bridge.feed(number)
+    in_loop(bridge)
+    assert received == [(number, "uavapi-loop") for number in range(100)]
+
+
+def test_bad_message_does_not_stop_the_next(bridge: Bridge, received: Received) -> None:
+    defects: list[str] = []
+    bridge.loop.set_exception_handler(lambda _, context: defects.append(context["message"]))
+    for message in ("one", BadMessage(), "two"):
+        bridge.feed(message)
+    in_loop(bridge)
+    assert [message for message, _ in received] == ["one", "two"]
+    assert defects == ["uavapi: defect on BAD"]
+
+
+def test_feed_never_goes_deaf_when_the_loop_empties_the_inbox_meanwhile(bridge: Bridge, received: Received) -> None:
+    class Preempted(deque[Any]):
+        """An inbox whose `append` the asyncio thread always precedes by taking all there is."""
+
+        def append(self, message: Any) -> None:
+            hold.set()
+            in_loop(bridge)
+            super().append(message)
+
+    hold, held = threading.Event(), threading.Event()
+    bridge._inbox = Preempted()
+
+    def hold_the_loop() -> None:
+        held.set()
+        hold.wait(2.0)
+
+    bridge.call_soon(hold_the_loop)
+    held.wait(2.0)
+    deque.append(bridge._inbox, "first")  # as fed, its delivery under way
+    bridge.call_soon(bridge._deliver)
+    bridge.feed("second")
+    bridge.feed("third")
+    in_loop(bridge)
+    assert [message for message, _ in received] == ["first", "second", "third"]
+
+
+def test_feed_after_the_end_is_dropped(mpstate: Any, received: Received) -> None:
+    bridge = Bridge(mpstate.select_extra, received.take)
+    bridge.start()
+    bridge.stop()
+    for number in range(3):
+        bridge.feed(number)
+    assert received == []
+    assert len(bridge._inbox) == 0
+
+
+def test_on_main_runs_in_the_main_loop_and_gives_its_result(bridge: Bridge, main_loop: Any) -> None:
+    future = asyncio.run_coroutine_threadsafe(bridge.on_main(threading.get_ident), bridge.loop)
+    main_loop.until(future.done)
+    assert future.result() == threading.get_ident()
+
+
+def test_on_main_raises_what_the_call_raised(bridge: Bridge, main_loop: Any) -> None:
+    future = asyncio.run_coroutine_threadsafe(bridge.on_main(lambda: 1 / 0), bridge.loop)
+    main_loop.until(future.done)
+    with pytest.raises(ZeroDivisionError):
+        future.result()
+
+
+def test_on_main_that_was_cancelled_before_it_ran_is_never_run(bridge: Bridge, main_loop: Any) -> None:
+    ran: list[int] = []
+
+    async def cancel_at_once() -> None:
+        task = asyncio.create_task(bridge.on_main(lambda: ran.append(1)))
+        await asyncio.sleep(0)
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+
+    bridge.run(cancel_at_once())
+    main_loop.turn()
+    bridge.drain()
+    assert ran == []
+
+
+def test_select_wakes_for_a_call_without_any_idle_task(bridge: Bridge, main_loop: Any) -> None:
+    ran: list[int] = []
+    bridge.post(lambda: ran.append(1))
+    main_loop.turn(wait=2.0)
+    assert ran == [1]
+
+
+def test_stop_takes_its_descriptor_out_of_select(mpstate: Any) -> None:
+    bridge = Bridge(mpstate.select_extra, lambda message: None)
+    bridge.start()
+    assert len(mpstate.select_extra) == 1
+    bridge.stop()
+    assert mpstate.select_extra == {}
+    assert not bridge.running
+
+
+def test_fifty_starts_and_stops_leave_no_thread_and_no_descriptor(mpstate: Any, descriptors: Any) -> None:
+    threads, before = threading.active_count(), descriptors()
+    for number in range(50):
+        bridge = Bridge(mpstate.select_extra, lambda message: None)
+        if number % 2:
+            bridge.start()
+            bridge.feed("hello")
+        bridge.stop()
+    assert threading.active_count() == threads
+    assert descriptors() == before
+
+
+FORK = """
+import os, socket, warnings
+warnings.simplefilter("ignore")
+from mavproxy_uavapi.host.bridge import Bridge
+
+def is_open(fd):
+    try:
+        os.fstat(fd)
+    except OSError:
+        return False
+    return True
+
+select_extra = {}
+bridge = Bridge(select_extra, print)
+bridge.start()
+port, kept = socket.socket(), socket.socket()
+taken_back = socket.socket()
+closed = [port.fileno(), *bridge._outbox.filenos()]
+bridge.close_in_children(lambda: [port.fileno(), -1])
+fileno = taken_back.fileno
+bridge.close_in_children(ours := (lambda: [fileno()]))
+bridge.keep_in_children(ours)
+stopped = Bridge({}, print)
+stopped.start()
+stopped.stop()
+child = os.fork()
+if not child:
+    wrong = any(is_open(fd) for fd in closed) or not is_open(kept.fileno()) or not is_open(fileno())
+    os._exit(3 if wrong else 0)
+status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+done = []
+bridge.call_soon(done.append, 1)  # the parent's loop and socket are as they were
+port.listen()
+
+async def look():
+    return done
+
+assert bridge.run(look()) == [1]
+bridge.stop()
+raise SystemExit(status)
+"""
+
+
+def test_forked_child_closes_our_sockets_and_no_other() -> None:
+    environment = {**os.environ, "MAVLINK20": "1"}
+    ended = subprocess.run(
+        [sys.executable, "-c", FORK], env=environment, capture_output=True, text=True, timeout=20, check=False
+    )
+    assert (ended.returncode, ended.stderr) == (0, "")

@@ -1,0 +1,104 @@
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from mavproxy_uavapi.host import host as hosts
+from mavproxy_uavapi.host.member import HostedModule
+
+
+class Demo(HostedModule):
+    def __init__(self, mpstate: Any, name: str = "demo") -> None:
+        self.done: list[Any] = []
+        actions = {"status": lambda args: self.done.append(("status", args)), "go": lambda args: self.done.append(args)}
+        super().__init__(mpstate, name, "a demo", actions, ["<status|go>"])
+
+    def begin(self) -> None:
+        self.done.append(("begun", self.host.bridge.running))
+
+    async def end(self) -> None:
+        self.done.append("ended")
+
+
+@pytest.fixture
+def demo(mpstate: Any, main_loop: Any) -> Iterator[Demo]:
+    demo = Demo(mpstate)
+    main_loop.modules.append(demo)
+    yield demo
+    if demo in demo.host.members:
+        demo.unload()
+
+
+def test_loading_adds_its_command_and_hears_every_vehicle(demo: Demo, mpstate: Any) -> None:
+    assert mpstate.command_map["demo"] == (demo.command, "a demo")
+    assert mpstate.completions["demo"] == ["<status|go>"]
+    assert demo.multi_vehicle
+
+
+def test_begin_comes_once_in_the_first_idle_task_when_the_host_runs(demo: Demo, main_loop: Any) -> None:
+    assert demo.done == []
+    main_loop.turn()
+    main_loop.turn()
+    assert demo.done == [("begun", True)]
+
+
+def test_command_without_a_word_is_status(demo: Demo) -> None:
+    demo.command([])
+    demo.command(["go", "1", "2"])
+    assert demo.done == [("status", []), ["1", "2"]]
+
+
+def test_unknown_word_is_answered_with_the_nearest(demo: Demo, capsys: Any) -> None:
+    demo.command(["statsu"])
+    demo.command(["xyz"])
+    assert capsys.readouterr().out == (
+        "demo: no command 'statsu'; did you mean status?\ndemo: no command 'xyz'; there are status, go\n"
+    )
+    assert demo.done == []
+
+
+def test_packets_reach_the_fleet(demo: Demo, main_loop: Any, msg: Any) -> None:
+    main_loop.turn()
+    demo.mavlink_packet(msg("heartbeat", system=4))
+    main_loop.until(lambda: 4 in demo.host.fleet.vehicles)
+
+
+def test_unload_ends_it_and_gives_all_back(demo: Demo, mpstate: Any, main_loop: Any) -> None:
+    main_loop.turn()
+    demo.unload()
+    assert demo.done[-1] == "ended"
+    assert mpstate.command_map == {}
+    assert mpstate.completions == {}
+    assert mpstate.select_extra == {}
+    assert not hasattr(mpstate, hosts.ATTRIBUTE)
+
+
+def test_unload_before_the_first_idle_task_ends_nothing_that_never_began(demo: Demo, mpstate: Any) -> None:
+    demo.unload()
+    assert demo.done == []
+    assert not hasattr(mpstate, hosts.ATTRIBUTE)
+
+
+def test_host_is_given_back_even_when_the_end_fails(demo: Demo, mpstate: Any, main_loop: Any) -> None:
+    async def fail() -> None:
+        raise RuntimeError("no")
+
+    demo.end = fail  # type: ignore[method-assign]
+    main_loop.turn()
+    with pytest.raises(RuntimeError, match="no"):
+        demo.unload()
+    assert not hasattr(mpstate, hosts.ATTRIBUTE)
+
+
+def test_second_module_goes_on_when_the_first_is_unloaded(demo: Demo, mpstate: Any, main_loop: Any, msg: Any) -> None:
+    other = Demo(mpstate, "other")
+    main_loop.modules.append(other)
+    main_loop.turn()
+    demo.unload()
+    main_loop.modules.remove(demo)
+    other.mavlink_packet(msg("heartbeat", system=4))
+    main_loop.until(lambda: 4 in other.host.fleet.vehicles)
+    other.unload()
+    assert not hasattr(mpstate, hosts.ATTRIBUTE)

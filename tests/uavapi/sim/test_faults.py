@@ -1,0 +1,168 @@
+import json
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from mavproxy_uavapi.sim.control import Control
+
+HOME = mavlink.MAV_CMD_GET_HOME_POSITION
+
+
+@pytest.fixture
+def control(ground):
+    ground.run(6.0)
+    return Line(ground)
+
+
+class Line:
+    """The control protocol without its socket."""
+
+    def __init__(self, ground):
+        self.ground = ground
+        self._control = Control(ground.simulator)
+
+    def ask(self, **request):
+        return json.loads(self._control.handle_line(json.dumps(request)))
+
+    def fault(self, name, **fields):
+        answer = self.ask(op="fault", name=name, **fields)
+        assert answer["ok"], answer
+
+
+def acks(ground, seconds):
+    return [m for m in ground.run(seconds) if m.get_type() == "COMMAND_ACK"]
+
+
+def send_command(ground, command=HOME):
+    ground.send(mavlink.MAVLink_command_long_message(1, 1, command, 0, *([0.0] * 7)))
+
+
+def test_silence_sends_nothing_and_hears_nothing_for_its_time(control):
+    control.fault("silence", seconds=2)
+    send_command(control.ground)
+    control.ground.run(0.02)
+    assert control.ground.run(1.9) == []
+    assert control.ask(op="received")["messages"] == []
+    assert control.ground.run(2.0) != []
+
+
+def test_silence_can_be_one_way(control):
+    control.fault("silence", receiving=False)
+    send_command(control.ground)
+    assert control.ground.run(3.0) == []
+    assert len(control.ask(op="received")["messages"]) == 1
+    control.ask(op="clear")
+    assert control.ground.run(2.0) != []
+
+
+def test_lost_acks_are_counted_but_the_command_is_done(control):
+    control.fault("lose_acks", command=HOME, count=2)
+    for expected in (0, 0, 1):
+        send_command(control.ground)
+        assert len(acks(control.ground, 0.1)) == expected
+    assert len(control.ground.of("HOME_POSITION")) == 4
+
+
+def test_delayed_and_foreign_acks(control):
+    control.fault("delay_acks", command="all", seconds=1.5, count=1)
+    send_command(control.ground)
+    assert acks(control.ground, 1.4) == []
+    assert len(acks(control.ground, 0.2)) == 1
+    control.fault("foreign_ack", command=HOME, count=1, result=4)
+    send_command(control.ground)
+    control.ground.simulator.step()
+    heard = mavlink.MAVLink(None).parse_buffer(control.ground.link.drain())
+    results = [(m.get_srcSystem(), m.result) for m in heard if m.get_type() == "COMMAND_ACK"]
+    assert results == [(99, 4), (1, 0)]
+
+
+def test_refused_commands_are_not_done(control):
+    control.fault("refuse", command=HOME, result=1, text="no", count=1)
+    control.ground.heard.clear()
+    send_command(control.ground)
+    assert [ack.result for ack in acks(control.ground, 0.1)] == [1]
+    assert control.ground.of("HOME_POSITION") == []
+    assert "no" in control.ground.texts()
+
+
+def test_progress_before_the_result(control):
+    control.fault("in_progress", command=HOME, seconds=1.0)
+    send_command(control.ground)
+    assert [ack.result for ack in acks(control.ground, 2.0)] == [5, 5, 0]
+
+
+def test_a_frozen_gps_reports_the_same_place(flying):
+    control = Line(flying)
+    control.fault("freeze_gps", seconds=4)
+    flying.run(0.02)
+    flying.local((50.0, 0.0, -10.0))
+    telemetry = flying.simulator.telemetry
+    before = telemetry.build("GPS_RAW_INT")
+    flying.run(3.5)
+    assert telemetry.build("GPS_RAW_INT").lat == before.lat
+    assert telemetry.build("GPS_RAW_INT").time_usec == before.time_usec
+    assert control.ask(op="state")["position"][0] > 5.0
+    flying.run(1.0)
+    assert telemetry.build("GPS_RAW_INT").lat > before.lat
+
+
+@pytest.mark.parametrize(("action", "mode"), [(0, "GUIDED"), (1, "LAND"), (2, "RTL")])
+def test_a_low_battery_does_what_it_is_configured_to(flying, action, mode):
+    flying.send(mavlink.MAVLink_param_set_message(1, 1, b"BATT_FS_LOW_ACT", float(action), 2))
+    Line(flying).fault("low_battery")
+    flying.run(9.0)
+    assert flying.copter.mode.name == "GUIDED"
+    flying.run(2.0)
+    assert flying.copter.mode.name == mode
+    assert any(text.startswith("Battery 1 is low") for text in flying.texts())
+
+
+def test_a_pilot_takes_over_and_the_vehicle_stays_up(flying):
+    control = Line(flying)
+    flying.local((100.0, 0.0, -10.0))
+    flying.run(3.0)
+    control.fault("pilot_mode", mode="loiter")
+    flying.run(0.05)
+    assert flying.of("HEARTBEAT")[-1].custom_mode == 5
+    flying.run(8.0)
+    assert control.ask(op="state")["altitude_above_home"] == pytest.approx(10.0, abs=0.2)
+    assert not control.ask(op="fault", name="pilot_mode", mode="AUTO")["ok"]
+
+
+def test_a_pilot_disarms_and_a_reboot_comes_out_of_the_blue(flying):
+    control = Line(flying)
+    control.fault("pilot_disarm")
+    assert not control.ask(op="state")["armed"]
+    control.fault("reboot")
+    flying.run(0.1)
+    assert control.ask(op="state")["time_boot_ms"] < 200
+
+
+def test_a_bad_estimator_is_not_ready_until_it_recovers(control):
+    control.fault("ekf_bad", seconds=3)
+    control.ground.mode(4)
+    assert control.ground.arm() == mavlink.MAV_RESULT_FAILED
+    control.ground.run(3.0)
+    assert control.ground.arm() == mavlink.MAV_RESULT_ACCEPTED
+
+
+def test_what_was_received_is_told_by_index(control):
+    send_command(control.ground)
+    control.ground.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
+    first = control.ask(op="received")
+    assert [entry["name"] for entry in first["messages"]] == ["COMMAND_LONG"]
+    assert first["messages"][0]["fields"]["command"] == HOME
+    assert first["messages"][0]["system"] == 255
+    assert control.ask(op="received", since=first["last"])["messages"] == []
+    assert len(control.ask(op="received", heartbeats=True)["messages"]) == 2
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["", "[]", "{}", '{"op": "nope"}', '{"op": "fault"}', '{"op": "fault", "name": "nope"}', "7",
+     '{"op": "fault", "name": "refuse", "count": "many"}', '{"op": "fault", "name": "silence", "seconds": -1}'],
+)
+def test_nonsense_is_answered_with_an_error(control, line):
+    answer = json.loads(control._control.handle_line(line))
+    assert answer["ok"] is False
+    assert answer["error"]

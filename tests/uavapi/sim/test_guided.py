@@ -1,0 +1,265 @@
+import math
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from mavproxy_uavapi.sim.geodesy import Ned, from_ned
+
+VELOCITY_ONLY = 0b110111000111
+YAW_ONLY = 0b100111111111
+YAW_RATE_ONLY = 0b010111111111
+ACCELERATION_ONLY = 0b110000111111
+POSITION_AND_VELOCITY = 0b110111000000
+POSITION_AND_YAW = 0b100111111000
+VELOCITY_AND_YAW_RATE = 0b010111000111
+TAKEOFF = mavlink.MAV_CMD_NAV_TAKEOFF
+
+
+def test_takeoff_only_armed_and_in_guided(ground):
+    ground.run(6.0)
+    ground.mode(4)
+    assert ground.command(TAKEOFF, 0, 0, 0, 0, 0, 0, 10) == mavlink.MAV_RESULT_FAILED
+    ground.mode(0)
+    ground.arm()
+    assert ground.command(TAKEOFF, 0, 0, 0, 0, 0, 0, 10) == mavlink.MAV_RESULT_FAILED
+    ground.mode(4)
+    assert ground.command(TAKEOFF, 0, 0, 0, 0, 0, 0, -1) == mavlink.MAV_RESULT_FAILED
+    assert ground.command(TAKEOFF, 0, 0, 0, 0, 0, 0, 10) == mavlink.MAV_RESULT_ACCEPTED
+    ground.run(20.0)
+    assert ground.body.down == pytest.approx(-10.0, abs=0.05)
+    assert ground.command(TAKEOFF, 0, 0, 0, 0, 0, 0, 20) == mavlink.MAV_RESULT_FAILED
+
+
+def test_takeoff_goes_through_landed_states(ground):
+    ground.command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, 100000)
+    ground.fly(5.0)
+    ground.run(0.2)
+    ground.command(mavlink.MAV_CMD_NAV_LAND)
+    ground.run(20.0)
+    states = [m.landed_state for m in ground.of("EXTENDED_SYS_STATE")]
+    assert mavlink.MAV_LANDED_STATE_IN_AIR in states
+    assert states[-1] == mavlink.MAV_LANDED_STATE_ON_GROUND
+    assert mavlink.MAV_LANDED_STATE_LANDING in states
+
+
+@pytest.mark.parametrize(
+    ("frame", "vector", "expected"),
+    [
+        (mavlink.MAV_FRAME_LOCAL_NED, (20.0, -10.0, -15.0), (20.0, -10.0, -15.0)),
+        (mavlink.MAV_FRAME_LOCAL_OFFSET_NED, (20.0, -10.0, -5.0), (20.0, -10.0, -15.0)),
+        (mavlink.MAV_FRAME_BODY_OFFSET_NED, (10.0, 0.0, 0.0), (0.0, 10.0, -10.0)),
+        (mavlink.MAV_FRAME_BODY_NED, (0.0, 10.0, 0.0), (-10.0, 0.0, -10.0)),
+    ],
+)
+def test_position_setpoints_in_local_frames(flying, frame, vector, expected):
+    flying.command(mavlink.MAV_CMD_CONDITION_YAW, 90, 0, 0, 0)
+    flying.run(5.0)
+    flying.local(vector, frame=frame)
+    flying.run(20.0)
+    assert flying.body.position == pytest.approx(expected, abs=0.25)
+
+
+@pytest.mark.parametrize(
+    ("frame", "altitude"),
+    [(0, 604.0), (5, 604.0), (3, 20.0), (6, 20.0), (10, 20.0), (11, 20.0)],
+)
+def test_position_setpoints_in_global_frames(flying, frame, altitude):
+    place = from_ned(flying.copter.estimator.origin, Ned(30.0, 40.0, 0.0))
+    flying.send(
+        mavlink.MAVLink_set_position_target_global_int_message(
+            0, 1, 1, frame, 0b110111111000, round(place.latitude * 1e7), round(place.longitude * 1e7), altitude,
+            *([0.0] * 8),
+        )
+    )
+    flying.run(20.0)
+    assert flying.body.position == pytest.approx((30.0, 40.0, -20.0), abs=0.1)
+
+
+def test_a_position_move_reaches_wpnav_speed_and_stops_without_overshoot(flying):
+    flying.local((150.0, 0.0, -10.0))
+    fastest = farthest = 0.0
+    for _ in range(300):
+        flying.run(0.1)
+        fastest, farthest = max(fastest, flying.body.velocity_north), max(farthest, flying.body.north)
+    assert fastest == pytest.approx(10.0, abs=0.3)
+    assert farthest < 150.2
+    assert flying.body.north == pytest.approx(150.0, abs=0.03)
+
+
+def test_a_new_target_in_flight_blends_without_a_jump_in_acceleration(flying):
+    flying.local((100.0, 0.0, -10.0))
+    flying.run(5.0)
+    flying.local((0.0, 100.0, -10.0))
+    before = flying.body.velocity
+    for _ in range(50):
+        flying.run(0.02)
+        assert math.dist(flying.body.velocity, before) / 0.02 < 4.0
+        before = flying.body.velocity
+    flying.run(30.0)
+    assert flying.body.position == pytest.approx((0.0, 100.0, -10.0), abs=0.1)
+
+
+def test_velocity_setpoints_expire(flying):
+    flying.local((0.0, 4.0, 0.0), VELOCITY_ONLY)
+    flying.run(2.5)
+    assert flying.body.velocity_east == pytest.approx(4.0, abs=0.3)
+    flying.run(5.0)
+    assert flying.body.velocity == pytest.approx((0.0, 0.0, 0.0), abs=0.2)
+
+
+def test_velocity_in_the_body_frame_turns_with_the_nose(flying):
+    flying.command(mavlink.MAV_CMD_CONDITION_YAW, 180, 0, 0, 0)
+    flying.run(6.0)
+    flying.local((3.0, 0.0, 0.0), VELOCITY_ONLY, frame=mavlink.MAV_FRAME_BODY_NED)
+    flying.run(2.5)
+    assert flying.body.velocity_north == pytest.approx(-3.0, abs=0.3)
+
+
+def test_acceleration_setpoints_accelerate_and_expire(flying):
+    flying.local((0.0, 0.0, 0.0), ACCELERATION_ONLY, acceleration=(1.0, 0.0, 0.0))
+    flying.run(2.0)
+    assert flying.body.velocity_north == pytest.approx(2.0, abs=0.4)
+    flying.run(8.0)
+    assert flying.body.velocity_north == pytest.approx(0.0, abs=0.2)
+
+
+def test_position_with_velocity_follows_a_moving_target(flying):
+    flying.local((0.0, 0.0, -10.0), POSITION_AND_VELOCITY, velocity=(2.0, 0.0, 0.0))
+    flying.run(2.9)
+    assert flying.body.velocity_north == pytest.approx(2.0, abs=1.0)
+    flying.run(8.0)
+    assert flying.body.velocity_north == pytest.approx(0.0, abs=0.1)
+
+
+def test_yaw_fields_turn_the_vehicle(flying):
+    flying.local((0.0, 0.0, -10.0), POSITION_AND_YAW, yaw=math.radians(120))
+    flying.run(5.0)
+    assert flying.heading == pytest.approx(120.0, abs=1.0)
+    flying.local((0.0, 0.0, 0.0), VELOCITY_AND_YAW_RATE, yaw_rate=math.radians(20))
+    flying.run(2.0)
+    assert flying.heading == pytest.approx(160.0, abs=3.0)
+    flying.run(3.0)
+    stopped_at = flying.heading
+    flying.run(2.0)
+    assert flying.heading == pytest.approx(stopped_at, abs=1.0)
+
+
+@pytest.mark.parametrize("mask", [YAW_ONLY, YAW_RATE_ONLY])
+def test_a_yaw_alone_stops_the_vehicle_as_in_arducopter(flying, mask):
+    flying.local((100.0, 0.0, -10.0))
+    flying.run(4.0)
+    flying.local((0.0, 0.0, 0.0), mask, yaw=1.5, yaw_rate=1.0)
+    flying.run(8.0)
+    assert flying.body.velocity == pytest.approx((0.0, 0.0, 0.0), abs=0.1)
+    assert flying.body.north < 60.0
+
+
+@pytest.mark.parametrize("velocity", [(float("nan"), 0.0, 0.0), (0.0, 2000.0, 0.0)])
+def test_a_nonsense_velocity_stops_the_vehicle(flying, velocity):
+    flying.local((3.0, 0.0, 0.0), VELOCITY_ONLY)
+    flying.run(1.5)
+    flying.local(velocity, VELOCITY_ONLY)
+    flying.run(4.0)
+    assert flying.body.velocity == pytest.approx((0.0, 0.0, 0.0), abs=0.2)
+
+
+def test_setpoints_outside_guided_and_on_the_ground_do_nothing(ground):
+    ground.run(6.0)
+    ground.mode(4)
+    ground.arm()
+    ground.local((10.0, 0.0, -10.0))
+    ground.run(5.0)
+    assert ground.body.position == (0.0, 0.0, 0.0)
+    ground.mode(5)
+    ground.local((10.0, 0.0, -10.0))
+    ground.run(1.0)
+    assert ground.body.position == (0.0, 0.0, 0.0)
+
+
+def test_reposition_needs_command_int_and_the_mode_or_the_flag(flying):
+    place = from_ned(flying.copter.estimator.origin, Ned(20.0, 0.0, 0.0))
+    where = (round(place.latitude * 1e7), round(place.longitude * 1e7), 12.0)
+    reposition = mavlink.MAV_CMD_DO_REPOSITION
+    assert flying.command(reposition, -1, 0, 0, 0, place.latitude, place.longitude, 12) == 3
+    flying.mode(17)
+    assert flying.command_int(reposition, 3, (-1, 0, 0, 0), where) == mavlink.MAV_RESULT_DENIED
+    assert flying.command_int(reposition, 3, (-1, 1, 0, 0), where) == mavlink.MAV_RESULT_ACCEPTED
+    flying.run(12.0)
+    assert flying.copter.mode.name == "GUIDED"
+    assert flying.body.position == pytest.approx((20.0, 0.0, -12.0), abs=0.2)
+    assert flying.command_int(reposition, 3, (-1, 1, 0, 0), (999999999, 0, 1.0)) == mavlink.MAV_RESULT_DENIED
+
+
+@pytest.mark.parametrize(
+    ("start", "parameters", "end"),
+    [
+        (0, (90, 0, 0, 0), 90),
+        (0, (90, 0, -1, 0), 90),
+        (350, (20, 0, 1, 1), 10),
+        (10, (20, 0, -1, 1), 350),
+    ],
+)
+def test_condition_yaw_directions_and_relative_angles(flying, start, parameters, end):
+    flying.copter.body.yaw = math.radians(start)
+    assert flying.command(mavlink.MAV_CMD_CONDITION_YAW, *parameters) == mavlink.MAV_RESULT_ACCEPTED
+    flying.run(10.0)
+    assert flying.heading == pytest.approx(end, abs=1.0)
+
+
+def test_condition_yaw_the_long_way_takes_longer_and_keeps_its_speed(flying):
+    flying.copter.body.yaw = 0.0
+    flying.command(mavlink.MAV_CMD_CONDITION_YAW, 90, 30, -1, 0)
+    flying.run(3.0)
+    assert flying.heading == pytest.approx(270.0, abs=8.0)
+    assert flying.command(mavlink.MAV_CMD_CONDITION_YAW, 400, 0, 0, 0) == mavlink.MAV_RESULT_FAILED
+
+
+def test_change_speed_limits_a_move_until_the_kind_of_setpoint_changes(flying):
+    flying.local((0.0, 0.0, -10.0))
+    assert flying.command(mavlink.MAV_CMD_DO_CHANGE_SPEED, 1, 3) == mavlink.MAV_RESULT_ACCEPTED
+    flying.local((100.0, 0.0, -10.0))
+    flying.run(6.0)
+    assert flying.body.velocity_north == pytest.approx(3.0, abs=0.1)
+    flying.local((0.0, 0.0, 0.0), VELOCITY_ONLY)
+    flying.local((100.0, 0.0, -10.0))
+    flying.run(5.0)
+    assert flying.body.velocity_north > 5.0
+    assert flying.command(mavlink.MAV_CMD_DO_CHANGE_SPEED, 1, 0) == mavlink.MAV_RESULT_DENIED
+    flying.mode(9)
+    assert flying.command(mavlink.MAV_CMD_DO_CHANGE_SPEED, 1, 3) == mavlink.MAV_RESULT_FAILED
+
+
+def test_pause_holds_even_against_new_targets_until_resume(flying):
+    pause = mavlink.MAV_CMD_DO_PAUSE_CONTINUE
+    flying.local((100.0, 0.0, -10.0))
+    flying.run(4.0)
+    assert flying.command(pause, 0) == mavlink.MAV_RESULT_ACCEPTED
+    flying.run(6.0)
+    held = flying.body.position
+    flying.local((0.0, 50.0, -10.0))
+    flying.run(3.0)
+    assert flying.body.position == pytest.approx(held, abs=0.1)
+    assert flying.command(pause, 1) == mavlink.MAV_RESULT_ACCEPTED
+    flying.run(25.0)
+    assert flying.body.position == pytest.approx((0.0, 50.0, -10.0), abs=0.1)
+    flying.mode(5)
+    assert flying.command(pause, 0) == mavlink.MAV_RESULT_FAILED
+
+
+def test_flying_down_into_the_ground_lands_and_disarms(flying):
+    for _ in range(40):
+        flying.local((0.0, 0.0, 1.5), VELOCITY_ONLY)
+        flying.run(0.5)
+    assert flying.copter.landed
+    flying.run(12.0)
+    assert not flying.copter.armed
+
+
+def test_the_nose_follows_the_way_unless_told_not_to(flying):
+    flying.local((0.0, 60.0, -10.0))
+    flying.run(5.0)
+    assert flying.heading == pytest.approx(90.0, abs=2.0)
+    flying.send(mavlink.MAVLink_param_set_message(1, 1, b"WP_YAW_BEHAVIOR", 0.0, 2))
+    flying.local((0.0, -60.0, -10.0))
+    flying.run(8.0)
+    assert flying.heading == pytest.approx(90.0, abs=2.0)

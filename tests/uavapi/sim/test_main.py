@@ -1,0 +1,83 @@
+"""The real process over real sockets."""
+
+import contextlib
+import json
+import signal
+import socket
+import subprocess
+import sys
+import time
+
+import pytest
+from pymavlink import mavutil
+
+SIM = [sys.executable, "-m", "mavproxy_uavapi.sim", "--port", "0"]
+
+
+@contextlib.contextmanager
+def running(*arguments):
+    """The process and the ports it printed."""
+    lines = 2 if "--control" in arguments else 1
+    with subprocess.Popen([*SIM, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            ports = [int(process.stdout.readline().rsplit(":", 1)[1]) for _ in range(lines)]
+            yield process, ports
+        finally:
+            process.terminate()
+            process.wait(5)
+
+
+def test_mavlink_over_tcp_reconnects_and_a_clean_end():
+    with running("--sysid", "3", "--speedup", "20", "--control", "0") as (process, (port, control)):
+        for _ in range(2):
+            connection = mavutil.mavlink_connection(f"tcp:127.0.0.1:{port}", retries=1)
+            heartbeat = connection.wait_heartbeat(timeout=5)
+            assert heartbeat.get_srcSystem() == 3
+            connection.close()
+        with socket.create_connection(("127.0.0.1", control), timeout=5) as line:
+            line.sendall(b'{"op": "state"}\n')
+            state = json.loads(line.makefile().readline())
+        assert state["mode"] == "STABILIZE"
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(5) == 0
+        assert process.stderr.read() == ""
+
+
+def test_speedup_runs_simulated_time_faster():
+    with running("--speedup", "10") as (_, (port,)):
+        connection = mavutil.mavlink_connection(f"tcp:127.0.0.1:{port}", retries=1)
+        connection.wait_heartbeat(timeout=5)
+        started, heartbeats = time.monotonic(), 0
+        while time.monotonic() - started < 1.0:
+            heartbeats += connection.recv_match(type="HEARTBEAT", blocking=True, timeout=1) is not None
+        connection.close()
+        assert 6 <= heartbeats <= 13
+
+
+def test_udp_peers_get_heartbeats_and_can_answer():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ground:
+        ground.bind(("127.0.0.1", 0))
+        ground.settimeout(5)
+        with running("--udp", f"127.0.0.1:{ground.getsockname()[1]}", "--speedup", "5"):
+            data, _ = ground.recvfrom(2048)
+    assert data[0] == 0xFD
+
+
+def test_a_taken_port_is_one_line_and_status_1():
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        ended = subprocess.run(
+            [*SIM[:-1], str(port)], capture_output=True, text=True, timeout=10, check=False
+        )
+    assert ended.returncode == 1
+    assert ended.stderr.count("\n") == 1
+    assert str(port) in ended.stderr
+
+
+@pytest.mark.parametrize("arguments", [["--speedup", "0"], ["--sysid", "300"], ["--home", "1,2"], ["--wind", "x"]])
+def test_bad_options_are_refused(arguments):
+    ended = subprocess.run([*SIM, *arguments], capture_output=True, text=True, timeout=10, check=False)
+    assert ended.returncode == 2
+    assert arguments[0] in ended.stderr

@@ -1,0 +1,208 @@
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from mavproxy_uavapi.sim.geodesy import Ned, from_ned
+
+ACCEPTED = mavlink.MAV_MISSION_ACCEPTED
+
+
+def item(seq, command, place=(0, 0), z=0.0, parameters=(0, 0, 0, 0), frame=3):
+    return mavlink.MAVLink_mission_item_int_message(1, 1, seq, frame, command, 0, 1, *parameters, *place, z, 0)
+
+
+def place(ground, north, east):
+    location = from_ned(ground.copter.estimator.start, Ned(north, east, 0.0))
+    return round(location.latitude * 1e7), round(location.longitude * 1e7)
+
+
+def upload(ground, items):
+    """Send the items as they are asked for; the type of the final ack."""
+    ground.send(mavlink.MAVLink_mission_count_message(1, 1, len(items), 0))
+    for _ in range(len(items) + 1):
+        heard = ground.run(0.01)
+        acks = [m for m in heard if m.get_type() == "MISSION_ACK"]
+        if acks:
+            return acks[0].type
+        for request in (m for m in heard if m.get_type() == "MISSION_REQUEST"):
+            ground.send(items[request.seq])
+    return None
+
+
+def simple_mission(ground):
+    return [
+        item(0, 16, place(ground, 0, 0), 584.0, frame=0),
+        item(1, 22, z=10.0),
+        item(2, 16, place(ground, 40, 0), 10.0),
+        item(3, 178, parameters=(1, 4, 0, 0)),
+        item(4, 183, parameters=(9, 1700, 0, 0)),
+        item(5, 16, place(ground, 40, 30), 15.0, (2, 0, 0, 0)),
+        item(6, 20),
+    ]
+
+
+def test_upload_and_download_keep_the_items(ground):
+    ground.run(6.0)
+    assert upload(ground, simple_mission(ground)) == ACCEPTED
+    ground.send(mavlink.MAVLink_mission_request_list_message(1, 1, 0))
+    ground.run(0.01)
+    assert ground.of("MISSION_COUNT")[-1].count == 7
+    ground.send(mavlink.MAVLink_mission_request_int_message(1, 1, 5, 0))
+    ground.send(mavlink.MAVLink_mission_request_message(1, 1, 5, 0))
+    ground.run(0.01)
+    as_int, as_float = ground.of("MISSION_ITEM_INT")[-1], ground.of("MISSION_ITEM")[-1]
+    assert (as_int.command, as_int.x, as_int.y) == (16, *place(ground, 40, 30))
+    assert as_float.x == pytest.approx(as_int.x / 1e7, abs=1e-5)
+
+
+def test_a_mission_flies_from_takeoff_to_disarming(ground):
+    ground.run(6.0)
+    upload(ground, simple_mission(ground))
+    ground.mode(4)
+    ground.arm()
+    assert ground.command(mavlink.MAV_CMD_MISSION_START) == mavlink.MAV_RESULT_ACCEPTED
+    ground.run(120.0)
+    assert [m.seq for m in ground.of("MISSION_ITEM_REACHED")] == [1, 2, 5]
+    assert "Mission: 1 Takeoff" in ground.texts()
+    assert ground.copter.servos.pulses(1000)[8] == 1700
+    assert not ground.copter.armed
+    assert (ground.body.north, ground.body.east) == pytest.approx((0.0, 0.0), abs=0.5)
+
+
+def test_a_waypoint_delay_is_waited_at_a_standstill(ground):
+    ground.run(6.0)
+    mission = simple_mission(ground)[:2] + [item(2, 16, place(ground, 30, 0), 10.0, (5, 0, 0, 0))]
+    upload(ground, mission)
+    ground.mode(4)
+    ground.arm()
+    ground.command(mavlink.MAV_CMD_MISSION_START)
+    ground.run(60.0)
+    assert [m.seq for m in ground.of("MISSION_ITEM_REACHED")] == [1, 2]
+    assert ground.body.north == pytest.approx(30.0, abs=0.2)
+    assert ground.copter.armed
+
+
+def test_conditions_and_jumps(ground):
+    ground.run(6.0)
+    mission = [
+        *simple_mission(ground)[:2],
+        item(2, 16, place(ground, 10, 0), 10.0, (1, 0, 0, 0)),
+        item(3, 177, parameters=(2, 1, 0, 0)),
+        item(4, 112, parameters=(3, 0, 0, 0)),
+        item(5, 183, parameters=(9, 1234, 0, 0)),
+        item(6, 21),
+    ]
+    upload(ground, mission)
+    ground.mode(4)
+    ground.arm()
+    ground.command(mavlink.MAV_CMD_MISSION_START)
+    ground.run(70.0)
+    assert [m.seq for m in ground.of("MISSION_ITEM_REACHED")][:3] == [1, 2, 2]
+    assert ground.copter.servos.pulses(1000)[8] == 1234
+    assert not ground.copter.armed
+
+
+def test_auto_on_the_ground_waits_for_the_throttle_or_mission_start(ground):
+    ground.run(6.0)
+    upload(ground, simple_mission(ground))
+    ground.mode(4)
+    ground.arm()
+    assert ground.mode(3) == 0
+    ground.run(5.0)
+    assert ground.body.down == 0.0
+    ground.command(mavlink.MAV_CMD_MISSION_START)
+    ground.run(5.0)
+    assert ground.body.down < 0.0
+
+
+def test_auto_on_the_ground_wants_a_takeoff_first(ground):
+    ground.run(6.0)
+    upload(ground, [simple_mission(ground)[0], item(1, 16, place(ground, 10, 0), 10.0)])
+    ground.mode(4)
+    ground.arm()
+    assert ground.command(mavlink.MAV_CMD_MISSION_START) == mavlink.MAV_RESULT_FAILED
+    ground.run(0.02)
+    assert "Auto: Missing Takeoff Cmd" in ground.texts()
+
+
+def test_set_current_goes_to_that_item(ground):
+    ground.run(6.0)
+    upload(ground, simple_mission(ground))
+    ground.mode(4)
+    ground.arm()
+    ground.command(mavlink.MAV_CMD_MISSION_START)
+    ground.run(20.0)
+    ground.send(mavlink.MAVLink_mission_set_current_message(1, 1, 5))
+    ground.run(0.02)
+    assert ground.of("MISSION_CURRENT")[-1].seq == 5
+    assert ground.copter.mission.current == 5
+    assert ground.command(mavlink.MAV_CMD_DO_SET_MISSION_CURRENT, 77) == mavlink.MAV_RESULT_DENIED
+
+
+def test_a_mission_can_be_paused_left_and_resumed(ground):
+    ground.run(6.0)
+    upload(ground, simple_mission(ground))
+    ground.mode(4)
+    ground.arm()
+    ground.command(mavlink.MAV_CMD_MISSION_START)
+    while ground.copter.mission.current < 2:
+        ground.run(0.5)
+    ground.run(3.0)
+    assert ground.command(mavlink.MAV_CMD_DO_PAUSE_CONTINUE, 0) == mavlink.MAV_RESULT_ACCEPTED
+    ground.run(6.0)
+    held = ground.body.position
+    ground.run(3.0)
+    assert ground.body.position == pytest.approx(held, abs=0.1)
+    assert ground.command(mavlink.MAV_CMD_DO_PAUSE_CONTINUE, 1) == mavlink.MAV_RESULT_ACCEPTED
+    ground.mode(17)
+    ground.run(3.0)
+    ground.mode(3)
+    assert ground.copter.mission.current == 2
+    ground.run(30.0)
+    assert 5 in [m.seq for m in ground.of("MISSION_ITEM_REACHED")]
+
+
+def test_clear_empties_the_list_but_not_while_it_runs(ground):
+    ground.run(6.0)
+    upload(ground, simple_mission(ground))
+    ground.send(mavlink.MAVLink_mission_clear_all_message(1, 1, 0))
+    assert ground.run(0.01)[0].type == ACCEPTED
+    assert not ground.copter.mission.items
+    upload(ground, simple_mission(ground))
+    ground.mode(4)
+    ground.arm()
+    ground.command(mavlink.MAV_CMD_MISSION_START)
+    ground.run(10.0)
+    ground.send(mavlink.MAVLink_mission_clear_all_message(1, 1, 0))
+    acks = [m for m in ground.run(0.01) if m.get_type() == "MISSION_ACK"]
+    assert acks[0].type == mavlink.MAV_MISSION_ERROR
+
+
+def test_bad_uploads_are_refused(ground):
+    ground.run(6.0)
+    bad = simple_mission(ground)
+    bad[2] = item(2, 30000)
+    assert upload(ground, bad) == mavlink.MAV_MISSION_UNSUPPORTED
+    bad[2] = item(2, 16, (950000000, 0), 10.0)
+    assert upload(ground, bad) == mavlink.MAV_MISSION_INVALID_PARAM5_X
+    ground.send(mavlink.MAVLink_mission_count_message(1, 1, 10000, 0))
+    assert ground.run(0.01)[-1].type == mavlink.MAV_MISSION_NO_SPACE
+    ground.send(mavlink.MAVLink_mission_request_int_message(1, 1, 50, 0))
+    ground.run(0.01)
+    assert ground.of("MISSION_ACK")[-1].type == mavlink.MAV_MISSION_INVALID_SEQUENCE
+
+
+def test_an_abandoned_upload_is_asked_for_again_and_then_cancelled(ground):
+    ground.run(6.0)
+    ground.send(mavlink.MAVLink_mission_count_message(1, 1, 3, 0))
+    ground.run(9.5)
+    assert len(ground.of("MISSION_REQUEST")) > 5
+    assert ground.of("MISSION_ACK")[-1].type == mavlink.MAV_MISSION_OPERATION_CANCELLED
+
+
+def test_fence_and_rally_lists_are_kept_apart(ground):
+    ground.send(mavlink.MAVLink_mission_count_message(1, 1, 1, mavlink.MAV_MISSION_TYPE_RALLY))
+    ground.send(mavlink.MAVLink_mission_item_int_message(1, 1, 0, 3, 5100, 0, 1, 0, 0, 0, 0, 1, 2, 3.0, 2))
+    ground.send(mavlink.MAVLink_mission_request_list_message(1, 1, mavlink.MAV_MISSION_TYPE_RALLY))
+    ground.send(mavlink.MAVLink_mission_request_list_message(1, 1, mavlink.MAV_MISSION_TYPE_MISSION))
+    ground.run(0.01)
+    assert [(m.mission_type, m.count) for m in ground.of("MISSION_COUNT")] == [(2, 1), (0, 0)]

@@ -1,0 +1,623 @@
+"""The launcher: options, command lines, and that it ends all of its processes and none of anybody else's."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import pty
+import shlex
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import termios
+import textwrap
+import time
+from pathlib import Path
+
+import pytest
+
+from mavproxy_uavapi.launcher import (
+    command,
+    commands,
+    directories,
+    environment,
+    instances,
+    locations,
+    main,
+    options,
+    processes,
+)
+from mavproxy_uavapi.launcher.errors import LaunchError, OptionError
+from mavproxy_uavapi.launcher.options import Options, parse
+
+ROOT = Path(command.__file__).resolve().parents[2]
+
+
+@pytest.fixture(autouse=True)
+def own_directories(tmp_path, monkeypatch):
+    """Nothing of the user's is read or written."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    monkeypatch.setenv("ARDUPILOT_LOCATIONS", str(tmp_path / "locations.txt"))
+    monkeypatch.delenv("UAVAPI_TOKEN", raising=False)
+
+
+def ini(tmp_path, text):
+    file = tmp_path / "uav.ini"
+    file.write_text(textwrap.dedent(text), encoding="utf-8")
+    return f"--config={file}"
+
+
+# Options
+
+
+def test_the_table_and_the_options_name_the_same_things():
+    table = {row.name for row in options.TABLE} | {"module", "mavproxy_args"}
+    assert table == {field.name for field in dataclasses.fields(Options)}
+
+
+def test_defaults_are_those_of_the_original_service():
+    assert parse([]) == Options()
+    assert Options().port == 8000
+    assert Options().sysid == 10
+    assert Options().uav_connection == "127.0.0.1:17171"
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ([], False),
+        (["--simulated"], True),
+        (["--simulated", "true"], True),
+        (["--simulated", "False"], False),
+        (["--simulated=0"], False),
+        (["--simulated", "--port", "8001"], True),
+    ],
+)
+def test_a_switch_works_bare_and_with_a_word(words, expected):
+    assert parse(words).simulated is expected
+
+
+def test_file_of_the_original_service_loads(tmp_path):
+    loaded = parse(
+        [
+            ini(
+                tmp_path,
+                """
+                [api]
+                port=8001
+                uav_connection=127.0.0.1:17172
+                connection_type=udpin
+                sysid=11
+                gradys_gs = None
+                scripts_path = ~/scripts
+
+                [simulated]
+                location=AbraDF
+                ardupilot_path=None
+                speedup=5
+                gs_connection=[192.168.1.5:14550, 192.168.1.6:14550]
+
+                [logs]
+                log_console=[VEHICLE, UVICORN, SCRIPT]
+                debug=[]
+                """,
+            )
+        ]
+    )
+    assert loaded == Options(
+        port=8001,
+        uav_connection="127.0.0.1:17172",
+        sysid=11,
+        scripts_path=str(Path.home() / "scripts"),
+        simulated=True,
+        speedup=5.0,
+        gs_connection=("192.168.1.5:14550", "192.168.1.6:14550"),
+        log_console=("COPTER", "API"),
+    )
+
+
+def test_command_line_wins_over_the_file_wherever_it_stands(tmp_path):
+    file = ini(tmp_path, "[api]\nport=8001\nsysid=11\ngradys_gs=1.2.3.4:80\n[simulated]\nspeedup=5\n")
+    assert parse([file, "--port", "8002"]).port == 8002
+    assert parse(["--port", "8000", file]).port == 8000
+    assert parse(["--port", "8002", file]).sysid == 11
+    assert parse([file, "--simulated", "false"]).simulated is False
+    assert parse([file, "--gradys_gs", "None"]).gradys_gs is None
+
+
+def test_simulated_section_may_say_no(tmp_path):
+    assert parse([ini(tmp_path, "[simulated]\n")]).simulated is True
+    assert parse([ini(tmp_path, "[simulated]\nsimulated = false\n")]).simulated is False
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[api]\nprot=8001\n", "unknown key 'prot' in [api]"),
+        ("[apl]\nport=8001\n", "unknown section [apl]"),
+        ("[api]\nport=80o1\n", "port in [api]: expected a whole number from 1 to 65535, got '80o1'"),
+        ("[simulated]\nheadless=maybe\n", "expected true or false"),
+        ("port=8001\n", "no section headers"),
+        ("[api]\nport=1\nport=2\n", "already exists"),
+    ],
+)
+def test_wrong_file_is_one_line(tmp_path, capsys, text, said):
+    assert main([ini(tmp_path, text)]) == 2
+    message = capsys.readouterr().err
+    assert said in message
+    assert message.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--config", "/nonexistent/uav.ini"], "No such file"),
+        (["--prot", "1"], "unrecognized arguments: --prot"),
+        (["--port", "65536"], "--port: expected"),
+        (["--sysid", "0"], "--sysid: expected"),
+        (["--speedup", "nan"], "--speedup: expected a number above 0"),
+        (["--simulated", "ja"], "--simulated: expected true or false"),
+        (["--connection_type", "udp"], "--connection_type: expected udpin, udpout, tcp or usb"),
+        (["--uav_connection", "/dev/ttyUSB0"], "--uav_connection: expected HOST:PORT with udpin"),
+        (["--connection_type", "usb", "--uav_connection", "/dev/x,fast"], "expected DEVICE or DEVICE,BAUD"),
+        (["--log_console", "ENGINE"], "--log_console: expected some of COPTER"),
+        (["--gradys_gs", "10.0.2.5"], "--gradys_gs: expected HOST:PORT"),
+        (["--module", "x;reboot"], "--module: expected NAME"),
+        (["--simulated", "--vehicle", "plane"], "--vehicle plane needs --ardupilot_path"),
+        (["--simulated", "--ardupilot_path", "/nonexistent"], "there is no /nonexistent/Tools"),
+        (["--simulated", "--ardupilot_path", "/nonexistent", "--speedup", "1.5"], "whole numbers only"),
+        (["--simulated", "--location", "Nowhere"], "unknown name 'Nowhere'"),
+        (["--simulated", "--location", "99,0,0,0"], "expected lat,lon,alt,heading"),
+    ],
+)
+def test_wrong_option_is_one_line_and_status_2(capsys, words, said):
+    assert main(["--port", str(free_port()), *words]) == 2
+    message = capsys.readouterr().err
+    assert said in message
+    assert message.count("\n") == 1
+
+
+def test_both_spellings_lists_modules_and_the_rest():
+    read = parse(
+        [
+            *("--uav-connection", "10.0.0.1:5", "--log_console", "VEHICLE", "UVICORN", "COPTER"),
+            *("--gs_connection", "[1.1.1.1:1,2.2.2.2:2]", "--module", "vision", "--module", "map,graph"),
+            *("--", "--map", "--out", "3.3.3.3:3"),
+        ]
+    )
+    assert read.uav_connection == "10.0.0.1:5"
+    assert read.log_console == ("COPTER", "API")
+    assert read.gs_connection == ("1.1.1.1:1", "2.2.2.2:2")
+    assert read.module == ("vision", "map", "graph")
+    assert read.mavproxy_args == ("--map", "--out", "3.3.3.3:3")
+
+
+# Locations
+
+
+def test_location_by_name_numbers_and_files(tmp_path):
+    assert locations.resolve("CMAC") == (-35.363261, 149.165230, 584, 353)
+    assert locations.resolve("1.5,2.5,30,90") == (1.5, 2.5, 30, 90)
+    autotest = tmp_path / "ap" / "Tools" / "autotest"
+    autotest.mkdir(parents=True)
+    (autotest / "locations.txt").write_text("# names\nHill=1,2,3,4 # a hill\nPond=5,6,7,8\nbroken line\n")
+    (tmp_path / "locations.txt").write_text("Pond=50,60,70,80\n")
+    assert locations.resolve("Hill", str(tmp_path / "ap")) == (1, 2, 3, 4)
+    assert locations.resolve("Pond", str(tmp_path / "ap")) == (50, 60, 70, 80)
+    with pytest.raises(OptionError):
+        locations.resolve("Hill")
+
+
+# Command lines
+
+
+def as_mavproxy_reads(load):
+    """MAVProxy 1.8.75: `--cmd` at `;`, then shlex with white space only, then JSON behind the first `:{`."""
+    [line] = load.split(";")
+    lexer = shlex.shlex(line)
+    lexer.quotes, lexer.whitespace_split, lexer.commenters = '"', True, ""
+    [_, _, argument] = list(lexer)
+    name, _, text = argument.partition(":{")
+    return name, json.loads("{" + text)
+
+
+def test_module_settings_survive_mavproxys_splitting():
+    settings = {"config": "/home/a b/c;d\te,'f'/\"g\".ini", "port": 8001}
+    assert as_mavproxy_reads(commands.module_load("uavapi", settings)) == ("uavapi", settings)
+
+
+def test_mavproxy_command_for_a_real_vehicle():
+    given = Options(port=8001, sysid=3, gradys_gs="10.0.2.5:8000", module=("vision",), mavproxy_args=("--map",))
+    line = commands.mavproxy_command(given, ["mavproxy.py"], Path("/run"), None, None)
+    assert line[:4] == [
+        *("mavproxy.py", "--master=udpin:127.0.0.1:17171", "--target-system=3", "--logfile=/run/mav.tlog")
+    ]
+    loads = [word.removeprefix("--cmd=") for word in line if word.startswith("--cmd=")]
+    assert as_mavproxy_reads(loads[0]) == ("uavapi", {"host": "127.0.0.1", "port": 8001, "sysid": 3})
+    assert as_mavproxy_reads(loads[1]) == ("gradys", {"gs": "10.0.2.5:8000"})
+    assert loads[2] == "module load vision"
+    assert line[-1] == "--map"
+    assert "--daemon" not in line
+
+
+@pytest.mark.parametrize(
+    ("given", "instance", "expected"),
+    [
+        (Options(connection_type="udpout"), None, "udpout:127.0.0.1:17171"),
+        (Options(connection_type="tcp", uav_connection="10.0.0.1:5760"), None, "tcp:10.0.0.1:5760"),
+        (Options(connection_type="usb", uav_connection="/dev/ttyACM0,57600"), None, "/dev/ttyACM0,57600"),
+        (Options(simulated=True), 2, "tcp:127.0.0.1:5780"),
+    ],
+)
+def test_link_to_the_vehicle(given, instance, expected):
+    assert commands.master(given, instance) == expected
+
+
+def test_headless_mavproxy_is_a_daemon_and_forwards():
+    given = Options(headless=True, simulated=True, gs_connection=("1.1.1.1:1",))
+    line = commands.mavproxy_command(given, [], Path("/run"), 0, None)
+    assert "--daemon" in line
+    assert "--out=1.1.1.1:1" in line
+    assert not any(word.startswith("--sitl") for word in line)
+
+
+def test_vehicle_commands():
+    home = locations.BUILT_IN["AbraDF"]
+    embedded = commands.embedded_command(Options(speedup=2.5), 3, home)
+    assert embedded[1:] == [
+        *("-m", "mavproxy_uavapi.sim", "--instance=3", "--sysid=10", "--speedup=2.5"),
+        "--home=-15.8400810,-47.9266420,1042,30",
+    ]
+    given = Options(ardupilot_path="/ap", vehicle="plane", speedup=5.0, sysid=7)
+    sitl = commands.sim_vehicle_command(given, "python3", 1, home, Path("/run/vehicle"))
+    assert sitl[:2] == ["python3", "/ap/Tools/autotest/sim_vehicle.py"]
+    assert {"--vehicle=ArduPlane", "--instance=1", "--sysid=7", "--speedup=5", "--no-mavproxy"} < set(sitl)
+
+
+def test_settings_without_a_keyword_travel_by_file():
+    assert commands.settings_file(Options(port=9000)) is None
+    text = commands.settings_file(Options(scripts_path="/a%b", log_console=("API",), log_path="/l/u.log"))
+    assert text is not None
+    assert text == "[api]\nscripts_path = /a%b\n\n[logs]\nlog_console = [API]\nlog_path = /l/u.log\n\n"
+
+
+def test_token_is_on_no_command_line_and_in_no_greeting(monkeypatch):
+    monkeypatch.setenv("UAVAPI_TOKEN", "very-secret")
+    given = Options(simulated=True, host="0.0.0.0", scripts_path="/s")
+    lines = [
+        *commands.mavproxy_command(given, ["m"], Path("/run"), 0, Path("/run/uavapi.ini")),
+        *commands.embedded_command(given, 0, locations.BUILT_IN["CMAC"]),
+        commands.greeting(given, with_token=True),
+        commands.settings_file(given) or "",
+    ]
+    assert "very-secret" not in " ".join(lines)
+    assert environment.for_python(os.environ)["UAVAPI_TOKEN"] == "very-secret"
+
+
+def test_greeting_has_three_lines_to_try_for_a_simulated_vehicle():
+    lines = commands.greeting(Options(simulated=True, port=8001), with_token=False).splitlines()
+    assert lines == [
+        "API of vehicle 10: http://127.0.0.1:8001",
+        "  curl http://127.0.0.1:8001/command/arm",
+        "  curl 'http://127.0.0.1:8001/command/takeoff?alt=10'",
+        "  curl http://127.0.0.1:8001/telemetry/gps",
+    ]
+    assert commands.greeting(Options(), with_token=False).count("\n") == 0
+
+
+def test_sim_vehicle_gets_no_window_and_no_working_pkill(tmp_path):
+    env = environment.for_sim_vehicle({"DISPLAY": ":0", "TMUX": "x", "PATH": os.defpath}, tmp_path)
+    assert not set(env) & set(commands.WINDOW_VARIABLES)
+    assert shutil.which("pkill", path=env["PATH"]) == str(tmp_path / "bin" / "pkill")
+    assert subprocess.run([tmp_path / "bin" / "pkill", "none"], check=False).returncode == 1
+
+
+def test_mavproxy_beside_this_python_comes_before_path(tmp_path, monkeypatch):
+    (tmp_path / "mavproxy.py").write_text("")
+    monkeypatch.setattr(environment.sysconfig, "get_path", lambda name: str(tmp_path))
+    assert environment.mavproxy_program() == [sys.executable, str(tmp_path / "mavproxy.py")]
+    monkeypatch.setattr(environment.sysconfig, "get_path", lambda name: "/nonexistent")
+    monkeypatch.setattr(environment.sys, "executable", "/nonexistent/python")
+    monkeypatch.setenv("PATH", "/nonexistent")
+    with pytest.raises(LaunchError, match="pip install MAVProxy"):
+        environment.mavproxy_program()
+
+
+# Directories and instances
+
+
+def test_run_directories_never_collide_and_are_private(tmp_path):
+    first = directories.new_run(directories.state_root(), Options())
+    second = directories.new_run(directories.state_root(), Options())
+    assert first != second
+    assert first.parent == second.parent == tmp_path / "state" / "mavproxy-uavapi" / "uav10"
+    assert first.stat().st_mode & 0o777 == 0o700
+
+
+def test_log_path_may_be_a_file_or_a_directory(tmp_path):
+    assert directories.split_log_path(None, 1) == (directories.state_root(), None)
+    assert directories.split_log_path(f"{tmp_path}/a/uav.log", 1) == (tmp_path / "a", f"{tmp_path}/a/uav.log")
+    assert directories.split_log_path(f"{tmp_path}/a", 1) == (tmp_path / "a", f"{tmp_path}/a/uav_1.log")
+
+
+def test_two_runs_get_two_instances(tmp_path, monkeypatch):
+    monkeypatch.setattr(instances, "ports_are_free", lambda instance: instance != 1)
+    with instances.reserved(tmp_path, 0) as first, instances.reserved(tmp_path, 0) as second:
+        assert (first, second) == (0, 2)
+    with instances.reserved(tmp_path, 0) as again:
+        assert again == 0
+
+
+def test_port_in_use_is_not_free_and_the_launcher_says_so(capsys):
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+        assert not instances.is_free(port)
+        assert main(["--port", str(port)]) == 1
+    assert f"127.0.0.1:{port} is taken" in capsys.readouterr().err
+
+
+# Processes: a MAVProxy and a vehicle of our own, and the real launcher around them
+
+FAKE_MAVPROXY = """
+import http.server, json, os, signal, subprocess, sys, threading, time
+mode = os.environ.get("FAKE_MODE", "")
+print("MAVProxy stand-in", flush=True)
+if mode == "crash":
+    sys.exit("cannot open the link")
+if mode == "no module":
+    print("Failed to load module: uavapi: no setting 'x'. Use 'set moddebug 3' for more", flush=True)
+stray = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(300)"])
+other = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(300)"], start_new_session=True)
+with open(os.environ["FAKE_PIDS"], "a") as pids:
+    print("mavproxy", os.getpid(), "\\nstray", stray.pid, "\\nother", other.pid, file=pids)
+stop = threading.Event()
+def on_term(*_):
+    if mode != "deaf":
+        stop.set()
+signal.signal(signal.SIGTERM, on_term)
+[load] = [word for word in sys.argv if word.startswith("--cmd=module load uavapi:")]
+class Api(http.server.BaseHTTPRequestHandler):
+    def do_GET(self):
+        self.send_response(200)
+        self.end_headers()
+    def log_message(self, *_):
+        pass
+server = http.server.HTTPServer(("127.0.0.1", json.loads(load.partition("uavapi:")[2])["port"]), Api)
+if mode != "no module":
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+if "--daemon" in sys.argv:
+    stop.wait()
+else:
+    try:
+        input("MAV> ")
+    except (EOFError, KeyboardInterrupt):
+        pass
+print("Unloading module uavapi", flush=True)
+os._exit(1)
+"""
+FAKE_VEHICLE = """
+import os, subprocess, sys, time
+child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(300)"])
+with open(os.environ["FAKE_PIDS"], "a") as pids:
+    print("vehicle", os.getpid(), "\\nchild", child.pid, file=pids)
+if os.environ.get("FAKE_MODE") == "no vehicle":
+    sys.exit("sim: the port is taken")
+print("sim: vehicle 10 listening on tcp:127.0.0.1:5760", flush=True)
+time.sleep(300)
+"""
+DRIVER = """
+import fcntl, os, sys, termios
+if os.isatty(0):
+    fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+from mavproxy_uavapi.launcher import command, commands, environment, instances, supervisor
+environment.mavproxy_program = lambda: [sys.executable, {mavproxy!r}]
+commands.embedded_command = lambda *_: [sys.executable, {vehicle!r}]
+instances.ports_are_free = lambda _: True
+supervisor.MAVPROXY_GRACE_S = supervisor.PROMPT_GRACE_S = supervisor.MAVPROXY_FORCED_S = 0.3
+sys.exit(command.run())
+"""
+
+
+def free_port():
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        return server.getsockname()[1]
+
+
+def is_alive(pid):
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+    return state != "Z"
+
+
+def eventually(condition, timeout_s=10.0):
+    """Wait for real processes; the time is a limit, not a pause."""
+    deadline = time.monotonic() + timeout_s
+    while not condition():
+        if time.monotonic() > deadline:
+            return False
+        time.sleep(0.02)
+    return True
+
+
+class Launched:
+    """The launcher in a process of its own, around the stand-ins."""
+
+    def __init__(self, directory, words, mode="", stdin=subprocess.DEVNULL):
+        for name, text in {"mavproxy": FAKE_MAVPROXY, "vehicle": FAKE_VEHICLE}.items():
+            (directory / f"{name}.py").write_text(text)
+        driver = DRIVER.format(mavproxy=str(directory / "mavproxy.py"), vehicle=str(directory / "vehicle.py"))
+        (directory / "driver.py").write_text(driver)
+        self.pids_file = directory / "pids"
+        self.out_file = directory / "out"
+        self.port = free_port()
+        interactive = stdin is not subprocess.DEVNULL
+        with self.out_file.open("wb") as output:
+            self.process = subprocess.Popen(
+                [sys.executable, str(directory / "driver.py"), f"--port={self.port}", *words],
+                stdin=stdin,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                env={**os.environ, "PYTHONPATH": str(ROOT), "FAKE_PIDS": str(self.pids_file), "FAKE_MODE": mode},
+                cwd=directory,
+                start_new_session=interactive,
+            )
+
+    @property
+    def pids(self):
+        lines = self.pids_file.read_text().splitlines() if self.pids_file.exists() else []
+        return {name: int(pid) for name, pid in map(str.split, lines)}
+
+    @property
+    def out(self):
+        return self.out_file.read_text()
+
+    def ours(self):
+        return [pid for name, pid in self.pids.items() if name != "other" and is_alive(pid)]
+
+    def wait_up(self):
+        up = eventually(lambda: "API of vehicle" in self.out or self.process.poll() is not None)
+        assert up and self.process.poll() is None, self.out
+
+    def close(self):
+        if self.process.poll() is None:
+            self.process.kill()
+        self.process.wait()
+        for pid in self.pids.values():
+            if is_alive(pid):
+                os.kill(pid, signal.SIGKILL)
+
+
+@pytest.fixture
+def launched(tmp_path):
+    started = []
+
+    def launch(*words, **more):
+        started.append(Launched(tmp_path, words, **more))
+        return started[-1]
+
+    yield launch
+    for one in started:
+        one.close()
+
+
+@pytest.mark.parametrize("signum", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+def test_signal_ends_all_of_its_processes_and_no_other(launched, tmp_path, signum):
+    run = launched("--simulated")
+    run.wait_up()
+    assert set(run.pids) == {"mavproxy", "stray", "other", "vehicle", "child"}
+    assert f"curl http://127.0.0.1:{run.port}/command/arm" in run.out
+    run.process.send_signal(signum)
+    assert run.process.wait(10) == 0
+    assert run.ours() == []
+    assert is_alive(run.pids["other"]), "what MAVProxy started in another session is not ours to end"
+    [run_dir] = (tmp_path / "state" / "mavproxy-uavapi" / "uav10").iterdir()
+    assert "Unloading module uavapi" in (run_dir / "mavproxy.log").read_text()
+    assert {entry.name for entry in tmp_path.iterdir()} == {
+        *("mavproxy.py", "vehicle.py", "driver.py", "pids", "out", "state")
+    }
+
+
+def test_killed_launcher_takes_everything_with_it(launched):
+    run = launched("--simulated")
+    run.wait_up()
+    run.process.kill()
+    assert eventually(lambda: run.ours() == [])
+    assert is_alive(run.pids["other"])
+
+
+def test_mavproxy_that_does_not_listen_is_killed(launched):
+    run = launched(mode="deaf")
+    run.wait_up()
+    run.process.terminate()
+    assert run.process.wait(10) == 0
+    assert run.ours() == []
+
+
+def test_clean_end_of_mavproxy_is_status_0(launched):
+    run = launched("--simulated")
+    run.wait_up()
+    os.kill(run.pids["mavproxy"], signal.SIGTERM)
+    assert run.process.wait(10) == 0
+    assert run.ours() == []
+
+
+def test_crash_of_mavproxy_is_one_line_with_its_log(launched):
+    run = launched("--simulated", mode="crash")
+    assert run.process.wait(10) == 1
+    assert "MAVProxy ended with status 1: cannot open the link (log: " in run.out
+    assert run.ours() == []
+
+
+def test_api_that_cannot_load_ends_the_wait_in_mavproxys_words(launched):
+    run = launched("--simulated", mode="no module")
+    assert run.process.wait(10) == 1
+    assert "mavproxy-uavapi: Failed to load module: uavapi: no setting 'x'. (log: " in run.out
+    assert run.ours() == []
+
+
+def test_mavproxy_killed_from_outside_is_reported_as_a_shell_would(launched):
+    run = launched()
+    run.wait_up()
+    os.kill(run.pids["mavproxy"], signal.SIGKILL)
+    assert run.process.wait(10) == 128 + signal.SIGKILL
+    assert run.ours() == []
+
+
+def test_vehicle_that_does_not_start_is_one_line_with_its_log(launched):
+    run = launched("--simulated", mode="no vehicle")
+    assert run.process.wait(10) == 1
+    assert "the vehicle did not start: sim: the port is taken (log: " in run.out
+    assert run.ours() == []
+
+
+def test_vehicle_that_dies_ends_the_run(launched):
+    run = launched("--simulated")
+    run.wait_up()
+    os.kill(run.pids["vehicle"], signal.SIGKILL)
+    assert run.process.wait(10) == 1
+    assert "the simulated vehicle ended" in run.out
+    assert run.ours() == []
+
+
+@pytest.mark.parametrize("typed", [b"exit\n", b"\x03", b"\x04"])
+def test_at_a_terminal_mavproxy_has_the_prompt_and_ends_the_run(launched, typed):
+    keyboard, terminal = pty.openpty()
+    try:
+        run = launched("--simulated", stdin=terminal)
+        run.wait_up()
+        assert os.getpgid(run.pids["mavproxy"]) == run.process.pid, "the terminal's foreground group"
+        assert os.getsid(run.pids["vehicle"]) != run.process.pid, "out of reach of the terminal's Ctrl-C"
+        os.write(keyboard, typed)
+        assert run.process.wait(10) == 0
+        assert run.ours() == []
+    finally:
+        os.close(keyboard)
+        os.close(terminal)
+
+
+def test_at_a_terminal_a_signal_to_the_launcher_ends_the_run_too(launched):
+    keyboard, terminal = pty.openpty()
+    try:
+        run = launched("--simulated", stdin=terminal, mode="deaf")
+        run.wait_up()
+        before = termios.tcgetattr(terminal)
+        run.process.terminate()
+        assert run.process.wait(10) == 0
+        assert run.ours() == []
+        assert termios.tcgetattr(terminal) == before
+    finally:
+        os.close(keyboard)
+        os.close(terminal)
+
+
+def test_a_strangers_process_is_no_member_even_in_our_session():
+    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as stranger:
+        assert not processes.signal_member(stranger.pid, signal.SIGKILL, "tag", {os.getsid(0)})
+        assert stranger.poll() is None
+        stranger.kill()
