@@ -10,8 +10,6 @@ from mavproxy_uavapi.http.app import Server
 from mavproxy_uavapi.http.call import Service
 from mavproxy_uavapi.settings import Settings
 from mavproxy_uavapi.vehicle.freshness import Freshness
-from mavproxy_uavapi.vehicle.hangar import Hangar
-from mavproxy_uavapi.vehicle.jobs import JobBook
 
 
 class Api:
@@ -19,8 +17,6 @@ class Api:
 
     def __init__(self, host: Host) -> None:
         self.host = host
-        self.hangar = Hangar(host)
-        self.jobs = JobBook()
         self._server: Server | None = None
         self._freshness: asyncio.Task[None] | None = None
 
@@ -38,14 +34,14 @@ class Api:
         if self._server is not None:
             return
         self.host.link_timeout = settings.link_timeout
-        server = Server(Service(self.host, self.hangar, self.jobs, settings))
+        server = Server(Service(self.host, settings))
         try:
             await server.start()
         except OSError:
             await server.stop()
             raise
         self._server = server
-        self._freshness = asyncio.create_task(Freshness(self.hangar, settings.sysid).run())
+        self._freshness = asyncio.create_task(Freshness(self.host.hangar, settings.sysid).run())
 
     async def stop(self) -> None:
         """Close the port and end what is in flight."""

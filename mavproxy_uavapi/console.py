@@ -14,10 +14,10 @@ def report(api: Api, settings: Settings) -> str:
     address = f"http://{settings.host}:{settings.port}"
     lines = [f"uavapi: {'listening on' if api.listening else 'not listening; it would be'} {address}"]
     try:
-        lines.append(describe(api, api.hangar.find(settings.sysid).state))
+        lines.append(describe(api, api.host.hangar.find(settings.sysid).state))
     except UavApiError as error:
         lines.append(str(error))
-    running = api.jobs.running()
+    running = api.host.jobs.running()
     lines.append(f"{len(running)} call{'' if len(running) == 1 else 's'} in flight")
     lines += [f"  {job.id}: {job.verb} {_progress(job.progress)}".rstrip() for job in running]
     return "\n".join(lines)

@@ -159,6 +159,11 @@ class LinkLost(Unavailable):
 
     code = "link_lost"
 
+    @classmethod
+    def since(cls, system: int, silent_for: float) -> LinkLost:
+        """The error for vehicle `system`, which has been silent for that many seconds."""
+        return cls(f"no heartbeat from vehicle {system} for {silent_for:.1f} s")
+
 
 class NoVehicle(Unavailable):
     """No vehicle on the link yet."""

@@ -12,14 +12,20 @@ from mavproxy_uavapi.host.bridge import Bridge
 from mavproxy_uavapi.host.link import MavproxyLink
 from mavproxy_uavapi.host.pending import Pending
 from mavproxy_uavapi.host.state import Fleet, VehicleState
+from mavproxy_uavapi.vehicle.hangar import Hangar
+from mavproxy_uavapi.vehicle.jobs import JobBook
 
 ATTRIBUTE = "uavapi_host"  # on MAVProxy's state, so that a module loaded anew finds it
 
 
 class Host:
-    """The shared half of our modules: bridge, link, fleet, waits.
+    """The shared half of our modules: bridge, link, fleet, waits, the vehicles and the jobs that fly them.
 
     Everything but `bridge` belongs to the asyncio thread.
+
+    Attributes:
+        listeners: called with each vehicle message, after the state has taken it and the waits have seen it.
+        extensions: HTTP routes of the other modules, by path; `uavapi` serves them while it is loaded.
 
     Args:
         mpstate: MAVProxy's state.
@@ -34,7 +40,10 @@ class Host:
         self.link = MavproxyLink(self.bridge, mpstate)
         self.link_timeout = 5.0
         self.target = 0  # the system id that MAVProxy's own commands go to; 0 before it knows one
+        self.hangar = Hangar(self)
+        self.jobs = JobBook()
         self.listeners: list[Callable[[VehicleState, Any, float], None]] = []
+        self.extensions: dict[str, Any] = {}
         self.members: list[Any] = []
         self._mpstate = mpstate
         self._told_target = 0
@@ -80,17 +89,12 @@ class Host:
         """End the waits on a vehicle when its heartbeats have been missing for the link timeout."""
         silent_for = self.clock() - state.heartbeat_at
         if silent_for >= self.link_timeout:
-            self.pending.fail(state.system, lambda: link_lost(state, silent_for))
+            self.pending.fail(state.system, lambda: LinkLost.since(state.system, silent_for))
             delay = self.link_timeout / 5
         else:
             delay = self.link_timeout - silent_for
         timer = self.bridge.loop.call_later(max(delay, 0.05), self._watch_link, state)
         self._link_timers[state.system] = timer
-
-
-def link_lost(state: VehicleState, silent_for: float) -> LinkLost:
-    """The error for a vehicle that has been silent for that many seconds."""
-    return LinkLost(f"no heartbeat from vehicle {state.system} for {silent_for:.1f} s")
 
 
 def join(mpstate: Any, member: Any) -> Host:

@@ -7,6 +7,7 @@ from typing import Any
 
 from aiohttp import web
 
+from mavproxy_uavapi.errors import NotFound
 from mavproxy_uavapi.http.call import SERVICE, Call, Service, parameters
 from mavproxy_uavapi.http.responses import Handler, errors_as_answers, success
 from mavproxy_uavapi.http.routes import ROUTES, Route
@@ -14,6 +15,8 @@ from mavproxy_uavapi.http.security import only_for_us
 
 MAX_BODY = 1024 * 1024  # bytes
 SHUTDOWN_TIMEOUT = 1.0  # s for answers that are being written when we stop
+
+PATHS = {route.path: route.methods for route in ROUTES}
 
 
 def make_app(service: Service) -> web.Application:
@@ -25,16 +28,34 @@ def make_app(service: Service) -> web.Application:
         for method in route.methods:
             for path in (route.path, route.path + "/"):
                 app.router.add_route(method, path, handler)
+    app.router.add_route("*", "/{path:.*}", _extension)
     return app
 
 
 def _handler(route: Route) -> Handler:
     async def handle(request: web.Request) -> web.StreamResponse:
-        params = await parameters(request, route.model, body=request.method == "POST")
-        answer = await route.action(Call(request.app[SERVICE], request, params))
-        return answer if isinstance(answer, web.StreamResponse) else success(answer)
+        return await _answer(route, request)
 
     return handle
+
+
+async def _extension(request: web.Request) -> web.StreamResponse:
+    """A path that another module serves, which may be loaded and unloaded while we listen."""
+    path = request.path.rstrip("/")
+    if path in PATHS:
+        raise web.HTTPMethodNotAllowed(request.method, PATHS[path])
+    route: Route | None = request.app[SERVICE].host.extensions.get(path)
+    if route is None:
+        raise NotFound("no such path")
+    if request.method not in route.methods:
+        raise web.HTTPMethodNotAllowed(request.method, route.methods)
+    return await _answer(route, request)
+
+
+async def _answer(route: Route, request: web.Request) -> web.StreamResponse:
+    params = await parameters(request, route.model, body=request.method == "POST")
+    answer = await route.action(Call(request.app[SERVICE], request, params))
+    return answer if isinstance(answer, web.StreamResponse) else success(answer)
 
 
 class Server:
@@ -61,7 +82,7 @@ class Server:
 
     async def stop(self) -> None:
         """End the verbs in flight, answer their clients, and close the port."""
-        self.service.jobs.abort_all("the API is stopping")
+        self.service.host.jobs.abort_remote("the API is stopping")
         await self._runner.cleanup()
         if self._socket is not None:
             self._socket.close()

@@ -14,8 +14,7 @@ from mavproxy_uavapi.http.requests import Request, parse
 from mavproxy_uavapi.http.responses import envelope
 from mavproxy_uavapi.settings import Settings
 from mavproxy_uavapi.vehicle.copter import Copter
-from mavproxy_uavapi.vehicle.hangar import Hangar
-from mavproxy_uavapi.vehicle.jobs import Job, JobBook
+from mavproxy_uavapi.vehicle.jobs import Job
 from mavproxy_uavapi.vehicle.vehicle import Vehicle
 
 R = TypeVar("R", bound=Request)
@@ -26,15 +25,11 @@ class Service:
     """What the handlers work with.
 
     Attributes:
-        host: bridge, fleet, waits.
-        hangar: the vehicles.
-        jobs: the verbs in flight.
+        host: the vehicles, and the verbs in flight.
         settings: the snapshot in force.
     """
 
     host: Host
-    hangar: Hangar
-    jobs: JobBook
     settings: Settings
 
 
@@ -54,12 +49,12 @@ class Call:
     @property
     def seen(self) -> Vehicle:
         """The vehicle, whether its link is alive or not."""
-        return self.service.hangar.find(self.service.settings.sysid)
+        return self.service.host.hangar.find(self.service.settings.sysid)
 
     @property
     def vehicle(self) -> Vehicle:
         """The vehicle, with a link that is alive: it can be commanded."""
-        return self.service.hangar.commandable(self.service.settings.sysid)
+        return self.service.host.hangar.commandable(self.service.settings.sysid)
 
     @property
     def copter(self) -> Copter:
@@ -99,7 +94,10 @@ class Call:
 
         path = self.request.path.rstrip("/")
         request = self._params.model_dump()
-        job = self.service.jobs.begin(vehicle.seat, path, request, body, outlives_client)
+        client = self.request.remote or "unknown"
+        job = self.service.host.jobs.begin(
+            vehicle.seat, path, request, body, client=client, outlives_client=outlives_client
+        )
         return self.answer(await job.outcome())
 
 

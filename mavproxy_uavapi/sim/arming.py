@@ -35,6 +35,8 @@ def prearm_failures(copter: Copter) -> list[str]:
         failures.append("GPS 1: Bad fix")
     if copter.home is None:
         failures.append("AHRS: waiting for home")
+    if copter.mode.name == "AUTO" and not copter.mission.present:
+        failures.append("Mode requires mission")
     if copter.battery.low:
         failures.append("Battery 1 low voltage failsafe")
     return failures

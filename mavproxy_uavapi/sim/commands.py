@@ -31,7 +31,8 @@ FAILED: int = mavlink.MAV_RESULT_FAILED
 BUSY: int = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
 UNSUPPORTED: int = mavlink.MAV_RESULT_UNSUPPORTED
 FORCE_REBOOT = 20190226
-FASTEST_INTERVAL = 0.001
+FASTEST_INTERVAL = 0.003
+"""Seconds; ArduPilot refuses more than 0.8 of SCHED_LOOP_RATE. More than 100 Hz is not sent here."""
 LONGEST_INTERVAL = 60.0
 LOCATION_COMMANDS = {
     # The frame that COMMAND_LONG means, for commands whose x and y are a location; None: COMMAND_INT only.
@@ -208,9 +209,9 @@ class Commands:
     def _change_speed(self, command: Command, link: Link) -> int:
         del link
         kind = SPEED_KINDS.get(int(command.param1))
-        if not command.param2 > 0 or kind is None:
+        if not command.param2 > 0:
             return DENIED
-        changed = self._simulator.copter.mode.set_speed(kind, command.param2)
+        changed = kind is not None and self._simulator.copter.mode.set_speed(kind, command.param2)
         return ACCEPTED if changed else FAILED
 
     def _pause_continue(self, command: Command, link: Link) -> int:
@@ -231,8 +232,10 @@ class Commands:
             return ACCEPTED if copter.set_home_here(lock=True) else FAILED
         if command.param1 != 0:
             return FAILED
-        if command.frame not in GLOBAL_FRAMES or not valid_location(command.x, command.y, command.z):
+        if command.frame not in GLOBAL_FRAMES or not abs(command.z) <= HIGHEST_ALTITUDE:
             return DENIED
+        if not valid_location(command.x, command.y, command.z):
+            return FAILED
         altitude = command.z if command.frame in AMSL_FRAMES else command.z + copter.home_altitude
         home = Location(command.x / 1e7, command.y / 1e7, altitude)
         return ACCEPTED if copter.set_home(home, lock=True) else FAILED
@@ -283,7 +286,8 @@ class Commands:
         name = self._name_of(wanted)
         if name is None:
             return FAILED
-        self._simulator.send(link, name)
+        # Like most messages in ArduPilot it waits its turn, so the acknowledgement comes first.
+        self._simulator.send_soon(link, name)
         return ACCEPTED
 
     def _set_interval(self, command: Command, link: Link) -> int:
@@ -295,7 +299,11 @@ class Commands:
             return DENIED
         if command.param3 != 0 or command.param2 < -1:
             return DENIED
-        interval: float | None = max(FASTEST_INTERVAL, min(LONGEST_INTERVAL, command.param2 / 1e6))
+        if 0 < command.param2 < FASTEST_INTERVAL * 1e6:
+            text = f"Requested rate for message ID {int(command.param1)} too fast. Increase SCHED_LOOP_RATE"
+            copter.say(mavlink.MAV_SEVERITY_INFO, text)
+            return DENIED
+        interval: float | None = min(LONGEST_INTERVAL, command.param2 / 1e6)
         if command.param2 == -1:
             interval = None
         elif command.param2 == 0:

@@ -13,7 +13,8 @@ seconds), `foreign_ack` (command, count, result, system, component), `refuse` (c
 `pilot_sticks` (roll, pitch, throttle, yaw in microseconds), `pilot_disarm`, `reboot`, `ekf_bad` (seconds).
 `command` is a MAV_CMD number or "all", seconds are simulated ones and default to "until cleared".
 
-Every answer has "ok"; with false there is an "error" that says why.
+Every answer has "ok"; with false there is an "error" that says why. What is sent while the vehicle hears nothing
+is not in "received" either. A low battery that has made its failsafe act stays low until a reboot, as in ArduPilot.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from .events import Broadcast, Event, StatusText
 from .failsafes import Failsafes
 from .geodesy import Location, Ned, to_ned
 from .land_detector import LandDetector
-from .mission import Mission, State
+from .mission import Mission, State, home_item
 from .modes import Guided, Mode, build
 from .modes.base import Demand
 from .options import Options
@@ -184,6 +184,7 @@ class Copter:
         if self.estimator.origin is None:
             return False
         self.home = home
+        self.mission.remember_home(home_item(home))
         self._home_locked = self._home_locked or lock
         self.tell(Broadcast("HOME_POSITION"))
         self.tell(Broadcast("GPS_GLOBAL_ORIGIN"))

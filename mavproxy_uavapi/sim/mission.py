@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from .geodesy import Location
+
 NAVIGATION = frozenset(
     {
         mavlink.MAV_CMD_NAV_WAYPOINT,
@@ -57,6 +59,12 @@ class Item(NamedTuple):
     z: float
 
 
+def home_item(home: Location) -> Item:
+    """Home as an item."""
+    place = (round(home.latitude * 1e7), round(home.longitude * 1e7), home.altitude)
+    return Item(mavlink.MAV_CMD_NAV_WAYPOINT, mavlink.MAV_FRAME_GLOBAL, 0, 0, 0, 0, *place)
+
+
 class State(Enum):
     """Where the mission stands; STOPPED is one that was left and can be resumed."""
 
@@ -97,6 +105,11 @@ class Mission:
             if item.command in NAVIGATION and item.command != mavlink.MAV_CMD_NAV_DELAY:
                 return bool(item.command == mavlink.MAV_CMD_NAV_TAKEOFF)
         return False
+
+    def remember_home(self, home: Item) -> None:
+        """An empty list gets home as its item 0 when home is set, as in ArduPilot; a clear empties it again."""
+        if not self.items:
+            self.items = [home]
 
     def replace(self, items: list[Item]) -> None:
         """A complete upload takes the place of the old list."""

@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from .events import StatusText
 from .frames import HIGHEST_ALTITUDE
-from .mission import SUPPORTED, Item
+from .mission import SUPPORTED, Item, home_item
 
 if TYPE_CHECKING:
     from .copter import Copter
@@ -76,7 +76,7 @@ class MissionProtocol:
         if upload is None:
             return
         if now - upload.heard_at > GIVE_UP_AFTER:
-            self._upload = None
+            self._abandon(upload)
             upload.link.send(
                 mavlink.MAVLink_mission_ack_message(
                     *upload.sender, mavlink.MAV_MISSION_OPERATION_CANCELLED, upload.kind
@@ -93,8 +93,7 @@ class MissionProtocol:
         home = self.copter.home
         if not items or home is None:
             return items
-        place = (round(home.latitude * 1e7), round(home.longitude * 1e7), home.altitude)
-        return [Item(mavlink.MAV_CMD_NAV_WAYPOINT, mavlink.MAV_FRAME_GLOBAL, 0, 0, 0, 0, *place), *items[1:]]
+        return [home_item(home), *items[1:]]
 
     def _ack(self, link: Link, message: Any, result: int) -> None:
         link.send(mavlink.MAVLink_mission_ack_message(*_sender(message), result, message.mission_type))
@@ -121,7 +120,8 @@ class MissionProtocol:
             self._store(message.mission_type, [])
             self._ack(link, message, mavlink.MAV_MISSION_ACCEPTED)
         else:
-            self._begin(Upload(link, _sender(message), message.mission_type, 0, message.count - 1, []))
+            kept = self.items(message.mission_type)[: message.count]
+            self._begin(Upload(link, _sender(message), message.mission_type, 0, message.count - 1, kept))
 
     def _partial(self, link: Link, message: Any) -> None:
         if self._busy(link, message):
@@ -163,7 +163,7 @@ class MissionProtocol:
     def _take(self, link: Link, message: Any, upload: Upload) -> None:
         refusal = _refusal(message) if upload.kind == MISSION and message.seq > 0 else None
         if refusal is not None:
-            self._upload = None
+            self._abandon(upload)
             self._ack(link, message, refusal)
             return
         upload.items[message.seq : message.seq + 1] = [_as_item(message)]
@@ -177,6 +177,11 @@ class MissionProtocol:
         self._ack(link, message, mavlink.MAV_MISSION_ACCEPTED)
         if upload.kind == MISSION:
             self.copter.say(mavlink.MAV_SEVERITY_INFO, "Flight plan received")
+
+    def _abandon(self, upload: Upload) -> None:
+        """An upload that ends early leaves what had come so far, and cuts the old list: so does ArduPilot."""
+        self._upload = None
+        self._store(upload.kind, upload.items)
 
     def _store(self, kind: int, items: list[Item]) -> None:
         if kind == MISSION:

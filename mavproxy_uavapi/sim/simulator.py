@@ -36,7 +36,7 @@ from .telemetry import Telemetry
 
 STEP = 0.01
 """Seconds of simulated time in one step, at any speedup."""
-PARAMETERS_PER_STEP = 5
+PARAMETERS_PER_STEP = 20
 UNKNOWN_INDEX = 65535
 TEXT_LENGTH = 50
 REMEMBERED_MESSAGES = 20000
@@ -131,6 +131,15 @@ class Simulator:
         if message is not None:
             link.send(message)
 
+    def send_soon(self, link: Link, name: str) -> None:
+        """The same with the next step."""
+        message = self.telemetry.build(name)
+        if message is not None:
+            self._plan(self.copter.now, link, message)
+
+    def _plan(self, at: float, link: Link, message: Any, source: tuple[int, int] | None = None) -> None:
+        heapq.heappush(self._planned, (at, next(self._order), link, message, source))
+
     def broadcast(self, name: str) -> None:
         """Queue a message about the present state for all links."""
         for link in self.links:
@@ -214,7 +223,7 @@ class Simulator:
         if planned.at <= self.copter.now:
             link.send(ack, planned.source)
         else:
-            heapq.heappush(self._planned, (planned.at, next(self._order), link, ack, planned.source))
+            self._plan(planned.at, link, ack, planned.source)
 
     def set_mode(self, base_mode: int, custom_mode: int) -> int:
         """Change the mode as MAV_CMD_DO_SET_MODE and SET_MODE ask; a MAV_RESULT."""

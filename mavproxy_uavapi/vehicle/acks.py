@@ -39,9 +39,7 @@ class Commands:
         self._waiting = waiting
         self._locks: defaultdict[int, asyncio.Lock] = defaultdict(asyncio.Lock)
 
-    async def send(
-        self, command: Command, patience: float = 20.0, shown: Callable[[], bool] = lambda: False
-    ) -> None:
+    async def send(self, command: Command, patience: float = 20.0, shown: Callable[[], bool] = lambda: False) -> None:
         """Send `command`; returns when the vehicle has accepted it.
 
         Args:

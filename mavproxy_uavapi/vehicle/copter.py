@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Callable
-from typing import Any
 
 from mavproxy_uavapi.errors import Busy, Invalid, ModeChanged, NotArmed, Stale, TimedOut
 from mavproxy_uavapi.host.link import Link

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from mavproxy_uavapi.errors import NoVehicle
-from mavproxy_uavapi.host.host import Host, link_lost
+from typing import TYPE_CHECKING
+
+from mavproxy_uavapi.errors import LinkLost, NoVehicle
 from mavproxy_uavapi.vehicle.copter import Copter
 from mavproxy_uavapi.vehicle.modes import kind_of
 from mavproxy_uavapi.vehicle.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from mavproxy_uavapi.host.host import Host
 
 CLASSES: dict[str, type[Vehicle]] = {"copter": Copter}
 
@@ -44,5 +48,5 @@ class Hangar:
         """
         vehicle = self.find(system)
         if not self.host.is_alive(vehicle.state):
-            raise link_lost(vehicle.state, self.host.clock() - vehicle.state.heartbeat_at)
+            raise LinkLost.since(vehicle.state.system, self.host.clock() - vehicle.state.heartbeat_at)
         return vehicle

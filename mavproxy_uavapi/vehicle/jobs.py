@@ -14,6 +14,7 @@ from typing import Any
 from mavproxy_uavapi.errors import Aborted, Superseded, UavApiError
 
 FINISHED_KEPT = 100
+CONSOLE = "console"  # the client of what was typed at MAVProxy's prompt
 
 
 class Job:
@@ -24,6 +25,7 @@ class Job:
         verb: the path that was called, `/movement/go_to_ned_wait`.
         request: the validated parameters.
         seat: the vehicle's, which it takes.
+        client: who asked for it: an address, or CONSOLE.
         outlives_client: whether it goes on when its client hangs up (land, rtl).
         progress: what it last said of itself, such as distance_to_go (m) and altitude (m above home).
         result: the text of its success.
@@ -31,9 +33,10 @@ class Job:
     """
 
     def __init__(
-        self, number: int, verb: str, request: Mapping[str, Any], seat: Seat, outlives_client: bool
+        self, number: int, verb: str, request: Mapping[str, Any], seat: Seat, *, client: str, outlives_client: bool
     ) -> None:
         self.id = str(number)
+        self.client = client
         self.verb = verb
         self.request = dict(request)
         self.seat = seat
@@ -128,13 +131,15 @@ class JobBook:
         verb: str,
         request: Mapping[str, Any],
         body: Callable[[Job], Awaitable[str]],
+        *,
+        client: str = CONSOLE,
         outlives_client: bool = False,
     ) -> Job:
         """Start a job, or join the one for that seat that does just the same."""
         for job in self.running():  # not the one in the seat: a job takes that when it has begun
             if job.seat is seat and job.is_for(verb, request):
                 return job
-        job = Job(next(self._numbers), verb, request, seat, outlives_client)
+        job = Job(next(self._numbers), verb, request, seat, client=client, outlives_client=outlives_client)
         self._jobs[job.id] = job
         self._forget_old()
         job.start(body)
@@ -144,10 +149,11 @@ class JobBook:
         """The jobs without an outcome, oldest first."""
         return [job for job in self._jobs.values() if job.running]
 
-    def abort_all(self, reason: str) -> None:
-        """End every running job."""
+    def abort_remote(self, reason: str) -> None:
+        """End every running job that came over the network."""
         for job in self.running():
-            job.abort(Aborted(f"{job.verb}: {reason}"))
+            if job.client != CONSOLE:
+                job.abort(Aborted(f"{job.verb}: {reason}"))
 
     def _forget_old(self) -> None:
         finished = [job for job in self._jobs.values() if not job.running]

@@ -332,7 +332,7 @@ def link(host: Host) -> FakeLink:
 @pytest.fixture
 def hangar(host: Host) -> Hangar:
     """The vehicles."""
-    return Hangar(host)
+    return host.hangar
 
 
 @pytest.fixture

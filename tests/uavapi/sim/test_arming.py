@@ -44,9 +44,18 @@ def test_the_time_until_ready_is_an_option(new_ground):
     assert ground.arm() == mavlink.MAV_RESULT_ACCEPTED
 
 
+def test_auto_without_a_mission_is_entered_on_the_ground_but_does_not_arm(ground):
+    ground.run(6.0)
+    assert ground.mode(3) == mavlink.MAV_RESULT_ACCEPTED
+    assert ground.arm() == mavlink.MAV_RESULT_FAILED
+    ground.run(0.02)
+    assert "Arm: Mode requires mission" in ground.texts()
+
+
 @pytest.mark.parametrize(("number", "name"), [(3, "AUTO"), (6, "RTL"), (9, "LAND"), (17, "BRAKE")])
 def test_some_modes_do_not_arm(ground, number, name):
     ground.run(6.0)
+    ground.copter.mission.items = [object(), object()]
     ground.mode(number)
     assert ground.arm() == mavlink.MAV_RESULT_FAILED
     ground.run(0.02)

@@ -58,7 +58,7 @@ def test_home_needs_an_origin_and_a_sane_place(ground):
     assert ground.command(home, 1) == mavlink.MAV_RESULT_FAILED
     ground.run(6.0)
     assert ground.command(home, 1) == mavlink.MAV_RESULT_ACCEPTED
-    assert ground.command_int(home, 0, (0, 0, 0, 0), (999999999, 1, 0.0)) == mavlink.MAV_RESULT_DENIED
+    assert ground.command_int(home, 0, (0, 0, 0, 0), (999999999, 1, 0.0)) == mavlink.MAV_RESULT_FAILED
     assert ground.command_int(home, 1, (0, 0, 0, 0), (1, 1, 0.0)) == mavlink.MAV_RESULT_DENIED
 
 

@@ -206,3 +206,13 @@ def test_fence_and_rally_lists_are_kept_apart(ground):
     ground.send(mavlink.MAVLink_mission_request_list_message(1, 1, mavlink.MAV_MISSION_TYPE_MISSION))
     ground.run(0.01)
     assert [(m.mission_type, m.count) for m in ground.of("MISSION_COUNT")] == [(2, 1), (0, 0)]
+
+
+def test_an_upload_that_fails_leaves_a_cut_mission(ground):
+    ground.run(6.0)
+    assert len(ground.copter.mission.items) == 1
+    upload(ground, simple_mission(ground))
+    bad = simple_mission(ground)[:3]
+    bad[2] = item(2, 30000)
+    upload(ground, bad)
+    assert len(ground.copter.mission.items) == 3

@@ -73,6 +73,7 @@ def test_intervals_can_be_read_stopped_and_set_to_the_default(ground):
     ground.command(SET_INTERVAL, ATTITUDE, 0)
     assert told() == 200000
     assert ground.command(SET_INTERVAL, 4242, 1000000) == mavlink.MAV_RESULT_DENIED
+    assert ground.command(SET_INTERVAL, ATTITUDE, 1000) == mavlink.MAV_RESULT_DENIED
 
 
 def test_a_late_caller_is_not_flooded():

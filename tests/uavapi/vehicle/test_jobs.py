@@ -32,7 +32,7 @@ class Bench:
 
     def begin_body(self, body: Any, verb: str = "/a", settle: bool = True, outlives: bool = False, **request: Any) -> Job:
         async def begin() -> Job:
-            return self.book.begin(self.seat, verb, request, body, outlives)
+            return self.book.begin(self.seat, verb, request, body, client="10.0.0.7", outlives_client=outlives)
 
         job = self.loop.run(begin())
         if settle:
@@ -169,11 +169,11 @@ def test_verb_that_is_refused_does_not_take_the_command(bench: Bench) -> None:
     assert flying.running
 
 
-def test_abort_all_ends_every_job(bench: Bench) -> None:
+def test_abort_remote_ends_every_job_that_came_over_the_network(bench: Bench) -> None:
     clients = [bench.client(bench.begin("/land", outlives_client=True))]
     bench.loop.run(asyncio.sleep(0))
     assert [job.verb for job in bench.book.running()] == ["/land"]
-    bench.book.abort_all("the API is stopping")
+    bench.book.abort_remote("the API is stopping")
     with pytest.raises(Aborted, match="^/land: the API is stopping$"):
         bench.loop.run(clients[0])
     assert bench.book.running() == []

@@ -1,0 +1,97 @@
+"""The HTTP application before the scripted copter, both on the time-travelling loop."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterator
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from aiohttp import TCPConnector, web
+from aiohttp.test_utils import TestClient, TestServer
+
+from mavproxy_uavapi.http.app import make_app
+from mavproxy_uavapi.http.call import Service
+from mavproxy_uavapi.settings import ModuleSettings
+
+SOCKET_PATIENCE = 0.002  # real s that the sockets get before the clock jumps
+
+
+class Api:
+    """A client of the API; `get` and `post` give an answer with `status`, `body` and `headers`."""
+
+    def __init__(self, loop: Any, service: Service) -> None:
+        self.loop, self.service = loop, service
+        self.client: TestClient[Any, Any]
+
+    async def start(self) -> None:
+        server = TestServer(make_app(self.service))
+        await server.start_server(access_log=None)
+        self.client = TestClient(server, connector=TCPConnector(limit=0))
+
+    async def ask(self, method: str, path: str, **kwargs: Any) -> Any:
+        """One request; the body is parsed strictly, without NaN and infinities."""
+
+        def forbidden(constant: str) -> None:
+            raise AssertionError(f"{constant} is not JSON")
+
+        async with self.client.request(method, path, allow_redirects=False, **kwargs) as response:
+            import json
+
+            text = await response.text()
+            body = json.loads(text, parse_constant=forbidden)
+            return SimpleNamespace(status=response.status, body=body, headers=response.headers)
+
+    def get(self, path: str, **kwargs: Any) -> Any:
+        return self.loop.run(self.ask("GET", path, **kwargs))
+
+    def post(self, path: str, body: Any = None, **kwargs: Any) -> Any:
+        if body is not None:
+            kwargs["json"] = body
+        return self.loop.run(self.ask("POST", path, **kwargs))
+
+    def begin(self, method: str, path: str, **kwargs: Any) -> asyncio.Task[Any]:
+        """A request in flight."""
+        return self.loop.create_task(self.ask(method, path, **kwargs))
+
+
+@pytest.fixture
+def service(host: Any) -> Service:
+    """What the handlers work with."""
+    return Service(host, ModuleSettings().snapshot())
+
+
+@pytest.fixture
+def api(loop: Any, service: Service) -> Iterator[Api]:
+    """The API, with whatever vehicle the test puts on the link."""
+    loop.patience = SOCKET_PATIENCE
+    api = Api(loop, service)
+    loop.run(api.start())
+    yield api
+    service.host.jobs.abort_remote("the test is over")
+    loop.run(api.client.close())
+
+
+@pytest.fixture
+def raising(loop: Any) -> Any:
+    """The answer of an application that raises this."""
+    from mavproxy_uavapi.http.responses import errors_as_answers
+
+    def raising(error: BaseException) -> Any:
+        async def handler(_request: web.Request) -> web.StreamResponse:
+            raise error
+
+        async def ask() -> Any:
+            import json
+
+            from aiohttp.test_utils import make_mocked_request
+
+            response = await errors_as_answers(make_mocked_request("GET", "/x"), handler)
+            return SimpleNamespace(
+                status=response.status, body=json.loads(response.text or "null"), headers=response.headers
+            )
+
+        return loop.run(ask())
+
+    return raising

@@ -1,0 +1,214 @@
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from pymavlink import mavutil
+
+mavlink = mavutil.mavlink
+NED = {"x": 3, "y": 4.5, "z": -15}
+GPS = {"lat": -35.0001, "long": 149.0, "alt": 12.5}
+BODY = {"front": 3, "right": -2, "down": 1}
+
+ROWS = [
+    ("POST", "go_to_gps", GPS, "Going to coord (-35.0001, 149.0, 12.5)"),
+    ("POST", "go_to_gps_wait", GPS, "Arrived at coord (-35.0001, 149.0, 12.5)"),
+    ("POST", "go_to_ned", NED, "Going to NED coord (3, 4.5, -15)"),
+    ("POST", "go_to_ned_wait", NED, "Arrived at NED coord (3, 4.5, -15)"),
+    ("POST", "drive", {"x": 3, "y": 4, "z": 0}, "Copter is driving"),
+    ("POST", "drive_wait", {"x": 3, "y": 4, "z": -1}, "Copter arrived at (13.0, 24.0, -31.0)"),
+    ("POST", "drive_body", BODY, "Copter is driving"),
+    ("POST", "drive_body_wait", BODY, "Copter arrived at (12.0, 23.0, -29.0)"),
+    ("POST", "travel_at_ned", {"vx": 1, "vy": -2.5, "vz": 0}, "Travelling at NED velocity (1, -2.5, 0)"),
+    ("POST", "travel_at_ned", {"vx": 1, "vy": 0, "vz": 0, "duration": 4}, "Travelling at NED velocity (1, 0, 0)"),
+    ("GET", "set_heading", {"heading": 359}, "Heading set to 359 degrees"),
+    ("GET", "set_heading", {"heading": 0.5}, "Heading set to 0.5 degrees"),
+    ("GET", "set_yaw_rate", {"yaw_rate": -20}, "Yaw rate set to -20 deg/s"),
+    ("GET", "stop", {}, "Copter has stopped"),
+    ("GET", "resume", {}, "Copter has resumed"),
+]
+
+
+@pytest.fixture
+def there(loop: Any, drone: Any) -> Any:
+    """The drone in the air at (10, 20, -30), heading east."""
+    drone.yaw = math.radians(90)
+    drone.fly(at=(10.0, 20.0, -30.0))
+    loop.settle()
+    return drone
+
+
+@pytest.mark.parametrize("slash", ["", "/"])
+@pytest.mark.parametrize(("method", "path", "values", "result"), ROWS, ids=[f"{row[1]}{row[2]}" for row in ROWS])
+def test_every_row_of_the_contract(
+    there: Any, api: Any, method: str, path: str, values: dict[str, Any], result: str, slash: str
+) -> None:
+    path = f"/movement/{path}{slash}"
+    answer = api.post(path, values) if method == "POST" else api.get(path, params=values)
+    assert (answer.status, answer.body) == (200, {"device": "uav", "id": "1", "result": result})
+
+
+def one_setpoint(drone: Any) -> Any:
+    (setpoint,) = drone.setpoints()
+    return setpoint
+
+
+@pytest.mark.parametrize(
+    ("path", "values", "target"),
+    [
+        ("go_to_ned", NED, (3, 4.5, -15)),
+        ("drive", {"x": 3, "y": 4, "z": -1}, (13, 24, -31)),
+        ("drive_body", BODY, (12, 23, -29)),
+    ],
+)
+def test_position_is_sent_in_ned(
+    there: Any, api: Any, path: str, values: dict[str, Any], target: tuple[float, float, float]
+) -> None:
+    api.post(f"/movement/{path}", values)
+    setpoint = one_setpoint(there)
+    assert (setpoint.x, setpoint.y, setpoint.z) == pytest.approx(target)
+    assert setpoint.type_mask & mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE
+
+
+def test_gps_target_is_sent_above_home(there: Any, api: Any) -> None:
+    api.post("/movement/go_to_gps", GPS)
+    setpoint = one_setpoint(there)
+    assert (setpoint.lat_int, setpoint.lon_int, setpoint.alt) == (-350001000, 1490000000, 12.5)
+    assert setpoint.coordinate_frame == mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
+
+
+@pytest.mark.parametrize(
+    ("path", "values", "yaw"),
+    [
+        ("go_to_ned", {"x": 10, "y": 50, "z": -30}, 90),
+        ("drive", {"x": -5, "y": 0, "z": 0}, 180),
+        ("drive_body", {"front": 5, "right": 0}, 90),
+        ("travel_at_ned", {"vx": 1, "vy": 1, "vz": 0}, 45),
+    ],
+)
+def test_look_at_target_turns_along_the_way(there: Any, api: Any, path: str, values: Any, yaw: float) -> None:
+    api.post(f"/movement/{path}", {**values, "look_at_target": True})
+    setpoint = one_setpoint(there)
+    assert not setpoint.type_mask & mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE
+    assert math.degrees(setpoint.yaw) == pytest.approx(yaw, abs=0.1)
+
+
+def test_duration_keeps_travelling_then_stops(there: Any, api: Any) -> None:
+    api.post("/movement/travel_at_ned", {"vx": 1, "vy": 0, "vz": 0, "duration": 4})
+    assert [setpoint.vx for setpoint in there.setpoints()] == [1, 1, 1, 1, 0]
+
+
+@pytest.mark.parametrize(
+    ("path", "values"),
+    [
+        ("go_to_gps", {**GPS, "lat": 90.1}),
+        ("go_to_gps", {**GPS, "lat": 999}),
+        ("go_to_gps", {**GPS, "long": -180.5}),
+        ("go_to_gps", {**GPS, "alt": -1}),
+        ("go_to_gps", {**GPS, "alt": 10001}),
+        ("go_to_gps", {"lat": 1, "long": 2}),
+        ("go_to_gps", {**GPS, "lat": None}),
+        ("go_to_gps", {**GPS, "lat": True}),
+        ("go_to_gps", {**GPS, "lat": [1]}),
+        ("go_to_ned", {**NED, "x": float("nan")}),
+        ("go_to_ned", {**NED, "y": float("inf")}),
+        ("go_to_ned", {**NED, "z": 20}),
+        ("go_to_ned", {**NED, "tolerance": 0}),
+        ("go_to_ned", {**NED, "look_at_target": "perhaps"}),
+        ("go_to_ned_wait", {**NED, "x": 10**400}),
+        ("drive", {**NED, "x": "far"}),
+        ("drive", {"x": 0, "y": 0, "z": 35}),
+        ("drive_body", {**BODY, "front": float("-inf")}),
+        ("drive_body", {"front": 3}),
+        ("travel_at_ned", {"vx": 51, "vy": 0, "vz": 0}),
+        ("travel_at_ned", {"vx": 1, "vy": 0, "vz": 0, "duration": 0}),
+        ("travel_at_ned", {"vx": 1, "vy": 0, "vz": 0, "duration": float("inf")}),
+    ],
+)
+def test_body_that_is_out_of_range_is_422_and_nothing_is_sent(
+    there: Any, api: Any, path: str, values: dict[str, Any]
+) -> None:
+    answer = api.post(f"/movement/{path}", values)
+    assert (answer.status, answer.body["code"]) == (422, "invalid")
+    assert all(set(problem) == {"loc", "msg", "type"} for problem in answer.body["detail"])
+    assert answer.body["detail"][0]["loc"][0] == "body"
+    assert there.orders() == []
+
+
+@pytest.mark.parametrize(
+    "query",
+    ["set_heading?heading=360.5", "set_heading?heading=-1", "set_heading", "set_yaw_rate?yaw_rate=nan"],
+)
+def test_query_that_is_out_of_range_is_422(there: Any, api: Any, query: str) -> None:
+    answer = api.get(f"/movement/{query}")
+    assert (answer.status, answer.body["detail"][0]["loc"][0]) == (422, "query")
+    assert there.orders() == []
+
+
+def test_every_problem_is_listed(there: Any, api: Any) -> None:
+    answer = api.post("/movement/go_to_gps", {"lat": 999, "long": "x"})
+    assert sorted(problem["loc"][1] for problem in answer.body["detail"]) == ["alt", "lat", "long"]
+
+
+def test_unknown_members_are_ignored(there: Any, api: Any) -> None:
+    assert api.post("/movement/go_to_ned", {**NED, "colour": "red"}).status == 200
+
+
+def test_stale_position_is_503_and_nothing_is_sent(there: Any, loop: Any, api: Any) -> None:
+    there.mute.add("LOCAL_POSITION_NED")
+    loop.pass_time(4.0)
+    for path in ("go_to_ned", "drive", "drive_body"):
+        answer = api.post(f"/movement/{path}", {**NED, **BODY})
+        assert (answer.status, answer.body["code"]) == (503, "stale")
+    assert there.orders() == []
+
+
+def test_movement_on_the_ground_is_409(drone: Any, loop: Any, api: Any) -> None:
+    answer = api.post("/movement/drive", {"x": 1, "y": 0, "z": 0})
+    assert (answer.status, answer.body["code"]) == (409, "not_armed")
+    drone.mode, drone.armed = "GUIDED", True
+    loop.pass_time(0.5)
+    answer = api.post("/movement/drive", {"x": 1, "y": 0, "z": 0})
+    assert (answer.status, answer.body["code"]) == (409, "busy")
+
+
+def test_drive_that_is_asked_for_twice_aims_at_one_place(there: Any, loop: Any, api: Any) -> None:
+    values = {"x": 40, "y": 0, "z": 0}
+    first = api.begin("POST", "/movement/drive_wait", json=values)
+    loop.pass_time(2.0)
+    second = api.begin("POST", "/movement/drive_wait", json=values)
+    results = [loop.run(request).body["result"] for request in (first, second)]
+    assert results == ["Copter arrived at (50.0, 20.0, -30.0)"] * 2
+    assert len(there.setpoints()) == 1
+
+
+def test_pilots_mode_change_ends_a_wait_with_409_and_nothing_more_is_sent(there: Any, loop: Any, api: Any) -> None:
+    request = api.begin("POST", "/movement/go_to_ned_wait", json={"x": 300, "y": 0, "z": -20})
+    loop.pass_time(3.0)
+    there.pilot("LOITER")
+    answer = loop.run(request)
+    assert (answer.status, answer.body["code"]) == (409, "mode_changed")
+    before = len(there.orders())
+    loop.pass_time(10.0)
+    assert len(there.orders()) == before
+
+
+def test_telemetry_is_read_at_once_while_two_hundred_calls_wait(there: Any, loop: Any, api: Any) -> None:
+    there.stuck = True
+    body = {"x": 300, "y": 0, "z": -20}
+    waiting = []
+    for _ in range(4):  # no more at once than the listening queue holds
+        waiting += [api.begin("POST", "/movement/go_to_ned_wait", json=body) for _ in range(50)]
+        loop.pass_time(0.5)
+    started = loop.time()
+    answer = api.get("/telemetry/gps")
+    assert answer.status == 200
+    assert loop.time() - started < 0.3
+    assert not any(request.done() for request in waiting)
+    there.pilot("LOITER")
+
+    async def all_of_them() -> list[int]:
+        return [(await request).status for request in waiting]
+
+    assert loop.run(all_of_them()) == [409] * 200

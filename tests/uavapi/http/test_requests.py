@@ -1,0 +1,79 @@
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from mavproxy_uavapi.errors import Invalid
+from mavproxy_uavapi.http import requests
+from mavproxy_uavapi.http.requests import parse
+
+
+@pytest.mark.parametrize(
+    ("given", "value"),
+    [("30", 30), (30, 30), ("30.5", 30.5), (30.5, 30.5), ("30.0", 30.0), ("3e1", 30.0), (30.0, 30.0)],
+)
+def test_numbers_stay_as_the_client_wrote_them(given: Any, value: float) -> None:
+    alt = parse(requests.Takeoff, "query", {"alt": given}).alt  # type: ignore[attr-defined]
+    assert (alt, type(alt)) == (value, type(value))
+
+
+@pytest.mark.parametrize(
+    "given", [math.nan, math.inf, -math.inf, "nan", "inf", "-Infinity", "1e400", True, None, [], {}, "", "ten", "9" * 5000]
+)
+def test_what_is_no_finite_number_is_invalid(given: Any) -> None:
+    with pytest.raises(Invalid) as caught:
+        parse(requests.Takeoff, "body", {"alt": given})
+    assert caught.value.problems[0]["loc"][:2] == ["body", "alt"]
+
+
+def bounds() -> list[tuple[type[requests.Request], dict[str, Any], str, float, float, float, float]]:
+    """Model, the other values, name, lowest and highest value, and the nearest that are out of range."""
+    gps = {"lat": 0, "long": 0, "alt": 0}
+    velocity = {"vx": 0, "vy": 0, "vz": 0}
+    return [
+        (requests.Takeoff, {}, "alt", 0.001, 500, 0, 500.001),
+        (requests.NewSpeed, {}, "new_v", 0.001, 50, 0, 50.001),
+        (requests.GpsTarget, gps, "lat", -90, 90, -90.001, 90.001),
+        (requests.GpsTarget, gps, "long", -180, 180, -180.001, 180.001),
+        (requests.GpsTarget, gps, "alt", 0, 10_000, -0.001, 10_000.001),
+        (requests.NedVelocity, velocity, "vx", -50, 50, -50.001, 50.001),
+        (requests.Heading, {}, "heading", 0, 360, -0.001, 360.001),
+        (requests.Servo, {"pwm": 1500}, "channel", 1, 16, 0, 17),
+        (requests.Servo, {"channel": 1}, "pwm", 800, 2200, 799, 2201),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("model", "others", "name", "lowest", "highest", "below", "above"), bounds(), ids=[f"{b[0].__name__}.{b[2]}" for b in bounds()]
+)
+def test_bounds_are_those_that_clients_know(
+    model: type[requests.Request], others: Any, name: str, lowest: float, highest: float, below: float, above: float
+) -> None:
+    for value in (lowest, highest):
+        assert getattr(parse(model, "query", {**others, name: value}), name) == value
+    for value in (below, above):
+        with pytest.raises(Invalid):
+            parse(model, "query", {**others, name: value})
+
+
+def test_defaults_are_those_of_the_contract() -> None:
+    assert parse(requests.Takeoff, "query", {}).model_dump() == {"timeout": None, "alt": 15}
+    assert parse(requests.Disarm, "query", {}).model_dump() == {"force": False}
+    target = parse(requests.NedPlace, "body", {"x": 1, "y": 2, "z": 3})
+    assert (target.look_at_target, target.tolerance, target.timeout) == (False, 1.0, None)  # type: ignore[attr-defined]
+
+
+def test_unknown_members_are_ignored() -> None:
+    assert parse(requests.Disarm, "query", {"colour": "red", "force": "true"}).model_dump() == {"force": True}
+
+
+def test_each_problem_has_its_place_message_and_type() -> None:
+    with pytest.raises(Invalid) as caught:
+        parse(requests.Servo, "body", {"channel": 99})
+    channel, pwm = caught.value.problems
+    assert channel == {
+        "loc": ["body", "channel"], "msg": "Input should be less than or equal to 16", "type": "less_than_equal",
+    }  # fmt: skip
+    assert (pwm["loc"], pwm["type"]) == (["body", "pwm"], "missing")
