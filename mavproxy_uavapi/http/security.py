@@ -31,13 +31,16 @@ def check_origin(headers: Mapping[str, str]) -> None:
     if site is not None and site not in OURSELVES:
         raise Forbidden(f"a page of another site ({site}) may not call this API")
     origin = headers.get("Origin")
-    if origin is not None and urlsplit(origin).netloc != host:
+    if origin is not None and origin.partition("://")[2] != host:
         raise Forbidden(f"a page of {origin} may not call this API")
 
 
 def is_our_name(host: str) -> bool:
     """Whether a Host header names us by `localhost` or an IP address, which no foreign name server can rebind."""
-    name = urlsplit(f"//{host}").hostname or ""
+    try:
+        name = urlsplit(f"//{host}").hostname or ""
+    except ValueError:  # such as a bracket that is not closed
+        return False
     if name == "localhost":
         return True
     try:

@@ -27,6 +27,7 @@ UNKNOWN: dict[str, dict[str, int]] = {
     },
     "SYS_STATUS": {"voltage_battery": UINT16_MAX, "current_battery": -1, "battery_remaining": -1},
     "BATTERY_STATUS": {
+        "voltages": UINT16_MAX,
         "temperature": INT16_MAX,
         "current_battery": -1,
         "current_consumed": -1,
@@ -50,9 +51,12 @@ SENSORS = {
 
 
 def known(message: Any, name: str) -> Any:
-    """A field's value; None where the message says that it does not know."""
+    """A field's value; None where the message says that it does not know, of an array each element's."""
     value = getattr(message, name)
-    if value == UNKNOWN.get(message.get_type(), {}).get(name):
+    unknown = UNKNOWN.get(message.get_type(), {}).get(name)
+    if isinstance(value, list):
+        return [None if item == unknown else item for item in value]
+    if value == unknown:
         return None
     if isinstance(value, float) and not math.isfinite(value):
         return None
