@@ -115,12 +115,11 @@ async def parameters(request: web.Request, model: type[Request], body: bool) -> 
     values: dict[str, Any] = dict(request.query)
     if not body or not request.can_read_body:
         return parse(model, "query", values)
-    if request.content_type == "application/x-www-form-urlencoded":
-        return parse(model, "body", {**values, **await request.post()})
+    form = request.content_type == "application/x-www-form-urlencoded"
     try:
-        given = await request.json()
-    except ValueError as error:
-        raise BadRequest(f"the body is not JSON: {error}") from error
+        given = dict(await request.post()) if form else await request.json()
+    except (ValueError, LookupError, RecursionError) as error:  # no such charset; nested without end
+        raise BadRequest(f"the body is not {'a form' if form else 'JSON'}: {error}") from error
     if not isinstance(given, dict):
         raise BadRequest("the body is not a JSON object")
     return parse(model, "body", {**values, **cast(dict[str, Any], given)})

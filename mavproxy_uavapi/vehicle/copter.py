@@ -220,7 +220,13 @@ class Copter(Vehicle):
 
     async def _take_up(self, target: Target, yaw: Yaw) -> None:
         """Begin a movement; a pause that is in force would hold it back, so it ends."""
+        same_kind = self._setpoint_at >= self.state.mode_since and _same_kind(self._setpoint, target)
         await self._send_setpoint(target, yaw)
+        if not same_kind and self._speeds_at >= self.state.mode_since:
+            # ArduCopter takes up its own speeds again whenever the kind of setpoint changes.
+            for kind, speed in self.speeds.items():
+                self.held_by("GUIDED")
+                await self.commands.send(messages.change_speed(kind, speed))
         paused_at, self._paused_at = self._paused_at, None
         if paused_at is not None and paused_at >= self.state.mode_since:
             # In this order, so that it does not take up the old movement for a moment.
@@ -307,3 +313,8 @@ class Copter(Vehicle):
         self.require_mode("GUIDED")
         await self.commands.send(messages.pause(False))
         self._paused_at = None
+
+
+def _same_kind(one: Target | None, other: Target) -> bool:
+    """Whether ArduCopter flies both in the same way: to a position, or at a velocity."""
+    return one is not None and isinstance(one, VelocityTarget) == isinstance(other, VelocityTarget)

@@ -59,7 +59,8 @@ class Vehicle:
         self.seat = Seat()
         self.waiting = Waiting(state, pending, clock)
         self.commands = Commands(state, link, self.waiting)
-        self.speeds: dict[str, float] = {}
+        self.speeds: dict[str, float] = {}  # what DO_CHANGE_SPEED set (m/s), by kind
+        self._speeds_at = 0.0
 
     # -- what it is ---------------------------------------------------------------------------------------
 
@@ -292,7 +293,9 @@ class Vehicle:
     async def set_speed(self, kind: str, speed: float) -> None:
         """Set the `kind` of speed (air, ground, climb, descent) to `speed` m/s; the ack is the proof."""
         await self.commands.send(messages.change_speed(kind, speed))
-        self.speeds[kind] = speed
+        if self._speeds_at < self.state.mode_since:
+            self.speeds.clear()  # a mode change undid the older ones
+        self.speeds[kind], self._speeds_at = speed, self.clock()
 
     async def set_home(self) -> None:
         """Make the current position home; asked again while the estimator settles."""

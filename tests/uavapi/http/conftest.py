@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from types import SimpleNamespace
 from typing import Any
 
@@ -50,6 +50,14 @@ class Api:
         if body is not None:
             kwargs["json"] = body
         return self.loop.run(self.ask("POST", path, **kwargs))
+
+    def until(self, condition: Callable[[], Any]) -> None:
+        """Let time pass until that holds."""
+        for _ in range(100):
+            if condition():
+                return
+            self.loop.pass_time(0.1)
+        raise AssertionError("it did not happen")
 
     def begin(self, method: str, path: str, **kwargs: Any) -> asyncio.Task[Any]:
         """A request in flight."""

@@ -1,0 +1,184 @@
+from __future__ import annotations
+
+import asyncio
+import io
+import json
+import socket
+from typing import Any
+
+import pytest
+from aiohttp import ClientSession
+
+from mavproxy_uavapi.http.app import MAX_BODY, Server, listening_socket
+from mavproxy_uavapi.settings import ModuleSettings
+
+
+@pytest.fixture
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@pytest.fixture
+def server(loop: Any, service: Any, free_port: int) -> Any:
+    loop.patience = 0.002
+    service.settings = ModuleSettings({"port": free_port}).snapshot()
+    server = Server(service)
+    yield server
+    loop.run(server.stop())
+
+
+async def status_of(port: int, path: str = "/telemetry/gps") -> int:
+    async with ClientSession() as session, session.get(f"http://127.0.0.1:{port}{path}") as response:
+        return response.status
+
+
+@pytest.mark.parametrize("path", ["/", "/command", "/command/fly", "/telemetry/gps/x", "/favicon.ico"])
+@pytest.mark.parametrize("method", ["GET", "POST"])
+def test_unknown_path_is_404(api: Any, loop: Any, method: str, path: str) -> None:
+    answer = loop.run(api.ask(method, path))
+    assert (answer.status, answer.body) == (404, {"detail": "no such path", "code": "not_found"})
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "allowed"),
+    [
+        ("GET", "/movement/go_to_ned", "POST"),
+        ("POST", "/telemetry/gps/", "GET"),
+        ("DELETE", "/command/arm", "GET,POST"),
+        ("GET", "/peripherical/servo_output", "POST"),
+    ],
+)
+def test_wrong_method_is_405_with_those_that_are_allowed(
+    flying: Any, api: Any, loop: Any, method: str, path: str, allowed: str
+) -> None:
+    answer = loop.run(api.ask(method, path))
+    assert answer.status == 405
+    assert set(answer.headers["Allow"].split(",")) == set(allowed.split(","))
+    assert isinstance(answer.body["detail"], str)
+    assert flying.got == []
+
+
+@pytest.mark.parametrize("data", ["{", "x=1", "", "[1, 2]", '"text"', "null", b"\xff\xfe{}", '{"x": 1,}', "[" * 5000])
+@pytest.mark.parametrize("path", ["/movement/go_to_ned", "/command/takeoff"])
+def test_body_that_is_no_json_object_is_400_and_nothing_is_sent(
+    flying: Any, api: Any, path: str, data: Any
+) -> None:
+    answer = api.post(path, data=data, headers={"Content-Type": "application/json"})
+    if data == "":  # no body at all: as if nothing had been given
+        assert answer.status in (409, 422)
+    else:
+        assert (answer.status, answer.body["code"]) == (400, "bad_request")
+        assert isinstance(answer.body["detail"], str)
+    assert flying.orders() == []
+
+
+@pytest.mark.parametrize("kind", ["application/json", "application/x-www-form-urlencoded"])
+def test_body_in_an_unknown_charset_is_400(flying: Any, api: Any, kind: str) -> None:
+    headers = {"Content-Type": f"{kind}; charset=klingon"}
+    answer = api.post("/movement/go_to_ned", data=b"x=1", headers=headers)
+    assert (answer.status, answer.body["code"]) == (400, "bad_request")
+
+
+def test_body_that_is_too_large_is_413(flying: Any, api: Any) -> None:
+    body = io.BytesIO(json.dumps({"x": 1, "y": 2, "z": -3, "padding": "p" * MAX_BODY}).encode())
+    answer = api.post("/movement/go_to_ned", data=body, headers={"Content-Type": "application/json"})
+    assert answer.status == 413
+    assert answer.body["code"] == "bad_request"
+    assert flying.orders() == []
+
+
+def test_body_comes_before_the_query(flying: Any, api: Any) -> None:
+    answer = api.post("/movement/go_to_ned?x=1&y=2&z=-30", {"x": 7})
+    assert answer.body["result"] == "Going to NED coord (7, 2, -30)"
+
+
+def test_no_answer_is_a_redirect(flying: Any, api: Any) -> None:
+    for path in ("/movement/go_to_ned", "/movement/go_to_ned/"):
+        assert api.post(path, {"x": 1, "y": 2, "z": -30}).status == 200
+
+
+# -- the server -------------------------------------------------------------------------------------------
+
+
+def test_server_listens_and_stops(loop: Any, server: Any, free_port: int, drone: Any) -> None:
+    loop.run(server.start())
+    assert loop.run(status_of(free_port)) == 200
+    loop.run(server.stop())
+    with pytest.raises(OSError, match="refused|Cannot connect"):
+        loop.run(status_of(free_port))
+
+
+def test_port_that_is_taken_is_an_os_error_and_leaks_nothing(
+    loop: Any, server: Any, free_port: int, descriptors: Any
+) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", free_port))
+        taken.listen()
+        before = descriptors()
+        with pytest.raises(OSError, match="in use"):
+            loop.run(server.start())
+        loop.run(server.stop())
+        assert descriptors() == before
+
+
+def test_port_can_be_bound_again_at_once(loop: Any, service: Any, free_port: int, drone: Any) -> None:
+    loop.patience = 0.002
+    service.settings = ModuleSettings({"port": free_port}).snapshot()
+    for _ in range(3):
+        server = Server(service)
+        loop.run(server.start())
+        assert loop.run(status_of(free_port)) == 200
+        loop.run(server.stop())
+
+
+def test_stop_answers_the_clients_whose_verbs_it_ends(
+    loop: Any, server: Any, service: Any, free_port: int, flying: Any
+) -> None:
+    async def stop_meanwhile() -> tuple[int, Any]:
+        async with ClientSession() as session:
+            request = loop.create_task(session.get(f"http://127.0.0.1:{free_port}/command/land"))
+            while not service.host.jobs.running():
+                await asyncio.sleep(0.1)
+            await server.stop()
+            async with await request as response:
+                return response.status, await response.json()
+
+    loop.run(server.start())
+    status, body = loop.run(stop_meanwhile())
+    assert (status, body["code"]) == (409, "aborted")
+    assert "stopping" in body["detail"]
+
+
+def test_stop_does_not_wait_long_for_an_open_stream(loop: Any, server: Any, free_port: int, flying: Any) -> None:
+    async def stop_meanwhile() -> float:
+        async with ClientSession() as session:
+            socket = await session.ws_connect(f"http://127.0.0.1:{free_port}/telemetry/stream")
+            await socket.receive()
+            started = loop.time()
+            await server.stop()
+            return loop.time() - started
+
+    loop.run(server.start())
+    assert loop.run(stop_meanwhile()) < 3.5  # MAVProxy gives an unload 5 s, and we give this 4
+
+
+def test_descriptors_are_those_of_the_port_and_of_every_connection(
+    loop: Any, server: Any, free_port: int, drone: Any
+) -> None:
+    async def count() -> list[int]:
+        async with ClientSession() as session, session.get(f"http://127.0.0.1:{free_port}/telemetry/gps"):
+            return server.filenos()
+
+    assert server.filenos() == []
+    loop.run(server.start())
+    assert len(server.filenos()) == 1
+    found = loop.run(count())
+    assert len(set(found)) == 2
+    assert server._socket.fileno() in found
+
+
+def test_listening_socket_of_a_foreign_address_is_an_os_error() -> None:
+    with pytest.raises(OSError, match="assign"):
+        listening_socket("192.0.2.1", 0)

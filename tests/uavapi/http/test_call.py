@@ -1,0 +1,36 @@
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from mavproxy_uavapi.http.call import Call
+from mavproxy_uavapi.http.requests import Blocking, Empty, Servo
+from mavproxy_uavapi.settings import ModuleSettings
+
+
+def test_parameters_are_those_of_the_routes_model(service: Any) -> None:
+    call = Call(service, None, Blocking(timeout=3.0))  # type: ignore[arg-type]
+    assert call.params(Blocking).timeout == 3.0
+    with pytest.raises(AssertionError):
+        call.params(Servo)
+
+
+def test_vehicle_is_the_one_of_the_settings(make_drone: Any, service: Any) -> None:
+    make_drone(1)
+    make_drone(2)
+    service.settings = ModuleSettings({"sysid": 2}).snapshot()
+    call = Call(service, None, Empty())  # type: ignore[arg-type]
+    assert call.vehicle.state.system == call.seen.state.system == 2
+    assert call.answer("done")["id"] == "2"
+
+
+def test_command_and_telemetry_follow_mavproxys_current_vehicle(
+    make_drone: Any, host: Any, api: Any, loop: Any
+) -> None:
+    first, second = make_drone(1), make_drone(2)
+    host.target = 2
+    assert api.get("/command/guided").body["id"] == "2"
+    assert api.get("/telemetry/gps").body["id"] == "2"
+    assert first.orders() == []
+    assert second.mode == "GUIDED"
