@@ -10,7 +10,7 @@ demo: $(INSTALLED)
 	$(BIN)/mavproxy-uavapi --simulated $(ARGS)
 
 test: $(INSTALLED)
-	$(BIN)/python -m pytest -m "not sitl" $(ARGS)
+	$(BIN)/python -m pytest -m "not sitl" -n 4 --dist loadfile $(ARGS)
 
 # Against ArduPilot's own simulation: make test-sitl ARDUPILOT_HOME=…
 test-sitl: $(INSTALLED)

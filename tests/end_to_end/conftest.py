@@ -58,8 +58,12 @@ def free_port() -> int:
 
 
 def free_instance() -> int:
-    """A SITL instance number whose ports nobody has just now; from 30, to leave the low ones to people."""
-    for instance in range(30, 200):
+    """A SITL instance number whose ports nobody has just now; from 30, to leave the low ones to people.
+
+    Tests that run side by side (pytest-xdist) look in ranges of their own, so that they do not race.
+    """
+    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+    for instance in range(30 + 100 * worker, 130 + 100 * worker):
         base = 5760 + 10 * instance
         with contextlib.ExitStack() as probes:
             try:

@@ -50,9 +50,7 @@ def test_follower_keeps_behind_its_leader(embedded_rig, leader, program):
     assert done.returncode == 0, done.stdout + done.stderr
     status = embedded_rig.status()
     assert (status["armed"], status["landed_state"]) == (False, "on_ground")
-    leader_at, follower_at = (
-        rig.ok(rig.get("/telemetry/gps"))["info"]["position"] for rig in (leader, embedded_rig)
-    )
+    leader_at, follower_at = (rig.ok(rig.get("/telemetry/gps"))["info"]["position"] for rig in (leader, embedded_rig))
     assert (leader_at["lat"] - follower_at["lat"]) * 111_319 == pytest.approx(5, abs=3)
 
 

@@ -23,7 +23,10 @@ def python(tmp_path: Path) -> Path:
     venv.create(tmp_path / "venv", with_pip=False)
     python = tmp_path / "venv" / "bin" / "python"
     site = subprocess.run(
-        [python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"], check=True, capture_output=True, text=True
+        [python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"],
+        check=True,
+        capture_output=True,
+        text=True,
     ).stdout.strip()
     visible = tmp_path / "visible"
     visible.mkdir()
@@ -46,7 +49,9 @@ def pip(python: Path, *arguments: str) -> None:
 
 
 def importable(python: Path) -> str:
-    return subprocess.run([python, "-c", LIST], check=True, capture_output=True, text=True, cwd=python.parent).stdout.strip()
+    return subprocess.run(
+        [python, "-c", LIST], check=True, capture_output=True, text=True, cwd=python.parent
+    ).stdout.strip()
 
 
 @pytest.mark.parametrize("editable", [False, True], ids=["install", "editable"])

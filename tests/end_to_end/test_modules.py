@@ -71,7 +71,7 @@ def test_reload_takes_the_port_over(mavproxy, harness):
     prompt.ask(load_line(mavproxy), f"listening on {mavproxy.url}")
     before = resources(prompt.pid)
     for _ in range(5):
-        said = prompt.ask(f'module reload {load_line(mavproxy).removeprefix("module load ")}', "listening on")
+        said = prompt.ask(f"module reload {load_line(mavproxy).removeprefix('module load ')}", "listening on")
         assert "Reloaded module uavapi" not in said or "Failed" not in said
         mavproxy.wait_until_up()
     assert harness.eventually(lambda: no_more_than(before, prompt.pid), 5, f"having no more than {before}")
