@@ -32,6 +32,7 @@ class UavApiModule(HostedModule):
 
     def __init__(self, mpstate: Any, given: dict[str, Any]) -> None:
         self.api_settings = ModuleSettings(given)
+        self._wanted = True  # whether it is to listen; `uavapi stop` says no
         actions: dict[str, Callable[[list[str]], None]] = {
             "status": self._status,
             "start": lambda _: self._start(),
@@ -46,8 +47,9 @@ class UavApiModule(HostedModule):
         self.host.bridge.close_in_children(self.api.filenos)
 
     def begin(self) -> None:
-        """Listen."""
-        self._start()
+        """Listen, unless a startup script said no."""
+        if self._wanted:
+            self._start()
 
     async def end(self) -> None:
         """Stop listening."""
@@ -71,9 +73,13 @@ class UavApiModule(HostedModule):
         async def told() -> str:
             return tell(self.api)
 
-        print(self.host.bridge.run(told()))
+        print(self.host.bridge.run(told()) if self._begun else tell(self.api))
 
     def _start(self) -> None:
+        self._wanted = True
+        if not self._begun:
+            print("uavapi: it listens once MAVProxy's main loop runs")
+            return
         settings = self.api_settings.snapshot()
         address = f"http://{settings.host}:{settings.port}"
         try:
@@ -85,7 +91,9 @@ class UavApiModule(HostedModule):
             print(f"uavapi: listening on {address}")
 
     def _stop(self) -> None:
-        self.host.bridge.run(self.api.stop())
+        self._wanted = False
+        if self._begun:
+            self.host.bridge.run(self.api.stop())
         print("uavapi: stopped")
 
     def _set(self, args: list[str]) -> None:
@@ -98,7 +106,7 @@ class UavApiModule(HostedModule):
         except SettingError as error:
             print(f"uavapi: {error}")
             return
-        if self.api_settings.snapshot() != before and self._begun:
+        if self.api_settings.snapshot() != before and self._begun and self._wanted:
             self.host.bridge.run(self.api.stop())
             self._start()
 

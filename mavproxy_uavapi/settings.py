@@ -5,6 +5,7 @@ from __future__ import annotations
 import configparser
 import difflib
 import ipaddress
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -108,7 +109,7 @@ class ModuleSettings:
             raise SettingError(f"no setting {name!r}; {hint}")
         if name == "host":
             check_loopback(str(value))
-        if not self.mp.set(name, value):
+        if _is_nothing(value) or not self.mp.set(name, value):
             setting = self.mp.get_setting(name)
             limits = f" from {setting.range[0]} to {setting.range[1]}" if setting.range else ""
             raise SettingError(f"{name} = {value!r}: it takes a {setting.type.__name__}{limits}")
@@ -116,6 +117,14 @@ class ModuleSettings:
     def snapshot(self) -> Settings:
         """The settings as they are now."""
         return Settings(**{name: self.mp.get(name) for name in self.mp.list()})
+
+
+def _is_nothing(value: Any) -> bool:
+    """Whether it is None or NaN, which MPSetting compares with its range as if they were numbers."""
+    try:
+        return value is None or math.isnan(float(value))
+    except (TypeError, ValueError):
+        return False
 
 
 def check_loopback(host: str) -> None:

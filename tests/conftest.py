@@ -125,9 +125,7 @@ def message_of(name: str, system: int = 1, component: int = 1, sequence: int = 0
         if isinstance(given[field], str):
             given[field] = given[field].encode()
     message = cls(**given)
-    message._header = mavlink.MAVLink_header(
-        cls.id, srcSystem=system, srcComponent=component, seq=sequence % 256
-    )
+    message._header = mavlink.MAVLink_header(cls.id, srcSystem=system, srcComponent=component, seq=sequence % 256)
     return message
 
 

@@ -18,6 +18,7 @@ class TimeRatio:
         self.ratio = 1.0
         self._boot_ms: int | None = None
         self._from: tuple[float, int] | None = None
+        self._newest: tuple[float, int] | None = None
 
     def update(self, boot_ms: int | None, name: str, now: float) -> bool:
         """Take a message's `time_boot_ms`, arrived at `now` (s); whether it says that the vehicle rebooted."""
@@ -28,8 +29,19 @@ class TimeRatio:
             self._from = None
         if rebooted or self._boot_ms is None or boot_ms > self._boot_ms:
             self._boot_ms = boot_ms
+            self._newest = now, boot_ms
         self._measure(boot_ms, now)
         return rebooted
+
+    def boot_time(self, now: float) -> float:
+        """The vehicle's own clock at `now` (s of ours), in s since its boot; 0 before it told.
+
+        Between two messages it is reckoned by the ratio.
+        """
+        if self._newest is None:
+            return 0.0
+        at, boot_ms = self._newest
+        return boot_ms / 1000.0 + (now - at) * self.ratio
 
     def _measure(self, boot_ms: int, now: float) -> None:
         if self._from is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import asyncio
+import contextlib
 import math
 from collections.abc import Callable
 
@@ -262,13 +262,12 @@ class Copter(Vehicle):
 
     async def _travelled(self, seconds: float) -> None:
         """Let `seconds` of the vehicle's clock pass while it stays armed and in GUIDED."""
-        over = asyncio.get_running_loop().time() + seconds / max(self.state.time_ratio.ratio, 0.01)
-        while (left := over - asyncio.get_running_loop().time()) > 0:
+        clock = self.state.time_ratio
+        over = clock.boot_time(self.clock()) + seconds
+        while (left := over - clock.boot_time(self.clock())) > 0:
             self.held_by("GUIDED")
-            try:
-                await self.waiting.message({"HEARTBEAT"}, lambda heartbeat: heartbeat, left, "beat")
-            except TimedOut:
-                return
+            with contextlib.suppress(TimedOut):  # the time has passed, unless the vehicle's clock ran slower
+                await self.waiting.message({"HEARTBEAT"}, lambda beat: beat, max(left / clock.ratio, 0.01), "beat")
 
     async def set_heading(self, heading: float) -> None:
         """Turn to `heading` degrees clockwise from north, the shorter way round; a movement goes on."""

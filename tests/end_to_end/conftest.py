@@ -211,6 +211,7 @@ class Rig:
             x, y, _ = self.ned()
             self.ok(self.post("/movement/go_to_ned_wait", x=x, y=y, z=-alt))
             return
+        self.ok(self.get("/command/disarm"))  # armed and forgotten on the ground it may disarm at any moment
         self.ok(self.get("/command/arm"))
         self.ok(self.get("/command/takeoff", alt=alt))
 

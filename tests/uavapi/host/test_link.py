@@ -27,7 +27,10 @@ def send(loop: Any, mpstate: Any, host: Any) -> Callable[..., None]:
 
 
 def test_message_goes_out_by_the_vehicles_best_link(send: Any, mpstate: Any) -> None:
-    masters = {1: mpstate.the_master, 7: SimpleNamespace(mav=SimpleNamespace(send=lambda m: pytest.fail("wrong link")))}
+    masters = {
+        1: mpstate.the_master,
+        7: SimpleNamespace(mav=SimpleNamespace(send=lambda m: pytest.fail("wrong link"))),
+    }
     mpstate.master = masters.get
     send("hello", 1)
     assert mpstate.the_master.written == ["hello"]

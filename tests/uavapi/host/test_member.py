@@ -12,7 +12,10 @@ from mavproxy_uavapi.host.member import HostedModule
 class Demo(HostedModule):
     def __init__(self, mpstate: Any, name: str = "demo") -> None:
         self.done: list[Any] = []
-        actions = {"status": lambda args: self.done.append(("status", args)), "go": lambda args: self.done.append(args)}
+        actions = {
+            "status": lambda args: self.done.append(("status", args)),
+            "go": self.done.append,
+        }
         super().__init__(mpstate, name, "a demo", actions, ["<status|go>"])
 
     def begin(self) -> None:

@@ -54,7 +54,9 @@ def test_first_heartbeat_makes_a_vehicle(fleet: Fleet, hear: Any) -> None:
         (QUADROTOR, mavlink.MAV_AUTOPILOT_INVALID),
     ],
 )
-def test_what_is_no_autopilot_never_makes_a_vehicle(fleet: Fleet, hear: Any, vehicle_type: int, autopilot: int) -> None:
+def test_what_is_no_autopilot_never_makes_a_vehicle(
+    fleet: Fleet, hear: Any, vehicle_type: int, autopilot: int
+) -> None:
     assert hear("heartbeat", system=9, type=vehicle_type, autopilot=autopilot) is None
     assert fleet.vehicles == {}
 
@@ -148,7 +150,9 @@ def test_status_text_in_chunks_is_one_text(state: VehicleState, hear: Any) -> No
     assert state.said_since(3.3) == ["again"]
 
 
-@pytest.mark.parametrize(("lost", "text"), [((0,), "…bcd"), ((1,), "a…cd"), ((1, 2), "a…d"), ((0, 1), "…cd"), ((0, 1, 2), "…d")])
+@pytest.mark.parametrize(
+    ("lost", "text"), [((0,), "…bcd"), ((1,), "a…cd"), ((1, 2), "a…d"), ((0, 1), "…cd"), ((0, 1, 2), "…d")]
+)
 def test_lost_chunk_leaves_one_gap(state: VehicleState, hear: Any, lost: tuple[int, ...], text: str) -> None:
     for number, letter in enumerate("abcd"):
         if number not in lost:

@@ -60,9 +60,7 @@ def test_message_that_was_overtaken_on_another_link_is_no_reboot() -> None:
     assert not ratio.update(60_100, "ATTITUDE", 1.2)
 
 
-@pytest.mark.parametrize(
-    ("boot_ms", "name"), [(None, "HEARTBEAT"), (0, "ATTITUDE"), (500, "GLOBAL_POSITION_INT")]
-)
+@pytest.mark.parametrize(("boot_ms", "name"), [(None, "HEARTBEAT"), (0, "ATTITUDE"), (500, "GLOBAL_POSITION_INT")])
 def test_messages_without_a_true_boot_time_do_not_count(boot_ms: int | None, name: str) -> None:
     ratio = TimeRatio()
     ratio.update(60_000, "ATTITUDE", 1.0)

@@ -10,6 +10,8 @@ import pytest
 from aiohttp import ClientSession
 
 from mavproxy_uavapi.http.app import MAX_BODY, Server, listening_socket
+from mavproxy_uavapi.http.requests import Servo
+from mavproxy_uavapi.http.routes import Route
 from mavproxy_uavapi.settings import ModuleSettings
 
 
@@ -62,9 +64,7 @@ def test_wrong_method_is_405_with_those_that_are_allowed(
 
 @pytest.mark.parametrize("data", ["{", "x=1", "", "[1, 2]", '"text"', "null", b"\xff\xfe{}", '{"x": 1,}', "[" * 5000])
 @pytest.mark.parametrize("path", ["/movement/go_to_ned", "/command/takeoff"])
-def test_body_that_is_no_json_object_is_400_and_nothing_is_sent(
-    flying: Any, api: Any, path: str, data: Any
-) -> None:
+def test_body_that_is_no_json_object_is_400_and_nothing_is_sent(flying: Any, api: Any, path: str, data: Any) -> None:
     answer = api.post(path, data=data, headers={"Content-Type": "application/json"})
     if data == "":  # no body at all: as if nothing had been given
         assert answer.status in (409, 422)
@@ -97,6 +97,25 @@ def test_body_comes_before_the_query(flying: Any, api: Any) -> None:
 def test_no_answer_is_a_redirect(flying: Any, api: Any) -> None:
     for path in ("/movement/go_to_ned", "/movement/go_to_ned/"):
         assert api.post(path, {"x": 1, "y": 2, "z": -30}).status == 200
+
+
+# -- paths of the other modules ---------------------------------------------------------------------------
+
+
+def test_path_of_another_module_is_served_while_that_is_loaded(flying: Any, api: Any, host: Any) -> None:
+    async def search(call: Any) -> dict[str, Any]:
+        return call.answer(f"Searching for {call.params(Servo).channel}")
+
+    assert api.post("/vision/search", {"channel": 3, "pwm": 1000}).status == 404
+    host.extensions["/vision/search"] = Route("/vision/search", search, Servo, ("POST",))
+    for slash in ("", "/"):
+        answer = api.post(f"/vision/search{slash}", {"channel": 3, "pwm": 1000})
+        assert (answer.status, answer.body["result"]) == (200, "Searching for 3")
+    assert api.post("/vision/search", {"channel": 99, "pwm": 1000}).status == 422
+    refused = api.get("/vision/search")
+    assert (refused.status, refused.headers["Allow"]) == (405, "POST")
+    del host.extensions["/vision/search"]
+    assert api.post("/vision/search", {"channel": 3, "pwm": 1000}).status == 404
 
 
 # -- the server -------------------------------------------------------------------------------------------
@@ -139,8 +158,8 @@ def test_stop_answers_the_clients_whose_verbs_it_ends(
     async def stop_meanwhile() -> tuple[int, Any]:
         async with ClientSession() as session:
             request = loop.create_task(session.get(f"http://127.0.0.1:{free_port}/command/land"))
-            while not service.host.jobs.running():
-                await asyncio.sleep(0.1)
+            await asyncio.sleep(2.0)
+            assert service.host.jobs.running()
             await server.stop()
             async with await request as response:
                 return response.status, await response.json()

@@ -20,7 +20,8 @@ def test_numbers_stay_as_the_client_wrote_them(given: Any, value: float) -> None
 
 
 @pytest.mark.parametrize(
-    "given", [math.nan, math.inf, -math.inf, "nan", "inf", "-Infinity", "1e400", True, None, [], {}, "", "ten", "9" * 5000]
+    "given",
+    [math.nan, math.inf, -math.inf, "nan", "inf", "-Infinity", "1e400", True, None, [], {}, "", "ten", "9" * 5000],
 )
 def test_what_is_no_finite_number_is_invalid(given: Any) -> None:
     with pytest.raises(Invalid) as caught:
@@ -46,7 +47,9 @@ def bounds() -> list[tuple[type[requests.Request], dict[str, Any], str, float, f
 
 
 @pytest.mark.parametrize(
-    ("model", "others", "name", "lowest", "highest", "below", "above"), bounds(), ids=[f"{b[0].__name__}.{b[2]}" for b in bounds()]
+    ("model", "others", "name", "lowest", "highest", "below", "above"),
+    bounds(),
+    ids=[f"{b[0].__name__}.{b[2]}" for b in bounds()],
 )
 def test_bounds_are_those_that_clients_know(
     model: type[requests.Request], others: Any, name: str, lowest: float, highest: float, below: float, above: float

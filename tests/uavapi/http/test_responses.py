@@ -79,4 +79,8 @@ def test_envelope_has_the_system_id_as_text() -> None:
 
 def test_json_never_has_nan_or_infinities() -> None:
     body = {"a": math.nan, "b": [math.inf, {"c": (-math.inf, 1.5)}], "d": "NaN"}
-    assert json.loads(dumps(body), parse_constant=pytest.fail) == {"a": None, "b": [None, {"c": [None, 1.5]}], "d": "NaN"}
+    assert json.loads(dumps(body), parse_constant=pytest.fail) == {
+        "a": None,
+        "b": [None, {"c": [None, 1.5]}],
+        "d": "NaN",
+    }

@@ -9,14 +9,23 @@ CONTRACT = {
     "set_descent_speed set_sim_speedup set_home",
     "/movement": "go_to_gps go_to_gps_wait go_to_ned go_to_ned_wait drive drive_wait drive_body drive_body_wait "
     "travel_at_ned set_heading set_yaw_rate stop resume",
-    "/telemetry": "general gps gps_raw ned compass sys_status sensor_status battery_info error_info home_info attitude "
-    "status message/{name} stream",
+    "/telemetry": "general gps gps_raw ned compass sys_status sensor_status battery_info error_info home_info "
+    "attitude status message/{name} stream",
     "/peripherical": "servo_output",
 }
 POSTS = {
     "/movement/" + name
-    for name in "go_to_gps go_to_gps_wait go_to_ned go_to_ned_wait drive drive_wait drive_body drive_body_wait "
-    "travel_at_ned".split()
+    for name in [
+        "go_to_gps",
+        "go_to_gps_wait",
+        "go_to_ned",
+        "go_to_ned_wait",
+        "drive",
+        "drive_wait",
+        "drive_body",
+        "drive_body_wait",
+        "travel_at_ned",
+    ]
 } | {"/peripherical/servo_output"}
 
 

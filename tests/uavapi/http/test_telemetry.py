@@ -12,7 +12,12 @@ POSITION = {"lat": -35.0, "lon": 149.0, "alt": 604.0}
 
 # path, the member that holds the payload, result, and what the payload says of the drone of conftest
 ROWS = [
-    ("general", "info", "Success", {"airspeed": 1.5, "groundspeed": 2.5, "heading": 90, "throttle": 40, "alt": 604.0}),
+    (
+        "general",
+        "info",
+        "Success",
+        {"airspeed": 1.5, "groundspeed": 2.5, "heading": 90, "throttle": 40, "alt": 604.0},
+    ),
     (
         "gps",
         "info",
@@ -49,7 +54,12 @@ SENSORS = {
     "battery", "pre_arm_check",
 }  # fmt: skip
 ALL = ["general", "gps", "gps_raw", "ned", "attitude", "sys_status", "sensor_status", "battery_info", "error_info"]
-MESSAGE_OF = {"general": "VFR_HUD", "gps": "GLOBAL_POSITION_INT", "gps_raw": "GPS_RAW_INT", "ned": "LOCAL_POSITION_NED"}
+MESSAGE_OF = {
+    "general": "VFR_HUD",
+    "gps": "GLOBAL_POSITION_INT",
+    "gps_raw": "GPS_RAW_INT",
+    "ned": "LOCAL_POSITION_NED",
+}
 
 
 @pytest.mark.parametrize("slash", ["", "/"])

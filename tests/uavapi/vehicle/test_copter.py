@@ -393,7 +393,10 @@ def test_travel_with_duration_repeats_the_velocity_then_stops(
     loop: Any, flying: Any, copter: Any, pilotage: Any
 ) -> None:
     started, times = loop.time(), []
-    copter.link.on_send = lambda message, system: (times.append(loop.time() - started), flying.on_send(message, system))
+    copter.link.on_send = lambda message, system: (
+        times.append(loop.time() - started),
+        flying.on_send(message, system),
+    )
     loop.run(copter.limits())
     times.clear()
     pilotage.do(copter.travel, VelocityTarget(1.0, 0.0, 0.0), duration=10.0)

@@ -31,8 +31,6 @@ def test_offset_across_the_date_line_is_the_short_way() -> None:
     assert offset(0.0, -179.9999, 0.0, 179.9999)[1] == pytest.approx(-east)
 
 
-@pytest.mark.parametrize(
-    ("heading", "north", "east"), [(0, 3, 4), (90, -4, 3), (180, -3, -4), (270, 4, -3)]
-)
+@pytest.mark.parametrize(("heading", "north", "east"), [(0, 3, 4), (90, -4, 3), (180, -3, -4), (270, 4, -3)])
 def test_rotate_turns_front_and_right_by_the_heading(heading: float, north: float, east: float) -> None:
     assert rotate(3, 4, math.radians(heading)) == pytest.approx((north, east))

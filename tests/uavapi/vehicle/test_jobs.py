@@ -30,7 +30,9 @@ class Bench:
 
         return self.begin_body(body, verb, settle, outlives_client, **request)
 
-    def begin_body(self, body: Any, verb: str = "/a", settle: bool = True, outlives: bool = False, **request: Any) -> Job:
+    def begin_body(
+        self, body: Any, verb: str = "/a", settle: bool = True, outlives: bool = False, **request: Any
+    ) -> Job:
         async def begin() -> Job:
             return self.book.begin(self.seat, verb, request, body, client="10.0.0.7", outlives_client=outlives)
 

@@ -1,0 +1,84 @@
+from __future__ import annotations
+
+import asyncio
+import socket
+from typing import Any
+
+import pytest
+from aiohttp import ClientSession
+
+from mavproxy_uavapi.api import Api
+from mavproxy_uavapi.settings import ModuleSettings
+
+
+@pytest.fixture
+def settings() -> Any:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return ModuleSettings({"port": probe.getsockname()[1], "link_timeout": 9.0}).snapshot()
+
+
+@pytest.fixture
+def api(loop: Any, host: Any) -> Any:
+    loop.patience = 0.002
+    api = Api(host)
+    yield api
+    loop.run(api.stop())
+
+
+async def status_of(settings: Any) -> int:
+    address = f"http://{settings.host}:{settings.port}/telemetry/gps"
+    async with ClientSession() as session, session.get(address) as response:
+        return response.status
+
+
+def test_start_listens_and_takes_the_settings(loop: Any, api: Api, host: Any, settings: Any, drone: Any) -> None:
+    assert not api.listening
+    loop.run(api.start(settings))
+    assert api.listening
+    assert host.link_timeout == 9.0
+    assert loop.run(status_of(settings)) == 200
+
+
+def test_start_twice_is_one_server(loop: Any, api: Api, settings: Any) -> None:
+    loop.run(api.start(settings))
+    before = api.filenos()
+    loop.run(api.start(settings))
+    assert api.filenos() == before
+
+
+def test_stop_closes_the_port_and_ends_the_watch(loop: Any, api: Api, settings: Any, drone: Any) -> None:
+    loop.run(api.start(settings))
+    loop.run(api.stop())
+    loop.run(api.stop())
+    assert not api.listening
+    assert api.filenos() == []
+    with pytest.raises(OSError, match="Cannot connect"):
+        loop.run(status_of(settings))
+    drone.got.clear()
+    drone.mute.add("VFR_HUD")
+    loop.pass_time(20.0)
+    assert drone.got == []
+
+
+def test_api_watches_the_telemetry(loop: Any, api: Api, settings: Any, drone: Any) -> None:
+    loop.run(api.start(settings))
+    drone.mute.add("VFR_HUD")
+    loop.pass_time(10.0)
+    assert drone.got
+
+
+def test_taken_port_leaves_nothing_behind_and_can_be_tried_again(
+    loop: Any, api: Api, settings: Any, drone: Any, descriptors: Any
+) -> None:
+    with socket.socket() as taken:
+        taken.bind((settings.host, settings.port))
+        taken.listen()
+        before = descriptors()
+        with pytest.raises(OSError, match="in use"):
+            loop.run(api.start(settings))
+        assert not api.listening
+        assert descriptors() == before
+        assert asyncio.all_tasks(loop) <= {drone._stream}
+    loop.run(api.start(settings))
+    assert loop.run(status_of(settings)) == 200

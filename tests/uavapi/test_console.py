@@ -1,0 +1,84 @@
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from pymavlink import mavutil
+
+from mavproxy_uavapi.api import Api
+from mavproxy_uavapi.console import report, vehicles
+from mavproxy_uavapi.settings import ModuleSettings
+from mavproxy_uavapi.vehicle.messages import NedTarget
+
+mavlink = mavutil.mavlink
+SETTINGS = ModuleSettings().snapshot()
+
+
+@pytest.fixture
+def api(host: Any) -> Api:
+    return Api(host)
+
+
+def test_report_before_anything_happened(api: Api) -> None:
+    assert report(api, SETTINGS) == (
+        "uavapi: not listening; it would be http://127.0.0.1:8000\nno vehicle on the link yet\n0 calls in flight"
+    )
+
+
+def test_report_of_a_vehicle(loop: Any, api: Api, drone: Any) -> None:
+    loop.pass_time(0.1)
+    assert report(api, SETTINGS).splitlines()[1] == (
+        "vehicle 1: copter, STABILIZE, disarmed, link ok (heartbeat 0.1 s ago, 0.0 % lost)"
+    )
+
+
+def test_report_of_a_call_in_flight_tells_its_progress(
+    loop: Any, host: Any, api: Api, flying: Any, copter: Any
+) -> None:
+    async def body(job: Any) -> str:
+        await copter.go_to(job, NedTarget(200.0, 0.0, -20.0), wait=True)
+        return "done"
+
+    async def begin() -> None:
+        host.jobs.begin(copter.seat, "/movement/go_to_ned_wait", {}, body)
+
+    loop.run(begin())
+    loop.pass_time(5.1)
+    *_, count, job = report(api, SETTINGS).splitlines()
+    assert count == "1 call in flight"
+    assert job == "  1: /movement/go_to_ned_wait altitude 20.0 m, distance to go 150.0 m"
+
+
+def test_lost_link_and_lost_packets_are_told(loop: Any, api: Api, drone: Any) -> None:
+    drone._sequence += 9
+    loop.pass_time(0.25)
+    drone.power_off()
+    loop.pass_time(7.0)
+    assert "LINK LOST (heartbeat 7.0 s ago, 33.3 % lost)" in report(api, SETTINGS)
+
+
+def test_report_is_of_the_vehicle_of_the_settings(api: Api, make_drone: Any) -> None:
+    make_drone(1)
+    make_drone(2)
+    assert "vehicle 2:" in report(api, ModuleSettings({"sysid": 2}).snapshot())
+    assert "no vehicle 9 on the link yet; heard so far: 1, 2" in report(api, ModuleSettings({"sysid": 9}).snapshot())
+
+
+def test_vehicles_are_a_line_each(loop: Any, host: Any, api: Api, make_drone: Any, msg: Any) -> None:
+    assert vehicles(api) == "uavapi: no vehicle was heard yet"
+    make_drone(7)
+    make_drone(2).fly("LOITER")
+    host.bridge.feed(msg("heartbeat", system=5, type=mavlink.MAV_TYPE_FIXED_WING, custom_mode=15, armed=True))
+    loop.settle()
+    assert [line.split(" (")[0] for line in vehicles(api).splitlines()] == [
+        "vehicle 2: copter, LOITER, armed, link ok",
+        "vehicle 5: plane, GUIDED, armed, link ok",
+        "vehicle 7: copter, STABILIZE, disarmed, link ok",
+    ]
+
+
+def test_rebooted_vehicle_is_armed_or_not(loop: Any, api: Api, drone: Any) -> None:
+    drone.power_off()
+    drone.send("attitude", time_boot_ms=100)
+    loop.settle()
+    assert "copter, UNKNOWN, armed or not: unknown" in vehicles(api)

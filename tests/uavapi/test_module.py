@@ -1,0 +1,302 @@
+from __future__ import annotations
+
+import json
+import socket
+import threading
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+import uavapi
+from mavproxy_uavapi.module import HELP
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+class Loader:
+    """Loads and unloads the module as MAVProxy does."""
+
+    def __init__(self, mpstate: Any, main_loop: Any) -> None:
+        self.mpstate, self.main_loop = mpstate, main_loop
+
+    def load(self, **kwargs: Any) -> Any:
+        module = uavapi.init(self.mpstate, **kwargs)
+        self.main_loop.modules.append(module)
+        return module
+
+    def unload(self, module: Any) -> None:
+        """In another thread, while the main loop waits."""
+        thread = threading.Thread(target=module.unload)
+        thread.start()
+        thread.join(5.0)
+        assert not thread.is_alive()
+        self.main_loop.modules.remove(module)
+
+
+@pytest.fixture
+def loader(mpstate: Any, main_loop: Any) -> Iterator[Loader]:
+    loader = Loader(mpstate, main_loop)
+    yield loader
+    for module in list(main_loop.modules):
+        loader.unload(module)
+
+
+@pytest.fixture
+def port() -> int:
+    return free_port()
+
+
+@pytest.fixture
+def module(loader: Loader, main_loop: Any, port: int, capsys: Any) -> Any:
+    """The module, listening."""
+    module = loader.load(port=port)
+    main_loop.turn()
+    assert capsys.readouterr().out == f"uavapi: listening on http://127.0.0.1:{port}\n"
+    return module
+
+
+def ask(port: int, path: str) -> tuple[int, Any]:
+    try:
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}{path}", timeout=5) as response:
+            return response.status, json.load(response)
+    except urllib.error.HTTPError as error:
+        with error:
+            return error.code, json.load(error)
+
+
+def listens(port: int) -> bool:
+    with socket.socket() as client:
+        return client.connect_ex(("127.0.0.1", port)) == 0
+
+
+def test_module_is_what_mavproxy_looks_for(module: Any, mpstate: Any) -> None:
+    assert module.name == "uavapi"
+    assert module.multi_vehicle
+    assert set(mpstate.command_map) == {"uavapi"}
+    assert mpstate.completions["uavapi"] == ["<status|start|stop|vehicles|help>", "set (UAVAPISETTING)"]
+    assert "port" in mpstate.completion_functions["(UAVAPISETTING)"]("")
+
+
+def test_nothing_listens_before_the_first_idle_task(loader: Loader, port: int, mpstate: Any) -> None:
+    loader.load(port=port)
+    assert not listens(port)
+    assert mpstate.select_extra == {}
+
+
+def test_loaded_module_answers(module: Any, main_loop: Any, port: int, msg: Callable[..., Any]) -> None:
+    module.mavlink_packet(msg("heartbeat", system=3, armed=True, mode="LOITER"))
+    main_loop.until(lambda: 3 in module.host.fleet.vehicles)
+    status, body = ask(port, "/telemetry/status")
+    assert (status, body["id"], body["info"]["mode"], body["info"]["armed"]) == (200, "3", "LOITER", True)
+
+
+def test_command_goes_out_in_the_main_loop(
+    module: Any, main_loop: Any, mpstate: Any, port: int, msg: Callable[..., Any]
+) -> None:
+    senders: list[int] = []
+    answers: list[Any] = []
+
+    def send(message: Any) -> None:
+        senders.append(threading.get_ident())
+        if message.get_type() == "COMMAND_LONG" and message.command == 183:
+            module.mavlink_packet(
+                msg("command_ack", command=183, target_system=255, target_component=230, sequence=1)
+            )
+
+    def client() -> None:
+        request = urllib.request.Request(
+            f"http://127.0.0.1:{port}/peripherical/servo_output",
+            json.dumps({"channel": 9, "pwm": 1500}).encode(),
+            {"Content-Type": "application/json"},
+        )
+        with urllib.request.urlopen(request, timeout=5) as response:
+            answers.append(json.load(response)["result"])
+
+    mpstate.the_master.mav.send = send
+    module.mavlink_packet(msg("heartbeat"))
+    main_loop.until(lambda: 1 in module.host.fleet.vehicles)
+    thread = threading.Thread(target=client)
+    thread.start()
+    main_loop.until(lambda: answers)
+    thread.join()
+    assert answers == ["Servo 9 set to 1500 PWM"]
+    assert set(senders) == {threading.get_ident()}
+
+
+# -- loading ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("kwargs", "words"),
+    [
+        ({"prot": 1}, "uavapi: no setting 'prot'; did you mean port?"),
+        ({"port": "x"}, "uavapi: port = 'x': it takes a int from 1 to 65535"),
+        ({"host": "0.0.0.0"}, "loopback only"),
+        ({"config": "/no/such.ini"}, "/no/such.ini: No such file or directory"),
+    ],
+)
+def test_bad_argument_is_an_import_error_of_one_line_and_leaves_nothing(
+    mpstate: Any, descriptors: Any, kwargs: dict[str, Any], words: str
+) -> None:
+    threads, before = threading.active_count(), descriptors()
+    with pytest.raises(ImportError) as caught:
+        uavapi.init(mpstate, **kwargs)
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert (mpstate.command_map, mpstate.select_extra) == ({}, {})
+    assert not hasattr(mpstate, "uavapi_host")
+    assert (threading.active_count(), descriptors()) == (threads, before)
+
+
+def test_taken_port_is_one_line_and_another_port_helps(
+    loader: Loader, main_loop: Any, port: int, capsys: Any
+) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", port))
+        taken.listen()
+        module = loader.load(port=port)
+        main_loop.turn()
+        assert capsys.readouterr().out == (
+            f"uavapi: cannot listen on http://127.0.0.1:{port}: Address already in use; "
+            "`uavapi set port N` takes another port\n"
+        )
+        main_loop.turn()
+        assert capsys.readouterr().out == ""
+        other = free_port()
+        module.command(["set", "port", str(other)])
+        assert listens(other)
+
+
+# -- the prompt -------------------------------------------------------------------------------------------
+
+
+def test_set_port_restarts_there(module: Any, port: int, capsys: Any) -> None:
+    other = free_port()
+    module.command(["set", "port", str(other)])
+    assert capsys.readouterr().out == f"uavapi: listening on http://127.0.0.1:{other}\n"
+    assert listens(other)
+    assert not listens(port)
+
+
+def test_set_to_the_same_value_restarts_nothing(module: Any, port: int, capsys: Any) -> None:
+    before = module.api.filenos()
+    module.command(["set", "port", str(port)])
+    assert capsys.readouterr().out == ""
+    assert module.api.filenos() == before
+
+
+def test_bad_value_at_the_prompt_changes_nothing(module: Any, port: int, capsys: Any) -> None:
+    module.command(["set", "prot", "1"])
+    module.command(["set", "port", "x"])
+    out = capsys.readouterr().out
+    assert "uavapi: no setting 'prot'; did you mean port?\n" in out
+    assert "uavapi: port = 'x': it takes a int from 1 to 65535\n" in out
+    assert listens(port)
+
+
+def test_set_shows_the_settings(module: Any, port: int, capsys: Any) -> None:
+    module.command(["set"])
+    out = capsys.readouterr().out
+    assert f"port {port}" in out
+    assert "host 127.0.0.1" in out
+    module.command(["set", "max_age"])
+    assert capsys.readouterr().out.split() == ["max_age", "5.0"]
+
+
+def test_stop_and_start(module: Any, port: int, capsys: Any) -> None:
+    module.command(["stop"])
+    assert not listens(port)
+    module.command(["start"])
+    assert listens(port)
+    assert capsys.readouterr().out == f"uavapi: stopped\nuavapi: listening on http://127.0.0.1:{port}\n"
+
+
+def test_set_does_not_open_what_was_stopped(module: Any, capsys: Any) -> None:
+    module.command(["stop"])
+    other = free_port()
+    module.command(["set", "port", str(other)])
+    assert not listens(other)
+    module.command(["start"])
+    assert listens(other)
+
+
+def test_status_and_vehicles_and_help(module: Any, main_loop: Any, port: int, msg: Any, capsys: Any) -> None:
+    module.command([])
+    assert capsys.readouterr().out == (
+        f"uavapi: listening on http://127.0.0.1:{port}\nno vehicle on the link yet\n0 calls in flight\n"
+    )
+    module.mavlink_packet(msg("heartbeat", system=3))
+    main_loop.until(lambda: 3 in module.host.fleet.vehicles)
+    module.command(["vehicles"])
+    assert capsys.readouterr().out.startswith("vehicle 3: copter, STABILIZE, disarmed, link ok")
+    module.command(["help"])
+    assert capsys.readouterr().out == HELP + "\n"
+
+
+def test_commands_of_a_startup_script_come_before_the_main_loop(
+    loader: Loader, main_loop: Any, port: int, capsys: Any
+) -> None:
+    module = loader.load(port=port)
+    started = time.monotonic()
+    other = free_port()
+    for line in ("status", "vehicles", "start", f"set port {other}"):
+        module.command(line.split())
+    assert time.monotonic() - started < 1.0
+    assert f"not listening; it would be http://127.0.0.1:{port}" in capsys.readouterr().out
+    main_loop.turn()
+    assert listens(other)
+
+
+def test_startup_script_may_keep_it_from_listening(loader: Loader, main_loop: Any, port: int) -> None:
+    module = loader.load(port=port)
+    module.command(["stop"])
+    main_loop.turn()
+    assert not listens(port)
+    module.command(["start"])
+    assert listens(port)
+
+
+# -- unloading --------------------------------------------------------------------------------------------
+
+
+def test_unload_leaves_nothing_behind_twenty_times(
+    loader: Loader, main_loop: Any, mpstate: Any, port: int, descriptors: Any, msg: Any
+) -> None:
+    threads, before = threading.active_count(), descriptors()
+    for number in range(20):
+        module = loader.load(port=port)
+        if number % 5:  # and sometimes it is unloaded before it began
+            main_loop.turn()
+            module.mavlink_packet(msg("heartbeat"))
+            main_loop.until(lambda module=module: module.host.fleet.vehicles)
+            assert ask(port, "/telemetry/status")[0] == 200
+        loader.unload(module)
+        assert (mpstate.command_map, mpstate.completions, mpstate.select_extra) == ({}, {}, {})
+        assert list(mpstate.completion_functions) == ["(OTHER)"]
+        assert not hasattr(mpstate, "uavapi_host")
+    assert not listens(port)
+    assert threading.active_count() == threads
+    assert descriptors() == before
+
+
+def test_unload_ends_a_call_in_flight_and_answers_it(
+    loader: Loader, module: Any, main_loop: Any, port: int, msg: Any
+) -> None:
+    answers: list[Any] = []
+    module.mavlink_packet(msg("heartbeat"))
+    main_loop.until(lambda: 1 in module.host.fleet.vehicles)
+    client = threading.Thread(target=lambda: answers.append(ask(port, "/command/arm")))
+    client.start()
+    main_loop.until(module.host.jobs.running)
+    loader.unload(module)
+    client.join(5.0)
+    assert answers[0][0] == 409
+    assert answers[0][1]["code"] == "aborted"

@@ -1,0 +1,148 @@
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mavproxy_uavapi.settings import ModuleSettings, SettingError
+
+
+@pytest.fixture
+def ini(tmp_path: Path) -> Any:
+    """Write an INI file."""
+
+    def write(text: str) -> str:
+        file = tmp_path / "uavapi.ini"
+        file.write_text(text, encoding="utf-8")
+        return str(file)
+
+    return write
+
+
+def test_defaults_are_safe() -> None:
+    settings = ModuleSettings().snapshot()
+    assert (settings.host, settings.port, settings.sysid) == ("127.0.0.1", 8000, 0)
+    assert (settings.link_timeout, settings.max_age) == (5.0, 5.0)
+
+
+def test_values_are_taken_as_text_too() -> None:
+    settings = ModuleSettings({"port": "8001", "max_age": "2.5", "host": "localhost"}).snapshot()
+    assert (settings.port, settings.max_age, settings.host) == (8001, 2.5, "localhost")
+
+
+def test_snapshot_does_not_change() -> None:
+    settings = ModuleSettings()
+    before = settings.snapshot()
+    settings.set("port", 9000)
+    assert (before.port, settings.snapshot().port) == (8000, 9000)
+
+
+def test_misspelt_setting_is_answered_with_the_nearest() -> None:
+    with pytest.raises(SettingError, match=r"^no setting 'prot'; did you mean port\?$"):
+        ModuleSettings({"prot": 8001})
+
+
+def test_unknown_setting_is_answered_with_all_there_are() -> None:
+    with pytest.raises(SettingError, match=r"^no setting 'xyz'; there are host, port, sysid, .*max_age"):
+        ModuleSettings({"xyz": 1})
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("port", "http", "it takes a int from 1 to 65535"),
+        ("port", 0, "from 1 to 65535"),
+        ("port", 70000, "from 1 to 65535"),
+        ("sysid", 256, "from 0 to 255"),
+        ("sysid", -1, "from 0 to 255"),
+        ("link_timeout", 0.5, "from 1 to 60"),
+        ("link_timeout", "nan", "from 1 to 60"),
+        ("max_age", float("nan"), "it takes a float from 0.1 to 3600"),
+        ("max_age", "inf", "from 0.1 to 3600"),
+        ("max_age", None, "it takes a float"),
+    ],
+)
+def test_bad_value_is_one_clear_line_and_changes_nothing(name: str, value: Any, words: str) -> None:
+    settings = ModuleSettings()
+    before = settings.snapshot()
+    with pytest.raises(SettingError) as caught:
+        settings.set(name, value)
+    assert words in str(caught.value)
+    assert str(caught.value).startswith(f"{name} = ")
+    assert "\n" not in str(caught.value)
+    assert settings.snapshot() == before
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.2", "::1", "localhost"])
+def test_loopback_may_be_listened_on(host: str) -> None:
+    assert ModuleSettings({"host": host}).snapshot().host == host
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "192.168.1.5", "::", "10.0.0.1"])
+def test_network_may_not_be_listened_on(host: str) -> None:
+    with pytest.raises(SettingError, match="anybody on that network could fly the vehicle"):
+        ModuleSettings({"host": host})
+
+
+@pytest.mark.parametrize("host", ["drone.local", "", "127.0.0.1.evil.example"])
+def test_host_is_an_address(host: str) -> None:
+    with pytest.raises(SettingError, match="is not an IP address"):
+        ModuleSettings({"host": host})
+
+
+def test_ini_file_of_the_original_service_loads(ini: Any) -> None:
+    file = ini(
+        "[api]\nport = 8123\nsysid = 7\nuav_connection = 127.0.0.1:17171\nconnection_type = udpin\n"
+        "gradys_gs = None\nscripts_path = ~/scripts\npython_path = python3\nvehicle = copter\n"
+        "[simulated]\nardupilot_path = ~/ardupilot\nlocation = AbraDF\ngs_connection = []\nspeedup = 1\n"
+        "headless = yes\n"
+        "[logs]\nlog_console = COPTER\nlog_path = None\ndebug = []\nscript_logs = ~/logs\n"
+    )
+    settings = ModuleSettings({"config": file}).snapshot()
+    assert (settings.port, settings.sysid) == (8123, 7)
+
+
+def test_settings_that_are_given_win_over_the_file(ini: Any) -> None:
+    file = ini("[api]\nport = 8123\nsysid = 7\n")
+    settings = ModuleSettings({"port": 9000, "config": file}).snapshot()
+    assert (settings.port, settings.sysid) == (9000, 7)
+
+
+@pytest.mark.parametrize("unset", ["", "None", "[]"])
+def test_unset_values_leave_the_default(ini: Any, unset: str) -> None:
+    assert ModuleSettings({"config": ini(f"[api]\nport = {unset}\n")}).snapshot().port == 8000
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[api]\nprot = 1\n", "no key 'prot' in \\[api\\]"),
+        ("[simulated]\nport = 1\n", "no key 'port' in \\[simulated\\]"),
+        ("[apy]\nport = 1\n", "no section \\[apy\\]; there are api, simulated, logs"),
+        ("[api]\nport = high\n", "it takes a int"),
+        ("[api]\nhost = 0.0.0.0\n", "loopback only"),
+        ("port = 1\n", "no section headers"),
+        ("[api]\nport = 1\nport = 2\n", "already exists"),
+    ],
+)
+def test_file_that_means_nothing_is_refused_in_one_line(ini: Any, text: str, words: str) -> None:
+    with pytest.raises(SettingError, match=words) as caught:
+        ModuleSettings({"config": ini(text)})
+    assert "\n" not in str(caught.value)
+
+
+def test_missing_file_is_noticed(tmp_path: Path) -> None:
+    with pytest.raises(SettingError, match=r"nowhere\.ini: No such file"):
+        ModuleSettings({"config": str(tmp_path / "nowhere.ini")})
+
+
+def test_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "uavapi.ini"
+    file.write_bytes(b"[api]\nport = \xff\xfe\n")
+    with pytest.raises(SettingError, match="uavapi.ini"):
+        ModuleSettings({"config": str(file)})
+
+
+def test_percent_signs_are_taken_as_they_are(ini: Any) -> None:
+    assert ModuleSettings({"config": ini("[logs]\nscript_logs = /tmp/%Y\n")}).snapshot().port == 8000
