@@ -2,36 +2,127 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
+try:
+    from mavproxy_gradys import console
+    from mavproxy_gradys.http import Handlers
+    from mavproxy_gradys.service import Gradys
+    from mavproxy_gradys.settings import ModuleSettings
+except ModuleNotFoundError as missing:  # MAVProxy prints the text of an ImportError as one line
+    raise ImportError(f"gradys needs {missing.name}: pip install mavproxy-uavapi") from missing
+from mavproxy_uavapi.errors import UavApiError
 from mavproxy_uavapi.host.member import HostedModule
+from mavproxy_uavapi.settings import SettingError
 
 NAME = "gradys"
-ABOUT = "gradys: pushes position and readings to a GrADyS ground station."
+COMPLETION = "(GRADYSSETTING)"
+COMPLETIONS = ["<status|stats|start|stop|flush|help>", f"set {COMPLETION}"]
 HELP = """\
-gradys status    the ground station, and what was pushed
-gradys help      this"""
+gradys status            the ground stations, what was pushed, what became of it, and why nothing is pushed
+gradys stats             the same counts, as a table
+gradys start             push and sense (it does so by itself when the module is loaded)
+gradys stop              end that; unsent readings stay in the spool
+gradys flush             end all pauses after failures and try everything now
+gradys set               show the settings
+gradys set NAME VALUE    change one; it takes effect at once
+gradys set gs HOST:PORT  the ground station (several by comma)
+gradys set sink URL      where readings go: http(s)://HOST/PATH or mqtt(s)://HOST/fleet/{sysid}/{quantity}
+gradys help              this"""
 
 
 class GradysModule(HostedModule):
-    """`module load gradys`.
+    """`module load gradys`."""
 
-    Args:
-        mpstate: MAVProxy's state.
-        gs: HOST:PORT of the ground station; empty for none.
+    def __init__(self, mpstate: Any, given: dict[str, Any]) -> None:
+        self.gradys_settings = ModuleSettings(given)
+        actions: dict[str, Callable[[list[str]], None]] = {
+            "status": lambda _: self._show(console.status),
+            "stats": lambda _: self._show(console.stats),
+            "start": lambda _: self._start(),
+            "stop": lambda _: self._stop(),
+            "flush": lambda _: self._flush(),
+            "set": self._set,
+            "help": lambda _: print(HELP),
+        }
+        super().__init__(mpstate, NAME, "GrADyS ground station push", actions, COMPLETIONS)
+        self.add_completion_function(COMPLETION, self.gradys_settings.mp.completion)
+        self.gradys = Gradys(self.host)
+        self._routes = Handlers(self.gradys).routes()
+
+    def begin(self) -> None:
+        """Push and sense."""
+        for route in self._routes:
+            self.host.extensions[route.path] = route
+        self._start()
+
+    async def end(self) -> None:
+        """End it."""
+        for route in self._routes:
+            if self.host.extensions.get(route.path) is route:
+                del self.host.extensions[route.path]
+        await self.gradys.stop()
+
+    def unload(self) -> None:
+        """Give back what is ours alone, then the rest."""
+        self.mpstate.completion_functions.pop(COMPLETION, None)
+        super().unload()
+
+    def _show(self, tell: Callable[[dict[str, Any]], str]) -> None:
+        """Print what `tell` makes of the report; the state belongs to the asyncio thread."""
+
+        async def report() -> dict[str, Any]:
+            return self.gradys.report()
+
+        print(tell(self.host.bridge.run(report())))
+
+    def _start(self) -> None:
+        settings = self.gradys_settings.snapshot()
+        try:
+            self.host.bridge.run(self.gradys.start(settings))
+        except UavApiError as error:
+            print(f"gradys: {error}")
+            return
+        told = ", ".join(station.url for station in settings.gs)
+        print(f"gradys: telling {told}" if told else "gradys: no ground station is set; `gradys set gs HOST:PORT`")
+
+    def _stop(self) -> None:
+        self.host.bridge.run(self.gradys.stop())
+        print("gradys: stopped")
+
+    def _flush(self) -> None:
+        self.host.bridge.call_soon(self.gradys.flush)
+        print("gradys: everything is tried now; `gradys status` tells what comes of it")
+
+    def _set(self, args: list[str]) -> None:
+        if len(args) < 2:
+            names = args or sorted(self.gradys_settings.mp.list())
+            for name in names:
+                if name in self.gradys_settings.mp.list():
+                    print(f"{name:>20} {self.gradys_settings.shown(name)}")
+                else:
+                    print(f"gradys: no setting {name!r}")
+            return
+        before = self.gradys_settings.snapshot()
+        try:
+            self.gradys_settings.set(args[0], " ".join(args[1:]))
+        except SettingError as error:
+            print(f"gradys: {error}")
+            return
+        if self.gradys_settings.snapshot() != before and self.gradys.running:
+            self.host.bridge.run(self.gradys.stop())
+            self._start()
+
+
+def init(mpstate: Any, **kwargs: Any) -> GradysModule:
+    """MAVProxy calls this on `module load gradys`, or `gradys:{"gs":"10.0.0.5:8000"}`.
+
+    Raises:
+        ImportError: a setting that does not exist or a value that it does not take; MAVProxy reports this
+            kind of error in one line, and goes on.
     """
-
-    def __init__(self, mpstate: Any, gs: str) -> None:
-        self._gs = gs
-        actions = {"status": lambda _: print(self.about()), "help": lambda _: print(HELP)}
-        super().__init__(mpstate, NAME, "GrADyS ground station push", actions, ["<status|help>"])
-
-    def about(self) -> str:
-        """What it is, and what it does just now."""
-        station = f"ground station {self._gs}" if self._gs else "no ground station is set"
-        return f"{ABOUT}\n{station}; this version does not push yet"
-
-
-def init(mpstate: Any, gs: str = "") -> GradysModule:
-    """MAVProxy calls this on `module load gradys`, or `gradys:{"gs":"10.0.0.5:8000"}`."""
-    return GradysModule(mpstate, gs)
+    try:
+        return GradysModule(mpstate, kwargs)
+    except SettingError as error:
+        raise ImportError(f"gradys: {error}") from error

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 
+from mavproxy_uavapi.audit import Audit
 from mavproxy_uavapi.host.host import Host
 from mavproxy_uavapi.http.app import Server
 from mavproxy_uavapi.http.call import Service
@@ -15,8 +16,9 @@ from mavproxy_uavapi.vehicle.freshness import Freshness
 class Api:
     """Everything of uavapi that lives in the asyncio thread; so do all its methods but `filenos`."""
 
-    def __init__(self, host: Host) -> None:
+    def __init__(self, host: Host, audit: Audit) -> None:
         self.host = host
+        self.audit = audit
         self._server: Server | None = None
         self._freshness: asyncio.Task[None] | None = None
 
@@ -34,13 +36,14 @@ class Api:
         if self._server is not None:
             return
         self.host.link_timeout = settings.link_timeout
-        server = Server(Service(self.host, settings))
+        server = Server(Service(self.host, settings, self.audit))
         try:
             await server.start()
         except OSError:
             await server.stop()
             raise
         self._server = server
+        self.host.api_address = settings.host, settings.port
         self._freshness = asyncio.create_task(Freshness(self.host.hangar, settings.sysid).run())
 
     async def stop(self) -> None:
@@ -48,6 +51,7 @@ class Api:
         server, self._server = self._server, None
         if server is None:
             return
+        self.host.api_address = None
         if self._freshness is not None:
             self._freshness.cancel()
             with contextlib.suppress(asyncio.CancelledError):

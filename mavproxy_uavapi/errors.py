@@ -13,7 +13,9 @@
     |  |- NotArmed             409 not_armed
     |  `- Aborted              409 aborted
     |- Invalid                 422 invalid        nothing was sent
+    |- TooManyRequests         429 too_many_requests
     |- Rejected                500 rejected       the autopilot refused
+    |- ToolFailed              500 tool_failed    a program that we started failed, or is not installed
     |- Unavailable             503 (one of its children)
     |  |- LinkLost             503 link_lost
     |  |- NoVehicle            503 no_vehicle
@@ -132,6 +134,19 @@ class Invalid(UavApiError):
         return self.problems
 
 
+class TooManyRequests(UavApiError):
+    """More requests, or more verbs in flight, than one client or all of them may have.
+
+    `retry_after` is in s.
+    """
+
+    status, code = 429, "too_many_requests"
+
+    def __init__(self, sentence: str, retry_after: int = 1) -> None:
+        super().__init__(sentence)
+        self.retry_after = retry_after
+
+
 class Rejected(UavApiError):
     """The autopilot refused: `ack` is the MAV_RESULT name, `statustext` what it said since it was asked."""
 
@@ -146,6 +161,20 @@ class Rejected(UavApiError):
         """`ack` where there was one, and `statustext`."""
         ack = {} if self.ack is None else {"ack": self.ack}
         return {**ack, "statustext": self.statustext}
+
+
+class ToolFailed(UavApiError):
+    """A program that we started (tmux, a camera tool) failed or is not installed: `stderr` has its own words."""
+
+    status, code = 500, "tool_failed"
+
+    def __init__(self, sentence: str, stderr: str = "") -> None:
+        super().__init__(f"{sentence}: {stderr}" if stderr else sentence)
+        self.stderr = stderr
+
+    def extras(self) -> dict[str, Any]:
+        """`stderr`, where it said something."""
+        return {"stderr": self.stderr} if self.stderr else {}
 
 
 class Unavailable(UavApiError):

@@ -3,26 +3,32 @@
 from __future__ import annotations
 
 import os
+import ssl
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 try:
     from mavproxy_uavapi.api import Api
 except ModuleNotFoundError as missing:  # MAVProxy prints the text of an ImportError as one line
     raise ImportError(f"uavapi needs {missing.name}: pip install mavproxy-uavapi") from missing
-from mavproxy_uavapi.console import report, vehicles
+from mavproxy_uavapi.audit import Audit
+from mavproxy_uavapi.console import address_of, report, vehicles
 from mavproxy_uavapi.host.member import HostedModule
 from mavproxy_uavapi.settings import ModuleSettings, SettingError
 
 NAME = "uavapi"
 COMPLETION = "(UAVAPISETTING)"
-COMPLETIONS = ["<status|start|stop|vehicles|help>", f"set {COMPLETION}"]
+COMPLETIONS = ["<status|start|stop|vehicles|config|log|help>", f"set {COMPLETION}"]
+LOG_SHOWN = 20  # entries
 HELP = """\
 uavapi status            what it listens on, the vehicle that it flies, and the calls in flight
 uavapi start             listen (it does so by itself when the module is loaded)
 uavapi stop              close the port; calls in flight end
 uavapi set               show the settings
 uavapi set NAME VALUE    change one; it takes effect at once
+uavapi config            the settings in force, and where each came from
+uavapi log [N]           the last N commands: who asked, and how it ended
 uavapi vehicles          every vehicle that was heard
 uavapi help              this"""
 
@@ -38,16 +44,21 @@ class UavApiModule(HostedModule):
             "start": lambda _: self._start(),
             "stop": lambda _: self._stop(),
             "set": self._set,
+            "config": lambda _: print("\n".join(self.api_settings.listing())),
+            "log": self._log,
             "vehicles": lambda _: self._tell(vehicles),
             "help": lambda _: print(HELP),
         }
         super().__init__(mpstate, NAME, "HTTP API to fly and watch vehicles", actions, COMPLETIONS)
-        self.add_completion_function(COMPLETION, self.api_settings.mp.completion)
-        self.api = Api(self.host)
+        self.add_completion_function(COMPLETION, lambda _: self.api_settings.names())
+        self.audit = Audit(log_directory(mpstate))
+        self.api = Api(self.host, self.audit)
         self.host.bridge.close_in_children(self.api.filenos)
 
     def begin(self) -> None:
         """Listen, unless a startup script said no."""
+        for note in self.api_settings.notes:
+            print(f"uavapi: {note}")
         if self._wanted:
             self._start()
 
@@ -62,6 +73,7 @@ class UavApiModule(HostedModule):
             super().unload()
         finally:
             self.host.bridge.keep_in_children(self.api.filenos)
+            self.audit.close()
 
     def _status(self, _args: list[str]) -> None:
         settings = self.api_settings.snapshot()
@@ -81,14 +93,29 @@ class UavApiModule(HostedModule):
             print("uavapi: it listens once MAVProxy's main loop runs")
             return
         settings = self.api_settings.snapshot()
-        address = f"http://{settings.host}:{settings.port}"
+        address = address_of(settings)
         try:
             self.host.bridge.run(self.api.start(settings))
+        except ssl.SSLError as error:
+            print(f"uavapi: cannot use {settings.certfile} with {settings.keyfile}: {error.reason}")
         except OSError as error:
             why = os.strerror(error.errno) if error.errno else str(error)
             print(f"uavapi: cannot listen on {address}: {why}; `uavapi set port N` takes another port")
         else:
             print(f"uavapi: listening on {address}")
+            if settings.allow_open and not settings.is_local:
+                print("uavapi: WARNING: allow_open is set: anybody who reaches this port can fly the vehicle")
+
+    def _log(self, args: list[str]) -> None:
+        try:
+            count = int(args[0]) if args else LOG_SHOWN
+        except ValueError:
+            print(f"uavapi: log takes a number, not {args[0]!r}")
+            return
+        entries = list(self.audit.entries)[-max(count, 1) :]
+        print("\n".join(map(str, entries)) or "uavapi: no commands yet")
+        if self.audit.file is not None:
+            print(f"all of them: {self.audit.file}")
 
     def _stop(self) -> None:
         self._wanted = False
@@ -98,17 +125,24 @@ class UavApiModule(HostedModule):
 
     def _set(self, args: list[str]) -> None:
         if len(args) < 2:
-            self.api_settings.mp.show_pattern(args[0] if args else "*")
+            wanted = args[0] if args else ""
+            print("\n".join(line for line in self.api_settings.listing() if line.startswith(wanted)))
             return
         before = self.api_settings.snapshot()
         try:
-            self.api_settings.set(args[0], args[1])
+            self.api_settings.set(args[0], " ".join(args[1:]))
         except SettingError as error:
             print(f"uavapi: {error}")
             return
         if self.api_settings.snapshot() != before and self._begun and self._wanted:
             self.host.bridge.run(self.api.stop())
             self._start()
+
+
+def log_directory(mpstate: Any) -> Path | None:
+    """Where MAVProxy keeps its logs; None when it keeps none (--no-state)."""
+    directory = mpstate.status.logdir
+    return None if directory is None else Path(directory)
 
 
 def init(mpstate: Any, **kwargs: Any) -> UavApiModule:

@@ -1,4 +1,7 @@
-"""The module's settings: MPSettings at the prompt -> one frozen snapshot handed inward."""
+"""The module's settings: one table; defaults < INI file < environment < `module load` < `uavapi set`.
+
+MPSettings holds and validates the values at the prompt; inward goes one frozen snapshot.
+"""
 
 from __future__ import annotations
 
@@ -6,20 +9,29 @@ import configparser
 import difflib
 import ipaddress
 import math
+import os
+import sys
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from MAVProxy.modules.lib.mp_settings import MPSetting, MPSettings
 
+Network = ipaddress.IPv4Network | ipaddress.IPv6Network
+
 # Keys that an INI file of the original service, or of the launcher, may have and that are not the module's:
 # MAVProxy has the link, the launcher starts what is simulated.
 NOT_OURS = {
-    "api": {"uav_connection", "connection_type", "gradys_gs", "scripts_path", "python_path", "vehicle"},
+    "api": {"uav_connection", "connection_type", "gradys_gs", "vehicle"},
     "simulated": {"simulated", "ardupilot_path", "location", "gs_connection", "speedup", "headless"},
-    "logs": {"log_console", "log_path", "debug", "script_logs"},
+    "logs": {"log_console", "log_path", "debug"},
 }
+MAVPROXYS = {"uav_connection", "connection_type"}
 UNSET = {"", "None", "[]"}
+PREFIX = "UAVAPI_"  # of the environment variables
+ON_SCRIPT_EXIT = ("nothing", "hold", "land", "rtl")
+SECRET = "token"  # kept out of listings, logs and the process list
 
 
 class SettingError(ValueError):
@@ -36,6 +48,21 @@ class Settings:
         sysid: system id of the vehicle that the API flies; 0 is MAVProxy's current one.
         link_timeout: s without a heartbeat after which a vehicle counts as lost.
         max_age: s after which telemetry is no longer served.
+        on_disconnect: what the vehicle does when the client of a waiting verb hangs up: continue or hold.
+        allow_from: networks that may call without a token.
+        allow_open: whether anybody may call without a token, from anywhere.
+        cors_origins: origins of the web pages that may call.
+        certfile, keyfile: PEM files for TLS; empty for none.
+        max_jobs: verbs that may be in flight at once.
+        max_rate: requests per second of one client, in the long run.
+        scripts_path: folder of the uploaded scripts.
+        script_logs: folder of their logs.
+        python_path: what runs .py scripts.
+        script_grace: s from Ctrl-C to the kill of a script that is stopped.
+        script_size: kB of one script.
+        script_quota: MB of all scripts together.
+        on_script_exit: what the vehicle does when its script dies in flight: nothing, hold, land or rtl.
+        token: what clients must send as a bearer token; empty for none.
     """
 
     host: str
@@ -43,35 +70,100 @@ class Settings:
     sysid: int
     link_timeout: float
     max_age: float
+    on_disconnect: str
+    allow_from: tuple[Network, ...]
+    allow_open: bool
+    cors_origins: tuple[str, ...]
+    certfile: str
+    keyfile: str
+    max_jobs: int
+    max_rate: float
+    scripts_path: str
+    script_logs: str
+    python_path: str
+    script_grace: float
+    script_size: int
+    script_quota: int
+    on_script_exit: str
+    token: str
+
+    @property
+    def is_local(self) -> bool:
+        """Whether only this machine can call."""
+        return is_loopback(self.host)
+
+    def check(self) -> None:
+        """Refuse combinations that would let anybody fly the vehicle, or that cannot work.
+
+        Raises:
+            SettingError: with the reason.
+        """
+        if not self.is_local and not (self.token or self.allow_from or self.allow_open):
+            raise SettingError(
+                f"host = {self.host}: anybody on that network could fly the vehicle; set a token, or name the "
+                "networks that may call without one (allow_from), or set allow_open on purpose"
+            )
+        if bool(self.certfile) != bool(self.keyfile):
+            raise SettingError("TLS needs both certfile and keyfile")
 
 
 def table() -> list[Any]:
     """The settings with their types, defaults and ranges, as MAVProxy knows them."""
     return [
-        MPSetting("host", str, "127.0.0.1", "address to listen on (loopback only)", tab="API"),
+        MPSetting("host", str, "127.0.0.1", "address to listen on", tab="API"),
         MPSetting("port", int, 8000, "TCP port to listen on", range=(1, 65535), increment=1),
         MPSetting("sysid", int, 0, "vehicle to fly; 0 is MAVProxy's current one", range=(0, 255), increment=1),
         MPSetting("link_timeout", float, 5.0, "s without heartbeat until the link is lost", range=(1, 60)),
         MPSetting("max_age", float, 5.0, "s after which telemetry is stale", range=(0.1, 3600)),
+        MPSetting("on_disconnect", str, "continue", "when a client hangs up", choice=["continue", "hold"]),
+        MPSetting("allow_from", str, "", "networks that may call without a token", tab="Access"),
+        MPSetting("allow_open", bool, False, "let anybody call without a token"),
+        MPSetting("cors_origins", str, "", "origins of web pages that may call"),
+        MPSetting("certfile", str, "", "TLS certificate (PEM)"),
+        MPSetting("keyfile", str, "", "TLS key (PEM)"),
+        MPSetting("max_jobs", int, 64, "verbs in flight at once", range=(1, 10000), tab="Limits"),
+        MPSetting("max_rate", float, 500.0, "requests/s of one client", range=(1, 100000)),
+        MPSetting("scripts_path", str, "~/uav_scripts", "folder of the uploaded scripts", tab="Scripts"),
+        MPSetting("script_logs", str, "~/uav_scripts/logs", "folder of their logs"),
+        MPSetting("python_path", str, sys.executable, "what runs .py scripts"),
+        MPSetting("script_grace", float, 10.0, "s from Ctrl-C to the kill", range=(0, 3600)),
+        MPSetting("script_size", int, 1024, "kB of one script", range=(1, 100000)),
+        MPSetting("script_quota", int, 50, "MB of all scripts", range=(1, 100000)),
+        MPSetting("on_script_exit", str, "hold", "when a script dies in flight", choice=list(ON_SCRIPT_EXIT)),
     ]
 
 
 class ModuleSettings:
-    """The settings of the loaded module: validated, whichever way they come in."""
+    """The settings of the loaded module: validated, whichever way they come in.
 
-    def __init__(self, given: dict[str, Any] | None = None) -> None:
-        """Take `given` settings; those of an INI file that it names as `config` yield to the others.
+    Args:
+        given: keywords of `module load`; `config` names an INI file.
+        environ: the environment.
 
-        Raises:
-            SettingError: as `set` and `load`.
-        """
+    Raises:
+        SettingError: as `set` and `load`.
+    """
+
+    def __init__(self, given: Mapping[str, Any] | None = None, environ: Mapping[str, str] | None = None) -> None:
         self.mp = MPSettings(table())
+        self.origins: dict[str, str] = {}
+        self.notes: list[str] = []
+        self._token = ""
         given = dict(given or {})
         config = given.pop("config", None)
         if config is not None:
-            self.load(Path(config).expanduser())
+            self.load(Path(str(config)).expanduser())
+        for name in self.names():
+            value = (os.environ if environ is None else environ).get(PREFIX + name.upper())
+            if value is not None:
+                self._take(name, value, "environment")
         for name, value in given.items():
-            self.set(name, value)
+            self._take(name, value, "module load")
+        self.snapshot().check()
+
+    def names(self) -> list[str]:
+        """All settings, the secret one too."""
+        return [*self.mp.list(), SECRET]
 
     def load(self, file: Path) -> None:
         """Read an INI file: section [api] has the settings, by their names.
@@ -91,32 +183,79 @@ class ModuleSettings:
             if section not in NOT_OURS:
                 raise SettingError(f"{file}: no section [{section}]; there are {', '.join(NOT_OURS)}")
             for name, value in parser[section].items():
-                if name in NOT_OURS[section] or value in UNSET:
-                    continue
-                if section != "api" or name not in self.mp.list():
-                    raise SettingError(f"{file}: no key {name!r} in [{section}]")
-                self.set(name, value)
+                self._take_key(file, section, name, value)
+
+    def _take_key(self, file: Path, section: str, name: str, value: str) -> None:
+        if value in UNSET:
+            return
+        if name in MAVPROXYS:
+            self.notes.append(f"{file}: {name} is ignored here, MAVProxy has the link (--master)")
+        elif name not in NOT_OURS[section]:
+            if section != "api" or name not in self.names():
+                raise SettingError(f"{file}: no key {name!r} in [{section}]{self._hint(name)}")
+            self._take(name, value, str(file))
 
     def set(self, name: str, value: Any) -> None:
-        """Set one.
+        """Set one at the prompt; a value that must not be leaves everything as it was.
 
         Raises:
-            SettingError: unknown, of the wrong type, or out of range.
+            SettingError: unknown, of the wrong type, out of range, or against the others.
         """
-        if name not in self.mp.list():
-            near = difflib.get_close_matches(name, self.mp.list(), n=1)
-            hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(self.mp.list())}"
-            raise SettingError(f"no setting {name!r}; {hint}")
-        if name == "host":
-            check_loopback(str(value))
-        if _is_nothing(value) or not self.mp.set(name, value):
-            setting = self.mp.get_setting(name)
-            limits = f" from {setting.range[0]} to {setting.range[1]}" if setting.range else ""
-            raise SettingError(f"{name} = {value!r}: it takes a {setting.type.__name__}{limits}")
+        before = self._token if name == SECRET else self.mp.get(name) if name in self.mp.list() else None
+        self._take(name, value, "uavapi set")
+        try:
+            self.snapshot().check()
+        except SettingError:
+            self._take(name, before, self.origins[name])
+            raise
+
+    def _take(self, name: str, value: Any, origin: str) -> None:
+        if name == SECRET:
+            self._token = "" if str(value) in UNSET else str(value)
+        elif name not in self.mp.list():
+            raise SettingError(f"no setting {name!r}{self._hint(name)}")
+        else:
+            _parse(name, value)
+            if _is_nothing(value) or not self.mp.set(name, value):
+                raise SettingError(f"{name} = {value!r}: {self._wanted(name)}")
+        self.origins[name] = origin
+
+    def _hint(self, name: str) -> str:
+        near = difflib.get_close_matches(name, self.names(), n=1)
+        return f"; did you mean {near[0]}?" if near else f"; there are {', '.join(self.names())}"
+
+    def _wanted(self, name: str) -> str:
+        setting = self.mp.get_setting(name)
+        if setting.choice:
+            return f"it is one of {', '.join(setting.choice)}"
+        limits = f" from {setting.range[0]} to {setting.range[1]}" if setting.range else ""
+        return f"it takes a {setting.type.__name__}{limits}"
 
     def snapshot(self) -> Settings:
         """The settings as they are now."""
-        return Settings(**{name: self.mp.get(name) for name in self.mp.list()})
+        values = {name: _parse(name, self.mp.get(name)) for name in self.mp.list()}
+        return Settings(**values, token=self._token)
+
+    def listing(self) -> list[str]:
+        """A line for each setting: its value and where that came from; the token is not shown."""
+        shown = {name: self.mp.get(name) for name in self.mp.list()}
+        shown[SECRET] = "(set)" if self._token else ""
+        return [f"{name:14} {shown[name]!s:24} {self.origins.get(name, 'default')}" for name in self.names()]
+
+
+def _parse(name: str, value: Any) -> Any:
+    """The value as the snapshot has it.
+
+    Raises:
+        SettingError: it is no such thing.
+    """
+    if name == "host":
+        is_loopback(str(value))
+    if name == "allow_from":
+        return tuple(_network(word) for word in _words(value))
+    if name == "cors_origins":
+        return tuple(_words(value))
+    return value
 
 
 def _is_nothing(value: Any) -> bool:
@@ -127,17 +266,26 @@ def _is_nothing(value: Any) -> bool:
         return False
 
 
-def check_loopback(host: str) -> None:
-    """Refuse to listen where others could fly the vehicle.
+def _words(value: Any) -> list[str]:
+    return [word for word in str(value).strip("[]").replace(",", " ").split() if word not in UNSET]
+
+
+def _network(text: str) -> Network:
+    try:
+        return ipaddress.ip_network(text, strict=False)
+    except ValueError as error:
+        raise SettingError(f"allow_from: {text!r} is no network such as 192.168.1.0/24") from error
+
+
+def is_loopback(host: str) -> bool:
+    """Whether an address is of this machine alone.
 
     Raises:
-        SettingError: `host` is not a loopback address.
+        SettingError: it is no IP address.
     """
     if host == "localhost":
-        return
+        return True
     try:
-        loopback = ipaddress.ip_address(host).is_loopback
+        return ipaddress.ip_address(host).is_loopback
     except ValueError as error:
         raise SettingError(f"host = {host!r} is not an IP address") from error
-    if not loopback:
-        raise SettingError(f"host = {host!r}: anybody on that network could fly the vehicle; loopback only")

@@ -155,6 +155,7 @@ def mavproxy_state() -> Any:
         instance_count={},
         public_modules={},
         settings=SimpleNamespace(target_system=0, target_component=0, source_system=255, source_component=230),
+        status=SimpleNamespace(logdir=None),
         the_master=master,
         master=lambda system=None: master,
     )

@@ -25,6 +25,7 @@ class Host:
 
     Attributes:
         listeners: called with each vehicle message, after the state has taken it and the waits have seen it.
+        api_address: where `uavapi` listens; None while it does not.
         extensions: HTTP routes of the other modules, by path; `uavapi` serves them while it is loaded.
 
     Args:
@@ -44,6 +45,7 @@ class Host:
         self.jobs = JobBook()
         self.listeners: list[Callable[[VehicleState, Any, float], None]] = []
         self.extensions: dict[str, Any] = {}
+        self.api_address: tuple[str, int] | None = None
         self.members: list[Any] = []
         self._mpstate = mpstate
         self._told_target = 0

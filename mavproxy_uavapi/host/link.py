@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol
 
+from mavproxy_uavapi.audit import note_sent
 from mavproxy_uavapi.errors import LinkLost
 from mavproxy_uavapi.host.bridge import Bridge
 
@@ -51,6 +52,7 @@ class MavproxyLink:
 
     async def send(self, message: Any, system: int) -> None:
         """See `Link.send`."""
+        note_sent(message.get_type())
         await self._bridge.on_main(lambda: self._write(message, system))
 
     def _write(self, message: Any, system: int) -> None:

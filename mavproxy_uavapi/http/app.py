@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import asyncio
 import socket
+import ssl
 from typing import Any
 
 from aiohttp import web
 
 from mavproxy_uavapi.errors import NotFound
 from mavproxy_uavapi.http.call import SERVICE, Call, Service, parameters
+from mavproxy_uavapi.http.limits import BUCKET, Bucket, at_a_bearable_rate, headers_are_here, patient
 from mavproxy_uavapi.http.responses import Handler, errors_as_answers, success
 from mavproxy_uavapi.http.routes import ROUTES, Route
-from mavproxy_uavapi.http.security import only_for_us
+from mavproxy_uavapi.http.security import name_the_trusted, only_for_us
 
+BACKLOG = 512  # connections that wait to be accepted
 MAX_BODY = 1024 * 1024  # bytes
 SHUTDOWN_TIMEOUT = 1.0  # s for answers that are being written when we stop
 
@@ -21,8 +25,11 @@ PATHS = {route.path: route.methods for route in ROUTES}
 
 def make_app(service: Service) -> web.Application:
     """The application with every route, each with and without a trailing slash."""
-    app = web.Application(middlewares=[errors_as_answers, only_for_us], client_max_size=MAX_BODY)
+    middlewares = [headers_are_here, errors_as_answers, at_a_bearable_rate, only_for_us]
+    app = web.Application(middlewares=middlewares, client_max_size=MAX_BODY)
     app[SERVICE] = service
+    app[BUCKET] = Bucket()
+    app.on_response_prepare.append(name_the_trusted)
     for route in ROUTES:
         handler = _handler(route)
         for method in route.methods:
@@ -54,7 +61,8 @@ async def _extension(request: web.Request) -> web.StreamResponse:
 
 async def _answer(route: Route, request: web.Request) -> web.StreamResponse:
     params = await parameters(request, route.model, body=request.method == "POST")
-    answer = await route.action(Call(request.app[SERVICE], request, params))
+    call = Call(request.app[SERVICE], request, params)
+    answer = await (call.audited(route.action) if route.commands else route.action(call))
     return answer if isinstance(answer, web.StreamResponse) else success(answer)
 
 
@@ -68,21 +76,27 @@ class Server:
             make_app(service), access_log=None, handler_cancellation=True, shutdown_timeout=SHUTDOWN_TIMEOUT
         )
         self._socket: socket.socket | None = None
+        self._server: asyncio.Server | None = None
 
     async def start(self) -> None:
         """Listen.
 
         Raises:
-            OSError: the port is taken, or there is no such address.
+            OSError: the port is taken, there is no such address, or the TLS files cannot be read.
         """
         settings = self.service.settings
+        tls = tls_context(settings.certfile, settings.keyfile) if settings.certfile else None
         await self._runner.setup()
         self._socket = listening_socket(settings.host, settings.port)
-        await web.SockSite(self._runner, self._socket).start()
+        factory: Any = self._runner.server
+        loop = asyncio.get_running_loop()
+        self._server = await loop.create_server(patient(factory), sock=self._socket, ssl=tls, backlog=BACKLOG)
 
     async def stop(self) -> None:
         """End the verbs in flight, answer their clients, and close the port."""
         self.service.host.jobs.abort_remote("the API is stopping")
+        if self._server is not None:
+            self._server.close()
         await self._runner.cleanup()
         if self._socket is not None:
             self._socket.close()
@@ -99,6 +113,17 @@ class Server:
         return found
 
 
+def tls_context(certfile: str, keyfile: str) -> ssl.SSLContext:
+    """What a TLS server needs.
+
+    Raises:
+        OSError: a file cannot be read, or is no PEM of that kind.
+    """
+    context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
+    context.load_cert_chain(certfile, keyfile)
+    return context
+
+
 def listening_socket(host: str, port: int) -> socket.socket:
     """A bound TCP socket that can be bound again at once after we close it.
 
@@ -110,7 +135,6 @@ def listening_socket(host: str, port: int) -> socket.socket:
     try:
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listening.bind(address)
-        listening.listen(128)
     except OSError:
         listening.close()
         raise

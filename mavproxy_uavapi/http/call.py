@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from typing import Any, TypeVar, cast
 
 from aiohttp import web
 
-from mavproxy_uavapi.errors import BadRequest, NotSupported
+from mavproxy_uavapi.audit import Audit, Entry, noting_sent, utc_now
+from mavproxy_uavapi.errors import BadRequest, NotSupported, NoVehicle, TooManyRequests, UavApiError
 from mavproxy_uavapi.host.host import Host
 from mavproxy_uavapi.http.requests import Request, parse
 from mavproxy_uavapi.http.responses import envelope
@@ -18,6 +20,8 @@ from mavproxy_uavapi.vehicle.jobs import Job
 from mavproxy_uavapi.vehicle.vehicle import Vehicle
 
 R = TypeVar("R", bound=Request)
+Answer = dict[str, Any] | web.StreamResponse
+Action = Callable[["Call"], Awaitable[Answer]]
 
 
 @dataclass
@@ -27,10 +31,12 @@ class Service:
     Attributes:
         host: the vehicles, and the verbs in flight.
         settings: the snapshot in force.
+        audit: the trail of commands.
     """
 
     host: Host
     settings: Settings
+    audit: Audit
 
 
 class Call:
@@ -65,7 +71,7 @@ class Call:
         """
         vehicle = self.vehicle
         if not isinstance(vehicle, Copter):
-            raise NotSupported(f"a {vehicle.kind} does not have {self.request.path.rstrip('/')}")
+            raise NotSupported(f"a {vehicle.kind} does not have {self.path}")
         return vehicle
 
     def answer(self, result: str, **members: Any) -> dict[str, Any]:
@@ -78,8 +84,8 @@ class Call:
         verb: Callable[[Job], Awaitable[None]],
         result: str | Callable[[], str],
         outlives_client: bool = False,
-    ) -> dict[str, Any]:
-        """Run a flight verb as a job and await it.
+    ) -> Answer:
+        """Run a flight verb as a job and await it; or answer 202 at once, where the client wants it so.
 
         Args:
             vehicle: whose seat the job takes.
@@ -92,17 +98,92 @@ class Call:
             await verb(job)
             return result if isinstance(result, str) else result()
 
-        path = self.request.path.rstrip("/")
-        request = self._params.model_dump()
-        client = self.request.remote or "unknown"
-        job = self.service.host.jobs.begin(
-            vehicle.seat, path, request, body, client=client, outlives_client=outlives_client
+        jobs = self.service.host.jobs
+        if len(jobs.running()) >= self.service.settings.max_jobs:
+            raise TooManyRequests(f"{len(jobs.running())} verbs are in flight already (max_jobs)")
+        job = jobs.begin(
+            vehicle.seat,
+            self.path,
+            self._params.model_dump(),
+            body,
+            client=self.client,
+            outlives_client=outlives_client or self.is_async,
+            timeout=getattr(self._params, "timeout", None),
         )
-        return self.answer(await job.outcome())
+        if self.is_async:
+            return self._accepted(job)
+        try:
+            return self.answer(await job.outcome())
+        except asyncio.CancelledError:
+            if self.service.settings.on_disconnect == "hold" and job.ended_by_hang_up and isinstance(vehicle, Copter):
+                jobs.begin(vehicle.seat, "hold", {}, lambda _: _held(vehicle))
+            raise
+
+    @property
+    def path(self) -> str:
+        """The path without a trailing slash."""
+        return self.request.path.rstrip("/")
+
+    @property
+    def client(self) -> str:
+        """The client's address."""
+        return self.request.remote or "unknown"
+
+    @property
+    def is_async(self) -> bool:
+        """Whether the client wants the job's number rather than its outcome."""
+        prefers = self.request.headers.get("Prefer", "").replace(" ", "").lower().split(",")
+        return self.request.query.get("wait", "").lower() in ("false", "0", "no") or "respond-async" in prefers
+
+    def _accepted(self, job: Job) -> web.Response:
+        body = self.answer(f"Job {job.id} accepted", job=job.id)
+        return web.json_response(body, status=202, headers={"Location": f"/jobs/{job.id}"})
+
+    async def audited(self, action: Action) -> Answer:
+        """Run an action that commands, and leave a trace of it."""
+        began = self.service.host.clock()
+        with noting_sent() as sent:
+            try:
+                answer = await action(self)
+            except UavApiError as error:
+                self._leave_trace(began, sent, error.code, str(error))
+                raise
+            except asyncio.CancelledError:
+                self._leave_trace(began, sent, "client_gone", "the client hung up")
+                raise
+        self._leave_trace(began, sent, "ok", answer.get("result", "") if isinstance(answer, dict) else "")
+        return answer
+
+    def _leave_trace(self, began: float, sent: list[str], outcome: str, detail: str) -> None:
+        try:
+            system = self.seen.state.system
+        except NoVehicle:
+            system = 0
+        entry = Entry(
+            time=utc_now(),
+            client=self.client,
+            verb=self.path,
+            request=self._params.model_dump(exclude_none=True),
+            system=system,
+            outcome=outcome,
+            detail=detail,
+            seconds=round(self.service.host.clock() - began, 3),
+            sent=tuple(sent),
+        )
+        self.service.audit.add(entry)
 
 
-Action = Callable[[Call], Awaitable[dict[str, Any] | web.StreamResponse]]
+async def _held(copter: Copter) -> str:
+    await copter.hold()
+    return "Holding"
+
+
+BODY_TIMEOUT = 10.0  # s from the headers to the end of the body
 SERVICE = web.AppKey("service", Service)
+
+
+async def _body(request: web.Request, form: bool) -> Any:
+    return dict(await request.post()) if form else await request.json()
 
 
 async def parameters(request: web.Request, model: type[Request], body: bool) -> Request:
@@ -117,7 +198,9 @@ async def parameters(request: web.Request, model: type[Request], body: bool) -> 
         return parse(model, "query", values)
     form = request.content_type == "application/x-www-form-urlencoded"
     try:
-        given = dict(await request.post()) if form else await request.json()
+        given = await asyncio.wait_for(_body(request, form), BODY_TIMEOUT)
+    except asyncio.TimeoutError as error:
+        raise BadRequest(f"the body did not arrive within {BODY_TIMEOUT:g} s") from error
     except (ValueError, LookupError, RecursionError) as error:  # no such charset; nested without end
         raise BadRequest(f"the body is not {'a form' if form else 'JSON'}: {error}") from error
     if not isinstance(given, dict):

@@ -2,99 +2,97 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from mavproxy_uavapi.http.call import Call
+from mavproxy_uavapi.http.call import Answer, Call
 from mavproxy_uavapi.http.requests import Blocking, Disarm, ModeName, NewSpeed, SimFactor, Takeoff
 
 
-async def arm(call: Call) -> dict[str, Any]:
+async def arm(call: Call) -> Answer:
     """Wait until the vehicle is ready, switch to GUIDED and arm."""
     vehicle, p = call.vehicle, call.params(Blocking)
     return await call.fly(vehicle, lambda job: vehicle.arm(job, p.timeout), "Armed vehicle")
 
 
-async def disarm(call: Call) -> dict[str, Any]:
+async def disarm(call: Call) -> Answer:
     """Disarm; refused in flight unless forced."""
     vehicle, p = call.vehicle, call.params(Disarm)
     return await call.fly(vehicle, lambda job: vehicle.disarm(job, p.force), "Disarmed vehicle")
 
 
-async def takeoff(call: Call) -> dict[str, Any]:
+async def takeoff(call: Call) -> Answer:
     """Take off to an altitude above home."""
     copter, p = call.copter, call.params(Takeoff)
     result = f"Takeoff successful! Vehicle at {p.alt} meters"
     return await call.fly(copter, lambda job: copter.takeoff(job, p.alt, p.timeout), result)
 
 
-async def land(call: Call) -> dict[str, Any]:
+async def land(call: Call) -> Answer:
     """Land here and disarm."""
     copter, p = call.copter, call.params(Blocking)
     result = "Landed at home successfully"
     return await call.fly(copter, lambda job: copter.land(job, p.timeout), result, outlives_client=True)
 
 
-async def rtl(call: Call) -> dict[str, Any]:
+async def rtl(call: Call) -> Answer:
     """Return to launch, land there and disarm."""
     copter, p = call.copter, call.params(Blocking)
     result = "Landed at home successfully"
     return await call.fly(copter, lambda job: copter.rtl(job, p.timeout), result, outlives_client=True)
 
 
-async def brake(call: Call) -> dict[str, Any]:
+async def brake(call: Call) -> Answer:
     """Stop at once, in BRAKE mode."""
     copter = call.copter
     result = "Copter braking. Use /command/guided to enable movement commands again"
     return await call.fly(copter, lambda job: copter.set_mode(job, "BRAKE"), result)
 
 
-async def guided(call: Call) -> dict[str, Any]:
+async def guided(call: Call) -> Answer:
     """Switch to GUIDED, in which movement commands work."""
     vehicle = call.vehicle
     result = f"{vehicle.kind.capitalize()} in GUIDED mode"
     return await call.fly(vehicle, lambda job: vehicle.set_mode(job, "GUIDED"), result)
 
 
-async def set_mode(call: Call) -> dict[str, Any]:
+async def set_mode(call: Call) -> Answer:
     """Switch to any mode of the vehicle's type."""
     vehicle, mode = call.vehicle, call.params(ModeName).mode
     return await call.fly(vehicle, lambda job: vehicle.set_mode(job, mode), f"Mode {mode}")
 
 
-async def _set_speed(call: Call, kind: str, name: str) -> dict[str, Any]:
+async def _set_speed(call: Call, kind: str, name: str) -> Answer:
     speed = call.params(NewSpeed).new_v
     await call.vehicle.set_speed(kind, speed)
     return call.answer(f"{name} speed set to {speed}m/s")
 
 
-async def set_air_speed(call: Call) -> dict[str, Any]:
+async def set_air_speed(call: Call) -> Answer:
     """Set the air speed (m/s)."""
     return await _set_speed(call, "air", "Air")
 
 
-async def set_ground_speed(call: Call) -> dict[str, Any]:
+async def set_ground_speed(call: Call) -> Answer:
     """Set the ground speed (m/s)."""
     return await _set_speed(call, "ground", "Ground")
 
 
-async def set_climb_speed(call: Call) -> dict[str, Any]:
+async def set_climb_speed(call: Call) -> Answer:
     """Set the climb speed (m/s)."""
     return await _set_speed(call, "climb", "Climb")
 
 
-async def set_descent_speed(call: Call) -> dict[str, Any]:
+async def set_descent_speed(call: Call) -> Answer:
     """Set the descent speed (m/s)."""
     return await _set_speed(call, "descent", "Descent")
 
 
-async def set_sim_speedup(call: Call) -> dict[str, Any]:
+async def set_sim_speedup(call: Call) -> Answer:
     """Set how much faster than the clock a simulated vehicle flies."""
     factor = call.params(SimFactor).sim_factor
     await call.vehicle.set_sim_speedup(factor)
     return call.answer(f"Simulation speedup set to {factor}x")
 
 
-async def set_home(call: Call) -> dict[str, Any]:
+async def set_home(call: Call) -> Answer:
     """Make the current position home."""
     await call.vehicle.set_home()
     return call.answer("Home location set successfully!")

@@ -3,43 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
-from typing import Any
 
-from mavproxy_uavapi.http.call import Call
+from mavproxy_uavapi.http.call import Answer, Call
 from mavproxy_uavapi.http.requests import BodyOffset, GpsTarget, Heading, NedPlace, NedVelocity, YawRate
 from mavproxy_uavapi.vehicle.copter import Copter
 from mavproxy_uavapi.vehicle.jobs import Job
 from mavproxy_uavapi.vehicle.messages import GlobalTarget, NedTarget, VelocityTarget
 
 
-async def go_to_gps(call: Call) -> dict[str, Any]:
+async def go_to_gps(call: Call) -> Answer:
     """Fly to a latitude, longitude and altitude above home; answer once it is on its way."""
     return await _go_to_gps(call, wait=False)
 
 
-async def go_to_gps_wait(call: Call) -> dict[str, Any]:
+async def go_to_gps_wait(call: Call) -> Answer:
     """Fly to a latitude, longitude and altitude above home; answer on arrival."""
     return await _go_to_gps(call, wait=True)
 
 
-async def _go_to_gps(call: Call, wait: bool) -> dict[str, Any]:
+async def _go_to_gps(call: Call, wait: bool) -> Answer:
     copter, p = call.copter, call.params(GpsTarget)
     place = f"coord ({p.lat}, {p.long}, {p.alt})"
     verb = _going(copter, lambda: GlobalTarget(p.lat, p.long, p.alt), p, wait)
     return await call.fly(copter, verb, f"Arrived at {place}" if wait else f"Going to {place}")
 
 
-async def go_to_ned(call: Call) -> dict[str, Any]:
+async def go_to_ned(call: Call) -> Answer:
     """Fly to a place in NED metres from the EKF origin; answer once it is on its way."""
     return await _go_to_ned(call, wait=False)
 
 
-async def go_to_ned_wait(call: Call) -> dict[str, Any]:
+async def go_to_ned_wait(call: Call) -> Answer:
     """Fly to a place in NED metres from the EKF origin; answer on arrival."""
     return await _go_to_ned(call, wait=True)
 
 
-async def _go_to_ned(call: Call, wait: bool) -> dict[str, Any]:
+async def _go_to_ned(call: Call, wait: bool) -> Answer:
     copter, p = call.copter, call.params(NedPlace)
     place = f"NED coord ({p.x}, {p.y}, {p.z})"
     verb = _going(copter, lambda: NedTarget(p.x, p.y, p.z), p, wait)
@@ -60,39 +59,39 @@ def _going(
     return verb
 
 
-async def drive(call: Call) -> dict[str, Any]:
+async def drive(call: Call) -> Answer:
     """Fly an NED offset from here; answer once it is on its way."""
     return await _drive(call, wait=False)
 
 
-async def drive_wait(call: Call) -> dict[str, Any]:
+async def drive_wait(call: Call) -> Answer:
     """Fly an NED offset from here; answer on arrival."""
     return await _drive(call, wait=True)
 
 
-async def _drive(call: Call, wait: bool) -> dict[str, Any]:
+async def _drive(call: Call, wait: bool) -> Answer:
     copter, p = call.copter, call.params(NedPlace)
     return await _drive_to(call, copter, lambda: copter.ned_from_here(p.x, p.y, p.z), p, wait)
 
 
-async def drive_body(call: Call) -> dict[str, Any]:
+async def drive_body(call: Call) -> Answer:
     """Fly an offset in the body's frame; answer once it is on its way."""
     return await _drive_body(call, wait=False)
 
 
-async def drive_body_wait(call: Call) -> dict[str, Any]:
+async def drive_body_wait(call: Call) -> Answer:
     """Fly an offset in the body's frame; answer on arrival."""
     return await _drive_body(call, wait=True)
 
 
-async def _drive_body(call: Call, wait: bool) -> dict[str, Any]:
+async def _drive_body(call: Call, wait: bool) -> Answer:
     copter, p = call.copter, call.params(BodyOffset)
     return await _drive_to(call, copter, lambda: copter.body_from_here(p.front, p.right, p.down), p, wait)
 
 
 async def _drive_to(
     call: Call, copter: Copter, aim: Callable[[], NedTarget], p: NedPlace | BodyOffset, wait: bool
-) -> dict[str, Any]:
+) -> Answer:
     aimed_at: list[NedTarget] = []
 
     def aim_once() -> NedTarget:
@@ -108,7 +107,7 @@ async def _drive_to(
     return await call.fly(copter, _going(copter, aim_once, p, wait), result)
 
 
-async def travel_at_ned(call: Call) -> dict[str, Any]:
+async def travel_at_ned(call: Call) -> Answer:
     """Fly at an NED velocity until the autopilot drops it, or for a duration."""
     copter, p = call.copter, call.params(NedVelocity)
     velocity = VelocityTarget(p.vx, p.vy, p.vz)
@@ -119,27 +118,27 @@ async def travel_at_ned(call: Call) -> dict[str, Any]:
     return await call.fly(copter, verb, f"Travelling at NED velocity ({p.vx}, {p.vy}, {p.vz})")
 
 
-async def set_heading(call: Call) -> dict[str, Any]:
+async def set_heading(call: Call) -> Answer:
     """Turn to a heading, the shorter way round."""
     heading = call.params(Heading).heading
     await call.copter.set_heading(heading)
     return call.answer(f"Heading set to {heading} degrees")
 
 
-async def set_yaw_rate(call: Call) -> dict[str, Any]:
+async def set_yaw_rate(call: Call) -> Answer:
     """Turn at a rate."""
     rate = call.params(YawRate).yaw_rate
     await call.copter.set_yaw_rate(rate)
     return call.answer(f"Yaw rate set to {rate} deg/s")
 
 
-async def stop(call: Call) -> dict[str, Any]:
+async def stop(call: Call) -> Answer:
     """Pause the guided movement."""
     await call.copter.pause()
     return call.answer("Copter has stopped")
 
 
-async def resume(call: Call) -> dict[str, Any]:
+async def resume(call: Call) -> Answer:
     """Continue the guided movement."""
     await call.copter.resume()
     return call.answer("Copter has resumed")

@@ -10,7 +10,7 @@ from typing import Any
 
 from aiohttp import web
 
-from mavproxy_uavapi.errors import BadRequest, NotFound, UavApiError
+from mavproxy_uavapi.errors import BadRequest, NotFound, TooManyRequests, UavApiError, Unauthorized
 
 log = logging.getLogger("uavapi.http")
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
@@ -45,7 +45,12 @@ def success(body: Mapping[str, Any]) -> web.Response:
 def failure(error: UavApiError) -> web.Response:
     """The answer to any error of the tree."""
     body = {"detail": error.detail, "code": error.code, **error.extras()}
-    return web.json_response(body, status=error.status, dumps=dumps)
+    response = web.json_response(body, status=error.status, dumps=dumps)
+    if isinstance(error, Unauthorized):
+        response.headers["WWW-Authenticate"] = "Bearer"
+    if isinstance(error, TooManyRequests):
+        response.headers["Retry-After"] = str(error.retry_after)
+    return response
 
 
 def of_http_exception(error: web.HTTPException) -> web.Response:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mavproxy_uavapi.http import command, movement, peripherical, requests, stream, telemetry
+from mavproxy_uavapi.http import command, jobs, movement, peripherical, requests, stream, telemetry
 from mavproxy_uavapi.http.call import Action
 
 
@@ -16,6 +16,11 @@ class Route:
     action: Action
     model: type[requests.Request]
     methods: tuple[str, ...] = ("GET",)
+
+    @property
+    def commands(self) -> bool:
+        """Whether it does something; what can only be read with GET does not."""
+        return self.methods != ("GET",)
 
 
 EITHER = ("GET", "POST")
@@ -71,8 +76,14 @@ TELEMETRY = [
     Route("/telemetry/stream", stream.stream, requests.StreamFilter),
 ]
 
+JOBS = [
+    Route("/jobs", jobs.list_jobs, requests.Empty),
+    Route("/jobs/{id}", jobs.show_job, requests.Empty),
+    Route("/jobs/{id}", jobs.abort_job, requests.Empty, ("DELETE",)),
+]
+
 PERIPHERICAL = [
     Route("/peripherical/servo_output", peripherical.servo_output, requests.Servo, POST),
 ]
 
-ROUTES = [*COMMAND, *MOVEMENT, *TELEMETRY, *PERIPHERICAL]
+ROUTES = [*COMMAND, *MOVEMENT, *TELEMETRY, *JOBS, *PERIPHERICAL]

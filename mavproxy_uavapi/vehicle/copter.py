@@ -224,7 +224,7 @@ class Copter(Vehicle):
         await self._send_setpoint(target, yaw)
         if not same_kind and self._speeds_at >= self.state.mode_since:
             # ArduCopter takes up its own speeds again whenever the kind of setpoint changes.
-            for kind, speed in self.speeds.items():
+            for kind, speed in list(self.speeds.items()):  # others may set theirs meanwhile
                 self.held_by("GUIDED")
                 await self.commands.send(messages.change_speed(kind, speed))
         paused_at, self._paused_at = self._paused_at, None
@@ -298,6 +298,18 @@ class Copter(Vehicle):
         timeout = (await self.limits()).guided_timeout
         flown_for = (self.clock() - self._setpoint_at) * self.state.time_ratio.ratio
         return self._setpoint if flown_for < timeout else None
+
+    async def hold(self) -> None:
+        """Stop and stay: by a zero velocity in GUIDED, by BRAKE where the autopilot flies by itself for us.
+
+        On the ground, disarmed, or in a mode of the pilot's nothing is sent.
+        """
+        if not self.state.armed or self.state.landed:
+            return
+        if self.mode == "GUIDED":
+            await self._send_setpoint(VelocityTarget(0, 0, 0), NO_YAW)
+        elif self.mode in ("LAND", "RTL"):
+            await self.switch_to("BRAKE")
 
     async def pause(self) -> None:
         """Pause the guided movement: the vehicle stops where it is. Whoever waits for its end waits on."""

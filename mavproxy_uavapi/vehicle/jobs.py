@@ -11,9 +11,10 @@ import itertools
 from collections.abc import Awaitable, Callable, Mapping
 from typing import Any
 
-from mavproxy_uavapi.errors import Aborted, Superseded, UavApiError
+from mavproxy_uavapi.errors import Aborted, Superseded, TimedOut, UavApiError
 
 FINISHED_KEPT = 100
+GRACE = 2.0  # s; a verb that runs into its own deadline says what it still waited for
 CONSOLE = "console"  # the client of what was typed at MAVProxy's prompt
 
 
@@ -26,6 +27,8 @@ class Job:
         request: the validated parameters.
         seat: the vehicle's, which it takes.
         client: who asked for it: an address, or CONSOLE.
+        began_at, ended_at: on the loop's clock (s); ended_at is None while it runs.
+        ended_by_hang_up: whether it ended because its last client hung up.
         outlives_client: whether it goes on when its client hangs up (land, rtl).
         progress: what it last said of itself, such as distance_to_go (m) and altitude (m above home).
         result: the text of its success.
@@ -44,7 +47,12 @@ class Job:
         self.progress: dict[str, float] = {}
         self.result: str | None = None
         self.error: UavApiError | None = None
+        self._loop = asyncio.get_running_loop()
+        self.began_at = self._loop.time()
+        self.ended_at: float | None = None
+        self.ended_by_hang_up = False
         self._task: asyncio.Task[None] | None = None
+        self._limit: asyncio.TimerHandle | None = None
         self._finished = asyncio.Event()
         self._clients = 0
 
@@ -57,9 +65,19 @@ class Job:
         """Whether it does just what another request asks for."""
         return self.verb == verb and self.request == dict(request)
 
-    def start(self, body: Callable[[Job], Awaitable[str]]) -> None:
-        """Run `body`, whose text is the result."""
-        self._task = asyncio.get_running_loop().create_task(self._run(body))
+    @property
+    def outcome_name(self) -> str:
+        """`running`, `succeeded` or `failed`."""
+        if self.running:
+            return "running"
+        return "succeeded" if self.error is None else "failed"
+
+    def start(self, body: Callable[[Job], Awaitable[str]], timeout: float | None = None) -> None:
+        """Run `body`, whose text is the result; it never outlives `timeout` (s)."""
+        self._task = self._loop.create_task(self._run(body))
+        if timeout is not None:
+            late = TimedOut(f"{self.verb} was not done within {timeout:g} s")
+            self._limit = self._loop.call_later(timeout + GRACE, self.abort, late)
 
     async def _run(self, body: Callable[[Job], Awaitable[str]]) -> None:
         try:
@@ -84,6 +102,9 @@ class Job:
     def _finish(self, result: str | None = None, error: UavApiError | None = None) -> None:
         if self.running:
             self.result, self.error = result, error
+            self.ended_at = self._loop.time()
+            if self._limit is not None:
+                self._limit.cancel()
             self._finished.set()
 
     async def outcome(self) -> str:
@@ -98,6 +119,7 @@ class Job:
         finally:
             self._clients -= 1
             if self.running and not self._clients and not self.outlives_client:
+                self.ended_by_hang_up = True
                 self.abort(Aborted(f"{self.verb}: its client hung up"))
         if self.error is not None:
             raise self.error
@@ -134,6 +156,7 @@ class JobBook:
         *,
         client: str = CONSOLE,
         outlives_client: bool = False,
+        timeout: float | None = None,
     ) -> Job:
         """Start a job, or join the one for that seat that does just the same."""
         for job in self.running():  # not the one in the seat: a job takes that when it has begun
@@ -142,8 +165,16 @@ class JobBook:
         job = Job(next(self._numbers), verb, request, seat, client=client, outlives_client=outlives_client)
         self._jobs[job.id] = job
         self._forget_old()
-        job.start(body)
+        job.start(body, timeout)
         return job
+
+    def get(self, number: str) -> Job | None:
+        """The job of that number; None when there is none, or it is forgotten."""
+        return self._jobs.get(number)
+
+    def all(self) -> list[Job]:
+        """The running jobs and the last ones that ended, oldest first."""
+        return list(self._jobs.values())
 
     def running(self) -> list[Job]:
         """The jobs without an outcome, oldest first."""

@@ -38,6 +38,7 @@ def test_codes_are_the_contracts_each_with_its_status() -> None:
         "busy": 409,
         "not_armed": 409,
         "aborted": 409,
+        "too_many_requests": 429,
         "invalid": 422,
         "rejected": 500,
         "link_lost": 503,

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 import json
 import socket
 import threading
@@ -81,7 +82,7 @@ def test_module_is_what_mavproxy_looks_for(module: Any, mpstate: Any) -> None:
     assert module.name == "uavapi"
     assert module.multi_vehicle
     assert set(mpstate.command_map) == {"uavapi"}
-    assert mpstate.completions["uavapi"] == ["<status|start|stop|vehicles|help>", "set (UAVAPISETTING)"]
+    assert mpstate.completions["uavapi"] == ["<status|start|stop|vehicles|config|log|help>", "set (UAVAPISETTING)"]
     assert "port" in mpstate.completion_functions["(UAVAPISETTING)"]("")
 
 
@@ -139,7 +140,7 @@ def test_command_goes_out_in_the_main_loop(
     [
         ({"prot": 1}, "uavapi: no setting 'prot'; did you mean port?"),
         ({"port": "x"}, "uavapi: port = 'x': it takes a int from 1 to 65535"),
-        ({"host": "0.0.0.0"}, "loopback only"),
+        ({"host": "0.0.0.0"}, "anybody on that network"),
         ({"config": "/no/such.ini"}, "/no/such.ini: No such file or directory"),
     ],
 )
@@ -205,7 +206,7 @@ def test_bad_value_at_the_prompt_changes_nothing(module: Any, port: int, capsys:
 def test_set_shows_the_settings(module: Any, port: int, capsys: Any) -> None:
     module.command(["set"])
     out = capsys.readouterr().out
-    assert f"port {port}" in out
+    assert re.search(rf"port +{port} +module load", out)
     assert "host 127.0.0.1" in out
     module.command(["set", "max_age"])
     assert capsys.readouterr().out.split() == ["max_age", "5.0"]
@@ -300,3 +301,21 @@ def test_unload_ends_a_call_in_flight_and_answers_it(
     client.join(5.0)
     assert answers[0][0] == 409
     assert answers[0][1]["code"] == "aborted"
+
+
+def test_unload_takes_its_descriptors_back_from_a_host_that_goes_on(
+    loader: Loader, main_loop: Any, mpstate: Any, port: int
+) -> None:
+    import vision
+
+    other = vision.init(mpstate)
+    main_loop.modules.append(other)
+    before = len(other.host.bridge._open_sockets)
+    for _ in range(3):
+        module = loader.load(port=port)
+        main_loop.turn()
+        assert listens(port)
+        loader.unload(module)
+        assert not listens(port)
+    assert len(other.host.bridge._open_sockets) == before
+    assert other.host.bridge.running

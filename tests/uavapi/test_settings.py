@@ -121,7 +121,7 @@ def test_unset_values_leave_the_default(ini: Any, unset: str) -> None:
         ("[simulated]\nport = 1\n", "no key 'port' in \\[simulated\\]"),
         ("[apy]\nport = 1\n", "no section \\[apy\\]; there are api, simulated, logs"),
         ("[api]\nport = high\n", "it takes a int"),
-        ("[api]\nhost = 0.0.0.0\n", "loopback only"),
+        ("[api]\nhost = 0.0.0.0\n", "anybody on that network"),
         ("port = 1\n", "no section headers"),
         ("[api]\nport = 1\nport = 2\n", "already exists"),
     ],

@@ -10,6 +10,8 @@ import pytest
 from mavproxy_uavapi.errors import LinkLost
 from mavproxy_uavapi.host.link import Address, FakeLink, MavproxyLink
 
+HELLO = SimpleNamespace(get_type=lambda: "HELLO")
+
 
 @pytest.fixture
 def send(loop: Any, mpstate: Any, host: Any) -> Callable[..., None]:
@@ -32,14 +34,14 @@ def test_message_goes_out_by_the_vehicles_best_link(send: Any, mpstate: Any) -> 
         7: SimpleNamespace(mav=SimpleNamespace(send=lambda m: pytest.fail("wrong link"))),
     }
     mpstate.master = masters.get
-    send("hello", 1)
-    assert mpstate.the_master.written == ["hello"]
+    send(HELLO, 1)
+    assert mpstate.the_master.written == [HELLO]
 
 
 def test_without_a_link_sending_is_link_lost(send: Any, mpstate: Any) -> None:
     mpstate.master = lambda system: None
     with pytest.raises(LinkLost, match="MAVProxy has no link"):
-        send("hello", 1)
+        send(HELLO, 1)
 
 
 def test_write_error_is_link_lost(send: Any, mpstate: Any) -> None:
@@ -48,7 +50,7 @@ def test_write_error_is_link_lost(send: Any, mpstate: Any) -> None:
 
     mpstate.the_master.mav.send = broken
     with pytest.raises(LinkLost, match="Input/output error"):
-        send("hello", 1)
+        send(HELLO, 1)
 
 
 def test_source_is_mavproxys_own_address(mpstate: Any, host: Any) -> None:
@@ -59,6 +61,6 @@ def test_source_is_mavproxys_own_address(mpstate: Any, host: Any) -> None:
 def test_fake_link_remembers_and_tells(loop: asyncio.AbstractEventLoop) -> None:
     told: list[Any] = []
     link = FakeLink(lambda message, system: told.append((message, system)))
-    loop.run_until_complete(link.send("hello", 3))
-    assert link.sent == ["hello"]
-    assert told == [("hello", 3)]
+    loop.run_until_complete(link.send(HELLO, 3))
+    assert link.sent == [HELLO]
+    assert told == [(HELLO, 3)]

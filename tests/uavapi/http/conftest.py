@@ -11,6 +11,7 @@ import pytest
 from aiohttp import TCPConnector, web
 from aiohttp.test_utils import TestClient, TestServer
 
+from mavproxy_uavapi.audit import Audit
 from mavproxy_uavapi.http.app import make_app
 from mavproxy_uavapi.http.call import Service
 from mavproxy_uavapi.settings import ModuleSettings
@@ -67,7 +68,7 @@ class Api:
 @pytest.fixture
 def service(host: Any) -> Service:
     """What the handlers work with."""
-    return Service(host, ModuleSettings().snapshot())
+    return Service(host, ModuleSettings(environ={}).snapshot(), Audit(None))
 
 
 @pytest.fixture

@@ -35,8 +35,8 @@ def test_every_path_of_the_contract_is_there() -> None:
 
 
 def test_no_path_is_there_twice() -> None:
-    paths = [route.path for route in ROUTES]
-    assert len(paths) == len(set(paths))
+    asked = [(method, route.path) for route in ROUTES for method in route.methods]
+    assert len(asked) == len(set(asked))
 
 
 @pytest.mark.parametrize("route", ROUTES, ids=lambda route: route.path)

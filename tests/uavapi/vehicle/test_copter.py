@@ -380,6 +380,18 @@ def test_offset_from_here(flying: Any, loop: Any, copter: Any) -> None:
     assert (body.x, body.y, body.z) == pytest.approx((8.0, 25.0, -29.0))
 
 
+def test_speed_that_is_set_while_another_is_repeated_disturbs_no_movement(
+    loop: Any, flying: Any, copter: Any, pilotage: Any
+) -> None:
+    for kind in ("ground", "descent"):
+        loop.run(copter.set_speed(kind, 1.0))
+    job = pilotage.start(copter.go_to, FAR)  # repeats the speeds, for the kind of setpoint has changed
+    climb = loop.create_task(copter.set_speed("climb", 1.0))
+    assert pilotage.result(job) == "done"
+    loop.run(climb)
+    assert copter.speeds == dict.fromkeys(("ground", "descent", "climb"), 1.0)
+
+
 # -- travel -----------------------------------------------------------------------------------------------
 
 

@@ -1,0 +1,65 @@
+"""When the next turn is due: a fixed cadence, and the pauses after failures. Pure: the clock is an argument."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+FIRST_PAUSE = 1.0  # s
+LONGEST_PAUSE = 30.0  # s
+
+
+class Cadence:
+    """Turns at `start`, `start + period`, …: a turn that comes late does not move the later ones.
+
+    Args:
+        period: s between turns.
+        start: the first one (s).
+    """
+
+    def __init__(self, period: float, start: float) -> None:
+        self.period = period
+        self._start = start
+        self._turn = -1
+
+    def wait(self, now: float) -> float:
+        """Seconds from `now` to the next turn; turns that were slept through are left out."""
+        missed = math.ceil((now - self._start) / self.period - 1e-9)
+        self._turn = max(self._turn + 1, missed)
+        return max(self._start + self._turn * self.period - now, 0.0)
+
+
+class Backoff:
+    """Pauses after failures in a row: 1, 2, 4 … 30 s, each shortened by up to a half at random.
+
+    The chance keeps a fleet that lost its station from coming back all at once.
+
+    Args:
+        random: numbers from 0 to 1.
+    """
+
+    def __init__(self, random: Callable[[], float]) -> None:
+        self._random = random
+        self.failures = 0
+        self.until = -math.inf
+
+    def failed(self, now: float) -> float:
+        """Count a failure at `now` (s); the seconds to wait."""
+        longest = min(FIRST_PAUSE * 2.0 ** min(self.failures, 16), LONGEST_PAUSE)
+        self.failures += 1
+        pause = longest * (1.0 - 0.5 * self._random())
+        self.until = now + pause
+        return pause
+
+    def succeeded(self) -> None:
+        """Forget the failures."""
+        self.failures = 0
+        self.until = -math.inf
+
+    def hurry(self) -> None:
+        """End the pause, but remember the failures."""
+        self.until = -math.inf
+
+    def waits(self, now: float) -> bool:
+        """Whether the pause is not over yet."""
+        return now < self.until

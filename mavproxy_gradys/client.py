@@ -1,0 +1,128 @@
+"""The HTTP client: one keep-alive session, time-outs, no redirects, TLS with a CA file, a bearer token."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import ssl
+from typing import Any
+
+import aiohttp
+
+from mavproxy_gradys.errors import NotDelivered
+
+CONNECTIONS = 8  # to one receiver at a time
+LARGEST_ANSWER = 1024 * 1024  # bytes; a receiver that says more is not heard out
+FORM = "application/x-www-form-urlencoded"
+JSON = "application/json"
+
+
+class Client:
+    """Posts to one receiver; belongs to the asyncio thread.
+
+    Args:
+        timeout: s from the first byte of the request to the last of the answer.
+        token: sent as a bearer token; empty for none.
+        ca_file: certificates that a TLS receiver is trusted by; empty for the system's own.
+
+    Raises:
+        NotDelivered: the CA file cannot be used.
+    """
+
+    def __init__(self, timeout: float, token: str = "", ca_file: str = "") -> None:
+        headers = {"User-Agent": "mavproxy-uavapi"}
+        if token:
+            headers["Authorization"] = f"Bearer {token}"
+        self._timeout = timeout
+        self._session = aiohttp.ClientSession(
+            connector=aiohttp.TCPConnector(limit=CONNECTIONS, ssl=tls_context(ca_file)),
+            timeout=aiohttp.ClientTimeout(total=timeout),
+            headers=headers,
+            cookie_jar=aiohttp.DummyCookieJar(),
+            trust_env=False,
+        )
+
+    async def close(self) -> None:
+        """Close the connections."""
+        await self._session.close()
+
+    async def post(self, url: str, body: bytes, content_type: str) -> Any:
+        """POST `body`; the JSON of a 200's body, None when that is not JSON.
+
+        A connection that the receiver closed while it was idle is replaced once.
+
+        Raises:
+            NotDelivered: nobody answered in time, or not with 200.
+        """
+        try:
+            try:
+                return await self._post(url, body, content_type)
+            except aiohttp.ServerDisconnectedError:
+                return await self._post(url, body, content_type)
+        except (aiohttp.ClientError, OSError, asyncio.TimeoutError, ValueError) as error:
+            raise NotDelivered(explain(error, self._timeout)) from error
+
+    async def _post(self, url: str, body: bytes, content_type: str) -> Any:
+        headers = {"Content-Type": content_type}
+        async with self._session.post(url, data=body, headers=headers, allow_redirects=False) as answer:
+            said = await read_up_to(answer.content, LARGEST_ANSWER)
+            if answer.status != 200:
+                raise refusal(answer.status, answer.headers.get("Location", ""))
+        try:
+            return json.loads(said)
+        except ValueError:
+            return None  # a 200 is an acknowledgement, whatever it says
+
+
+async def read_up_to(stream: aiohttp.StreamReader, limit: int) -> bytes:
+    """The whole body.
+
+    Raises:
+        NotDelivered: it is longer than `limit` bytes.
+    """
+    said = bytearray()
+    async for piece in stream.iter_any():
+        said += piece
+        if len(said) > limit:
+            raise NotDelivered(f"it answers with more than {limit} bytes", reached=True)
+    return bytes(said)
+
+
+def refusal(status: int, location: str) -> NotDelivered:
+    """The error for an answer that is not a 200."""
+    if 300 <= status < 400:
+        where = f" to {location}" if location else ""
+        return NotDelivered(f"it redirects{where} ({status}), which is refused: set its real address", reached=True)
+    why = {401: " (does it want a token?)", 403: " (is the token the right one?)"}.get(status, "")
+    return NotDelivered(f"it answers {status}{why}", reached=True, too_large=status == 413)
+
+
+def tls_context(ca_file: str) -> ssl.SSLContext | bool:
+    """What a TLS receiver's certificate is checked by; True is aiohttp's own check by the system's certificates.
+
+    Raises:
+        NotDelivered: the file cannot be read, or holds no certificate.
+    """
+    if not ca_file:
+        return True
+    try:
+        return ssl.create_default_context(cafile=ca_file)
+    except OSError as error:  # ssl.SSLError is one
+        raise NotDelivered(f"ca_file {ca_file}: {error.strerror or error}") from error
+
+
+def explain(error: BaseException, timeout: float) -> str:
+    """Why nobody answered, in a few words."""
+    if isinstance(error, asyncio.TimeoutError):
+        return f"no answer within {timeout:g} s"
+    if isinstance(error, aiohttp.ClientConnectorDNSError):
+        return f"no such host: {error.host}"
+    if isinstance(error, aiohttp.ClientConnectorCertificateError):
+        return f"its certificate is not trusted: {error.certificate_error}"
+    if isinstance(error, aiohttp.ClientSSLError):
+        return f"no TLS there: {error.os_error}"
+    if isinstance(error, aiohttp.ClientConnectorError):
+        return f"cannot connect to {error.host}:{error.port}: {error.os_error.strerror or error.os_error}"
+    if isinstance(error, aiohttp.ServerDisconnectedError):
+        return "it closed the connection without an answer"
+    return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__

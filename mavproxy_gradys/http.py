@@ -1,0 +1,94 @@
+"""What the module answers over HTTP while uavapi is loaded: /gradys/status, /gradys/readings."""
+
+from __future__ import annotations
+
+import time
+from typing import Annotated, Any
+
+from pydantic import Field, model_validator
+
+from mavproxy_gradys.readings import NAME, Reading, device_of
+from mavproxy_gradys.service import Gradys
+from mavproxy_uavapi.errors import NoVehicle
+from mavproxy_uavapi.http.call import Call
+from mavproxy_uavapi.http.requests import Empty, Number, Request
+from mavproxy_uavapi.http.routes import EITHER, POST, Route
+
+MOST_READINGS = 1000  # in one request
+LONGEST_TEXT = 4096
+LONGEST_LIST = 64
+Name = Annotated[str, Field(pattern=rf"^{NAME}$", description="letters, digits, _ . -")]
+Text = Annotated[str, Field(max_length=LONGEST_TEXT)]
+Numbers = Annotated[list[Number], Field(max_length=LONGEST_LIST)]
+
+
+class OneReading(Request):
+    """A measurement; `time` is s since 1970, by default now; `sysid` the vehicle that it belongs to."""
+
+    quantity: Name
+    value: Annotated[bool | Number | Text | Numbers, Field(union_mode="left_to_right")]
+    representation: Annotated[str, Field(max_length=64)] = ""
+    time: Annotated[float | None, Field(ge=0, le=1e11)] = None
+    device: Name | None = None
+    sysid: Annotated[int | None, Field(ge=1, le=255)] = None
+
+
+class Readings(Request):
+    """One measurement, or `readings`: several."""
+
+    readings: Annotated[list[OneReading], Field(min_length=1, max_length=MOST_READINGS)]
+
+    @model_validator(mode="before")
+    @classmethod
+    def one_or_several(cls, given: Any) -> Any:
+        """Take a single measurement for a list of one."""
+        return given if not isinstance(given, dict) or "readings" in given else {"readings": [given]}
+
+
+class Handlers:
+    """Answers, by the module's service."""
+
+    def __init__(self, gradys: Gradys) -> None:
+        self._gradys = gradys
+
+    def routes(self) -> list[Route]:
+        """The routes that uavapi is to serve."""
+        return [
+            Route("/gradys/status", self.status, Empty),
+            Route("/gradys/readings", self.readings, Readings, POST),
+            Route("/gradys/flush", self.flush, Empty, EITHER),
+        ]
+
+    async def status(self, call: Call) -> dict[str, Any]:
+        """What was pushed and spooled, and what became of it."""
+        return {"device": "uav", "id": self._id(call), "result": "Success", "info": self._gradys.report()}
+
+    async def flush(self, call: Call) -> dict[str, Any]:
+        """Try all stations and sinks now."""
+        self._gradys.flush()
+        return {"device": "uav", "id": self._id(call), "result": "Everything is tried now"}
+
+    async def readings(self, call: Call) -> dict[str, Any]:
+        """Keep measurements of a program on the companion computer; answered when they are on the disk."""
+        now = time.time()
+        found = [self._reading(call, given, now) for given in call.params(Readings).readings]
+        numbers = await self._gradys.sensing.keep(found)
+        plural = "" if len(numbers) == 1 else "s"
+        return {
+            "device": "uav",
+            "id": self._id(call),
+            "result": f"Kept {len(numbers)} reading{plural}",
+            "seq": numbers,
+        }
+
+    def _reading(self, call: Call, given: OneReading, now: float) -> Reading:
+        system = given.sysid or call.seen.state.system
+        at = now if given.time is None else given.time
+        device = given.device or device_of(system)
+        return Reading(device, system, given.quantity, given.representation, given.value, at)
+
+    def _id(self, call: Call) -> str | None:
+        try:
+            return str(call.seen.state.system)
+        except NoVehicle:
+            return None

@@ -1,0 +1,160 @@
+"""The push: one task for each ground station, which tells it where every vehicle is."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+from mavproxy_gradys import payload
+from mavproxy_gradys.address import Station, api_note, ip_field, own_address
+from mavproxy_gradys.cadence import Cadence
+from mavproxy_gradys.client import FORM, Client
+from mavproxy_gradys.errors import NotDelivered
+from mavproxy_gradys.settings import Settings
+from mavproxy_gradys.tally import StationTally, VehicleTally
+from mavproxy_uavapi.errors import Unavailable
+from mavproxy_uavapi.host.host import Host
+from mavproxy_uavapi.host.state import VehicleState
+
+DROPPED = 101  # the station's `type` when it received an update but no browser took it; 103 when one did
+ADDRESS_KEPT = 30.0  # s for which our own address is not looked up again
+
+
+class Pusher:
+    """Tells one station where the vehicles are; belongs to the asyncio thread.
+
+    Args:
+        station: whom to tell.
+        host: the vehicles, and the clock.
+        settings: the snapshot in force.
+        tally: what became of it.
+
+    Raises:
+        NotDelivered: the CA file cannot be used.
+    """
+
+    def __init__(self, station: Station, host: Host, settings: Settings, tally: StationTally) -> None:
+        self.station = station
+        self.tally = tally
+        self._host = host
+        self._settings = settings
+        self._client = Client(settings.timeout, settings.token, settings.ca_file)
+        self._in_flight: dict[int, asyncio.Task[None]] = {}
+        self._own = ""
+        self._own_at = -ADDRESS_KEPT
+
+    async def run(self) -> None:
+        """Push at a fixed cadence, until cancelled."""
+        loop = asyncio.get_running_loop()
+        cadence = Cadence(self._settings.period, loop.time())
+        try:
+            while True:
+                await asyncio.sleep(cadence.wait(loop.time()))
+                self.turn()
+        finally:
+            for task in list(self._in_flight.values()):
+                task.cancel()
+            await asyncio.gather(*self._in_flight.values(), return_exceptions=True)
+            await self._client.close()
+
+    def turn(self) -> None:
+        """Begin an update for every vehicle that has one to tell.
+
+        While a station does not answer one vehicle's update is enough to find out that it is back.
+        """
+        now = self._host.clock()
+        if self.tally.backoff.waits(now):
+            return
+        for system, state in list(self._host.fleet.vehicles.items()):
+            vehicle = self.tally.vehicle(system)
+            if system in self._in_flight or vehicle.backoff.waits(now):
+                continue
+            if self.tally.backoff.failures and self._in_flight:
+                return
+            if self._where(state, vehicle) is not None:
+                task = asyncio.get_running_loop().create_task(self._push(state, vehicle))
+                self._in_flight[system] = task
+                task.add_done_callback(lambda _, system=system: self._in_flight.pop(system, None))
+
+    def _where(self, state: VehicleState, vehicle: VehicleTally) -> payload.Position | None:
+        """Where it is now; None when that is unknown or too old, and then the tally says why."""
+        try:
+            where = payload.position(
+                state,
+                self._host.clock(),
+                max_age=self._settings.max_age,
+                link_timeout=self._host.link_timeout,
+                has_position=self._host.hangar.find(state.system).has_position,
+            )
+        except Unavailable as nothing:
+            vehicle.withhold(str(nothing))
+            return None
+        vehicle.why_not = ""
+        return where
+
+    async def _push(self, state: VehicleState, vehicle: VehicleTally) -> None:
+        try:
+            self.tally.ip = await self._ip()
+            where = self._where(state, vehicle)  # finding our own address may have taken its time
+            if where is None:
+                return
+            body = payload.encode(self._form(state, vehicle, where))
+            vehicle.sent += 1
+            started = self._host.clock()
+            answer = await self._client.post(self.station.update_url, body, FORM)
+        except NotDelivered as error:
+            self._failed(vehicle, error)
+            return
+        now = self._host.clock()
+        self.tally.round_trips.add(now - started)
+        self.tally.backoff.succeeded()
+        vehicle.answered(was_dropped(answer), now)
+
+    def _failed(self, vehicle: VehicleTally, error: NotDelivered) -> None:
+        now = self._host.clock()
+        vehicle.refused(str(error))
+        self.tally.failed(str(error), now)
+        if error.reached:
+            self.tally.backoff.succeeded()
+            vehicle.backoff.failed(now)
+        elif not self.tally.backoff.waits(now):  # several updates that fail together are one failure
+            self.tally.backoff.failed(now)
+            self._own_at = -ADDRESS_KEPT
+
+    def _form(self, state: VehicleState, vehicle: VehicleTally, where: payload.Position) -> dict[str, str]:
+        return payload.form(
+            state,
+            where,
+            self._host.clock(),
+            seq=vehicle.seq,
+            ip=self.tally.ip,
+            ready=self._host.hangar.find(state.system).is_ready_to_arm,
+            max_age=self._settings.max_age,
+        )
+
+    async def _ip(self) -> str:
+        """The form's `ip`.
+
+        Raises:
+            NotDelivered: there is no way to the station.
+        """
+        api: tuple[str, int] | None = getattr(self._host, "api_address", None)
+        self.tally.note = api_note(api, self.station.host)
+        if self._settings.ip:
+            return ip_field(self._settings.ip, "", api)
+        now = self._host.clock()
+        if now - self._own_at >= ADDRESS_KEPT:
+            look_up = own_address(self.station.host, self.station.port)
+            try:
+                self._own = await asyncio.wait_for(look_up, self._settings.timeout)
+            except asyncio.TimeoutError as error:
+                raise NotDelivered(f"no answer about the name {self.station.host}") from error
+            except OSError as error:
+                raise NotDelivered(f"no way to {self.station.host}: {error.strerror or error}") from error
+            self._own_at = now
+        return ip_field("", self._own, api)
+
+
+def was_dropped(answer: Any) -> bool:
+    """Whether the station's answer says that it received the update but dropped it."""
+    return isinstance(answer, dict) and str(answer.get("type")) == str(DROPPED)

@@ -1,0 +1,215 @@
+"""Quantities that are sampled, and the readings that come of it. Pure: the clock is an argument.
+
+A quantity is written `NAME=MESSAGE.field*SCALE+OFFSET@PERIOD[REPRESENTATION]`:
+
+    alt=GLOBAL_POSITION_INT.relative_alt*0.001@1[m]
+    cell1=BATTERY_STATUS[0].voltages[0]*0.001@10[V]
+
+Scale, offset, period (s, 1 by default) and representation (a unit or a type, for whoever reads it) may be left
+out. `position@1` is built in: [degrees, degrees, m above home].
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass, field
+from typing import Any
+
+from mavproxy_uavapi.host.state import VehicleState
+from mavproxy_uavapi.settings import SettingError
+
+POSITION = "position"
+POSITION_REPRESENTATION = "degrees, degrees, m above home"
+NAME = r"[A-Za-z0-9_.-]{1,64}"  # fits into an MQTT topic
+NUMBER = r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?"
+GRAMMAR = re.compile(
+    rf"(?P<name>{NAME})"
+    r"(?:=(?P<message>[A-Z0-9_]+)(?:\[(?P<instance>\d+)\])?\.(?P<attribute>[a-z0-9_]+)(?:\[(?P<index>\d+)\])?"
+    rf"(?:\*(?P<scale>{NUMBER}))?(?P<offset>[-+]{NUMBER.removeprefix('[-+]?')})?)?"
+    rf"(?:@(?P<period>{NUMBER}))?(?:\[(?P<representation>[^\[\]]*)\])?"
+)
+SHORTEST_PERIOD = 0.05  # s
+LONGEST_PERIOD = 86400.0  # s
+
+Value = float | int | str | bool | list[float]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What is sampled of every vehicle.
+
+    Attributes:
+        name: what it is called; unique.
+        message: MAVLink message, with `[instance]` where several devices send it; empty for `position`.
+        attribute, index: the field, and which element of an array.
+        scale, offset: the value is field * scale + offset.
+        period: s between samples.
+        representation: unit or type, for whoever reads it.
+    """
+
+    name: str
+    message: str = ""
+    attribute: str = ""
+    index: int | None = None
+    scale: float = 1.0
+    offset: float = 0.0
+    period: float = 1.0
+    representation: str = ""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One measurement.
+
+    Attributes:
+        device: who measured, `uav-1`.
+        system: MAVLink system id of the vehicle that it belongs to.
+        quantity, representation, value: what.
+        time: when, s since 1970 on this machine's clock.
+    """
+
+    device: str
+    system: int
+    quantity: str
+    representation: str
+    value: Value
+    time: float
+
+
+@dataclass(frozen=True)
+class Stored:
+    """A reading in the spool, with its sequence number."""
+
+    seq: int
+    reading: Reading
+
+    def body(self) -> dict[str, Any]:
+        """As it is sent."""
+        reading = self.reading
+        return {
+            "device": reading.device,
+            "id": str(reading.system),
+            "seq": self.seq,
+            "quantity": reading.quantity,
+            "representation": reading.representation,
+            "value": reading.value,
+            "time": round(reading.time, 3),
+        }
+
+
+def device_of(system: int) -> str:
+    """What a vehicle is called as a device."""
+    return f"uav-{system}"
+
+
+def parse_quantities(text: str) -> list[Quantity]:
+    """The quantities of a list by comma, semicolon or white space (not within brackets).
+
+    Raises:
+        SettingError: one cannot be read, or two have one name.
+    """
+    parts = [part for part in re.split(r"[,;\s]+(?![^\[\]]*\])", text.strip()) if part]
+    found = [parse_quantity(part) for part in parts]
+    names = [quantity.name for quantity in found]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise SettingError(f"quantities: {', '.join(twice)} is there twice")
+    return found
+
+
+def parse_quantity(text: str) -> Quantity:
+    """One quantity.
+
+    Raises:
+        SettingError: it cannot be read.
+    """
+    match = GRAMMAR.fullmatch(text)
+    if match is None:
+        raise SettingError(f"quantities: {text!r} is not NAME=MESSAGE.field*SCALE+OFFSET@PERIOD[REPRESENTATION]")
+    given = match.groupdict()
+    try:
+        numbers = [float(given[name] or default) for name, default in (("scale", 1), ("offset", 0), ("period", 1))]
+    except ValueError as error:
+        raise SettingError(f"quantities: {text!r}: {error}") from error
+    scale, offset, period = numbers
+    if not SHORTEST_PERIOD <= period <= LONGEST_PERIOD:
+        raise SettingError(f"quantities: {text!r}: a period is {SHORTEST_PERIOD:g} to {LONGEST_PERIOD:g} s")
+    if given["message"] is None:
+        if given["name"] != POSITION:
+            raise SettingError(f"quantities: {text!r} names no message; {POSITION} alone is built in")
+        return Quantity(POSITION, period=period, representation=POSITION_REPRESENTATION)
+    instance = "" if given["instance"] is None else f"[{given['instance']}]"
+    index = None if given["index"] is None else int(given["index"])
+    message, attribute = given["message"] + instance, given["attribute"]
+    representation = given["representation"] or ""
+    return Quantity(given["name"], message, attribute, index, scale, offset, period, representation)
+
+
+@dataclass
+class Sampler:
+    """Takes one quantity of every vehicle.
+
+    A message is sampled once: what has not been told anew since the last sample is no new measurement.
+
+    Attributes:
+        taken: readings that were taken.
+        why_not: why there was none at the last turn, by system id.
+    """
+
+    quantity: Quantity
+    taken: int = 0
+    why_not: dict[int, str] = field(default_factory=dict)
+    _sampled_at: dict[int, float] = field(default_factory=dict)
+
+    def sample(self, state: VehicleState, now: float, wall: float, max_age: float) -> Reading | None:
+        """One reading of a message; None when there is nothing new, and then `why_not` says so.
+
+        Args:
+            state: the vehicle's.
+            now: on the clock of arrivals (s).
+            wall: the same moment in s since 1970.
+            max_age: s after which a message is too old to be a measurement.
+        """
+        received = state.messages.get(self.quantity.message)
+        if received is None:
+            return self._none(state.system, f"{self.quantity.message} has not come yet")
+        if now - received.at > max_age:
+            return self._none(state.system, f"{self.quantity.message} is {now - received.at:.1f} s old")
+        if self._sampled_at.get(state.system) == received.at:
+            return self._none(state.system, f"{self.quantity.message} has not come anew")
+        value = self._value(received.message)
+        if value is None:
+            return self._none(state.system, f"{self.quantity.message} has no such number")
+        self._sampled_at[state.system] = received.at
+        return self.take(state.system, value, wall - (now - received.at))
+
+    def take(self, system: int, value: Value, at: float) -> Reading:
+        """A reading of `value`, measured at `at` (s since 1970)."""
+        self.why_not.pop(system, None)
+        self.taken += 1
+        quantity = self.quantity
+        return Reading(device_of(system), system, quantity.name, quantity.representation, value, at)
+
+    def _none(self, system: int, why: str) -> None:
+        self.why_not[system] = why
+
+    def skip(self, system: int, why: str) -> None:
+        """Say why there was nothing to take."""
+        self.why_not[system] = why
+
+    def _value(self, message: Any) -> float | int | str | None:
+        found = getattr(message, self.quantity.attribute, None)
+        if self.quantity.index is not None:
+            found = found[self.quantity.index] if _has(found, self.quantity.index) else None
+        if isinstance(found, str):
+            return found
+        if isinstance(found, bool) or not isinstance(found, int | float) or not math.isfinite(found):
+            return None
+        if self.quantity.scale == 1.0 and self.quantity.offset == 0.0:
+            return found
+        return float(f"{found * self.quantity.scale + self.quantity.offset:.12g}")  # without 20.123000000000001
+
+
+def _has(found: Any, index: int) -> bool:
+    return isinstance(found, list | tuple) and index < len(found)

@@ -1,0 +1,161 @@
+"""Sensing with store and forward: samplers, the spool, and a sender for each sink."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from mavproxy_gradys import payload
+from mavproxy_gradys.cadence import Cadence
+from mavproxy_gradys.errors import NotStored
+from mavproxy_gradys.keeper import Keeper
+from mavproxy_gradys.readings import POSITION, Quantity, Reading, Sampler
+from mavproxy_gradys.sender import Sender
+from mavproxy_gradys.settings import Settings
+from mavproxy_gradys.spool import Spool
+from mavproxy_uavapi.errors import Unavailable
+from mavproxy_uavapi.host.host import Host
+from mavproxy_uavapi.host.state import VehicleState
+
+MEGABYTE = 1e6
+
+
+class Sensing:
+    """Samples the quantities while there is a sink, and keeps what is posted even while there is none.
+
+    Args:
+        host: the vehicles.
+        wall: s since 1970.
+    """
+
+    def __init__(self, host: Host, wall: Callable[[], float] = time.time) -> None:
+        self._host = host
+        self._wall = wall
+        self._settings: Settings | None = None
+        self._keeper: Keeper | None = None
+        self._opening = asyncio.Lock()
+        self._senders: dict[str, Sender] = {}
+        self._samplers: list[Sampler] = []
+        self._tasks: list[asyncio.Task[None]] = []
+
+    async def start(self, settings: Settings) -> None:
+        """Sample and send, if there is a sink."""
+        self._settings = settings
+        self._opening = asyncio.Lock()
+        if not settings.sink:
+            return
+        keeper = await self._kept()
+        loop = asyncio.get_running_loop()
+        for url in settings.sink:
+            sender = self._senders[url] = Sender(url, keeper, self._host.clock)
+            self._tasks.append(loop.create_task(sender.run(settings)))
+        for quantity in settings.quantities:
+            sampler = Sampler(quantity)
+            self._samplers.append(sampler)
+            self._tasks.append(loop.create_task(self._sample(sampler, keeper)))
+
+    async def stop(self) -> None:
+        """End it, and close the spool."""
+        self._settings = None
+        tasks, self._tasks = self._tasks, []
+        for task in tasks:
+            task.cancel()
+        for task in tasks:
+            with contextlib.suppress(asyncio.CancelledError):
+                await task
+        self._samplers.clear()
+        self._senders.clear()
+        keeper, self._keeper = self._keeper, None
+        if keeper is not None:
+            await keeper.stop()
+
+    async def _kept(self) -> Keeper:
+        """The spool's keeper, started if need be."""
+        settings = self._settings
+        if settings is None:
+            raise NotStored("gradys is stopped: `gradys start`")
+        async with self._opening:
+            if self._keeper is None:
+                largest, longest = settings.spool_mb * MEGABYTE, settings.spool_hours * 3600
+                keeper = Keeper(lambda: Spool(settings.spool, largest, longest))
+                await keeper.start(settings.sink)
+                self._keeper = keeper
+            return self._keeper
+
+    async def keep(self, readings: Sequence[Reading]) -> list[int]:
+        """Keep what was posted; the sequence numbers, when it is on the disk.
+
+        Raises:
+            NotStored: it is not.
+        """
+        return await (await self._kept()).keep(readings)
+
+    def flush(self) -> None:
+        """Try all sinks now."""
+        for sender in self._senders.values():
+            sender.flush()
+        if self._keeper is not None:
+            self._keeper.flush()
+
+    # -- sampling -----------------------------------------------------------------------------------------
+
+    async def _sample(self, sampler: Sampler, keeper: Keeper) -> None:
+        loop = asyncio.get_running_loop()
+        cadence = Cadence(sampler.quantity.period, loop.time())
+        while True:
+            await asyncio.sleep(cadence.wait(loop.time()))
+            for state in list(self._host.fleet.vehicles.values()):
+                reading = self._read(sampler, state)
+                if reading is not None:
+                    keeper.put(reading)
+
+    def _read(self, sampler: Sampler, state: VehicleState) -> Reading | None:
+        assert self._settings is not None
+        now, wall, max_age = self._host.clock(), self._wall(), self._settings.max_age
+        if sampler.quantity.name != POSITION or sampler.quantity.message:
+            return sampler.sample(state, now, wall, max_age)
+        try:
+            where = payload.position(
+                state,
+                now,
+                max_age=max_age,
+                link_timeout=self._host.link_timeout,
+                has_position=self._host.hangar.find(state.system).has_position,
+            )
+        except Unavailable as nothing:
+            sampler.skip(state.system, str(nothing))
+            return None
+        return sampler.take(state.system, [where.lat, where.lng, where.alt], wall - where.age)
+
+    # -- what the status says -------------------------------------------------------------------------------
+
+    def report(self) -> dict[str, Any]:
+        """spooled, oldest unsent, the spool, the sinks, the quantities."""
+        keeper = self._keeper
+        oldest = None if keeper is None else keeper.oldest_age
+        return {
+            "spooled": 0 if keeper is None else keeper.count + keeper.waiting,
+            "oldest_unsent_s": None if oldest is None else round(oldest, 1),
+            "spool": None if keeper is None else self._spool_report(keeper),
+            "sinks": [sender.report() for sender in self._senders.values()],
+            "quantities": [quantity_report(sampler) for sampler in self._samplers],
+        }
+
+    def _spool_report(self, keeper: Keeper) -> dict[str, Any]:
+        assert self._settings is not None
+        return {
+            "file": str(self._settings.spool),
+            "problem": keeper.problem or None,
+            "dropped": dict(keeper.dropped),
+            "set_aside": [str(file) for file in keeper.set_aside],
+        }
+
+
+def quantity_report(sampler: Sampler) -> dict[str, Any]:
+    """What the status says of one quantity."""
+    quantity: Quantity = sampler.quantity
+    why_not = {str(system): why for system, why in sorted(sampler.why_not.items())}
+    return {"quantity": quantity.name, "period_s": quantity.period, "taken": sampler.taken, "why_not": why_not}

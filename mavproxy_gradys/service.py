@@ -1,0 +1,92 @@
+"""The module as one thing that is started and stopped: its pushers, its sensing, its senders."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import random
+from typing import Any
+
+from mavproxy_gradys.address import Station
+from mavproxy_gradys.pusher import Pusher
+from mavproxy_gradys.sensing import Sensing
+from mavproxy_gradys.settings import Settings
+from mavproxy_gradys.tally import StationTally
+from mavproxy_uavapi.host.host import Host
+
+
+class Gradys:
+    """Everything of gradys that lives in the asyncio thread; so do all its methods.
+
+    Attributes:
+        stations: what became of the updates, by station; it outlives a stop and a start.
+        sensing: readings, their spool and their sinks.
+    """
+
+    def __init__(self, host: Host) -> None:
+        self.host = host
+        self.stations: dict[str, StationTally] = {}
+        self.sensing = Sensing(host)
+        self.settings: Settings | None = None
+        self._tasks: list[asyncio.Task[None]] = []
+
+    @property
+    def running(self) -> bool:
+        """Whether it pushes and senses."""
+        return self.settings is not None
+
+    async def start(self, settings: Settings) -> None:
+        """Push and sense as the settings say; does nothing when it does so already.
+
+        Raises:
+            NotDelivered: the CA file cannot be used.
+        """
+        if self.running:
+            return
+        pushers = [Pusher(station, self.host, settings, self._tally(station)) for station in settings.gs]
+        self.settings = settings
+        loop = asyncio.get_running_loop()
+        self._tasks = [loop.create_task(pusher.run()) for pusher in pushers]
+        await self.sensing.start(settings)
+
+    def _tally(self, station: Station) -> StationTally:
+        tally = self.stations.setdefault(station.url, StationTally(station.url, random.random))
+        tally.backoff.hurry()
+        return tally
+
+    async def stop(self) -> None:
+        """End it; what is not acknowledged stays in the spool."""
+        self.settings = None
+        tasks, self._tasks = self._tasks, []
+        for task in tasks:
+            task.cancel()
+        for task in tasks:
+            with contextlib.suppress(asyncio.CancelledError):
+                await task
+        await self.sensing.stop()
+
+    def flush(self) -> None:
+        """End all pauses after failures: everything is tried now."""
+        for tally in self.stations.values():
+            tally.backoff.hurry()
+            for vehicle in tally.vehicles.values():
+                vehicle.backoff.hurry()
+        self.sensing.flush()
+
+    def report(self) -> dict[str, Any]:
+        """What `GET /gradys/status` says."""
+        now = self.host.clock()
+        current = [] if self.settings is None else [station.url for station in self.settings.gs]
+        tallies = [self.stations[url] for url in current]
+        newest = max((tally for tally in tallies if tally.last_error), key=lambda t: t.last_error_at, default=None)
+        trips = [tally.round_trips.summary() for tally in tallies]
+        return {
+            "running": self.running,
+            "sent": sum(tally.total("sent") for tally in tallies),
+            "acknowledged": sum(tally.total("acknowledged") for tally in tallies),
+            "dropped_by_station": sum(tally.total("dropped") for tally in tallies),
+            "last_error": newest.last_error if newest else None,
+            "round_trip_ms": next((trip for trip in trips if trip), None),
+            "stations": [tally.report(now) for tally in tallies],
+            **self.sensing.report(),
+        }

@@ -1,0 +1,63 @@
+"""/jobs: the verbs in flight, and the last ones that ended."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mavproxy_uavapi.errors import Aborted, Busy, NotFound
+from mavproxy_uavapi.http.call import Call
+from mavproxy_uavapi.vehicle.copter import Copter
+from mavproxy_uavapi.vehicle.jobs import Job
+
+
+def describe(job: Job, now: float) -> dict[str, Any]:
+    """A job as an answer shows it; times in s."""
+    return {
+        "job": job.id,
+        "verb": job.verb,
+        "request": job.request,
+        "client": job.client,
+        "state": job.outcome_name,
+        "progress": job.progress,
+        "seconds": round((job.ended_at or now) - job.began_at, 3),
+        "result": job.result,
+        "error": None if job.error is None else error_of(job),
+    }
+
+
+def error_of(job: Job) -> dict[str, Any]:
+    """Why it failed, as the blocking call's answer would have said it."""
+    assert job.error is not None
+    error = job.error
+    return {"status": error.status, "code": error.code, "detail": error.detail, **error.extras()}
+
+
+def _job(call: Call) -> Job:
+    job = call.service.host.jobs.get(call.request.match_info["id"])
+    if job is None:
+        raise NotFound(f"there is no job {call.request.match_info['id']}")
+    return job
+
+
+async def list_jobs(call: Call) -> dict[str, Any]:
+    """All jobs that are running, and the last ones that ended."""
+    host = call.service.host
+    return {"jobs": [describe(job, host.clock()) for job in host.jobs.all()]}
+
+
+async def show_job(call: Call) -> dict[str, Any]:
+    """One job: its state, its progress, its result or error."""
+    return describe(_job(call), call.service.host.clock())
+
+
+async def abort_job(call: Call) -> dict[str, Any]:
+    """Abort a job; a copter stops and holds its place."""
+    job, host = _job(call), call.service.host
+    if not job.running:
+        raise Busy(f"job {job.id} ({job.verb}) has ended already")
+    vehicle = host.hangar.with_seat(job.seat)
+    flies = vehicle is not None and vehicle.seat.job is job
+    job.abort(Aborted(f"{job.verb} was aborted by DELETE /jobs/{job.id}"))
+    if flies and isinstance(vehicle, Copter):
+        await vehicle.hold()
+    return describe(job, host.clock())

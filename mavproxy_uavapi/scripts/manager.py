@@ -1,0 +1,243 @@
+"""The scripts of one API: upload, execute, watch, stop. Files are read in an executor, never on the loop."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import os
+import signal
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from mavproxy_uavapi.errors import BadRequest, NoVehicle, ToolFailed
+from mavproxy_uavapi.host.host import Host
+from mavproxy_uavapi.scripts import names, on_exit, runner, runs, tmux
+from mavproxy_uavapi.scripts.runs import Run
+from mavproxy_uavapi.scripts.store import Store
+from mavproxy_uavapi.settings import Settings
+
+log = logging.getLogger("uavapi.script")
+
+LOOK_EVERY = 0.25  # s between looks at a running script's lock and record: files tell nobody when they change
+START_TIMEOUT = 10.0  # s until the runner must have started the script
+SHELL = "bash"
+
+
+class Scripts:
+    """What the API knows and does of scripts. A script goes on when the API ends; the next one finds it again.
+
+    Args:
+        host: the vehicle that they fly.
+        settings: the snapshot in force.
+    """
+
+    def __init__(self, host: Host, settings: Settings) -> None:
+        self._host = host
+        self._settings = settings
+        self.store = Store(
+            Path(settings.scripts_path).expanduser(), settings.script_size * 1024, settings.script_quota * 1024 * 1024
+        )
+        self.logs = Path(settings.script_logs).expanduser()
+        self._watched: dict[str, Run] = {}
+        self._watches: dict[str, asyncio.Task[None]] = {}
+        self._launching = asyncio.Lock()
+
+    # -- life ---------------------------------------------------------------------------------------------
+
+    async def start(self) -> None:
+        """Find the scripts again that an earlier API started, by their sessions."""
+        try:
+            found = await tmux.sessions(names.session_prefix(self._settings.sysid))
+        except ToolFailed as error:
+            log.info("%s", error)  # execute will say so too
+            return
+        for session, record in found.items():
+            if record is None or session in self._watched:
+                continue
+            try:
+                run = await asyncio.to_thread(runs.load, record)
+            except (OSError, ValueError) as error:
+                log.warning("session %s has no readable record: %s", session, error)
+                continue
+            if run.running and run.port == self._settings.port:
+                log.info("%s still runs in session %s", run.script, session)
+                self._watch(run)
+
+    async def stop(self) -> None:
+        """Watch no more. The scripts go on."""
+        watches = list(self._watches.values())
+        for watch in watches:
+            watch.cancel()
+        await asyncio.gather(*watches, return_exceptions=True)
+
+    # -- verbs --------------------------------------------------------------------------------------------
+
+    async def save(self, name: str, data: bytes) -> Path:
+        """As `Store.save`.
+
+        Raises:
+            BadRequest: see there.
+            ToolFailed: the folder cannot be written to.
+        """
+        try:
+            return await asyncio.to_thread(self.store.save, name, data)
+        except OSError as error:
+            raise ToolFailed(f"cannot save {name} in {self.store.folder}: {error.strerror}") from error
+
+    async def execute(self, name: str, args: Sequence[str]) -> Run:
+        """Start a script in a session of its own; returns when it runs.
+
+        Raises:
+            BadRequest: it is running already, or `name` is no name for a script.
+            NotFound: no such script.
+            ToolFailed: no tmux, or it could not be started; nothing is left behind.
+        """
+        path = await asyncio.to_thread(self.store.find, name)
+        async with self._launching:
+            if self.running_run(path.name) is not None:
+                raise BadRequest(f"{path.name} is already running")
+            # A client that hangs up now must not leave a script that nobody watches.
+            return await asyncio.shield(self._launch(path, args))
+
+    async def _launch(self, path: Path, args: Sequence[str]) -> Run:
+        run = await self._create(path, args)
+        try:
+            await tmux.start(run.session, [sys.executable, "-I", runner.__file__, str(run.path)], run.path)
+            run = await self._started(run)
+        except ToolFailed:
+            await tmux.kill(run.session)
+            await asyncio.to_thread(runs.discard, run)
+            raise
+        self._watch(run)
+        log.info("%s runs in session %s", run.script, run.session)
+        return run
+
+    async def _create(self, path: Path, args: Sequence[str]) -> Run:
+        program = [SHELL] if path.suffix == ".sh" else [self._settings.python_path]
+        try:
+            return await asyncio.to_thread(
+                runs.create,
+                self.logs,
+                path.name,
+                args,
+                self.sysid,
+                command=[*program, str(path.absolute()), *args],
+                cwd=path.parent.absolute(),
+                port=self._settings.port,
+                grace=self._settings.script_grace,
+                environment=self.environment(),
+            )
+        except OSError as error:
+            raise ToolFailed(f"cannot write logs in {self.logs}: {error.strerror}") from error
+
+    async def _started(self, run: Run) -> Run:
+        deadline = time.monotonic() + START_TIMEOUT
+        while time.monotonic() < deadline:
+            run = await asyncio.to_thread(runs.refreshed, run)
+            if run.error is not None:
+                raise ToolFailed(run.error)
+            if run.pid is not None:
+                return run
+            await asyncio.sleep(0.05)
+        raise ToolFailed(f"session {run.session} did not start {run.script} within {START_TIMEOUT:g} s")
+
+    async def halt(self, name: str) -> Run:
+        """Ctrl-C, and a kill where that does not end it within the grace period; returns when it has ended.
+
+        A client that hangs up does not change that.
+
+        Raises:
+            NotFound, BadRequest: no such script; it is not running.
+        """
+        script = names.resolved(name)
+        run = self.running_run(script)
+        if run is None:
+            await asyncio.to_thread(self.store.find, name)
+            raise BadRequest(f"{script} is not running")
+        assert run.pid is not None
+        with contextlib.suppress(ProcessLookupError):  # it has just ended
+            os.kill(run.pid, signal.SIGTERM)  # to its runner, which knows what to do
+        await asyncio.shield(self._watches[run.session])
+        return await asyncio.to_thread(runs.refreshed, run)
+
+    async def running(self) -> list[Run]:
+        """The scripts that run now, oldest first."""
+        found = [await asyncio.to_thread(runs.refreshed, run) for run in list(self._watched.values())]
+        return sorted((run for run in found if run.running), key=lambda run: run.started_at)
+
+    def running_run(self, script: str) -> Run | None:
+        """The run of a script that goes on, as it was last looked at."""
+        return next((run for run in self._watched.values() if run.script == script), None)
+
+    async def newest(self, script: str) -> Run | None:
+        """The newest run of a script, whether it goes on or not."""
+        running = self.running_run(script)
+        if running is not None:
+            return await asyncio.to_thread(runs.refreshed, running)
+        told = await asyncio.to_thread(runs.of_script, self.logs, script)
+        return told[0] if told else None
+
+    # -- what a script is given ---------------------------------------------------------------------------
+
+    @property
+    def sysid(self) -> int:
+        """The vehicle's system id; 0 while none was heard and none is set."""
+        try:
+            return self._host.hangar.find(self._settings.sysid).state.system
+        except NoVehicle:
+            return self._settings.sysid
+
+    def environment(self) -> dict[str, str]:
+        """Our own environment, and what a script needs to reach us."""
+        return {
+            **os.environ,
+            "PYTHONUNBUFFERED": "1",  # so that the logs and the session show what it prints as it prints
+            "UAVAPI_URL": address(self._settings),
+            "UAVAPI_TOKEN": self._settings.token,
+            "UAVAPI_SYSID": str(self.sysid),
+        }
+
+    # -- watching -----------------------------------------------------------------------------------------
+
+    def _watch(self, run: Run) -> None:
+        self._watched[run.session] = run
+        self._watches[run.session] = asyncio.create_task(self._until_ended(run))
+
+    async def _until_ended(self, run: Run) -> None:
+        try:
+            while run.running:
+                await asyncio.sleep(LOOK_EVERY)
+                run = await asyncio.to_thread(runs.refreshed, run)
+                self._watched[run.session] = run
+        finally:
+            self._watched.pop(run.session, None)
+            self._watches.pop(run.session, None)
+        log.info("%s ended with status %s", run.script, run.exit_status)
+        if run.died:
+            self._keep(asyncio.create_task(self._after_death(run)))
+
+    def _keep(self, task: asyncio.Task[None]) -> None:
+        """Hold a task until it is done; asyncio itself holds it weakly."""
+        name = f"after {id(task)}"
+        self._watches[name] = task
+        task.add_done_callback(lambda _: self._watches.pop(name, None))
+
+    async def _after_death(self, run: Run) -> None:
+        others = [other.script for other in self._watched.values() if other.sysid in (0, run.sysid)]
+        if others:
+            log.warning("%s died in flight or not; left alone, because %s still runs", run.script, others[0])
+            return
+        sysid = run.sysid or self._settings.sysid
+        done = await on_exit.after_death(self._host, sysid, self._settings.on_script_exit, run.script)
+        log.warning("%s died (status %s): %s", run.script, run.exit_status, done)
+
+
+def address(settings: Settings) -> str:
+    """The URL by which this machine reaches the API."""
+    scheme = "https" if settings.certfile else "http"
+    everywhere = {"0.0.0.0": "127.0.0.1", "::": "::1"}
+    host = everywhere.get(settings.host, settings.host)
+    return f"{scheme}://[{host}]:{settings.port}" if ":" in host else f"{scheme}://{host}:{settings.port}"

@@ -1,0 +1,52 @@
+"""What a script may be called. Pure."""
+
+from __future__ import annotations
+
+import re
+from pathlib import PurePath
+
+from mavproxy_uavapi.errors import BadRequest
+
+SUFFIXES = (".py", ".sh")
+LONGEST = 100  # characters; with a timestamp behind it a log's name must still fit into 255 bytes
+ALLOWED = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]*")
+
+
+def checked(name: str) -> str:
+    """A script's file name, as it is.
+
+    Raises:
+        BadRequest: it is no single, plain file name, or neither .py nor .sh.
+    """
+    if not ALLOWED.fullmatch(name) or len(name) > LONGEST:
+        raise BadRequest(
+            f"{name[:LONGEST]!r} is no name for a script: letters, digits, '.', '_' and '-' only, not beginning with "
+            f"'.' or '-', and at most {LONGEST} of them"
+        )
+    if PurePath(name).suffix not in SUFFIXES:
+        raise BadRequest(f"{name!r} is neither a .py nor a .sh file")
+    return name
+
+
+def resolved(name: str) -> str:
+    """The file name that a client means, which may leave `.py` out.
+
+    Raises:
+        BadRequest: as `checked`.
+    """
+    return checked(name if PurePath(name).suffix in SUFFIXES else f"{name}.py")
+
+
+def stem(script: str) -> str:
+    """The file name without its extension, by which logs are named."""
+    return PurePath(script).stem
+
+
+def session_name(sysid: int, run: str) -> str:
+    """The tmux session of a run: `run` is `<stem>_<timestamp>`. tmux allows neither '.' nor ':' in a name."""
+    return f"{session_prefix(sysid)}{run.replace('.', '_')}"
+
+
+def session_prefix(sysid: int) -> str:
+    """How the sessions of a vehicle's scripts begin; of every vehicle's, where `sysid` is 0."""
+    return f"uavapi_{sysid}_" if sysid else "uavapi_"

@@ -1,0 +1,208 @@
+"""The program in a script's tmux session: runs the script, logs it, stops it, and records how it ended.
+
+It is started by its path and uses the standard library only, so that it runs whatever the session's
+environment is. Its one argument is the run's record (see `runs.py`), which it alone writes from then on. It
+holds a lock on the output log for as long as it lives: so the API, even one started later, knows without any
+process id whether the run goes on.
+
+SIGTERM (or the end of the tmux session) stops the script: Ctrl-C first, so that `finally` blocks land the
+vehicle; it is killed when it has not ended within the grace period. The API's end changes nothing here.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import json
+import os
+import selectors
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any, BinaryIO
+
+CHUNK = 65536  # bytes
+LOG_LIMIT = 50 * 1024 * 1024  # bytes of each log; an endless script must not fill a companion computer's card
+LAST_OUTPUT = 0.5  # s for what the script's own children still write after its end
+CANNOT_START = 127  # as a shell has it
+
+
+class Terminal:
+    """The tmux pane: shows what it can take at once, so that Ctrl-S there does not stop a flying script."""
+
+    def __init__(self) -> None:
+        try:
+            self._fd = os.open(os.ttyname(1), os.O_WRONLY | os.O_NONBLOCK | os.O_NOCTTY)
+        except OSError:  # there is none: somebody started us by hand with the output sent elsewhere
+            self._fd = 1
+
+    def show(self, data: bytes) -> None:
+        """Write it; what the terminal does not take is in the log."""
+        with contextlib.suppress(OSError):  # nobody has the session any more: the script goes on all the same
+            os.write(self._fd, data)
+
+
+class Log:
+    """One output stream of the script: into its file, and onto the terminal."""
+
+    def __init__(self, path: str, terminal: Terminal) -> None:
+        self.file: BinaryIO = open(path, "ab", buffering=0)  # noqa: SIM115  open until the runner ends
+        self._terminal = terminal
+        self._left = LOG_LIMIT
+
+    def write(self, data: bytes) -> None:
+        """Take what the script wrote."""
+        self._terminal.show(data)
+        if self._left <= 0:
+            return
+        self._left -= len(data)
+        try:
+            self.file.write(data)
+            if self._left <= 0:
+                self.file.write(b"\n[the log is full]\n")
+        except OSError as error:  # the disk is full: no reason to end a script in flight
+            self._left = 0
+            self._terminal.show(f"\n[no more log: {error.strerror}]\n".encode())
+
+
+class Runner:
+    """One run of a script, from its record."""
+
+    def __init__(self, record: Path) -> None:
+        self._path = record
+        self._record: dict[str, Any] = json.loads(record.read_text(encoding="utf-8"))
+        self._terminal = Terminal()
+        self._out = Log(self._record["out_log"], self._terminal)
+        self._err = Log(self._record["err_log"], self._terminal)
+        self._child: subprocess.Popen[bytes] | None = None
+        self._stop_wanted = False
+        self._kill_at: float | None = None
+
+    def run(self) -> int:
+        """Run the script to its end; its exit status."""
+        fcntl.flock(self._out.file, fcntl.LOCK_EX)
+        with selectors.DefaultSelector() as selector:
+            self._listen_to_signals(selector)
+            try:
+                self._start()
+            except OSError as error:
+                sentence = f"cannot start {self._record['script']}: {error}"
+                self._err.write(sentence.encode() + b"\n")
+                return self._end(CANNOT_START, error=sentence)
+            self._pump(selector)
+        assert self._child is not None
+        return self._end(self._child.wait())
+
+    def _start(self) -> None:
+        environment = self._path.with_name(self._path.name.replace("_run.json", "_env.json"))
+        given: dict[str, str] = json.loads(environment.read_text(encoding="utf-8"))
+        environment.unlink()  # it may hold a token
+        self._child = subprocess.Popen(
+            self._record["command"],
+            cwd=self._record["cwd"],
+            env={**given, **{name: os.environ[name] for name in os.environ if name.startswith(("TERM", "TMUX"))}},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            preexec_fn=_be_in_front,  # nothing else runs in this process: no threads, no locks
+        )
+        self._note(pid=os.getpid())
+
+    def _listen_to_signals(self, selector: selectors.BaseSelector) -> None:
+        reader, writer = os.pipe()
+        os.set_blocking(reader, False)
+        os.set_blocking(writer, False)
+        signal.set_wakeup_fd(writer)
+        for number in (signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, self._on_stop)
+        for number in (signal.SIGCHLD, signal.SIGINT):
+            signal.signal(number, lambda *_: None)
+        signal.signal(signal.SIGTTOU, signal.SIG_IGN)  # the script has the terminal, and we write to it too
+        selector.register(reader, selectors.EVENT_READ)
+
+    def _on_stop(self, *_: object) -> None:
+        self._stop_wanted = True
+
+    def _pump(self, selector: selectors.BaseSelector) -> None:
+        """Pass on what the script writes, until it has ended."""
+        child = self._child
+        assert child is not None and child.stdout is not None and child.stderr is not None
+        for stream, log in ((child.stdout, self._out), (child.stderr, self._err)):
+            os.set_blocking(stream.fileno(), False)
+            selector.register(stream, selectors.EVENT_READ, log)
+        ended_at: float | None = None
+        while any(key.data is not None for key in selector.get_map().values()):
+            if child.poll() is not None:
+                ended_at = ended_at or time.monotonic()
+            if ended_at is not None and time.monotonic() > ended_at + LAST_OUTPUT:
+                return  # a child of the script keeps its output open
+            self._stop_if_wanted(child)
+            for key, _ in selector.select(self._patience(ended_at)):
+                self._pass_on(selector, key)
+        while child.poll() is None:  # it closed its outputs, and goes on
+            self._stop_if_wanted(child)
+            for key, _ in selector.select(self._patience(None)):
+                self._pass_on(selector, key)
+
+    def _patience(self, ended_at: float | None) -> float | None:
+        if ended_at is not None:
+            return LAST_OUTPUT
+        if self._kill_at is None or self._record.get("killed"):
+            return None
+        return max(self._kill_at - time.monotonic(), 0.0)
+
+    def _pass_on(self, selector: selectors.BaseSelector, key: selectors.SelectorKey) -> None:
+        try:
+            data = os.read(key.fd, CHUNK)
+        except BlockingIOError:
+            return
+        if key.data is None:
+            return  # a signal woke us
+        if data:
+            key.data.write(data)
+        else:
+            selector.unregister(key.fileobj)
+
+    def _stop_if_wanted(self, child: subprocess.Popen[bytes]) -> None:
+        if self._stop_wanted and self._kill_at is None:
+            self._kill_at = time.monotonic() + self._record["grace"]
+            self._note(stopping_at=time.time())
+            _send(child, signal.SIGINT)
+            _send(child, signal.SIGCONT)  # a script that was suspended (Ctrl-Z) cannot hear otherwise
+        if self._kill_at is not None and time.monotonic() >= self._kill_at and not self._record.get("killed"):
+            self._note(killed=True)
+            _send(child, signal.SIGKILL)
+
+    def _end(self, status: int, **more: Any) -> int:
+        self._note(exit_status=status, ended_at=time.time(), **more)
+        self._terminal.show(f"\n[{self._record['script']} ended with status {status}]\n".encode())
+        return status
+
+    def _note(self, **what: Any) -> None:
+        """Write it into the record, which readers find whole at any time."""
+        self._record.update(what)
+        written = self._path.with_suffix(".tmp")
+        try:
+            written.write_text(json.dumps(self._record), encoding="utf-8")
+            written.replace(self._path)
+        except OSError as error:  # the disk is full: no reason to end a script in flight
+            self._terminal.show(f"\n[cannot write {self._path.name}: {error.strerror}]\n".encode())
+
+
+def _be_in_front() -> None:
+    """In the script's process: a group of its own, which has the terminal, so that Ctrl-C there reaches it."""
+    os.setpgid(0, 0)
+    if os.isatty(0):
+        os.tcsetpgrp(0, os.getpgrp())
+    signal.signal(signal.SIGTTOU, signal.SIG_DFL)
+
+
+def _send(child: subprocess.Popen[bytes], number: int) -> None:
+    """Signal the script and its children."""
+    with contextlib.suppress(ProcessLookupError):  # it has just ended
+        os.killpg(child.pid, number)
+
+
+if __name__ == "__main__":
+    sys.exit(Runner(Path(sys.argv[1])).run() & 0xFF)

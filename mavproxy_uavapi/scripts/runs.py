@@ -1,0 +1,214 @@
+"""A run of a script: what its record, its logs and its lock tell. Blocking: for an executor, not for the loop."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from mavproxy_uavapi.scripts import names
+
+RECORD = "_run.json"
+ENVIRONMENT = "_env.json"
+TAIL = 4096  # bytes of a log's end that an answer carries
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run, as its record told it last.
+
+    Attributes:
+        path: the record's file.
+        script, args: what runs.
+        session: its tmux session.
+        sysid, port: the vehicle that it flies, and the API that started it.
+        started_at, stopping_at, ended_at: s since 1970; None where that has not happened.
+        out_log, err_log: what it writes.
+        grace: s from Ctrl-C to the kill.
+        pid: its runner's process; None before it has started.
+        exit_status: as a shell has it, negative for a signal; None while it runs, and where nobody could tell.
+        killed: whether it was killed after the grace period.
+        error: why it could not start.
+        alive: whether its runner lives.
+    """
+
+    path: Path
+    script: str
+    args: list[str]
+    session: str
+    sysid: int
+    port: int
+    started_at: float
+    out_log: Path
+    err_log: Path
+    grace: float
+    pid: int | None = None
+    stopping_at: float | None = None
+    ended_at: float | None = None
+    exit_status: int | None = None
+    killed: bool = False
+    error: str | None = None
+    alive: bool = False
+
+    @property
+    def running(self) -> bool:
+        """Whether it goes on."""
+        return self.alive and self.ended_at is None
+
+    @property
+    def died(self) -> bool:
+        """Whether it ended otherwise than by itself with status 0, or by Ctrl-C on our asking."""
+        if self.running:
+            return False
+        asked_to = self.stopping_at is not None and not self.killed and self.exit_status is not None
+        return self.exit_status != 0 and not asked_to
+
+    def report(self, now: float) -> dict[str, Any]:
+        """What clients see; `now` is in s since 1970."""
+        told: dict[str, Any] = {
+            "script": self.script,
+            "args": self.args,
+            "session": self.session,
+            "attach": f"tmux attach -t {self.session}",
+            "started_at": moment(self.started_at),
+            "out_log": str(self.out_log),
+            "err_log": str(self.err_log),
+            "running": self.running,
+        }
+        if self.running:
+            told["running_for_s"] = round(now - self.started_at, 3)
+            told["stopping"] = self.stopping_at is not None
+            if self.stopping_at is not None:
+                told["kill_in_s"] = round(max(self.stopping_at + self.grace - now, 0.0), 3)
+            return told
+        told["ended_at"] = None if self.ended_at is None else moment(self.ended_at)
+        told["exit_status"] = self.exit_status
+        told["killed"] = self.killed
+        return told if self.error is None else {**told, "error": self.error}
+
+
+def moment(at: float) -> str:
+    """ISO 8601 with this machine's time zone, whole seconds; `at` in s since 1970."""
+    return datetime.fromtimestamp(at).astimezone().isoformat(timespec="seconds")
+
+
+def create(
+    logs: Path,
+    script: str,
+    args: Sequence[str],
+    sysid: int,
+    *,
+    command: Sequence[str],
+    cwd: Path,
+    port: int,
+    grace: float,
+    environment: Mapping[str, str],
+) -> Run:
+    """The files of a new run: record, environment (for the runner alone) and two empty logs.
+
+    Raises:
+        OSError: they cannot be written.
+    """
+    logs.mkdir(parents=True, exist_ok=True)
+    started_at = time.time()
+    stamp = datetime.fromtimestamp(started_at).strftime("%Y%m%d_%H%M%S")
+    name = f"{names.stem(script)}_{stamp}"
+    path = logs / f"{name}{RECORD}"
+    if path.exists():  # the run before it was as short as that; a name holds whole seconds
+        time.sleep(1.0 - started_at % 1.0)
+        return create(
+            logs, script, args, sysid, command=command, cwd=cwd, port=port, grace=grace, environment=environment
+        )
+    out_log, err_log = logs / f"{name}_out.log", logs / f"{name}_err.log"
+    record = {
+        "script": script,
+        "args": list(args),
+        "session": names.session_name(sysid, name),
+        "sysid": sysid,
+        "port": port,
+        "started_at": started_at,
+        "out_log": str(out_log),
+        "err_log": str(err_log),
+        "grace": grace,
+        "command": list(command),
+        "cwd": str(cwd),
+    }
+    out_log.touch()
+    err_log.touch()
+    secret = os.open(logs / f"{name}{ENVIRONMENT}", os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    with os.fdopen(secret, "w", encoding="utf-8") as file:
+        json.dump(dict(environment), file)
+    path.write_text(json.dumps(record), encoding="utf-8")
+    return load(path)
+
+
+def discard(run: Run) -> None:
+    """Remove the files of a run that never began."""
+    environment = run.path.with_name(run.path.name.replace(RECORD, ENVIRONMENT))
+    for file in (run.path, environment, run.out_log, run.err_log):
+        file.unlink(missing_ok=True)
+
+
+def load(path: Path) -> Run:
+    """The run that this record tells of.
+
+    Raises:
+        OSError, ValueError: there is no such record.
+    """
+    out_log = path.with_name(path.name.replace(RECORD, "_out.log"))
+    alive = _is_locked(out_log)  # first: a run that ends meanwhile has written its record by then
+    record = json.loads(path.read_text(encoding="utf-8"))
+    told = {name: record[name] for name in Run.__dataclass_fields__ if name in record}
+    try:
+        told |= {"path": path, "out_log": out_log, "err_log": Path(record["err_log"]), "alive": alive}
+        return Run(**told)
+    except (TypeError, KeyError) as error:
+        raise ValueError(f"{path} is no record of a run") from error
+
+
+def refreshed(run: Run) -> Run:
+    """The run as it is now."""
+    try:
+        return load(run.path)
+    except (OSError, ValueError):  # somebody removed the record
+        return replace(run, alive=_is_locked(run.out_log))
+
+
+def of_script(logs: Path, script: str) -> list[Run]:
+    """The runs of a script that `logs` tell of, newest first."""
+    found = []
+    for path in logs.glob(f"{names.stem(script)}_*{RECORD}"):
+        try:
+            run = load(path)
+        except (OSError, ValueError):
+            continue  # another file of that name, or one that was just removed
+        if run.script == script:
+            found.append(run)
+    return sorted(found, key=lambda run: run.started_at, reverse=True)
+
+
+def tail(log: Path, size: int = TAIL) -> str:
+    """The end of a log; empty when there is none."""
+    try:
+        with log.open("rb") as file:
+            file.seek(max(file.seek(0, os.SEEK_END) - size, 0))
+            return file.read().decode(errors="replace")
+    except FileNotFoundError:
+        return ""
+
+
+def _is_locked(log: Path) -> bool:
+    try:
+        with log.open("rb") as file:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except FileNotFoundError:
+        return False
+    return False

@@ -1,0 +1,63 @@
+"""Other programs: run one, without ever blocking the loop, and know how it ended."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import signal
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from mavproxy_uavapi.errors import TimedOut, ToolFailed
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a program ended: its exit status, and what it wrote."""
+
+    status: int
+    stdout: str
+    stderr: str
+
+
+async def run_tool(command: Sequence[str], timeout: float, cwd: Path | None = None) -> Outcome:
+    """Run a program to its end. No shell is involved.
+
+    Whatever ends the wait early (time, a client that hangs up) ends the program and its children too.
+
+    Args:
+        command: the program and its arguments.
+        timeout: in s.
+        cwd: where it runs.
+
+    Raises:
+        ToolFailed: it is not there.
+        TimedOut: it took longer.
+    """
+    name = command[0]
+    try:
+        process = await asyncio.create_subprocess_exec(
+            *command,
+            cwd=cwd,
+            stdin=asyncio.subprocess.DEVNULL,
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.PIPE,
+            start_new_session=True,
+        )
+    except FileNotFoundError as error:
+        raise ToolFailed(f"{name} is not installed on this machine") from error
+    except OSError as error:
+        raise ToolFailed(f"cannot run {name}: {error.strerror}") from error
+    try:
+        out, err = await asyncio.wait_for(process.communicate(), timeout)
+    except asyncio.TimeoutError:
+        raise TimedOut(f"{name} did not end within {timeout:g} s") from None
+    finally:
+        if process.returncode is None:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            await asyncio.shield(process.wait())
+    assert process.returncode is not None
+    return Outcome(process.returncode, out.decode(errors="replace"), err.decode(errors="replace"))

@@ -1,0 +1,106 @@
+"""Corners to a tenth of a pixel: lines through the edge points of each side, intersected. Pure.
+
+OpenCV's own corners lie inside the true edge, so that a far tag seems farther: 0.17 m at 5 m, 1.04 m at 9 m.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Corners = NDArray[np.float64]
+
+ALONG = 20  # sample lines across each side
+ACROSS = 11  # samples along each of them
+ENDS = 0.12  # of a side left out at both ends, where the neighbouring side blurs in
+REACH = (1.5, 5.0)  # px to both sides of the rough edge, at least and at most
+REACH_SHARE = 0.10  # of the side's length: less than the outermost cell, so that no payload is taken for the edge
+TRUSTED = 2.5  # px that a refined corner may move; farther, the rough one was no corner
+
+
+def refine(image: NDArray[np.uint8], rough: Corners) -> Corners:
+    """The corners (4, 2) of a dark square on a light ground, sharpened; those that cannot be stay as they are.
+
+    Args:
+        image: grey, shape (height, width).
+        rough: corners in px, clockwise, within about two pixels of the true ones.
+    """
+    starts, ends = rough, np.roll(rough, -1, axis=0)
+    lengths = np.linalg.norm(ends - starts, axis=1)
+    if lengths.min() < 6:
+        return rough
+    along = (ends - starts) / lengths[:, None]
+    outward = np.stack([along[:, 1], -along[:, 0]], axis=1)  # of a clockwise square, in image coordinates
+    reach = np.clip(REACH_SHARE * lengths, *REACH)
+    steps = np.linspace(ENDS, 1 - ENDS, ALONG)
+    feet = starts[:, None] + steps[None, :, None] * (ends - starts)[:, None]  # (4, ALONG, 2)
+    offsets = np.linspace(-1.0, 1.0, ACROSS)[None, :] * reach[:, None]  # (4, ACROSS)
+    points = feet[:, :, None] + offsets[:, None, :, None] * outward[:, None, None]
+    flat = points.reshape(4 * ALONG, ACROSS, 2).astype(np.float32)
+    values: Any = cv2.remap(
+        image, flat[..., 0], flat[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0
+    )
+    inside = _inside(points, image.shape)
+    edges, weights = _edges(values.reshape(4, ALONG, ACROSS).astype(np.float64), offsets)
+    weights = weights * inside
+    lines = _fit(feet + edges[..., None] * outward[:, None], weights, along)
+    return _intersect(lines, rough)
+
+
+def _inside(points: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.float64]:
+    height, width = shape[:2]
+    x, y = points[..., 0], points[..., 1]
+    within = (x >= 0) & (x <= width - 1) & (y >= 0) & (y <= height - 1)
+    return within.all(axis=2).astype(np.float64)
+
+
+def _edges(
+    profiles: NDArray[np.float64], offsets: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Where each profile (dark to light, outward) rises: offset in px, and how much it can be trusted."""
+    rises = np.maximum(np.diff(profiles, axis=2), 0.0)
+    middles = (offsets[:, 1:] + offsets[:, :-1]) / 2
+    peak = rises.max(axis=2, keepdims=True)
+    rises = np.where(rises > 0.3 * peak, rises, 0.0)  # noise rises too
+    total = rises.sum(axis=2)
+    edge = (rises * middles[:, None]).sum(axis=2) / np.maximum(total, 1e-9)
+    return edge, np.where(total > 15.0, total, 0.0)
+
+
+def _fit(points: NDArray[np.float64], weights: NDArray[np.float64], along: Corners) -> list[Any]:
+    """For each side a point on its line and its normal; None where too little is seen."""
+    lines: list[Any] = []
+    for side in range(4):
+        xy, weight = points[side], weights[side].copy()
+        line = None
+        for _ in range(3):
+            if np.count_nonzero(weight) < 6:
+                line = None
+                break
+            centre = np.average(xy, axis=0, weights=weight)
+            spread = (xy - centre) * np.sqrt(weight)[:, None]
+            direction = np.linalg.svd(spread, full_matrices=False)[2][0]
+            normal = np.array([direction[1], -direction[0]])
+            away = np.abs((xy - centre) @ normal)
+            line = (centre, normal)
+            weight = np.where(away > max(2.5 * float(np.median(away[weight > 0])), 0.15), 0.0, weight)
+        lines.append(line if line is not None and abs(float(line[1] @ along[side])) < 0.2 else None)
+    return lines
+
+
+def _intersect(lines: list[Any], rough: Corners) -> Corners:
+    corners = rough.copy()
+    for i in range(4):
+        before, after = lines[i - 1], lines[i]
+        if before is None or after is None:
+            continue
+        normals = np.array([before[1], after[1]])
+        if abs(np.linalg.det(normals)) < 0.2:
+            continue
+        corner = np.linalg.solve(normals, [before[1] @ before[0], after[1] @ after[0]])
+        if np.linalg.norm(corner - rough[i]) <= TRUSTED + 0.04 * np.linalg.norm(rough[i] - rough[i - 2]):
+            corners[i] = corner
+    return corners

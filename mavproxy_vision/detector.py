@@ -1,0 +1,138 @@
+"""AprilTags in a grey frame, by cv2.aruco.
+
+Not pupil-apriltags nor dt-apriltags: both aborted the process when detectors of several families were built.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mavproxy_vision.corners import Corners, refine
+from mavproxy_vision.dictionaries import Family, family
+from mavproxy_vision.model import CameraModel
+from mavproxy_vision.sighting import Sighting
+from mavproxy_vision.tags import FAMILIES
+
+Image = NDArray[np.uint8]
+
+FAR_ZOOM = 2  # the far setting looks at the frame enlarged so much
+SQUARE = 0.35  # the shorter diagonal of a tag in view is at least so much of the longer one
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to look.
+
+    Attributes:
+        families: names of `tags.FAMILIES`.
+        sizes: side of the black square (m) by id.
+        any_id: look for all ids, not only for those of `sizes`; slower, and 16h5 sees ghosts then.
+        far: see a seventh farther, at several times the cost.
+        refine: sharpen the corners.
+    """
+
+    families: tuple[str, ...] = ("36h11",)
+    sizes: Mapping[int, float] | None = None
+    any_id: bool = False
+    far: bool = False
+    refine: bool = True
+
+
+class Detector:
+    """Finds tags. One thread at a time.
+
+    Args:
+        model: the camera; frames of another size are taken as the same lens scaled.
+        options: how to look.
+    """
+
+    def __init__(self, model: CameraModel, options: Options) -> None:
+        self.model, self.options = model, options
+        self._sizes = dict(options.sizes or {})
+        wanted: Iterable[int] | None = None if options.any_id or not self._sizes else self._sizes
+        families = [family(name, wanted) for name in options.families]
+        self._families = [one for one in families if one.ids is None or one.ids]
+        self._detectors = [cv2.aruco.ArucoDetector(f.dictionary, parameters(f, options)) for f in self._families]
+        self._bits = {f.name: {} for f in self._families}  # type: dict[str, dict[int, Any]]
+
+    def detect(self, image: Image) -> tuple[Sighting, ...]:
+        """The tags in a grey frame, shape (height, width)."""
+        zoom = FAR_ZOOM if self.options.far else 1
+        shown = image
+        if zoom > 1:
+            shown = np.asarray(cv2.resize(image, None, fx=zoom, fy=zoom, interpolation=cv2.INTER_CUBIC), np.uint8)
+        model = self.model.scaled_to(image.shape[1], image.shape[0])
+        found = []
+        for one, detector in zip(self._families, self._detectors, strict=True):
+            corners, indices, _ = detector.detectMarkers(shown)
+            for quad, index in zip(corners, () if indices is None else indices.ravel(), strict=True):
+                rough = (np.asarray(quad, np.float64).reshape(4, 2) + 0.5) / zoom - 0.5
+                sighting = self._sight(image, model, one, int(index), rough)
+                if sighting is not None:
+                    found.append(sighting)
+        return tuple(found)
+
+    def _sight(
+        self, image: Image, model: CameraModel, one: Family, index: int, rough: Corners
+    ) -> Sighting | None:
+        if not is_squarish(rough):
+            return None
+        corners = refine(image, rough) if self.options.refine else rough
+        number = one.id_of(index)
+        hamming = self._hamming(image, one, index, corners)
+        size = self._sizes.get(number, 0.0)
+        if size <= 0:
+            return Sighting(one.name, number, hamming, corners)
+        position, turned, error = locate(model, corners, size)
+        return Sighting(one.name, number, hamming, corners, size, position, turned, error)
+
+    def _hamming(self, image: Image, one: Family, index: int, corners: Corners) -> int:
+        """Payload bits that do not agree, read at the middles of the cells."""
+        bits = self._bits[one.name].setdefault(index, one.bits(index))
+        cells = FAMILIES[one.name][0]
+        square = np.array([[0, 0], [cells, 0], [cells, cells], [0, cells]], np.float32)
+        transform = cv2.getPerspectiveTransform(square, corners.astype(np.float32))
+        middles = np.arange(cells) + 0.5
+        grid = np.stack(np.meshgrid(middles, middles), axis=-1).reshape(1, -1, 2)
+        points = cv2.perspectiveTransform(grid, transform).astype(np.float32)[0]
+        values = cv2.remap(image, points[:, 0], points[:, 1], cv2.INTER_LINEAR).reshape(cells, cells)
+        payload = values[1:-1, 1:-1].astype(np.float64)
+        border = np.concatenate([values[0], values[-1], values[:, 0], values[:, -1]]).mean()
+        middle = (payload.max() + min(border, payload.min())) / 2
+        return int(np.count_nonzero((payload > middle) != (bits == 1)))
+
+
+def is_squarish(corners: Corners) -> bool:
+    """Whether four corners may be a tag seen from a sane angle."""
+    one, other = np.linalg.norm(corners[0] - corners[2]), np.linalg.norm(corners[1] - corners[3])
+    return bool(min(one, other) >= SQUARE * max(one, other))
+
+
+def parameters(one: Family, options: Options) -> Any:
+    """OpenCV's detector parameters: the defaults where they are good, which was measured for the others."""
+    chosen = cv2.aruco.DetectorParameters()
+    chosen.errorCorrectionRate = one.correction
+    if options.far:
+        chosen.adaptiveThreshWinSizeMin, chosen.adaptiveThreshWinSizeMax = 5, 25
+        chosen.adaptiveThreshWinSizeStep = 10
+    return chosen
+
+
+def locate(model: CameraModel, corners: Corners, size: float) -> tuple[Any, Any, float]:
+    """Position (m) and rotation of a square of `size` m in the camera's frame, and the error (px, rms)."""
+    half = size / 2
+    square = np.array([[-half, half, 0], [half, half, 0], [half, -half, 0], [-half, -half, 0]])
+    count, rotations, positions, errors = cv2.solvePnPGeneric(
+        square, corners.reshape(4, 1, 2), model.matrix, model.coefficients, flags=cv2.SOLVEPNP_IPPE_SQUARE
+    )
+    if not count:
+        return None, None, math.nan
+    rms = float(np.ravel(errors)[0])
+    return positions[0].ravel(), cv2.Rodrigues(rotations[0])[0], rms

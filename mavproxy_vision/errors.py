@@ -1,0 +1,53 @@
+"""What can go wrong with seeing and landing, as children of the project's error tree.
+
+    UavApiError
+    |- Aborted (409 aborted)
+    |  `- LandingFailed     not landed on the tag; `report` tells what was tried and what was done instead
+    |- BadRequest (400 bad_request)
+    |  `- BadImage          what was posted is no image
+    |- Unavailable (503)
+    |  `- NoCamera          503 no_camera: no source is set, or it gives no frames
+    `- Invalid (422 invalid)
+       `- BadSetting        a setting that does not exist or a value that it does not take
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from mavproxy_uavapi.errors import Aborted, BadRequest, Invalid, Unavailable
+
+
+class LandingFailed(Aborted):
+    """Not landed on the tag.
+
+    Args:
+        sentence: why.
+        report: what was tried, and what was done instead.
+    """
+
+    def __init__(self, sentence: str, report: Mapping[str, Any]) -> None:
+        super().__init__(sentence)
+        self.report = dict(report)
+
+    def extras(self) -> dict[str, Any]:
+        """`info`: the report."""
+        return {"info": self.report}
+
+
+class BadImage(BadRequest):
+    """What was posted is no image that OpenCV can read."""
+
+
+class NoCamera(Unavailable):
+    """No source is set, or it gives no frames."""
+
+    code = "no_camera"
+
+
+class BadSetting(Invalid):
+    """A setting that does not exist, or a value that it does not take; the text is one clear line."""
+
+    def __str__(self) -> str:
+        return str(self.problems[0]["msg"])

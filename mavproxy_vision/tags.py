@@ -1,0 +1,77 @@
+"""Which tags are landed on: families, ids, sizes, and where they lie. Pure.
+
+A list of tags is written `ID:SIZE[@X,Y]`, separated by spaces or semicolons: the size in m is that of the black
+square; X and Y in m are where the tag's centre lies from the target, to the right and to the top of the tags.
+The first one is the main tag. `0:0.30 1:0.06@0.25,0` is a large tag with a small one to its right.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+from mavproxy_vision.errors import BadSetting
+
+# Family -> cells along the black square, and how many ids it has.
+FAMILIES = {"36h11": (8, 587), "25h9": (7, 35), "16h5": (6, 30), "36h10": (8, 2320)}
+PATTERN = re.compile(r"(\d+):([0-9.]+)(?:@(-?[0-9.]+),(-?[0-9.]+))?")
+
+
+@dataclass(frozen=True)
+class Tag:
+    """A tag of the target: id, side of the black square (m), its centre right of and above the target's (m)."""
+
+    id: int
+    size: float
+    right: float = 0.0
+    up: float = 0.0
+
+
+def parse_tags(text: str) -> tuple[Tag, ...]:
+    """Read a list of tags.
+
+    Raises:
+        BadSetting: it is no such list.
+    """
+    found = []
+    for word in re.split(r"[\s;]+", text.strip()):
+        match = PATTERN.fullmatch(word)
+        if match is None:
+            raise BadSetting(f"tags: {word!r} is not ID:SIZE or ID:SIZE@RIGHT,UP, in m", "tags")
+        size = float(match[2])
+        if not 0.005 <= size <= 10:
+            raise BadSetting(f"tags: a size of {size:g} m", "tags")
+        found.append(Tag(int(match[1]), size, float(match[3] or 0), float(match[4] or 0)))
+    if len({tag.id for tag in found}) != len(found):
+        raise BadSetting("tags: an id twice", "tags")
+    return tuple(found)
+
+
+def parse_families(text: str) -> tuple[str, ...]:
+    """Read family names, separated by commas or spaces.
+
+    Raises:
+        BadSetting: one of them is unknown.
+    """
+    names = tuple(name.lower().removeprefix("tag") for name in re.split(r"[\s,;]+", text.strip()) if name)
+    for name in names:
+        if name not in FAMILIES:
+            raise BadSetting(f"family: {name!r} is none of {', '.join(FAMILIES)}", "family")
+    if not names:
+        raise BadSetting(f"family: one or several of {', '.join(FAMILIES)}", "family")
+    return names
+
+
+def target_from(tag: Tag, x_axis: tuple[float, float]) -> tuple[float, float]:
+    """North and east (m) from the tag's centre to the target's.
+
+    Args:
+        tag: the tag that is seen.
+        x_axis: where the tag's right is: north and east components, of any length.
+    """
+    length = math.hypot(*x_axis) or 1.0
+    north, east = x_axis[0] / length, x_axis[1] / length
+    # Seen from above, the tag's top is a quarter turn anticlockwise from its right.
+    up_north, up_east = east, -north
+    return -(tag.right * north + tag.up * up_north), -(tag.right * east + tag.up * up_east)
