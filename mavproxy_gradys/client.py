@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import ssl
-from typing import Any
+from typing import Any, Protocol
 
 import aiohttp
 
@@ -15,6 +15,16 @@ CONNECTIONS = 8  # to one receiver at a time
 LARGEST_ANSWER = 1024 * 1024  # bytes; a receiver that says more is not heard out
 FORM = "application/x-www-form-urlencoded"
 JSON = "application/json"
+
+
+class Poster(Protocol):
+    """What the push and the HTTP sink need of a client."""
+
+    async def post(self, url: str, body: bytes, content_type: str) -> Any:
+        """See `Client.post`."""
+
+    async def close(self) -> None:
+        """Close what is open."""
 
 
 class Client:
@@ -115,14 +125,19 @@ def explain(error: BaseException, timeout: float) -> str:
     """Why nobody answered, in a few words."""
     if isinstance(error, asyncio.TimeoutError):
         return f"no answer within {timeout:g} s"
-    if isinstance(error, aiohttp.ClientConnectorDNSError):
-        return f"no such host: {error.host}"
-    if isinstance(error, aiohttp.ClientConnectorCertificateError):
-        return f"its certificate is not trusted: {error.certificate_error}"
-    if isinstance(error, aiohttp.ClientSSLError):
-        return f"no TLS there: {error.os_error}"
-    if isinstance(error, aiohttp.ClientConnectorError):
-        return f"cannot connect to {error.host}:{error.port}: {error.os_error.strerror or error.os_error}"
     if isinstance(error, aiohttp.ServerDisconnectedError):
         return "it closed the connection without an answer"
+    if isinstance(error, aiohttp.ClientConnectorCertificateError):
+        return f"its certificate is not trusted: {error.certificate_error}"
+    if isinstance(error, aiohttp.ClientConnectorError):
+        return unreachable(error)
     return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+
+
+def unreachable(error: aiohttp.ClientConnectorError) -> str:
+    """Why there is no connection."""
+    if isinstance(error, aiohttp.ClientConnectorDNSError):
+        return f"no such host: {error.host}"
+    if isinstance(error, aiohttp.ClientSSLError):
+        return f"no TLS there: {error.os_error}"
+    return f"cannot connect to {error.host}:{error.port}: {error.os_error.strerror or error.os_error}"

@@ -2,31 +2,53 @@
 
 from __future__ import annotations
 
+import math
 import time
 from typing import Annotated, Any
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
-from mavproxy_gradys.readings import NAME, Reading, device_of
+from mavproxy_gradys.readings import NAME, Reading, Value, device_of
 from mavproxy_gradys.service import Gradys
 from mavproxy_uavapi.errors import NoVehicle
 from mavproxy_uavapi.http.call import Call
-from mavproxy_uavapi.http.requests import Empty, Number, Request
+from mavproxy_uavapi.http.requests import Empty, Request
 from mavproxy_uavapi.http.routes import EITHER, POST, Route
 
 MOST_READINGS = 1000  # in one request
 LONGEST_TEXT = 4096
 LONGEST_LIST = 64
 Name = Annotated[str, Field(pattern=rf"^{NAME}$", description="letters, digits, _ . -")]
-Text = Annotated[str, Field(max_length=LONGEST_TEXT)]
-Numbers = Annotated[list[Number], Field(max_length=LONGEST_LIST)]
+
+
+def checked(value: Any) -> Value:
+    """A measured value, as it came.
+
+    Raises:
+        ValueError: none that can be told.
+    """
+    if isinstance(value, bool | int) or (isinstance(value, str) and len(value) <= LONGEST_TEXT):
+        return value
+    if isinstance(value, float) and math.isfinite(value):
+        return value
+    if isinstance(value, list) and len(value) <= LONGEST_LIST and all(map(is_number, value)):
+        return value
+    raise ValueError(
+        f"Input should be a finite number, true or false, a text of at most {LONGEST_TEXT} letters,"
+        f" or a list of at most {LONGEST_LIST} finite numbers"
+    )
+
+
+def is_number(value: Any) -> bool:
+    """Whether that is a finite number."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
 class OneReading(Request):
     """A measurement; `time` is s since 1970, by default now; `sysid` the vehicle that it belongs to."""
 
     quantity: Name
-    value: Annotated[bool | Number | Text | Numbers, Field(union_mode="left_to_right")]
+    value: Annotated[Any, BeforeValidator(checked)]
     representation: Annotated[str, Field(max_length=64)] = ""
     time: Annotated[float | None, Field(ge=0, le=1e11)] = None
     device: Name | None = None

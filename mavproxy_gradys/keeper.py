@@ -177,7 +177,7 @@ class Keeper:
         return result
 
     async def _run(self, call: Callable[..., T], *args: Any) -> T:
-        return await asyncio.get_running_loop().run_in_executor(self._thread, call, *args)
+        return await asyncio.get_running_loop().run_in_executor(self._thread, lambda: call(*args))
 
     def _work(self, work: Callable[[Spool], T], trim: bool) -> T:
         spool = self._spool or self._open()

@@ -117,7 +117,7 @@ def motion(state: VehicleState, now: float, max_age: float) -> dict[str, str]:
 
 
 def battery(state: VehicleState, now: float, max_age: float) -> dict[str, str]:
-    """battery_percent by SYS_STATUS; -1 where the autopilot does not measure it, as MAVLink and the station have it."""
+    """battery_percent by SYS_STATUS; -1 where the autopilot does not measure it, as MAVLink has it."""
     age = state.age("SYS_STATUS", now)
     if age is None or age > max_age:
         return {}

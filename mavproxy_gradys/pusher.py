@@ -8,7 +8,7 @@ from typing import Any
 from mavproxy_gradys import payload
 from mavproxy_gradys.address import Station, api_note, ip_field, own_address
 from mavproxy_gradys.cadence import Cadence
-from mavproxy_gradys.client import FORM, Client
+from mavproxy_gradys.client import FORM, Poster
 from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.settings import Settings
 from mavproxy_gradys.tally import StationTally, VehicleTally
@@ -28,17 +28,15 @@ class Pusher:
         host: the vehicles, and the clock.
         settings: the snapshot in force.
         tally: what became of it.
-
-    Raises:
-        NotDelivered: the CA file cannot be used.
+        poster: how it is told; closed at the end.
     """
 
-    def __init__(self, station: Station, host: Host, settings: Settings, tally: StationTally) -> None:
+    def __init__(self, station: Station, host: Host, settings: Settings, tally: StationTally, poster: Poster) -> None:
         self.station = station
         self.tally = tally
         self._host = host
         self._settings = settings
-        self._client = Client(settings.timeout, settings.token, settings.ca_file)
+        self._poster = poster
         self._in_flight: dict[int, asyncio.Task[None]] = {}
         self._own = ""
         self._own_at = -ADDRESS_KEPT
@@ -55,7 +53,7 @@ class Pusher:
             for task in list(self._in_flight.values()):
                 task.cancel()
             await asyncio.gather(*self._in_flight.values(), return_exceptions=True)
-            await self._client.close()
+            await self._poster.close()
 
     def turn(self) -> None:
         """Begin an update for every vehicle that has one to tell.
@@ -72,9 +70,12 @@ class Pusher:
             if self.tally.backoff.failures and self._in_flight:
                 return
             if self._where(state, vehicle) is not None:
-                task = asyncio.get_running_loop().create_task(self._push(state, vehicle))
-                self._in_flight[system] = task
-                task.add_done_callback(lambda _, system=system: self._in_flight.pop(system, None))
+                self._begin(state, vehicle)
+
+    def _begin(self, state: VehicleState, vehicle: VehicleTally) -> None:
+        task = asyncio.get_running_loop().create_task(self._push(state, vehicle))
+        self._in_flight[state.system] = task
+        task.add_done_callback(lambda _: self._in_flight.pop(state.system, None))
 
     def _where(self, state: VehicleState, vehicle: VehicleTally) -> payload.Position | None:
         """Where it is now; None when that is unknown or too old, and then the tally says why."""
@@ -101,7 +102,7 @@ class Pusher:
             body = payload.encode(self._form(state, vehicle, where))
             vehicle.sent += 1
             started = self._host.clock()
-            answer = await self._client.post(self.station.update_url, body, FORM)
+            answer = await self._poster.post(self.station.update_url, body, FORM)
         except NotDelivered as error:
             self._failed(vehicle, error)
             return

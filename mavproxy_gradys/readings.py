@@ -16,7 +16,7 @@ import re
 from dataclasses import dataclass, field
 from typing import Any
 
-from mavproxy_uavapi.host.state import VehicleState
+from mavproxy_uavapi.host.state import Received, VehicleState
 from mavproxy_uavapi.settings import SettingError
 
 POSITION = "position"
@@ -172,17 +172,24 @@ class Sampler:
             max_age: s after which a message is too old to be a measurement.
         """
         received = state.messages.get(self.quantity.message)
-        if received is None:
-            return self._none(state.system, f"{self.quantity.message} has not come yet")
-        if now - received.at > max_age:
-            return self._none(state.system, f"{self.quantity.message} is {now - received.at:.1f} s old")
-        if self._sampled_at.get(state.system) == received.at:
-            return self._none(state.system, f"{self.quantity.message} has not come anew")
+        why = self._why_not(state.system, received, now, max_age)
+        if received is None or why:
+            self.skip(state.system, why)
+            return None
         value = self._value(received.message)
         if value is None:
-            return self._none(state.system, f"{self.quantity.message} has no such number")
+            self.skip(state.system, f"{self.quantity.message} has no such number")
+            return None
         self._sampled_at[state.system] = received.at
         return self.take(state.system, value, wall - (now - received.at))
+
+    def _why_not(self, system: int, received: Received | None, now: float, max_age: float) -> str:
+        message = self.quantity.message
+        if received is None:
+            return f"{message} has not come yet"
+        if now - received.at > max_age:
+            return f"{message} is {now - received.at:.1f} s old"
+        return f"{message} has not come anew" if self._sampled_at.get(system) == received.at else ""
 
     def take(self, system: int, value: Value, at: float) -> Reading:
         """A reading of `value`, measured at `at` (s since 1970)."""
@@ -191,9 +198,6 @@ class Sampler:
         quantity = self.quantity
         return Reading(device_of(system), system, quantity.name, quantity.representation, value, at)
 
-    def _none(self, system: int, why: str) -> None:
-        self.why_not[system] = why
-
     def skip(self, system: int, why: str) -> None:
         """Say why there was nothing to take."""
         self.why_not[system] = why
@@ -201,7 +205,7 @@ class Sampler:
     def _value(self, message: Any) -> float | int | str | None:
         found = getattr(message, self.quantity.attribute, None)
         if self.quantity.index is not None:
-            found = found[self.quantity.index] if _has(found, self.quantity.index) else None
+            found = _element(found, self.quantity.index)
         if isinstance(found, str):
             return found
         if isinstance(found, bool) or not isinstance(found, int | float) or not math.isfinite(found):
@@ -211,5 +215,5 @@ class Sampler:
         return float(f"{found * self.quantity.scale + self.quantity.offset:.12g}")  # without 20.123000000000001
 
 
-def _has(found: Any, index: int) -> bool:
-    return isinstance(found, list | tuple) and index < len(found)
+def _element(found: Any, index: int) -> Any:
+    return found[index] if isinstance(found, list | tuple) and index < len(found) else None

@@ -8,6 +8,7 @@ import random
 from typing import Any
 
 from mavproxy_gradys.address import Station
+from mavproxy_gradys.client import Client
 from mavproxy_gradys.pusher import Pusher
 from mavproxy_gradys.sensing import Sensing
 from mavproxy_gradys.settings import Settings
@@ -43,11 +44,15 @@ class Gradys:
         """
         if self.running:
             return
-        pushers = [Pusher(station, self.host, settings, self._tally(station)) for station in settings.gs]
+        pushers = [self._pusher(station, settings) for station in settings.gs]
         self.settings = settings
         loop = asyncio.get_running_loop()
         self._tasks = [loop.create_task(pusher.run()) for pusher in pushers]
         await self.sensing.start(settings)
+
+    def _pusher(self, station: Station, settings: Settings) -> Pusher:
+        client = Client(settings.timeout, settings.token, settings.ca_file)
+        return Pusher(station, self.host, settings, self._tally(station), client)
 
     def _tally(self, station: Station) -> StationTally:
         tally = self.stations.setdefault(station.url, StationTally(station.url, random.random))

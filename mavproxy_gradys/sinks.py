@@ -6,7 +6,7 @@ import json
 from collections.abc import Sequence
 from typing import Any, Protocol
 
-from mavproxy_gradys.client import JSON, Client
+from mavproxy_gradys.client import JSON, Client, Poster
 from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.readings import Stored
 from mavproxy_gradys.settings import Settings
@@ -49,7 +49,7 @@ class HttpSink:
         client: made for it alone.
     """
 
-    def __init__(self, url: str, client: Client) -> None:
+    def __init__(self, url: str, client: Poster) -> None:
         self._url = url
         self._client = client
 

@@ -219,11 +219,13 @@ class Spool:
             if gone:
                 self._db.execute("DELETE FROM acknowledged WHERE seq <= ?", (max(seq for seq, _ in gone),))
                 self._db.execute(
-                    "INSERT INTO dropped VALUES (?, ?) ON CONFLICT (cause) DO UPDATE SET count = count + excluded.count",
+                    "INSERT INTO dropped VALUES (?, ?)"
+                    " ON CONFLICT (cause) DO UPDATE SET count = count + excluded.count",
                     (cause, len(gone)),
                 )
-        self._forget(size for _, size in gone)
-        self.dropped[cause] = self.dropped.get(cause, 0) + len(gone)
+        if gone:
+            self._forget(size for _, size in gone)
+            self.dropped[cause] = self.dropped.get(cause, 0) + len(gone)
         return len(gone)
 
     def _forget(self, sizes: Iterable[int]) -> None:
@@ -255,26 +257,22 @@ class Spool:
         Raises:
             sqlite3.Error: nothing was noted; the readings are sent again some time.
         """
-        rows = [(number,) for number in numbers]
         others = [other for other in self.sinks if other != sink]
-        gone: list[int] = []
         with self._transaction():
-            if others:
-                self._db.executemany(
-                    "INSERT OR IGNORE INTO acknowledged VALUES (?, ?)", [(sink, *row) for row in rows]
-                )
-            marks = ", ".join("?" * len(others))
-            for row in rows:
-                held = self._db.execute(
-                    f"SELECT count(*) FROM acknowledged WHERE seq = ? AND sink IN ({marks})", (*row, *others)
-                ).fetchone()
-                if held[0] == len(others):
-                    gone += [
-                        size for (size,) in self._db.execute("DELETE FROM readings WHERE seq = ? RETURNING size", row)
-                    ]
-                    if others:
-                        self._db.execute("DELETE FROM acknowledged WHERE seq = ?", row)
+            gone = [size for number in numbers for size in self._acknowledge(sink, number, others)]
         self._forget(gone)
+
+    def _acknowledge(self, sink: str, number: int, others: Sequence[str]) -> list[int]:
+        """Note one acknowledgement; the size of the reading if nobody else waits for it."""
+        marks = ", ".join("?" * len(others))
+        held = f"SELECT count(*) FROM acknowledged WHERE seq = ? AND sink IN ({marks})"
+        (by_others,) = self._db.execute(held, (number, *others)).fetchone()
+        if by_others < len(others):
+            self._db.execute("INSERT OR IGNORE INTO acknowledged VALUES (?, ?)", (sink, number))
+            return []
+        if others:
+            self._db.execute("DELETE FROM acknowledged WHERE seq = ?", (number,))
+        return [size for (size,) in self._db.execute("DELETE FROM readings WHERE seq = ? RETURNING size", (number,))]
 
     def use_sinks(self, sinks: Sequence[str]) -> None:
         """From now on readings are owed to these; what all of them have acknowledged already is removed.

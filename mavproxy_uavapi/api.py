@@ -21,6 +21,7 @@ class Api:
         self.audit = audit
         self._server: Server | None = None
         self._freshness: asyncio.Task[None] | None = None
+        self._finding_scripts: asyncio.Task[None] | None = None
 
     @property
     def listening(self) -> bool:
@@ -45,6 +46,7 @@ class Api:
         self._server = server
         self.host.api_address = settings.host, settings.port
         self._freshness = asyncio.create_task(Freshness(self.host.hangar, settings.sysid).run())
+        self._finding_scripts = asyncio.create_task(server.service.scripts.start())
 
     async def stop(self) -> None:
         """Close the port and end what is in flight."""
@@ -54,8 +56,12 @@ class Api:
         self.host.api_address = None
         if self._freshness is not None:
             self._freshness.cancel()
+            await asyncio.gather(self._freshness, return_exceptions=True)
+        if self._finding_scripts is not None:
+            self._finding_scripts.cancel()
             with contextlib.suppress(asyncio.CancelledError):
-                await self._freshness
+                await self._finding_scripts
+        await server.service.scripts.stop()
         await server.stop()
 
     def filenos(self) -> list[int]:

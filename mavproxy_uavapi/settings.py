@@ -8,7 +8,6 @@ from __future__ import annotations
 import configparser
 import difflib
 import ipaddress
-import math
 import os
 import sys
 from collections.abc import Mapping
@@ -191,7 +190,7 @@ class ModuleSettings:
         if name in MAVPROXYS:
             self.notes.append(f"{file}: {name} is ignored here, MAVProxy has the link (--master)")
         elif name not in NOT_OURS[section]:
-            if section != "api" or name not in self.names():
+            if section == "simulated" or name not in self.names():
                 raise SettingError(f"{file}: no key {name!r} in [{section}]{self._hint(name)}")
             self._take(name, value, str(file))
 
@@ -216,7 +215,8 @@ class ModuleSettings:
             raise SettingError(f"no setting {name!r}{self._hint(name)}")
         else:
             _parse(name, value)
-            if _is_nothing(value) or not self.mp.set(name, value):
+            # MPSettings would print lines of its own about a value that it does not take.
+            if not _is_taken(self.mp.get_setting(name), value) or not self.mp.set(name, value):
                 raise SettingError(f"{name} = {value!r}: {self._wanted(name)}")
         self.origins[name] = origin
 
@@ -258,12 +258,20 @@ def _parse(name: str, value: Any) -> Any:
     return value
 
 
-def _is_nothing(value: Any) -> bool:
-    """Whether it is None or NaN, which MPSetting compares with its range as if they were numbers."""
+def _is_taken(setting: Any, value: Any) -> bool:
+    """Whether an MPSetting takes `value`; NaN and None are in no range, whatever a comparison says."""
+    if setting.type is bool:
+        return str(value).lower() in ("1", "true", "yes", "0", "false", "no")
+    if setting.choice is not None:
+        return value in setting.choice
     try:
-        return value is None or math.isnan(float(value))
+        number = setting.type(value)
     except (TypeError, ValueError):
         return False
+    if setting.range is None:
+        return value is not None
+    low, high = setting.range
+    return bool(low <= number <= high)
 
 
 def _words(value: Any) -> list[str]:

@@ -55,12 +55,12 @@ class Host:
 
     def feed(self, member: Any, message: Any) -> None:
         """Hand a message over; of several loaded modules only the first one's counts."""
-        if self.members[0] is member:
+        if self.members[:1] == [member]:
             self.bridge.feed(message)
 
     def idle(self, member: Any) -> None:
         """MAVProxy's idle task: start at the first one, then send what is to be sent."""
-        if self.members[0] is not member:
+        if self.members[:1] != [member]:
             return
         if not self.bridge.running:
             self.bridge.start()

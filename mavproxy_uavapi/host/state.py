@@ -14,6 +14,7 @@ mavlink = mavutil.mavlink
 
 RATE_SMOOTHING = 0.2  # weight of the newest interval in the smoothed rate
 STATUSTEXTS_KEPT = 200
+RECENT = 5.0  # s before the newest heartbeat; a state that was told earlier is the present one no more
 SEQUENCE_REORDER = 128  # a step back of less than this is a message out of order, not a loss
 ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
 NOT_VEHICLES = {
@@ -110,6 +111,16 @@ class VehicleState:
         received = self.messages.get(name)
         return None if received is None else getattr(received.message, attribute)
 
+    def recent_field(self, name: str, attribute: str) -> Any:
+        """As `field`, but None as well when the message is much older than the newest heartbeat.
+
+        After a reboot the streams may be off, and what was told before must not count as the present state.
+        """
+        received = self.messages.get(name)
+        if received is None or self.heartbeat_at - received.at > RECENT:
+            return None
+        return getattr(received.message, attribute)
+
     def age(self, name: str, now: float) -> float | None:
         """Seconds since a message of that name arrived; None when none did."""
         received = self.messages.get(name)
@@ -126,7 +137,7 @@ class VehicleState:
         EXTENDED_SYS_STATE says so where it comes; else the heartbeat: ArduCopter's system_status is
         STANDBY on the ground and ACTIVE in the air.
         """
-        landed_state = self.field("EXTENDED_SYS_STATE", "landed_state")
+        landed_state = self.recent_field("EXTENDED_SYS_STATE", "landed_state")
         if landed_state:
             return bool(landed_state == mavlink.MAV_LANDED_STATE_ON_GROUND)
         if self.system_status is None:

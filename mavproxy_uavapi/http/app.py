@@ -60,7 +60,7 @@ async def _extension(request: web.Request) -> web.StreamResponse:
 
 
 async def _answer(route: Route, request: web.Request) -> web.StreamResponse:
-    params = await parameters(request, route.model, body=request.method == "POST")
+    params = await parameters(request, route.model, body=request.method == "POST" and not route.raw)
     call = Call(request.app[SERVICE], request, params)
     answer = await (call.audited(route.action) if route.commands else route.action(call))
     return answer if isinstance(answer, web.StreamResponse) else success(answer)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, TypeVar, cast
 
 from aiohttp import web
@@ -14,6 +14,7 @@ from mavproxy_uavapi.errors import BadRequest, NotSupported, NoVehicle, TooManyR
 from mavproxy_uavapi.host.host import Host
 from mavproxy_uavapi.http.requests import Request, parse
 from mavproxy_uavapi.http.responses import envelope
+from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.settings import Settings
 from mavproxy_uavapi.vehicle.copter import Copter
 from mavproxy_uavapi.vehicle.jobs import Job
@@ -32,11 +33,16 @@ class Service:
         host: the vehicles, and the verbs in flight.
         settings: the snapshot in force.
         audit: the trail of commands.
+        scripts: the mission scripts.
     """
 
     host: Host
     settings: Settings
     audit: Audit
+    scripts: Scripts = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.scripts = Scripts(self.host, self.settings)
 
 
 class Call:

@@ -6,7 +6,7 @@ Unknown members are ignored. NaN and infinities are refused everywhere: they mus
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
@@ -33,6 +33,7 @@ Number = Annotated[int | float, BeforeValidator(_number)]
 Speed = Annotated[Number, Field(gt=0, le=50, description="m/s")]
 Timeout = Annotated[float | None, Field(gt=0, le=86400, description="s that the call may take")]
 Tolerance = Annotated[float, Field(gt=0, le=100, description="m, horizontally and vertically")]
+Argument = Annotated[str, Field(max_length=4096, pattern=r"^[^\x00]*$")]  # no command line can hold a 0
 
 
 class Request(BaseModel):
@@ -138,6 +139,25 @@ class Servo(Request):
 
     channel: Annotated[int, Field(ge=1, le=16)]
     pwm: Annotated[int, Field(ge=800, le=2200)]
+
+
+class ScriptName(Request):
+    """`script_name`: an uploaded script; `.py` may be left out."""
+
+    script_name: Annotated[str, Field(min_length=1, max_length=200)]
+
+
+class ExecuteScript(ScriptName):
+    """`args`: what the script gets on its command line."""
+
+    args: Annotated[list[Argument], Field(max_length=100)] = []
+
+
+class ScriptLog(Request):
+    """`stream`: out or err. With `follow` both come, line by line, as Server-Sent Events, until the run ends."""
+
+    stream: Literal["out", "err"] = "out"
+    follow: bool = False
 
 
 class Read(Request):

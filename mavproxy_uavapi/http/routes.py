@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mavproxy_uavapi.http import command, jobs, movement, peripherical, requests, stream, telemetry
+from mavproxy_uavapi.http import command, jobs, mission, movement, peripherical, requests, stream, telemetry
 from mavproxy_uavapi.http.call import Action
 
 
@@ -16,6 +16,7 @@ class Route:
     action: Action
     model: type[requests.Request]
     methods: tuple[str, ...] = ("GET",)
+    raw: bool = False  # whether the action itself reads the body, which holds no parameters
 
     @property
     def commands(self) -> bool:
@@ -82,8 +83,20 @@ JOBS = [
     Route("/jobs/{id}", jobs.abort_job, requests.Empty, ("DELETE",)),
 ]
 
+MISSION = [
+    Route("/mission/upload-script", mission.upload_script, requests.Empty, POST, raw=True),
+    Route("/mission/list-scripts", mission.list_scripts, requests.Empty),
+    Route("/mission/execute-script", mission.execute_script, requests.ExecuteScript, POST),
+    Route("/mission/running-scripts", mission.running_scripts, requests.Empty),
+    Route("/mission/stop-script", mission.stop_script, requests.ScriptName, POST),
+    Route("/mission/clear-scripts", mission.clear_scripts, requests.Empty, ("DELETE",)),
+    Route("/mission/clear", mission.clear_scripts, requests.Empty, ("DELETE",)),
+    Route("/mission/scripts/{name}", mission.show_script, requests.Empty),
+    Route("/mission/scripts/{name}/log", mission.script_log, requests.ScriptLog),
+]
+
 PERIPHERICAL = [
     Route("/peripherical/servo_output", peripherical.servo_output, requests.Servo, POST),
 ]
 
-ROUTES = [*COMMAND, *MOVEMENT, *TELEMETRY, *JOBS, *PERIPHERICAL]
+ROUTES = [*COMMAND, *MOVEMENT, *TELEMETRY, *JOBS, *MISSION, *PERIPHERICAL]

@@ -38,9 +38,11 @@ class Scripts:
         self._host = host
         self._settings = settings
         self.store = Store(
-            Path(settings.scripts_path).expanduser(), settings.script_size * 1024, settings.script_quota * 1024 * 1024
+            Path(settings.scripts_path).expanduser().absolute(),
+            settings.script_size * 1024,
+            settings.script_quota * 1024 * 1024,
         )
-        self.logs = Path(settings.script_logs).expanduser()
+        self.logs = Path(settings.script_logs).expanduser().absolute()
         self._watched: dict[str, Run] = {}
         self._watches: dict[str, asyncio.Task[None]] = {}
         self._launching = asyncio.Lock()
@@ -124,8 +126,8 @@ class Scripts:
                 path.name,
                 args,
                 self.sysid,
-                command=[*program, str(path.absolute()), *args],
-                cwd=path.parent.absolute(),
+                command=[*program, str(path), *args],
+                cwd=path.parent,
                 port=self._settings.port,
                 grace=self._settings.script_grace,
                 environment=self.environment(),

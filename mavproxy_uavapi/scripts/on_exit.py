@@ -31,24 +31,30 @@ async def after_death(host: Host, sysid: int, action: str, script: str) -> str:
         vehicle = host.hangar.commandable(sysid)
     except UavApiError as error:
         return f"nothing can be done: {error}"
+    why_not = _in_other_hands(vehicle)
+    if why_not is not None:
+        return why_not
+
+    async def body(job: Job) -> str:
+        await _act(vehicle, action, job)
+        return f"{action} is done"
+
+    verb, client = f"on_script_exit={action}", f"script {script}"
+    job = host.jobs.begin(vehicle.seat, verb, {"script": script}, body, client=client, outlives_client=True)
+    try:
+        return await job.outcome()
+    except UavApiError as error:
+        return f"{action} ended: {error}"
+
+
+def _in_other_hands(vehicle: Vehicle) -> str | None:
     if not vehicle.state.armed:
         return "the vehicle is not armed"
     if vehicle.mode != FLOWN_BY_SCRIPTS:
         return f"the vehicle is in {vehicle.mode}, which is left alone"
     if vehicle.seat.job is not None and vehicle.seat.job.running:
         return f"{vehicle.seat.job.verb} flies the vehicle"
-
-    async def body(job: Job) -> str:
-        await _act(vehicle, action, job)
-        return f"{action} is done"
-
-    job = host.jobs.begin(
-        vehicle.seat, f"on_script_exit={action}", {"script": script}, body, client=f"script {script}", outlives_client=True
-    )
-    try:
-        return await job.outcome()
-    except UavApiError as error:
-        return f"{action} ended: {error}"
+    return None
 
 
 async def _act(vehicle: Vehicle, action: str, job: Job) -> None:

@@ -105,7 +105,7 @@ class Runner:
             env={**given, **{name: os.environ[name] for name in os.environ if name.startswith(("TERM", "TMUX"))}},
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
-            preexec_fn=_be_in_front,  # nothing else runs in this process: no threads, no locks
+            preexec_fn=_be_in_front,  # noqa: PLW1509  this process has no threads
         )
         self._note(pid=os.getpid())
 

@@ -44,7 +44,7 @@ def status(vehicle: Vehicle, link_alive: bool, now: float) -> dict[str, Any]:
 
 def landed_state(vehicle: Vehicle) -> str:
     """`on_ground`, `in_air`, `takeoff`, `landing`, or `unknown`."""
-    told = vehicle.state.field("EXTENDED_SYS_STATE", "landed_state")
+    told = vehicle.state.recent_field("EXTENDED_SYS_STATE", "landed_state")
     if told:
         name: str = mavlink.enums["MAV_LANDED_STATE"][told].name
         return name.removeprefix("MAV_LANDED_STATE_").lower()
@@ -63,7 +63,7 @@ def why_not(vehicle: Vehicle, link_alive: bool, now: float) -> list[str]:
     reasons = []
     if not vehicle.has_position:
         reasons.append("no position estimate yet")
-    if (state.field("GPS_RAW_INT", "fix_type") or 0) < mavlink.GPS_FIX_TYPE_3D_FIX:
+    if (state.recent_field("GPS_RAW_INT", "fix_type") or 0) < mavlink.GPS_FIX_TYPE_3D_FIX:
         reasons.append("no 3D GPS fix")
     if not vehicle.is_ready_to_arm:
         said = [text for text in state.said_since(now - TEXT_AGE) if text.startswith(ABOUT_ARMING)]

@@ -34,6 +34,7 @@ mavlink = mavutil.mavlink
 
 ARM_TIMEOUT = 90.0  # s until an estimator that does not settle is reported
 HEARTBEAT_TIMEOUT = 5.0  # s until a heartbeat must show what was acknowledged
+PARAMETER_ASKINGS = 2
 PARAMETER_TIMEOUT = 1.0  # s; ArduPilot answers a known name at once and an unknown one not at all
 FRESH = 3.0  # s; older positions are not flown by
 
@@ -61,6 +62,7 @@ class Vehicle:
         self.commands = Commands(state, link, self.waiting)
         self.speeds: dict[str, float] = {}  # what DO_CHANGE_SPEED set (m/s), by kind
         self._speeds_at = 0.0
+        self._parameter_askings: dict[tuple[int, str], int] = {}  # by boot and name
 
     # -- what it is ---------------------------------------------------------------------------------------
 
@@ -82,8 +84,8 @@ class Vehicle:
     @property
     def is_ready_to_arm(self) -> bool:
         """Whether its pre-arm checks pass, by SYS_STATUS; an autopilot that does not report them may try."""
-        present = self.state.field("SYS_STATUS", "onboard_control_sensors_present")
-        health = self.state.field("SYS_STATUS", "onboard_control_sensors_health")
+        present = self.state.recent_field("SYS_STATUS", "onboard_control_sensors_present")
+        health = self.state.recent_field("SYS_STATUS", "onboard_control_sensors_health")
         if present is None:
             return False
         return not present & mavlink.MAV_SYS_STATUS_PREARM_CHECK or bool(health & mavlink.MAV_SYS_STATUS_PREARM_CHECK)
@@ -95,7 +97,7 @@ class Vehicle:
         An autopilot that sends no such report is taken at its pre-arm word. The pre-arm bit alone is not
         enough: in STABILIZE ArduCopter sets it 20 s before its position is good for GUIDED.
         """
-        flags = self.state.field("EKF_STATUS_REPORT", "flags")
+        flags = self.state.recent_field("EKF_STATUS_REPORT", "flags")
         if flags is None:
             return self.is_ready_to_arm
         return bool(flags & mavlink.EKF_POS_HORIZ_ABS) and not flags & mavlink.EKF_CONST_POS_MODE
@@ -190,11 +192,17 @@ class Vehicle:
         )
 
     async def parameters(self, names: Iterable[str]) -> dict[str, float]:
-        """Values of those of the named parameters that the vehicle has, asked for once and then remembered."""
+        """Values of those of the named parameters that the vehicle has, asked for once and then remembered.
+
+        ArduPilot does not answer for a name that it does not have: those are asked for twice in a boot, since
+        a message may be lost, and then taken as absent.
+        """
         names = list(names)
         known = self.state.parameters
-        missing = [name for name in names if name not in known]
+        missing = [name for name in names if name not in known and self._asked_for(name) < PARAMETER_ASKINGS]
         if missing:
+            for name in missing:
+                self._parameter_askings[self.state.reboots, name] = self._asked_for(name) + 1
             with self.waiting.expecting(
                 {"PARAM_VALUE"}, lambda _: True if all(name in known for name in missing) else None
             ) as told:
@@ -203,6 +211,9 @@ class Vehicle:
                 with contextlib.suppress(TimedOut):
                     await told.within(PARAMETER_TIMEOUT, f"tell {', '.join(missing)}")
         return {name: known[name] for name in names if name in known}
+
+    def _asked_for(self, name: str) -> int:
+        return self._parameter_askings.get((self.state.reboots, name), 0)
 
     async def limits(self) -> deadlines.Limits:
         """Its speeds and heights, for deadlines."""
@@ -308,7 +319,11 @@ class Vehicle:
         Raises:
             NotFound: the vehicle has no home yet.
         """
-        with self.waiting.expecting({"HOME_POSITION"}, lambda message: message) as told:
+
+        def from_autopilot(message: Any) -> Any:
+            return message if message.get_srcComponent() == self.state.component else None
+
+        with self.waiting.expecting({"HOME_POSITION"}, from_autopilot) as told:
             try:
                 await self.commands.send(messages.request_message(messages.MESSAGE_IDS["HOME_POSITION"]))
             except Rejected as error:

@@ -207,9 +207,9 @@ def test_set_shows_the_settings(module: Any, port: int, capsys: Any) -> None:
     module.command(["set"])
     out = capsys.readouterr().out
     assert re.search(rf"port +{port} +module load", out)
-    assert "host 127.0.0.1" in out
+    assert re.search(r"host +127.0.0.1 +default", out)
     module.command(["set", "max_age"])
-    assert capsys.readouterr().out.split() == ["max_age", "5.0"]
+    assert capsys.readouterr().out.split() == ["max_age", "5.0", "default"]
 
 
 def test_stop_and_start(module: Any, port: int, capsys: Any) -> None:

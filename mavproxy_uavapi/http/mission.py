@@ -1,0 +1,200 @@
+"""/mission: scripts, each in a tmux session of its own."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from aiohttp import BodyPartReader, web
+
+from mavproxy_uavapi.errors import BadRequest, Forbidden, NotFound
+from mavproxy_uavapi.http.call import Call
+from mavproxy_uavapi.http.requests import ExecuteScript, ScriptLog, ScriptName
+from mavproxy_uavapi.http.responses import dumps, envelope
+from mavproxy_uavapi.scripts import names, runs
+from mavproxy_uavapi.scripts.manager import Scripts
+from mavproxy_uavapi.scripts.runs import Run
+
+# The kinds of these answers, as clients of the original service know them.
+SAVED, LISTED, STARTED, CLEARED, RUNNING, STOPPED = 44, 42, 46, 48, 50, 52
+
+CHUNK = 65536  # bytes
+LOG_SERVED = 1024 * 1024  # bytes of a log's end
+FOLLOW_EVERY = 0.25  # s between looks at a log: a file tells nobody when it grows
+KEEP_ALIVE = 15.0  # s; a comment after such a silence, so that a dead client is noticed
+
+
+async def upload_script(call: Call) -> dict[str, Any]:
+    """Save a .py or .sh file, sent as the multipart field `file`, in place of one of that name."""
+    scripts = _scripts(call)
+    name, data = await _uploaded(call.request, scripts)
+    path = await scripts.save(name, data)
+    return _answer(call, SAVED, info=f"Mission File '{name}' saved at {path} successfully.")
+
+
+async def list_scripts(call: Call) -> dict[str, Any]:
+    """The uploaded .py scripts; `shell_scripts` has the .sh ones."""
+    store = _scripts(call).store
+    python = await asyncio.to_thread(store.listed, (".py",))
+    return _answer(call, LISTED, scripts=python, shell_scripts=await asyncio.to_thread(store.listed, (".sh",)))
+
+
+async def execute_script(call: Call) -> dict[str, Any]:
+    """Run a script in a tmux session of its own; answers when it runs."""
+    scripts, p = _scripts(call), call.params(ExecuteScript)
+    run = await scripts.execute(p.script_name, p.args)
+    return _answer(call, STARTED, **_report(run))
+
+
+async def running_scripts(call: Call) -> dict[str, Any]:
+    """The scripts that run now, and of those being stopped the seconds until they are killed."""
+    return _answer(call, RUNNING, scripts=[_report(run) for run in await _scripts(call).running()])
+
+
+async def stop_script(call: Call) -> dict[str, Any]:
+    """Ctrl-C, so that the script can land the vehicle; a kill after the grace period; answers at its end."""
+    run = await _scripts(call).halt(call.params(ScriptName).script_name)
+    return _answer(call, STOPPED, info="Stopped", **_report(run))
+
+
+async def clear_scripts(call: Call) -> dict[str, Any]:
+    """Remove all uploaded scripts. Those that run go on; logs stay."""
+    removed = await asyncio.to_thread(_scripts(call).store.clear)
+    return _answer(call, CLEARED, info=f"Removed {len(removed)} script(s)", removed=removed)
+
+
+async def show_script(call: Call) -> dict[str, Any]:
+    """A script's newest run: whether it goes on, its exit status, and the ends of both logs."""
+    scripts, script = _scripts(call), _script_of(call)
+    run = await scripts.newest(script)
+    if run is None:
+        path = await asyncio.to_thread(scripts.store.find, script)
+        return _answer(call, None, script=script, path=str(path), running=False, run=None)
+    out, err = [await asyncio.to_thread(runs.tail, log) for log in (run.out_log, run.err_log)]
+    return _answer(call, None, script=script, running=run.running, run={**_report(run), "out": out, "err": err})
+
+
+async def script_log(call: Call) -> web.StreamResponse:
+    """The end of a log of a script's newest run, as text; with `follow` both logs as they grow."""
+    scripts, script, p = _scripts(call), _script_of(call), call.params(ScriptLog)
+    run = await scripts.newest(script)
+    if run is None:
+        raise NotFound(f"{script} never ran")
+    if p.follow:
+        return await _follow(call.request, run)
+    text = await asyncio.to_thread(runs.tail, run.out_log if p.stream == "out" else run.err_log, LOG_SERVED)
+    return web.Response(text=text, content_type="text/plain", charset="utf-8")
+
+
+# -- what they are made of ----------------------------------------------------------------------------------
+
+
+def _scripts(call: Call) -> Scripts:
+    """The scripts, for whoever may have them.
+
+    Raises:
+        Forbidden: others than this machine could call without a token.
+    """
+    settings = call.service.settings
+    if not settings.is_local and not settings.token:
+        raise Forbidden("scripts run on this machine: they need a token, or an API that listens on the loopback only")
+    return call.service.scripts
+
+
+def _script_of(call: Call) -> str:
+    return names.resolved(call.request.match_info["name"])
+
+
+def _answer(call: Call, kind: int | None, **members: Any) -> dict[str, Any]:
+    """A success body; a script needs no vehicle, so neither do these."""
+    of_that_kind = {} if kind is None else {"type": kind}
+    return envelope(call.service.scripts.sysid, "Success", **of_that_kind, **members)
+
+
+def _report(run: Run) -> dict[str, Any]:
+    return run.report(time.time())
+
+
+async def _uploaded(request: web.Request, scripts: Scripts) -> tuple[str, bytes]:
+    """Name and contents of the form's file.
+
+    Raises:
+        BadRequest: there is none, or it is too large; reading stops there.
+    """
+    if request.content_type != "multipart/form-data":
+        raise BadRequest("the file goes into field `file` of a multipart/form-data body")
+    try:
+        form = await request.multipart()
+        while (part := await form.next()) is not None:
+            if isinstance(part, BodyPartReader) and part.name == "file" and part.filename is not None:
+                return names.checked(part.filename), await _contents(part, scripts)
+    except (ValueError, LookupError, AssertionError, RuntimeError) as error:
+        raise BadRequest(f"the body is no multipart form: {error}") from error
+    raise BadRequest("the form has no file in its field `file`")
+
+
+async def _contents(part: BodyPartReader, scripts: Scripts) -> bytes:
+    data = bytearray()
+    while chunk := await part.read_chunk(CHUNK):
+        data += chunk
+        if len(data) > scripts.store.size_limit:
+            raise scripts.store.too_large(part.filename or "the file")
+    return bytes(data)
+
+
+async def _follow(request: web.Request, run: Run) -> web.StreamResponse:
+    """Both logs from their beginning, line by line, then how the run ended."""
+    response = web.StreamResponse(headers={"Content-Type": "text/event-stream", "Cache-Control": "no-store"})
+    await response.prepare(request)
+    followers = [_Follower("out", run.out_log), _Follower("err", run.err_log)]
+    silent_since = time.monotonic()
+    with suppress(ConnectionError):  # the client has gone: that is how following ends
+        while True:
+            run = await asyncio.to_thread(runs.refreshed, run)  # before the logs: then nothing of them is missed
+            for follower in followers:
+                for event in await asyncio.to_thread(follower.events, not run.running):
+                    await response.write(event)
+                    silent_since = time.monotonic()
+            if not run.running:
+                await response.write(f"event: end\ndata: {dumps(_report(run))}\n\n".encode())
+                return response
+            if time.monotonic() - silent_since > KEEP_ALIVE:
+                await response.write(b": still here\n\n")
+                silent_since = time.monotonic()
+            await asyncio.sleep(FOLLOW_EVERY)
+    return response
+
+
+class _Follower:
+    """Reads a log as it grows. Blocking: for an executor."""
+
+    def __init__(self, kind: str, log: Path) -> None:
+        self._kind = kind
+        self._log = log
+        self._position = 0
+        self._rest = b""
+
+    def events(self, at_end: bool) -> list[bytes]:
+        """An event for each new line; what is no whole line yet waits for its rest, unless none comes."""
+        try:
+            with self._log.open("rb") as file:
+                file.seek(self._position)
+                data = file.read(LOG_SERVED)
+                while at_end and (more := file.read(LOG_SERVED)):
+                    data += more
+        except FileNotFoundError:
+            return []
+        self._position += len(data)
+        lines = (self._rest + data).split(b"\n")
+        self._rest = lines.pop()
+        if at_end and self._rest:
+            lines.append(self._rest)
+            self._rest = b""
+        return [self._event(line) for line in lines]
+
+    def _event(self, line: bytes) -> bytes:
+        text = line.decode(errors="replace").rstrip("\r")
+        return f"event: {self._kind}\ndata: {dumps({'line': text})}\n\n".encode()
