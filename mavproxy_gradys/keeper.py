@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.readings import Reading, Stored
@@ -169,15 +169,15 @@ class Keeper:
             NotStored: it failed; `problem` says why until something succeeds.
         """
         try:
-            result = await self._run(self._work, work, trim)
+            result = await self._run(lambda: self._work(work, trim))
         except NotStored as error:
             self.problem = str(error)
             raise
         self.problem = ""
         return result
 
-    async def _run(self, call: Callable[..., T], *args: Any) -> T:
-        return await asyncio.get_running_loop().run_in_executor(self._thread, lambda: call(*args))
+    async def _run(self, call: Callable[[], T]) -> T:
+        return await asyncio.get_running_loop().run_in_executor(self._thread, call)
 
     def _work(self, work: Callable[[Spool], T], trim: bool) -> T:
         spool = self._spool or self._open()

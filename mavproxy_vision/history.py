@@ -15,7 +15,7 @@ from mavproxy_vision.geometry import Attitude, Vector, vector, wrap
 
 KEPT = 12.0  # s of the vehicle's clock
 BEYOND = 0.3  # s that the newest telemetry is carried on by its rates
-CLOCK_WINDOW = 3.0  # s of the host's clock over which the least delayed message sets the clocks' offset
+CLOCK_WINDOW = 1.5  # s of the faster clock over which the least delayed message sets the clocks' offset
 REBOOT = 3.0  # s that a clock may step back without a reboot
 
 
@@ -36,7 +36,7 @@ class VehicleClock:
         """A message stamped `vehicle` arrived at `host`; vehicle seconds per host second are `ratio`."""
         self.ratio = ratio
         self._pairs.append((host, vehicle))
-        while host - self._pairs[0][0] > CLOCK_WINDOW:
+        while host - self._pairs[0][0] > CLOCK_WINDOW / max(ratio, 1.0):
             self._pairs.popleft()
         self._best = max(self._pairs, key=lambda pair: pair[1] - ratio * pair[0])
 

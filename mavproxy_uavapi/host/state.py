@@ -16,6 +16,7 @@ RATE_SMOOTHING = 0.2  # weight of the newest interval in the smoothed rate
 STATUSTEXTS_KEPT = 200
 RECENT = 5.0  # s before the newest heartbeat; a state that was told earlier is the present one no more
 SEQUENCE_REORDER = 128  # a step back of less than this is a message out of order, not a loss
+FAILING = {mavlink.MAV_STATE_CRITICAL, mavlink.MAV_STATE_EMERGENCY}
 ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
 NOT_VEHICLES = {
     mavlink.MAV_TYPE_GCS,
@@ -134,16 +135,18 @@ class VehicleState:
     def landed(self) -> bool | None:
         """Whether it stands on the ground; None while unknown.
 
-        EXTENDED_SYS_STATE says so where it comes; else the heartbeat: ArduCopter's system_status is
-        STANDBY on the ground and ACTIVE in the air.
+        A disarmed vehicle does. Else whichever told last: EXTENDED_SYS_STATE, or the heartbeat, whose
+        system_status is STANDBY on the ground and ACTIVE in the air (ArduCopter); CRITICAL says neither.
         """
-        landed_state = self.recent_field("EXTENDED_SYS_STATE", "landed_state")
-        if landed_state:
-            return bool(landed_state == mavlink.MAV_LANDED_STATE_ON_GROUND)
-        if self.system_status is None:
+        if self.armed is None or self.system_status is None:
             return None
-        flying = {mavlink.MAV_STATE_ACTIVE, mavlink.MAV_STATE_CRITICAL, mavlink.MAV_STATE_EMERGENCY}
-        return not (self.armed and self.system_status in flying)
+        if not self.armed:
+            return True
+        told = self.messages.get("EXTENDED_SYS_STATE")
+        in_doubt = self.system_status in FAILING
+        if told is not None and told.message.landed_state and (in_doubt or told.at >= self.heartbeat_at):
+            return bool(told.message.landed_state == mavlink.MAV_LANDED_STATE_ON_GROUND)
+        return bool(self.system_status not in {mavlink.MAV_STATE_ACTIVE} | FAILING)
 
     @property
     def packet_loss(self) -> float:

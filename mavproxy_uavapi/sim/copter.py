@@ -23,6 +23,7 @@ from .options import Options
 from .parameters import Parameters
 from .physics import Body
 from .position_control import Limits, PositionController, Speed
+from .precland import PrecisionLanding
 from .yaw_control import AutoYaw
 
 ARMING_DELAY = 2.0
@@ -61,6 +62,7 @@ class Copter:
         self.auto_armed = False
         self.landed = True
         self.failsafes = Failsafes(self)
+        self.precland = PrecisionLanding(self)
         self._spool = 0.0
         self._armed_since = 0.0
         self._detector = LandDetector()

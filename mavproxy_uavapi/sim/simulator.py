@@ -85,6 +85,7 @@ class Simulator:
             "SET_POSITION_TARGET_LOCAL_NED": self._local_setpoint,
             "SET_POSITION_TARGET_GLOBAL_INT": self._global_setpoint,
             "RC_CHANNELS_OVERRIDE": self._sticks,
+            "LANDING_TARGET": lambda _link, message: self.copter.precland.hear(message),
             "TIMESYNC": self._timesync,
             "FILE_TRANSFER_PROTOCOL": self._file_transfer,
         }
@@ -252,9 +253,7 @@ class Simulator:
 
     def _parameter_value(self, parameter: Parameter, index: int) -> Any:
         name = parameter.name.encode()
-        return mavlink.MAVLink_param_value_message(
-            name, parameter.value, parameter.kind, len(self.parameters), index
-        )
+        return mavlink.MAVLink_param_value_message(name, parameter.value, parameter.kind, len(self.parameters), index)
 
     def _parameter_read(self, link: Link, message: Any) -> None:
         parameter = self.parameters.find(message.param_id, message.param_index)

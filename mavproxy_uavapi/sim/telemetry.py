@@ -8,9 +8,10 @@ from typing import Any
 from .copter import Copter
 from .motion_messages import MotionMessages
 from .system_messages import SystemMessages
+from .truth_messages import TruthMessages
 
 
-class Telemetry(MotionMessages, SystemMessages):
+class Telemetry(MotionMessages, SystemMessages, TruthMessages):
     """Builds messages by name; None where ArduCopter would not send one either."""
 
     def __init__(self, copter: Copter, unix_epoch: float) -> None:

@@ -27,8 +27,12 @@ def descend(mode: Mode, dt: float) -> Demand:
         speed = max(slow, min(fast, planned))
     if copter.maybe_landed:
         control.follow_horizontally(copter.estimator.position, copter.estimator.velocity)
-    control.fly_at(0.0, 0.0, dt)
-    control.climb_at(speed, dt)
+    target = copter.precland.target
+    if target is None or copter.maybe_landed:
+        control.fly_at(0.0, 0.0, dt)
+    else:
+        control.go_to(target, dt)
+    control.climb_at(0.0 if copter.precland.must_hover else speed, dt)
     return mode.fly(dt)
 
 

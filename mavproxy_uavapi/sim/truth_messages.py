@@ -1,0 +1,55 @@
+"""SIM_STATE: the whole truth about the vehicle, as SITL sends it to whoever asks. For simulated cameras."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from .geodesy import from_ned
+from .message_source import MessageSource
+
+
+class TruthMessages(MessageSource):
+    """What no real vehicle knows of itself."""
+
+    def _build_sim_state(self) -> Any:
+        copter = self.copter
+        body = copter.body
+        place = from_ned(copter.estimator.start, body.position)
+        lat, lon = round(place.latitude * 1e7), round(place.longitude * 1e7)
+        return mavlink.MAVLink_sim_state_message(
+            *_quaternion(body.roll, body.pitch, body.yaw),
+            body.roll,
+            body.pitch,
+            body.yaw,
+            0.0,
+            0.0,
+            -9.80665,
+            body.roll_rate,
+            body.pitch_rate,
+            body.yaw_rate,
+            lat,
+            lon,
+            place.altitude,
+            0.0,
+            0.0,
+            body.velocity_north,
+            body.velocity_east,
+            body.velocity_down,
+            lat,
+            lon,
+        )
+
+
+def _quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
+    cr, sr = math.cos(roll / 2), math.sin(roll / 2)
+    cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
+    cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
+    return (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )

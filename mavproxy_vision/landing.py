@@ -1,0 +1,275 @@
+"""The landing as a state machine: time, motion and target in, velocity and phase out. Pure.
+
+    LOOK -> DESCEND -> (done: land)
+      ^       | lost for 0.5 s, above BLIND_BELOW: HOLD -> 2 s: CLIMB -> LOOK -> SEARCH -> … -> (failed)
+      |       | lost below BLIND_BELOW: straight down (done: land)
+
+An attempt is a time of looking: in place, then along one more ring of the expanding square each.
+Times are on the vehicle's clock (s), velocities m/s NED, places m NED in the frame of `Motion.travelled`.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from mavproxy_vision.geometry import Vector, limited, vector
+from mavproxy_vision.history import Motion
+from mavproxy_vision.search import Waypoint, expanding_square
+from mavproxy_vision.target import Target
+
+COAST = 0.5  # s without a sighting that change nothing
+HOLD = 2.0  # s without a sighting until it climbs
+BLIND_BELOW = 1.0  # m: a tag that is lost lower than that is landed on all the same
+CLIMB = 1.5  # m above the last fix
+GAIN = 0.9  # 1/s: velocity for each m of offset
+INTEGRAL = 0.15  # 1/s/s
+INTEGRAL_LIMIT = 0.25  # m/s
+VERTICAL_GAIN = 0.8  # 1/s
+CONE = ((3.0, math.radians(20)), (1.0, math.radians(10)))  # height (m) and half angle: wide high up, narrow low
+SLOWDOWN = (0.20, 0.45)  # descent rate: m/s, and 1/s of the height
+SLOWEST = 0.15  # m/s of descent
+NEAR = 0.4  # m from a waypoint that count as there
+STEP_TIME = 0.2  # s between two steps at most that are reckoned with
+
+
+class Phase(enum.Enum):
+    """What the landing is doing."""
+
+    LOOK = "looking"
+    DESCEND = "descending"
+    HOLD = "holding: tag lost"
+    CLIMB = "climbing to the last fix"
+    SEARCH = "searching"
+    LAND = "touching down"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What it may do.
+
+    Attributes:
+        attempts: times of looking.
+        look: s of each in place.
+        tolerance: m from the target within which it may touch down.
+        final: m above the target below which the autopilot's LAND takes over.
+        speed: m/s, horizontally.
+        descent: m/s, at most.
+        climb: m/s, at most.
+        acceleration: m/s/s, at most.
+        step: m between two tracks of the search.
+        leash: m from where the search began.
+        ceiling: m above the target's ground that the search does not exceed.
+        time_limit: s for all.
+        descend: whether to descend; a search ends when the tag is found.
+    """
+
+    attempts: int = 5
+    look: float = 2.0
+    tolerance: float = 0.12
+    final: float = 0.6
+    speed: float = 1.5
+    descent: float = 1.0
+    climb: float = 1.0
+    acceleration: float = 1.5
+    step: float = 2.0
+    leash: float = 15.0
+    ceiling: float = 8.0
+    time_limit: float = 180.0
+    descend: bool = True
+
+
+@dataclass(frozen=True)
+class Order:
+    """What to do now: the phase, a velocity (m/s NED), and why it failed, if it did."""
+
+    phase: Phase
+    velocity: Vector
+    reason: str = ""
+
+
+REST = vector(0.0, 0.0, 0.0)
+
+
+class Landing:
+    """One landing, or one search."""
+
+    def __init__(self, plan: Plan, target: Target) -> None:
+        self.plan, self.target = plan, target
+        self.phase = Phase.LOOK
+        self.attempt = 0
+        self.offset: float | None = None  # m, horizontally, at the last sighting
+        self.began: float | None = None
+        self.phases: dict[str, float] = {}  # s that each phase took
+        self._since = 0.0
+        self._last_step = 0.0
+        self._velocity = REST
+        self._integral = np.zeros(2)
+        self._anchor: Vector = REST  # where it holds, climbs to, or searches from
+        self._height = 0.0  # m above the ground that it holds there
+        self._corners: Iterator[Waypoint] = iter(())
+        self._corner: Waypoint | None = None
+
+    def step(self, now: float, motion: Motion, height: float) -> Order:
+        """One step.
+
+        Args:
+            now: vehicle time, s.
+            motion: of the vehicle now.
+            height: above the target's ground by its own estimate, m.
+        """
+        if self.began is None:
+            self._begin(now, motion, height)
+        elapsed = min(max(now - self._last_step, 0.0), STEP_TIME)
+        self._last_step = now
+        self.phases[self.phase.value] = self.phases.get(self.phase.value, 0.0) + elapsed
+        failure = self._failure(now)
+        if failure:
+            return self._fail(failure)
+        wanted = self._wanted(now, motion, height, elapsed)
+        if self.phase in (Phase.LAND, Phase.FAILED):
+            self._velocity = wanted
+            return Order(self.phase, wanted, self._reason)
+        change = limited((wanted - self._velocity)[:2], self.plan.acceleration * elapsed)
+        self._velocity = vector(self._velocity[0] + change[0], self._velocity[1] + change[1], wanted[2])
+        return Order(self.phase, self._velocity)
+
+    _reason = ""
+
+    def _begin(self, now: float, motion: Motion, height: float) -> None:
+        self.began = self._last_step = now
+        self.attempt = 1
+        self._velocity = motion.velocity.copy()
+        self._stay(now, Phase.LOOK, motion.travelled, min(height, self.plan.ceiling))
+        self._corners = expanding_square(self.plan.step, self.plan.leash)
+
+    def _stay(self, now: float, phase: Phase, anchor: Vector, height: float) -> None:
+        self.phase, self._since = phase, now
+        self._anchor, self._height = anchor.copy(), height
+        self._integral[:] = 0.0
+
+    def _fail(self, reason: str) -> Order:
+        self.phase, self._reason, self._velocity = Phase.FAILED, reason, REST
+        return Order(Phase.FAILED, REST, reason)
+
+    def _failure(self, now: float) -> str | None:
+        assert self.began is not None
+        if self.phase is Phase.FAILED:
+            return self._reason
+        if self.target.ambiguous >= 5:
+            return "two tags of the same id are in view: it is not clear on which to land"
+        if self.target.contradiction:
+            return self.target.contradiction
+        if now - self.began > self.plan.time_limit:
+            return f"not landed within {self.plan.time_limit:.0f} s"
+        return None
+
+    # -- the phases ----------------------------------------------------------------------------------------
+
+    def _wanted(self, now: float, motion: Motion, height: float, elapsed: float) -> Vector:
+        target = self.target
+        visible = target.found and target.age(now) <= COAST
+        if visible and self.phase in (Phase.LOOK, Phase.HOLD, Phase.CLIMB, Phase.SEARCH):
+            if not self.plan.descend:
+                self.phase = Phase.LAND
+                return REST
+            self.phase, self._since = Phase.DESCEND, now
+        if self.phase is Phase.DESCEND:
+            return self._descend(now, motion, height, elapsed)
+        if self.phase is Phase.HOLD:
+            return self._hold(now, motion, height)
+        if self.phase is Phase.CLIMB:
+            return self._climb(now, motion, height)
+        if self.phase is Phase.SEARCH:
+            return self._search(now, motion, height)
+        if self.phase is Phase.LOOK and now - self._since > self.plan.look:
+            self._look_farther(now)
+        return self._towards(self._anchor, motion, height)
+
+    def _descend(self, now: float, motion: Motion, height: float, elapsed: float) -> Vector:
+        place = self.target.place
+        assert place is not None
+        offset = (place - motion.travelled)[:2]
+        above = float(place[2] - motion.travelled[2])
+        distance = float(np.linalg.norm(offset))
+        if self.target.age(now) > COAST:
+            if above < BLIND_BELOW:
+                self.phase = Phase.LAND
+                return REST
+            self._stay(now, Phase.HOLD, motion.travelled, height)
+            return REST
+        self.offset = distance
+        if above <= self.plan.final and distance <= self.plan.tolerance:
+            self.phase = Phase.LAND
+            return REST
+        if distance < 1.0:
+            self._integral = limited(self._integral + INTEGRAL * offset * elapsed, INTEGRAL_LIMIT)
+        sideways = limited(GAIN * offset + self._integral, self.plan.speed)
+        return vector(sideways[0], sideways[1], self._descent(distance, above))
+
+    def _descent(self, distance: float, above: float) -> float:
+        if above <= self.plan.final:
+            return 0.0 if above > 0.7 * self.plan.final else -0.2  # centre first
+        room = 1.0 - distance / max(above * math.tan(cone(above)), self.plan.tolerance)
+        rate = min(self.plan.descent, SLOWDOWN[0] + SLOWDOWN[1] * (above - self.plan.final))
+        return max(rate * room, 0.0) if room < SLOWEST else max(rate * room, SLOWEST)
+
+    def _hold(self, now: float, motion: Motion, height: float) -> Vector:
+        if self.target.age(now) > HOLD:
+            last = self.target.last
+            assert last is not None
+            place = self.target.place if self.target.place is not None else last.place
+            top = min(max(last.height, height) + CLIMB, max(self.plan.ceiling, height))
+            self._stay(now, Phase.CLIMB, place, top)
+        return self._towards(self._anchor, motion, height)
+
+    def _climb(self, now: float, motion: Motion, height: float) -> Vector:
+        near = float(np.linalg.norm((self._anchor - motion.travelled)[:2])) < NEAR
+        if (near and abs(self._height - height) < NEAR) or now - self._since > 20.0:
+            self._corners = expanding_square(self.plan.step, self.plan.leash)
+            self._stay(now, Phase.LOOK, self._anchor, self._height)
+            self._next_attempt()
+        return self._towards(self._anchor, motion, height)
+
+    def _next_attempt(self) -> None:
+        if self.attempt >= self.plan.attempts:
+            times = f"{self.attempt} attempt{'' if self.attempt == 1 else 's'}"
+            self._fail(f"no tag in sight after {times}")
+            return
+        self.attempt += 1
+
+    def _look_farther(self, now: float) -> None:
+        """Nothing in sight from here: along the next leg of the search."""
+        corner = next(self._corners, None)
+        if corner is None:
+            self._fail(f"no tag in sight within {self.plan.leash:g} m")
+            return
+        if self._corner is None or corner.ring != self._corner.ring or self.phase is Phase.LOOK:
+            self._next_attempt()
+        if self.phase is not Phase.FAILED:
+            self.phase, self._since, self._corner = Phase.SEARCH, now, corner
+
+    def _search(self, now: float, motion: Motion, height: float) -> Vector:
+        assert self._corner is not None
+        there = self._anchor + vector(self._corner.north, self._corner.east, 0.0)
+        if np.linalg.norm((there - motion.travelled)[:2]) < NEAR or now - self._since > 60.0:
+            self._look_farther(now)
+        return self._towards(there, motion, height)
+
+    def _towards(self, place: Vector, motion: Motion, height: float) -> Vector:
+        """To above `place`, at the height that is held."""
+        sideways = limited(GAIN * (place - motion.travelled)[:2], self.plan.speed)
+        up = VERTICAL_GAIN * (self._height - height)
+        return vector(sideways[0], sideways[1], -min(max(up, -self.plan.descent), self.plan.climb))
+
+
+def cone(height: float) -> float:
+    """Half angle (rad) around the vertical within which it may descend, `height` m above the target."""
+    (high, wide), (low, narrow) = CONE
+    share = min(max((height - low) / (high - low), 0.0), 1.0)
+    return narrow + share * (wide - narrow)

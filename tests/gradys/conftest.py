@@ -1,0 +1,136 @@
+"""A host on the time-travelling loop, a vehicle that tells where it is, and a station that answers."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import parse_qsl
+
+import pytest
+from pymavlink import mavutil
+
+from mavproxy_gradys.errors import NotDelivered
+from mavproxy_gradys.settings import ModuleSettings, Settings
+from mavproxy_uavapi.host.host import Host
+from mavproxy_uavapi.host.link import FakeLink
+
+mavlink = mavutil.mavlink
+
+
+@pytest.fixture
+def host(loop: Any, mpstate: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Host]:
+    """A host whose asyncio side runs in the test's loop and clock."""
+    with monkeypatch.context() as patch:
+        patch.setattr(asyncio, "new_event_loop", lambda: loop)
+        host = Host(mpstate, clock=loop.time)
+    host.link = FakeLink()
+    yield host
+    host.bridge._outbox.close()
+
+
+class Teller:
+    """A vehicle that tells; `loop.pass_time` does not make it tell again."""
+
+    TELLS: dict[str, dict[str, Any]] = {
+        "heartbeat": {},
+        "gps_raw_int": {"fix_type": 3},
+        "sys_status": {
+            "onboard_control_sensors_present": mavlink.MAV_SYS_STATUS_PREARM_CHECK,
+            "onboard_control_sensors_health": mavlink.MAV_SYS_STATUS_PREARM_CHECK,
+            "battery_remaining": 97,
+            "voltage_battery": 12600,
+        },
+        "vfr_hud": {"groundspeed": 1.25, "airspeed": 1.5, "heading": 270},
+        "global_position_int": {"lat": -158400810, "lon": -479266420, "relative_alt": 20123, "alt": 604123},
+    }
+
+    def __init__(self, host: Host, make: Callable[..., Any], system: int = 10) -> None:
+        self._host, self._make, self.system = host, make, system
+
+    def tell(self, name: str, **fields: Any) -> None:
+        """One message, now."""
+        given = {**self.TELLS.get(name, {}), **fields}
+        self._host._receive(self._make(name, self.system, **given))
+
+    def tell_all(self) -> None:
+        """All that it tells, now."""
+        for name in self.TELLS:
+            self.tell(name)
+
+    @property
+    def state(self) -> Any:
+        return self._host.fleet.vehicles[self.system]
+
+
+@pytest.fixture
+def teller(host: Host, msg: Any, loop: Any) -> Teller:
+    """Vehicle 10, which has told all once; on the bench loop, whose link watch it must not start."""
+    host._watch_link = lambda state: None  # type: ignore[method-assign]
+    vehicle = Teller(host, msg)
+    vehicle.tell_all()
+    return vehicle
+
+
+class FakePoster:
+    """A station or a receiver: remembers what came, and answers what a test wants.
+
+    Attributes:
+        posts: (time, url, body) of each.
+        answer: what it answers; an exception is raised, a callable asked with the body.
+        takes: s until it answers.
+    """
+
+    def __init__(self, loop: Any) -> None:
+        self._loop = loop
+        self.posts: list[tuple[float, str, bytes]] = []
+        self.answer: Any = {"type": 103}
+        self.takes = 0.0
+        self.closed = False
+
+    async def post(self, url: str, body: bytes, content_type: str) -> Any:
+        self.posts.append((self._loop.time(), url, body))
+        await asyncio.sleep(self.takes)
+        answer = self.answer(body) if callable(self.answer) else self.answer
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    async def close(self) -> None:
+        self.closed = True
+
+    @property
+    def times(self) -> list[float]:
+        return [at for at, _, _ in self.posts]
+
+    @property
+    def forms(self) -> list[dict[str, str]]:
+        return [dict(parse_qsl(body.decode())) for _, _, body in self.posts]
+
+    @property
+    def batches(self) -> list[list[int]]:
+        return [[reading["seq"] for reading in json.loads(body)["readings"]] for _, _, body in self.posts]
+
+
+@pytest.fixture
+def poster(loop: Any) -> FakePoster:
+    """A station that answers at once."""
+    return FakePoster(loop)
+
+
+@pytest.fixture
+def down() -> NotDelivered:
+    """Nobody answers."""
+    return NotDelivered("cannot connect")
+
+
+@pytest.fixture
+def settings(tmp_path: Path) -> Callable[..., Settings]:
+    """A snapshot: `settings(gs="127.0.0.1:1")`."""
+
+    def make(**given: Any) -> Settings:
+        return ModuleSettings({"spool": str(tmp_path / "spool.db"), **given}).snapshot()
+
+    return make

@@ -1,0 +1,176 @@
+"""The manager with real tmux sessions and real files; the vehicle is not asked for anything here."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from mavproxy_uavapi.errors import BadRequest, NotFound, NoVehicle, ToolFailed
+from mavproxy_uavapi.scripts import manager
+from mavproxy_uavapi.scripts.manager import Scripts, address
+from mavproxy_uavapi.settings import ModuleSettings
+
+PRINTS = b"import os, sys\nprint(os.environ['UAVAPI_URL'], os.environ['UAVAPI_TOKEN'], os.environ['UAVAPI_SYSID'])\n"
+SLEEPS = b"import time\nprint('up')\ntime.sleep(60)\n"
+
+
+class NoHangar:
+    def find(self, _system: int) -> Any:
+        raise NoVehicle("none")
+
+
+def settings(folder: Path, **given: Any) -> Any:
+    defaults = {"scripts_path": str(folder / "scripts"), "script_logs": str(folder / "logs"), "sysid": 9}
+    return ModuleSettings({**defaults, **given}, environ={}).snapshot()
+
+
+def scripts_in(folder: Path, **given: Any) -> Scripts:
+    return Scripts(SimpleNamespace(hangar=NoHangar()), settings(folder, **given))  # type: ignore[arg-type]
+
+
+def flown(folder: Path, story: Callable[[Scripts], Awaitable[Any]], **given: Any) -> Any:
+    async def run() -> Any:
+        scripts = scripts_in(folder, **given)
+        try:
+            return await asyncio.wait_for(story(scripts), 30)
+        finally:
+            await scripts.stop()
+
+    return asyncio.run(run())
+
+
+async def ended(scripts: Scripts, script: str) -> Any:
+    while scripts.running_run(script) is not None:
+        await asyncio.sleep(0.02)
+    return await scripts.newest(script)
+
+
+@pytest.mark.usefixtures("own_tmux")
+def test_script_is_told_where_the_api_is_and_its_end_is_remembered(tmp_path: Path) -> None:
+    async def story(scripts: Scripts) -> Any:
+        await scripts.save("a.py", PRINTS)
+        await scripts.execute("a", [])
+        return await ended(scripts, "a.py")
+
+    run = flown(tmp_path, story, token="secret", port=8123)
+    assert run.out_log.read_text() == "http://127.0.0.1:8123 secret 9\n"
+    assert (run.exit_status, run.session.startswith("uavapi_9_a_")) == (0, True)
+    assert b"secret" not in b"".join(file.read_bytes() for file in run.path.parent.iterdir() if "json" in file.name)
+
+
+@pytest.mark.usefixtures("own_tmux")
+def test_running_script_is_not_started_twice_and_stops(tmp_path: Path) -> None:
+    async def story(scripts: Scripts) -> None:
+        await scripts.save("a.py", SLEEPS)
+        outcomes = await asyncio.gather(*(scripts.execute("a", []) for _ in range(3)), return_exceptions=True)
+        assert [type(outcome) for outcome in outcomes].count(BadRequest) == 2
+        assert [run.script for run in await scripts.running()] == ["a.py"]
+        run = await scripts.halt("a.py")
+        assert (run.running, run.exit_status, run.killed) == (False, -2, False)
+        assert await scripts.running() == []
+        with pytest.raises(BadRequest, match="not running"):
+            await scripts.halt("a")
+        with pytest.raises(NotFound):
+            await scripts.halt("b")
+
+    flown(tmp_path, story)
+
+
+@pytest.mark.usefixtures("own_tmux")
+def test_next_api_finds_the_scripts_of_the_last_one_and_no_others(tmp_path: Path) -> None:
+    async def begin(scripts: Scripts) -> None:
+        await scripts.save("a.py", SLEEPS)
+        await scripts.execute("a", ["x"])
+
+    async def find(scripts: Scripts) -> list[str]:
+        await scripts.start()
+        return [run.script for run in await scripts.running()]
+
+    async def find_and_stop(scripts: Scripts) -> Any:
+        await scripts.start()
+        with pytest.raises(BadRequest, match="already running"):
+            await scripts.execute("a", [])
+        return await scripts.halt("a")
+
+    flown(tmp_path, begin)
+    assert flown(tmp_path, find) == ["a.py"]
+    assert flown(tmp_path, find, sysid=0) == ["a.py"]
+    assert flown(tmp_path, find, sysid=90) == flown(tmp_path, find, port=8001) == []
+    assert flown(tmp_path / "elsewhere", find_and_stop).exit_status == -2
+
+
+@pytest.mark.usefixtures("own_tmux")
+def test_what_cannot_be_started_is_an_error_and_leaves_nothing(tmp_path: Path) -> None:
+    async def story(scripts: Scripts) -> None:
+        await scripts.save("a.py", PRINTS)
+        with pytest.raises(ToolFailed, match="/no/such/python"):
+            await scripts.execute("a", [])
+        assert await scripts.running() == []
+
+    flown(tmp_path, story, python_path="/no/such/python")
+    assert list((tmp_path / "logs").iterdir()) == []
+
+
+def test_without_tmux_execute_is_a_clear_error_and_all_else_works(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def story(scripts: Scripts) -> None:
+        await scripts.start()
+        await scripts.save("a.py", PRINTS)
+        with pytest.raises(ToolFailed, match="tmux is not installed"):
+            await scripts.execute("a", [])
+        assert scripts.store.listed() == ["a.py"]
+        assert await scripts.running() == []
+
+    monkeypatch.setenv("PATH", str(tmp_path))
+    flown(tmp_path, story)
+    assert list((tmp_path / "logs").iterdir()) == []
+
+
+@pytest.mark.usefixtures("own_tmux")
+def test_deaths_are_acted_upon_and_other_ends_are_not(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    acted: list[tuple[int, str, str]] = []
+
+    async def after_death(_host: Any, sysid: int, action: str, script: str) -> str:
+        acted.append((sysid, action, script))
+        return "done"
+
+    async def story(scripts: Scripts) -> None:
+        for name, text in {"good.py": b"", "bad.py": b"1/0", "stopped.py": SLEEPS}.items():
+            await scripts.save(name, text)
+        for name in ("good.py", "bad.py"):
+            await scripts.execute(name, [])
+            await ended(scripts, name)
+        await scripts.execute("stopped.py", [])
+        await scripts.execute("bad.py", [])  # while another one may fly the vehicle
+        await ended(scripts, "bad.py")
+        await scripts.halt("stopped.py")
+        await asyncio.sleep(0.1)
+
+    monkeypatch.setattr(manager.on_exit, "after_death", after_death)
+    flown(tmp_path, story, on_script_exit="rtl")
+    assert acted == [(9, "rtl", "bad.py")]
+
+
+@pytest.mark.parametrize(
+    ("given", "url"),
+    [
+        ({}, "http://127.0.0.1:8000"),
+        ({"host": "0.0.0.0", "token": "t", "port": 81}, "http://127.0.0.1:81"),
+        ({"host": "::", "token": "t"}, "http://[::1]:8000"),
+        ({"host": "192.168.1.5", "token": "t"}, "http://192.168.1.5:8000"),
+        ({"certfile": "c", "keyfile": "k"}, "https://127.0.0.1:8000"),
+    ],
+)
+def test_address_is_one_that_this_machine_can_reach(tmp_path: Path, given: dict[str, Any], url: str) -> None:
+    assert address(settings(tmp_path, **given)) == url
+
+
+def test_scripts_run_by_the_python_that_we_run_by(tmp_path: Path) -> None:
+    assert settings(tmp_path).python_path == sys.executable

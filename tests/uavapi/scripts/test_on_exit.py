@@ -1,0 +1,66 @@
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from mavproxy_uavapi.scripts.on_exit import after_death
+
+
+def after(loop: Any, host: Any, action: str, sysid: int = 1) -> str:
+    return str(loop.run(after_death(host, sysid, action, "a.py")))
+
+
+def test_hold_stops_the_vehicle_and_leaves_it_in_guided(loop: Any, host: Any, flying: Any) -> None:
+    assert after(loop, host, "hold") == "hold is done"
+    setpoint = flying.setpoints()[-1]
+    assert (setpoint.vx, setpoint.vy, setpoint.vz) == (0, 0, 0)
+    assert flying.mode == "GUIDED"
+
+
+@pytest.mark.parametrize(("action", "mode"), [("land", "LAND"), ("rtl", "RTL")])
+def test_land_and_rtl_bring_it_down(loop: Any, host: Any, flying: Any, action: str, mode: str) -> None:
+    assert after(loop, host, action) == f"{action} is done"
+    assert (flying.mode, flying.armed) == (mode, False)
+
+
+@pytest.mark.parametrize("action", ["hold", "land", "rtl"])
+@pytest.mark.parametrize("mode", ["LOITER", "LAND", "AUTO"])
+def test_a_pilots_mode_is_never_touched(loop: Any, host: Any, flying: Any, action: str, mode: str) -> None:
+    flying.pilot(mode)
+    loop.settle()
+    assert mode in after(loop, host, action)
+    assert flying.orders() == []
+
+
+@pytest.mark.parametrize("action", ["hold", "land", "rtl"])
+def test_a_vehicle_that_is_not_armed_is_left_alone(loop: Any, host: Any, drone: Any, action: str) -> None:
+    drone.pilot("GUIDED")
+    loop.settle()
+    assert "not armed" in after(loop, host, action)
+    assert drone.orders() == []
+
+
+def test_nothing_is_nothing(loop: Any, host: Any, flying: Any) -> None:
+    after(loop, host, "nothing")
+    assert flying.orders() == []
+
+
+def test_somebody_elses_verb_is_not_superseded(loop: Any, host: Any, flying: Any, pilotage: Any, copter: Any) -> None:
+    job = pilotage.start(copter.land)
+    orders = len(flying.orders())
+    assert "flies the vehicle" in after(loop, host, "hold") or flying.mode == "LAND"
+    assert len(flying.orders()) == orders
+    assert job.running
+
+
+def test_no_vehicle_is_said(loop: Any, host: Any) -> None:
+    assert "nothing can be done" in after(loop, host, "land", sysid=9)
+
+
+def test_pilot_who_takes_the_vehicle_meanwhile_keeps_it(loop: Any, host: Any, flying: Any) -> None:
+    task = loop.create_task(after_death(host, 1, "land", "a.py"))
+    loop.pass_time(2.0)
+    flying.pilot("LOITER")
+    assert "LOITER" in loop.run(task)
+    assert flying.mode == "LOITER"

@@ -1,0 +1,154 @@
+"""The runner as a process, without tmux: what it logs, records, and does when it is told to stop."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from mavproxy_uavapi.scripts import runner, runs
+
+MakeRun = Callable[..., runs.Run]
+LANDS = "trap 'echo landing; exit 0' INT\necho up\nwhile true; do sleep 0.1; done"
+STUBBORN = "trap '' INT\necho up\nwhile true; do sleep 0.1; done"
+
+
+@pytest.fixture
+def started() -> Iterator[Callable[[runs.Run], subprocess.Popen[bytes]]]:
+    processes: list[subprocess.Popen[bytes]] = []
+
+    def start(run: runs.Run) -> subprocess.Popen[bytes]:
+        command = [sys.executable, "-I", runner.__file__, str(run.path)]
+        processes.append(subprocess.Popen(command, stdout=subprocess.PIPE, stdin=subprocess.DEVNULL))
+        return processes[-1]
+
+    yield start
+    for process in processes:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()
+
+
+def test_output_goes_to_both_logs_and_to_the_terminal(make_run: MakeRun, started: Any) -> None:
+    run = make_run('echo "out $1 $GIVEN"; echo err >&2; exit 3', args=["a b; c"])
+    shown, _ = started(run).communicate(timeout=20)
+    run = runs.load(run.path)
+    assert run.out_log.read_text() == "out a b; c yes\n"
+    assert run.err_log.read_text() == "err\n"
+    assert b"out a b; c yes" in shown and b"err" in shown and b"ended with status 3" in shown
+    assert (run.exit_status, run.running, run.died, run.killed) == (3, False, True, False)
+    assert run.ended_at is not None and run.ended_at >= run.started_at
+
+
+def test_environment_file_is_for_us_alone_and_gone_at_once(make_run: MakeRun, started: Any, eventually: Any) -> None:
+    run = make_run(LANDS)
+    environment = run.path.with_name(run.path.name.replace("_run", "_env"))
+    assert environment.stat().st_mode & 0o777 == 0o600
+    started(run)
+    eventually(lambda: runs.load(run.path).running)
+    assert not environment.exists()
+
+
+def test_stop_is_ctrl_c_first_so_that_the_script_can_land(make_run: MakeRun, started: Any, eventually: Any) -> None:
+    run = make_run(LANDS)
+    process = started(run)
+    eventually(lambda: runs.tail(run.out_log))
+    assert runs.load(run.path).running
+    process.terminate()
+    process.communicate(timeout=20)
+    run = runs.load(run.path)
+    assert run.out_log.read_text() == "up\nlanding\n"
+    assert (run.exit_status, run.killed, run.died) == (0, False, False)
+    assert run.stopping_at is not None
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_script_that_does_not_stop_is_killed_after_the_grace_period(
+    make_run: MakeRun, started: Any, eventually: Any, number: int
+) -> None:
+    run = make_run(STUBBORN, grace=0.3)
+    process = started(run)
+    eventually(lambda: runs.tail(run.out_log))
+    process.send_signal(number)
+    stopping = eventually(lambda: runs.load(run.path).stopping_at)
+    process.communicate(timeout=20)
+    run = runs.load(run.path)
+    assert (run.exit_status, run.killed, run.died) == (-signal.SIGKILL, True, True)
+    assert run.ended_at is not None and run.ended_at - stopping >= 0.3
+
+
+def test_suspended_script_hears_the_stop(make_run: MakeRun, started: Any, eventually: Any) -> None:
+    run = make_run(LANDS + "\n# kill -STOP")
+    process = started(run)
+    eventually(lambda: runs.tail(run.out_log))
+    child = int(subprocess.check_output(["ps", "-o", "pid=", "--ppid", str(process.pid)]).split()[0])
+    os.killpg(child, signal.SIGSTOP)
+    process.terminate()
+    process.communicate(timeout=20)
+    assert runs.load(run.path).out_log.read_text().endswith("landing\n")
+
+
+def test_program_that_is_not_there_is_recorded_in_words(make_run: MakeRun, started: Any) -> None:
+    run = make_run(command=["/no/such/python", "a.py"])
+    started(run).communicate(timeout=20)
+    run = runs.load(run.path)
+    assert run.exit_status == 127
+    assert run.error is not None and "/no/such/python" in run.error
+    assert "/no/such/python" in run.err_log.read_text()
+
+
+def test_background_child_that_keeps_the_output_does_not_keep_the_run(make_run: MakeRun, started: Any) -> None:
+    run = make_run("sleep 30 &\necho done")
+    started(run).communicate(timeout=10)
+    assert runs.load(run.path).exit_status == 0
+
+
+def test_script_that_closes_its_outputs_goes_on(make_run: MakeRun, started: Any, eventually: Any) -> None:
+    run = make_run("echo up; exec >&- 2>&-; sleep 0.5; exit 4")
+    process = started(run)
+    process.communicate(timeout=20)
+    assert runs.load(run.path).exit_status == 4
+
+
+def test_runner_that_was_killed_leaves_a_run_that_nobody_takes_for_running(
+    make_run: MakeRun, started: Any, eventually: Any
+) -> None:
+    run = make_run(LANDS)
+    process = started(run)
+    eventually(lambda: runs.load(run.path).pid)
+    child = int(subprocess.check_output(["ps", "-o", "pid=", "--ppid", str(process.pid)]).split()[0])
+    process.kill()
+    process.wait(10)
+    os.killpg(child, signal.SIGKILL)
+    run = runs.load(run.path)
+    assert (run.running, run.exit_status, run.died) == (False, None, True)
+
+
+def test_full_log_ends_with_a_note_and_the_script_goes_on(
+    tmp_path: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(runner, "LOG_LIMIT", 10)
+    log = runner.Log(str(tmp_path / "log"), runner.Terminal())
+    for _ in range(5):
+        log.write(b"123456")
+    log.file.close()
+    assert (tmp_path / "log").read_bytes() == b"123456123456\n[the log is full]\n"
+
+
+def test_full_disk_does_not_end_the_script(tmp_path: Any) -> None:
+    log = runner.Log("/dev/full", runner.Terminal())
+    log.write(b"x")
+    log.write(b"x")
+    log.file.close()
+
+
+def test_record_is_json_for_anybody(make_run: MakeRun, started: Any) -> None:
+    run = make_run("exit 0")
+    started(run).communicate(timeout=20)
+    assert json.loads(run.path.read_text())["exit_status"] == 0

@@ -1,0 +1,86 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from mavproxy_uavapi.scripts import runs
+
+MakeRun = Callable[..., runs.Run]
+
+
+def test_logs_are_named_by_script_and_time(make_run: MakeRun) -> None:
+    run = make_run(script="square.sh")
+    assert run.out_log.name[:-8].rsplit("_", 2)[0] == "square"
+    assert len(run.out_log.name) == len("square_YYYYmmdd_HHMMSS_out.log")
+    assert run.err_log.name == run.out_log.name.replace("_out", "_err")
+    assert run.session == "uavapi_1_" + run.out_log.name.removesuffix("_out.log")
+
+
+def test_second_run_in_the_same_second_waits_for_the_next(make_run: MakeRun) -> None:
+    assert make_run().path != make_run().path
+
+
+def test_discarded_run_leaves_nothing(make_run: MakeRun) -> None:
+    run = make_run()
+    runs.discard(run)
+    assert list(run.path.parent.iterdir()) == []
+
+
+def test_newest_run_comes_first_and_other_scripts_are_left_out(make_run: MakeRun) -> None:
+    first = make_run(script="a.sh")
+    make_run(script="a.py")
+    second = make_run(script="a.sh")
+    make_run(script="a_b.sh")
+    (first.path.parent / "a_x_run.json").write_text("[]")
+    (first.path.parent / "a_y_run.json").write_text("{")
+    assert [run.path for run in runs.of_script(first.path.parent, "a.sh")] == [second.path, first.path]
+
+
+def test_tail_is_the_end_of_a_log(tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    assert runs.tail(log) == ""
+    log.write_bytes(b"a" * 10 + b"\xff" + b"bcd")
+    assert runs.tail(log, 4) == "\ufffdbcd"
+
+
+@pytest.mark.parametrize(
+    ("told", "died"),
+    [
+        ({"exit_status": 0, "ended_at": 2.0}, False),
+        ({"exit_status": 1, "ended_at": 2.0}, True),
+        ({"exit_status": -11, "ended_at": 2.0}, True),
+        ({"exit_status": -2, "ended_at": 2.0}, True),
+        ({"exit_status": -2, "ended_at": 2.0, "stopping_at": 1.0}, False),
+        ({"exit_status": 1, "ended_at": 2.0, "stopping_at": 1.0}, False),
+        ({"exit_status": -9, "ended_at": 2.0, "stopping_at": 1.0, "killed": True}, True),
+        ({}, True),
+        ({"alive": True}, False),
+    ],
+)
+def test_a_run_died_unless_it_ended_well_or_by_ctrl_c_on_our_asking(
+    make_run: MakeRun, told: dict[str, object], died: bool
+) -> None:
+    assert replace(make_run(), **told).died is died  # type: ignore[arg-type]
+
+
+def test_report_of_a_run_that_is_being_stopped_says_how_long_it_has(make_run: MakeRun) -> None:
+    run = replace(make_run(grace=10.0), alive=True, started_at=100.0, stopping_at=105.0)
+    told = run.report(now=108.0)
+    assert (told["running"], told["running_for_s"], told["stopping"], told["kill_in_s"]) == (True, 8.0, True, 7.0)
+
+
+def test_record_that_was_removed_leaves_what_was_known(make_run: MakeRun) -> None:
+    run = make_run()
+    run.path.unlink()
+    assert runs.refreshed(run).script == "a.sh"
+
+
+def test_record_of_something_else_is_a_value_error(tmp_path: Path) -> None:
+    path = tmp_path / "x_run.json"
+    path.write_text(json.dumps({"script": "a.py"}))
+    with pytest.raises(ValueError, match="no record"):
+        runs.load(path)
