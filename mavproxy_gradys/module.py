@@ -69,6 +69,13 @@ class GradysModule(HostedModule):
         self.mpstate.completion_functions.pop(COMPLETION, None)
         super().unload()
 
+    def command(self, args: list[str]) -> None:
+        """The module's command at the prompt; most of it needs the asyncio thread."""
+        if self._begun or args[:1] in (["set"], ["help"]):
+            super().command(args)
+        else:
+            print("gradys: MAVProxy is still starting")
+
     def _show(self, tell: Callable[[dict[str, Any]], str]) -> None:
         """Print what `tell` makes of the report; the state belongs to the asyncio thread."""
 

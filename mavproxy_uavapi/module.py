@@ -15,6 +15,7 @@ except ModuleNotFoundError as missing:  # MAVProxy prints the text of an ImportE
 from mavproxy_uavapi.audit import Audit
 from mavproxy_uavapi.console import address_of, report, vehicles
 from mavproxy_uavapi.host.member import HostedModule
+from mavproxy_uavapi.logs import Logs, print_above_prompt
 from mavproxy_uavapi.settings import ModuleSettings, SettingError
 
 NAME = "uavapi"
@@ -52,6 +53,7 @@ class UavApiModule(HostedModule):
         super().__init__(mpstate, NAME, "HTTP API to fly and watch vehicles", actions, COMPLETIONS)
         self.add_completion_function(COMPLETION, lambda _: self.api_settings.names())
         self.audit = Audit(log_directory(mpstate))
+        self.logs = Logs(lambda text: self.host.bridge.post(lambda: print_above_prompt(text, self.mpstate.rl.prompt)))
         self.api = Api(self.host, self.audit)
         self.host.bridge.close_in_children(self.api.filenos)
 
@@ -74,6 +76,7 @@ class UavApiModule(HostedModule):
         finally:
             self.host.bridge.keep_in_children(self.api.filenos)
             self.audit.close()
+            self.logs.close()
 
     def _status(self, _args: list[str]) -> None:
         settings = self.api_settings.snapshot()
@@ -95,11 +98,15 @@ class UavApiModule(HostedModule):
         settings = self.api_settings.snapshot()
         address = address_of(settings)
         try:
+            self.logs.open(settings.log_console, settings.debug, settings.log_path, settings.sysid)
             self.host.bridge.run(self.api.start(settings))
         except ssl.SSLError as error:
             print(f"uavapi: cannot use {settings.certfile} with {settings.keyfile}: {error.reason}")
         except OSError as error:
             why = os.strerror(error.errno) if error.errno else str(error)
+            if error.filename is not None:
+                print(f"uavapi: cannot open {error.filename}: {why}")
+                return
             print(f"uavapi: cannot listen on {address}: {why}; `uavapi set port N` takes another port")
         else:
             print(f"uavapi: listening on {address}")

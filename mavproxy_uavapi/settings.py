@@ -17,14 +17,16 @@ from typing import Any
 
 from MAVProxy.modules.lib.mp_settings import MPSetting, MPSettings
 
+from mavproxy_uavapi.logs import components
+
 Network = ipaddress.IPv4Network | ipaddress.IPv6Network
 
 # Keys that an INI file of the original service, or of the launcher, may have and that are not the module's:
 # MAVProxy has the link, the launcher starts what is simulated.
-NOT_OURS = {
+NOT_OURS: dict[str, set[str]] = {
     "api": {"uav_connection", "connection_type", "gradys_gs", "vehicle"},
     "simulated": {"simulated", "ardupilot_path", "location", "gs_connection", "speedup", "headless"},
-    "logs": {"log_console", "log_path", "debug"},
+    "logs": set(),
 }
 MAVPROXYS = {"uav_connection", "connection_type"}
 UNSET = {"", "None", "[]"}
@@ -61,6 +63,8 @@ class Settings:
         script_size: kB of one script.
         script_quota: MB of all scripts together.
         on_script_exit: what the vehicle does when its script dies in flight: nothing, hold, land or rtl.
+        log_console, debug: components (COPTER, API, GRADYS_GS, SCRIPT) that log to the console, in detail.
+        log_path: the log file, or its folder; empty for none.
         token: what clients must send as a bearer token; empty for none.
     """
 
@@ -84,6 +88,9 @@ class Settings:
     script_size: int
     script_quota: int
     on_script_exit: str
+    log_console: frozenset[str]
+    log_path: str
+    debug: frozenset[str]
     token: str
 
     @property
@@ -122,6 +129,9 @@ def table() -> list[Any]:
         MPSetting("keyfile", str, "", "TLS key (PEM)"),
         MPSetting("max_jobs", int, 64, "verbs in flight at once", range=(1, 10000), tab="Limits"),
         MPSetting("max_rate", float, 500.0, "requests/s of one client", range=(1, 100000)),
+        MPSetting("log_console", str, "", "components that log to the console", tab="Logs"),
+        MPSetting("log_path", str, "", "log file, or its folder"),
+        MPSetting("debug", str, "", "components that log in detail"),
         MPSetting("scripts_path", str, "~/uav_scripts", "folder of the uploaded scripts", tab="Scripts"),
         MPSetting("script_logs", str, "~/uav_scripts/logs", "folder of their logs"),
         MPSetting("python_path", str, sys.executable, "what runs .py scripts"),
@@ -253,6 +263,11 @@ def _parse(name: str, value: Any) -> Any:
         is_loopback(str(value))
     if name == "allow_from":
         return tuple(_network(word) for word in _words(value))
+    if name in ("log_console", "debug"):
+        try:
+            return components(str(value))
+        except ValueError as error:
+            raise SettingError(f"{name}: {error}") from error
     if name == "cors_origins":
         return tuple(_words(value))
     return value

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import time
 from collections.abc import Callable
 from typing import Any
@@ -14,6 +15,8 @@ from mavproxy_uavapi.host.pending import Pending
 from mavproxy_uavapi.host.state import Fleet, VehicleState
 from mavproxy_uavapi.vehicle.hangar import Hangar
 from mavproxy_uavapi.vehicle.jobs import JobBook
+
+log = logging.getLogger("uavapi.copter")
 
 ATTRIBUTE = "uavapi_host"  # on MAVProxy's state, so that a module loaded anew finds it
 
@@ -49,6 +52,7 @@ class Host:
         self.members: list[Any] = []
         self._mpstate = mpstate
         self._told_target = 0
+        self._lost: set[int] = set()
         self._link_timers: dict[int, asyncio.TimerHandle] = {}
 
     # -- MAVProxy's main loop ---------------------------------------------------------------------------
@@ -90,7 +94,11 @@ class Host:
     def _watch_link(self, state: VehicleState) -> None:
         """End the waits on a vehicle when its heartbeats have been missing for the link timeout."""
         silent_for = self.clock() - state.heartbeat_at
-        if silent_for >= self.link_timeout:
+        lost = silent_for >= self.link_timeout
+        if lost != (state.system in self._lost):
+            self._lost ^= {state.system}
+            log.warning("vehicle %d: %s", state.system, "link lost" if lost else "link is back")
+        if lost:
             self.pending.fail(state.system, lambda: LinkLost.since(state.system, silent_for))
             delay = self.link_timeout / 5
         else:

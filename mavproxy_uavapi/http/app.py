@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import socket
 import ssl
+from pathlib import Path
 from typing import Any
 
 from aiohttp import web
@@ -119,6 +120,8 @@ def tls_context(certfile: str, keyfile: str) -> ssl.SSLContext:
     Raises:
         OSError: a file cannot be read, or is no PEM of that kind.
     """
+    for file in (certfile, keyfile):
+        Path(file).open("rb").close()  # ssl's own error would not name the file
     context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
     context.load_cert_chain(certfile, keyfile)
     return context

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 from collections import defaultdict
 from collections.abc import Callable
 from typing import Any
@@ -21,6 +22,8 @@ from mavproxy_uavapi.vehicle.messages import Command
 from mavproxy_uavapi.vehicle.waiting import Waiting
 
 mavlink = mavutil.mavlink
+
+log = logging.getLogger("uavapi.copter")
 
 ACK_TIMEOUT = 1.5  # s until a command is sent again
 SENDINGS = 4  # the first one and three more
@@ -57,6 +60,7 @@ class Commands:
             started = self._waiting.clock()
             while True:
                 result = await self._ask(command, shown)
+                log.debug("%s%s: %s", command.name, command.params, result_name(result))
                 if result == mavlink.MAV_RESULT_ACCEPTED:
                     return
                 again = command.patient and result in WORTH_ASKING_AGAIN

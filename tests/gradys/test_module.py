@@ -41,6 +41,7 @@ def test_loading_and_unloading_leaves_nothing_behind(mpstate: Any, descriptors: 
 
 def test_status_tells_the_ground_station(mpstate: Any, capsys: Any) -> None:
     module = gradys.init(mpstate, gs="10.0.0.5:8000")
+    module.idle_task()
     module.command(["status"])
-    assert "ground station 10.0.0.5:8000" in capsys.readouterr().out
+    assert "ground station http://10.0.0.5:8000" in capsys.readouterr().out
     module.unload()

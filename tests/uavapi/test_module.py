@@ -1,7 +1,7 @@
 from __future__ import annotations
 
-import re
 import json
+import re
 import socket
 import threading
 import time

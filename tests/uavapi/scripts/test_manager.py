@@ -51,6 +51,13 @@ async def ended(scripts: Scripts, script: str) -> Any:
     return await scripts.newest(script)
 
 
+async def up(scripts: Scripts, script: str) -> None:
+    run = await scripts.newest(script)
+    assert run is not None
+    while not run.out_log.read_text():
+        await asyncio.sleep(0.02)
+
+
 @pytest.mark.usefixtures("own_tmux")
 def test_script_is_told_where_the_api_is_and_its_end_is_remembered(tmp_path: Path) -> None:
     async def story(scripts: Scripts) -> Any:
@@ -71,6 +78,7 @@ def test_running_script_is_not_started_twice_and_stops(tmp_path: Path) -> None:
         outcomes = await asyncio.gather(*(scripts.execute("a", []) for _ in range(3)), return_exceptions=True)
         assert [type(outcome) for outcome in outcomes].count(BadRequest) == 2
         assert [run.script for run in await scripts.running()] == ["a.py"]
+        await up(scripts, "a.py")
         run = await scripts.halt("a.py")
         assert (run.running, run.exit_status, run.killed) == (False, -2, False)
         assert await scripts.running() == []
@@ -94,8 +102,10 @@ def test_next_api_finds_the_scripts_of_the_last_one_and_no_others(tmp_path: Path
 
     async def find_and_stop(scripts: Scripts) -> Any:
         await scripts.start()
+        await scripts.save("a.py", SLEEPS)
         with pytest.raises(BadRequest, match="already running"):
             await scripts.execute("a", [])
+        await up(scripts, "a.py")
         return await scripts.halt("a")
 
     flown(tmp_path, begin)

@@ -130,9 +130,7 @@ def test_runner_that_was_killed_leaves_a_run_that_nobody_takes_for_running(
     assert (run.running, run.exit_status, run.died) == (False, None, True)
 
 
-def test_full_log_ends_with_a_note_and_the_script_goes_on(
-    tmp_path: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_full_log_ends_with_a_note_and_the_script_goes_on(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(runner, "LOG_LIMIT", 10)
     log = runner.Log(str(tmp_path / "log"), runner.Terminal())
     for _ in range(5):

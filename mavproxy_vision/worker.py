@@ -1,0 +1,198 @@
+"""Two threads: one keeps the newest frame, the other looks for tags in it. Neither is MAVProxy's or asyncio's."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import threading
+import time
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from mavproxy_uavapi.errors import UavApiError
+from mavproxy_vision.camera import Frame, Image, Source
+from mavproxy_vision.detector import Detector
+from mavproxy_vision.sighting import Seen
+
+log = logging.getLogger("vision")
+
+SILENT_AFTER = 0.5  # s without a new frame until the camera counts as dead or frozen
+RECONNECT_PAUSE = 1.0  # s between two tries
+JOIN = 2.0  # s that a thread gets to end; a driver that hangs is left behind
+
+
+@dataclass(frozen=True)
+class Health:
+    """How the camera does.
+
+    Attributes:
+        state: `starting`, `ok`, `frozen`, `no frames`, `closed`.
+        frames: frames that were looked at.
+        repeated: frames that were the one before again, and were not looked at.
+        skipped: frames that a newer one overtook.
+        reconnects: times that the source was opened again.
+        rate: frames per second, lately.
+        error: what the source said last, if it was an error.
+    """
+
+    state: str = "starting"
+    frames: int = 0
+    repeated: int = 0
+    skipped: int = 0
+    reconnects: int = 0
+    rate: float = 0.0
+    error: str = ""
+
+
+class Watch:
+    """Tells new frames from repeated ones, and a live camera from a dead one. Pure: the clock is an argument."""
+
+    def __init__(self, live: bool, now: float) -> None:
+        self._live = live
+        self._mark: int | None = None
+        self.fresh_at = now  # the last new frame
+        self.any_at = now  # the last frame of any kind
+
+    def is_new(self, frame: Frame) -> bool:
+        """Whether the frame is another one than the last."""
+        self.any_at = frame.received_at
+        mark = zlib.crc32(frame.image[::4, ::4].tobytes())
+        if self._live and mark == self._mark:
+            return False
+        self._mark, self.fresh_at = mark, frame.received_at
+        return True
+
+    def verdict(self, now: float) -> str:
+        """`ok`, `frozen` or `no frames`."""
+        if now - self.fresh_at <= SILENT_AFTER:
+            return "ok"
+        return "frozen" if now - self.any_at <= SILENT_AFTER else "no frames"
+
+
+class Worker:
+    """Reads a source and looks for tags, until stopped.
+
+    Args:
+        source: where frames come from.
+        detector: looks; used by one thread only.
+        tell: called from the worker's thread with each outcome and its frame.
+        clock: monotonic seconds.
+    """
+
+    def __init__(
+        self,
+        source: Source,
+        detector: Detector,
+        tell: Callable[[Seen, Image], None],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.source, self.detector = source, detector
+        # Each of these has one thread that writes it.
+        self._state, self._error = "starting", ""
+        self._repeated = self._skipped = self._reconnects = self._frames = 0
+        self._rate = 0.0
+        self._tell, self._clock = tell, clock
+        self._newest: Frame | None = None
+        self._changed = threading.Condition()
+        self._stop = threading.Event()
+        self._watch = Watch(source.live, clock())
+        self._threads = [
+            threading.Thread(target=self._guarded, args=(body,), name=name, daemon=True)
+            for name, body in (("vision-camera", self._grab), ("vision-detector", self._look))
+        ]
+
+    def start(self) -> None:
+        """Start both threads."""
+        for thread in self._threads:
+            thread.start()
+
+    def stop(self) -> None:
+        """End both; a driver that hangs in a read is left behind. Any other thread."""
+        self._stop.set()
+        with self._changed:
+            self._changed.notify_all()
+        for thread in self._threads:
+            thread.join(JOIN)
+        self._state = "closed"
+
+    @property
+    def health(self) -> Health:
+        """How the camera does. Any thread."""
+        return Health(
+            self.verdict(), self._frames, self._repeated, self._skipped, self._reconnects, self._rate, self._error
+        )
+
+    def verdict(self) -> str:
+        """How the camera does just now: `ok`, `frozen`, `no frames`, `starting` or `closed`."""
+        if self._state in ("starting", "closed") or not self._threads[0].is_alive():
+            return self._state
+        return self._watch.verdict(self._clock())
+
+    def _guarded(self, body: Callable[[], None]) -> None:
+        try:
+            body()
+        except Exception as error:  # a defect of ours; the thread ends, and the status says so
+            self._error = f"a defect of this program: {error!r}"
+            log.exception("vision: the camera's thread ended")
+
+    # -- the camera's thread -------------------------------------------------------------------------------
+
+    def _grab(self) -> None:
+        while not self._stop.is_set():
+            try:
+                self.source.open()
+            except UavApiError as error:
+                self._error, self._state = str(error), "no frames"
+                self._stop.wait(RECONNECT_PAUSE)
+                continue
+            with contextlib.closing(self.source):
+                self._read_until_it_fails()
+            if not self._stop.is_set():
+                self._reconnects += 1
+                self._stop.wait(RECONNECT_PAUSE)
+
+    def _read_until_it_fails(self) -> None:
+        self._watch.any_at = self._watch.fresh_at = opened = self._clock()
+        while not self._stop.is_set():
+            frame = self.source.read()
+            if frame is not None and self._watch.is_new(frame):
+                self._keep(frame)
+            elif frame is not None:
+                self._repeated += 1
+            now = self._clock()
+            self._state = state = self._watch.verdict(now)
+            if state != "ok" and now - opened > 2 * SILENT_AFTER:
+                self._error = f"{state} for {now - self._watch.fresh_at:.1f} s"
+                return
+
+    def _keep(self, frame: Frame) -> None:
+        with self._changed:
+            if self._newest is not None:
+                self._skipped += 1
+            self._newest = frame
+            self._changed.notify_all()
+
+    # -- the detector's thread -----------------------------------------------------------------------------
+
+    def _look(self) -> None:
+        last = self._clock()
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._newest is not None or self._stop.is_set())
+                frame, self._newest = self._newest, None
+            if self._stop.is_set() or frame is None:
+                return
+            self._tell(self.look_at(frame), frame.image)
+            now = self._clock()
+            self._rate += 0.1 * (1.0 / max(now - last, 1e-3) - self._rate)
+            last = now
+
+    def look_at(self, frame: Frame) -> Seen:
+        """Look for tags in a frame."""
+        sightings = self.detector.detect(frame.image)
+        self._frames += 1
+        size = (frame.image.shape[1], frame.image.shape[0])
+        return Seen(
+            self._frames, frame.captured_at, frame.received_at, self._clock(), size, sightings
+        )

@@ -1,0 +1,164 @@
+"""Mission scripts in real tmux sessions, flying a real vehicle by the API that started them."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+
+import pytest
+import requests
+
+pytestmark = pytest.mark.skipif(shutil.which("tmux") is None, reason="scripts run in tmux")
+
+GRACE = 2.0
+FLIES = """
+import json, os, sys, time, urllib.request
+
+def ask(path):
+    request = urllib.request.Request(os.environ["UAVAPI_URL"] + path)
+    with urllib.request.urlopen(request, timeout=100) as answer:
+        return json.load(answer)
+
+print("vehicle", os.environ["UAVAPI_SYSID"], *sys.argv[1:])
+if sys.argv[1:] != ["early"]:
+    ask("/command/arm")
+    ask("/command/takeoff?alt=8")
+print("flying")
+try:
+    if sys.argv[1:] == ["die"]:
+        os._exit(5)
+    time.sleep(100)
+finally:
+    print(ask("/command/land")["result"])
+"""
+STUBBORN = "trap '' INT\necho up\nwhile true; do sleep 0.1; done\n"
+
+
+@pytest.fixture(scope="module")
+def rig(harness, tmp_path_factory):
+    directory = tmp_path_factory.mktemp("scripts")
+    folders = {"scripts_path": str(directory / "scripts"), "script_logs": str(directory / "logs")}
+    rig = harness.embedded(directory, script_grace=GRACE, **folders)
+    for name, text in {"flies.py": FLIES, "stubborn.sh": STUBBORN}.items():
+        upload(rig, name, text)
+    yield rig
+    for run in rig.ok(rig.get("/mission/running-scripts"))["scripts"]:
+        rig.ok(rig.post("/mission/stop-script", script_name=run["script"]))
+    rig.stop()
+
+
+def upload(rig, name, text):
+    answer = requests.post(rig.url + "/mission/upload-script", files={"file": (name, text)}, timeout=10)
+    rig.ok(answer)
+
+
+def execute(rig, name, *args):
+    return rig.ok(rig.post("/mission/execute-script", script_name=name, args=list(args)))
+
+
+def show(rig, name):
+    return rig.ok(rig.get(f"/mission/scripts/{name}"))["run"]
+
+
+def test_script_flies_is_seen_in_tmux_and_lands_when_it_is_stopped(rig, harness):
+    run = execute(rig, "flies")
+    harness.eventually(lambda: "flying" in show(rig, "flies")["out"])
+    pane = subprocess.run(["tmux", "capture-pane", "-p", "-t", run["session"]], capture_output=True, check=True)
+    assert b"flying" in pane.stdout
+    assert rig.post("/mission/execute-script", script_name="flies").status_code == 400
+    assert [r["script"] for r in rig.ok(rig.get("/mission/running-scripts"))["scripts"]] == ["flies.py"]
+    stopped = rig.ok(rig.post("/mission/stop-script", script_name="flies"))
+    assert (stopped["type"], stopped["info"], stopped["killed"]) == (52, "Stopped", False)
+    ended = show(rig, "flies")
+    assert ended["out"].splitlines() == ["vehicle 1", "flying", "Landed at home successfully"]
+    assert "KeyboardInterrupt" in ended["err"]
+    assert rig.status()["armed"] is False
+
+
+def test_stubborn_script_is_killed_after_the_grace_period_and_that_is_seen_coming(rig, harness):
+    execute(rig, "stubborn.sh")
+    harness.eventually(lambda: show(rig, "stubborn.sh")["out"])
+    with pytest.raises(requests.Timeout):  # its client hangs up; the stop goes on
+        rig.post("/mission/stop-script", timeout=0.5, script_name="stubborn.sh")
+    [stopping] = rig.ok(rig.get("/mission/running-scripts"))["scripts"]
+    assert stopping["stopping"] is True
+    assert 0 < stopping["kill_in_s"] <= GRACE
+    harness.eventually(lambda: not show(rig, "stubborn.sh")["running"])
+    assert show(rig, "stubborn.sh")["killed"] is True
+
+
+def test_log_is_followed_until_the_script_ends(rig):
+    upload(rig, "counts.py", "import time\nfor i in range(3):\n    print(i)\n    time.sleep(0.3)\n")
+    execute(rig, "counts")
+    with requests.get(f"{rig.url}/mission/scripts/counts/log?follow=1", stream=True, timeout=30) as answer:
+        lines = [line for line in answer.iter_lines(decode_unicode=True) if line]
+    assert lines[:6] == [word for i in range(3) for word in ("event: out", f'data: {{"line": "{i}"}}')]
+    assert lines[6] == "event: end"
+    assert json.loads(lines[7].removeprefix("data: "))["exit_status"] == 0
+
+
+def test_restarted_api_finds_its_scripts_again(rig, harness):
+    execute(rig, "flies", "early")
+    harness.eventually(lambda: "flying" in show(rig, "flies")["out"])
+    rig.mavproxy.ask("module unload uavapi", "Unloaded module uavapi")
+    settings = {"port": rig.port, "script_grace": GRACE}
+    settings |= {"scripts_path": f"{rig.directory}/scripts", "script_logs": f"{rig.directory}/logs"}
+    rig.mavproxy.ask(f"module load uavapi:{json.dumps(settings, separators=(',', ':'))}", "uavapi: listening")
+    rig.wait_until_up()
+
+    def running():
+        return [run["script"] for run in rig.ok(rig.get("/mission/running-scripts"))["scripts"]]
+
+    harness.eventually(lambda: running() == ["flies.py"])
+    assert rig.post("/mission/execute-script", script_name="flies").status_code == 400
+    rig.ok(rig.post("/mission/stop-script", script_name="flies"))
+    assert running() == []
+
+
+def test_vehicle_holds_when_its_script_dies_in_flight(rig, harness):
+    execute(rig, "flies", "die")
+    harness.eventually(lambda: not show(rig, "flies")["running"])
+    assert show(rig, "flies")["exit_status"] == 5
+    harness.eventually(lambda: setpoints(rig), what="the hold")
+    status = rig.status()
+    assert (status["armed"], status["mode"]) == (True, "GUIDED")
+    rig.on_the_ground()
+
+
+def setpoints(rig):
+    told = rig.control.ask("received", since=0)["messages"]
+    return [message for message in told if message["name"] == "SET_POSITION_TARGET_LOCAL_NED"]
+
+
+def test_pilots_mode_is_left_alone_when_the_script_dies(rig, harness):
+    upload(rig, "dies.py", "import time\ntime.sleep(1.5)\nraise SystemExit(1)\n")
+    rig.in_the_air(8)
+    execute(rig, "dies")
+    rig.mavproxy.type("mode LOITER")
+    harness.eventually(lambda: rig.status()["mode"] == "LOITER")
+    since = rig.control.ask("received", since=0)["last"]
+    harness.eventually(lambda: not show(rig, "dies")["running"])
+    harness.eventually(lambda: rig.status()["mode"] == "LOITER")
+    received = rig.control.ask("received", since=since)["messages"]
+    ours = {"SET_POSITION_TARGET_LOCAL_NED", "COMMAND_LONG", "SET_MODE"}
+    assert [message for message in received if message["name"] in ours] == []
+    rig.ok(rig.get("/command/guided"))
+    rig.on_the_ground()
+
+
+def test_names_never_reach_a_shell(rig, tmp_path):
+    evil = f"x$(touch {tmp_path}%2FPWN).py"
+    answer = requests.post(rig.url + "/mission/upload-script", files={"file": (evil, "")}, timeout=10)
+    assert answer.status_code == 400
+    assert rig.post("/mission/execute-script", script_name=evil).status_code == 400
+    upload(rig, "echo.sh", 'printf "%s|" "$@"\n')
+    execute(rig, "echo.sh", f"$(touch {tmp_path}/PWN)", ";", "a b")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_clear_removes_the_scripts(rig):
+    assert rig.ok(rig.get("/mission/list-scripts"))["scripts"]
+    answer = requests.delete(rig.url + "/mission/clear-scripts", timeout=10)
+    assert rig.ok(answer)["removed"]
+    assert rig.ok(rig.get("/mission/list-scripts"))["scripts"] == []
