@@ -172,7 +172,12 @@ class ModuleSettings:
 
     def names(self) -> list[str]:
         """All settings, the secret one too."""
-        return [*self.mp.list(), SECRET]
+        return self.all_names()
+
+    @staticmethod
+    def all_names() -> list[str]:
+        """All settings, the secret one too."""
+        return [*(setting.name for setting in table()), SECRET]
 
     def load(self, file: Path) -> None:
         """Read an INI file: section [api] has the settings, by their names.

@@ -103,6 +103,7 @@ class Landing:
         self.plan, self.target = plan, target
         self.phase = Phase.LOOK
         self.attempt = 0
+        self.refused = False  # failed because what is seen makes no sense
         self.offset: float | None = None  # m, horizontally, at the last sighting
         self.began: float | None = None
         self.phases: dict[str, float] = {}  # s that each phase took
@@ -114,6 +115,7 @@ class Landing:
         self._height = 0.0  # m above the ground that it holds there
         self._corners: Iterator[Waypoint] = iter(())
         self._corner: Waypoint | None = None
+        self._reason = ""
 
     def step(self, now: float, motion: Motion, height: float) -> Order:
         """One step.
@@ -130,7 +132,7 @@ class Landing:
         self.phases[self.phase.value] = self.phases.get(self.phase.value, 0.0) + elapsed
         failure = self._failure(now)
         if failure:
-            return self._fail(failure)
+            return self.fail(failure)
         wanted = self._wanted(now, motion, height, elapsed)
         if self.phase in (Phase.LAND, Phase.FAILED):
             self._velocity = wanted
@@ -138,8 +140,6 @@ class Landing:
         change = limited((wanted - self._velocity)[:2], self.plan.acceleration * elapsed)
         self._velocity = vector(self._velocity[0] + change[0], self._velocity[1] + change[1], wanted[2])
         return Order(self.phase, self._velocity)
-
-    _reason = ""
 
     def _begin(self, now: float, motion: Motion, height: float) -> None:
         self.began = self._last_step = now
@@ -153,7 +153,14 @@ class Landing:
         self._anchor, self._height = anchor.copy(), height
         self._integral[:] = 0.0
 
-    def _fail(self, reason: str) -> Order:
+    def resume(self, now: float, motion: Motion, height: float) -> None:
+        """The tag was lost while the autopilot landed: hold, climb, look again."""
+        self._last_step = now
+        self._velocity = motion.velocity.copy()
+        self._stay(now, Phase.HOLD, motion.travelled, height)
+
+    def fail(self, reason: str) -> Order:
+        """End it for that reason."""
         self.phase, self._reason, self._velocity = Phase.FAILED, reason, REST
         return Order(Phase.FAILED, REST, reason)
 
@@ -161,6 +168,7 @@ class Landing:
         assert self.began is not None
         if self.phase is Phase.FAILED:
             return self._reason
+        self.refused = self.target.ambiguous >= 5 or self.target.contradiction is not None
         if self.target.ambiguous >= 5:
             return "two tags of the same id are in view: it is not clear on which to land"
         if self.target.contradiction:
@@ -239,7 +247,7 @@ class Landing:
     def _next_attempt(self) -> None:
         if self.attempt >= self.plan.attempts:
             times = f"{self.attempt} attempt{'' if self.attempt == 1 else 's'}"
-            self._fail(f"no tag in sight after {times}")
+            self.fail(f"no tag in sight after {times}")
             return
         self.attempt += 1
 
@@ -247,7 +255,7 @@ class Landing:
         """Nothing in sight from here: along the next leg of the search."""
         corner = next(self._corners, None)
         if corner is None:
-            self._fail(f"no tag in sight within {self.plan.leash:g} m")
+            self.fail(f"no tag in sight within {self.plan.leash:g} m")
             return
         if self._corner is None or corner.ring != self._corner.ring or self.phase is Phase.LOOK:
             self._next_attempt()

@@ -90,6 +90,8 @@ def settings_file(options: Options) -> str | None:
         "logs": ("log_console", "log_path", "debug", "script_logs"),
     }.items():
         texts = {name: _ini_text(getattr(options, name)) for name in names if getattr(options, name)}
+        if section == "api":
+            texts.update(options.further)
         if texts:
             parser[section] = texts
     if not parser.sections():

@@ -17,11 +17,15 @@ from typing import Any, NoReturn
 
 from mavproxy_uavapi.launcher import values
 from mavproxy_uavapi.launcher.errors import OptionError
+from mavproxy_uavapi.settings import ModuleSettings, SettingError
 
 
 @dataclass(frozen=True)
 class Options:
-    """What to start. `None` and empty tuples mean "not given"."""
+    """What to start. `None` and empty tuples mean "not given".
+
+    `further` are settings of the `uavapi` module that the file has and the command line does not know.
+    """
 
     port: int = 8000
     host: str = "127.0.0.1"
@@ -43,6 +47,7 @@ class Options:
     debug: tuple[str, ...] = ()
     script_logs: str | None = None
     module: tuple[str, ...] = ()
+    further: tuple[tuple[str, str], ...] = ()
     mavproxy_args: tuple[str, ...] = ()
 
 
@@ -100,6 +105,7 @@ TABLE = (
     Row("debug", "logs", values.components, "components that log in detail"),
     Row("script_logs", "logs", path, "directory for the output of uploaded scripts"),
 )
+PREFIX = "UAVAPI_"  # of the environment variables
 SECTIONS = frozenset(row.section for row in TABLE)
 
 
@@ -130,8 +136,8 @@ def build_parser() -> argparse.ArgumentParser:
     return parser
 
 
-def parse(argv: Sequence[str]) -> Options:
-    """Read the arguments and the file they name.
+def parse(argv: Sequence[str], environ: Mapping[str, str] | None = None) -> Options:
+    """Read the arguments, the environment (`UAVAPI_PORT` …) and the file; the former win over the latter.
 
     Raises:
         OptionError: a wrong option, value, file or combination; its text is one line.
@@ -141,6 +147,7 @@ def parse(argv: Sequence[str]) -> Options:
     given = vars(build_parser().parse_args(arguments[:cut]))
     config = given.pop("config", None)
     merged = read_ini(Path(config).expanduser()) if config is not None else {}
+    merged.update(read_environment(os.environ if environ is None else environ))
     merged["module"] = tuple(name for text in given.pop("module", ()) for name in _read_module(text))
     for row in TABLE:
         if row.name in given:
@@ -160,6 +167,20 @@ def _read_module(text: str) -> tuple[str, ...]:
         return values.modules(text)
     except ValueError as error:
         raise OptionError(f"--module: {error}, got {text!r}") from error
+
+
+def read_environment(environ: Mapping[str, str]) -> dict[str, Any]:
+    """The values of the environment variables `UAVAPI_<NAME>`, by option name.
+
+    Raises:
+        OptionError: a value is wrong.
+    """
+    names = {PREFIX + row.name.upper(): row for row in TABLE}
+    return {
+        row.name: row.read(environ[variable], variable)
+        for variable, row in names.items()
+        if not values.is_unset(environ.get(variable, ""))
+    }
 
 
 def read_ini(file: Path) -> dict[str, Any]:
@@ -186,18 +207,41 @@ def read_ini(file: Path) -> dict[str, Any]:
         if section not in SECTIONS:
             raise OptionError(f"--config {file}: unknown section [{section}]")
         found.update(_read_section(file, section, parser[section]))
-    return found
+    further = _modules_own(file, parser)
+    return {**found, "further": further} if further else found
 
 
 def _read_section(file: Path, section: str, texts: Mapping[str, str]) -> dict[str, Any]:
     rows = {row.name: row for row in TABLE}
     found = {}
     for key, text in texts.items():
+        if key in ModuleSettings.all_names() and key not in rows and section != "simulated":
+            continue
         if key not in rows:
             raise OptionError(f"--config {file}: unknown key {key!r} in [{section}]")
         if not values.is_unset(text):
             found[key] = rows[key].read(text, f"--config {file}: {key} in [{section}]")
     return found
+
+
+def _modules_own(file: Path, parser: configparser.ConfigParser) -> tuple[tuple[str, str], ...]:
+    """The keys that are the `uavapi` module's alone, as they are written; it checks them here already.
+
+    Raises:
+        OptionError: a value is wrong.
+    """
+    rows = {row.name for row in TABLE}
+    own = [
+        (key, text)
+        for section in parser.sections()
+        for key, text in parser[section].items()
+        if key not in rows and key in ModuleSettings.all_names() and not values.is_unset(text)
+    ]
+    try:
+        ModuleSettings(dict(own), environ={"UAVAPI_ALLOW_OPEN": "true"})
+    except SettingError as error:
+        raise OptionError(f"--config {file}: {error}") from error
+    return tuple(own)
 
 
 def check(options: Options) -> None:

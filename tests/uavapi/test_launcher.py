@@ -55,7 +55,7 @@ def ini(tmp_path, text):
 
 
 def test_the_table_and_the_options_name_the_same_things():
-    table = {row.name for row in options.TABLE} | {"module", "mavproxy_args"}
+    table = {row.name for row in options.TABLE} | {"module", "mavproxy_args", "further"}
     assert table == {field.name for field in dataclasses.fields(Options)}
 
 
@@ -621,3 +621,25 @@ def test_a_strangers_process_is_no_member_even_in_our_session():
         assert not processes.signal_member(stranger.pid, signal.SIGKILL, "tag", {os.getsid(0)})
         assert stranger.poll() is None
         stranger.kill()
+
+
+def test_the_modules_own_keys_of_the_file_reach_the_module(tmp_path: Path) -> None:
+    file = tmp_path / "uav.ini"
+    file.write_text("[api]\nport = 8005\nmax_age = 2\nallow_from = 10.0.0.0/8\n", encoding="utf-8")
+    read = parse(["--config", str(file)], environ={})
+    text = commands.settings_file(read)
+    assert text is not None and "max_age = 2" in text and "allow_from = 10.0.0.0/8" in text
+
+
+def test_a_wrong_value_of_the_modules_is_an_error_at_once(tmp_path: Path) -> None:
+    file = tmp_path / "uav.ini"
+    file.write_text("[api]\nmax_age = soon\n", encoding="utf-8")
+    with pytest.raises(OptionError, match="max_age"):
+        parse(["--config", str(file)], environ={})
+
+
+def test_the_environment_stands_between_file_and_command_line(tmp_path: Path) -> None:
+    file = tmp_path / "uav.ini"
+    file.write_text("[api]\nport = 8005\nsysid = 5\n", encoding="utf-8")
+    read = parse(["--config", str(file), "--sysid", "7"], environ={"UAVAPI_PORT": "8006", "UAVAPI_SYSID": "6"})
+    assert (read.port, read.sysid) == (8006, 7)

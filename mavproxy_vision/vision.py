@@ -1,0 +1,301 @@
+"""Everything of the module that lives in the asyncio thread: the camera's outcomes, and the vehicle's history."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import cv2
+
+from mavproxy_uavapi.errors import UavApiError
+from mavproxy_uavapi.host.host import Host
+from mavproxy_uavapi.host.state import VehicleState
+from mavproxy_uavapi.vehicle.vehicle import Vehicle
+from mavproxy_vision.camera import Capture, Folder, Image, Posted, Source
+from mavproxy_vision.detector import Detector, Options
+from mavproxy_vision.errors import NoCamera
+from mavproxy_vision.fixes import Fixer, Wanted
+from mavproxy_vision.geometry import Attitude, vector
+from mavproxy_vision.history import History, VehicleClock
+from mavproxy_vision.rates import TRUTH, Rates
+from mavproxy_vision.rendering import Renderer
+from mavproxy_vision.settings import Settings
+from mavproxy_vision.sighting import Seen
+from mavproxy_vision.simulated import SimulatedCamera, parse_placed
+from mavproxy_vision.tags import Tag
+from mavproxy_vision.target import Target
+from mavproxy_vision.truth import Pose, Truth
+from mavproxy_vision.worker import Health, Worker
+
+FRESH = 1.0  # s; older sightings are not shown as what is in view
+
+
+class Vision:
+    """The eye. All methods belong to the asyncio thread, but for `deliver`.
+
+    Attributes:
+        settings: the snapshot in force.
+        history: where the vehicle was; its times are on `clock`.
+        truth: where a simulated vehicle truly is.
+        seen, image: the newest outcome, and its frame.
+        target: what is being landed on; None between landings.
+        changed: set and replaced with each outcome.
+
+    Args:
+        host: what our modules share.
+        settings: the first snapshot.
+    """
+
+    def __init__(self, host: Host, settings: Settings) -> None:
+        self.host, self.settings = host, settings
+        self.history, self.clock, self.truth = History(), VehicleClock(), Truth()
+        self.rates = Rates(host.clock)
+        self.worker: Worker | None = None
+        self.seen: Seen | None = None
+        self.image: Image | None = None
+        self.target: Target | None = None
+        self.changed = asyncio.Event()
+        self.latencies: list[float] = []  # s from a frame's arrival to the setpoint that uses it
+        self._fixer: Fixer | None = None
+        self._system = 0
+        self._home_down = 0.0
+        self._watching: asyncio.Task[None] | None = None
+        self._truth_needed = contextlib.ExitStack()
+        self._extra_sizes: dict[int, float] = {}
+
+    # -- life ----------------------------------------------------------------------------------------------
+
+    def listen(self) -> None:
+        """Follow the vehicle's telemetry."""
+        self.host.listeners.append(self._hear)
+        self._watching = asyncio.get_running_loop().create_task(self.rates.run(self.vehicle))
+
+    async def start(self, settings: Settings) -> None:
+        """Look through the camera that the settings name; what was running ends.
+
+        Raises:
+            BadSetting: they make no sense together.
+            NoCamera: they name no camera.
+        """
+        await self.stop()
+        self.settings = settings
+        if not settings.source:
+            raise NoCamera("no camera is set: `vision set source camera:0`, sim, http, a path or a URL")
+        loop = asyncio.get_running_loop()
+        self.worker = await loop.run_in_executor(None, self._make_worker, settings)
+        self.worker.start()
+        if settings.source == "sim":
+            self._truth_needed.enter_context(self.rates.at(TRUTH))
+
+    async def stop(self) -> None:
+        """Close the camera."""
+        self._truth_needed.close()
+        worker, self.worker = self.worker, None
+        self.seen = self.image = None
+        if worker is not None:
+            await asyncio.get_running_loop().run_in_executor(None, worker.stop)
+
+    async def close(self) -> None:
+        """Give back everything."""
+        if self._hear in self.host.listeners:
+            self.host.listeners.remove(self._hear)
+        if self._watching is not None:
+            self._watching.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await self._watching
+        await self.stop()
+
+    def _make_worker(self, settings: Settings) -> Worker:
+        cv2.setNumThreads(settings.threads)
+        detector = Detector(settings.model, self.options(settings))
+        return Worker(make_source(settings, self._where, self.host.clock), detector, self.deliver, self.host.clock)
+
+    def options(self, settings: Settings) -> Options:
+        """How the detector is to look."""
+        sizes = {tag.id: tag.size for tag in settings.tag_list}
+        return Options(settings.families, {**self._extra_sizes, **sizes}, settings.any_id, settings.far)
+
+    async def want(self, number: int) -> None:
+        """Look for that id too; it has the main tag's size unless `tags` says otherwise."""
+        tags = self.settings.tag_list
+        if number in self._extra_sizes or any(tag.id == number for tag in tags):
+            return
+        self._extra_sizes[number] = tags[0].size
+        if self.worker is not None:
+            settings, model = self.settings, self.settings.model
+            loop = asyncio.get_running_loop()
+            self.worker.detector = await loop.run_in_executor(None, Detector, model, self.options(settings))
+
+    # -- what comes in -------------------------------------------------------------------------------------
+
+    def deliver(self, seen: Seen, image: Image) -> None:
+        """An outcome. The worker's thread."""
+        self.host.bridge.call_soon(self.take, seen, image)
+
+    def take(self, seen: Seen, image: Image) -> None:
+        """An outcome."""
+        self.seen, self.image = seen, image
+        if self.target is not None and self._fixer is not None:
+            self.target.take(self._fixer.fixes(seen, self.history, self.clock, self._home_down))
+        self.changed.set()
+        self.changed = asyncio.Event()
+
+    def _hear(self, state: VehicleState, message: Any, now: float) -> None:
+        name = message.get_type()
+        if name not in HEARD or message.get_srcComponent() != state.component or not self._is_ours(state):
+            return
+        if name == "SIM_STATE":
+            self._hear_truth(state, message, now)
+            return
+        at = message.time_boot_ms / 1000.0
+        if name == "GLOBAL_POSITION_INT":
+            motion = self.history.motion(at)
+            if motion is not None:
+                self._home_down = float(motion.position[2]) + message.relative_alt / 1000.0
+            return
+        self.clock.hear(now, at, state.time_ratio.ratio)
+        if name == "ATTITUDE":
+            attitude = Attitude(message.roll, message.pitch, message.yaw)
+            self.history.add_attitude(at, attitude, (message.rollspeed, message.pitchspeed, message.yawspeed))
+        else:
+            position, velocity = vector(message.x, message.y, message.z), vector(message.vx, message.vy, message.vz)
+            self.history.add_motion(at, position, velocity)
+
+    def _is_ours(self, state: VehicleState) -> bool:
+        system = self.host.target or next(iter(self.host.fleet.vehicles), 0)
+        if system != self._system:  # another vehicle: what was known is of no use
+            self._system = system
+            self.history, self.clock, self.truth = History(), VehicleClock(), Truth()
+        return state.system == system
+
+    def _hear_truth(self, state: VehicleState, message: Any, now: float) -> None:
+        lat, lon = message.lat_int / 1e7, message.lon_int / 1e7
+        attitude = Attitude(message.roll, message.pitch, message.yaw)
+        pose = Pose(now, lat, lon, message.alt, (message.vn, message.ve, message.vd), attitude)
+        height = (state.field("GLOBAL_POSITION_INT", "relative_alt") or 0) / 1000.0
+        self.truth.add(pose, state.armed, height)
+
+    def _where(self, time: float) -> Any:
+        """Position and attitude for the simulated camera at host time `time`. The worker's thread."""
+        pose = self.truth.at(time)
+        newest = self.truth.newest
+        if pose is not None or (newest is not None and time - newest.at < FRESH):
+            return pose
+        at = self.clock.vehicle(time)  # not a simulation that tells the truth: its own word has to do
+        attitude, motion = self.history.attitude(at), self.history.motion(at)
+        if attitude is None or motion is None:
+            return None
+        return motion.position - vector(0.0, 0.0, self._home_down), attitude
+
+    # -- what is asked of it -------------------------------------------------------------------------------
+
+    def vehicle(self) -> Vehicle:
+        """The vehicle that carries the camera, with a link that is alive."""
+        return self.host.hangar.commandable(0)
+
+    @property
+    def health(self) -> Health:
+        """How the camera does."""
+        return self.worker.health if self.worker is not None else Health("closed")
+
+    def require_camera(self) -> None:
+        """Raises NoCamera unless frames come."""
+        if self.worker is None:
+            raise NoCamera("no camera runs: `vision set source …`, `vision start`")
+        health = self.health
+        if health.state not in ("ok", "starting"):
+            raise NoCamera(f"the camera: {health.state}{f' ({health.error})' if health.error else ''}")
+
+    def aim(self, tags: dict[int, Tag]) -> Target:
+        """Begin to keep track of a target."""
+        settings = self.settings
+        wanted = Wanted(settings.families[0], tags, settings.ground)
+        self._fixer = Fixer(settings.model, settings.camera_mount, wanted)
+        self.target = Target()
+        return self.target
+
+    def aim_no_more(self) -> None:
+        """The landing is over."""
+        self.target = self._fixer = None
+
+    def now(self) -> float:
+        """The vehicle's time."""
+        return self.clock.vehicle(self.host.clock())
+
+    def height(self, down: float) -> float:
+        """Metres above the target's ground, for m down of the EKF origin."""
+        return self._home_down - down - self.settings.ground
+
+    def touchdown_error(self, tag: int) -> float | None:
+        """Metres from the simulated vehicle to the simulated tag; None where nobody knows the truth."""
+        if self.settings.source != "sim" or self.truth.newest is None:
+            return None
+        if self.host.clock() - self.truth.newest.at > FRESH:
+            return None
+        placed = parse_placed(self.settings.sim_tags, self.settings.families[0])
+        errors = [self.truth.distance_to(one.north, one.east) for one in placed if one.id == tag]
+        return min((error for error in errors if error is not None), default=None)
+
+    @property
+    def fresh_seen(self) -> Seen | None:
+        """The newest outcome, if it shows what is in view now."""
+        if self.seen is None or self.host.clock() - self.seen.captured_at > FRESH:
+            return None
+        return self.seen
+
+    def home_down(self) -> float:
+        """Home in m down of the EKF origin."""
+        return self._home_down if math.isfinite(self._home_down) else 0.0
+
+
+HEARD = {"ATTITUDE", "LOCAL_POSITION_NED", "GLOBAL_POSITION_INT", "SIM_STATE"}
+
+
+def make_source(settings: Settings, where: Any, clock: Callable[[], float]) -> Source:
+    """The source that the settings name.
+
+    Raises:
+        BadSetting: one of its settings makes no sense.
+    """
+    spec, latency = settings.source, settings.latency / 1000
+    if spec == "sim":
+        tags = parse_placed(settings.sim_tags, settings.families[0])
+        renderer = Renderer(settings.model, settings.camera_mount, tags, settings.look)
+        return SimulatedCamera(renderer, where, settings.timing, clock)
+    if spec == "http":
+        return Posted(latency, clock)
+    folder = Path(spec).expanduser()
+    if folder.is_dir():
+        return Folder(folder, latency, settings.fps, clock)
+    name = str(folder) if folder.is_file() else spec
+    return Capture(name, latency, (settings.width, settings.height), settings.fps, clock)
+
+
+def in_view(seen: Seen | None) -> list[dict[str, Any]]:
+    """The tags of an outcome, as they are told to people."""
+    return [] if seen is None else [_told(seen, sighting) for sighting in seen.sightings]
+
+
+def _told(seen: Seen, sighting: Any) -> dict[str, Any]:
+    known = sighting.position is not None
+    return {
+        "id": sighting.id,
+        "family": sighting.family,
+        "hamming": sighting.hamming,
+        "corners": [[round(float(value), 2) for value in corner] for corner in sighting.corners],
+        "size": sighting.size or None,
+        "position": [round(float(value), 3) for value in sighting.position] if known else None,
+        "distance": round(sighting.distance, 3) if known else None,
+        "rotation": [[round(float(v), 4) for v in row] for row in sighting.rotation] if known else None,
+        "reprojection_error": round(sighting.error, 3) if known else None,
+        "latency_s": round(seen.latency, 3),
+    }
+
+
+def unloaded(error: UavApiError) -> str:
+    """An error as the prompt shows it."""
+    return f"vision: {error}"

@@ -1,0 +1,323 @@
+"""A real browser: what a page of another site can do to the API, and what a page that is named may do."""
+
+from __future__ import annotations
+
+import http.server
+import json
+import re
+import shutil
+import socket
+import threading
+from pathlib import Path
+from string import Template
+from typing import Any
+
+import pytest
+
+EVIL = "evil.example"  # a name that the browser is told to find at 127.0.0.1
+PATIENCE = 90.0  # s for a browser to start, try everything, and tell; other tests share the machine
+ARM = 400  # MAV_CMD_COMPONENT_ARM_DISARM
+# A line of the browser's log about an answer; of a refused WebSocket it only keeps the status.
+ANSWERED = re.compile(r'(?:"headers":\["HTTP/1\.1 |Unexpected response code: )(\d+)')
+FLAGS = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--disable-dev-shm-usage",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    f"--host-resolver-rules=MAP {EVIL} 127.0.0.1",
+]
+
+# Each try marks its request with ?by=NAME, which the API ignores and the browser's own log of its traffic keeps.
+PAGE = Template("""<!doctype html><meta charset="utf-8"><title>page</title><iframe name="sink"></iframe>
+<script>
+const api = "$api";
+const sink = document.querySelector("iframe");
+const read = async answer => answer.type === "opaque" ? "opaque" : `$${answer.status} $${await answer.text()}`;
+const form = path => new Promise(done => {
+  const form = document.createElement("form");
+  Object.assign(form, {method: "post", action: api + path, target: "sink"});
+  document.body.append(form);
+  sink.onload = () => done("answered");
+  form.submit();
+});
+const tries = {
+  image: () => new Promise(done => {
+    const image = new Image();
+    image.onload = image.onerror = () => done("answered");
+    image.src = api + "/command/arm?by=image";
+  }),
+  opaque: async () => read(await fetch(api + "/command/arm?by=opaque", {mode: "no-cors"})),
+  fetch: async () => read(await fetch(api + "/command/arm?by=fetch")),
+  form: () => form("/command/arm?by=form"),
+  text: async () => read(await fetch(api + "/movement/drive?by=text", {
+    method: "POST", mode: "no-cors", headers: {"Content-Type": "text/plain"}, body: '{"x": 1, "y": 1, "z": 0}'})),
+  telemetry: async () => read(await fetch(api + "/telemetry/status?by=telemetry")),
+  websocket: () => new Promise(done => {
+    const socket = new WebSocket(api.replace("http", "ws") + "/telemetry/stream?by=websocket");
+    socket.onmessage = event => { socket.close(); done(event.data); };
+    socket.onerror = () => done("refused");
+  }),
+  events: () => new Promise(done => {
+    const source = new EventSource(api + "/telemetry/stream?names=HEARTBEAT&by=events");
+    source.addEventListener("HEARTBEAT", event => { source.close(); done(event.data); });
+    source.onerror = () => { source.close(); done("refused"); };
+  }),
+};
+const late = () => new Promise(done => setTimeout(() => done("no answer"), 20000));
+(async () => {
+  const results = {};
+  for (const [name, act] of Object.entries(tries))
+    results[name] = await Promise.race([act().catch(error => `$${error}`), late()]);
+  await fetch("$report", {method: "POST", mode: "no-cors", body: JSON.stringify(results)});
+})();
+</script>""")
+
+
+class Site:
+    """A web server with one page, which tells it what came of the page's tries."""
+
+    def __init__(self) -> None:
+        site = self
+
+        class Handler(http.server.BaseHTTPRequestHandler):
+            def do_GET(self) -> None:
+                self._answer(site.page.encode() if self.path == "/" else b"")
+
+            def do_POST(self) -> None:
+                site.report = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
+                self._answer(b"")
+                site.reported.set()
+
+            def _answer(self, body: bytes) -> None:
+                self.send_response(200)
+                self.send_header("Content-Type", "text/html")
+                self.send_header("Content-Length", str(len(body)))
+                self.send_header("Connection", "close")
+                self.end_headers()
+                self.wfile.write(body)
+
+            def log_message(self, *_: Any) -> None:
+                """Say nothing."""
+
+        self.page = ""
+        self.report: dict[str, str] = {}
+        self.reported = threading.Event()
+        self._server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+        self._thread = threading.Thread(target=self._server.serve_forever)
+        self._thread.start()
+
+    @property
+    def port(self) -> int:
+        return int(self._server.server_address[1])
+
+    @property
+    def report_url(self) -> str:
+        return f"http://127.0.0.1:{self.port}/report"
+
+    def close(self) -> None:
+        self._server.shutdown()
+        self._server.server_close()
+        self._thread.join()
+
+
+class Rebound:
+    """An address that was the attacker's when its page was loaded, and is the API's from then on.
+
+    That is what DNS rebinding does: the browser takes both for one origin. Here the address stays, and what
+    answers at it changes.
+    """
+
+    def __init__(self, before: int, after: int) -> None:
+        self.targets = [before, after]
+        self._threads: list[threading.Thread] = []
+        self._sockets: list[socket.socket] = []
+        self._listening = socket.create_server(("127.0.0.1", 0))
+        self.port = int(self._listening.getsockname()[1])
+        self._spawn(self._accept)
+
+    def _spawn(self, work: Any, *args: Any) -> None:
+        thread = threading.Thread(target=work, args=args)
+        self._threads.append(thread)
+        thread.start()
+
+    def _accept(self) -> None:
+        while True:
+            try:
+                near, _ = self._listening.accept()
+            except OSError:
+                return
+            self._spawn(self._serve, near)
+
+    def _serve(self, near: socket.socket) -> None:
+        self._sockets.append(near)
+        try:
+            request = near.recv(65536)
+            if not request:  # a connection that the browser opened in case
+                return
+            page = request.startswith(b"GET / ") or request.startswith(b"GET /favicon")
+            far = socket.create_connection(("127.0.0.1", self.targets[0 if page else 1]))
+            self._sockets.append(far)
+            far.sendall(request)
+            self._spawn(_pour, near, far)
+            _pour(far, near)
+        except OSError:
+            pass
+
+    def close(self) -> None:
+        self._listening.shutdown(socket.SHUT_RDWR)
+        self._listening.close()
+        for one in list(self._sockets):
+            _hang_up(one)
+        for thread in self._threads:
+            thread.join()
+        for one in self._sockets:
+            one.close()
+
+
+def _pour(source: socket.socket, sink: socket.socket) -> None:
+    try:
+        while data := source.recv(65536):
+            sink.sendall(data)
+    except OSError:
+        pass
+    for one in (source, sink):
+        _hang_up(one)
+
+
+def _hang_up(one: socket.socket) -> None:
+    try:
+        one.shutdown(socket.SHUT_RDWR)
+    except OSError:
+        pass
+
+
+class Browser:
+    """A headless Chromium."""
+
+    def __init__(self, harness: Any, directory: Path) -> None:
+        program = shutil.which("chromium")
+        if program is None:
+            pytest.fail("there is no chromium to test with: apt-get install chromium")
+        self._program, self._harness, self._directory = program, harness, directory
+
+    def visit(self, url: str, site: Site) -> None:
+        """Open a page and wait until it has told `site` what came of its tries."""
+        self.traffic = self._directory / "traffic.json"
+        command = [self._program, *FLAGS, f"--user-data-dir={self._directory / 'profile'}"]
+        command += [f"--log-net-log={self.traffic}", url]
+        process = self._harness.Process(command, self._directory / "chromium.log", self._directory)
+        try:
+            told = site.reported.wait(PATIENCE)
+        finally:
+            process.stop()
+        assert told, f"the page told nothing: {process.output()[-2000:]}"
+
+    def statuses(self) -> dict[str, int]:
+        """The API's answer to each try, by its name, as the browser received it."""
+        names: dict[int, str] = {}
+        statuses: dict[str, int] = {}
+        for line in self.traffic.read_text(encoding="utf-8", errors="replace").splitlines():
+            source = re.search(r'"source":\{"id":(\d+)', line)
+            if source is None:
+                continue
+            number = int(source[1])
+            if asked := re.search(r'"url":"[^"]*[?&]by=(\w+)', line):
+                names[number] = asked[1]
+            if (answered := ANSWERED.search(line)) and number in names:
+                statuses[names[number]] = int(answered[1])
+        return statuses
+
+
+@pytest.fixture
+def browser(harness, tmp_path):
+    return Browser(harness, tmp_path)
+
+
+@pytest.fixture
+def site():
+    made = Site()
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def ready(embedded_rig, harness):
+    """The rig, disarmed and so that it would arm at once."""
+    embedded_rig.ok(embedded_rig.get("/command/disarm"))
+    harness.eventually(lambda: embedded_rig.status()["ready_to_arm"], what="getting ready to arm")
+    return embedded_rig
+
+
+def reached_the_vehicle(rig: Any, since: int) -> list[str]:
+    """What the API made of commands and setpoints: names of messages that arm or move the vehicle."""
+    received = rig.control.ask("received", since=since)["messages"]
+    arms = [m for m in received if m["name"] == "COMMAND_LONG" and m["fields"]["command"] == ARM]
+    moves = [m for m in received if m["name"].startswith("SET_POSITION_TARGET") or m["name"] == "SET_MODE"]
+    return [m["name"] for m in arms + moves]
+
+
+@pytest.mark.parametrize("name", ["127.0.0.1", EVIL], ids=["another-port", "another-site"])
+def test_a_page_of_another_origin_can_neither_command_nor_read(ready, browser, site, name):
+    since = ready.control.ask("received", since=0)["last"]
+    site.page = PAGE.substitute(api=ready.url, report=site.report_url)
+    browser.visit(f"http://{name}:{site.port}/", site)
+    assert browser.statuses() == dict.fromkeys(site.report, 403)
+    assert len(site.report) == 8
+    for attempt in ("fetch", "telemetry"):
+        assert "Failed to fetch" in site.report[attempt]
+    for attempt in ("websocket", "events"):
+        assert site.report[attempt] == "refused"
+    assert reached_the_vehicle(ready, since) == []
+    assert ready.status()["armed"] is False
+
+
+def test_the_same_page_may_do_all_that_names_its_origin_once_that_is_trusted(ready, browser, site):
+    origin = f"http://{EVIL}:{site.port}"
+    ready.mavproxy.ask(f"uavapi set cors_origins {origin}", "listening on")
+    try:
+        since = ready.control.ask("received", since=0)["last"]
+        site.page = PAGE.substitute(api=ready.url, report=site.report_url)
+        browser.visit(f"{origin}/", site)
+    finally:
+        ready.mavproxy.ask("uavapi set cors_origins None", "listening on")
+    statuses = browser.statuses()
+    assert statuses.pop("text") in (200, 409)  # on the ground it drives nowhere, but it was let in
+    assert statuses == {
+        "image": 403,  # browsers send no Origin with these two: nobody can tell whose they are
+        "opaque": 403,
+        "fetch": 200,
+        "form": 200,
+        "telemetry": 200,
+        "websocket": 101,
+        "events": 200,
+    }
+    assert "Armed vehicle" in site.report["fetch"]
+    assert '"vehicle_type": "copter"' in site.report["telemetry"]
+    assert json.loads(site.report["websocket"])["system"] == 1
+    assert json.loads(site.report["events"])["name"] == "HEARTBEAT"
+    assert "COMMAND_LONG" in reached_the_vehicle(ready, since)
+
+
+@pytest.mark.parametrize(("name", "status"), [(EVIL, "403"), ("localhost", "200")])
+def test_a_name_that_was_rebound_to_us_is_refused_and_our_own_is_not(ready, browser, site, name, status):
+    since = ready.control.ask("received", since=0)["last"]
+    rebound = Rebound(site.port, ready.port)
+    try:
+        site.page = PAGE.substitute(api=f"http://{name}:{rebound.port}", report=site.report_url)
+        browser.visit(f"http://{name}:{rebound.port}/", site)
+    finally:
+        rebound.close()
+    assert site.report["fetch"].startswith(status)  # one origin: the page can read every answer
+    assert site.report["telemetry"].startswith(status)
+    assert set(browser.statuses().values()) == ({403} if name == EVIL else {200, 101} | _text(browser))
+    assert bool(reached_the_vehicle(ready, since)) == (name != EVIL)
+
+
+def _text(browser: Browser) -> set[int]:
+    """What came of the try that drives nowhere on the ground."""
+    return {browser.statuses()["text"]}
