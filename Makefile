@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 
-.PHONY: demo test test-sitl lint bench clean
+.PHONY: demo test test-sitl lint bench soak clean
 
 demo: $(INSTALLED)
 	$(BIN)/mavproxy-uavapi --simulated $(ARGS)
@@ -29,6 +29,9 @@ $(INSTALLED): setup.py pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[dev]"
 	touch $@
+
+soak: $(INSTALLED)
+	$(BIN)/python benchmarks/soak.py --minutes $(or $(MINUTES),10)
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info
