@@ -1,4 +1,4 @@
-"""What the module answers over HTTP while uavapi is loaded: /gradys/status, /gradys/readings."""
+"""What the module answers over HTTP while uavapi is loaded: /gradys/status, /gradys/readings, /mission/fly-track."""
 
 from __future__ import annotations
 
@@ -10,6 +10,9 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from mavproxy_gradys.readings import NAME, Reading, Value, device_of
 from mavproxy_gradys.service import Gradys
+from mavproxy_gradys.track_flight import VERB
+from mavproxy_gradys.tracking import REACH
+from mavproxy_gradys.tracks import parse, waypoints
 from mavproxy_uavapi.errors import NoVehicle
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import Empty, Request
@@ -67,6 +70,19 @@ class Readings(Request):
         return given if not isinstance(given, dict) or "readings" in given else {"readings": [given]}
 
 
+class Track(Request):
+    """A track to fly: its text, in either of CentMesh's formats.
+
+    `ground` is the AMSL altitude (m) that heights count from, by default the track's lowest; every waypoint must
+    lie within `reach` m of here; with `wait` false the answer comes when the flight has begun.
+    """
+
+    track: Annotated[str, Field(min_length=1)]
+    ground: Annotated[float | None, Field(ge=-500, le=9000)] = None
+    reach: Annotated[float, Field(gt=0, le=100_000)] = REACH
+    wait: bool = True
+
+
 class Handlers:
     """Answers, by the module's service."""
 
@@ -79,6 +95,7 @@ class Handlers:
             Route("/gradys/status", self.status, Empty),
             Route("/gradys/readings", self.readings, Readings, POST),
             Route("/gradys/flush", self.flush, Empty, EITHER),
+            Route(VERB, self.fly_track, Track, POST),
         ]
 
     async def status(self, call: Call) -> dict[str, Any]:
@@ -102,6 +119,21 @@ class Handlers:
             "result": f"Kept {len(numbers)} reading{plural}",
             "seq": numbers,
         }
+
+    async def fly_track(self, call: Call) -> dict[str, Any]:
+        """Take off, fly through a track's places, return and land; `/gradys/status` tells the progress."""
+        given = call.params(Track)
+        readings = parse(given.track)
+        job = self._gradys.tracks.fly(
+            call.vehicle,
+            waypoints(readings, given.ground),
+            given.reach,
+            request=given.model_dump(),
+            client=call.request.remote or "unknown",
+            outlives_client=not given.wait,
+        )
+        result = await job.outcome() if given.wait else "The track is being flown"
+        return call.answer(result, job=job.id)
 
     def _reading(self, call: Call, given: OneReading, now: float) -> Reading:
         system = given.sysid or call.seen.state.system

@@ -10,6 +10,8 @@ try:
     from mavproxy_gradys.http import Handlers
     from mavproxy_gradys.service import Gradys
     from mavproxy_gradys.settings import ModuleSettings
+    from mavproxy_gradys.track_console import HELP as TRACK_HELP
+    from mavproxy_gradys.track_console import TrackConsole
 except ModuleNotFoundError as missing:  # MAVProxy prints the text of an ImportError as one line
     raise ImportError(f"gradys needs {missing.name}: pip install mavproxy-uavapi") from missing
 from mavproxy_uavapi.errors import UavApiError
@@ -18,8 +20,13 @@ from mavproxy_uavapi.settings import SettingError
 
 NAME = "gradys"
 COMPLETION = "(GRADYSSETTING)"
-COMPLETIONS = ["<status|stats|start|stop|flush|help>", f"set {COMPLETION}"]
-HELP = """\
+COMPLETIONS = [
+    "<status|stats|start|stop|flush|help>",
+    f"set {COMPLETION}",
+    "track <record|fly> (FILENAME)",
+    "track <stop|help>",
+]
+HELP = f"""\
 gradys status            the ground stations, what was pushed, what became of it, and why nothing is pushed
 gradys stats             the same counts, as a table
 gradys start             push and sense (it does so by itself when the module is loaded)
@@ -28,7 +35,8 @@ gradys flush             end all pauses after failures and try everything now
 gradys set               show the settings
 gradys set NAME VALUE    change one; it takes effect at once
 gradys set gs HOST:PORT  the ground station (several by comma)
-gradys set sink URL      where readings go: http(s)://HOST/PATH or mqtt(s)://HOST/fleet/{sysid}/{quantity}
+gradys set sink URL      where readings go: http(s)://HOST/PATH or mqtt(s)://HOST/fleet/{{sysid}}/{{quantity}}
+{TRACK_HELP}
 gradys help              this"""
 
 
@@ -44,11 +52,13 @@ class GradysModule(HostedModule):
             "stop": lambda _: self._stop(),
             "flush": lambda _: self._flush(),
             "set": self._set,
+            "track": self._tracks,
             "help": lambda _: print(HELP),
         }
         super().__init__(mpstate, NAME, "GrADyS ground station push", actions, COMPLETIONS)
         self.add_completion_function(COMPLETION, self.gradys_settings.mp.completion)
         self.gradys = Gradys(self.host)
+        self._track = TrackConsole(self.host, self.gradys.tracks)
         self._routes = Handlers(self.gradys).routes()
 
     def begin(self) -> None:
@@ -62,6 +72,7 @@ class GradysModule(HostedModule):
         for route in self._routes:
             if self.host.extensions.get(route.path) is route:
                 del self.host.extensions[route.path]
+        await self.gradys.tracks.close()
         await self.gradys.stop()
 
     def unload(self) -> None:
@@ -101,6 +112,9 @@ class GradysModule(HostedModule):
     def _flush(self) -> None:
         self.host.bridge.call_soon(self.gradys.flush)
         print("gradys: everything is tried now; `gradys status` tells what comes of it")
+
+    def _tracks(self, args: list[str]) -> None:
+        self._track.command(args)
 
     def _set(self, args: list[str]) -> None:
         if len(args) < 2:

@@ -13,6 +13,7 @@ from mavproxy_gradys.pusher import Pusher
 from mavproxy_gradys.sensing import Sensing
 from mavproxy_gradys.settings import Settings
 from mavproxy_gradys.tally import StationTally
+from mavproxy_gradys.tracking import Tracking
 from mavproxy_uavapi.host.host import Host
 
 
@@ -22,12 +23,14 @@ class Gradys:
     Attributes:
         stations: what became of the updates, by station; it outlives a stop and a start.
         sensing: readings, their spool and their sinks.
+        tracks: what is recorded, and what is flown.
     """
 
     def __init__(self, host: Host) -> None:
         self.host = host
         self.stations: dict[str, StationTally] = {}
         self.sensing = Sensing(host)
+        self.tracks = Tracking(host)
         self.settings: Settings | None = None
         self._tasks: list[asyncio.Task[None]] = []
 
@@ -94,4 +97,5 @@ class Gradys:
             "round_trip_ms": next((trip for trip in trips if trip), None),
             "stations": [tally.report(now) for tally in tallies],
             **self.sensing.report(),
+            "tracks": self.tracks.report(),
         }

@@ -105,6 +105,7 @@ class Spool:
     def _open(self) -> None:
         self._db = sqlite3.connect(self.path, timeout=0, isolation_level=None, check_same_thread=False)
         try:
+            self._check_owner()
             self._db.execute("PRAGMA locking_mode=EXCLUSIVE")
             self._db.execute("PRAGMA journal_mode=WAL")
             self._db.execute("PRAGMA synchronous=FULL")
@@ -120,14 +121,17 @@ class Spool:
             self._db.close()
             raise
 
-    def _check(self) -> None:
+    def _check_owner(self) -> None:
         (application,) = self._db.execute("PRAGMA application_id").fetchone()
+        (tables,) = self._db.execute("SELECT count(*) FROM sqlite_master").fetchone()
+        if tables and application != APPLICATION:
+            raise NotStored(f"{self.path} is a database of another program; `gradys set spool FILE` takes another")
+
+    def _check(self) -> None:
         (tables,) = self._db.execute("SELECT count(*) FROM sqlite_master").fetchone()
         if not tables:
             self._make()
             return
-        if application != APPLICATION:
-            raise NotStored(f"{self.path} is a database of another program; `gradys set spool FILE` takes another")
         (found,) = self._db.execute("PRAGMA quick_check(1)").fetchone()
         if found != "ok":
             raise sqlite3.DatabaseError(found)

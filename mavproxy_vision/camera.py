@@ -160,7 +160,9 @@ class Folder:
 
     live = False
 
-    def __init__(self, folder: Path, latency: float, rate: float, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, folder: Path, latency: float, rate: float, clock: Callable[[], float] = time.monotonic
+    ) -> None:
         self._folder, self._latency, self._rate, self._clock = folder, latency, rate, clock
         self._files: list[Path] = []
         self._index = 0

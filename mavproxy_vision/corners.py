@@ -29,7 +29,7 @@ def refine(image: NDArray[np.uint8], rough: Corners) -> Corners:
         rough: corners in px, clockwise, within about two pixels of the true ones.
     """
     starts, ends = rough, np.roll(rough, -1, axis=0)
-    lengths = np.linalg.norm(ends - starts, axis=1)
+    lengths: NDArray[np.float64] = np.asarray(np.linalg.norm(ends - starts, axis=1))
     if lengths.min() < 6:
         return rough
     along = (ends - starts) / lengths[:, None]
@@ -54,7 +54,8 @@ def _inside(points: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.f
     height, width = shape[:2]
     x, y = points[..., 0], points[..., 1]
     within = (x >= 0) & (x <= width - 1) & (y >= 0) & (y <= height - 1)
-    return within.all(axis=2).astype(np.float64)
+    inside: NDArray[np.float64] = within.all(axis=2).astype(np.float64)
+    return inside
 
 
 def _edges(
@@ -92,7 +93,7 @@ def _fit(points: NDArray[np.float64], weights: NDArray[np.float64], along: Corne
 
 
 def _intersect(lines: list[Any], rough: Corners) -> Corners:
-    corners = rough.copy()
+    corners: Corners = rough.copy()
     for i in range(4):
         before, after = lines[i - 1], lines[i]
         if before is None or after is None:

@@ -80,9 +80,7 @@ class Detector:
                     found.append(sighting)
         return tuple(found)
 
-    def _sight(
-        self, image: Image, model: CameraModel, one: Family, index: int, rough: Corners
-    ) -> Sighting | None:
+    def _sight(self, image: Image, model: CameraModel, one: Family, index: int, rough: Corners) -> Sighting | None:
         if not is_squarish(rough):
             return None
         corners = refine(image, rough) if self.options.refine else rough

@@ -1,14 +1,14 @@
 """What can go wrong with seeing and landing, as children of the project's error tree.
 
-    UavApiError
-    |- Aborted (409 aborted)
-    |  `- LandingFailed     not landed on the tag; `report` tells what was tried and what was done instead
-    |- BadRequest (400 bad_request)
-    |  `- BadImage          what was posted is no image
-    |- Unavailable (503)
-    |  `- NoCamera          503 no_camera: no source is set, or it gives no frames
-    `- Invalid (422 invalid)
-       `- BadSetting        a setting that does not exist or a value that it does not take
+UavApiError
+|- Aborted (409 aborted)
+|  `- LandingFailed     not landed on the tag; `report` tells what was tried and what was done instead
+|- BadRequest (400 bad_request)
+|  `- BadImage          what was posted is no image
+|- Unavailable (503)
+|  `- NoCamera          503 no_camera: no source is set, or it gives no frames
+`- Invalid (422 invalid)
+   `- BadSetting        a setting that does not exist or a value that it does not take
 """
 
 from __future__ import annotations

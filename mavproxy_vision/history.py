@@ -71,7 +71,7 @@ class Motion:
 
 
 class History:
-    """The last seconds of attitude and motion."""
+    """The last seconds of attitude and motion. One thread adds, any may ask."""
 
     def __init__(self) -> None:
         self._attitudes: list[tuple[float, Attitude, tuple[float, float, float]]] = []
@@ -82,22 +82,24 @@ class History:
         if self._attitudes and at <= self._attitudes[-1][0]:
             if at > self._attitudes[-1][0] - REBOOT:
                 return
-            self._attitudes.clear()
+            self._attitudes = []
         self._attitudes.append((at, attitude, rates))
-        _forget(self._attitudes, [entry[0] for entry in self._attitudes[:2]], at)
+        if at - self._attitudes[0][0] > 2 * KEPT:  # a new list: another thread may be reading the old one
+            self._attitudes = self._attitudes[len(self._attitudes) // 2 :]
 
     def add_motion(self, at: float, position: Vector, velocity: Vector) -> None:
         """Take LOCAL_POSITION_NED: vehicle time (s), m, m/s."""
         if self._motions and at <= self._motions[-1].at:
             if at > self._motions[-1].at - REBOOT:
                 return
-            self._motions.clear()
+            self._motions = []
         travelled = vector(0.0, 0.0, 0.0)
         if self._motions:
             last = self._motions[-1]
             travelled = last.travelled + (last.velocity + velocity) * ((at - last.at) / 2)
         self._motions.append(Motion(at, position, velocity, travelled))
-        _forget(self._motions, [motion.at for motion in self._motions[:2]], at)
+        if at - self._motions[0].at > 2 * KEPT:
+            self._motions = self._motions[len(self._motions) // 2 :]
 
     @property
     def newest(self) -> float:
@@ -108,33 +110,32 @@ class History:
 
     def attitude(self, at: float) -> Attitude | None:
         """The attitude at vehicle time `at` (s); None when it is not known."""
-        if not self._attitudes:
-            return None
-        times = [entry[0] for entry in self._attitudes]
+        attitudes = self._attitudes
+        times = [entry[0] for entry in attitudes]
         index = bisect.bisect_right(times, at)
         if index == 0:
             return None
-        time, attitude, rates = self._attitudes[index - 1]
+        time, attitude, rates = attitudes[index - 1]
         if index == len(times):
             after = at - time
             if after > BEYOND:
                 return None
             return _moved(attitude, [rate * after for rate in rates])
-        following, share = self._attitudes[index][1], (at - time) / (times[index] - time)
+        following, share = attitudes[index][1], (at - time) / (times[index] - time)
         turn = (following.roll - attitude.roll, following.pitch - attitude.pitch, wrap(following.yaw - attitude.yaw))
         return _moved(attitude, [share * angle for angle in turn])
 
     def motion(self, at: float) -> Motion | None:
         """Position and velocity at vehicle time `at` (s); None when they are not known."""
-        if not self._motions:
-            return None
-        index = bisect.bisect_right([motion.at for motion in self._motions], at)
+        motions = self._motions
+        times = [motion.at for motion in motions]
+        index = bisect.bisect_right(times, at)
         if index == 0:
             return None
-        before = self._motions[index - 1]
-        if index == len(self._motions):
+        before = motions[index - 1]
+        if index == len(times):
             return before.later(at - before.at) if at - before.at <= BEYOND else None
-        after = self._motions[index]
+        after = motions[index]
         share = (at - before.at) / (after.at - before.at)
         return Motion(
             at,
@@ -151,9 +152,3 @@ class History:
 
 def _moved(attitude: Attitude, by: list[float]) -> Attitude:
     return Attitude(attitude.roll + by[0], attitude.pitch + by[1], wrap(attitude.yaw + by[2]))
-
-
-def _forget(entries: list, oldest: list[float], now: float) -> None:  # type: ignore[type-arg]
-    """Drop what is too old, in batches."""
-    if now - oldest[0] > 2 * KEPT:
-        del entries[: len(entries) // 2]

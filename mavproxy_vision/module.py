@@ -2,25 +2,335 @@
 
 from __future__ import annotations
 
+import argparse
+import contextlib
+import os
+import shlex
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
+try:
+    import cv2
+    import numpy  # noqa: F401
+except ImportError as missing:  # MAVProxy prints the text of an ImportError as one line
+    raise ImportError(f"vision needs {missing.name}: pip install 'mavproxy-uavapi[vision]'") from missing
+if not hasattr(getattr(cv2, "aruco", None), "ArucoDetector"):
+    raise ImportError(
+        f"vision needs OpenCV 4.10 or newer, this is {cv2.__version__}: pip install -U 'mavproxy-uavapi[vision]'"
+    )
+
+from mavproxy_uavapi.errors import UavApiError
 from mavproxy_uavapi.host.member import HostedModule
+from mavproxy_uavapi.vehicle.jobs import Job
+from mavproxy_vision import console
+from mavproxy_vision.annotate import annotated
+from mavproxy_vision.calibration import Board, calibrate, save
+from mavproxy_vision.errors import BadSetting
+from mavproxy_vision.flights import Flights, Verb
+from mavproxy_vision.http import Pages
+from mavproxy_vision.mission import Errand
+from mavproxy_vision.printing import tag_pdf
+from mavproxy_vision.settings import METHODS, ModuleSettings
+from mavproxy_vision.vision import Vision
 
 NAME = "vision"
-ABOUT = "vision: camera, AprilTags, search and precise landing on a tag. This version has no camera source yet."
-HELP = """\
-vision status    what the module sees
-vision help      this"""
+COMPLETION = "(VISIONSETTING)"
+COMPLETIONS = [
+    "<status|start|stop|tags|land|search|mission|abort|help>",
+    f"set {COMPLETION}",
+    "<calibrate|snapshot|tag> (FILENAME)",
+]
+MISSION = ("5", "8", "-5")  # m: altitude, north, east; the seed's
+RESTARTS = {  # settings that the camera must be opened anew for
+    "source", "family", "tags", "any_id", "far", "calibration", "fov", "width", "height", "fps", "latency", "mount",
+    "offset", "gimbal", "threads",
+}  # fmt: skip
 
 
 class VisionModule(HostedModule):
     """`module load vision`."""
 
-    def __init__(self, mpstate: Any) -> None:
-        actions = {"status": lambda _: print(ABOUT), "help": lambda _: print(HELP)}
-        super().__init__(mpstate, NAME, "AprilTags and precise landing", actions, ["<status|help>"])
+    def __init__(self, mpstate: Any, given: dict[str, Any]) -> None:
+        self.vision_settings = ModuleSettings(given)
+        actions: dict[str, Callable[[list[str]], None]] = {
+            "status": lambda _: self._tell(lambda: console.report(self.vision, self.flights)),
+            "start": lambda _: self._start(),
+            "stop": lambda _: self._stop(),
+            "set": self._set,
+            "tags": lambda _: self._tell(lambda: console.tags(self.vision)),
+            "land": self._land,
+            "search": self._search,
+            "mission": self._mission,
+            "abort": lambda _: self._abort(),
+            "calibrate": self._calibrate,
+            "snapshot": self._snapshot,
+            "tag": self._tag,
+            "help": lambda _: print(console.HELP),
+        }
+        super().__init__(mpstate, NAME, "AprilTags, search and precise landing", actions, COMPLETIONS)
+        self.add_completion_function(COMPLETION, self.vision_settings.mp.completion)
+        self.vision = Vision(self.host, self.vision_settings.snapshot())
+        self.flights = Flights(self.vision, self._directory)
+        self._routes = {route.path: route for route in Pages(self.vision, self.flights).routes()}
+
+    # -- life ------------------------------------------------------------------------------------------------
+
+    def begin(self) -> None:
+        """Listen, and open the camera if one is set."""
+        self.host.extensions.update(self._routes)
+        self._run(self._listen())
+        if self.vision_settings.snapshot().source:
+            self._start()
+
+    async def _listen(self) -> None:
+        self.vision.listen()
+
+    async def end(self) -> None:
+        """Close everything."""
+        await self.vision.close()
+
+    def unload(self) -> None:
+        """Make the vehicle hold, then give everything back."""
+        self.mpstate.completion_functions.pop(COMPLETION, None)
+        for path in self._routes:
+            self.host.extensions.pop(path, None)
+        try:
+            self._abandon()
+        finally:
+            super().unload()
+
+    def _abandon(self) -> None:
+        """End what is in flight.
+
+        MAVProxy's main loop waits for us, or has ended: it cannot send what the asyncio side asks for, and
+        nobody else sends. So this thread does, here only.
+        """
+        if not self.host.bridge.running:
+            return
+
+        async def abandoned() -> list[tuple[Any, int]]:
+            return self.flights.abandon()
+
+        for message, system in self.host.bridge.run(abandoned()):
+            master = self.mpstate.master(system)
+            with contextlib.suppress(OSError):  # the link is down: nobody hears us anyhow
+                if master is not None:
+                    master.mav.send(message)
+
+    def _directory(self) -> Path:
+        """Where files go."""
+        chosen = self.vision_settings.snapshot().directory
+        if chosen:
+            return Path(chosen).expanduser()
+        return Path(getattr(self.mpstate.status, "logdir", None) or ".")
+
+    # -- helpers ---------------------------------------------------------------------------------------------
+
+    def _run(self, coroutine: Any) -> Any:
+        return self.host.bridge.run(coroutine)
+
+    def _tell(self, tell: Callable[[], str]) -> None:
+        """Print what `tell` makes of the state, which belongs to the asyncio thread."""
+
+        async def told() -> str:
+            return tell()
+
+        print(self._run(told()))
+
+    def _start(self) -> None:
+        settings = self.vision_settings.snapshot()
+        try:
+            self._run(self.vision.start(settings))
+        except UavApiError as error:
+            print(f"vision: {error}")
+        else:
+            print(f"vision: looking for {settings.family} through {settings.source}")
+
+    def _stop(self) -> None:
+        self._abort(quiet=True)
+        self._run(self.vision.stop())
+        print("vision: stopped")
+
+    def _abort(self, quiet: bool = False) -> None:
+        async def stopped() -> bool:
+            return self.flights.stop("it was stopped at the prompt; the vehicle holds")
+
+        if not self._run(stopped()) and not quiet:
+            print("vision: nothing is in flight")
+
+    def _set(self, args: list[str]) -> None:
+        if len(args) < 2:
+            self.vision_settings.mp.show_pattern(args[0] if args else "*")
+            return
+        before = self.vision_settings.snapshot()
+        try:
+            self.vision_settings.set(args[0], " ".join(args[1:]))
+        except BadSetting as error:
+            print(f"vision: {error}")
+            return
+        after = self.vision_settings.snapshot()
+        if after == before or not self._begun:
+            return
+        if args[0] in RESTARTS or args[0].startswith("sim_"):
+            self._start() if after.source else self._stop()
+        else:
+            self.host.bridge.call_soon(setattr, self.vision, "settings", after)
+
+    # -- flying ----------------------------------------------------------------------------------------------
+
+    def _land(self, args: list[str]) -> None:
+        method = next((word for word in args if word in METHODS), self.vision_settings.snapshot().method)
+        numbers = [word for word in args if word not in METHODS]
+        number = self._id(numbers)
+        if number is not False:
+            self._fly("/vision/land", {"id": number, "method": method}, self._landing)
+
+    def _landing(self, request: dict[str, Any]) -> Verb:
+        return self.flights.landing(self.flights.copter(), request["id"], request["method"])
+
+    def _search(self, args: list[str]) -> None:
+        number = self._id(args)
+        if number is not False:
+            self._fly("/vision/search", {"id": number}, self._searching)
+
+    def _searching(self, request: dict[str, Any]) -> Verb:
+        return self.flights.searching(self.flights.copter(), request["id"], None)
+
+    def _id(self, words: list[str]) -> Any:
+        """The id among the words, None without one, False for what is none."""
+        if not words:
+            return None
+        if len(words) == 1 and words[0].isdigit():
+            return int(words[0])
+        print(f"vision: {' '.join(words)!r} is not an id")
+        return False
+
+    def _mission(self, args: list[str]) -> None:
+        words = [*args[:3], *MISSION[len(args) :]] if len(args) < 3 else args[:3]
+        try:
+            alt, north, east = (float(word) for word in words)
+        except ValueError:
+            print("vision: mission [ALT NORTH EAST [ID|none]], in m")
+            return
+        if not 0 < alt <= 500:
+            print("vision: the altitude is more than 0 and at most 500 m above home")
+            return
+        tag = args[3] if len(args) > 3 else ""
+        number = None if tag in ("", "none") else self._id([tag])
+        if number is False:
+            return
+        method = self.vision_settings.snapshot().method
+        request = {"alt": alt, "north": north, "east": east, "id": number, "tag": tag != "none", "method": method}
+        self._fly("/vision/mission", request, self._errand)
+
+    def _errand(self, request: dict[str, Any]) -> Verb:
+        r = request
+        errand = Errand(r["alt"], r["north"], r["east"], None, None, r["id"], r["tag"], r["method"])
+        return self.flights.errand(self.flights.copter(), errand)
+
+    def _fly(self, path: str, request: dict[str, Any], make: Callable[[dict[str, Any]], Verb]) -> None:
+        """Begin a flight and say so; its end is printed when it comes."""
+
+        async def begin() -> Job:
+            copter = self.flights.copter()
+            return self.flights.begin(copter, make(request), path, request, self._say)
+
+        try:
+            job = self._run(begin())
+        except UavApiError as error:
+            print(f"vision: {error}")
+        else:
+            print(f"vision: {path.rpartition('/')[2]} begins (job {job.id}); `vision abort` ends it")
+
+    def _say(self, text: str) -> None:
+        """Print from the asyncio thread."""
+        self.host.bridge.post(lambda: print(f"vision: {text}"))
+
+    # -- files -----------------------------------------------------------------------------------------------
+
+    def _calibrate(self, args: list[str]) -> None:
+        if len(args) not in (2, 3):
+            print("vision: calibrate FOLDER charuco:7x5:0.03:0.022|chessboard:9x6:0.025 [FILE]")
+            return
+        file = Path(args[2] if len(args) == 3 else "camera.json").expanduser()
+
+        def work() -> str:
+            made = calibrate(Path(args[0]).expanduser(), Board.parse(args[1]))
+            save(made.model, file)
+            model = made.model
+            return (
+                f"{made.views} views, error {made.error:.2f} px, fx {model.fx:.1f}, fy {model.fy:.1f}; "
+                f"wrote {file}: `vision set calibration {file}`"
+            )
+
+        self._in_background(work)
+
+    def _snapshot(self, args: list[str]) -> None:
+        if len(args) != 1:
+            print("vision: snapshot FILE.png")
+            return
+
+        def work() -> str:
+            seen, image = self.vision.seen, self.vision.image
+            if seen is None or image is None:
+                return "there is no frame yet"
+            file = Path(args[0]).expanduser()
+            good, data = cv2.imencode(file.suffix or ".png", annotated(image, seen, []))
+            if not good:
+                return f"cannot write {file.suffix} files"
+            file.write_bytes(data.tobytes())
+            return f"wrote {file}"
+
+        self._in_background(work)
+
+    def _tag(self, args: list[str]) -> None:
+        settings = self.vision_settings.snapshot()
+        parser = argparse.ArgumentParser("vision tag", add_help=False, exit_on_error=False)
+        parser.add_argument("file", type=Path)
+        parser.add_argument("--family", default=settings.families[0])
+        parser.add_argument("--id", type=int, default=settings.tag_list[0].id)
+        parser.add_argument("--size", type=float, default=settings.tag_list[0].size)
+        try:
+            chosen, rest = parser.parse_known_args(shlex.split(" ".join(args)))
+        except (argparse.ArgumentError, SystemExit, ValueError):
+            chosen, rest = None, ["?"]
+        if chosen is None or rest:
+            print("vision: tag FILE.pdf [--family 36h11] [--id 0] [--size 0.15]")
+            return
+
+        def work() -> str:
+            chosen.file.expanduser().write_bytes(tag_pdf(chosen.family, chosen.id, chosen.size))
+            return f"wrote {chosen.file}"
+
+        self._in_background(work)
+
+    def _in_background(self, work: Callable[[], str]) -> None:
+        """Run what takes long, or touches a disk, and print what it says."""
+
+        def said() -> str:
+            try:
+                return work()
+            except OSError as error:
+                return f"{error.filename or 'a file'}: {os.strerror(error.errno or 0)}"
+            except (UavApiError, cv2.error) as error:
+                return str(error)
+
+        def done() -> None:
+            text = said()
+            self.host.bridge.post(lambda: print(f"vision: {text}"))
+
+        self.host.bridge.loop.call_soon_threadsafe(self.host.bridge.loop.run_in_executor, None, done)
 
 
-def init(mpstate: Any) -> VisionModule:
-    """MAVProxy calls this on `module load vision`."""
-    return VisionModule(mpstate)
+def init(mpstate: Any, **kwargs: Any) -> VisionModule:
+    """MAVProxy calls this on `module load vision`, or `vision:{"source":"sim"}`.
+
+    Raises:
+        ImportError: a setting that does not exist or a value that it does not take; MAVProxy reports this
+            kind of error in one line, and goes on.
+    """
+    try:
+        return VisionModule(mpstate, kwargs)
+    except BadSetting as error:
+        raise ImportError(f"vision: {error}") from error

@@ -1,4 +1,4 @@
-"""ArduPilot's own precision landing: its parameters, set and put back, and LANDING_TARGET. """
+"""ArduPilot's own precision landing: its parameters, set and put back, and LANDING_TARGET."""
 
 from __future__ import annotations
 
@@ -44,12 +44,14 @@ class PrecisionLanding:
             NotSupported: the autopilot has no precision landing.
             Rejected: a parameter did not take its value, or the type was another one at boot.
         """
+        if not mavutil.mavlink20():
+            raise NotSupported("LANDING_TARGET has a position in MAVLink 2 only: start MAVProxy without --mav10")
         told = await self.vehicle.parameters(WANTED)
         if ENABLE not in told:
             raise NotSupported("the autopilot has no precision landing (no PLND_ENABLED)")
         if told.get(AT_BOOT, WANTED[AT_BOOT]) != WANTED[AT_BOOT]:
             await self._set(AT_BOOT, WANTED[AT_BOOT])
-            raise Rejected("PLND_TYPE is 1 from now on, but the autopilot reads it at boot: reboot it, then try again")
+            raise Rejected("PLND_TYPE is 1 now, but the autopilot reads it at boot: reboot it, then try again")
         for name, value in WANTED.items():
             if name in told and told[name] != value:
                 self.before[name] = told[name]

@@ -23,9 +23,8 @@ FLIGHT = {"ATTITUDE": 25.0, "LOCAL_POSITION_NED": 25.0}  # Hz of the vehicle's c
 TRUTH = {"SIM_STATE": 50.0}
 LOOK_EVERY = 0.1  # s
 SLOW = 2.5  # intervals without a message until it is asked for again
-ASK_AGAIN = 1.0  # s
-GIVE_UP = 15.0  # s after which a message that never came is asked for rarely
-RARELY = 15.0  # s
+ASK_AGAIN = 1.0  # s until it is asked for again, twice as long each time that it did not help …
+RARELY = 15.0  # … up to so many s
 
 
 class Rates:
@@ -35,7 +34,7 @@ class Rates:
         self._clock = clock
         self._needed: list[dict[str, float]] = []
         self._asked: dict[str, float] = {}
-        self._first: dict[str, float] = {}
+        self._pause: dict[str, float] = {}
 
     @property
     def needed(self) -> dict[str, float]:
@@ -67,15 +66,19 @@ class Rates:
         for name, rate in needed.items():
             age = vehicle.state.age(name, now)
             received = vehicle.state.messages.get(name)
-            slow = received is None or max(age or 0.0, received.interval or 0.0) > SLOW / rate / ratio + LOOK_EVERY / 2
-            first = self._first.setdefault(name, now)
-            pause = RARELY if age is None and now - first > GIVE_UP else ASK_AGAIN
-            if slow and now - self._asked.get(name, -RARELY) >= pause:
+            slow = (
+                received is None or max(age or 0.0, received.interval or 0.0) > SLOW / rate / ratio + LOOK_EVERY / 2
+            )
+            if not slow:
+                self._pause[name] = ASK_AGAIN
+            elif now - self._asked.get(name, -RARELY) >= self._pause.get(name, ASK_AGAIN):
+                if name in self._asked:  # it did not help: a slow link, or a vehicle that cannot
+                    self._pause[name] = min(2 * self._pause.get(name, ASK_AGAIN), RARELY)
                 self._asked[name] = now
                 await self._send(vehicle, set_interval(MESSAGE_IDS[name], rate))
         for name in [name for name in self._asked if name not in needed]:
             del self._asked[name]
-            self._first.pop(name, None)
+            self._pause.pop(name, None)
             await self._send(vehicle, default_interval(MESSAGE_IDS[name]))
 
     async def _send(self, vehicle: Vehicle, command: Command) -> None:

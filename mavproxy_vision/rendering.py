@@ -5,6 +5,7 @@ The ground is the plane down = 0 of a local NED frame whose origin is `home`.
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -74,7 +75,7 @@ class Renderer:
     ) -> None:
         self.model, self.mount, self.tags, self.look = model, mount, tags, look
         self._random = np.random.default_rng(seed)
-        self._ground = pyramid(ground_texture(self._random))
+        self._ground = pyramid(ground_texture(seed))
         self._images = {tag: marker_image(tag.family, tag.id, PIXELS_PER_CELL) for tag in tags}
         shape = (NOISE_FRAMES, model.height, model.width)
         self._noise = self._random.normal(0.0, 1.0, shape).astype(np.float32)
@@ -95,7 +96,8 @@ class Renderer:
     def _homography(self, lens: Vector, to_camera: Matrix) -> Matrix:
         """From (north, east, 1) on the ground to pixels."""
         shifted = np.array([[1.0, 0.0, -lens[0]], [0.0, 1.0, -lens[1]], [0.0, 0.0, -lens[2]]])
-        return self.model.matrix @ to_camera @ shifted
+        homography: Matrix = self.model.matrix @ to_camera @ shifted
+        return homography
 
     def _draw_ground(self, lens: Vector, to_camera: Matrix) -> Image:
         per_pixel = -lens[2] / self.model.fx
@@ -186,13 +188,15 @@ class Renderer:
 
 def covered(picture: Image, share: float) -> Image:
     """The tag's picture with a dark hand over `share` of it."""
-    shown = picture.copy()
+    shown: Image = picture.copy()
     shown[:, : round(share * picture.shape[1])] = 60
     return shown
 
 
-def ground_texture(random: np.random.Generator) -> Image:
+@functools.lru_cache(maxsize=2)
+def ground_texture(seed: int) -> Image:
     """Grass and gravel: noise of several sizes that repeats at the edges, shape (TILE, TILE)."""
+    random = np.random.default_rng(seed)
     total = np.zeros((TILE, TILE), np.float32)
     for octave in range(2, 10):
         cells = 2**octave

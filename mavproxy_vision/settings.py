@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -137,7 +138,9 @@ def table() -> list[Any]:
         MPSetting("descent", float, 1.0, "m/s, at most", range=(0.1, 3)),
         MPSetting("leash", float, 15.0, "m that a search may go away", range=(0.5, 500)),
         MPSetting("time_limit", float, 180.0, "s for a landing or a search", range=(5, 3600)),
-        MPSetting("on_failure", str, "rtl", "rtl, land or hold when there is no landing on the tag", choice=ON_FAILURE),
+        MPSetting(
+            "on_failure", str, "rtl", "rtl, land or hold when there is no landing on the tag", choice=ON_FAILURE
+        ),
         MPSetting("ground", float, 0.0, "m by which the tag lies higher than home", range=(-500, 500)),
         MPSetting("directory", str, "", "where tracks, plots and snapshots go; none for MAVProxy's log directory"),
         MPSetting("threads", int, 1, "of OpenCV", range=(1, 16)),
@@ -152,7 +155,7 @@ def table() -> list[Any]:
     ]
 
 
-CHECKED = {
+CHECKED: dict[str, Callable[[Settings], object]] = {
     "family": lambda now: now.families,
     "tags": lambda now: now.tag_list,
     "calibration": lambda now: now.model,
@@ -192,7 +195,8 @@ class ModuleSettings:
             limits = f" from {setting.range[0]} to {setting.range[1]}" if setting.range else ""
             raise BadSetting(f"{name} = {value!r}: it takes a {setting.type.__name__}{limits}", name)
         try:
-            CHECKED.get(name, lambda _: None)(self.snapshot())
+            if name in CHECKED:
+                CHECKED[name](self.snapshot())
         except BadSetting:
             self.mp.set(name, before)
             raise

@@ -30,7 +30,7 @@ class Pose:
 
 
 class Truth:
-    """The last seconds of the truth."""
+    """The last seconds of the truth. One thread adds, any may ask."""
 
     def __init__(self) -> None:
         self._poses: list[Pose] = []
@@ -54,7 +54,7 @@ class Truth:
             return
         self._poses.append(pose)
         if len(self._poses) > 2 * KEPT:
-            del self._poses[:KEPT]
+            self._poses = self._poses[-KEPT:]  # a new list: the camera's thread may be reading the old one
         if self._home is None:
             self._home = pose.lat, pose.lon, pose.alt - (height if armed else 0.0)
         elif armed and self._armed is False:
@@ -64,19 +64,20 @@ class Truth:
 
     def at(self, time: float) -> tuple[Vector, Attitude] | None:
         """Position (m NED from home) and attitude at host time `time` (s); None when unknown."""
-        if not self._poses or self._home is None:
+        poses = self._poses
+        if not poses or self._home is None:
             return None
-        index = bisect.bisect_right([pose.at for pose in self._poses], time)
+        index = bisect.bisect_right([pose.at for pose in poses], time)
         if index == 0:
             return None
-        before = self._poses[index - 1]
+        before = poses[index - 1]
         after = time - before.at
         place = self._place(before)
-        if index == len(self._poses):
+        if index >= len(poses):
             if after > BEYOND:
                 return None
             return place + vector(*before.velocity) * after, before.attitude
-        following = self._poses[index]
+        following = poses[index]
         share = after / (following.at - before.at)
         old, new = before.attitude, following.attitude
         attitude = Attitude(

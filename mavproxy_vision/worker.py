@@ -193,6 +193,4 @@ class Worker:
         sightings = self.detector.detect(frame.image)
         self._frames += 1
         size = (frame.image.shape[1], frame.image.shape[0])
-        return Seen(
-            self._frames, frame.captured_at, frame.received_at, self._clock(), size, sightings
-        )
+        return Seen(self._frames, frame.captured_at, frame.received_at, self._clock(), size, sightings)

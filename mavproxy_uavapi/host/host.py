@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from typing import Any
 
 from mavproxy_uavapi.errors import LinkLost
@@ -30,6 +30,7 @@ class Host:
         listeners: called with each vehicle message, after the state has taken it and the waits have seen it.
         api_address: where `uavapi` listens; None while it does not.
         extensions: HTTP routes of the other modules, by path; `uavapi` serves them while it is loaded.
+        newest_frame: gives the newest camera frame as JPEG; None while no module has a camera.
 
     Args:
         mpstate: MAVProxy's state.
@@ -48,6 +49,7 @@ class Host:
         self.jobs = JobBook()
         self.listeners: list[Callable[[VehicleState, Any, float], None]] = []
         self.extensions: dict[str, Any] = {}
+        self.newest_frame: Callable[[], Awaitable[bytes]] | None = None
         self.api_address: tuple[str, int] | None = None
         self.members: list[Any] = []
         self._mpstate = mpstate

@@ -8,10 +8,11 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from aiohttp import BodyPartReader, web
+from aiohttp import web
 
-from mavproxy_uavapi.errors import BadRequest, Forbidden, NotFound
+from mavproxy_uavapi.errors import Forbidden, NotFound
 from mavproxy_uavapi.http.call import Call
+from mavproxy_uavapi.http.forms import file_of
 from mavproxy_uavapi.http.requests import ExecuteScript, ScriptLog, ScriptName
 from mavproxy_uavapi.http.responses import dumps, envelope
 from mavproxy_uavapi.scripts import names, runs
@@ -21,7 +22,6 @@ from mavproxy_uavapi.scripts.runs import Run
 # The kinds of these answers, as clients of the original service know them.
 SAVED, LISTED, STARTED, CLEARED, RUNNING, STOPPED = 44, 42, 46, 48, 50, 52
 
-CHUNK = 65536  # bytes
 LOG_SERVED = 1024 * 1024  # bytes of a log's end
 FOLLOW_EVERY = 0.25  # s between looks at a log: a file tells nobody when it grows
 KEEP_ALIVE = 15.0  # s; a comment after such a silence, so that a dead client is noticed
@@ -30,7 +30,7 @@ KEEP_ALIVE = 15.0  # s; a comment after such a silence, so that a dead client is
 async def upload_script(call: Call) -> dict[str, Any]:
     """Save a .py or .sh file, sent as the multipart field `file`, in place of one of that name."""
     scripts = _scripts(call)
-    name, data = await _uploaded(call.request, scripts)
+    name, data = await file_of(call.request, scripts.store.size_limit, names.checked)
     path = await scripts.save(name, data)
     return _answer(call, SAVED, info=f"Mission File '{name}' saved at {path} successfully.")
 
@@ -116,33 +116,6 @@ def _answer(call: Call, kind: int | None, **members: Any) -> dict[str, Any]:
 
 def _report(run: Run) -> dict[str, Any]:
     return run.report(time.time())
-
-
-async def _uploaded(request: web.Request, scripts: Scripts) -> tuple[str, bytes]:
-    """Name and contents of the form's file.
-
-    Raises:
-        BadRequest: there is none, or it is too large; reading stops there.
-    """
-    if request.content_type != "multipart/form-data":
-        raise BadRequest("the file goes into field `file` of a multipart/form-data body")
-    try:
-        form = await request.multipart()
-        while (part := await form.next()) is not None:
-            if isinstance(part, BodyPartReader) and part.name == "file" and part.filename is not None:
-                return names.checked(part.filename), await _contents(part, scripts)
-    except (ValueError, LookupError, AssertionError, RuntimeError) as error:
-        raise BadRequest(f"the body is no multipart form: {error}") from error
-    raise BadRequest("the form has no file in its field `file`")
-
-
-async def _contents(part: BodyPartReader, scripts: Scripts) -> bytes:
-    data = bytearray()
-    while chunk := await part.read_chunk(CHUNK):
-        data += chunk
-        if len(data) > scripts.store.size_limit:
-            raise scripts.store.too_large(part.filename or "the file")
-    return bytes(data)
 
 
 async def _follow(request: web.Request, run: Run) -> web.StreamResponse:

@@ -160,6 +160,28 @@ class ScriptLog(Request):
     follow: bool = False
 
 
+class MissionFile(Request):
+    """A mission as it came: a QGC WPL 110 file, a .plan file, or JSON items."""
+
+    digest: str  # what tells one upload from another
+    items: int
+
+
+class StartMission(Blocking):
+    """`until_complete`: answer at the mission's end rather than at its beginning."""
+
+    until_complete: bool = False
+
+
+class Photo(Request):
+    """A picture: the tool, pixels, ms of exposure, and m to what is in focus."""
+
+    command: Annotated[str, Field(description="fswebcam, rpicam-still, libcamera-still, or vision")]
+    resolution: Annotated[str, Field(description="width x height in pixels")] = "1280x720"
+    capture_time: Annotated[float, Field(gt=0, le=10_000, description="ms of exposure")] = 150
+    focus_distance: Annotated[float | None, Field(ge=0.01, le=1000, description="m")] = None
+
+
 class Read(Request):
     """A telemetry read: `max_age` is the age (s) up to which the answer is wanted."""
 

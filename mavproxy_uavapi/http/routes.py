@@ -4,7 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mavproxy_uavapi.http import command, jobs, mission, movement, peripherical, requests, stream, telemetry
+from mavproxy_uavapi.http import (
+    command,
+    jobs,
+    mission,
+    movement,
+    peripherical,
+    photo,
+    requests,
+    stream,
+    telemetry,
+    waypoints,
+)
 from mavproxy_uavapi.http.call import Action
 
 
@@ -93,9 +104,15 @@ MISSION = [
     Route("/mission/clear", mission.clear_scripts, requests.Empty, ("DELETE",)),
     Route("/mission/scripts/{name}", mission.show_script, requests.Empty),
     Route("/mission/scripts/{name}/log", mission.script_log, requests.ScriptLog),
+    Route("/mission/waypoints", waypoints.upload, requests.Empty, POST, raw=True),
+    Route("/mission/waypoints", waypoints.download, requests.Empty),
+    Route("/mission/waypoints", waypoints.clear, requests.Empty, ("DELETE",)),
+    Route("/mission/start", waypoints.start, requests.StartMission, POST),
+    Route("/mission/progress", waypoints.progress, requests.Read),
 ]
 
 PERIPHERICAL = [
+    Route("/peripherical/take_photo", photo.take_photo, requests.Photo),
     Route("/peripherical/servo_output", peripherical.servo_output, requests.Servo, POST),
 ]
 

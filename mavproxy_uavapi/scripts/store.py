@@ -36,7 +36,7 @@ class Store:
         """
         name = names.checked(name)
         if len(data) > self.size_limit:
-            raise self.too_large(name)
+            raise BadRequest(f"{name} is larger than {self.size_limit // 1024} kB")
         self.folder.mkdir(parents=True, exist_ok=True)
         held = sum(file.stat().st_size for file in self._files() if file.name != name)
         if held + len(data) > self.quota:
@@ -54,10 +54,6 @@ class Store:
             Path(temporary).unlink(missing_ok=True)
             raise
         return path
-
-    def too_large(self, name: str) -> BadRequest:
-        """The error for a script above the limit."""
-        return BadRequest(f"{name} is larger than {self.size_limit // 1024} kB (setting script_size)")
 
     def find(self, name: str) -> Path:
         """The script that a client means by `name`, which may leave `.py` out.

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from .geodesy import Ned
+from .physics import Body
 
 if TYPE_CHECKING:
     from .copter import Copter
@@ -42,7 +43,7 @@ class PrecisionLanding:
         if not (self._listens and self._copter.parameters["PLND_ENABLED"] and usable):
             return
         body, here = self._copter.body, self._copter.estimator.position
-        north, east = _level(message.x, message.y, message.z, body.roll, body.pitch, body.yaw)
+        north, east = _level((message.x, message.y, message.z), body)
         place = (here.north + north, here.east + east)
         if self._target is None or not self.acquired:
             self._copter.say(mavlink.MAV_SEVERITY_INFO, "PrecLand: Target Found")
@@ -76,8 +77,10 @@ class PrecisionLanding:
         return had_one and strict and not self.acquired and self._copter.altitude > 0.5
 
 
-def _level(x: float, y: float, z: float, roll: float, pitch: float, yaw: float) -> tuple[float, float]:
+def _level(vector: tuple[float, float, float], body: Body) -> tuple[float, float]:
     """North and east of a body FRD vector."""
+    x, y, z = vector
+    roll, pitch, yaw = body.roll, body.pitch, body.yaw
     across = y * math.cos(roll) - z * math.sin(roll)
     below = y * math.sin(roll) + z * math.cos(roll)
     ahead = x * math.cos(pitch) + below * math.sin(pitch)

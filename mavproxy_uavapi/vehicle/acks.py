@@ -28,6 +28,7 @@ log = logging.getLogger("uavapi.copter")
 ACK_TIMEOUT = 1.5  # s until a command is sent again
 SENDINGS = 4  # the first one and three more
 IN_PROGRESS_TIMEOUT = 10.0  # s that each IN_PROGRESS buys
+IN_PROGRESS_LIMIT = 60.0  # s until a command that is still in progress is given up
 PATIENCE_PAUSE = 1.0  # s before a patient command is asked again
 LAST_WORDS = 0.5  # s that a refusal's STATUSTEXT may come after its ack
 WORTH_ASKING_AGAIN = {mavlink.MAV_RESULT_TEMPORARILY_REJECTED, mavlink.MAV_RESULT_FAILED}
@@ -48,8 +49,8 @@ class Commands:
         Args:
             command: what to send.
             patience: how long (s) a patient command is asked again while it is refused.
-            shown: looked at before it is sent again: whether the vehicle shows that it was heard although its
-                ack was lost; what it raises ends the command.
+            shown: looked at after each heartbeat: whether the vehicle shows that it was heard although its ack was
+                lost; what it raises ends the command.
 
         Raises:
             Rejected: refused, with MAV_RESULT and the STATUSTEXTs since it was asked.
@@ -63,25 +64,29 @@ class Commands:
                 log.debug("%s%s: %s", command.name, command.params, result_name(result))
                 if result == mavlink.MAV_RESULT_ACCEPTED:
                     return
-                again = command.patient and result in WORTH_ASKING_AGAIN
+                again = result in (WORTH_ASKING_AGAIN if command.patient else command.again_after)
                 if not again or self._waiting.clock() + PATIENCE_PAUSE > started + patience:
                     raise await self._refusal(command, result, started)
                 await asyncio.sleep(PATIENCE_PAUSE)
+                if shown():
+                    return
 
     async def _ask(self, command: Command, shown: Callable[[], bool]) -> int:
         """One exchange: the MAV_RESULT that ends it."""
         address = Address(self._state.system, self._state.component)
         sendings = SENDINGS if command.repeatable else 1
+        give_up_at = self._waiting.clock() + IN_PROGRESS_LIMIT
         for confirmation in range(sendings):
-            with self._waiting.acks(command.number, self._link.source) as acks:
+            with self._waiting.acks(command.number, self._link.source, shown) as acks:
                 await self._link.send(command.to(address, confirmation), self._state.system)
                 result = await acks.next(ACK_TIMEOUT)
                 while result == mavlink.MAV_RESULT_IN_PROGRESS:
+                    if self._waiting.clock() >= give_up_at:
+                        waited = f"{IN_PROGRESS_LIMIT:g} s"
+                        raise TimedOut(f"vehicle {self._state.system} was not done with {command.name} in {waited}")
                     result = await acks.next(IN_PROGRESS_TIMEOUT)
             if result is not None:
                 return result
-            if shown():
-                return int(mavlink.MAV_RESULT_ACCEPTED)
         times = "" if sendings == 1 else f", sent {sendings} times"
         raise TimedOut(f"vehicle {self._state.system} did not acknowledge {command.name}{times}")
 

@@ -14,6 +14,7 @@ from mavproxy_uavapi.vehicle import deadlines, messages
 from mavproxy_uavapi.vehicle.geodesy import offset, rotate
 from mavproxy_uavapi.vehicle.jobs import Job
 from mavproxy_uavapi.vehicle.messages import NO_YAW, GlobalTarget, NedTarget, Target, VelocityTarget, Yaw
+from mavproxy_uavapi.vehicle.touchdown import Touchdown
 from mavproxy_uavapi.vehicle.vehicle import Vehicle
 
 TOLERANCE = 1.0  # m, horizontally and vertically
@@ -81,9 +82,10 @@ class Copter(Vehicle):
         if self.state.armed is False:
             return
         self.seat.take(job)
-        expected = deadlines.landing_time(await self.limits(), self.height)
+        limits = await self.limits()
+        expected = deadlines.landing_time(limits, self.height)
         await self.switch_to("LAND")
-        await self._flown_home(job, "LAND", self.allowed(expected, timeout))
+        await self._flown_home(job, "LAND", limits, self.allowed(expected, timeout))
 
     async def rtl(self, job: Job, timeout: float | None = None) -> None:
         """Return to launch; done when the vehicle has landed there and disarmed.
@@ -106,21 +108,24 @@ class Copter(Vehicle):
         limits = await self.limits()
         expected = deadlines.return_time(limits, distance or 0.0, self.height)
         await self.switch_to("RTL")
-        await self._flown_home(job, "RTL", self.allowed(expected, timeout))
+        await self._flown_home(job, "RTL", limits, self.allowed(expected, timeout))
 
-    async def _flown_home(self, job: Job, mode: str, timeout: float) -> None:
-        def disarmed() -> bool | None:
+    async def _flown_home(self, job: Job, mode: str, limits: deadlines.Limits, timeout: float) -> None:
+        """Wait until it has landed and disarmed in that mode; motors that stop in flight are no landing."""
+        landing = Touchdown(limits)
+
+        def landed() -> bool | None:
             self._report(job)
-            if self.state.armed is False:
-                return True
-            if self.state.armed is None:
-                raise NotArmed("the autopilot rebooted meanwhile")
-            if self.mode != mode:
-                raise ModeChanged(f"the vehicle left {mode}: it is in {self.mode} now")
-            return None
+            landing.sinks_at((self.state.field("GLOBAL_POSITION_INT", "vz") or 0) / 100.0)
+            if self.state.armed is not False or self.mode != mode:
+                self.held_by(mode)
+                return None
+            if landing.fell:
+                raise NotArmed("the vehicle was disarmed in flight, and fell")
+            return landing.is_over(self.clock(), self.state.age("GLOBAL_POSITION_INT", self.clock()))
 
         names = {"HEARTBEAT", "GLOBAL_POSITION_INT"}
-        await self.waiting.until(names, disarmed, timeout, f"land and disarm in {mode}")
+        await self.waiting.until(names, landed, timeout, f"land and disarm in {mode}")
 
     def _report(self, job: Job) -> None:
         job.progress = {"altitude": self.height}

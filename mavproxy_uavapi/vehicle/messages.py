@@ -48,12 +48,14 @@ class Command:
         repeatable: whether it may be sent again when no acknowledgement comes.
         patient: whether TEMPORARILY_REJECTED (and what else a settling estimator answers) is worth asking
             again for.
+        again_after: the MAV_RESULTs after which an impatient one is asked again all the same.
     """
 
     number: int
     params: tuple[float, ...] = ()
     repeatable: bool = True
     patient: bool = False
+    again_after: frozenset[int] = frozenset()
 
     @property
     def name(self) -> str:
@@ -74,7 +76,8 @@ def set_mode(number: int) -> Command:
 
 def arm() -> Command:
     """Arm."""
-    return Command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, (1, 0))
+    busy = frozenset({mavlink.MAV_RESULT_TEMPORARILY_REJECTED})
+    return Command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, (1, 0), again_after=busy)
 
 
 def disarm(force: bool) -> Command:
@@ -118,6 +121,16 @@ def pause(paused: bool) -> Command:
 def set_servo(channel: int, pwm: int) -> Command:
     """Set servo output `channel` (from 1) to `pwm` microseconds."""
     return Command(mavlink.MAV_CMD_DO_SET_SERVO, (channel, pwm))
+
+
+def set_mission_current(seq: int) -> Command:
+    """Make mission item `seq` (from 1) the current one, and count its jumps anew."""
+    return Command(mavlink.MAV_CMD_DO_SET_MISSION_CURRENT, (seq, 1))
+
+
+def start_mission() -> Command:
+    """Run the mission; on the ground this stands for the pilot's raising the throttle."""
+    return Command(mavlink.MAV_CMD_MISSION_START)
 
 
 def request_message(message_id: int) -> Command:

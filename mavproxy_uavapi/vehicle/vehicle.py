@@ -28,6 +28,7 @@ from mavproxy_uavapi.vehicle.geodesy import offset
 from mavproxy_uavapi.vehicle.jobs import Job, Seat
 from mavproxy_uavapi.vehicle.modes import kind_of, mode_name, mode_number
 from mavproxy_uavapi.vehicle.waiting import Waiting
+from mavproxy_uavapi.vehicle.waypoints import Waypoints
 
 T = TypeVar("T")
 mavlink = mavutil.mavlink
@@ -60,6 +61,7 @@ class Vehicle:
         self.seat = Seat()
         self.waiting = Waiting(state, pending, clock)
         self.commands = Commands(state, link, self.waiting)
+        self.waypoints = Waypoints(state, link, self.waiting)
         self.speeds: dict[str, float] = {}  # what DO_CHANGE_SPEED set (m/s), by kind
         self._speeds_at = 0.0
         self._parameter_askings: dict[tuple[int, str], int] = {}  # by boot and name
@@ -143,12 +145,12 @@ class Vehicle:
 
     def held_by(self, mode: str) -> None:
         """A guard for waits: raises when the vehicle was disarmed, or somebody else took it out of `mode`."""
-        if self.state.mode is not None and self.mode != mode:
-            raise ModeChanged(f"the vehicle left {mode}: it is in {self.mode} now, and whoever switched it has it")
-        if self.state.armed is False:
-            raise NotArmed("the vehicle was disarmed meanwhile")
         if self.state.armed is None:
             raise NotArmed("the autopilot rebooted meanwhile")
+        if not self.state.armed:  # the mode comes second: a reboot changes both
+            raise NotArmed("the vehicle was disarmed meanwhile" + ("" if self.mode == mode else f", in {self.mode}"))
+        if self.mode != mode:
+            raise ModeChanged(f"the vehicle left {mode}: it is in {self.mode} now, and whoever switched it has it")
 
     async def flown(
         self, mode: str, names: Iterable[str], done: Callable[[], T | None], timeout: float, what: str
@@ -258,7 +260,8 @@ class Vehicle:
         mode = self.mode
 
         def ready() -> bool | None:
-            self.require_mode(mode)
+            if self.mode != mode and self.state.mode is not None:
+                raise ModeChanged(f"the vehicle is in {self.mode} now: somebody else switched it meanwhile")
             return True if is_ready() else None
 
         remaining = max(deadline - self.clock(), 0.1)

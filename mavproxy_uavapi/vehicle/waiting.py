@@ -7,12 +7,16 @@ from collections.abc import Callable, Collection
 from types import TracebackType
 from typing import Any, Generic, TypeVar
 
+from pymavlink import mavutil
+
 from mavproxy_uavapi.errors import LinkLost, TimedOut
 from mavproxy_uavapi.host.link import Address
 from mavproxy_uavapi.host.pending import Pending, Wait
 from mavproxy_uavapi.host.state import VehicleState
+from mavproxy_uavapi.vehicle.conversation import Conversation
 
 T = TypeVar("T")
+mavlink = mavutil.mavlink
 
 
 class Waiting:
@@ -60,9 +64,16 @@ class Waiting:
         """A context that waits from its entering on: enter it, send, then await `within`."""
         return Expected(Wait(self.state.system, names, test), self._pending)
 
-    def acks(self, command: int, asker: Address) -> Acks:
-        """A context that catches the acks of `command` to `asker`; enter it before sending."""
-        return Acks(command, self.state, asker, self._pending)
+    def acks(self, command: int, asker: Address, shown: Callable[[], bool] = lambda: False) -> Acks:
+        """A context that catches the acks of `command` to `asker`; enter it before sending.
+
+        A heartbeat after which `shown` holds counts as an ack that accepts; what `shown` raises ends the wait.
+        """
+        return Acks(command, self.state, asker, self._pending, shown)
+
+    def conversation(self, names: Collection[str], asker: Address) -> Conversation:
+        """A context that catches messages of these names to `asker`; enter it before sending."""
+        return Conversation(self.state, asker, self._pending, names)
 
 
 class Expected(Generic[T]):
@@ -109,13 +120,16 @@ class Acks:
     They are queued: an IN_PROGRESS and the ack that follows it may arrive in one batch.
     """
 
-    def __init__(self, command: int, state: VehicleState, asker: Address, pending: Pending) -> None:
+    def __init__(
+        self, command: int, state: VehicleState, asker: Address, pending: Pending, shown: Callable[[], bool]
+    ) -> None:
         self._command = command
+        self._shown = shown
         self._state = state
         self._asker = asker
         self._pending = pending
         self._results: asyncio.Queue[int | None] = asyncio.Queue()
-        self._wait: Wait[int] = Wait(state.system, {"COMMAND_ACK"}, self._catch)
+        self._wait: Wait[int] = Wait(state.system, {"COMMAND_ACK", "HEARTBEAT"}, self._catch)
         self._wait.on_settled = lambda: self._results.put_nowait(None)
 
     def __enter__(self) -> Acks:
@@ -128,7 +142,10 @@ class Acks:
         self._pending.discard(self._wait)
 
     def _catch(self, message: Any) -> None:
-        if message.command == self._command and self._is_to_us(message):
+        if message.get_type() == "HEARTBEAT":
+            if self._shown():
+                self._results.put_nowait(mavlink.MAV_RESULT_ACCEPTED)
+        elif message.command == self._command and self._is_to_us(message):
             self._results.put_nowait(message.result)
 
     def _is_to_us(self, message: Any) -> bool:

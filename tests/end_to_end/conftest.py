@@ -203,8 +203,15 @@ class Rig:
 
         eventually(up, timeout, "the API's knowing its vehicle")
 
+    def be_patient(self) -> None:
+        """Have it stay armed on the ground for longer than ArduPilot's 10 s, which are 1 s of a busy machine's here."""
+        self.mavproxy.says("Received", timeout=60)  # the parameters, without which MAVProxy sets none
+        self.mavproxy.type("param set DISARM_DELAY 120")
+
     def in_the_air(self, alt: float = 10) -> None:
         """Get it to `alt` m above home, in GUIDED, whatever it was doing."""
+        if self.control is not None:  # a pilot keeps the throttle in the middle: LOITER then holds the height
+            self.control.fault("pilot_sticks", throttle=1500)
         status = self.status()
         if status["armed"] and status["landed_state"] != "on_ground":
             self.ok(self.get("/command/guided"))
@@ -259,6 +266,7 @@ def embedded(directory: Path, *arguments: str, speedup: float = SPEEDUP, **setti
         instance = start_embedded(rig, *arguments, speedup=speedup)
         rig.mavproxy = rig.start("mavproxy", mavproxy_command(instance, load(rig.port, **settings)))
         rig.wait_until_up()
+        rig.be_patient()
     except BaseException:
         rig.stop()
         raise
@@ -280,6 +288,7 @@ def ardupilot(directory: Path) -> Rig:
     try:
         rig.mavproxy = rig.start("sim_vehicle", command, env)
         rig.wait_until_up(120)
+        rig.be_patient()
     except BaseException:
         rig.stop()
         raise

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import http.server
 import json
 import re
@@ -133,7 +134,7 @@ class Rebound:
     """
 
     def __init__(self, before: int, after: int) -> None:
-        self.targets = [before, after]
+        self._before, self._after = before, after
         self._threads: list[threading.Thread] = []
         self._sockets: list[socket.socket] = []
         self._listening = socket.create_server(("127.0.0.1", 0))
@@ -155,18 +156,16 @@ class Rebound:
 
     def _serve(self, near: socket.socket) -> None:
         self._sockets.append(near)
-        try:
+        with contextlib.suppress(OSError):
             request = near.recv(65536)
             if not request:  # a connection that the browser opened in case
                 return
-            page = request.startswith(b"GET / ") or request.startswith(b"GET /favicon")
-            far = socket.create_connection(("127.0.0.1", self.targets[0 if page else 1]))
+            page = request.startswith((b"GET / ", b"GET /favicon"))
+            far = socket.create_connection(("127.0.0.1", self._before if page else self._after))
             self._sockets.append(far)
             far.sendall(request)
             self._spawn(_pour, near, far)
             _pour(far, near)
-        except OSError:
-            pass
 
     def close(self) -> None:
         self._listening.shutdown(socket.SHUT_RDWR)
@@ -180,20 +179,16 @@ class Rebound:
 
 
 def _pour(source: socket.socket, sink: socket.socket) -> None:
-    try:
+    with contextlib.suppress(OSError):
         while data := source.recv(65536):
             sink.sendall(data)
-    except OSError:
-        pass
     for one in (source, sink):
         _hang_up(one)
 
 
 def _hang_up(one: socket.socket) -> None:
-    try:
+    with contextlib.suppress(OSError):
         one.shutdown(socket.SHUT_RDWR)
-    except OSError:
-        pass
 
 
 class Browser:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future
 from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qsl
@@ -29,6 +30,28 @@ def host(loop: Any, mpstate: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[H
     host.link = FakeLink()
     yield host
     host.bridge._outbox.close()
+
+
+class AtOnce(Executor):
+    """Instead of the spool's thread: does the work where it is asked for, so that no real time goes by."""
+
+    def __init__(self, *_: Any, **__: Any) -> None:
+        """Take what a pool of threads takes."""
+
+    def submit(self, call: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        try:
+            future.set_result(call(*args, **kwargs))
+        except Exception as error:  # noqa: BLE001  it belongs to whoever awaits
+            future.set_exception(error)
+        return future
+
+
+@pytest.fixture
+def at_once(monkeypatch: pytest.MonkeyPatch) -> type[AtOnce]:
+    """Keepers work without a thread; for others, what to put in place of their pool."""
+    monkeypatch.setattr("mavproxy_gradys.keeper.ThreadPoolExecutor", AtOnce)
+    return AtOnce
 
 
 class Teller:

@@ -41,8 +41,7 @@ class Disk:
 
 
 @pytest.fixture
-def disk(loop: Any, tmp_path: Path) -> Disk:
-    loop.patience = 0.5  # the other thread's answers come over a socket
+def disk(loop: Any, tmp_path: Path, at_once: None) -> Disk:
     return Disk(loop, tmp_path / "spool.db")
 
 
@@ -98,7 +97,7 @@ def test_a_full_disk_is_said_and_sampled_readings_wait_in_memory(loop: Any, keep
     loop.pass_time(5)
     assert "full" in keeper.problem and keeper.waiting == 3
     with pytest.raises(NotStored, match="full"):
-        loop.run(keeper.keep([reading("x" * 3000)]))
+        loop.run(keeper.keep([reading("x" * 3000)] * 10))
     disk.make_room()
     loop.pass_time(1)
     assert (keeper.problem, keeper.waiting, keeper.count) == ("", 0, 4)

@@ -12,7 +12,7 @@ ALT = parse_quantity("alt=GLOBAL_POSITION_INT.relative_alt*0.001@1[m]")
 
 
 def test_a_quantity_as_it_is_written() -> None:
-    assert ALT == Quantity("alt", "GLOBAL_POSITION_INT", "relative_alt", None, 0.001, 0.0, 1.0, "m")
+    assert Quantity("alt", "GLOBAL_POSITION_INT", "relative_alt", None, 0.001, 0.0, 1.0, "m") == ALT
     cell = parse_quantity("cell1=BATTERY_STATUS[0].voltages[1]*1e-3-0.5@10[V, loaded]")
     assert cell == Quantity("cell1", "BATTERY_STATUS[0]", "voltages", 1, 0.001, -0.5, 10.0, "V, loaded")
     assert parse_quantity("kelvin=SCALED_PRESSURE.temperature*0.01+273.15").offset == 273.15

@@ -1,0 +1,39 @@
+"""/peripherical/take_photo: a picture from a camera of this machine."""
+
+from __future__ import annotations
+
+from aiohttp import web
+
+from mavproxy_uavapi import camera_tools
+from mavproxy_uavapi.camera_tools import TOOLS, Shot
+from mavproxy_uavapi.errors import BadRequest
+from mavproxy_uavapi.http.call import Call
+from mavproxy_uavapi.http.requests import Photo
+
+VISION = "vision"
+
+
+async def take_photo(call: Call) -> web.StreamResponse:
+    """Take a picture with a camera tool, or the newest frame of the vision module; answers a JPEG."""
+    p = call.params(Photo)
+    if p.command != VISION and p.command not in TOOLS:
+        raise BadRequest(f"no camera tool {p.command!r}; there are {', '.join([*TOOLS, VISION])}")
+    width, height = camera_tools.size_of(p.resolution)
+    if p.command == VISION:
+        picture = await _newest_frame(call)
+    else:
+        picture = await camera_tools.take(p.command, Shot(width, height, p.capture_time, p.focus_distance))
+    headers = {"Content-Disposition": 'attachment; filename="photo.jpg"', "Cache-Control": "no-store"}
+    return web.Response(body=picture, content_type="image/jpeg", headers=headers)
+
+
+async def _newest_frame(call: Call) -> bytes:
+    """The vision module's newest frame, in the size that its camera has.
+
+    Raises:
+        BadRequest: the module is not loaded.
+    """
+    newest_frame = call.service.host.newest_frame
+    if newest_frame is None:
+        raise BadRequest("the vision module is not loaded (`module load vision`)")
+    return await newest_frame()

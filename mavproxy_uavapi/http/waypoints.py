@@ -1,0 +1,100 @@
+"""/mission/waypoints, /mission/start, /mission/progress: the mission that the autopilot itself flies."""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+
+from mavproxy_uavapi.errors import BadRequest, Busy, Stale
+from mavproxy_uavapi.http.call import Answer, Call
+from mavproxy_uavapi.http.forms import file_of
+from mavproxy_uavapi.http.requests import MissionFile, Read, StartMission
+from mavproxy_uavapi.vehicle import mission, plans
+from mavproxy_uavapi.vehicle.jobs import Job
+from mavproxy_uavapi.vehicle.vehicle import Vehicle
+
+LARGEST = 1024 * 1024  # bytes of a mission file
+
+
+async def upload(call: Call) -> Answer:
+    """Replace the vehicle's mission and read it back; one that fails leaves the old mission, or says why not."""
+    vehicle = call.vehicle
+    body = await _body(call)
+    items = await asyncio.to_thread(plans.read, body)
+    request = MissionFile(digest=hashlib.sha256(body.encode()).hexdigest(), items=len(items))
+
+    async def verb(job: Job) -> None:
+        _require_no_flown_mission(vehicle)
+
+        def told(done: int, of: int) -> None:
+            job.progress = {"item": done, "items": of}
+
+        await vehicle.waypoints.upload(items, told)
+
+    uploading = Call(call.service, call.request, request)
+    # A client that hangs up must not leave half a mission.
+    return await uploading.fly(vehicle, verb, f"Mission of {len(items)} items uploaded", outlives_client=True)
+
+
+async def download(call: Call) -> Answer:
+    """The vehicle's mission, read from it now: `home`, and `items` from number 1 on."""
+    vehicle = call.vehicle
+    home, items = await vehicle.waypoints.download()
+    told = {"home": None if home is None else home.report(0), "items": [i.report(n) for n, i in enumerate(items, 1)]}
+    return call.answer("Success", **told)
+
+
+async def clear(call: Call) -> Answer:
+    """Remove the vehicle's mission."""
+    vehicle = call.vehicle
+
+    async def verb(_job: Job) -> None:
+        _require_no_flown_mission(vehicle)
+        await vehicle.waypoints.clear()
+
+    return await call.fly(vehicle, verb, "Mission cleared", outlives_client=True)
+
+
+async def start(call: Call) -> Answer:
+    """Fly the mission from its first item, in AUTO; needs an armed vehicle in GUIDED or AUTO."""
+    vehicle, p = call.vehicle, call.params(StartMission)
+    result = "Mission complete" if p.until_complete else "Mission started"
+    return await call.fly(vehicle, lambda job: mission.fly(vehicle, job, p.until_complete, p.timeout), result)
+
+
+async def progress(call: Call) -> Answer:
+    """Which item is flown, of how many, which was reached last, and how far (m) it is."""
+    vehicle = call.seen
+    told = mission.progress(vehicle)
+    age = vehicle.state.newest("MISSION_CURRENT")
+    assert age is not None
+    seconds = max(vehicle.clock() - age.at, 0.0)
+    limit = call.params(Read).max_age or call.service.settings.max_age
+    if seconds > limit:
+        raise Stale(f"vehicle {vehicle.state.system} last told MISSION_CURRENT {seconds:.1f} s ago")
+    return call.answer("Success", info=told, age_s=round(seconds, 3))
+
+
+def _require_no_flown_mission(vehicle: Vehicle) -> None:
+    """Raises Busy while the vehicle flies the mission that is to be changed."""
+    if vehicle.state.armed and vehicle.mode == mission.AUTO:
+        raise Busy("the vehicle flies its mission; /command/guided or /command/brake first")
+
+
+async def _body(call: Call) -> str:
+    """The mission's text: the body itself, or the file of a multipart form.
+
+    Raises:
+        BadRequest: there is none, or it is no text.
+    """
+    request = call.request
+    if request.content_type == "multipart/form-data":
+        _, data = await file_of(request, LARGEST)
+    else:
+        data = await request.read()
+    if not data.strip():
+        raise BadRequest("the body is the mission: a QGC WPL 110 file, a .plan file, or JSON items")
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise BadRequest(f"the mission is no UTF-8 text: {error}") from error

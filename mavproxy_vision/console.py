@@ -1,0 +1,98 @@
+"""What the prompt shows, and what /vision/status tells. Pure."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mavproxy_vision.flights import Flights
+from mavproxy_vision.vision import Vision, in_view
+
+HELP = """\
+vision status                      the camera, the tags in view, what is in flight
+vision start | stop                open or close the camera; stop ends a flight too, and the vehicle holds
+vision set [NAME [VALUE]]          show or change settings, such as: vision set source sim
+vision tags                        the tags in view
+vision land [ID] [METHOD]          land on the tag from here (velocity or landing_target)
+vision search [ID]                 fly an expanding square until the tag is in sight
+vision mission [ALT NORTH EAST [ID|none]]   take off, fly there (m from home), land on the tag
+vision abort                       end what is in flight; the vehicle holds
+vision calibrate FOLDER BOARD [FILE]        charuco:7x5:0.03:0.022 or chessboard:9x6:0.025
+vision snapshot FILE               write the newest frame, with its tags drawn in
+vision tag FILE.pdf [--family F] [--id N] [--size M]   a tag to scale, for printing
+vision help                        this"""
+
+
+def status(vision: Vision, flights: Flights) -> dict[str, Any]:
+    """The camera and the flight as JSON has them."""
+    health, settings = vision.health, vision.settings
+    seen = vision.fresh_seen
+    told: dict[str, Any] = {
+        "source": settings.source or None,
+        "camera": health.state,
+        "error": health.error or None,
+        "rate": round(health.rate, 1),
+        "frames": health.frames,
+        "repeated": health.repeated,
+        "skipped": health.skipped,
+        "reconnects": health.reconnects,
+        "families": list(settings.families),
+        "tags": [vars(tag) for tag in settings.tag_list],
+        "in_view": [one["id"] for one in in_view(seen)],
+        "frame_age_s": None if seen is None else round(vision.host.clock() - seen.captured_at, 3),
+        "detector_ms": None if seen is None else round(1000 * (seen.done_at - seen.received_at), 1),
+    }
+    if flights.report is not None:
+        told["flight"] = {"running": flights.running, "phase": flights.phase, **flights.report.told()}
+    return told
+
+
+def report(vision: Vision, flights: Flights) -> str:
+    """The same in a few lines."""
+    told = status(vision, flights)
+    source = told["source"] or "none; `vision set source camera:0`, sim, http, a path or a URL"
+    camera = f"camera {told['camera']}" + (f" ({told['error']})" if told["error"] else "")
+    lines = [
+        f"vision: source {source}: {camera}, {told['rate']} frames/s, {told['frames']} looked at, "
+        f"{told['repeated']} repeated, {told['reconnects']} reconnects",
+        f"tags of {', '.join(told['families'])}: {vision.settings.tags}; in view: {told['in_view'] or 'none'}",
+    ]
+    if told["detector_ms"] is not None:
+        lines.append(f"detector {told['detector_ms']} ms, newest frame {1000 * told['frame_age_s']:.0f} ms old")
+    if flights.report is not None:
+        flight = flights.report
+        what = flights.phase if flights.running else flight.reason or flights.result()
+        lines.append(f"{flight.verb}: {what}; attempt {flight.attempts}, {flight.duration:.0f} s")
+    return "\n".join(lines)
+
+
+def tags(vision: Vision) -> str:
+    """A line for each tag in view."""
+    seen = vision.fresh_seen
+    if seen is None:
+        return f"vision: no frames: {vision.health.state}"
+    if not seen.sightings:
+        return "vision: no tags in view"
+    lines = []
+    for one in in_view(seen):
+        if one["position"] is None:
+            lines.append(f"{one['family']} {one['id']}: of unknown size (`tags` does not list it)")
+            continue
+        right, down, ahead = one["position"]
+        lines.append(
+            f"{one['family']} {one['id']}: {one['distance']:.2f} m away; in the camera right {right:+.2f}, "
+            f"down {down:+.2f}, ahead {ahead:.2f} m; hamming {one['hamming']}, "
+            f"error {one['reprojection_error']:.2f} px, "
+            f"{1000 * one['latency_s']:.0f} ms after its light"
+        )
+    return "\n".join(lines)
+
+
+def caption(vision: Vision, flights: Flights) -> list[str]:
+    """What is written into the annotated frame."""
+    state = vision.health.state
+    lines = [f"{vision.settings.source}: {vision.health.rate:.0f} frames/s" if state == "ok" else f"camera: {state}"]
+    if flights.running and flights.report is not None:
+        flight = flights.report
+        offset = "" if flight.last_offset is None else f", {flight.last_offset:.2f} m off"
+        lines.append(f"{flight.verb}: {flights.phase}, attempt {flight.attempts}{offset}")
+    return lines

@@ -1,0 +1,197 @@
+"""/vision: what `uavapi` serves while both modules are loaded."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from typing import Annotated, Any
+
+from aiohttp import web
+from pydantic import Field, model_validator
+
+from mavproxy_uavapi.errors import BadRequest
+from mavproxy_uavapi.http.call import Call
+from mavproxy_uavapi.http.requests import NED_REACH, Blocking, Empty, Number, Request
+from mavproxy_uavapi.http.responses import envelope
+from mavproxy_uavapi.http.routes import EITHER, POST, Route
+from mavproxy_vision.annotate import annotated, jpeg
+from mavproxy_vision.camera import Posted, decode
+from mavproxy_vision.console import caption, status
+from mavproxy_vision.errors import NoCamera
+from mavproxy_vision.flights import Flights
+from mavproxy_vision.mission import Errand
+from mavproxy_vision.settings import METHODS
+from mavproxy_vision.vision import Vision, in_view
+
+BOUNDARY = "frame"
+FRAME_TIMEOUT = 5.0  # s without a frame until a stream ends
+
+TagId = Annotated[int | None, Field(ge=0, le=100_000, description="of the tag; none for the main tag")]
+Method = Annotated[str | None, Field(pattern=f"^({'|'.join(METHODS)})$", description="none for the setting")]
+
+
+class LandRequest(Blocking):
+    """`id` of the tag, `method` velocity or landing_target."""
+
+    id: TagId = None
+    method: Method = None
+
+
+class SearchRequest(Blocking):
+    """`id` of the tag; `leash` m that the search may go away."""
+
+    id: TagId = None
+    leash: Annotated[float | None, Field(gt=0, le=500)] = None
+
+
+class MissionRequest(Blocking):
+    """`alt` m above home; `north`, `east` m from home, or `lat`, `long` degrees; `tag` false lands without one."""
+
+    alt: Annotated[Number, Field(gt=0, le=500)] = 5
+    north: Annotated[Number | None, Field(ge=-NED_REACH, le=NED_REACH)] = None
+    east: Annotated[Number | None, Field(ge=-NED_REACH, le=NED_REACH)] = None
+    lat: Annotated[Number | None, Field(ge=-90, le=90)] = None
+    long: Annotated[Number | None, Field(ge=-180, le=180)] = None
+    id: TagId = None
+    tag: bool = True
+    method: Method = None
+
+    @model_validator(mode="after")
+    def _one_place(self) -> MissionRequest:
+        metres = self.north is not None and self.east is not None
+        degrees = self.lat is not None and self.long is not None
+        if metres == degrees:
+            raise ValueError("give north and east, or lat and long")
+        return self
+
+
+class StreamRequest(Request):
+    """`rate` frames per second at most."""
+
+    rate: Annotated[float, Field(gt=0, le=60)] = 10
+
+
+class FrameRequest(Request):
+    """`latency` ms from light to arrival; none for the setting."""
+
+    latency: Annotated[float | None, Field(ge=0, le=10_000)] = None
+
+
+class Pages:
+    """The actions of the routes."""
+
+    def __init__(self, vision: Vision, flights: Flights) -> None:
+        self.vision, self.flights = vision, flights
+
+    def routes(self) -> list[Route]:
+        """What is served."""
+        return [
+            Route("/vision/status", self.status, Empty),
+            Route("/vision/tags", self.tags, Empty),
+            Route("/vision/frame.jpg", self.frame, Empty),
+            Route("/vision/stream.mjpg", self.stream, StreamRequest),
+            Route("/vision/frame", self.post_frame, FrameRequest, POST, raw=True),
+            Route("/vision/land", self.land, LandRequest, POST),
+            Route("/vision/search", self.search, SearchRequest, POST),
+            Route("/vision/mission", self.mission, MissionRequest, POST),
+            Route("/vision/stop", self.stop, Empty, EITHER),
+        ]
+
+    # -- reading -------------------------------------------------------------------------------------------
+
+    async def status(self, _call: Call) -> dict[str, Any]:
+        """The camera, what it sees, and what is in flight."""
+        return self._answer("Success", info=status(self.vision, self.flights))
+
+    async def tags(self, _call: Call) -> dict[str, Any]:
+        """The tags in view."""
+        self.vision.require_camera()
+        seen = self.vision.fresh_seen
+        if seen is None:
+            raise NoCamera("no frame was looked at in the last second")
+        age = self.vision.host.clock() - seen.captured_at
+        return self._answer("Success", info={"tags": in_view(seen), "frame": seen.number}, age_s=round(age, 3))
+
+    async def frame(self, _call: Call) -> web.StreamResponse:
+        """The newest frame with its tags drawn in."""
+        return web.Response(
+            body=await self._picture(), content_type="image/jpeg", headers={"Cache-Control": "no-store"}
+        )
+
+    async def _picture(self) -> bytes:
+        vision = self.vision
+        seen, image = vision.seen, vision.image
+        if seen is None or image is None:
+            raise NoCamera("there is no frame yet")
+        lines = caption(vision, self.flights)
+        loop = asyncio.get_running_loop()
+        return await loop.run_in_executor(None, lambda: jpeg(annotated(image, seen, lines)))
+
+    async def stream(self, call: Call) -> web.StreamResponse:
+        """Annotated frames as they come, as browsers show them (MJPEG)."""
+        self.vision.require_camera()
+        pause = 1.0 / call.params(StreamRequest).rate
+        kind = f"multipart/x-mixed-replace; boundary={BOUNDARY}"
+        response = web.StreamResponse(headers={"Content-Type": kind, "Cache-Control": "no-store"})
+        await response.prepare(call.request)
+        with contextlib.suppress(
+            ConnectionError, NoCamera, asyncio.TimeoutError
+        ):  # the client, or the camera, has gone
+            while True:
+                await asyncio.wait_for(self.vision.changed.wait(), FRAME_TIMEOUT)
+                picture = await self._picture()
+                head = f"--{BOUNDARY}\r\nContent-Type: image/jpeg\r\nContent-Length: {len(picture)}\r\n\r\n"
+                await response.write(head.encode() + picture + b"\r\n")
+                await asyncio.sleep(pause)
+        return response
+
+    async def post_frame(self, call: Call) -> dict[str, Any]:
+        """Take a frame: the body is a JPEG or PNG; source `http`."""
+        worker = self.vision.worker
+        source = None if worker is None else worker.source
+        if not isinstance(source, Posted):
+            raise BadRequest("frames are taken with `vision set source http` only")
+        data = await call.request.read()
+        image = await asyncio.get_running_loop().run_in_executor(None, decode, data)
+        latency = call.params(FrameRequest).latency
+        source.post(image, None if latency is None else latency / 1000)
+        return self._answer("Frame taken")
+
+    # -- flying --------------------------------------------------------------------------------------------
+
+    async def land(self, call: Call) -> Any:
+        """Land on a tag from here; answers when it stands on it."""
+        p = call.params(LandRequest)
+        copter = self.flights.copter()
+        verb = self.flights.landing(copter, p.id, p.method or self.vision.settings.method)
+        return self._reported(await call.fly(copter, verb, self.flights.result, outlives_client=True))
+
+    async def search(self, call: Call) -> Any:
+        """Fly an expanding square until the tag is in sight."""
+        p = call.params(SearchRequest)
+        copter = self.flights.copter()
+        verb = self.flights.searching(copter, p.id, p.leash)
+        return self._reported(await call.fly(copter, verb, self.flights.result, outlives_client=True))
+
+    async def mission(self, call: Call) -> Any:
+        """Take off, fly there, land on the tag or without one; return when there is none."""
+        p = call.params(MissionRequest)
+        copter = self.flights.copter()
+        method = p.method or self.vision.settings.method
+        errand = Errand(p.alt, p.north, p.east, p.lat, p.long, p.id, p.tag, method)
+        verb = self.flights.errand(copter, errand)
+        return self._reported(await call.fly(copter, verb, self.flights.result, outlives_client=True))
+
+    async def stop(self, _call: Call) -> dict[str, Any]:
+        """End the landing, search or mission in flight; the vehicle holds where it is."""
+        was = self.flights.stop("it was stopped; the vehicle holds")
+        return self._answer("Stopped" if was else "Nothing was in flight")
+
+    def _reported(self, answer: Any) -> Any:
+        if isinstance(answer, dict) and self.flights.report is not None:
+            answer["info"] = self.flights.report.told()
+        return answer
+
+    def _answer(self, result: str, **members: Any) -> dict[str, Any]:
+        system = self.vision.host.target or next(iter(self.vision.host.fleet.vehicles), 0)
+        return envelope(system, result, **members)

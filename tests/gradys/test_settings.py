@@ -1,0 +1,52 @@
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mavproxy_gradys.settings import ModuleSettings, masked
+from mavproxy_uavapi.settings import SettingError
+
+
+def test_an_ini_file_of_the_original_service_names_the_station(tmp_path: Path) -> None:
+    ini = tmp_path / "uav.ini"
+    ini.write_text(
+        "[api]\nport = 8000\ngradys_gs = 10.0.0.5:8000\n[logs]\ndebug = []\n"
+        "[gradys]\nperiod = 2\nquantities = position@1\n  alt=GLOBAL_POSITION_INT.relative_alt*0.001@1[m]\n"
+    )
+    settings = ModuleSettings({"config": str(ini), "period": 3}).snapshot()
+    assert [station.url for station in settings.gs] == ["http://10.0.0.5:8000"]
+    assert settings.period == 3.0
+    assert [quantity.name for quantity in settings.quantities] == ["position", "alt"]
+
+
+@pytest.mark.parametrize("text", ["[gradys]\nnope = 1\n", "[gradys]\nperiod = x\n", "no section\n"])
+def test_an_ini_file_that_means_nothing_is_refused(tmp_path: Path, text: str) -> None:
+    ini = tmp_path / "uav.ini"
+    ini.write_text(text)
+    with pytest.raises(SettingError):
+        ModuleSettings({"config": str(ini)})
+
+
+@pytest.mark.parametrize(
+    "name,value",
+    [("gs", "x:y"), ("ip", "a b"), ("period", float("nan")), ("period", "inf"), ("timeout", 0), ("token", "a\nb"),
+     ("sink", "ftp://x"), ("quantities", "x"), ("ca_file", "/no/such"), ("spool_mb", -1), ("nope", 1)],
+)  # fmt: skip
+def test_what_cannot_work_is_refused(name: str, value: Any) -> None:
+    with pytest.raises(SettingError):
+        ModuleSettings({name: value})
+
+
+def test_none_unsets() -> None:
+    settings = ModuleSettings({"gs": "a:1"})
+    settings.set("gs", "None")
+    assert settings.snapshot().gs == ()
+
+
+def test_passwords_are_not_shown() -> None:
+    settings = ModuleSettings({"token": "s3cret", "sink": "mqtt://me:pass@broker/x"})
+    assert settings.shown("token") == "(set)"
+    assert settings.shown("sink") == "mqtt://me:***@broker/x"
+    assert masked("http://broker/x") == "http://broker/x"

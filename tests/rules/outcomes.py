@@ -1,0 +1,169 @@
+"""What each verb answers to each fault: the table that the tests check and docs/faults.md shows.
+
+`python tests/rules/outcomes.py` writes the file anew.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+FILE = Path(__file__).parents[2] / "docs" / "faults.md"
+
+
+class Fault(NamedTuple):
+    """A misfortune: what happens, and how soon after it an error is the answer (s)."""
+
+    meaning: str
+    within: float
+
+
+class Verb(NamedTuple):
+    """A verb: its path, what a success takes when all goes well (s), and its outcome by fault."""
+
+    path: str
+    takes: float
+    outcomes: dict[str, str]
+
+
+HEARTBEAT = 1.1  # s until the next one, and its way here
+
+FAULTS = {
+    "none": Fault("All goes well.", 0.0),
+    "ack lost": Fault(
+        "The first acknowledgement of each command is lost, of those that may be repeated the second too. A command "
+        "is sent again up to three times; what a heartbeat shows needs no acknowledgement.",
+        4.5,
+    ),
+    "acks lost for good": Fault(
+        "No acknowledgement ever comes. Modes, arming and a takeoff show themselves; nothing shows a speed, nor that "
+        "home is the new one.",
+        6.5,
+    ),
+    "late ack": Fault("Each acknowledgement takes 2 s, longer than it takes us to send the command again.", 4.5),
+    "foreign acceptance": Fault(
+        "Another component of the vehicle says ACCEPTED, the autopilot itself says DENIED: the autopilot's word counts.",
+        2.0,
+    ),
+    "foreign refusal": Fault("Another component says DENIED, the autopilot itself says ACCEPTED.", 0.2),
+    "refused": Fault("The autopilot says DENIED, and why.", 2.0),
+    "busy once": Fault(
+        "The autopilot says TEMPORARILY_REJECTED, once. Arming and home are worth asking again while an estimator "
+        "settles; the rest is the client's to repeat.",
+        2.0,
+    ),
+    "in progress": Fault("The autopilot says IN_PROGRESS for 4 s, then ACCEPTED.", 4.5),
+    "link silence": Fault("Neither side hears the other any more; found after the link timeout of 5 s.", 5.2),
+    "reboot": Fault(
+        "The autopilot starts anew and is back 2 s later, disarmed, in STABILIZE. A request that waited for it in vain "
+        "reaches it then: it can set its home and arm, and refuses a speed.",
+        2.0 + HEARTBEAT,
+    ),
+    "pilot's mode": Fault(
+        "The pilot switches to another mode. A speed needs none: it is asked for again, and the autopilot refuses it in "
+        "most modes (2 s).",
+        HEARTBEAT,
+    ),
+    "disarmed": Fault(
+        "The pilot stops the motors: in flight it falls, which is no landing. Arming that a heartbeat has shown is "
+        "done, and is not repeated.",
+        HEARTBEAT,
+    ),
+    "client gone": Fault(
+        "The client hangs up: the verb ends and is forgotten, the vehicle keeps its last setpoint. Landing and return "
+        "go on.",
+        0.1,
+    ),
+}
+
+REFUSAL = 2.0  # s; the autopilot's own word, after sending again
+ENDED, GOES_ON = "ended", "goes on"  # where nobody is left to be answered
+
+SUCCESS = dict.fromkeys(FAULTS, "200")
+LOST = {"link silence": "503 link_lost", "client gone": ENDED}
+REFUSED = {
+    "foreign acceptance": "500 rejected",
+    "refused": "500 rejected",
+    "busy once": "500 rejected",
+}
+FLIGHT = {"reboot": "409 not_armed", "pilot's mode": "409 mode_changed", "disarmed": "409 not_armed"}
+MOVING = {**SUCCESS, **LOST, **FLIGHT}  # by setpoints, which nobody acknowledges
+MODE = {**SUCCESS, **LOST, **REFUSED, "reboot": "409 mode_changed", "pilot's mode": "409 mode_changed"}
+LANDING = {**SUCCESS, **LOST, **REFUSED, **FLIGHT, "client gone": GOES_ON}
+ARM = {**MODE, "busy once": "200", "reboot": "200"}
+TAKEOFF = {**SUCCESS, **LOST, **REFUSED, **FLIGHT}
+HOME = {**SUCCESS, **LOST, **REFUSED, "busy once": "200", "acks lost for good": "504 timeout"}
+SPEED = {
+    **SUCCESS,
+    **LOST,
+    **REFUSED,
+    "acks lost for good": "504 timeout",
+    "reboot": "500 rejected",
+    "pilot's mode": "500 rejected",
+}
+
+VERBS = {
+    "arm": Verb("/command/arm", 5.0, ARM),
+    "takeoff": Verb("/command/takeoff", 12.0, TAKEOFF),
+    "land": Verb("/command/land", 20.0, LANDING),
+    "rtl": Verb("/command/rtl", 20.0, LANDING),
+    "go_to_ned_wait": Verb("/movement/go_to_ned_wait", 10.0, MOVING),
+    "go_to_gps_wait": Verb("/movement/go_to_gps_wait", 10.0, MOVING),
+    "drive_wait": Verb("/movement/drive_wait", 10.0, MOVING),
+    "drive_body_wait": Verb("/movement/drive_body_wait", 10.0, MOVING),
+    "travel, with duration": Verb("/movement/travel_at_ned", 5.0, MOVING),
+    "brake": Verb("/command/brake", HEARTBEAT, MODE),
+    "guided": Verb("/command/guided", HEARTBEAT, MODE),
+    "set_mode": Verb("/command/set_mode", HEARTBEAT, MODE),
+    "set_home": Verb("/command/set_home", 2.0, HOME),
+    "set_air_speed": Verb("/command/set_air_speed", 0.5, SPEED),
+    "set_ground_speed": Verb("/command/set_ground_speed", 0.5, SPEED),
+    "set_climb_speed": Verb("/command/set_climb_speed", 0.5, SPEED),
+    "set_descent_speed": Verb("/command/set_descent_speed", 0.5, SPEED),
+}
+
+
+def page() -> str:
+    """docs/faults.md."""
+    lines = [
+        "# What a verb answers when something goes wrong",
+        "",
+        "Written by `python tests/rules/outcomes.py`. `tests/rules/test_fault_matrix.py` flies every cell on the embedded",
+        "vehicle: the answer is this one, it comes in time, and after it nothing is sent until the next request: no",
+        "setpoint, no mode, no command.",
+        "",
+        "A flight has been under way for 3 s when the link, the autopilot, the pilot or the client does something; the",
+        "other verbs wait for an acknowledgement then.",
+        "",
+        "| fault | what happens | an error comes within |",
+        "| --- | --- | --- |",
+    ]
+    lines += [f"| {name} | {fault.meaning} | {_seconds(fault)} |" for name, fault in FAULTS.items()]
+    for verbs in (("arm", "takeoff", "land", "rtl"), tuple(list(VERBS)[4:9]), tuple(list(VERBS)[9:])):
+        groups = _alike(verbs)
+        lines += ["", "| fault | " + " | ".join(", ".join(f"`{name}`" for name in group) for group in groups) + " |"]
+        lines += ["| --- |" + " --- |" * len(groups)]
+        for fault in FAULTS:
+            lines += [f"| {fault} | " + " | ".join(VERBS[group[0]].outcomes[fault] for group in groups) + " |"]
+    return "\n".join(lines) + "\n"
+
+
+def _seconds(fault: Fault) -> str:
+    return f"{fault.within:g} s" if fault.within else ""
+
+
+def _alike(verbs: tuple[str, ...]) -> list[list[str]]:
+    """The verbs in groups of equal outcomes."""
+    groups: list[list[str]] = []
+    for name in verbs:
+        for group in groups:
+            if VERBS[group[0]].outcomes == VERBS[name].outcomes:
+                group.append(name)
+                break
+        else:
+            groups.append([name])
+    return groups
+
+
+if __name__ == "__main__":
+    FILE.write_text(page(), encoding="utf-8")

@@ -1,0 +1,199 @@
+"""Every blocking verb meets every fault: the right answer, in time, and nothing more is sent for it."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+_spec = importlib.util.spec_from_file_location("outcomes", Path(__file__).with_name("outcomes.py"))
+outcomes = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(outcomes)
+
+ARM = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
+TAKEOFF = mavlink.MAV_CMD_NAV_TAKEOFF
+COMMANDS = (ARM, TAKEOFF, mavlink.MAV_CMD_DO_SET_MODE, mavlink.MAV_CMD_DO_SET_HOME, mavlink.MAV_CMD_DO_CHANGE_SPEED)
+GUARD = 4.0  # s for which nothing must be sent after the answer: a resend comes after 1.5 s, a setpoint after 1
+UNDER_WAY = 3.0  # s after which something happens to a flight
+WAITING = 0.5  # s after which something happens to a command that is waiting for its ack
+DEAF = 1.0  # s for which the vehicle does not hear that command
+DARK = 2.0  # s that a reboot takes
+OVERHEAR = (1, 190)  # another component of the vehicle
+PLACE = (-35.363261, 149.165230)  # where it stands: the simulator's default home
+
+
+class Request(NamedTuple):
+    """How a verb is asked for, and where its vehicle is before: far is a flight that is not over soon."""
+
+    stage: str
+    near: dict[str, Any] | str
+    far: dict[str, Any] | str | None = None
+
+
+REQUESTS = {
+    "arm": Request("boot", ""),
+    "takeoff": Request("armed", "?alt=4", "?alt=100"),
+    "land": Request("flying", "", ""),
+    "rtl": Request("flying", "", ""),
+    "go_to_ned_wait": Request("flying", {"x": 6, "y": 3, "z": -9}, {"x": 300, "y": 0, "z": -9}),
+    "go_to_gps_wait": Request(
+        "flying",
+        {"lat": PLACE[0] + 6e-5, "long": PLACE[1], "alt": 9},
+        {"lat": PLACE[0] + 3e-3, "long": PLACE[1], "alt": 9},
+    ),
+    "drive_wait": Request("flying", {"x": 6, "y": 3, "z": -1}, {"x": 300, "y": 0, "z": 0}),
+    "drive_body_wait": Request("flying", {"front": 6, "right": 3}, {"front": 300, "right": 0}),
+    "travel, with duration": Request(
+        "flying", {"vx": 1, "vy": 0, "vz": 0, "duration": 3}, {"vx": 1, "vy": 0, "vz": 0, "duration": 60}
+    ),
+    "brake": Request("flying", ""),
+    "guided": Request("loitering", ""),
+    "set_mode": Request("flying", "?mode=ALT_HOLD"),
+    "set_home": Request("flying", ""),
+    **dict.fromkeys(
+        ("set_air_speed", "set_ground_speed", "set_climb_speed", "set_descent_speed"), Request("flying", "?new_v=2")
+    ),
+}
+STAGES: dict[str, Callable[[Any], None]] = {
+    "boot": lambda world: world.boot(),
+    "armed": lambda world: world.armed(),
+    "flying": lambda world: world.flying(),
+    "loitering": lambda world: world.flying("LOITER"),
+}
+
+
+def about_each_command(world: Any, name: str, **fields: Any) -> None:
+    for command in COMMANDS:
+        world.fault(name, command=command, **fields)
+
+
+def lose_the_first_acks(world: Any) -> None:
+    for command in COMMANDS:
+        world.fault("lose_acks", command=command, count=1 if command == TAKEOFF else 2)
+
+
+def accept_for_another(world: Any) -> None:
+    about_each_command(world, "foreign_ack", result=mavlink.MAV_RESULT_ACCEPTED, **_overheard())
+    about_each_command(world, "refuse", result=mavlink.MAV_RESULT_DENIED, text="Not now.")
+
+
+def _overheard() -> dict[str, int]:
+    system, component = OVERHEAR
+    return {"system": system, "component": component}
+
+
+# What is so already when the request comes.
+BEFORE: dict[str, Callable[[Any], None]] = {
+    "ack lost": lose_the_first_acks,
+    "acks lost for good": lambda world: about_each_command(world, "lose_acks"),
+    "late ack": lambda world: about_each_command(world, "delay_acks", seconds=2.0),
+    "foreign acceptance": accept_for_another,
+    "foreign refusal": lambda world: about_each_command(
+        world, "foreign_ack", result=mavlink.MAV_RESULT_DENIED, **_overheard()
+    ),
+    "refused": lambda world: about_each_command(
+        world, "refuse", result=mavlink.MAV_RESULT_DENIED, text="Not now."
+    ),
+    "busy once": lambda world: about_each_command(
+        world, "refuse", result=mavlink.MAV_RESULT_TEMPORARILY_REJECTED, text="Not now.", count=1
+    ),
+    "in progress": lambda world: about_each_command(world, "in_progress", seconds=4.0),
+}
+# What happens while the verb waits.
+MEANWHILE: dict[str, Callable[[Any, Any], None]] = {
+    "link silence": lambda world, wire: world.fault("silence"),
+    "reboot": lambda world, wire: world.reboot(DARK),
+    "pilot's mode": lambda world, wire: world.fault(
+        "pilot_mode", mode="LOITER" if world.copter.mode.name == "GUIDED" else "ALT_HOLD"
+    ),
+    "disarmed": lambda world, wire: world.fault("pilot_disarm"),
+    "client gone": lambda world, wire: wire.hang_up(),
+}
+CELLS = [(verb, fault) for verb in outcomes.VERBS for fault in outcomes.FAULTS]
+
+
+@pytest.mark.parametrize(("verb", "fault"), CELLS)
+def test_verb_meets_fault(make_world: Any, verb: str, fault: str) -> None:
+    world = make_world(STAGES[REQUESTS[verb].stage])
+    expected = outcomes.VERBS[verb].outcomes[fault]
+    struck, wire = strike(world, verb, fault)
+    allowed = outcomes.FAULTS[fault].within
+    if expected == "200":
+        allowed += outcomes.VERBS[verb].takes
+    elif expected == "500 rejected":
+        allowed = max(allowed, outcomes.REFUSAL)
+    if expected in (outcomes.ENDED, outcomes.GOES_ON):
+        after_hanging_up(world, expected, struck)
+        return
+    reply = world.answer(wire, 200.0)
+    assert reply.outcome == expected, reply.body
+    assert reply.at - struck <= allowed + 1e-6
+    assert says_why(reply.body, fault)
+    world.loop.pass_time(GUARD)
+    assert world.orders(since=reply.at) == []
+    if (verb, fault) == ("arm", "disarmed"):
+        assert not world.copter.armed
+
+
+def strike(world: Any, verb: str, fault: str) -> tuple[float, Any]:
+    """Ask, and let it happen; when it happened, and the request in flight."""
+    request = REQUESTS[verb]
+    flight = request.far is not None
+    BEFORE.get(fault, lambda _: None)(world)
+    meanwhile = MEANWHILE.get(fault)
+    delay = UNDER_WAY if flight else WAITING
+    if meanwhile is not None and not flight:
+        # What is done within a few milliseconds is caught in the act by a vehicle that does not hear it yet.
+        world.uplink_until = world.loop.time() + DEAF
+    if (verb, fault) == ("arm", "disarmed"):
+        # Nobody is disarmed before it is armed: it hears, its acks are lost, and a heartbeat has shown it.
+        world.uplink_until, delay = 0.0, 1.3
+        world.fault("lose_acks", command=ARM)
+    began = world.loop.time()
+    wire = begin(world, verb, request.far if flight and meanwhile is not None else request.near)
+    if meanwhile is None:
+        return began, wire
+    world.loop.pass_time(delay)
+    meanwhile(world, wire)
+    return world.loop.time(), wire
+
+
+def begin(world: Any, verb: str, given: Any) -> Any:
+    path = outcomes.VERBS[verb].path
+    if isinstance(given, dict):
+        return world.begin("POST", path, given)
+    return world.begin("GET", path + given)
+
+
+def says_why(body: dict[str, Any], fault: str) -> bool:
+    """Whether the answer names the pilot's mode, or repeats what the autopilot said."""
+    if body.get("code") == "mode_changed" and fault == "pilot's mode":
+        return "LOITER" in body["detail"] or "ALT_HOLD" in body["detail"]
+    if body.get("code") == "rejected" and fault in ("refused", "foreign acceptance"):
+        return body["ack"] == "MAV_RESULT_DENIED" and body["statustext"] == ["Not now."]
+    return True
+
+
+def after_hanging_up(world: Any, expected: str, struck: float) -> None:
+    """The verb has ended and nothing more is sent, or it goes on to its end by itself."""
+    world.loop.settle()
+    running = [job.verb for job in world.host.jobs.running()]
+    (entry,) = world.service.audit.entries
+    assert entry.outcome == "client_gone"
+    if expected == outcomes.ENDED:
+        assert running == []
+        world.loop.pass_time(GUARD)
+    else:
+        assert len(running) == 1
+        world.loop.pass_time(30.0)
+        assert world.host.jobs.running() == []
+        assert not world.copter.armed and world.at[2] > -0.1
+    assert world.orders(since=struck) == []
+
+
+def test_page_about_faults_is_up_to_date() -> None:
+    assert outcomes.FILE.read_text(encoding="utf-8") == outcomes.page(), "python tests/rules/outcomes.py"

@@ -1,0 +1,70 @@
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from mavproxy_uavapi import camera_tools
+from mavproxy_uavapi.camera_tools import Shot
+from mavproxy_uavapi.errors import TimedOut, ToolFailed
+
+
+@pytest.fixture
+def taken(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """What the camera tool was asked for."""
+    asked: list[Any] = []
+
+    async def take(tool: str, shot: Shot) -> bytes:
+        asked.append((tool, shot))
+        return b"\xff\xd8\xffpicture"
+
+    monkeypatch.setattr(camera_tools, "take", take)
+    return asked
+
+
+def photo(api: Any, loop: Any, query: str) -> Any:
+    async def ask() -> Any:
+        async with api.client.get(f"/peripherical/take_photo?{query}") as response:
+            return response, await response.read()
+
+    return loop.run(ask())
+
+
+def test_photo_is_a_jpeg_attachment_and_needs_no_vehicle(api: Any, loop: Any, taken: list[Any]) -> None:
+    response, body = photo(api, loop, "command=rpicam-still&focus_distance=2")
+    assert (response.status, response.content_type, body) == (200, "image/jpeg", b"\xff\xd8\xffpicture")
+    assert response.headers["Content-Disposition"] == 'attachment; filename="photo.jpg"'
+    assert taken == [("rpicam-still", Shot(1280, 720, 150, 2.0))]
+
+
+@pytest.mark.parametrize("query", ["command=rm", "command=", "command=fswebcam&resolution=big"])
+def test_other_tools_and_bad_resolutions_are_400(api: Any, taken: list[Any], query: str) -> None:
+    answer = api.get(f"/peripherical/take_photo?{query}")
+    assert (answer.status, answer.body["code"]) == (400, "bad_request")
+    assert taken == []
+
+
+@pytest.mark.parametrize("query", ["", "command=fswebcam&capture_time=0", "command=fswebcam&focus_distance=nan"])
+def test_values_out_of_range_are_422(api: Any, taken: list[Any], query: str) -> None:
+    assert api.get(f"/peripherical/take_photo?{query}").status == 422
+    assert taken == []
+
+
+@pytest.mark.parametrize(("error", "status"), [(ToolFailed("failed", "its words"), 500), (TimedOut("slow"), 504)])
+def test_failures_are_told(api: Any, monkeypatch: pytest.MonkeyPatch, error: Exception, status: int) -> None:
+    async def take(_tool: str, _shot: Shot) -> bytes:
+        raise error
+
+    monkeypatch.setattr(camera_tools, "take", take)
+    answer = api.get("/peripherical/take_photo?command=fswebcam")
+    assert (answer.status, answer.body.get("stderr")) == (status, getattr(error, "stderr", None))
+
+
+def test_vision_is_the_newest_frame_of_the_vision_module(api: Any, loop: Any, service: Any) -> None:
+    assert api.get("/peripherical/take_photo?command=vision").status == 400
+
+    async def newest_frame() -> bytes:
+        return b"\xff\xd8\xffframe"
+
+    service.host.newest_frame = newest_frame
+    assert photo(api, loop, "command=vision")[1] == b"\xff\xd8\xffframe"

@@ -1,0 +1,300 @@
+"""The closed loop in lock step: the embedded vehicle, the rendered camera, and the module's own verbs on one
+virtual clock. No threads, no sockets, no waiting; the same seed gives the same flight, and a minute of it takes
+a few seconds. What it leaves out is MAVProxy itself and the camera's threads.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import random
+import selectors
+import tempfile
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+from unittest.mock import patch
+
+os.environ["MAVLINK20"] = "1"  # before pymavlink is imported anywhere
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from mavproxy_uavapi.host.host import Host
+from mavproxy_uavapi.host.link import Address
+from mavproxy_uavapi.sim.options import Home, Options, Wind
+from mavproxy_uavapi.sim.simulator import STEP, Simulator
+from mavproxy_vision.camera import Frame
+from mavproxy_vision.detector import Detector
+from mavproxy_vision.flights import Flights
+from mavproxy_vision.rates import TRUTH
+from mavproxy_vision.settings import ModuleSettings
+from mavproxy_vision.sighting import Seen
+from mavproxy_vision.vision import Vision, make_source
+from mavproxy_vision.worker import Health, Watch
+
+DETECTOR_TIME = 0.015  # s from a frame's arrival to its outcome
+STREAMS_EVERY = 15.0  # s: as often does MAVProxy ask for all streams at its rate
+STREAM_RATE = 4  # Hz
+
+
+class VirtualLoop(asyncio.SelectorEventLoop):
+    """An asyncio loop whose clock jumps to the next timer."""
+
+    def __init__(self) -> None:
+        self.now = 1000.0
+        super().__init__(_Jump(self))
+
+    def time(self) -> float:
+        return self.now
+
+
+class _Jump(selectors.DefaultSelector):
+    def __init__(self, loop: VirtualLoop) -> None:
+        super().__init__()
+        self._loop = loop
+
+    def select(self, timeout: float | None = None) -> Any:
+        ready = super().select(0 if timeout is not None else 5.0)
+        if not ready and timeout is not None:
+            self._loop.now += max(timeout, 0.0)
+        return ready
+
+
+class Eye:
+    """Stands in for the worker: frames come, and are looked at, on the virtual clock.
+
+    Attributes:
+        frozen: give the same frame again and again.
+        dead: give none.
+        blind: called with the truth (position, attitude); true hides the tags.
+    """
+
+    def __init__(self, rig: Lockstep) -> None:
+        self.rig = rig
+        self.watch = Watch(True, rig.loop.time())
+        self.frozen = self.dead = False
+        self.blind: Callable[[Any], bool] = lambda _pose: False
+        self._last: Frame | None = None
+        self._random = random.Random(rig.seed + 7)
+        self._number = 0
+        self.source: Any = None
+        self.detector: Any = None
+        self.task: Any = None
+
+    def start(self) -> None:
+        settings = self.rig.vision.settings
+        self.source = make_source(settings, self.rig.vision._where, self.rig.loop.time)
+        self.source._random = random.Random(self.rig.seed + 11)
+        self.detector = Detector(settings.model, self.rig.vision.options(settings))
+        self.task = self.rig.loop.create_task(self._run())
+
+    def stop(self) -> None:
+        if self.task is not None:
+            self.task.cancel()
+
+    @property
+    def health(self) -> Health:
+        return Health(self.watch.verdict(self.rig.loop.time()), self._number)
+
+    async def _run(self) -> None:
+        loop = self.rig.loop
+        while True:
+            light = loop.time()
+            loop.call_later(self.source.latency(), self._arrive, light)
+            await asyncio.sleep(1.0 / self.source.timing.rate)
+
+    def _arrive(self, light: float) -> None:
+        now = self.rig.loop.time()
+        if self.dead or self._random.random() < self.source.timing.dropout:
+            return
+        frame = self._frame(light, now)
+        if frame is None or not self.watch.is_new(frame):
+            return
+        self._last = frame
+        self._number += 1
+        sightings = self.detector.detect(frame.image)
+        size = (frame.image.shape[1], frame.image.shape[0])
+        done = now + DETECTOR_TIME
+        seen = Seen(self._number, frame.captured_at, frame.received_at, done, size, sightings)
+        self.rig.loop.call_later(DETECTOR_TIME, self.rig.vision.take, seen, frame.image)
+
+    def _frame(self, light: float, now: float) -> Frame | None:
+        if self.frozen and self._last is not None:
+            return replace(self._last, received_at=now, captured_at=now)
+        renderer, pose = self.source.renderer, self.rig.vision._where(light)
+        tags, renderer.tags = renderer.tags, () if pose is not None and self.blind(pose) else renderer.tags
+        try:
+            return self.source.frame(light, now)
+        finally:
+            renderer.tags = tags
+
+
+class WireLink:
+    """The host's way out: through MAVLink's own bytes into the simulator."""
+
+    source = Address(255, 230)
+
+    def __init__(self, rig: Lockstep) -> None:
+        self.rig = rig
+        self.sent: list[Any] = []
+        self._out = mavlink.MAVLink(None, srcSystem=255, srcComponent=230)
+        self._in = mavlink.MAVLink(None)
+
+    async def send(self, message: Any, _system: int) -> None:
+        self.deliver(message)
+
+    def deliver(self, message: Any) -> None:
+        for decoded in self._in.parse_buffer(message.pack(self._out)) or []:
+            self.sent.append(decoded)
+            self.rig.simulator.receive(self.rig.link, decoded)
+
+
+class Lockstep:
+    """A vehicle, a host, a camera."""
+
+    def __init__(
+        self,
+        *,
+        seed: int = 1,
+        wind: tuple[float, float] = (0.0, 0.0),
+        gps_noise: float = 0.0,
+        heading: float = 353.0,
+        plnd: bool = False,
+        **settings: Any,
+    ) -> None:
+        self.seed = seed
+        self.loop = VirtualLoop()
+        asyncio.set_event_loop(self.loop)
+        home = Home(heading=heading)
+        options = Options(seed=seed, home=home, wind=Wind(*wind), gps_noise=gps_noise, ready_after=1.0)
+        self.simulator = Simulator(options)
+        if plnd:
+            self.simulator.parameters.set("PLND_TYPE", 1)  # the autopilot reads it at boot
+            self.simulator._boot(self.simulator.copter.mission)
+        mpstate = SimpleNamespace(select_extra={}, settings=SimpleNamespace(target_system=0))
+        with patch("asyncio.new_event_loop", lambda: self.loop):
+            self.host = Host(mpstate, clock=self.loop.time)
+        self.wire = self.host.link = WireLink(self)  # type: ignore[assignment]
+        self.link = self.simulator.open_link()
+        self._parser = mavlink.MAVLink(None)
+        self._truth = contextlib.ExitStack()
+        self.each_step: list[Callable[[], None]] = []
+        self.settings = ModuleSettings({"source": "sim", **settings})
+        self.directory = Path(tempfile.mkdtemp())
+        self.vision = Vision(self.host, self.settings.snapshot())
+        self.flights = Flights(self.vision, lambda: self.directory)
+        self.loop.call_soon(self._step)
+        self.loop.call_soon(self._streams)
+        self.eye = Eye(self)
+
+    def run(self, coroutine: Any) -> Any:
+        return self.loop.run_until_complete(coroutine)
+
+    def pass_time(self, seconds: float) -> None:
+        self.run(asyncio.sleep(seconds))
+
+    def _step(self) -> None:
+        self.simulator.step()
+        for hook in self.each_step:
+            hook()
+        for message in self._parser.parse_buffer(self.link.drain()) or []:
+            self.host._receive(message)
+        self.loop.call_later(STEP, self._step)
+
+    def _streams(self) -> None:
+        self.wire.deliver(mavlink.MAVLink_request_data_stream_message(1, 1, 0, STREAM_RATE, 1))
+        self.loop.call_later(STREAMS_EVERY, self._streams)
+
+    # -- flights ---------------------------------------------------------------------------------------------
+
+    @property
+    def copter(self) -> Any:
+        return self.flights.copter()
+
+    @property
+    def mode(self) -> str:
+        return self.simulator.copter.mode.name
+
+    def begin(self, verb: Any, name: str = "/vision/test") -> Any:
+        async def body(job: Any) -> str:
+            await verb(job)
+            return self.flights.result()
+
+        async def start() -> Any:
+            return self.host.jobs.begin(self.copter.seat, name, {"n": self.loop.time()}, body, outlives_client=True)
+
+        return self.run(start())
+
+    def outcome(self, job: Any) -> Any:
+        """Its result, or the error that it ended with."""
+
+        async def wait() -> Any:
+            try:
+                return await job.outcome()
+            except Exception as error:  # noqa: BLE001  the test looks at it
+                return error
+
+        return self.run(wait())
+
+    def start(self, alt: float = 6.0) -> None:
+        """Switch everything on, and take off."""
+
+        async def listen() -> None:
+            self.vision.listen()
+
+        self.run(listen())
+        self._truth.enter_context(self.vision.rates.at(TRUTH))
+        self.pass_time(3.0)
+
+        async def up(job: Any) -> None:
+            await self.copter.arm(job)
+            await self.copter.takeoff(job, alt)
+
+        result = self.outcome(self.begin(up, "/up"))
+        assert not isinstance(result, Exception), result
+        self.pass_time(1.0)
+        self.open_eye()
+
+    def open_eye(self) -> None:
+        self.vision.worker = self.eye  # type: ignore[assignment]
+        self.eye.start()
+        self.pass_time(0.3)
+
+    def put(self, **settings: Any) -> None:
+        """Change settings; the camera sees it at once."""
+        for name, value in settings.items():
+            self.settings.set(name, value)
+        self.vision.settings = self.settings.snapshot()
+        if self.eye.task is not None:
+            self.eye.stop()
+            self.eye.start()
+
+    def land(self, number: int | None = None, method: str = "velocity") -> Any:
+        return self.begin(self.flights.landing(self.copter, number, method), "/vision/land")
+
+    def fly_to(self, north: float, east: float, down: float) -> None:
+        """By the vehicle's own truth: it simply is there."""
+        from mavproxy_uavapi.vehicle.messages import NedTarget  # noqa: PLC0415
+
+        async def go(job: Any) -> None:
+            await self.copter.go_to(job, NedTarget(north, east, down), wait=True)
+
+        result = self.outcome(self.begin(go, "/go"))
+        assert not isinstance(result, Exception), result
+
+    @property
+    def truth(self) -> Any:
+        return self.simulator.copter.body.position
+
+    def close(self) -> None:
+        self.eye.stop()
+        for task in asyncio.all_tasks(self.loop):
+            task.cancel()
+        self.loop.run_until_complete(asyncio.sleep(0))
+        self.loop.run_until_complete(self.loop.shutdown_default_executor())
+        self.loop.close()
+        self.host.bridge._outbox.close()
+        asyncio.set_event_loop(None)
