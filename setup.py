@@ -4,6 +4,7 @@ from pathlib import Path
 
 from setuptools import find_packages, setup
 
+MQTT = ["aiomqtt>=2.3"]
 TEST = ["pytest>=8", "pytest-xdist>=3.5", "requests>=2.31", "setuptools>=70.1"]
 LINT = ["ruff>=0.6", "mypy>=1.11", "types-requests"]
 
@@ -24,12 +25,14 @@ setup(
         "pymavlink>=2.4.42",
         "aiohttp>=3.10",
         "pydantic>=2.7",
+        "swagger-ui-py>=25.7.1",  # the files of Swagger UI 5 for /docs, which OpenAPI 3.1 needs
     ],
     extras_require={
         "vision": ["opencv-python-headless>=4.10", "numpy>=1.26"],
-        "test": TEST,
+        "mqtt": MQTT,
+        "test": TEST + MQTT,
         "lint": LINT,
-        "dev": TEST + LINT,
+        "dev": TEST + MQTT + LINT,
     },
     entry_points={"console_scripts": ["mavproxy-uavapi = mavproxy_uavapi.launcher:main"]},
     classifiers=[

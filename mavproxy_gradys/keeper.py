@@ -71,7 +71,7 @@ class Keeper:
         spool, self._spool = self._spool, None
         if spool is not None:
             await self._run(spool.close)
-        self._thread.shutdown(wait=False)
+        self._thread.shutdown()  # it has nothing left to do
 
     # -- in -----------------------------------------------------------------------------------------------
 

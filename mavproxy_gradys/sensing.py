@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import time
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -14,8 +13,9 @@ from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.keeper import Keeper
 from mavproxy_gradys.readings import POSITION, Quantity, Reading, Sampler
 from mavproxy_gradys.sender import Sender
-from mavproxy_gradys.settings import Settings
+from mavproxy_gradys.settings import Settings, masked
 from mavproxy_gradys.spool import Spool
+from mavproxy_gradys.tasks import begin, end
 from mavproxy_uavapi.errors import Unavailable
 from mavproxy_uavapi.host.host import Host
 from mavproxy_uavapi.host.state import VehicleState
@@ -48,24 +48,19 @@ class Sensing:
         if not settings.sink:
             return
         keeper = await self._kept()
-        loop = asyncio.get_running_loop()
         for url in settings.sink:
             sender = self._senders[url] = Sender(url, keeper, self._host.clock)
-            self._tasks.append(loop.create_task(sender.run(settings)))
+            self._tasks.append(begin(sender.run(settings), f"the delivery to {masked(url)}"))
         for quantity in settings.quantities:
             sampler = Sampler(quantity)
             self._samplers.append(sampler)
-            self._tasks.append(loop.create_task(self._sample(sampler, keeper)))
+            self._tasks.append(begin(self._sample(sampler, keeper), f"the sampling of {quantity.name}"))
 
     async def stop(self) -> None:
         """End it, and close the spool."""
         self._settings = None
         tasks, self._tasks = self._tasks, []
-        for task in tasks:
-            task.cancel()
-        for task in tasks:
-            with contextlib.suppress(asyncio.CancelledError):
-                await task
+        await end(tasks)
         self._samplers.clear()
         self._senders.clear()
         keeper, self._keeper = self._keeper, None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import random
 from typing import Any
 
@@ -13,6 +12,7 @@ from mavproxy_gradys.pusher import Pusher
 from mavproxy_gradys.sensing import Sensing
 from mavproxy_gradys.settings import Settings
 from mavproxy_gradys.tally import StationTally
+from mavproxy_gradys.tasks import begin, end
 from mavproxy_gradys.tracking import Tracking
 from mavproxy_uavapi.host.host import Host
 
@@ -49,8 +49,7 @@ class Gradys:
             return
         pushers = [self._pusher(station, settings) for station in settings.gs]
         self.settings = settings
-        loop = asyncio.get_running_loop()
-        self._tasks = [loop.create_task(pusher.run()) for pusher in pushers]
+        self._tasks = [begin(pusher.run(), f"the push to {pusher.station.url}") for pusher in pushers]
         await self.sensing.start(settings)
 
     def _pusher(self, station: Station, settings: Settings) -> Pusher:
@@ -66,11 +65,7 @@ class Gradys:
         """End it; what is not acknowledged stays in the spool."""
         self.settings = None
         tasks, self._tasks = self._tasks, []
-        for task in tasks:
-            task.cancel()
-        for task in tasks:
-            with contextlib.suppress(asyncio.CancelledError):
-                await task
+        await end(tasks)
         await self.sensing.stop()
 
     def flush(self) -> None:

@@ -54,7 +54,7 @@ def report(vision: Vision, flights: Flights) -> str:
     lines = [
         f"vision: source {source}: {camera}, {told['rate']} frames/s, {told['frames']} looked at, "
         f"{told['repeated']} repeated, {told['reconnects']} reconnects",
-        f"tags of {', '.join(told['families'])}: {vision.settings.tags}; in view: {told['in_view'] or 'none'}",
+        f"AprilTags of {', '.join(told['families'])}: {vision.settings.tags}; in view: {told['in_view'] or 'none'}",
     ]
     if told["detector_ms"] is not None:
         lines.append(f"detector {told['detector_ms']} ms, newest frame {1000 * told['frame_age_s']:.0f} ms old")

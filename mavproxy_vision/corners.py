@@ -29,7 +29,7 @@ def refine(image: NDArray[np.uint8], rough: Corners) -> Corners:
         rough: corners in px, clockwise, within about two pixels of the true ones.
     """
     starts, ends = rough, np.roll(rough, -1, axis=0)
-    lengths: NDArray[np.float64] = np.asarray(np.linalg.norm(ends - starts, axis=1))
+    lengths = np.hypot((ends - starts)[:, 0], (ends - starts)[:, 1])
     if lengths.min() < 6:
         return rough
     along = (ends - starts) / lengths[:, None]
@@ -54,7 +54,7 @@ def _inside(points: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.f
     height, width = shape[:2]
     x, y = points[..., 0], points[..., 1]
     within = (x >= 0) & (x <= width - 1) & (y >= 0) & (y <= height - 1)
-    inside: NDArray[np.float64] = within.all(axis=2).astype(np.float64)
+    inside: NDArray[np.float64] = np.asarray(within.all(axis=2), np.float64)
     return inside
 
 

@@ -136,6 +136,8 @@ def locate(model: CameraModel, corners: Corners, size: float) -> tuple[Any, Any,
     """Position (m) and rotation of a square of `size` m in the camera's frame, and the error (px, rms)."""
     half = size / 2
     square = np.array([[-half, half, 0], [half, half, 0], [half, -half, 0], [-half, -half, 0]])
+    # Of a square that is exactly parallel to the image OpenCV makes nonsense; a millionth of a pixel helps.
+    corners = corners + np.array([[0.0, 0.0], [1e-6, 0.0], [0.0, -1e-6], [1e-6, 1e-6]])
     count, rotations, positions, errors = cv2.solvePnPGeneric(
         square, corners.reshape(4, 1, 2), model.matrix, model.coefficients, flags=cv2.SOLVEPNP_IPPE_SQUARE
     )

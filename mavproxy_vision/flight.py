@@ -90,12 +90,15 @@ class Flight:
     async def land(self, number: int | None, method: str) -> None:
         """Land on the tag from wherever the vehicle is; done when it stands on it, disarmed.
 
+        A camera that gives no frames is a refusal at first, and a failure like that of a lost tag later.
+
         Raises:
             LandingFailed: no tag, or what is seen cannot be believed; the report says what was done instead.
             ModeChanged, NotArmed, LinkLost: somebody else has the vehicle, or nobody; nothing more was sent.
         """
         self.vehicle.require_guided_flight()
-        self.vision.require_camera()
+        if self.report.verb == "land":
+            self.vision.require_camera()
         self.vehicle.seat.take(self.job)
         tags = await self._tags(number)
         main = next(iter(tags.values()))

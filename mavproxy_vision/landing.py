@@ -135,8 +135,8 @@ class Landing:
             return self.fail(failure)
         wanted = self._wanted(now, motion, height, elapsed)
         if self.phase in (Phase.LAND, Phase.FAILED):
-            self._velocity = wanted
-            return Order(self.phase, wanted, self._reason)
+            self._velocity = REST
+            return Order(self.phase, REST, self._reason)
         change = limited((wanted - self._velocity)[:2], self.plan.acceleration * elapsed)
         self._velocity = vector(self._velocity[0] + change[0], self._velocity[1] + change[1], wanted[2])
         return Order(self.phase, self._velocity)

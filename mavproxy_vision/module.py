@@ -127,6 +127,12 @@ class VisionModule(HostedModule):
 
     # -- helpers ---------------------------------------------------------------------------------------------
 
+    def _awake(self) -> bool:
+        """Whether MAVProxy's main loop has run; says so when it has not."""
+        if not self._begun:
+            print("vision: it begins once MAVProxy's main loop runs")
+        return self._begun
+
     def _run(self, coroutine: Any) -> Any:
         return self.host.bridge.run(coroutine)
 
@@ -136,9 +142,11 @@ class VisionModule(HostedModule):
         async def told() -> str:
             return tell()
 
-        print(self._run(told()))
+        print(self._run(told()) if self._begun else tell())
 
     def _start(self) -> None:
+        if not self._awake():
+            return
         settings = self.vision_settings.snapshot()
         try:
             self._run(self.vision.start(settings))
@@ -148,6 +156,8 @@ class VisionModule(HostedModule):
             print(f"vision: looking for {settings.family} through {settings.source}")
 
     def _stop(self) -> None:
+        if not self._awake():
+            return
         self._abort(quiet=True)
         self._run(self.vision.stop())
         print("vision: stopped")
@@ -156,7 +166,7 @@ class VisionModule(HostedModule):
         async def stopped() -> bool:
             return self.flights.stop("it was stopped at the prompt; the vehicle holds")
 
-        if not self._run(stopped()) and not quiet:
+        if self._awake() and not self._run(stopped()) and not quiet:
             print("vision: nothing is in flight")
 
     def _set(self, args: list[str]) -> None:
@@ -236,6 +246,8 @@ class VisionModule(HostedModule):
             copter = self.flights.copter()
             return self.flights.begin(copter, make(request), path, request, self._say)
 
+        if not self._awake():
+            return
         try:
             job = self._run(begin())
         except UavApiError as error:

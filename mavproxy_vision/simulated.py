@@ -6,7 +6,7 @@ import random
 import re
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from mavproxy_vision.camera import Frame
 from mavproxy_vision.errors import BadSetting
@@ -80,7 +80,8 @@ class SimulatedCamera:
         time.sleep(max(self._tick + latency - now, 0.0))
         if self._random.random() < timing.dropout:
             return None
-        return self.frame(self._tick, self._clock())
+        frame = self.frame(self._tick, self._clock())
+        return None if frame is None else replace(frame, received_at=self._clock())  # drawing takes its time
 
     def latency(self) -> float:
         """The next frame's latency, s."""

@@ -18,6 +18,7 @@ from mavproxy_vision.sighting import Seen
 log = logging.getLogger("vision")
 
 SILENT_AFTER = 0.5  # s without a new frame until the camera counts as dead or frozen
+RECONNECT_AFTER = 1.5  # s without a new frame until the source is opened anew
 RECONNECT_PAUSE = 1.0  # s between two tries
 JOIN = 2.0  # s that a thread gets to end; a driver that hangs is left behind
 
@@ -162,7 +163,7 @@ class Worker:
                 self._repeated += 1
             now = self._clock()
             self._state = state = self._watch.verdict(now)
-            if state != "ok" and now - opened > 2 * SILENT_AFTER:
+            if now - max(self._watch.fresh_at, opened) > RECONNECT_AFTER:
                 self._error = f"{state} for {now - self._watch.fresh_at:.1f} s"
                 return
 

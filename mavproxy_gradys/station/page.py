@@ -10,9 +10,9 @@ PAGE = """<!doctype html>
   main { display: flex; flex-wrap: wrap; gap: 16px; padding: 16px; }
   h1 { font-size: 16px; margin: 16px 16px 0; }
   canvas { background: #18202a; border: 1px solid #2b3644; flex: 2 1 480px; min-width: 0; height: 70vh; }
-  section { flex: 1 1 320px; overflow-x: auto; }
+  section { flex: 1 1 440px; overflow-x: auto; }
   table { border-collapse: collapse; width: 100%; }
-  th, td { text-align: right; padding: 4px 8px; border-bottom: 1px solid #2b3644; white-space: nowrap; }
+  th, td { text-align: right; padding: 4px 6px; border-bottom: 1px solid #2b3644; white-space: nowrap; }
   th:first-child, td:first-child { text-align: left; }
   .on_hold { color: #e8b339; } .inactive { color: #7d8794; } .active { color: #6bd08a; }
 </style></head>
@@ -90,7 +90,8 @@ source.onmessage = event => {
     if (!last || last[0] !== d.lat || last[1] !== d.lng) trail.push([d.lat, d.lng]);
     if (trail.length > LONGEST_TRAIL) trail.shift();
   }
-  document.getElementById("line").textContent = devices.length + " devices, " + told.readings + " readings";
+  const many = devices.length === 1 ? " device, " : " devices, ";
+  document.getElementById("line").textContent = devices.length + many + told.readings + " readings";
   fill(); draw();
 };
 source.onerror = () => { document.getElementById("line").textContent = "the station does not answer"; };

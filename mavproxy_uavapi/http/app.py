@@ -12,6 +12,7 @@ from aiohttp import web
 
 from mavproxy_uavapi.errors import NotFound
 from mavproxy_uavapi.http.call import SERVICE, Call, Service, parameters
+from mavproxy_uavapi.http.docs_page import TABLE
 from mavproxy_uavapi.http.limits import BUCKET, Bucket, at_a_bearable_rate, headers_are_here, patient
 from mavproxy_uavapi.http.responses import Handler, errors_as_answers, success
 from mavproxy_uavapi.http.routes import ROUTES, Route
@@ -29,6 +30,7 @@ def make_app(service: Service) -> web.Application:
     middlewares = [headers_are_here, errors_as_answers, at_a_bearable_rate, only_for_us]
     app = web.Application(middlewares=middlewares, client_max_size=MAX_BODY)
     app[SERVICE] = service
+    app[TABLE] = ROUTES
     app[BUCKET] = Bucket()
     app.on_response_prepare.append(name_the_trusted)
     for route in ROUTES:

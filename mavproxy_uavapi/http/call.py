@@ -207,6 +207,8 @@ async def parameters(request: web.Request, model: type[Request], body: bool) -> 
         given = await asyncio.wait_for(_body(request, form), BODY_TIMEOUT)
     except asyncio.TimeoutError as error:
         raise BadRequest(f"the body did not arrive within {BODY_TIMEOUT:g} s") from error
+    except ConnectionError as error:
+        raise BadRequest("the client hung up before its body had arrived") from error
     except (ValueError, LookupError, RecursionError) as error:  # no such charset; nested without end
         raise BadRequest(f"the body is not {'a form' if form else 'JSON'}: {error}") from error
     if not isinstance(given, dict):

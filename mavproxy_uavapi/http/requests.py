@@ -8,17 +8,31 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from mavproxy_uavapi.errors import Invalid
 
+SMALLEST = 1e-30  # more than single precision's least number
 NED_REACH = 100_000.0  # m; farther than that NED is no flat patch any more
+
+
+def _no_boolean(value: Any) -> Any:
+    """Refuse what Python, and JSON's `true`, would pass off as 1."""
+    if isinstance(value, bool):
+        raise ValueError("Input should be a valid number")
+    return value
+
+
+def _not_nothing(value: float) -> float:
+    """Refuse what is more than 0 here, and 0 in the single precision that goes to the autopilot."""
+    if value < SMALLEST:
+        raise ValueError("Input should be greater than 0 in single precision")
+    return value
 
 
 def _number(value: Any) -> Any:
     """Keep what the client wrote: `30` stays an int and `30.5` is a float, so that answers repeat it."""
-    if isinstance(value, bool):
-        raise ValueError("Input should be a valid number")
+    value = _no_boolean(value)
     if isinstance(value, str):
         try:
             return int(value)
@@ -30,9 +44,12 @@ def _number(value: Any) -> Any:
 
 
 Number = Annotated[int | float, BeforeValidator(_number)]
-Speed = Annotated[Number, Field(gt=0, le=50, description="m/s")]
-Timeout = Annotated[float | None, Field(gt=0, le=86400, description="s that the call may take")]
-Tolerance = Annotated[float, Field(gt=0, le=100, description="m, horizontally and vertically")]
+NotNothing = AfterValidator(_not_nothing)
+NoBoolean = BeforeValidator(_no_boolean)
+Speed = Annotated[Number, Field(gt=0, le=50, description="m/s"), NotNothing]
+Timeout = Annotated[float | None, Field(gt=0, le=86400, description="s that the call may take"), NoBoolean]
+Looking = Annotated[bool, Field(description="point to where it goes")]
+Tolerance = Annotated[float, Field(gt=0, le=100, description="m, horizontally and vertically"), NoBoolean]
 Argument = Annotated[str, Field(max_length=4096, pattern=r"^[^\x00]*$")]  # no command line can hold a 0
 
 
@@ -55,19 +72,19 @@ class Blocking(Request):
 class Disarm(Request):
     """`force` stops the motors in flight too."""
 
-    force: bool = False
+    force: Annotated[bool, Field(description="in flight too: it falls")] = False
 
 
 class Takeoff(Blocking):
     """`alt`: m above home."""
 
-    alt: Annotated[Number, Field(gt=0, le=500, description="m above home")] = 15
+    alt: Annotated[Number, Field(gt=0, le=500, description="m above home"), NotNothing] = 15
 
 
 class ModeName(Request):
     """`mode`: a name of the vehicle's mode map."""
 
-    mode: Annotated[str, Field(min_length=1, max_length=32)]
+    mode: Annotated[str, Field(min_length=1, max_length=32, description="a mode's name, such as LOITER")]
 
 
 class NewSpeed(Request):
@@ -79,7 +96,7 @@ class NewSpeed(Request):
 class SimFactor(Request):
     """`sim_factor`: simulated seconds per second."""
 
-    sim_factor: Annotated[Number, Field(gt=0, le=1000)]
+    sim_factor: Annotated[Number, Field(gt=0, le=1000), NotNothing]
 
 
 class GpsTarget(Blocking):
@@ -88,7 +105,7 @@ class GpsTarget(Blocking):
     lat: Annotated[Number, Field(ge=-90, le=90, description="degrees")]
     long: Annotated[Number, Field(ge=-180, le=180, description="degrees")]
     alt: Annotated[Number, Field(ge=0, le=10_000, description="m above home")]
-    look_at_target: bool = False
+    look_at_target: Looking = False
     tolerance: Tolerance = 1.0
 
 
@@ -98,7 +115,7 @@ class NedPlace(Blocking):
     x: Annotated[Number, Field(ge=-NED_REACH, le=NED_REACH, description="m north")]
     y: Annotated[Number, Field(ge=-NED_REACH, le=NED_REACH, description="m east")]
     z: Annotated[Number, Field(ge=-10_000, le=10_000, description="m down")]
-    look_at_target: bool = False
+    look_at_target: Looking = False
     tolerance: Tolerance = 1.0
 
 
@@ -108,7 +125,7 @@ class BodyOffset(Blocking):
     front: Annotated[Number, Field(ge=-NED_REACH, le=NED_REACH, description="m")]
     right: Annotated[Number, Field(ge=-NED_REACH, le=NED_REACH, description="m")]
     down: Annotated[Number, Field(ge=-10_000, le=10_000, description="m")] = 0
-    look_at_target: bool = False
+    look_at_target: Looking = False
     tolerance: Tolerance = 1.0
 
 
@@ -118,46 +135,46 @@ class NedVelocity(Request):
     vx: Annotated[Number, Field(ge=-50, le=50, description="m/s north")]
     vy: Annotated[Number, Field(ge=-50, le=50, description="m/s east")]
     vz: Annotated[Number, Field(ge=-50, le=50, description="m/s down")]
-    look_at_target: bool = False
-    duration: Annotated[float | None, Field(gt=0, le=3600, description="s")] = None
+    look_at_target: Looking = False
+    duration: Annotated[float | None, Field(gt=0, le=3600, description="s of the vehicle's clock"), NoBoolean] = None
 
 
 class Heading(Request):
     """`heading`: degrees clockwise from north."""
 
-    heading: Annotated[Number, Field(ge=0, le=360)]
+    heading: Annotated[Number, Field(ge=0, le=360, description="degrees clockwise from north")]
 
 
 class YawRate(Request):
     """`yaw_rate`: deg/s, clockwise positive."""
 
-    yaw_rate: Annotated[Number, Field(ge=-360, le=360)]
+    yaw_rate: Annotated[Number, Field(ge=-360, le=360, description="deg/s, clockwise positive")]
 
 
 class Servo(Request):
     """`channel` from 1, `pwm` in microseconds."""
 
-    channel: Annotated[int, Field(ge=1, le=16)]
-    pwm: Annotated[int, Field(ge=800, le=2200)]
+    channel: Annotated[int, Field(ge=1, le=16), NoBoolean]
+    pwm: Annotated[int, Field(ge=800, le=2200), NoBoolean]
 
 
 class ScriptName(Request):
     """`script_name`: an uploaded script; `.py` may be left out."""
 
-    script_name: Annotated[str, Field(min_length=1, max_length=200)]
+    script_name: Annotated[str, Field(min_length=1, max_length=200, description="`.py` may be left out")]
 
 
 class ExecuteScript(ScriptName):
     """`args`: what the script gets on its command line."""
 
-    args: Annotated[list[Argument], Field(max_length=100)] = []
+    args: Annotated[list[Argument], Field(max_length=100, description="its command line")] = []
 
 
 class ScriptLog(Request):
     """`stream`: out or err. With `follow` both come, line by line, as Server-Sent Events, until the run ends."""
 
-    stream: Literal["out", "err"] = "out"
-    follow: bool = False
+    stream: Annotated[Literal["out", "err"], Field(description="which log, without follow")] = "out"
+    follow: Annotated[bool, Field(description="as Server-Sent Events, until the run ends")] = False
 
 
 class MissionFile(Request):
@@ -170,7 +187,7 @@ class MissionFile(Request):
 class StartMission(Blocking):
     """`until_complete`: answer at the mission's end rather than at its beginning."""
 
-    until_complete: bool = False
+    until_complete: Annotated[bool, Field(description="answer at the mission's end")] = False
 
 
 class Photo(Request):
@@ -178,22 +195,22 @@ class Photo(Request):
 
     command: Annotated[str, Field(description="fswebcam, rpicam-still, libcamera-still, or vision")]
     resolution: Annotated[str, Field(description="width x height in pixels")] = "1280x720"
-    capture_time: Annotated[float, Field(gt=0, le=10_000, description="ms of exposure")] = 150
-    focus_distance: Annotated[float | None, Field(ge=0.01, le=1000, description="m")] = None
+    capture_time: Annotated[float, Field(gt=0, le=10_000, description="ms of exposure"), NoBoolean] = 150
+    focus_distance: Annotated[float | None, Field(ge=0.01, le=1000, description="m"), NoBoolean] = None
 
 
 class Read(Request):
     """A telemetry read: `max_age` is the age (s) up to which the answer is wanted."""
 
-    max_age: Annotated[float | None, Field(gt=0, le=86400)] = None
+    max_age: Annotated[float | None, Field(gt=0, le=86400), NoBoolean] = None
 
 
 class StreamFilter(Request):
     """What a telemetry stream carries: message names by comma, a system id, and at most `rate` Hz of each name."""
 
-    names: str = ""
-    sysid: Annotated[int | None, Field(ge=1, le=255)] = None
-    rate: Annotated[float | None, Field(gt=0, le=1000)] = None
+    names: Annotated[str, Field(description="message names by comma; none for all")] = ""
+    sysid: Annotated[int | None, Field(ge=1, le=255), NoBoolean] = None
+    rate: Annotated[float | None, Field(gt=0, le=1000), NoBoolean] = None
 
 
 def parse(model: type[Request], source: str, values: dict[str, Any]) -> Request:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from mavproxy_uavapi.http import (
     command,
+    docs_page,
     jobs,
     mission,
     movement,
@@ -116,4 +117,10 @@ PERIPHERICAL = [
     Route("/peripherical/servo_output", peripherical.servo_output, requests.Servo, POST),
 ]
 
-ROUTES = [*COMMAND, *MOVEMENT, *TELEMETRY, *JOBS, *MISSION, *PERIPHERICAL]
+DOCS = [
+    Route("/openapi.json", docs_page.specification, requests.Empty),
+    Route("/docs", docs_page.page, requests.Empty),
+    Route("/docs/{file}", docs_page.asset, requests.Empty),
+]
+
+ROUTES = [*COMMAND, *MOVEMENT, *TELEMETRY, *JOBS, *MISSION, *PERIPHERICAL, *DOCS]

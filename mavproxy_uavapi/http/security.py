@@ -103,8 +103,15 @@ async def only_for_us(request: web.Request, handler: Handler) -> web.StreamRespo
     check_origin(request.headers, settings.cors_origins)
     if origin in settings.cors_origins and request.method == "OPTIONS":
         return web.Response(status=204, headers={"Access-Control-Allow-Origin": origin, **CORS_HEADERS})
-    check_caller(request.remote, request.headers.get("Authorization"), settings)
+    # A browser has no token before it has the page that asks for one; the page tells nothing of the vehicle.
+    if not (settings.token and is_documentation(request.path)):
+        check_caller(request.remote, request.headers.get("Authorization"), settings)
     return await handler(request)
+
+
+def is_documentation(path: str) -> bool:
+    """Whether a path is the documentation's, which needs no token."""
+    return path.rstrip("/") in ("/docs", "/openapi.json") or path.startswith("/docs/")
 
 
 async def name_the_trusted(request: web.Request, response: web.StreamResponse) -> None:

@@ -29,7 +29,8 @@ async def _newest(call: Call, name: str) -> Received:
     if received is None:
         await _ask_for(call, name)
         received = vehicle.state.newest(name)
-        assert received is not None
+        if received is None:  # it came, and with it the news of a reboot, which makes it worthless
+            raise Stale(f"vehicle {vehicle.state.system} has not told {name} since it rebooted")
     age = vehicle.clock() - received.at
     if age > max_age:
         raise Stale(f"vehicle {vehicle.state.system} last told {name} {age:.1f} s ago (max_age is {max_age:g} s)")
@@ -119,7 +120,9 @@ async def home_info(call: Call) -> dict[str, Any]:
     age = vehicle.state.age("HOME_POSITION", vehicle.clock())
     if age is None or age > HOME_AGE:
         await vehicle.home()
-    received = vehicle.state.messages["HOME_POSITION"]
+    received = vehicle.state.messages.get("HOME_POSITION")
+    if received is None:
+        raise Stale(f"vehicle {vehicle.state.system} has not told its home since it rebooted")
     return call.answer("Success", **views.home(received.message), age_s=_age(call, received))
 
 

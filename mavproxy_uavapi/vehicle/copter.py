@@ -6,7 +6,7 @@ import contextlib
 import math
 from collections.abc import Callable
 
-from mavproxy_uavapi.errors import Busy, Invalid, ModeChanged, NotArmed, Stale, TimedOut
+from mavproxy_uavapi.errors import Busy, Invalid, NotArmed, Stale, TimedOut
 from mavproxy_uavapi.host.link import Link
 from mavproxy_uavapi.host.pending import Pending
 from mavproxy_uavapi.host.state import VehicleState

@@ -133,7 +133,7 @@ def test_mission_that_cannot_be_flown_is_422_and_changes_nothing(rig):
 def test_mavproxys_own_wp_module_still_works_beside_ours(rig, tmp_path):
     file = tmp_path / "own.txt"
     file.write_text(WPL)
-    rig.mavproxy.ask(f"wp load {file}", "Flight plan received")
+    rig.mavproxy.ask(f"wp load {file}", "Sent all 6 waypoints")
     assert commands(rig)[0] == "NAV_TAKEOFF"
     rig.ok(rig.post("/mission/waypoints", **JSON))
     rig.mavproxy.ask("wp list", "Saved 5 waypoints")

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -10,38 +12,89 @@ from mavproxy_gradys.module import HELP
 
 
 @pytest.fixture
-def module(mpstate: Any) -> Any:
-    module = gradys.init(mpstate)
-    yield module
-    if module in module.host.members:
-        module.unload()
+def make(mpstate: Any, main_loop: Any, tmp_path: Path) -> Iterator[Callable[..., Any]]:
+    """Loads the module, up to its first idle task."""
+    made: list[Any] = []
+
+    def load(**given: Any) -> Any:
+        module = gradys.init(mpstate, **{"spool": str(tmp_path / "spool.db"), **given})
+        made.append(module)
+        main_loop.modules.append(module)
+        main_loop.turn()
+        return module
+
+    yield load
+    for module in made:
+        if module in module.host.members:
+            module.unload()
 
 
-def test_module_is_what_mavproxy_looks_for(module: Any, mpstate: Any) -> None:
+def test_module_is_what_mavproxy_looks_for(make: Any, mpstate: Any) -> None:
+    module = make()
     assert module.name == "gradys"
     assert list(mpstate.command_map) == ["gradys"]
 
 
-def test_status_says_what_it_is_and_help_what_it_can(module: Any, capsys: Any) -> None:
+def test_status_says_what_it_does_and_help_what_it_can(make: Any, capsys: Any) -> None:
+    module = make()
+    capsys.readouterr()
     module.command([])
-    assert capsys.readouterr().out.startswith("gradys: ")
+    assert capsys.readouterr().out.startswith("gradys: running\nno ground station is set")
     module.command(["help"])
     assert capsys.readouterr().out == HELP + "\n"
 
 
-def test_loading_and_unloading_leaves_nothing_behind(mpstate: Any, descriptors: Any) -> None:
-    threads, before = threading.active_count(), descriptors()
+def test_before_the_first_idle_task_it_says_that_mavproxy_is_starting(mpstate: Any, capsys: Any) -> None:
+    module = gradys.init(mpstate)
+    module.command(["status"])
+    assert "still starting" in capsys.readouterr().out
+    module.command(["set", "gs", "10.0.0.5:8000"])
+    module.command(["set", "gs"])
+    assert "gs 10.0.0.5:8000" in capsys.readouterr().out
+    module.unload()
+
+
+def test_loading_and_unloading_leaves_nothing_behind(mpstate: Any, descriptors: Any, tmp_path: Path) -> None:
+    threads, before, functions = threading.active_count(), descriptors(), dict(mpstate.completion_functions)
     for _ in range(20):
-        module = gradys.init(mpstate)
+        module = gradys.init(mpstate, gs="127.0.0.1:9", sink="http://127.0.0.1:9/r", spool=str(tmp_path / "s.db"))
         module.idle_task()
         module.unload()
     assert (mpstate.command_map, mpstate.completions, mpstate.select_extra) == ({}, {}, {})
+    assert mpstate.completion_functions == functions
     assert (threading.active_count(), descriptors()) == (threads, before)
 
 
-def test_status_tells_the_ground_station(mpstate: Any, capsys: Any) -> None:
-    module = gradys.init(mpstate, gs="10.0.0.5:8000")
-    module.idle_task()
-    module.command(["status"])
-    assert "ground station http://10.0.0.5:8000" in capsys.readouterr().out
+def test_routes_come_and_go_with_it(make: Any) -> None:
+    module = make()
+    host = module.host
+    assert set(host.extensions) == {"/gradys/status", "/gradys/readings", "/gradys/flush", "/mission/fly-track"}
     module.unload()
+    assert host.extensions == {}
+
+
+def test_setting_takes_effect_at_once(make: Any, capsys: Any) -> None:
+    module = make(gs="127.0.0.1:9")
+    module.command(["set", "gs", "127.0.0.1:8,127.0.0.1:7"])
+    capsys.readouterr()
+    module.command(["status"])
+    said = capsys.readouterr().out
+    assert "ground station http://127.0.0.1:8" in said and "ground station http://127.0.0.1:7" in said
+    assert "127.0.0.1:9" not in said
+
+
+def test_a_stopped_module_stays_stopped_when_a_setting_changes(make: Any, capsys: Any) -> None:
+    module = make(gs="127.0.0.1:9")
+    module.command(["stop"])
+    module.command(["set", "period", "2"])
+    capsys.readouterr()
+    module.command(["status"])
+    assert capsys.readouterr().out.startswith("gradys: stopped")
+
+
+@pytest.mark.parametrize("given", [{"gs": "x:y"}, {"nope": 1}, {"config": "/no/such/file"}])
+def test_a_bad_setting_is_an_import_error_of_one_line(mpstate: Any, given: dict[str, Any]) -> None:
+    with pytest.raises(ImportError) as raised:
+        gradys.init(mpstate, **given)
+    assert "\n" not in str(raised.value)
+    assert mpstate.command_map == {}

@@ -43,11 +43,13 @@ PARAMETERS = {"LAND_SPEED": 100.0, "RTL_ALT": 0.0, "RTL_LOIT_TIME": 500.0}
 
 
 class Reply(NamedTuple):
-    """An answer: HTTP status, parsed body, and when it came (s)."""
+    """An answer: HTTP status, parsed body, when it came (s), and as it was."""
 
     status: int
     body: Any
     at: float
+    headers: dict[str, str]
+    raw: bytes
 
     @property
     def outcome(self) -> str:
@@ -97,7 +99,10 @@ class Wire(asyncio.Transport):
         head, _, body = bytes(self._written).partition(b"\r\n\r\n")
         if not head:
             return None
-        return Reply(int(head.split()[1]), json.loads(body, parse_constant=_no_json), self._loop.time())
+        status, *lines = head.decode("latin-1").split("\r\n")
+        headers = {name.strip().lower(): value.strip() for name, _, value in (line.partition(":") for line in lines)}
+        content = json.loads(body, parse_constant=_no_json)
+        return Reply(int(status.split()[1]), content, self._loop.time(), headers, body)
 
     def get_write_buffer_size(self) -> int:
         return 0
@@ -269,7 +274,12 @@ class World:
 
     def orders(self, since: float = -math.inf) -> list[Any]:
         """What the host sent after `since` (s), but for its watch over the telemetry."""
-        return [m for at, m in self.sent if at > since and getattr(m, "command", None) not in HOUSEKEEPING]
+        return self.orders_of([sent for sent in self.sent if sent.at > since])
+
+    @staticmethod
+    def orders_of(sent: list[Sent]) -> list[Any]:
+        """The messages of these, but for the watch over the telemetry."""
+        return [m for _, m in sent if getattr(m, "command", None) not in HOUSEKEEPING]
 
     def close(self) -> None:
         """End what is in flight."""
@@ -296,6 +306,7 @@ def make_world(loop: Any, mpstate: Any, monkeypatch: pytest.MonkeyPatch) -> Iter
         world.go_live()
         return world
 
+    make.worlds = worlds
     yield make
     for world in worlds:
         world.close()

@@ -42,7 +42,7 @@ FAULTS = {
     ),
     "late ack": Fault("Each acknowledgement takes 2 s, longer than it takes us to send the command again.", 4.5),
     "foreign acceptance": Fault(
-        "Another component of the vehicle says ACCEPTED, the autopilot itself says DENIED: the autopilot's word counts.",
+        "Another component of the vehicle says ACCEPTED, the autopilot itself says DENIED, and its word counts.",
         2.0,
     ),
     "foreign refusal": Fault("Another component says DENIED, the autopilot itself says ACCEPTED.", 0.2),
@@ -55,13 +55,12 @@ FAULTS = {
     "in progress": Fault("The autopilot says IN_PROGRESS for 4 s, then ACCEPTED.", 4.5),
     "link silence": Fault("Neither side hears the other any more; found after the link timeout of 5 s.", 5.2),
     "reboot": Fault(
-        "The autopilot starts anew and is back 2 s later, disarmed, in STABILIZE. A request that waited for it in vain "
-        "reaches it then: it can set its home and arm, and refuses a speed.",
+        "The autopilot starts anew and is back 2 s later, disarmed, in STABILIZE. A command that waited for it in "
+        "vain reaches it then: it can set its home and arm, and refuses a speed.",
         2.0 + HEARTBEAT,
     ),
     "pilot's mode": Fault(
-        "The pilot switches to another mode. A speed needs none: it is asked for again, and the autopilot refuses it in "
-        "most modes (2 s).",
+        "The pilot switches to another mode. A speed needs none: it is asked for again; most modes refuse it (2 s).",
         HEARTBEAT,
     ),
     "disarmed": Fault(
@@ -70,8 +69,8 @@ FAULTS = {
         HEARTBEAT,
     ),
     "client gone": Fault(
-        "The client hangs up: the verb ends and is forgotten, the vehicle keeps its last setpoint. Landing and return "
-        "go on.",
+        "The client hangs up: the verb ends and is forgotten, the vehicle keeps its last setpoint. Landing and "
+        "return go on.",
         0.1,
     ),
 }
@@ -128,12 +127,12 @@ def page() -> str:
     lines = [
         "# What a verb answers when something goes wrong",
         "",
-        "Written by `python tests/rules/outcomes.py`. `tests/rules/test_fault_matrix.py` flies every cell on the embedded",
-        "vehicle: the answer is this one, it comes in time, and after it nothing is sent until the next request: no",
-        "setpoint, no mode, no command.",
+        "Written by `python tests/rules/outcomes.py`. `tests/rules/test_fault_matrix.py` flies every cell on the",
+        "embedded vehicle: the answer is this one, it comes in time, and after it nothing is sent until the next",
+        "request: no setpoint, no mode, no command.",
         "",
-        "A flight has been under way for 3 s when the link, the autopilot, the pilot or the client does something; the",
-        "other verbs wait for an acknowledgement then.",
+        "A flight has been under way for 3 s when the link, the autopilot, the pilot or the client does something;",
+        "the other verbs wait for an acknowledgement then.",
         "",
         "| fault | what happens | an error comes within |",
         "| --- | --- | --- |",

@@ -81,6 +81,12 @@ def accept_for_another(world: Any) -> None:
     about_each_command(world, "refuse", result=mavlink.MAV_RESULT_DENIED, text="Not now.")
 
 
+def be_busy_once(world: Any) -> None:
+    """A vehicle on the ground is busy with what arming waits for; its mode it changes all the same."""
+    for command in COMMANDS if world.copter.armed else (ARM,):
+        world.fault("refuse", command=command, result=mavlink.MAV_RESULT_TEMPORARILY_REJECTED, count=1)
+
+
 def _overheard() -> dict[str, int]:
     system, component = OVERHEAR
     return {"system": system, "component": component}
@@ -95,12 +101,8 @@ BEFORE: dict[str, Callable[[Any], None]] = {
     "foreign refusal": lambda world: about_each_command(
         world, "foreign_ack", result=mavlink.MAV_RESULT_DENIED, **_overheard()
     ),
-    "refused": lambda world: about_each_command(
-        world, "refuse", result=mavlink.MAV_RESULT_DENIED, text="Not now."
-    ),
-    "busy once": lambda world: about_each_command(
-        world, "refuse", result=mavlink.MAV_RESULT_TEMPORARILY_REJECTED, text="Not now.", count=1
-    ),
+    "refused": lambda world: about_each_command(world, "refuse", result=mavlink.MAV_RESULT_DENIED, text="Not now."),
+    "busy once": be_busy_once,
     "in progress": lambda world: about_each_command(world, "in_progress", seconds=4.0),
 }
 # What happens while the verb waits.
@@ -193,6 +195,49 @@ def after_hanging_up(world: Any, expected: str, struck: float) -> None:
         assert world.host.jobs.running() == []
         assert not world.copter.armed and world.at[2] > -0.1
     assert world.orders(since=struck) == []
+
+
+def test_command_in_progress_for_ever_is_given_up(make_world: Any) -> None:
+    world = make_world()
+    world.fault("in_progress", command=mavlink.MAV_CMD_DO_CHANGE_SPEED, seconds=200)
+    began = world.loop.time()
+    reply = world.ask("GET", "/command/set_ground_speed?new_v=5")
+    assert reply.outcome == "504 timeout"
+    assert reply.at - began <= 61.0
+    world.loop.pass_time(GUARD)
+    assert world.orders(since=reply.at) == []
+
+
+def test_pilot_who_switches_while_arming_is_refused_for_now_is_not_armed_on(make_world: Any) -> None:
+    world = make_world(STAGES["boot"])
+    world.fault("refuse", command=ARM, result=mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
+    wire = world.begin("GET", "/command/arm")
+    world.loop.pass_time(2.5)
+    world.fault("pilot_mode", mode="LOITER")
+    switched = world.loop.time()
+    reply = world.answer(wire)
+    assert reply.outcome == "409 mode_changed"
+    assert world.orders(since=switched) == []
+
+
+def test_all_recovers_by_itself_when_the_link_returns(make_world: Any) -> None:
+    world = make_world()
+    wire = begin(world, "go_to_ned_wait", REQUESTS["go_to_ned_wait"].far)
+    world.fault("silence", seconds=9.0)
+    assert world.answer(wire).outcome == "503 link_lost"
+    assert world.ask("GET", "/command/brake").outcome == "503 link_lost"
+    world.loop.pass_time(6.0)
+    assert world.ask("GET", "/telemetry/gps").outcome == "200"
+    assert world.ask("POST", "/movement/drive_wait", {"x": 3, "y": 0, "z": 0}).outcome == "200"
+
+
+def test_vehicle_that_rebooted_can_be_flown_again(make_world: Any) -> None:
+    world = make_world()
+    world.reboot(DARK)
+    world.loop.pass_time(DARK + 2.0)
+    assert world.ask("GET", "/telemetry/status").body["info"]["armed"] is False
+    assert world.ask("GET", "/command/arm").outcome == "200"
+    assert world.ask("GET", "/command/takeoff?alt=3").outcome == "200"
 
 
 def test_page_about_faults_is_up_to_date() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import os
 import tempfile
 import time
 from pathlib import Path
@@ -104,13 +103,13 @@ def test_tool_that_hangs_is_ended_with_its_children(
     temporary: Path, fake: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(camera_tools, "TIME_LIMIT", 0.5)
-    fake("fswebcam", f"echo $$ > {tmp_path}/pid\nsleep 60 &\nwait\n")
+    fake("fswebcam", f"sleep 60 &\necho $! > {tmp_path}/pid\nwait\n")
     began = time.monotonic()
     with pytest.raises(TimedOut, match=r"0\.5 s"):
         asyncio.run(take("fswebcam", SHOT))
     assert time.monotonic() - began < 20
-    with pytest.raises(ProcessLookupError):
-        os.killpg(int((tmp_path / "pid").read_text()), 0)
+    status = Path("/proc", (tmp_path / "pid").read_text().strip(), "stat")
+    assert not status.exists() or ") Z " in status.read_text()  # nobody may have reaped it yet
     assert list(temporary.iterdir()) == []
 
 
@@ -132,7 +131,9 @@ def test_client_that_hangs_up_leaves_nothing(temporary: Path, fake: Any, tmp_pat
     assert list(temporary.iterdir()) == []
 
 
-@pytest.mark.parametrize("resolution", ["", "1280", "1280x", "x720", "1280X720", "0x720", "1280x720x3", "1e3x5", "-1x5"])
+@pytest.mark.parametrize(
+    "resolution", ["", "1280", "1280x", "x720", "1280X720", "0x720", "1280x720x3", "1e3x5", "-1x5"]
+)
 def test_bad_resolutions_are_refused(resolution: str) -> None:
     with pytest.raises(BadRequest, match="resolution"):
         size_of(resolution)

@@ -1,12 +1,17 @@
+"""The module as MAVProxy loads it."""
+
 from __future__ import annotations
 
+import builtins
+import importlib
+import sys
 import threading
 from typing import Any
 
 import pytest
 
 import vision
-from mavproxy_vision.module import HELP
+from mavproxy_vision.console import HELP
 
 
 @pytest.fixture
@@ -17,16 +22,34 @@ def module(mpstate: Any) -> Any:
         module.unload()
 
 
+@pytest.fixture
+def running(module: Any, main_loop: Any) -> Any:
+    """The module after MAVProxy's first turn."""
+    main_loop.modules.append(module)
+    main_loop.turn()
+    return module
+
+
+def said(module: Any, capsys: Any, *words: str) -> str:
+    capsys.readouterr()
+    module.command(list(words))
+    return capsys.readouterr().out
+
+
 def test_module_is_what_mavproxy_looks_for(module: Any, mpstate: Any) -> None:
     assert module.name == "vision"
     assert list(mpstate.command_map) == ["vision"]
 
 
 def test_status_says_what_it_is_and_help_what_it_can(module: Any, capsys: Any) -> None:
-    module.command([])
-    assert capsys.readouterr().out.startswith("vision: ")
-    module.command(["help"])
-    assert capsys.readouterr().out == HELP + "\n"
+    assert said(module, capsys).startswith("vision: source none")
+    assert "AprilTag" in said(module, capsys, "status")
+    assert said(module, capsys, "help") == HELP + "\n"
+
+
+def test_commands_before_the_first_turn_say_so(module: Any, capsys: Any) -> None:
+    for words in (["start"], ["stop"], ["land"], ["abort"], ["mission"]):
+        assert "main loop" in said(module, capsys, *words)
 
 
 def test_loading_and_unloading_leaves_nothing_behind(mpstate: Any, descriptors: Any) -> None:
@@ -36,4 +59,73 @@ def test_loading_and_unloading_leaves_nothing_behind(mpstate: Any, descriptors: 
         module.idle_task()
         module.unload()
     assert (mpstate.command_map, mpstate.completions, mpstate.select_extra) == ({}, {}, {})
+    assert list(mpstate.completion_functions) == ["(OTHER)"]
     assert (threading.active_count(), descriptors()) == (threads, before)
+
+
+def test_a_running_camera_ends_with_the_module(mpstate: Any, main_loop: Any) -> None:
+    threads = threading.active_count()
+    module = vision.init(mpstate, source="http")
+    main_loop.modules.append(module)
+    main_loop.turn()
+    assert {"vision-camera", "vision-detector"} <= {thread.name for thread in threading.enumerate()}
+    main_loop.modules.clear()
+    module.unload()
+    assert threading.active_count() == threads
+
+
+def test_routes_come_and_go(running: Any) -> None:
+    host = running.host
+    assert "/vision/status" in host.extensions
+    assert host.extensions["/vision/land"].methods == ("POST",)
+    running.unload()
+    assert host.extensions == {}
+
+
+def test_without_a_vehicle_nothing_flies(running: Any, capsys: Any) -> None:
+    for words in (["land"], ["search"], ["mission"]):
+        assert "no vehicle" in said(running, capsys, *words)
+
+
+def test_bad_words_are_explained(running: Any, capsys: Any) -> None:
+    assert "not an id" in said(running, capsys, "land", "x")
+    assert "ALT NORTH EAST" in said(running, capsys, "mission", "a")
+    assert "did you mean" in said(running, capsys, "set", "famly", "16h5")
+    assert "none of" in said(running, capsys, "set", "family", "4x4")
+    assert "not ID:SIZE" in said(running, capsys, "set", "tags", "0")
+    assert running.vision_settings.snapshot().tags == "0:0.30"
+    assert "one of velocity, landing_target" in said(running, capsys, "set", "method", "magic")
+    assert "snapshot FILE" in said(running, capsys, "snapshot")
+    assert "no camera" in said(running, capsys, "start")
+
+
+def test_a_setting_that_does_not_exist_is_an_import_error(mpstate: Any) -> None:
+    with pytest.raises(ImportError, match="vision: no setting 'nonsense'"):
+        vision.init(mpstate, nonsense=1)
+    assert mpstate.command_map == {}
+
+
+def test_without_opencv_one_line_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    real = builtins.__import__
+
+    def without(name: str, *args: Any, **kwargs: Any) -> Any:
+        if name == "cv2":
+            raise ModuleNotFoundError("No module named 'cv2'", name="cv2")
+        return real(name, *args, **kwargs)
+
+    import mavproxy_vision.module as loaded
+
+    monkeypatch.setattr(builtins, "__import__", without)
+    monkeypatch.delitem(sys.modules, "mavproxy_vision.module")
+    with pytest.raises(ImportError, match=r"vision needs cv2: pip install 'mavproxy-uavapi\[vision\]'"):
+        importlib.import_module("mavproxy_vision.module")
+    monkeypatch.undo()
+    sys.modules["mavproxy_vision.module"] = loaded
+
+
+def test_nothing_else_of_the_project_needs_opencv() -> None:
+    import subprocess
+
+    code = "import mavproxy_uavapi.module, mavproxy_gradys.module, sys; print('cv2' in sys.modules)"
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60).stdout
+    assert out.split()[0] == "False"

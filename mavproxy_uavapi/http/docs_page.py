@@ -1,0 +1,100 @@
+"""/docs: Swagger UI over /openapi.json, without internet: its files come from the package swagger-ui-py."""
+
+from __future__ import annotations
+
+import asyncio
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from aiohttp import web
+
+from mavproxy_uavapi.errors import NotFound
+from mavproxy_uavapi.http.call import Call
+from mavproxy_uavapi.http.openapi import document
+
+PACKAGE = "swagger_ui"
+ASSETS = {
+    "swagger-ui.css": "text/css",
+    "swagger-ui-bundle.js": "text/javascript",
+    "favicon-32x32.png": "image/png",
+}
+# Only what we serve runs there; Swagger UI itself sets styles on elements and has its icons in the CSS.
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
+    "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+HEADERS = {
+    "Content-Security-Policy": POLICY,
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cache-Control": "no-cache",
+}
+PAGE = """\
+<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>mavproxy-uavapi</title>
+<link rel="icon" href="/docs/favicon-32x32.png">
+<link rel="stylesheet" href="/docs/swagger-ui.css">
+</head>
+<body>
+<div id="page"></div>
+<script src="/docs/swagger-ui-bundle.js"></script>
+<script src="/docs/start.js"></script>
+</body>
+</html>
+"""
+START = "start.js"
+SCRIPT = """\
+window.ui = SwaggerUIBundle({
+  url: "/openapi.json",
+  dom_id: "#page",
+  deepLinking: true,
+  displayRequestDuration: true,
+  docExpansion: "list",
+  defaultModelsExpandDepth: -1,
+  filter: true,
+  persistAuthorization: false,
+  tryItOutEnabled: true,
+  validatorUrl: null,
+});
+"""
+
+
+async def specification(call: Call) -> dict[str, Any]:
+    """The description of this API, OpenAPI 3.1; with the routes of the other modules that are loaded."""
+    return document([*call.request.app[TABLE], *call.service.host.extensions.values()])
+
+
+async def page(_call: Call) -> web.StreamResponse:
+    """The documentation as a page, from which each endpoint can be tried."""
+    if await asyncio.to_thread(_folder) is None:
+        raise NotFound("the page needs swagger-ui-py (pip install swagger-ui-py); /openapi.json is there without it")
+    return web.Response(text=PAGE, content_type="text/html", charset="utf-8", headers=HEADERS)
+
+
+async def asset(call: Call) -> web.StreamResponse:
+    """A file of the documentation page."""
+    name = call.request.match_info["file"]
+    if name == START:
+        return web.Response(text=SCRIPT, content_type="text/javascript", charset="utf-8", headers=HEADERS)
+    kind = ASSETS.get(name)
+    folder = await asyncio.to_thread(_folder)
+    if kind is None or folder is None:
+        raise NotFound(f"the documentation has no file {name}")
+    body = await asyncio.to_thread((folder / name).read_bytes)
+    return web.Response(body=body, content_type=kind, headers=HEADERS)
+
+
+def _folder() -> Path | None:
+    """Where the package has its files; it is not imported, because it would bring its web frameworks along."""
+    found = find_spec(PACKAGE)
+    if found is None or found.origin is None:
+        return None
+    return Path(found.origin).parent / "static"
+
+
+TABLE: web.AppKey[list[Any]] = web.AppKey("table", list)

@@ -1,0 +1,123 @@
+"""The documentation page in a real browser: it shows every endpoint, and one is tried from it."""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import contextlib
+import itertools
+import json
+import os
+import shutil
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+from aiohttp import ClientSession
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+QUIET = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--disable-background-networking"]
+QUIET += ["--disable-component-update", "--disable-sync", "--no-first-run", "--remote-debugging-port=0"]
+QUIET += ["--window-size=1300,1700"]
+PATIENCE = 90.0  # s; a browser's start on a busy machine
+TRY_IT = """
+(async () => {
+  const wait = async (look) => {
+    for (let i = 0; i < 600; i++) { const found = look(); if (found) return found; await new Promise(r => setTimeout(r, 100)); }
+    throw new Error("nothing came of " + look);
+  };
+  const block = await wait(() => document.querySelector("#operations-telemetry-get_telemetry_status"));
+  block.querySelector(".opblock-summary-control").click();
+  (await wait(() => block.querySelector("button.execute"))).click();
+  const body = await wait(() => block.querySelector(".live-responses-table .response-col_description .highlight-code"));
+  block.scrollIntoView();
+  return [document.querySelectorAll(".opblock").length, body.innerText,
+          [...document.querySelectorAll(".errors-wrapper")].map(e => e.innerText).join()];
+})()
+"""  # noqa: E501
+
+
+class Page:
+    """A browser's tab, by the DevTools protocol."""
+
+    def __init__(self, socket) -> None:
+        self._socket = socket
+        self._numbers = itertools.count(1)
+        self.refused: list[str] = []
+
+    async def ask(self, method, **params):
+        number = next(self._numbers)
+        await self._socket.send_json({"id": number, "method": method, "params": params})
+        while True:
+            told = await self._socket.receive_json(timeout=PATIENCE)
+            if told.get("method") == "Log.entryAdded":
+                self.refused.append(told["params"]["entry"]["text"])
+            if told.get("method") == "Network.requestWillBeSent":
+                self.refused += [
+                    u for u in [told["params"]["request"]["url"]] if not u.startswith((self.url, "data:"))
+                ]
+            if told.get("id") == number:
+                assert "error" not in told, told
+                return told["result"]
+
+    async def look_at(self, url, script):
+        self.url = url.rsplit("/", 1)[0]
+        for domain in ("Page", "Log", "Network", "Runtime"):
+            await self.ask(f"{domain}.enable")
+        await self.ask("Page.navigate", url=url)
+        return (await self.ask("Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True))[
+            "result"
+        ]
+
+
+@contextlib.contextmanager
+def browser(directory: Path):
+    command = [CHROMIUM, *QUIET, f"--user-data-dir={directory}", "about:blank"]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
+    try:
+        port = directory / "DevToolsActivePort"
+        deadline = time.monotonic() + PATIENCE
+        while not (port.exists() and port.read_text()):
+            assert process.poll() is None and time.monotonic() < deadline, "the browser did not start"
+            time.sleep(0.1)
+        yield f"http://127.0.0.1:{port.read_text().split()[0]}"
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+
+
+async def tried(devtools, url, picture):
+    async with ClientSession() as session:
+        async with session.get(f"{devtools}/json") as answer:
+            tab = next(tab for tab in await answer.json() if tab["type"] == "page")
+        async with session.ws_connect(tab["webSocketDebuggerUrl"], max_msg_size=0) as socket:
+            page = Page(socket)
+            result = await page.look_at(url, TRY_IT)
+            shot = await page.ask("Page.captureScreenshot")
+            picture.write_bytes(base64.b64decode(shot["data"]))
+            return result, page.refused
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")
+def test_page_shows_all_endpoints_without_internet_and_one_can_be_tried(embedded_rig, tmp_path):
+    described = embedded_rig.ok(embedded_rig.get("/openapi.json"))
+    operations = sum(len(methods) for methods in described["paths"].values())
+    with browser(tmp_path / "profile") as devtools:
+        url = f"{embedded_rig.url}/docs"
+        result, refused = asyncio.run(tried(devtools, url, tmp_path / "docs.png"))
+    shown, body, errors = result["value"]
+    assert shown == operations
+    assert errors == ""
+    assert json.loads(body)["info"]["vehicle_type"] == "copter"
+    assert refused == []  # neither by the page's policy, nor for want of a network
+
+
+def test_page_and_its_files_are_served_with_their_policy(embedded_rig):
+    for path in ("/docs", "/docs/", "/docs/swagger-ui.css", "/docs/swagger-ui-bundle.js", "/docs/start.js"):
+        answer = embedded_rig.get(path)
+        assert answer.status_code == 200, path
+        assert "default-src 'none'" in answer.headers["Content-Security-Policy"]
+    assert embedded_rig.get("/docs/..%2fsetup.py").status_code == 404

@@ -1,0 +1,133 @@
+"""Recording a track and flying it again, at the prompt and over HTTP, by the rules of the air."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mavproxy_gradys.tracks import parse, waypoints
+
+EXAMPLES = Path(__file__).parents[2] / "examples" / "centmesh"
+
+
+@pytest.fixture(scope="module")
+def rig(harness, tmp_path_factory) -> Iterator:
+    made = harness.embedded(tmp_path_factory.mktemp("tracks"))
+    made.mavproxy.ask(f'module load gradys:{{"spool":"{made.directory}/spool.db"}}', "Loaded module gradys")
+    yield made
+    made.stop()
+
+
+@pytest.fixture(scope="module")
+def track(rig, tmp_path_factory) -> Path:
+    """A track that was flown and recorded: take-off, a corner, and another."""
+    directory = tmp_path_factory.mktemp("track")
+    file, latest = directory / "a.track", directory / "latest"
+    rig.mavproxy.ask(f"gradys track record {file} 0.3 --latest {latest}", "recording vehicle 1")
+    rig.in_the_air(8)
+    rig.ok(rig.post("/movement/go_to_ned_wait", x=25, y=0, z=-8))
+    rig.ok(rig.post("/movement/go_to_ned_wait", x=25, y=25, z=-14))
+    rig.mavproxy.ask("gradys track", "recording vehicle 1")
+    rig.mavproxy.ask("gradys track stop", "readings are in")
+    assert len(parse(latest.read_text())) == 1
+    rig.ok(rig.get("/command/rtl"))
+    return file
+
+
+def flight(rig: Any) -> dict[str, Any]:
+    found = rig.ok(rig.get("/gradys/status"))["info"]["tracks"]["flight"]
+    return found or {"state": None}
+
+
+def seen_while(rig: Any, harness: Any, over: Any) -> list[tuple[float, float, float]]:
+    """Where it was, in NED, until `over`."""
+    seen: list[tuple[float, float, float]] = []
+
+    def look() -> bool:
+        seen.append(rig.ned())
+        return bool(over())
+
+    harness.eventually(look, 120, "the flight's end")
+    return seen
+
+
+def test_a_track_is_flown_again_over_http_with_progress_and_ends_at_home(rig, track, harness):
+    answer = rig.ok(rig.post("/mission/fly-track", track=track.read_text(), wait=False))
+    assert answer["result"] == "The track is being flown" and answer["job"]
+    seen = seen_while(rig, harness, lambda: flight(rig)["state"] != "running")
+    assert flight(rig)["state"] == "done"
+    assert flight(rig)["leg"] == flight(rig)["legs"] == len(waypoints(parse(track.read_text())))
+    for corner in ((25, 0, -8), (25, 25, -14)):
+        assert min(math.dist(corner, place) for place in seen) < 8.0  # the track has a place every 3 s
+    status = rig.status()
+    assert (status["armed"], status["landed_state"]) == (False, "on_ground")
+
+
+def test_a_track_is_flown_at_the_prompt(rig, track):
+    rig.mavproxy.ask(f"gradys track fly {track}", "legs with vehicle 1")
+    rig.mavproxy.ask("gradys track", "track flight running")
+    rig.mavproxy.says("legs and landed at home", timeout=120)
+
+
+def test_the_pilot_ends_it_and_nothing_more_is_sent(rig, track, harness):
+    answers: list[Any] = []
+    waiting = threading.Thread(target=lambda: answers.append(rig.post("/mission/fly-track", track=track.read_text())))
+    waiting.start()
+    harness.eventually(lambda: flight(rig)["state"] == "running" and flight(rig)["leg"] >= 2, 60, "the second leg")
+    rig.mavproxy.type("mode LOITER")
+    waiting.join(30)
+    assert (answers[0].status_code, answers[0].json()["code"]) == (409, "mode_changed")
+    assert rig.status()["mode"] == "LOITER"
+    assert flight(rig)["state"] == "failed"
+    rig.on_the_ground()
+
+
+@pytest.mark.parametrize(
+    "body",
+    [{}, {"track": "nonsense"}, {"track": "(1, 357713121, -786743912, 584090, 0, 65535, 0, 0, 3, 10)"},
+     {"track": "(1, 357713121, -786743912, 584090, 0, 65535, 0, 0, 1, 10)"}],
+)  # fmt: skip
+def test_what_cannot_be_flown_is_refused_and_nothing_is_sent(rig, body):
+    answer = rig.post("/mission/fly-track", **body)
+    assert (answer.status_code, answer.json()["code"]) == (422, "invalid")
+    assert rig.status()["armed"] is False
+
+
+def test_mistakes_at_the_prompt_are_one_clear_answer(rig, tmp_path):
+    rig.mavproxy.ask("gradys track fly /no/such/file", "No such file")
+    rig.mavproxy.ask("gradys track record", "required: file")
+    rig.mavproxy.ask(f"gradys track record {tmp_path}/x 0", "SECONDS are from")
+    rig.mavproxy.ask("gradys track stop", "nothing is recorded")
+    rig.mavproxy.ask(f"gradys track record {tmp_path}/no/x", "No such file or directory")
+
+
+def test_gpx(rig, harness, tmp_path):
+    file = tmp_path / "a.gpx"
+    rig.mavproxy.ask(f"gradys track record {file} 0.2", "(gpx)")
+    harness.eventually(lambda: file.read_text().count("<trkpt") >= 3, 10, "three points")
+    rig.mavproxy.ask("gradys track stop", "readings are in")
+    assert file.read_text().endswith("</gpx>\n")
+
+
+def test_both_example_programs(rig, harness, tmp_path):
+    file = tmp_path / "example.track"
+    rig.in_the_air(8)
+    recording = subprocess.Popen(
+        [sys.executable, "collect_gps.py", str(file), "0.3", "--url", rig.url, "--count", "8", "--style", "tuple"],
+        cwd=EXAMPLES,
+    )
+    rig.ok(rig.post("/movement/go_to_ned_wait", x=20, y=0, z=-8))
+    assert recording.wait(60) == 0
+    assert len(parse(file.read_text())) == 8
+    rig.ok(rig.get("/command/rtl"))
+    command = [sys.executable, "replay_gps.py", str(file), "--url", rig.url, "--ground", "584"]
+    done = subprocess.run(command, cwd=EXAMPLES, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "landed at home" in done.stdout.lower()

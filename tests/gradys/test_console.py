@@ -1,0 +1,75 @@
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+
+from mavproxy_gradys import console
+from mavproxy_gradys.service import Gradys
+from mavproxy_gradys.tally import RoundTrips, StationTally
+
+
+@pytest.fixture
+def gradys(host: Any, teller: Any, settings: Any) -> Gradys:
+    """A service with one station, which has been told a few updates."""
+    made = Gradys(host)
+    made.settings = settings(gs="10.0.0.5:8000")
+    tally = made.stations["http://10.0.0.5:8000"] = StationTally("http://10.0.0.5:8000", lambda: 0.0)
+    vehicle = tally.vehicle(10)
+    vehicle.sent = 3
+    vehicle.answered(False, host.clock())
+    vehicle.answered(True, host.clock())
+    vehicle.refused("no answer within 3 s")
+    tally.failed("no answer within 3 s", host.clock())
+    tally.backoff.failed(host.clock())
+    tally.round_trips.add(0.0123)
+    tally.ip = "192.0.2.2:8000/"
+    return made
+
+
+def test_the_status_says_what_became_of_the_updates(gradys: Gradys) -> None:
+    said = console.status(gradys.report())
+    assert "3 sent, 2 acknowledged (1 of them dropped by the station: no browser watches), 1 failed" in said
+    assert "round trip 12.3 ms" in said
+    assert "we are at 192.0.2.2:8000/" in said
+    assert "last error 0 s ago: no answer within 3 s" in said
+    assert "next try in 1.0 s" in said
+    assert "vehicle 10: next is 2, last one acknowledged 0.0 s ago" in said
+
+
+def test_the_status_says_why_nothing_is_pushed(gradys: Gradys) -> None:
+    gradys.stations["http://10.0.0.5:8000"].vehicle(10).withhold("vehicle 10 has no position fix")
+    assert "nothing to say: vehicle 10 has no position fix" in console.status(gradys.report())
+
+
+def test_the_table_has_a_row_for_each_vehicle(gradys: Gradys) -> None:
+    head, row, *_ = console.stats(gradys.report()).splitlines()
+    assert head.split() == ["station", "vehicle", "sent", "acked", "dropped", "failed", "withheld", "seq"]
+    assert row.split() == ["http://10.0.0.5:8000", "10", "3", "2", "1", "1", "0", "2"]
+
+
+def test_the_report_is_json_with_the_totals_in_front(gradys: Gradys) -> None:
+    report = json.loads(json.dumps(gradys.report(), allow_nan=False))
+    assert (report["sent"], report["acknowledged"], report["dropped_by_station"]) == (3, 2, 1)
+    assert report["last_error"] == "no answer within 3 s"
+    assert report["round_trip_ms"]["last"] == 12.3
+    assert (report["spooled"], report["oldest_unsent_s"]) == (0, None)
+
+
+def test_the_spools_troubles_are_said() -> None:
+    spool = {"file": "/x", "problem": "disk is full", "dropped": {"size": 3, "age": 0}, "set_aside": ["/x.corrupt-1"]}
+    assert console.spool_lines(spool) == [
+        "  kept in /x",
+        "  NOT KEPT just now: disk is full",
+        "  dropped: 3 by size",
+        "  a corrupt file was set aside: /x.corrupt-1",
+    ]
+
+
+def test_round_trips_are_of_the_last_hundred() -> None:
+    trips = RoundTrips()
+    assert trips.summary() is None
+    for milliseconds in range(1000, 1101):
+        trips.add(milliseconds / 1000)
+    assert trips.summary() == {"last": 1100.0, "median": 1051.0, "p95": 1096.0, "max": 1100.0}

@@ -1,0 +1,65 @@
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from mavproxy_gradys.http import LONGEST_LIST, LONGEST_TEXT, MOST_READINGS, Readings, Track
+from mavproxy_uavapi.errors import Invalid
+from mavproxy_uavapi.http.requests import parse
+
+
+def readings(body: Any) -> list[Any]:
+    found = parse(Readings, "body", body)
+    assert isinstance(found, Readings)
+    return found.readings
+
+
+@pytest.mark.parametrize("value", [1, 0, 2.5, True, False, "yes", "12", [1, 2.5], ""])
+def test_a_value_stays_what_it_was(value: Any) -> None:
+    (found,) = readings({"quantity": "a", "value": value})
+    assert found.value == value and type(found.value) is type(value)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        None,
+        float("nan"),
+        float("inf"),
+        {},
+        [1, "a"],
+        [float("nan")],
+        "x" * (LONGEST_TEXT + 1),
+        [0] * (LONGEST_LIST + 1),
+    ],
+)
+def test_a_value_that_cannot_be_told_is_refused_once(value: Any) -> None:
+    with pytest.raises(Invalid) as raised:
+        readings({"readings": [{"quantity": "a", "value": value}]})
+    assert len(raised.value.problems) == 1
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        {"quantity": "a/b", "value": 1},
+        {"quantity": "", "value": 1},
+        {"quantity": "a" * 65, "value": 1},
+        {"quantity": "a", "value": 1, "time": float("nan")},
+        {"quantity": "a", "value": 1, "sysid": 256},
+        {"quantity": "a", "value": 1, "device": "#"},
+        {"readings": []},
+        {"readings": [{"quantity": "a", "value": 1}] * (MOST_READINGS + 1)},
+        {},
+    ],
+)
+def test_what_is_no_reading_is_refused(body: Any) -> None:
+    with pytest.raises(Invalid):
+        readings(body)
+
+
+def test_a_track_has_limits() -> None:
+    for body in ({}, {"track": ""}, {"track": "x", "reach": 0}, {"track": "x", "ground": 1e6}):
+        with pytest.raises(Invalid):
+            parse(Track, "body", body)

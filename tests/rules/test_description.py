@@ -1,0 +1,74 @@
+"""What /openapi.json promises, asked of the application itself: schemathesis makes the requests."""
+
+from __future__ import annotations
+
+import datetime
+from typing import Any
+
+import pytest
+import requests
+import schemathesis
+from hypothesis import HealthCheck, given, settings
+from schemathesis import GenerationMode
+from schemathesis.specs.openapi.checks import (
+    content_type_conformance,
+    response_schema_conformance,
+    status_code_conformance,
+)
+
+from mavproxy_uavapi.http.openapi import document
+from mavproxy_uavapi.http.routes import ROUTES
+
+PROMISES = [status_code_conformance, content_type_conformance, response_schema_conformance]
+BREATH = 0.5  # s that a verb is given before it is aborted: it is no flight that is tried here
+# These wait for disks, programs or for ever, which virtual time does not; they have tests of their own.
+ELSEWHERE = ("/mission", "/telemetry/stream", "/peripherical/take_photo", "/docs")
+
+SCHEMA = schemathesis.openapi.from_dict(document(ROUTES))
+OPERATIONS = {
+    f"{operation.method.upper()} {operation.path}": operation
+    for operation in (result.ok() for result in SCHEMA.get_all_operations())
+    if not operation.path.startswith(ELSEWHERE)
+}
+quick = settings(
+    derandomize=True,
+    database=None,
+    deadline=None,
+    max_examples=8,
+    suppress_health_check=list(HealthCheck),
+)
+
+
+def answer(world: Any, case: Any) -> requests.Response:
+    """The application's answer to a request of schemathesis."""
+    asked = requests.Request(**case.as_transport_kwargs("http://localhost")).prepare()
+    body = asked.body.encode() if isinstance(asked.body, str) else asked.body
+    wire = world.begin(asked.method, asked.path_url, body, asked.headers.get("Content-Type", "application/json"))
+    world.loop.pass_time(BREATH)
+    world.host.jobs.abort_remote("that will do")
+    reply = world.answer(wire, 60.0)
+    response = requests.Response()
+    response.status_code, response.request = reply.status, asked
+    response._content, response.elapsed = reply.raw, datetime.timedelta(0)
+    response.headers.update(reply.headers)
+    return response
+
+
+@pytest.mark.parametrize("name", OPERATIONS)
+@pytest.mark.parametrize("mode", [GenerationMode.POSITIVE, GenerationMode.NEGATIVE])
+def test_answers_are_those_of_the_description(make_world: Any, name: str, mode: GenerationMode) -> None:
+    world = make_world(max_rate=100_000, max_jobs=1000)
+    asked = 0
+
+    def ask(case: Any) -> None:
+        nonlocal asked
+        asked += 1
+        case.validate_response(answer(world, case), checks=PROMISES)
+
+    try:
+        quick(given(case=OPERATIONS[name].as_strategy(generation_mode=mode))(ask))()
+    except Exception as error:
+        if not (mode is GenerationMode.NEGATIVE and "Impossible to generate" in str(error)):
+            raise
+        return
+    assert asked

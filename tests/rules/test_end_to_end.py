@@ -1,0 +1,109 @@
+"""A few cells of the fault matrix with real processes, sockets and clocks."""
+
+from __future__ import annotations
+
+import importlib.util
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import requests
+
+
+def _load(path: Path) -> Any:
+    spec = importlib.util.spec_from_file_location(path.parent.name + "_" + path.stem, path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+HERE = Path(__file__).parent
+outcomes = _load(HERE / "outcomes.py")
+processes = _load(HERE.parent / "end_to_end" / "conftest.py")
+
+GUARD = 1.8  # s; a command would be sent again after 1.5 s
+MODE, ARM, TAKEOFF, HOME, SPEED = 176, 400, 22, 179, 178
+QUESTIONS = {"PARAM_REQUEST_READ", "REQUEST_DATA_STREAM", "HEARTBEAT"}  # MAVProxy asks such on its own account
+INTERVAL = 511
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """A vehicle, and a MAVProxy with the API."""
+    made = processes.embedded(tmp_path_factory.mktemp("faults"))
+    yield made
+    made.stop()
+
+
+def outcome(answer: requests.Response) -> str:
+    code = answer.json().get("code")
+    return f"{answer.status_code} {code}" if code else str(answer.status_code)
+
+
+def expected(verb: str, fault: str) -> str:
+    return outcomes.VERBS[verb].outcomes[fault]
+
+
+def assert_nothing_is_sent(rig: Any) -> None:
+    since = rig.control.ask("received", since=0)["last"]
+    time.sleep(GUARD)
+    received = rig.control.ask("received", since=since)["messages"]
+    orders = [m for m in received if m["name"] not in QUESTIONS and m["fields"].get("command") != INTERVAL]
+    assert orders == []
+
+
+def meanwhile(rig: Any, **fault: Any) -> None:
+    """Let that happen in half a second, while the test waits for its answer."""
+    threading.Timer(0.5, lambda: rig.control.fault(**fault)).start()
+
+
+@pytest.mark.parametrize(
+    ("verb", "query", "fault", "how"),
+    [
+        ("set_ground_speed", "?new_v=5", "refused", {"name": "refuse", "result": 2}),
+        ("set_ground_speed", "?new_v=5", "ack lost", {"name": "lose_acks", "count": 2}),
+        ("set_ground_speed", "?new_v=5", "foreign refusal", {"name": "foreign_ack", "result": 2, "system": 1}),
+        ("set_home", "", "acks lost for good", {"name": "lose_acks"}),
+        ("set_home", "", "busy once", {"name": "refuse", "result": 1, "count": 1}),
+        ("brake", "", "acks lost for good", {"name": "lose_acks"}),
+    ],
+)
+def test_command_meets_fault(rig: Any, verb: str, query: str, fault: str, how: dict[str, Any]) -> None:
+    rig.in_the_air(10)
+    rig.control.fault(command={"set_home": HOME, "brake": MODE}.get(verb, SPEED), **how)
+    began = time.monotonic()
+    answer = rig.get(outcomes.VERBS[verb].path + query)
+    took = time.monotonic() - began
+    rig.control.ask("clear")
+    assert outcome(answer) == expected(verb, fault)
+    assert took < outcomes.FAULTS[fault].within + outcomes.VERBS[verb].takes + 2.0
+    assert_nothing_is_sent(rig)
+
+
+@pytest.mark.parametrize(("fault", "how"), [("pilot's mode", {"name": "pilot_mode", "mode": "LOITER"})])
+def test_flight_meets_fault(rig: Any, fault: str, how: dict[str, Any]) -> None:
+    rig.in_the_air(10)
+    x, y, z = rig.ned()
+    meanwhile(rig, **how)
+    answer = rig.post("/movement/go_to_ned_wait", x=x + 500, y=y, z=z)
+    assert outcome(answer) == expected("go_to_ned_wait", fault)
+    assert_nothing_is_sent(rig)
+
+
+def test_client_that_is_gone_ends_its_travel(rig: Any) -> None:
+    rig.in_the_air(10)
+    with pytest.raises(requests.Timeout):
+        rig.post("/movement/travel_at_ned", timeout=0.5, vx=1, vy=0, vz=0, duration=300)
+    assert expected("travel, with duration", "client gone") == outcomes.ENDED
+    processes.eventually(lambda: all(job["state"] != "running" for job in rig.get("/jobs").json()["jobs"]), 2)
+    assert_nothing_is_sent(rig)
+
+
+def test_motors_that_stop_in_flight_are_no_landing(rig: Any) -> None:
+    rig.in_the_air(30)
+    meanwhile(rig, name="pilot_disarm")
+    assert outcome(rig.get("/command/rtl")) == expected("rtl", "disarmed")
+    assert_nothing_is_sent(rig)

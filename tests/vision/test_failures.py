@@ -1,0 +1,315 @@
+"""What goes wrong in flight, each with the action expected and a control that shows that the test can fail."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from mavproxy_uavapi.errors import LinkLost, ModeChanged
+from mavproxy_vision.errors import LandingFailed
+
+TAG = "0:0.30@0.8,-0.6"  # m north and east of home, above which the vehicle takes off
+SMALL = {"width": 320, "height": 240, "fps": 12.0, "sim_noise": 3.0, "sim_jitter": 0.0}
+
+
+@pytest.fixture
+def flying(lockstep: Any) -> Any:
+    """A vehicle some metres above home: `flying(alt=6, sim_tags=…)`."""
+
+    def make(alt: float = 4.0, **settings: Any) -> Any:
+        rig = lockstep(**{"sim_tags": TAG, **SMALL, **settings})
+        rig.start(alt)
+        return rig
+
+    return make
+
+
+def landed_off(rig: Any, north: float = 0.8, east: float = -0.6) -> float:
+    """Metres between the vehicle, which must stand on the ground, and a place."""
+    assert not rig.simulator.copter.armed
+    assert rig.truth.down == 0
+    return math.hypot(rig.truth.north - north, rig.truth.east - east)
+
+
+def setpoints(rig: Any, since: int = 0) -> list[Any]:
+    """Velocity setpoints that the vehicle got since the message of that number."""
+    return [m for m in rig.wire.sent[since:] if m.get_type() == "SET_POSITION_TARGET_LOCAL_NED"]
+
+
+def below(height: float) -> Any:
+    """Whether a pose is lower than that."""
+    return lambda pose: -pose[0][2] < height
+
+
+def test_control_it_lands_on_the_tag(flying):
+    rig = flying()
+    assert rig.outcome(rig.land()).startswith("Landed on tag 0")
+    assert landed_off(rig) < 0.2
+    report = rig.flights.report.told()
+    assert report["attempts"] == 1
+    assert report["touchdown_error"] == pytest.approx(landed_off(rig), abs=0.02)
+    assert report["last_offset"] < 0.2
+
+
+def test_wrong_id_is_not_landed_on(flying):
+    rig = flying(sim_tags="1:0.30@0.8,-0.6", attempts=2, leash=3.0)
+    error = rig.outcome(rig.land())
+    assert isinstance(error, LandingFailed)
+    assert "no tag in sight" in str(error)
+    assert error.report["action"] == "rtl"
+    assert landed_off(rig, 0, 0) < 1
+
+
+def test_an_id_that_is_asked_for_is_landed_on(flying):
+    rig = flying(sim_tags="1:0.30@0.8,-0.6")
+    assert rig.outcome(rig.land(1)).startswith("Landed on tag 1")
+    assert landed_off(rig) < 0.2
+
+
+def test_two_equal_tags_are_refused_and_the_vehicle_holds(flying):
+    rig = flying(sim_tags=f"{TAG} 0:0.30@-0.5,0.6")
+    error = rig.outcome(rig.land())
+    assert isinstance(error, LandingFailed)
+    assert "two tags" in str(error)
+    assert rig.mode == "GUIDED"
+    rig.pass_time(3)
+    assert rig.truth.down == pytest.approx(-4, abs=0.5)
+
+
+def test_two_tags_with_different_ids_are_no_matter(flying):
+    rig = flying(sim_tags=f"{TAG} 1:0.30@-0.5,0.6")
+    assert rig.outcome(rig.land()).startswith("Landed on tag 0")
+    assert landed_off(rig) < 0.2
+
+
+@pytest.mark.parametrize("height", [6, 3])
+def test_a_tag_lost_high_up_is_held_for_then_climbed_for_then_searched(flying, height):
+    rig = flying(alt=height + 1.0, attempts=3, leash=4.0, tags="0:0.6", sim_tags="0:0.6@0.8,-0.6")
+    rig.eye.blind = below(height)
+    phases: list[str] = []
+    tops: list[float] = []
+
+    def watch() -> None:
+        if not phases or phases[-1] != rig.flights.phase:
+            phases.append(rig.flights.phase)
+        tops.append(-rig.truth.down)
+
+    rig.each_step.append(watch)
+    # The climb brings it into sight again; from the second time on it is gone for good.
+    rig.each_step.append(lambda: setattr(rig.eye, "blind", lambda _: True) if "climbing" in phases[-1] else None)
+    error = rig.outcome(rig.land())
+    assert isinstance(error, LandingFailed)
+    order = [phase.split(":")[0] for phase in phases]
+    assert order.index("holding") < order.index("climbing to the last fix") < order.index("searching")
+    assert max(tops) > height + 0.8
+    assert error.report["action"] == "rtl"
+    assert error.report["attempts"] == 3
+
+
+@pytest.mark.parametrize("height", [1.0, 0.4])
+def test_a_tag_lost_low_down_is_landed_on_straight(flying, height):
+    rig = flying()
+    rig.eye.blind = below(height - 0.05)
+    assert rig.outcome(rig.land()).startswith("Landed on tag 0")
+    assert landed_off(rig) < 0.3
+    assert "climbing to the last fix" not in rig.flights.report.phases
+
+
+def test_a_short_loss_changes_nothing(flying):
+    rig = flying()
+    began = []
+
+    def blink(pose: Any) -> bool:
+        if -pose[0][2] < 3 and not began:
+            began.append(rig.loop.time())
+        return bool(began) and rig.loop.time() - began[0] < 0.25
+
+    rig.eye.blind = blink
+    assert rig.outcome(rig.land()).startswith("Landed on tag 0")
+    assert set(rig.flights.report.phases) <= {"looking", "descending"}
+
+
+@pytest.mark.parametrize("fault", ["frozen", "dead"])
+def test_a_frozen_or_dead_camera_ends_the_landing(flying, fault):
+    rig = flying()
+    job = rig.land()
+    rig.pass_time(2.5)
+    height = -rig.truth.down
+    setattr(rig.eye, fault, True)
+    error = rig.outcome(job)
+    assert isinstance(error, LandingFailed)
+    assert "the camera: " in str(error)
+    assert error.report["action"] == "rtl"
+    assert height > 1.5  # else it had been too late to matter
+
+
+@pytest.mark.parametrize("mount", ["90", "180", "-90"])
+def test_a_camera_turned_from_what_mount_says_is_noticed(flying, mount):
+    rig = flying(alt=5.0)
+    rig.eye.source.renderer.mount = type(rig.eye.source.renderer.mount)(yaw=float(mount))
+    error = rig.outcome(rig.land())
+    assert isinstance(error, LandingFailed)
+    assert "mount" in str(error)
+    assert math.hypot(rig.truth.north - 0.8, rig.truth.east + 0.6) < 5
+    assert rig.truth.down < -2  # it holds where it noticed
+
+
+@pytest.mark.parametrize("mount", ["90", "180"])
+def test_a_camera_turned_as_mount_says_lands(flying, mount):
+    rig = flying(mount=mount)
+    assert rig.outcome(rig.land()).startswith("Landed on tag 0")
+    assert landed_off(rig) < 0.2
+
+
+@pytest.mark.parametrize("size", ["0.20", "0.42"])
+def test_a_wrong_tag_size_is_refused_with_the_reason(flying, size):
+    rig = flying(alt=5.0, tags=f"0:{size}")
+    error = rig.outcome(rig.land())
+    assert isinstance(error, LandingFailed)
+    assert "by its size" in str(error)
+    assert "tags" in str(error)
+    assert rig.mode == "GUIDED"
+    assert rig.truth.down < -2
+
+
+def test_occlusion_is_waited_out(flying):
+    rig = flying()
+    look = rig.eye.source.renderer.look
+    covered = type(look)(look.noise, look.blur, look.exposure, 0.5)
+    times: list[float] = []
+
+    def hand() -> None:
+        if -rig.truth.down < 3 and not times:
+            times.append(rig.loop.time())
+        over = bool(times) and rig.loop.time() - times[0] < 1.5
+        rig.eye.source.renderer.look = covered if over else look
+
+    rig.each_step.append(hand)
+    assert rig.outcome(rig.land()).startswith("Landed on tag 0")
+    assert "holding: tag lost" in rig.flights.report.phases
+    assert landed_off(rig) < 0.2
+
+
+def test_link_silence_of_four_seconds_is_rested_out(flying):
+    rig = flying(alt=7.5, tags="0:0.6", sim_tags="0:0.6@0.8,-0.6")
+    job = rig.land()
+    rig.pass_time(2.0)
+    rig.simulator.faults.silence(rig.simulator.copter.now, 4.0, sending=True, receiving=True)
+    rig.pass_time(3.9)
+    mark = len(rig.wire.sent)
+    height = -rig.truth.down
+    assert height > 1.5  # the autopilot itself rests after GUID_TIMEOUT, 3 s
+    assert rig.outcome(job).startswith("Landed on tag 0")
+    assert mark < len(rig.wire.sent)
+    assert landed_off(rig) < 0.2
+
+
+def test_during_link_silence_it_is_told_to_rest(flying):
+    rig = flying(alt=5.0)
+    rig.land()
+    rig.pass_time(2.0)
+    rig.simulator.faults.silence(rig.simulator.copter.now, 3.5, sending=True, receiving=False)
+    rig.pass_time(1.5)
+    mark = len(rig.wire.sent)
+    rig.pass_time(1.0)
+    told = setpoints(rig, mark)
+    assert told
+    assert all(m.vx == m.vy == m.vz == 0 for m in told)
+
+
+def test_a_lost_link_ends_the_landing_and_nothing_more_is_sent(flying):
+    rig = flying(alt=5.0)
+    job = rig.land()
+    rig.pass_time(2.0)
+    rig.simulator.faults.silence(rig.simulator.copter.now, 60.0, sending=True, receiving=False)
+    error = rig.outcome(job)
+    assert isinstance(error, LinkLost)
+    mark = len(rig.wire.sent)
+    rig.pass_time(3.0)
+    assert not setpoints(rig, mark)
+
+
+@pytest.mark.parametrize("mode", [5, 2, 0])  # LOITER, ALT_HOLD, STABILIZE
+def test_the_pilots_mode_ends_the_landing_and_nothing_more_is_sent(flying, mode):
+    rig = flying(alt=5.0)
+    job = rig.land()
+    rig.pass_time(2.0)
+    rig.simulator.copter.sticks.move(3, 1500)
+    assert rig.simulator.copter.set_mode(mode)
+    rig.pass_time(0.1)
+    mark = len(rig.wire.sent)
+    error = rig.outcome(job)
+    rig.pass_time(3.0)
+    assert isinstance(error, ModeChanged)
+    assert not setpoints(rig, mark)
+    assert not [m for m in rig.wire.sent[mark:] if m.get_type() == "COMMAND_LONG" and m.command == 176]
+    assert rig.simulator.copter.mode.number == mode
+
+
+def test_a_battery_failsafe_has_its_way(flying):
+    rig = flying(alt=5.0)
+    rig.simulator.parameters.set("BATT_FS_LOW_ACT", 2)  # RTL
+    rig.simulator.parameters.set("BATT_LOW_TIMER", 1)
+    job = rig.land()
+    rig.pass_time(1.0)
+    rig.simulator.copter.battery.forced_voltage = 9.9
+    error = rig.outcome(job)
+    mark = len(rig.wire.sent)
+    rig.pass_time(3.0)
+    assert isinstance(error, ModeChanged)
+    assert rig.mode == "RTL"
+    assert not setpoints(rig, mark)
+
+
+def test_unloaded_in_flight_the_vehicle_holds(flying):
+    rig = flying(alt=5.0)
+    job = rig.land()
+    rig.pass_time(2.0)
+    assert rig.simulator.copter.body.velocity_down > 0.1
+
+    async def abandon() -> list[Any]:
+        return rig.flights.abandon()
+
+    last = rig.run(abandon())
+    for message, _system in last:
+        rig.wire.deliver(message)
+    mark = len(rig.wire.sent)
+    height = -rig.truth.down
+    rig.pass_time(5.0)
+    assert len(last) == 1
+    assert not job.running
+    assert not setpoints(rig, mark)
+    assert rig.mode == "GUIDED"
+    assert -rig.truth.down == pytest.approx(height, abs=0.7)
+
+
+def test_a_newer_command_supersedes_the_landing_and_it_sends_nothing_more(flying):
+    rig = flying(alt=5.0)
+    job = rig.land()
+    rig.pass_time(2.0)
+
+    async def other(new: Any) -> None:
+        rig.copter.seat.take(new)
+
+    rig.begin(other, "/movement/other")
+    rig.pass_time(0.05)
+    mark = len(rig.wire.sent)
+    assert rig.outcome(job).code == "superseded"
+    rig.pass_time(2.0)
+    assert not setpoints(rig, mark)
+
+
+def test_stopped_it_holds(flying):
+    rig = flying(alt=5.0)
+    rig.land()
+    rig.pass_time(2.0)
+    mark = len(rig.wire.sent)
+    assert rig.flights.stop("stopped")
+    rig.pass_time(0.2)
+    last = setpoints(rig, mark)[-1]
+    assert (last.vx, last.vy, last.vz) == (0, 0, 0)
+    height = -rig.truth.down
+    rig.pass_time(4.0)
+    assert -rig.truth.down == pytest.approx(height, abs=0.7)
