@@ -4,8 +4,16 @@ from pathlib import Path
 
 from setuptools import find_packages, setup
 
+VISION = ["opencv-python-headless>=4.10", "numpy>=1.26"]
 MQTT = ["aiomqtt>=2.3"]
-TEST = ["pytest>=8", "pytest-xdist>=3.5", "requests>=2.31", "setuptools>=70.1"]
+TEST = [
+    "pytest>=8",
+    "pytest-xdist>=3.5",
+    "hypothesis>=6.100",
+    "schemathesis>=4",
+    "requests>=2.31",
+    "setuptools>=70.1",
+]
 LINT = ["ruff>=0.6", "mypy>=1.11", "types-requests"]
 
 setup(
@@ -28,11 +36,11 @@ setup(
         "swagger-ui-py>=25.7.1",  # the files of Swagger UI 5 for /docs, which OpenAPI 3.1 needs
     ],
     extras_require={
-        "vision": ["opencv-python-headless>=4.10", "numpy>=1.26"],
+        "vision": VISION,
         "mqtt": MQTT,
-        "test": TEST + MQTT,
+        "test": TEST + VISION + MQTT,
         "lint": LINT,
-        "dev": TEST + MQTT + LINT,
+        "dev": TEST + VISION + MQTT + LINT,
     },
     entry_points={"console_scripts": ["mavproxy-uavapi = mavproxy_uavapi.launcher:main"]},
     classifiers=[

@@ -37,13 +37,6 @@ PATIENT = 60.0  # s for verbs without a deadline: an ack that says IN_PROGRESS m
 QUICK = 15.0  # s for reads; one that was never told is asked of the vehicle
 QUIET = 90.0  # s in which everything must come to rest
 BAD_WORDS = ("Traceback", "defect in", "defect of this program", "Task was destroyed", "never retrieved")
-    "Traceback",
-    "defect in",
-    "defect of this program",
-    "Task was destroyed",
-    "never retrieved",
-    "never awaited",
-)
 KNOWN = {200, 202, 400, 404, 405, 408, 409, 413, 422, 429, 503, 504}
 
 READS = ("general", "gps", "gps_raw", "ned", "attitude", "sys_status", "sensor_status", "battery_info", "error_info")

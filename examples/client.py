@@ -97,9 +97,7 @@ def detail(answer: requests.Response) -> str:
 
 def parser(description: str | None, altitude: float | None = 10.0) -> argparse.ArgumentParser:
     """Arguments with `--url` and, unless it is None, `--altitude`."""
-    arguments = argparse.ArgumentParser(
-        description=description, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    arguments = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     arguments.add_argument("--url", default="http://127.0.0.1:8000", help="the vehicle's API; host:port will do")
     if altitude is not None:
         arguments.add_argument("--altitude", type=positive, default=altitude, help="m above home (%(default)g)")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import socket
 import ssl
 from typing import Any, Protocol
 
@@ -136,7 +137,7 @@ def explain(error: BaseException, timeout: float) -> str:
 
 def unreachable(error: aiohttp.ClientConnectorError) -> str:
     """Why there is no connection."""
-    if isinstance(error, aiohttp.ClientConnectorDNSError):
+    if isinstance(error.os_error, socket.gaierror):
         return f"no such host: {error.host}"
     if isinstance(error, aiohttp.ClientSSLError):
         return f"no TLS there: {error.os_error}"

@@ -33,7 +33,8 @@ def annotated(image: NDArray[np.uint8], seen: Seen, lines: list[str]) -> NDArray
 
 
 def _text(image: Any, text: str, at: tuple[int, int]) -> None:
-    cv2.putText(image, text, at, cv2.FONT_HERSHEY_SIMPLEX, 0.5, (0, 0, 0), 3, cv2.LINE_AA)
+    (width, height), below = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 0.5, 1)
+    cv2.rectangle(image, (at[0] - 3, at[1] - height - 2), (at[0] + width + 3, at[1] + below), (0, 0, 0), -1)
     cv2.putText(image, text, at, cv2.FONT_HERSHEY_SIMPLEX, 0.5, (255, 255, 255), 1, cv2.LINE_AA)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 from mavproxy_vision.flights import Flights
@@ -41,9 +42,17 @@ def status(vision: Vision, flights: Flights) -> dict[str, Any]:
         "frame_age_s": None if seen is None else round(vision.host.clock() - seen.captured_at, 3),
         "detector_ms": None if seen is None else round(1000 * (seen.done_at - seen.received_at), 1),
     }
+    if vision.latencies:
+        told["setpoint_ms"] = {"median": percentile(vision.latencies, 0.5), "p99": percentile(vision.latencies, 0.99)}
     if flights.report is not None:
         told["flight"] = {"running": flights.running, "phase": flights.phase, **flights.report.told()}
     return told
+
+
+def percentile(seconds: Iterable[float], share: float) -> float:
+    """Of some times, in ms."""
+    ordered = sorted(seconds)
+    return round(1000 * ordered[min(int(share * len(ordered)), len(ordered) - 1)], 1)
 
 
 def report(vision: Vision, flights: Flights) -> str:

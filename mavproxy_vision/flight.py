@@ -4,24 +4,24 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from dataclasses import dataclass, field
 from typing import Any
 
 from pymavlink import mavutil
 
-from mavproxy_uavapi.errors import Invalid, LinkLost, ModeChanged, NotArmed, NotSupported, Superseded, TimedOut
-from mavproxy_uavapi.host.link import Address
+from mavproxy_uavapi.errors import Invalid, LinkLost, ModeChanged, Superseded
 from mavproxy_uavapi.vehicle import messages
 from mavproxy_uavapi.vehicle.copter import Copter
 from mavproxy_uavapi.vehicle.jobs import Job
 from mavproxy_uavapi.vehicle.modes import mode_number
 from mavproxy_vision.errors import LandingFailed
-from mavproxy_vision.geometry import Vector, heading_frame
+from mavproxy_vision.geometry import Vector
 from mavproxy_vision.history import Motion
 from mavproxy_vision.landing import BLIND_BELOW, COAST, REST, Landing, Order, Phase, Plan
 from mavproxy_vision.plnd import PrecisionLanding, landing_target
 from mavproxy_vision.rates import FLIGHT
+from mavproxy_vision.report import Report
 from mavproxy_vision.search import step_for
+from mavproxy_vision.setpoints import setpoint
 from mavproxy_vision.tags import FAMILIES, Tag
 from mavproxy_vision.target import Target
 from mavproxy_vision.vision import Vision
@@ -37,36 +37,7 @@ PLND_HEARD = 3.0  # s until the autopilot must have said that it has a target
 FINAL = 1.3  # of the height at which the tag fills the view
 LOWEST_FINAL = 0.4  # m
 DEPENDABLE = 0.85  # of the detection range
-VELOCITY_ONLY = 3527  # SET_POSITION_TARGET_LOCAL_NED: velocity alone, the heading as it is
 DISARM = 60.0  # s for the autopilot to land from low and disarm
-
-
-@dataclass
-class Report:
-    """What a flight tells of itself; see `docs/vision.md`."""
-
-    verb: str
-    method: str = ""
-    tag: int | None = None
-    attempts: int = 0
-    duration: float = 0.0
-    phases: dict[str, float] = field(default_factory=dict)
-    last_offset: float | None = None
-    touchdown_error: float | None = None
-    action: str | None = None
-    reason: str | None = None
-    place: tuple[float, float, float] | None = None
-    track: str | None = None
-    plot: str | None = None
-
-    def told(self) -> dict[str, Any]:
-        """As JSON has it; what is not known is left out, lengths in m, times in s of the vehicle's clock."""
-        rounded = {name: round(value, 2) for name, value in self.phases.items()}
-        members = {**vars(self), "phases": rounded, "duration": round(self.duration, 2)}
-        for name in ("last_offset", "touchdown_error"):
-            if members[name] is not None:
-                members[name] = round(members[name], 3)
-        return {name: value for name, value in members.items() if value is not None and value != ""}
 
 
 class Flight:
@@ -84,6 +55,7 @@ class Flight:
         self.plnd: PrecisionLanding | None = None
         self.phase = "on its way"
         self._in_land = False
+        self._timed = 0  # number of the frame whose way to a setpoint was timed last
 
     # -- verbs ---------------------------------------------------------------------------------------------
 
@@ -216,20 +188,21 @@ class Flight:
             await self._pause()
 
     def _time_latency(self) -> None:
+        """Note how long the newest frame took from its arrival to the first setpoint that knows it."""
         seen = self.vision.seen
-        if seen is not None and seen.sightings:
+        if seen is not None and seen.number != self._timed:
+            self._timed = seen.number
             self.vision.latencies.append(self.vision.host.clock() - seen.received_at)
-            del self.vision.latencies[:-1000]
 
     async def _pause(self) -> None:
-        """Until the next setpoint is due; ends early when the vehicle is no longer ours."""
+        """Until the next setpoint is due, or a frame was looked at.
 
-        def guard(_message: Any) -> None:
-            self.vehicle.held_by("LAND" if self._in_land else "GUIDED")
-
+        Raises:
+            LinkLost: the vehicle's heartbeats stopped.
+        """
         seconds = max(PERIOD / max(self.vehicle.state.time_ratio.ratio, 0.1), SHORTEST)
-        with contextlib.suppress(TimedOut):
-            await self.vehicle.waiting.message({"HEARTBEAT"}, guard, seconds, "beat")
+        with contextlib.suppress(asyncio.TimeoutError):
+            await asyncio.wait_for(self.vision.changed.wait(), seconds)
         if not self.vision.host.is_alive(self.vehicle.state):
             silent = self.vision.host.clock() - self.vehicle.state.heartbeat_at
             raise LinkLost.since(self.vehicle.state.system, silent)
@@ -346,10 +319,7 @@ class Flight:
                         return False
                     if target.age(now) <= COAST or above <= BLIND_BELOW:
                         await self._tell_target(target)
-                try:
-                    await self._pause()
-                except NotArmed:
-                    break
+                await self._pause()
             return True
         finally:
             self._in_land = False
@@ -382,25 +352,3 @@ class Flight:
             guided = messages.set_mode(mode_number(vehicle.state.vehicle_type, "GUIDED"))
             found.append(guided.to(vehicle.address, 0))
         return found
-
-
-def setpoint(address: Address, velocity: Vector, yaw: float | None) -> Any:
-    """SET_POSITION_TARGET_LOCAL_NED with a velocity (m/s NED), in BODY_NED where the heading (rad) is known."""
-    if yaw is None:
-        frame, (x, y, z) = mavlink.MAV_FRAME_LOCAL_NED, (float(part) for part in velocity)
-    else:
-        frame, (x, y, z) = mavlink.MAV_FRAME_BODY_NED, heading_frame(velocity, yaw)
-    return mavlink.MAVLink_set_position_target_local_ned_message(
-        0, *address, frame, VELOCITY_ONLY, 0.0, 0.0, 0.0, x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0
-    )
-
-
-def copter_of(vehicle: Any) -> Copter:
-    """The vehicle, which must be a copter.
-
-    Raises:
-        NotSupported: it is another type.
-    """
-    if not isinstance(vehicle, Copter):
-        raise NotSupported(f"a {vehicle.kind} cannot land on a tag")
-    return vehicle

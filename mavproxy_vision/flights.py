@@ -9,14 +9,15 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
 
-from mavproxy_uavapi.errors import Aborted, UavApiError
+from mavproxy_uavapi.errors import Aborted, NotSupported, UavApiError
 from mavproxy_uavapi.host.state import VehicleState
 from mavproxy_uavapi.vehicle.copter import Copter
 from mavproxy_uavapi.vehicle.geodesy import METRES_PER_DEGREE
 from mavproxy_uavapi.vehicle.jobs import CONSOLE, Job
 from mavproxy_vision import mission
-from mavproxy_vision.flight import Flight, Report, copter_of
+from mavproxy_vision.flight import Flight
 from mavproxy_vision.mission import Errand
+from mavproxy_vision.report import Report
 from mavproxy_vision.track import Track
 from mavproxy_vision.vision import Vision
 
@@ -104,7 +105,7 @@ class Flights:
 
     async def _keep(self, track: Track, report: Report) -> None:
         """Write track and plot; a disk that is full ends no flight."""
-        base = self._directory() / time.strftime("vision_mission_%Y%m%d_%H%M%S")
+        base = self._directory().absolute() / time.strftime("vision_mission_%Y%m%d_%H%M%S")
         loop = asyncio.get_running_loop()
         try:
             await loop.run_in_executor(None, track.write, base.with_suffix(".csv"))
@@ -178,3 +179,14 @@ class Flights:
         flight.vehicle.seat.job = None  # so that its own end finds nothing more to send
         flight.job.abort(Aborted("vision was unloaded; the vehicle holds"))
         return last
+
+
+def copter_of(vehicle: Any) -> Copter:
+    """The vehicle, which must be a copter.
+
+    Raises:
+        NotSupported: it is another type.
+    """
+    if not isinstance(vehicle, Copter):
+        raise NotSupported(f"a {vehicle.kind} cannot land on a tag")
+    return vehicle

@@ -118,6 +118,14 @@ class Pages:
             body=await self._picture(), content_type="image/jpeg", headers={"Cache-Control": "no-store"}
         )
 
+    async def newest_frame(self) -> bytes:
+        """The newest frame as it came, as JPEG: what take_photo answers with `command=vision`."""
+        self.vision.require_camera()
+        image = self.vision.image
+        if image is None:
+            raise NoCamera("there is no frame yet")
+        return await asyncio.get_running_loop().run_in_executor(None, jpeg, image)
+
     async def _picture(self) -> bytes:
         vision = self.vision
         seen, image = vision.seen, vision.image

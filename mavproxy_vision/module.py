@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import os
-import shlex
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -23,14 +21,11 @@ if not hasattr(getattr(cv2, "aruco", None), "ArucoDetector"):
 from mavproxy_uavapi.errors import UavApiError
 from mavproxy_uavapi.host.member import HostedModule
 from mavproxy_uavapi.vehicle.jobs import Job
-from mavproxy_vision import console
-from mavproxy_vision.annotate import annotated
-from mavproxy_vision.calibration import Board, calibrate, save
+from mavproxy_vision import console, files
 from mavproxy_vision.errors import BadSetting
 from mavproxy_vision.flights import Flights, Verb
 from mavproxy_vision.http import Pages
 from mavproxy_vision.mission import Errand
-from mavproxy_vision.printing import tag_pdf
 from mavproxy_vision.settings import METHODS, ModuleSettings
 from mavproxy_vision.vision import Vision
 
@@ -72,13 +67,15 @@ class VisionModule(HostedModule):
         self.add_completion_function(COMPLETION, self.vision_settings.mp.completion)
         self.vision = Vision(self.host, self.vision_settings.snapshot())
         self.flights = Flights(self.vision, self._directory)
-        self._routes = {route.path: route for route in Pages(self.vision, self.flights).routes()}
+        self._pages = Pages(self.vision, self.flights)
+        self._routes = {route.path: route for route in self._pages.routes()}
 
     # -- life ------------------------------------------------------------------------------------------------
 
     def begin(self) -> None:
         """Listen, and open the camera if one is set."""
         self.host.extensions.update(self._routes)
+        self.host.newest_frame = self._pages.newest_frame
         self._run(self._listen())
         if self.vision_settings.snapshot().source:
             self._start()
@@ -95,6 +92,7 @@ class VisionModule(HostedModule):
         self.mpstate.completion_functions.pop(COMPLETION, None)
         for path in self._routes:
             self.host.extensions.pop(path, None)
+        self.host.newest_frame = None
         try:
             self._abandon()
         finally:
@@ -262,60 +260,14 @@ class VisionModule(HostedModule):
     # -- files -----------------------------------------------------------------------------------------------
 
     def _calibrate(self, args: list[str]) -> None:
-        if len(args) not in (2, 3):
-            print("vision: calibrate FOLDER charuco:7x5:0.03:0.022|chessboard:9x6:0.025 [FILE]")
-            return
-        file = Path(args[2] if len(args) == 3 else "camera.json").expanduser()
-
-        def work() -> str:
-            made = calibrate(Path(args[0]).expanduser(), Board.parse(args[1]))
-            save(made.model, file)
-            model = made.model
-            return (
-                f"{made.views} views, error {made.error:.2f} px, fx {model.fx:.1f}, fy {model.fy:.1f}; "
-                f"wrote {file}: `vision set calibration {file}`"
-            )
-
-        self._in_background(work)
+        self._in_background(lambda: files.calibrated(args))
 
     def _snapshot(self, args: list[str]) -> None:
-        if len(args) != 1:
-            print("vision: snapshot FILE.png")
-            return
-
-        def work() -> str:
-            seen, image = self.vision.seen, self.vision.image
-            if seen is None or image is None:
-                return "there is no frame yet"
-            file = Path(args[0]).expanduser()
-            good, data = cv2.imencode(file.suffix or ".png", annotated(image, seen, []))
-            if not good:
-                return f"cannot write {file.suffix} files"
-            file.write_bytes(data.tobytes())
-            return f"wrote {file}"
-
-        self._in_background(work)
+        self._in_background(lambda: files.snapshot(args, self.vision.seen, self.vision.image))
 
     def _tag(self, args: list[str]) -> None:
         settings = self.vision_settings.snapshot()
-        parser = argparse.ArgumentParser("vision tag", add_help=False, exit_on_error=False)
-        parser.add_argument("file", type=Path)
-        parser.add_argument("--family", default=settings.families[0])
-        parser.add_argument("--id", type=int, default=settings.tag_list[0].id)
-        parser.add_argument("--size", type=float, default=settings.tag_list[0].size)
-        try:
-            chosen, rest = parser.parse_known_args(shlex.split(" ".join(args)))
-        except (argparse.ArgumentError, SystemExit, ValueError):
-            chosen, rest = None, ["?"]
-        if chosen is None or rest:
-            print("vision: tag FILE.pdf [--family 36h11] [--id 0] [--size 0.15]")
-            return
-
-        def work() -> str:
-            chosen.file.expanduser().write_bytes(tag_pdf(chosen.family, chosen.id, chosen.size))
-            return f"wrote {chosen.file}"
-
-        self._in_background(work)
+        self._in_background(lambda: files.tag(args, settings.families[0], settings.tag_list[0]))
 
     def _in_background(self, work: Callable[[], str]) -> None:
         """Run what takes long, or touches a disk, and print what it says."""

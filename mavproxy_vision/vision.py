@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import math
+from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import cv2
 
-from mavproxy_uavapi.errors import UavApiError
 from mavproxy_uavapi.host.host import Host
 from mavproxy_uavapi.host.state import VehicleState
 from mavproxy_uavapi.vehicle.vehicle import Vehicle
@@ -59,7 +58,7 @@ class Vision:
         self.image: Image | None = None
         self.target: Target | None = None
         self.changed = asyncio.Event()
-        self.latencies: list[float] = []  # s from a frame's arrival to the setpoint that uses it
+        self.latencies: deque[float] = deque(maxlen=1000)  # s from a frame's arrival to the setpoint that knows it
         self._fixer: Fixer | None = None
         self._system = 0
         self._home_down = 0.0
@@ -247,10 +246,6 @@ class Vision:
             return None
         return self.seen
 
-    def home_down(self) -> float:
-        """Home in m down of the EKF origin."""
-        return self._home_down if math.isfinite(self._home_down) else 0.0
-
 
 HEARD = {"ATTITUDE", "LOCAL_POSITION_NED", "GLOBAL_POSITION_INT", "SIM_STATE"}
 
@@ -294,8 +289,3 @@ def _told(seen: Seen, sighting: Any) -> dict[str, Any]:
         "reprojection_error": round(sighting.error, 3) if known else None,
         "latency_s": round(seen.latency, 3),
     }
-
-
-def unloaded(error: UavApiError) -> str:
-    """An error as the prompt shows it."""
-    return f"vision: {error}"

@@ -96,7 +96,7 @@ class NewSpeed(Request):
 class SimFactor(Request):
     """`sim_factor`: simulated seconds per second."""
 
-    sim_factor: Annotated[Number, Field(gt=0, le=1000), NotNothing]
+    sim_factor: Annotated[Number, Field(gt=0, le=1000, description="simulated s per s"), NotNothing]
 
 
 class GpsTarget(Blocking):
@@ -154,8 +154,8 @@ class YawRate(Request):
 class Servo(Request):
     """`channel` from 1, `pwm` in microseconds."""
 
-    channel: Annotated[int, Field(ge=1, le=16), NoBoolean]
-    pwm: Annotated[int, Field(ge=800, le=2200), NoBoolean]
+    channel: Annotated[int, Field(ge=1, le=16, description="servo output, from 1"), NoBoolean]
+    pwm: Annotated[int, Field(ge=800, le=2200, description="microseconds"), NoBoolean]
 
 
 class ScriptName(Request):
@@ -202,15 +202,15 @@ class Photo(Request):
 class Read(Request):
     """A telemetry read: `max_age` is the age (s) up to which the answer is wanted."""
 
-    max_age: Annotated[float | None, Field(gt=0, le=86400), NoBoolean] = None
+    max_age: Annotated[float | None, Field(gt=0, le=86400, description="s; the oldest wanted"), NoBoolean] = None
 
 
 class StreamFilter(Request):
     """What a telemetry stream carries: message names by comma, a system id, and at most `rate` Hz of each name."""
 
     names: Annotated[str, Field(description="message names by comma; none for all")] = ""
-    sysid: Annotated[int | None, Field(ge=1, le=255), NoBoolean] = None
-    rate: Annotated[float | None, Field(gt=0, le=1000), NoBoolean] = None
+    sysid: Annotated[int | None, Field(ge=1, le=255, description="system id; none for all"), NoBoolean] = None
+    rate: Annotated[float | None, Field(gt=0, le=1000, description="Hz at most, of each"), NoBoolean] = None
 
 
 def parse(model: type[Request], source: str, values: dict[str, Any]) -> Request:

@@ -118,9 +118,7 @@ def embedded_command(options: Options, instance: int, home: Home) -> list[str]:
     ]
 
 
-def sim_vehicle_command(
-    options: Options, python: str, instance: int, home: Home, use_dir: Path
-) -> list[str]:
+def sim_vehicle_command(options: Options, python: str, instance: int, home: Home, use_dir: Path) -> list[str]:
     """The command line of ArduPilot's sim_vehicle.py, for the vehicle alone.
 
     MAVProxy is ours to start (`--no-mavproxy`): it keeps the terminal, and its arguments need not survive

@@ -11,7 +11,8 @@ from mavproxy_uavapi.tools import Outcome, run_tool
 
 TIMEOUT = 10.0  # s for one call
 RECORD = "@uavapi_record"  # the session's option that says where its run's record is
-NOBODY = ("no server running", "error connecting to", "no sessions")  # how tmux says that it has no session
+ENDING = "server exited"  # it ends with its last session, which may be just now
+NOBODY = ("no server running", "error connecting to", "no sessions", ENDING)  # how tmux says that it has no session
 
 
 async def start(session: str, command: Sequence[str], record: Path) -> None:
@@ -26,11 +27,11 @@ async def start(session: str, command: Sequence[str], record: Path) -> None:
         ToolFailed: there is no tmux, or it could not.
     """
     assert len(command) > 1
-    size = ("-x", "200", "-y", "50")
-    told = await _tmux(
-        "new-session", "-d", "-s", session, *size, *command,
-        ";", "set-option", "-t", f"={session}:", RECORD, str(record),
-    )  # fmt: skip
+    beginning = ["new-session", "-d", "-s", session, "-x", "200", "-y", "50", *command]
+    remembering = ["set-option", "-t", f"={session}:", RECORD, str(record)]
+    told = await _tmux(*beginning, ";", *remembering)
+    if ENDING in told.stderr:
+        told = await _tmux(*beginning, ";", *remembering)
     # An option that comes too late for a run that is over already is no failure of the run.
     if told.status and "no such session" not in told.stderr and "can't find" not in told.stderr:
         raise ToolFailed(f"tmux could not start session {session}", told.stderr.strip())

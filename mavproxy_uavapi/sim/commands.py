@@ -201,9 +201,7 @@ class Commands:
         del link
         if not 0 <= command.param1 <= 360 or command.param4 not in (0, 1):
             return FAILED
-        self._simulator.copter.fix_yaw(
-            command.param1, command.param2, int(command.param3), command.param4 == 1
-        )
+        self._simulator.copter.fix_yaw(command.param1, command.param2, int(command.param3), command.param4 == 1)
         return ACCEPTED
 
     def _change_speed(self, command: Command, link: Link) -> int:

@@ -116,9 +116,7 @@ class Faults:
         if progress is not None:
             # As often as a long command reports: twice a second.
             reports = max(1, int(progress.seconds / 0.5))
-            planned += [
-                PlannedAck(now + 0.5 * report, mavlink.MAV_RESULT_IN_PROGRESS) for report in range(reports)
-            ]
+            planned += [PlannedAck(now + 0.5 * report, mavlink.MAV_RESULT_IN_PROGRESS) for report in range(reports)]
             at += progress.seconds
         delay = self._taken("delay_acks", command)
         if delay is not None:

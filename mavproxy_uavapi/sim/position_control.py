@@ -103,9 +103,7 @@ class PositionController:
         error_n, error_e = target.north - self.position[0], target.east - self.position[1]
         error_d = target.down - self.position[2]
         distance = math.hypot(error_n, error_e)
-        speed_xy, speed_z = shaping.speeds_along(
-            distance, error_d, limits.speed, limits.speed_up, limits.speed_down
-        )
+        speed_xy, speed_z = shaping.speeds_along(distance, error_d, limits.speed, limits.speed_up, limits.speed_down)
         braking = shaping.BRAKING_SHARE * limits.acceleration
         speed = min(shaping.square_root_speed(distance, shaping.POSITION_GAIN, braking), speed_xy)
         scale = speed / distance if distance > 1e-9 else 0.0
@@ -145,9 +143,7 @@ class PositionController:
         limits = self.limits
         north, east = shaping.limit_length(acceleration.north, acceleration.east, limits.acceleration)
         self._advance_xy((north, east), dt)
-        self.velocity[0], self.velocity[1] = shaping.limit_length(
-            self.velocity[0], self.velocity[1], limits.speed
-        )
+        self.velocity[0], self.velocity[1] = shaping.limit_length(self.velocity[0], self.velocity[1], limits.speed)
         down = max(-limits.acceleration_z, min(limits.acceleration_z, acceleration.down))
         self._advance_z(down, dt)
         self.velocity[2] = max(-limits.speed_up, min(limits.speed_down, self.velocity[2]))
@@ -157,9 +153,7 @@ class PositionController:
         limits = self.limits
         down = max(-limits.speed_up, min(limits.speed_down, down))
         error = down - self.velocity[2]
-        self._advance_z(
-            shaping.accelerate_1d(error, self.acceleration[2], limits.acceleration_z, JERK, dt), dt
-        )
+        self._advance_z(shaping.accelerate_1d(error, self.acceleration[2], limits.acceleration_z, JERK, dt), dt)
 
     def _advance_xy(self, acceleration: tuple[float, float], dt: float) -> None:
         for axis, value in enumerate(acceleration):

@@ -128,9 +128,7 @@ class SystemMessages(MessageSource):
 
     def _build_system_time(self) -> Any:
         unix = self.unix_epoch + self.copter.now
-        return mavlink.MAVLink_system_time_message(
-            int(unix * 1e6) if unix > GPS_EPOCH else 0, self._milliseconds()
-        )
+        return mavlink.MAVLink_system_time_message(int(unix * 1e6) if unix > GPS_EPOCH else 0, self._milliseconds())
 
     def _build_battery_status(self) -> Any:
         battery = self.copter.battery
@@ -151,9 +149,7 @@ class SystemMessages(MessageSource):
     def _build_ekf_status_report(self) -> Any:
         estimator = self.copter.estimator
         variance = 0.01 if estimator.ready else 1.0
-        return mavlink.MAVLink_ekf_status_report_message(
-            estimator.flags, variance, variance, 0.01, 0.01, 0.0
-        )
+        return mavlink.MAVLink_ekf_status_report_message(estimator.flags, variance, variance, 0.01, 0.01, 0.0)
 
     def _build_vibration(self) -> Any:
         return mavlink.MAVLink_vibration_message(self._microseconds(), 0.0, 0.0, 0.0, 0, 0, 0)

@@ -75,9 +75,7 @@ class AutoYaw:
         self._speed = min(self.slew, speed) if speed > 0 else self.slew
         self.mode = YawMode.FIXED
 
-    def setpoint(
-        self, yaw: float | None, rate: float | None, relative: bool, behaviour: int, present: float
-    ) -> None:
+    def setpoint(self, yaw: float | None, rate: float | None, relative: bool, behaviour: int, present: float) -> None:
         """The yaw fields of a SET_POSITION_TARGET message; None is an ignored field."""
         if yaw is not None and relative:
             self.fix(yaw, 0.0, 0, True, present)

@@ -111,7 +111,10 @@ def _is_complete(vehicle: Vehicle) -> bool:
 
 
 def _report(vehicle: Vehicle, job: Job) -> None:
-    told = progress(vehicle)
+    try:
+        told = progress(vehicle)
+    except Stale:  # nothing to report yet
+        return
     numbers = {"item": told["current"], "items": told["total"], "distance_to_go": told["distance_m"]}
     job.progress = {name: value for name, value in numbers.items() if value is not None}
 

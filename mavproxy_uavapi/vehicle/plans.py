@@ -5,12 +5,11 @@ Item 0 of an ArduPilot mission is home, which is no item here: a list begins wit
 
 from __future__ import annotations
 
+import io
 import json
 import math
-import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from pymavlink import mavutil, mavwp
@@ -31,6 +30,7 @@ SAME_FRAMES = {
     mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT,
     mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT: mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT,
 }
+WPL_110 = "QGC WPL 110"
 LOWEST, HIGHEST = -1000.0, 10_000.0  # m, in whichever frame
 MOST_ITEMS = 5000  # more than any ArduPilot vehicle stores
 ALTITUDE_TOLERANCE = 0.02  # m; ArduPilot stores whole centimetres
@@ -96,7 +96,7 @@ def has_location(command: int) -> bool:
 
 
 def read(text: str) -> list[Item]:
-    """The items of a mission in any of the three formats. Blocking: pymavlink reads files.
+    """The items of a mission in any of the three formats.
 
     Raises:
         BadRequest: it is none of them.
@@ -192,13 +192,14 @@ def _misplaced(lat: float, lon: float, alt: float) -> str | None:
 
 def _from_wpl(text: str) -> list[Any]:
     loader = mavwp.MAVWPLoader()
-    with tempfile.TemporaryDirectory(prefix="uavapi-") as folder:
-        file = Path(folder, "mission.txt")
-        file.write_text(text, encoding="utf-8")
-        try:
-            loader.load(str(file))
-        except (mavwp.MAVWPError, ValueError, IndexError) as error:
-            raise BadRequest(f"this is no QGC WPL 110 file: {error}") from error
+    header, _, rows = text.partition("\n")
+    if header.strip() != WPL_110:
+        raise BadRequest(f"this is no {WPL_110} file: it begins with {header.strip()!r}")
+    try:
+        # What load() calls once it has opened a file, which it leaves open when a row is wrong.
+        loader._read_waypoints_v110(io.StringIO(rows))
+    except (mavwp.MAVWPError, ValueError) as error:
+        raise BadRequest(f"this is no {WPL_110} file: {error}") from error
     if loader.count() and loader.item(0).command != mavlink.MAV_CMD_NAV_WAYPOINT:
         raise BadRequest("the first row of a QGC WPL file is home, a waypoint (16); this one is another command")
     return list(loader.wpoints[1:])
@@ -209,6 +210,8 @@ def _loaded(items: Iterable[Any], convert: Any) -> list[Any]:
     loader = mavwp.MAVWPLoader()
     for seq, item in enumerate(items, 1):
         try:
+            if not isinstance(item, dict):
+                raise ValueError("an item is a JSON object")
             command, frame, autocontinue, numbers = convert(item)
             loader.add(mavlink.MAVLink_mission_item_message(0, 0, seq, frame, command, 0, autocontinue, *numbers))
         except (TypeError, ValueError, KeyError, OverflowError) as error:

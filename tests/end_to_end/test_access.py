@@ -111,6 +111,7 @@ def test_pages_that_are_named_may_call_and_read(embedded_rig):
         embedded_rig.mavproxy.ask("uavapi set cors_origins None", "listening on")
 
 
+@pytest.mark.needs("openssl")
 def test_tls(embedded_rig, tmp_path):
     key, cert = tmp_path / "key.pem", tmp_path / "cert.pem"
     subject = ["-subj", "/CN=localhost", "-addext", "subjectAltName=IP:127.0.0.1"]

@@ -15,6 +15,8 @@ from typing import Any
 
 import pytest
 
+pytestmark = pytest.mark.needs("chromium")
+
 EVIL = "evil.example"  # a name that the browser is told to find at 127.0.0.1
 PATIENCE = 90.0  # s for a browser to start, try everything, and tell; other tests share the machine
 ARM = 400  # MAV_CMD_COMPONENT_ARM_DISARM

@@ -110,7 +110,7 @@ def test_the_form_is_that_of_the_original_once_a_second_on_one_connection(rig, r
     tell(rig, recorder)
     harness.eventually(lambda: len(recorder.updates) >= 6, 15, "six updates")
     times = [at for at, *_ in recorder.updates]
-    assert times[5] - times[0] == pytest.approx(5.0, abs=0.3)
+    assert times[5] - times[0] == pytest.approx(5.0, abs=0.6)
     assert len({peer for _, peer, *_ in recorder.updates}) == 1
     _, _, headers, body = recorder.updates[5]
     assert headers["Content-Type"] == "application/x-www-form-urlencoded"
@@ -202,7 +202,7 @@ def test_several_stations_each_with_its_own_state_and_a_dead_one_delays_nobody(r
     with hanging:
         harness.eventually(lambda: len(recorder.updates) >= 8, 20, "eight updates")
         times = [at for at, *_ in recorder.updates]
-        assert times[7] - times[0] == pytest.approx(7.0, abs=0.3)
+        assert times[7] - times[0] == pytest.approx(7.0, abs=0.6)
         stations = {station["station"]: station for station in report(rig)["stations"]}
         errors = [stations[f"http://{name}"]["last_error"] for name in names]
         assert "no answer within 3 s" in errors[0]

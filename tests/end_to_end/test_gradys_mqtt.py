@@ -16,7 +16,7 @@ import pytest
 
 MOSQUITTO = shutil.which("mosquitto", path="/usr/sbin:/usr/bin:/usr/local/sbin:/usr/local/bin:/opt/homebrew/sbin")
 
-pytestmark = pytest.mark.skipif(MOSQUITTO is None, reason="Mosquitto is not installed (apt install mosquitto)")
+pytestmark = pytest.mark.needs("mosquitto")
 mqtt = pytest.importorskip("paho.mqtt.client")
 
 

@@ -196,6 +196,7 @@ def test_root_files_hold_one_import_each():
         assert lines == [f"from mavproxy_{name}.module import init as init"]
 
 
+@pytest.mark.needs("tmux")
 def test_tab_completes_the_commands_and_settings(mavproxy, harness, tmp_path):
     """In a terminal of its own: tmux types, and shows the screen."""
     tmux = ["tmux", "-L", f"uavapi-test-{os.getpid()}"]

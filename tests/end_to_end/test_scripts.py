@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-import shutil
 import subprocess
 
 import pytest
 import requests
 
-pytestmark = pytest.mark.skipif(shutil.which("tmux") is None, reason="scripts run in tmux")
+pytestmark = pytest.mark.needs("tmux")
 
 GRACE = 2.0
 FLIES = """

@@ -20,6 +20,16 @@ LEGS = [{"command": "NAV_WAYPOINT", "lat": lat, "long": lon, "alt": alt} for lat
 JSON = {"items": [{"command": 22, "alt": 10}, LEGS[0], {"command": 178, "param1": 1, "param2": 8}, LEGS[1]]}
 
 
+SPEEDUP = 4  # a vehicle gives an upload up after 8 s of its own clock; a busy machine needs some of ours
+
+
+@pytest.fixture(scope="module")
+def rig(harness, tmp_path_factory):
+    made = harness.embedded(tmp_path_factory.mktemp("waypoints"), speedup=SPEEDUP)
+    yield made
+    made.stop()
+
+
 def simple(command, *params):
     return {"type": "SimpleItem", "command": command, "frame": 3, "autoContinue": True, "params": list(params)}
 

@@ -313,3 +313,35 @@ def test_stopped_it_holds(flying):
     height = -rig.truth.down
     rig.pass_time(4.0)
     assert -rig.truth.down == pytest.approx(height, abs=0.7)
+
+
+def test_landing_target_lands_and_puts_the_parameters_back(flying):
+    rig = flying(plnd=True)
+    parameters = rig.simulator.parameters
+    before = {name: parameters[name] for name in ("PLND_ENABLED", "PLND_STRICT", "PLND_ALT_MIN", "PLND_ALT_MAX")}
+    during: list[float] = []
+    rig.each_step.append(lambda: during.append(parameters["PLND_ENABLED"]) if rig.mode == "LAND" else None)
+    assert rig.outcome(rig.land(method="landing_target")).startswith("Landed on tag 0")
+    assert landed_off(rig) < 0.1
+    assert during[0] == 1
+    assert {name: parameters[name] for name in before} == before
+    assert [m for m in rig.wire.sent if m.get_type() == "LANDING_TARGET" and m.position_valid == 1]
+
+
+def test_a_precision_landing_that_was_off_at_boot_asks_for_a_reboot(flying):
+    rig = flying()
+    error = rig.outcome(rig.land(method="landing_target"))
+    assert "reboot" in str(error)
+    assert rig.simulator.parameters["PLND_TYPE"] == 1
+    assert rig.mode == "GUIDED"
+
+
+def test_a_tag_lost_high_up_under_land_is_taken_back_to_guided(flying):
+    rig = flying(plnd=True, alt=5.0, attempts=1)
+    rig.eye.blind = below(3.0)
+    rig.each_step.append(lambda: setattr(rig.eye, "blind", lambda _: True) if -rig.truth.down < 3.0 else None)
+    error = rig.outcome(rig.land(method="landing_target"))
+    assert isinstance(error, LandingFailed)
+    assert error.report["action"] == "rtl"
+    assert rig.simulator.parameters["PLND_ENABLED"] == 0
+    assert landed_off(rig, 0, 0) < 1

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
+from mavproxy_vision import files
 from mavproxy_vision.annotate import annotated, jpeg
 from mavproxy_vision.calibration import Board, calibrate, load, save
 from mavproxy_vision.camera import Capture, Folder, Frame, Posted, decode
@@ -18,6 +19,7 @@ from mavproxy_vision.printing import POINTS_PER_METRE, tag_pdf
 from mavproxy_vision.settings import ModuleSettings
 from mavproxy_vision.sighting import Seen
 from mavproxy_vision.simulated import parse_placed
+from mavproxy_vision.tags import Tag
 from mavproxy_vision.track import SIDE, Track
 from mavproxy_vision.worker import Watch, Worker
 
@@ -233,6 +235,24 @@ def test_settings_are_checked_as_they_are_set():
     settings.set("offset", "0.1,0,0.05")
     mount = settings.snapshot().camera_mount
     assert (mount.roll, mount.pitch, mount.yaw, mount.offset) == (1, 2, 90, (0.1, 0, 0.05))
+
+
+def test_the_prompts_file_commands(tmp_path):
+    seen = Seen(1, 0.0, 0.0, 0.0, (64, 48), ())
+    assert files.snapshot([str(tmp_path / "a.png")], seen, picture(9)).startswith("wrote ")
+    assert files.tag([str(tmp_path / "t.pdf"), "--family", "16h5", "--id", "2"], "36h11", Tag(0, 0.1)).startswith(
+        "wrote"
+    )
+    assert (tmp_path / "t.pdf").read_bytes().startswith(b"%PDF")
+    assert files.snapshot(["a.png"], None, None) == "there is no frame yet"
+    for call in (
+        lambda: files.snapshot([], seen, picture()),
+        lambda: files.tag([], "36h11", Tag(0, 0.1)),
+        lambda: files.tag(["a.pdf", "--size", "x"], "36h11", Tag(0, 0.1)),
+        lambda: files.calibrated(["a"]),
+    ):
+        with pytest.raises(BadSetting):
+            call()
 
 
 def test_an_annotated_frame_has_colour():

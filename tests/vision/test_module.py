@@ -95,7 +95,6 @@ def test_bad_words_are_explained(running: Any, capsys: Any) -> None:
     assert "not ID:SIZE" in said(running, capsys, "set", "tags", "0")
     assert running.vision_settings.snapshot().tags == "0:0.30"
     assert "one of velocity, landing_target" in said(running, capsys, "set", "method", "magic")
-    assert "snapshot FILE" in said(running, capsys, "snapshot")
     assert "no camera" in said(running, capsys, "start")
 
 

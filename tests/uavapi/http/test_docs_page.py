@@ -7,6 +7,13 @@ import pytest
 from mavproxy_uavapi.http import docs_page
 from mavproxy_uavapi.settings import ModuleSettings
 
+FILE_PATIENCE = 2.0  # real s that the executor gets with its files before the clock jumps
+
+
+@pytest.fixture(autouse=True)
+def patient(api: Any, loop: Any) -> None:
+    loop.patience = FILE_PATIENCE
+
 
 def fetch(api: Any, loop: Any, path: str, **kwargs: Any) -> Any:
     async def ask() -> Any:

@@ -14,10 +14,13 @@ from mavproxy_uavapi.scripts import runs
 from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.settings import ModuleSettings
 
+FILE_PATIENCE = 2.0  # real s that the executor gets with its files before the clock jumps
+
 
 @pytest.fixture
-def configured(service: Any, tmp_path: Path) -> Any:
+def configured(api: Any, loop: Any, service: Any, tmp_path: Path) -> Any:
     """`configured(**settings)`: the service with those, and its scripts in a folder of the test's."""
+    loop.patience = FILE_PATIENCE
 
     def configure(**given: Any) -> Any:
         folders = {"scripts_path": str(tmp_path / "scripts"), "script_logs": str(tmp_path / "logs")}

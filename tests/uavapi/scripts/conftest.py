@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 import time
 from collections.abc import Callable, Iterator
@@ -16,9 +15,7 @@ from mavproxy_uavapi.scripts import runs
 
 @pytest.fixture
 def own_tmux(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """tmux with a server that nobody else uses; the test is skipped where there is no tmux."""
-    if shutil.which("tmux") is None:
-        pytest.skip("no tmux on this machine")
+    """tmux with a server that nobody else uses."""
     monkeypatch.setenv("TMUX_TMPDIR", str(tmp_path_factory.mktemp("tmux")))
     monkeypatch.delenv("TMUX", raising=False)
     yield

@@ -46,7 +46,7 @@ def flown(folder: Path, story: Callable[[Scripts], Awaitable[Any]], **given: Any
 
 
 async def ended(scripts: Scripts, script: str) -> Any:
-    while scripts.running_run(script) is not None:
+    while scripts.running_run(script) is not None:  # noqa: ASYNC110  another process ends it
         await asyncio.sleep(0.02)
     return await scripts.newest(script)
 
@@ -54,10 +54,11 @@ async def ended(scripts: Scripts, script: str) -> Any:
 async def up(scripts: Scripts, script: str) -> None:
     run = await scripts.newest(script)
     assert run is not None
-    while not run.out_log.read_text():
+    while not run.out_log.read_text():  # noqa: ASYNC110  another process writes it
         await asyncio.sleep(0.02)
 
 
+@pytest.mark.needs("tmux")
 @pytest.mark.usefixtures("own_tmux")
 def test_script_is_told_where_the_api_is_and_its_end_is_remembered(tmp_path: Path) -> None:
     async def story(scripts: Scripts) -> Any:
@@ -71,6 +72,7 @@ def test_script_is_told_where_the_api_is_and_its_end_is_remembered(tmp_path: Pat
     assert b"secret" not in b"".join(file.read_bytes() for file in run.path.parent.iterdir() if "json" in file.name)
 
 
+@pytest.mark.needs("tmux")
 @pytest.mark.usefixtures("own_tmux")
 def test_running_script_is_not_started_twice_and_stops(tmp_path: Path) -> None:
     async def story(scripts: Scripts) -> None:
@@ -90,6 +92,7 @@ def test_running_script_is_not_started_twice_and_stops(tmp_path: Path) -> None:
     flown(tmp_path, story)
 
 
+@pytest.mark.needs("tmux")
 @pytest.mark.usefixtures("own_tmux")
 def test_next_api_finds_the_scripts_of_the_last_one_and_no_others(tmp_path: Path) -> None:
     async def begin(scripts: Scripts) -> None:
@@ -115,6 +118,7 @@ def test_next_api_finds_the_scripts_of_the_last_one_and_no_others(tmp_path: Path
     assert flown(tmp_path / "elsewhere", find_and_stop).exit_status == -2
 
 
+@pytest.mark.needs("tmux")
 @pytest.mark.usefixtures("own_tmux")
 def test_what_cannot_be_started_is_an_error_and_leaves_nothing(tmp_path: Path) -> None:
     async def story(scripts: Scripts) -> None:
@@ -143,6 +147,7 @@ def test_without_tmux_execute_is_a_clear_error_and_all_else_works(
     assert list((tmp_path / "logs").iterdir()) == []
 
 
+@pytest.mark.needs("tmux")
 @pytest.mark.usefixtures("own_tmux")
 def test_deaths_are_acted_upon_and_other_ends_are_not(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     acted: list[tuple[int, str, str]] = []

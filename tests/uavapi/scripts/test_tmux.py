@@ -13,6 +13,7 @@ from mavproxy_uavapi.errors import ToolFailed
 from mavproxy_uavapi.scripts import runner, runs, tmux
 
 
+@pytest.mark.needs("tmux")
 @pytest.mark.usefixtures("own_tmux")
 def test_session_remembers_its_record_and_ends_with_the_script(
     make_run: Callable[..., runs.Run], eventually: Any
@@ -29,6 +30,7 @@ def test_session_remembers_its_record_and_ends_with_the_script(
     assert runs.load(run.path).exit_status == 0
 
 
+@pytest.mark.needs("tmux")
 @pytest.mark.usefixtures("own_tmux")
 def test_end_of_the_session_stops_the_script(make_run: Callable[..., runs.Run], eventually: Any) -> None:
     run = make_run("trap 'echo landing; exit 0' INT; echo up; while true; do sleep 0.1; done")
@@ -39,6 +41,7 @@ def test_end_of_the_session_stops_the_script(make_run: Callable[..., runs.Run], 
     assert run.out_log.read_text() == "up\nlanding\n"
 
 
+@pytest.mark.needs("tmux")
 @pytest.mark.usefixtures("own_tmux")
 def test_session_that_exists_is_a_failure_and_not_a_running_script() -> None:
     asyncio.run(tmux.start("uavapi_1_x", ["sleep", "30"], Path("/x")))
@@ -46,11 +49,13 @@ def test_session_that_exists_is_a_failure_and_not_a_running_script() -> None:
         asyncio.run(tmux.start("uavapi_1_x", ["sleep", "30"], Path("/x")))
 
 
+@pytest.mark.needs("tmux")
 @pytest.mark.usefixtures("own_tmux")
 def test_no_server_is_no_session() -> None:
     assert asyncio.run(tmux.sessions("uavapi_")) == {}
 
 
+@pytest.mark.needs("tmux")
 @pytest.mark.usefixtures("own_tmux")
 def test_run_that_is_over_at_once_is_no_failure() -> None:
     asyncio.run(tmux.start("uavapi_1_x", ["true", "x"], Path("/x")))

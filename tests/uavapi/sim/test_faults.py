@@ -159,8 +159,17 @@ def test_what_was_received_is_told_by_index(control):
 
 @pytest.mark.parametrize(
     "line",
-    ["", "[]", "{}", '{"op": "nope"}', '{"op": "fault"}', '{"op": "fault", "name": "nope"}', "7",
-     '{"op": "fault", "name": "refuse", "count": "many"}', '{"op": "fault", "name": "silence", "seconds": -1}'],
+    [
+        "",
+        "[]",
+        "{}",
+        '{"op": "nope"}',
+        '{"op": "fault"}',
+        '{"op": "fault", "name": "nope"}',
+        "7",
+        '{"op": "fault", "name": "refuse", "count": "many"}',
+        '{"op": "fault", "name": "silence", "seconds": -1}',
+    ],
 )
 def test_nonsense_is_answered_with_an_error(control, line):
     answer = json.loads(control._control.handle_line(line))

@@ -67,7 +67,14 @@ def test_position_setpoints_in_global_frames(flying, frame, altitude):
     place = from_ned(flying.copter.estimator.origin, Ned(30.0, 40.0, 0.0))
     flying.send(
         mavlink.MAVLink_set_position_target_global_int_message(
-            0, 1, 1, frame, 0b110111111000, round(place.latitude * 1e7), round(place.longitude * 1e7), altitude,
+            0,
+            1,
+            1,
+            frame,
+            0b110111111000,
+            round(place.latitude * 1e7),
+            round(place.longitude * 1e7),
+            altitude,
             *([0.0] * 8),
         )
     )

@@ -68,9 +68,7 @@ def test_a_taken_port_is_one_line_and_status_1():
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        ended = subprocess.run(
-            [*SIM[:-1], str(port)], capture_output=True, text=True, timeout=10, check=False
-        )
+        ended = subprocess.run([*SIM[:-1], str(port)], capture_output=True, text=True, timeout=10, check=False)
     assert ended.returncode == 1
     assert ended.stderr.count("\n") == 1
     assert str(port) in ended.stderr

@@ -1,0 +1,66 @@
+"""The commands at the prompt that read or write files; each returns the line that is printed.
+
+Raises:
+    OSError: a file cannot be read or written.
+    BadSetting: the words or what is in the files make no sense.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import NoReturn
+
+import cv2
+
+from mavproxy_vision.annotate import annotated
+from mavproxy_vision.calibration import Board, calibrate, save
+from mavproxy_vision.camera import Image
+from mavproxy_vision.errors import BadSetting
+from mavproxy_vision.printing import tag_pdf
+from mavproxy_vision.sighting import Seen
+from mavproxy_vision.tags import Tag
+
+
+class _Words(argparse.ArgumentParser):
+    """A parser that neither prints nor exits: MAVProxy goes on."""
+
+    def error(self, message: str) -> NoReturn:
+        raise BadSetting(f"tag FILE.pdf [--family 36h11] [--id 0] [--size 0.15]: {message}")
+
+
+def calibrated(args: list[str]) -> str:
+    """`FOLDER BOARD [FILE]`: make a camera model of the folder's images."""
+    if len(args) not in (2, 3):
+        raise BadSetting("calibrate FOLDER charuco:7x5:0.03:0.022|chessboard:9x6:0.025 [FILE]")
+    file = Path(args[2] if len(args) == 3 else "camera.json").expanduser()
+    made = calibrate(Path(args[0]).expanduser(), Board.parse(args[1]))
+    save(made.model, file)
+    focal = f"fx {made.model.fx:.1f}, fy {made.model.fy:.1f}"
+    return f"{made.views} views, error {made.error:.2f} px, {focal}; wrote {file}: `vision set calibration {file}`"
+
+
+def snapshot(args: list[str], seen: Seen | None, image: Image | None) -> str:
+    """`FILE`: write the newest frame, with its tags drawn in."""
+    if len(args) != 1:
+        raise BadSetting("snapshot FILE.png")
+    if seen is None or image is None:
+        return "there is no frame yet"
+    file = Path(args[0]).expanduser()
+    good, data = cv2.imencode(file.suffix or ".png", annotated(image, seen, []))
+    if not good:
+        raise BadSetting(f"cannot write {file.suffix} files")
+    file.write_bytes(data.tobytes())
+    return f"wrote {file}"
+
+
+def tag(args: list[str], family: str, main: Tag) -> str:
+    """`FILE.pdf [--family F] [--id N] [--size M]`: write a tag to scale; `main` and `family` are the defaults."""
+    parser = _Words("vision tag", add_help=False)
+    parser.add_argument("file", type=Path)
+    parser.add_argument("--family", default=family)
+    parser.add_argument("--id", type=int, default=main.id)
+    parser.add_argument("--size", type=float, default=main.size)
+    chosen = parser.parse_args(args)
+    chosen.file.expanduser().write_bytes(tag_pdf(chosen.family, chosen.id, chosen.size))
+    return f"wrote {chosen.file}"

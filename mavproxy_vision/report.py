@@ -1,0 +1,34 @@
+"""What a flight tells of itself. Pure data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+
+@dataclass
+class Report:
+    """What a flight tells of itself; see `docs/vision.md`."""
+
+    verb: str
+    method: str = ""
+    tag: int | None = None
+    attempts: int = 0
+    duration: float = 0.0
+    phases: dict[str, float] = field(default_factory=dict)
+    last_offset: float | None = None
+    touchdown_error: float | None = None
+    action: str | None = None
+    reason: str | None = None
+    place: tuple[float, float, float] | None = None
+    track: str | None = None
+    plot: str | None = None
+
+    def told(self) -> dict[str, Any]:
+        """As JSON has it; what is not known is left out, lengths in m, times in s of the vehicle's clock."""
+        rounded = {name: round(value, 2) for name, value in self.phases.items()}
+        members = {**vars(self), "phases": rounded, "duration": round(self.duration, 2)}
+        for name in ("last_offset", "touchdown_error"):
+            if members[name] is not None:
+                members[name] = round(members[name], 3)
+        return {name: value for name, value in members.items() if value is not None and value != ""}
