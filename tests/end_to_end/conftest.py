@@ -39,7 +39,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def eventually(look: Callable[[], Any], timeout: float = PATIENCE, what: str = "it") -> Any:
-    """The first true value of `look`, which is called until then; for other processes, which have no clock of ours."""
+    """The first true value of `look`, called until then; other processes have no clock of ours."""
     deadline = time.monotonic() + timeout
     while True:
         value = look()
@@ -204,7 +204,7 @@ class Rig:
         eventually(up, timeout, "the API's knowing its vehicle")
 
     def be_patient(self) -> None:
-        """Have it stay armed on the ground for longer than ArduPilot's 10 s, which are 1 s of a busy machine's here."""
+        """Have it stay armed on the ground for longer than ArduPilot's 10 s, which are 1 s here, on a busy machine."""
         self.mavproxy.says("Received", timeout=60)  # the parameters, without which MAVProxy sets none
         self.mavproxy.type("param set DISARM_DELAY 120")
 

@@ -167,6 +167,7 @@ def certificate(tmp_path_factory) -> Path:
     return both
 
 
+@pytest.mark.needs("openssl")
 def test_tls_needs_a_certificate_that_is_trusted(rig, harness, certificate):
     station = Recorder(harness.free_port(), certificate)
     try:
