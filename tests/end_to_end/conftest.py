@@ -128,14 +128,14 @@ class Process:
 
     def stop(self) -> None:
         """End it, and all its children."""
+        assert self.popen.stdin is not None
+        with contextlib.suppress(BrokenPipeError):
+            self.popen.stdin.close()  # a MAVProxy that waits for a line heeds its end rather than a signal
         for sign in (signal.SIGTERM, signal.SIGKILL):
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(self.popen.pid, sign)
             with contextlib.suppress(subprocess.TimeoutExpired):
                 self.popen.wait(10)
-        if self.popen.stdin is not None:
-            with contextlib.suppress(BrokenPipeError):
-                self.popen.stdin.close()
 
 
 class Control:
@@ -204,7 +204,7 @@ class Rig:
         eventually(up, timeout, "the API's knowing its vehicle")
 
     def be_patient(self) -> None:
-        """Have it stay armed on the ground for longer than ArduPilot's 10 s, which are 1 s here, on a busy machine."""
+        """Have it stay armed on the ground for longer than ArduPilot's 10 s, which are 1 s here."""
         self.mavproxy.says("Received", timeout=60)  # the parameters, without which MAVProxy sets none
         self.mavproxy.type("param set DISARM_DELAY 120")
 
