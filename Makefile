@@ -7,10 +7,10 @@ INSTALLED := $(VENV)/.installed
 .PHONY: demo test test-sitl lint bench soak clean
 
 demo: $(INSTALLED)
-	$(BIN)/mavproxy-uavapi --simulated $(ARGS)
+	$(BIN)/mavproxy-uavapi --simulated --module 'vision:{"source":"sim"}' $(ARGS)
 
 test: $(INSTALLED)
-	$(BIN)/python -m pytest -m "not sitl" -n 4 --dist loadfile $(ARGS)
+	$(BIN)/python -m pytest -m "not sitl" -n 3 --dist loadfile $(ARGS)
 
 # Against ArduPilot's own simulation: make test-sitl ARDUPILOT_HOME=…
 test-sitl: $(INSTALLED)
@@ -23,7 +23,7 @@ lint: $(INSTALLED)
 	$(BIN)/mypy
 
 bench: $(INSTALLED)
-	for benchmark in benchmarks/bench_*.py; do $(BIN)/python $$benchmark || exit 1; done
+	for benchmark in $(filter-out %_sitl.py,$(wildcard benchmarks/bench_*.py)); do $(BIN)/python $$benchmark || exit 1; done
 
 $(INSTALLED): setup.py pyproject.toml
 	$(PYTHON) -m venv $(VENV)

@@ -367,6 +367,8 @@ class Soak:
         return Usage.of(self._rig.mavproxy.pid)
 
     async def _chaos(self, seconds: float) -> None:
+        for line in ("module load uavapi", "uavapi start"):  # whoever reloads may have been stopped half-way
+            self._rig.mavproxy.type(line)
         trouble = Trouble(self._rig, self._notes, self._dice)
         troubles = [asyncio.ensure_future(one()) for one in (trouble.faults, trouble.pilot, trouble.reloads)]
         await Clients(self._rig.port, self._notes, self._dice).run(seconds)

@@ -65,6 +65,7 @@ class GradysModule(HostedModule):
         """Push and sense."""
         for route in self._routes:
             self.host.extensions[route.path] = route
+        self.host.commands["fly"] = self._fly  # `uavapi fly FILE`
         self._start()
 
     async def end(self) -> None:
@@ -72,6 +73,8 @@ class GradysModule(HostedModule):
         for route in self._routes:
             if self.host.extensions.get(route.path) is route:
                 del self.host.extensions[route.path]
+        if self.host.commands.get("fly") == self._fly:
+            del self.host.commands["fly"]
         await self.gradys.tracks.close()
         await self.gradys.stop()
 
@@ -112,6 +115,9 @@ class GradysModule(HostedModule):
     def _flush(self) -> None:
         self.host.bridge.call_soon(self.gradys.flush)
         print("gradys: everything is tried now; `gradys status` tells what comes of it")
+
+    def _fly(self, args: list[str]) -> None:
+        self._track.command(["fly", *args])
 
     def _tracks(self, args: list[str]) -> None:
         self._track.command(args)

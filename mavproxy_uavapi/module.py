@@ -20,7 +20,7 @@ from mavproxy_uavapi.settings import ModuleSettings, SettingError
 
 NAME = "uavapi"
 COMPLETION = "(UAVAPISETTING)"
-COMPLETIONS = ["<status|start|stop|vehicles|config|log|help>", f"set {COMPLETION}"]
+COMPLETIONS = ["<status|start|stop|vehicles|config|log|help>", f"set {COMPLETION}", "fly (FILENAME)"]
 LOG_SHOWN = 20  # entries
 HELP = """\
 uavapi status            what it listens on, the vehicle that it flies, and the calls in flight
@@ -31,6 +31,7 @@ uavapi set NAME VALUE    change one; it takes effect at once
 uavapi config            the settings in force, and where each came from
 uavapi log [N]           the last N commands: who asked, and how it ended
 uavapi vehicles          every vehicle that was heard
+uavapi fly FILE          fly a recorded track (module gradys)
 uavapi help              this"""
 
 
@@ -48,6 +49,7 @@ class UavApiModule(HostedModule):
             "config": lambda _: print("\n".join(self.api_settings.listing())),
             "log": self._log,
             "vehicles": lambda _: self._tell(vehicles),
+            "fly": self._fly,
             "help": lambda _: print(HELP),
         }
         super().__init__(mpstate, NAME, "HTTP API to fly and watch vehicles", actions, COMPLETIONS)
@@ -112,6 +114,14 @@ class UavApiModule(HostedModule):
             print(f"uavapi: listening on {address}")
             if settings.allow_open and not settings.is_local:
                 print("uavapi: WARNING: allow_open is set: anybody who reaches this port can fly the vehicle")
+
+    def _fly(self, args: list[str]) -> None:
+        """`uavapi fly FILE`: the module that knows tracks flies it."""
+        fly = self.host.commands.get("fly")
+        if fly is None:
+            print("uavapi: fly needs the module that knows tracks: `module load gradys`")
+        else:
+            fly(args)
 
     def _log(self, args: list[str]) -> None:
         try:

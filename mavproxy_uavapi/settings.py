@@ -28,6 +28,7 @@ NOT_OURS: dict[str, set[str]] = {
     "simulated": {"simulated", "ardupilot_path", "location", "gs_connection", "speedup", "headless"},
     "logs": set(),
 }
+NEIGHBOURS = {"gradys", "vision"}  # sections of the other modules, in a file that serves all
 MAVPROXYS = {"uav_connection", "connection_type"}
 UNSET = {"", "None", "[]"}
 PREFIX = "UAVAPI_"  # of the environment variables
@@ -194,6 +195,8 @@ class ModuleSettings:
         except (configparser.Error, UnicodeDecodeError) as error:
             raise SettingError(f"{file}: {' '.join(str(error).split())}") from error
         for section in parser.sections():
+            if section in NEIGHBOURS:
+                continue
             if section not in NOT_OURS:
                 raise SettingError(f"{file}: no section [{section}]; there are {', '.join(NOT_OURS)}")
             for name, value in parser[section].items():

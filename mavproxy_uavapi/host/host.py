@@ -30,6 +30,7 @@ class Host:
         listeners: called with each vehicle message, after the state has taken it and the waits have seen it.
         api_address: where `uavapi` listens; None while it does not.
         extensions: HTTP routes of the other modules, by path; `uavapi` serves them while it is loaded.
+        commands: words after `uavapi` at the prompt that other modules serve.
         newest_frame: gives the newest camera frame as JPEG; None while no module has a camera.
 
     Args:
@@ -49,6 +50,7 @@ class Host:
         self.jobs = JobBook()
         self.listeners: list[Callable[[VehicleState, Any, float], None]] = []
         self.extensions: dict[str, Any] = {}
+        self.commands: dict[str, Callable[[list[str]], None]] = {}
         self.newest_frame: Callable[[], Awaitable[bytes]] | None = None
         self.api_address: tuple[str, int] | None = None
         self.members: list[Any] = []

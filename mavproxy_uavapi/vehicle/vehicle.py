@@ -34,6 +34,7 @@ T = TypeVar("T")
 mavlink = mavutil.mavlink
 
 ARM_TIMEOUT = 90.0  # s until an estimator that does not settle is reported
+REASON_TIME = 2.0  # s of a client's timeout that asking why it is not ready may need
 HEARTBEAT_TIMEOUT = 5.0  # s until a heartbeat must show what was acknowledged
 PARAMETER_ASKINGS = 2
 PARAMETER_TIMEOUT = 1.0  # s; ArduPilot answers a known name at once and an unknown one not at all
@@ -240,7 +241,7 @@ class Vehicle:
         if self.state.armed and not self.state.landed:
             raise ModeChanged(f"the vehicle is flying in {self.mode}; /command/guided takes it over")
         self.seat.take(job)
-        deadline = self.clock() + (timeout or ARM_TIMEOUT)
+        deadline = self.clock() + (max(timeout - REASON_TIME, timeout / 2) if timeout else ARM_TIMEOUT)
         await self._get_ready(lambda: self.has_position, deadline)
         if self.mode != "GUIDED":
             await self.switch_to("GUIDED")

@@ -132,9 +132,9 @@ def page() -> str:
         "request: no setpoint, no mode, no command.",
         "",
         "A flight has been under way for 3 s when the link, the autopilot, the pilot or the client does something;",
-        "the other verbs wait for an acknowledgement then.",
+        "the other verbs wait for an acknowledgement then. Movements go by setpoints, which nobody acknowledges.",
         "",
-        "| fault | what happens | an error comes within |",
+        "| fault | what happens | ends it within, or delays it by |",
         "| --- | --- | --- |",
     ]
     lines += [f"| {name} | {fault.meaning} | {_seconds(fault)} |" for name, fault in FAULTS.items()]

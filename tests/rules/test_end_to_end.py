@@ -35,6 +35,7 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     """A vehicle, and a MAVProxy with the API."""
     made = processes.embedded(tmp_path_factory.mktemp("faults"))
     yield made
+    made.mavproxy.popen.stdin.close()  # MAVProxy may sit in input(), which a signal does not end
     made.stop()
 
 

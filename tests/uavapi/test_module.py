@@ -82,7 +82,11 @@ def test_module_is_what_mavproxy_looks_for(module: Any, mpstate: Any) -> None:
     assert module.name == "uavapi"
     assert module.multi_vehicle
     assert set(mpstate.command_map) == {"uavapi"}
-    assert mpstate.completions["uavapi"] == ["<status|start|stop|vehicles|config|log|help>", "set (UAVAPISETTING)"]
+    assert mpstate.completions["uavapi"] == [
+        "<status|start|stop|vehicles|config|log|help>",
+        "set (UAVAPISETTING)",
+        "fly (FILENAME)",
+    ]
     assert "port" in mpstate.completion_functions["(UAVAPISETTING)"]("")
 
 
