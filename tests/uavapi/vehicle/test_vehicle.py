@@ -66,10 +66,10 @@ def test_arm_of_a_vehicle_that_does_not_get_ready_is_rejected_with_its_reasons(
     loop.pass_time(1.0)
     started = loop.time()
     job = pilotage.start(copter.arm, timeout=10.0)
-    loop.call_later(10.3, drone.say, "PreArm: GPS: no fix")
-    loop.call_later(10.5, drone.say, "PreArm: battery low")
+    loop.call_later(8.3, drone.say, "PreArm: GPS: no fix")
+    loop.call_later(8.5, drone.say, "PreArm: battery low")
     with pytest.raises(
-        Rejected, match=r"not ready to arm after 10 s: PreArm: compass not healthy; PreArm: GPS: n"
+        Rejected, match=r"not ready to arm after 8 s: PreArm: compass not healthy; PreArm: GPS: n"
     ) as e:
         pilotage.result(job)
     assert e.value.statustext == ["PreArm: compass not healthy", "PreArm: GPS: no fix", "PreArm: battery low"]
