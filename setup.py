@@ -9,6 +9,7 @@ MQTT = ["aiomqtt>=2.3"]
 TEST = [
     "pytest>=8",
     "pytest-xdist>=3.5",
+    "pytest-rerunfailures>=14",
     "hypothesis>=6.100",
     "schemathesis>=4",
     "requests>=2.31",
