@@ -50,9 +50,11 @@ def test_environment_file_is_for_us_alone_and_gone_at_once(make_run: MakeRun, st
     run = make_run(LANDS)
     environment = run.path.with_name(run.path.name.replace("_run", "_env"))
     assert environment.stat().st_mode & 0o777 == 0o600
-    started(run)
+    process = started(run)
     eventually(lambda: runs.load(run.path).running)
     assert not environment.exists()
+    process.terminate()  # the runner ends its script; killed it could not
+    process.communicate(timeout=20)
 
 
 def test_stop_is_ctrl_c_first_so_that_the_script_can_land(make_run: MakeRun, started: Any, eventually: Any) -> None:
