@@ -48,9 +48,11 @@ class Case:
 class Bench:
     """One run: the rig and its four cases."""
 
-    def __init__(self, made: Any, forwarding: Forwarding, clients: Clients, bare: Bare, seconds: float) -> None:
+    def __init__(
+        self, made: Any, forwarding: Forwarding, clients: Clients, bare: Bare, options: argparse.Namespace
+    ) -> None:
         self._rig, self._forwarding, self._clients, self._bare = made, forwarding, clients, bare
-        self._seconds = seconds
+        self._seconds, self._rate = options.seconds, options.rate
         self._loaded = True
         self.cases = {name: Case() for name in CASES}
 
@@ -120,6 +122,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=2.0, help="of each case in each round")
     parser.add_argument("--rounds", type=int, default=4)
+    parser.add_argument("--rate", type=int, default=500, help="max_rate; 100000 lifts the limit")
     parser.add_argument("--first", action="store_true", help="run before the machine's other work (root)")
     parser.add_argument("--strict", action="store_true", help="fail when the budget is not kept")
     options = parser.parse_args()
@@ -127,12 +130,12 @@ def main() -> int:
     forwarding, clients, bare = Forwarding(), Clients(), Bare()
     try:
         outs = (f"udp:127.0.0.1:{forwarding.port}",)
-        with rig(outs=outs, streamrate=10, max_rate=100000) as (made, tap):
+        with rig(outs=outs, streamrate=10, max_rate=options.rate) as (made, tap):
             forwarding.attach(tap)
             if options.first:
                 put_first(*(process.pid for process in made.processes))
             fly(made)
-            bench = Bench(made, forwarding, clients, bare, options.seconds)
+            bench = Bench(made, forwarding, clients, bare, options)
             for _ in range(options.rounds):
                 bench.round()
     finally:
