@@ -71,9 +71,8 @@ class Bench:
 
     def _load_module(self, wanted: bool) -> None:
         if wanted and not self._loaded:
-            self._rig.mavproxy.ask(
-                f'module load uavapi:{{"port":{self._rig.port},"max_rate":100000}}', "listening on"
-            )
+            given = f'{{"port":{self._rig.port},"max_rate":{self._rate}}}'
+            self._rig.mavproxy.ask(f"module load uavapi:{given}", "listening on")
             self._rig.wait_until_up()
         elif self._loaded and not wanted:
             self._rig.mavproxy.ask("module unload uavapi", "Unloaded")
