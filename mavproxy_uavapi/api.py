@@ -48,6 +48,15 @@ class Api:
         self._freshness = asyncio.create_task(Freshness(self.host.hangar, settings.sysid).run())
         self._finding_scripts = asyncio.create_task(server.service.scripts.start())
 
+    async def renew(self, settings: Settings) -> None:
+        """Take up settings that need no other listening (`Settings.listens_as`): what is in flight goes on."""
+        if self._server is None:
+            return
+        self.host.link_timeout = settings.link_timeout
+        service = self._server.service
+        service.settings = settings
+        service.scripts.renew(settings)
+
     async def stop(self) -> None:
         """Close the port and end what is in flight."""
         server, self._server = self._server, None

@@ -6,6 +6,7 @@ errors always show in the console.
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import logging.handlers
 import queue
@@ -78,6 +79,29 @@ class _Console(logging.Handler):
         self._say(self.format(record))
 
 
+class _File(logging.handlers.RotatingFileHandler):
+    """The log file. A disk that takes no more is told of once, on the console, and is tried again each time."""
+
+    def __init__(self, file: Path, say: Callable[[str], None]) -> None:
+        super().__init__(file, maxBytes=FILE_BYTES, backupCount=FILES_KEPT, encoding="utf-8")
+        self._say = say
+        self._failing = self._failed = False
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self._failing = False
+        super().emit(record)
+        self._failed = self._failing
+
+    def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802  logging's own name
+        self._failing = True
+        if not self._failed:
+            self._say(f"API: cannot write {self.baseFilename}: {sys.exc_info()[1]}")
+
+    def close(self) -> None:
+        with contextlib.suppress(OSError):  # what the disk did not take; it was told of
+            super().close()
+
+
 class Logs:
     """The handlers that are in force, from `open` to `close`.
 
@@ -100,15 +124,16 @@ class Logs:
             system: the vehicle's system id.
 
         Raises:
-            OSError: the file cannot be written.
+            OSError: the file cannot be written; what was in force stays so.
         """
+        file = _File(log_file(path, system), self._say) if path else None
         self.close()
         shown = _Console(self._say)
         shown.addFilter(_Named(console))
         shown.setFormatter(logging.Formatter("%(component)s: %(message)s"))
         self._handlers = [shown]
-        if path:
-            self._handlers.append(self._to_file(log_file(path, system)))
+        if file is not None:
+            self._handlers.append(self._to_file(file))
         for root in ROOTS:
             logger = logging.getLogger(root)
             logger.setLevel(logging.INFO)
@@ -119,9 +144,8 @@ class Logs:
             for name in names:
                 logging.getLogger(name).setLevel(logging.DEBUG if component in debug else logging.INFO)
 
-    def _to_file(self, file: Path) -> logging.Handler:
+    def _to_file(self, writer: logging.Handler) -> logging.Handler:
         """A handler that only queues; a thread of its own writes, so that no disk holds anybody up."""
-        writer = logging.handlers.RotatingFileHandler(file, maxBytes=FILE_BYTES, backupCount=FILES_KEPT)
         writer.setFormatter(logging.Formatter(FORMAT))
         records: queue.SimpleQueue[logging.LogRecord] = queue.SimpleQueue()
         handler = logging.handlers.QueueHandler(records)
@@ -148,7 +172,7 @@ class Logs:
 def log_file(path: str, system: int) -> Path:
     """The log file that `path` means: itself, or `uav_<system>.log` in it when it is a folder."""
     given = Path(path).expanduser()
-    if given.is_dir() or not given.suffix:
+    if given.is_dir() or not (given.suffix or given.exists()):
         given.mkdir(parents=True, exist_ok=True)
         return given / f"uav_{system}.log"
     given.parent.mkdir(parents=True, exist_ok=True)

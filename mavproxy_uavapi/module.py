@@ -16,7 +16,7 @@ from mavproxy_uavapi.audit import Audit
 from mavproxy_uavapi.console import address_of, report, vehicles
 from mavproxy_uavapi.host.member import HostedModule
 from mavproxy_uavapi.logs import Logs, print_above_prompt
-from mavproxy_uavapi.settings import ModuleSettings, SettingError
+from mavproxy_uavapi.settings import ModuleSettings, SettingError, Settings
 
 NAME = "uavapi"
 COMPLETION = "(UAVAPISETTING)"
@@ -143,7 +143,8 @@ class UavApiModule(HostedModule):
     def _set(self, args: list[str]) -> None:
         if len(args) < 2:
             wanted = args[0] if args else ""
-            print("\n".join(line for line in self.api_settings.listing() if line.startswith(wanted)))
+            found = [line for line in self.api_settings.listing() if line.startswith(wanted)]
+            print("\n".join(found) or f"uavapi: no setting {wanted!r}")
             return
         before = self.api_settings.snapshot()
         try:
@@ -151,9 +152,22 @@ class UavApiModule(HostedModule):
         except SettingError as error:
             print(f"uavapi: {error}")
             return
-        if self.api_settings.snapshot() != before and self._begun and self._wanted:
-            self.host.bridge.run(self.api.stop())
-            self._start()
+        after = self.api_settings.snapshot()
+        if after == before or not self._begun or not self._wanted:
+            return
+        if after.listens_as(before):
+            self._renew(after)
+            return
+        self.host.bridge.run(self.api.stop())
+        self._start()
+
+    def _renew(self, settings: Settings) -> None:
+        """Take up settings without ending what is in flight."""
+        try:
+            self.logs.open(settings.log_console, settings.debug, settings.log_path, settings.sysid)
+        except OSError as error:
+            print(f"uavapi: cannot open {error.filename}: {error.strerror}; the logs stay as they were")
+        self.host.bridge.run(self.api.renew(settings))
 
 
 def log_directory(mpstate: Any) -> Path | None:

@@ -21,17 +21,34 @@ from mavproxy_uavapi.logs import components
 
 Network = ipaddress.IPv4Network | ipaddress.IPv6Network
 
-# Keys that an INI file of the original service, or of the launcher, may have and that are not the module's:
-# MAVProxy has the link, the launcher starts what is simulated.
-NOT_OURS: dict[str, set[str]] = {
-    "api": {"uav_connection", "connection_type", "gradys_gs", "vehicle"},
-    "simulated": {"simulated", "ardupilot_path", "location", "gs_connection", "speedup", "headless"},
-    "logs": set(),
+# Keys that an INI file of the original service, or of the launcher, may have and that are not the module's,
+# with the reason; a line tells of each.
+LAUNCHERS = "`mavproxy-uavapi --config` starts simulated vehicles"
+NOT_OURS: dict[str, dict[str, str]] = {
+    "api": {
+        "uav_connection": "MAVProxy has the link (--master)",
+        "connection_type": "MAVProxy has the link (--master)",
+        "gradys_gs": "the module gradys reads it from here (`module load gradys`, with this file as its config)",
+        "vehicle": "the vehicle tells its type itself",
+        "udp": "there is no HTTP/3",
+    },
+    "simulated": {
+        "simulated": LAUNCHERS,
+        "ardupilot_path": LAUNCHERS,
+        "location": LAUNCHERS,
+        "speedup": LAUNCHERS,
+        "headless": LAUNCHERS,
+        "gs_connection": "MAVProxy forwards to ground stations (--out)",
+    },
+    "logs": {},
 }
 NEIGHBOURS = {"gradys", "vision"}  # sections of the other modules, in a file that serves all
-MAVPROXYS = {"uav_connection", "connection_type"}
+# What an API takes up by listening anew: its address, its vehicle, and who may call.
+ACCESS = ("token", "allow_from", "allow_open", "cors_origins")
+LISTENING = ("host", "port", "sysid", "certfile", "keyfile", *ACCESS)
 UNSET = {"", "None", "[]"}
 PREFIX = "UAVAPI_"  # of the environment variables
+DEFAULT = "default"  # where a value came from that nobody set
 ON_SCRIPT_EXIT = ("nothing", "hold", "land", "rtl")
 SECRET = "token"  # kept out of listings, logs and the process list
 
@@ -99,6 +116,10 @@ class Settings:
         """Whether only this machine can call."""
         return is_loopback(self.host)
 
+    def listens_as(self, other: Settings) -> bool:
+        """Whether an API that runs by the other ones can take these up as it runs."""
+        return all(getattr(self, name) == getattr(other, name) for name in LISTENING)
+
     def check(self) -> None:
         """Refuse combinations that would let anybody fly the vehicle, or that cannot work.
 
@@ -147,7 +168,8 @@ class ModuleSettings:
     """The settings of the loaded module: validated, whichever way they come in.
 
     Args:
-        given: keywords of `module load`; `config` names an INI file.
+        given: keywords of `module load`; `config` names an INI file, and `origins` tells by setting where the
+            launcher had the others from.
         environ: the environment.
 
     Raises:
@@ -161,6 +183,7 @@ class ModuleSettings:
         self._token = ""
         given = dict(given or {})
         config = given.pop("config", None)
+        self._told_origins: Mapping[str, str] = given.pop("origins", {})
         if config is not None:
             self.load(Path(str(config)).expanduser())
         for name in self.names():
@@ -168,7 +191,7 @@ class ModuleSettings:
             if value is not None:
                 self._take(name, value, "environment")
         for name, value in given.items():
-            self._take(name, value, "module load")
+            self._take(name, value, self._told_origins.get(name, "module load"))
         self.snapshot().check()
 
     def names(self) -> list[str]:
@@ -205,12 +228,13 @@ class ModuleSettings:
     def _take_key(self, file: Path, section: str, name: str, value: str) -> None:
         if value in UNSET:
             return
-        if name in MAVPROXYS:
-            self.notes.append(f"{file}: {name} is ignored here, MAVProxy has the link (--master)")
-        elif name not in NOT_OURS[section]:
+        why_not = NOT_OURS[section].get(name)
+        if why_not is not None:
+            self.notes.append(f"{file}: {name} is ignored here, {why_not}")
+        else:
             if section == "simulated" or name not in self.names():
                 raise SettingError(f"{file}: no key {name!r} in [{section}]{self._hint(name)}")
-            self._take(name, value, str(file))
+            self._take(name, value, self._told_origins.get(name, str(file)))
 
     def set(self, name: str, value: Any) -> None:
         """Set one at the prompt; a value that must not be leaves everything as it was.
@@ -219,11 +243,12 @@ class ModuleSettings:
             SettingError: unknown, of the wrong type, out of range, or against the others.
         """
         before = self._token if name == SECRET else self.mp.get(name) if name in self.mp.list() else None
+        origin = self.origins.get(name, DEFAULT)
         self._take(name, value, "uavapi set")
         try:
             self.snapshot().check()
         except SettingError:
-            self._take(name, before, self.origins[name])
+            self._take(name, before, origin)
             raise
 
     def _take(self, name: str, value: Any, origin: str) -> None:
@@ -258,7 +283,7 @@ class ModuleSettings:
         """A line for each setting: its value and where that came from; the token is not shown."""
         shown = {name: self.mp.get(name) for name in self.mp.list()}
         shown[SECRET] = "(set)" if self._token else ""
-        return [f"{name:14} {shown[name]!s:24} {self.origins.get(name, 'default')}" for name in self.names()]
+        return [f"{name:14} {shown[name]!s:24} {self.origins.get(name, DEFAULT)}" for name in self.names()]
 
 
 def _parse(name: str, value: Any) -> Any:

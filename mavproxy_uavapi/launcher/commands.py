@@ -14,6 +14,7 @@ from pathlib import Path
 
 from mavproxy_uavapi.launcher.locations import Home
 from mavproxy_uavapi.launcher.options import Options
+from mavproxy_uavapi.settings import DEFAULT, ModuleSettings
 
 # What makes run_in_terminal_window.sh put the vehicle into a window, a tmux server or a screen that is not
 # our child. Without them it runs in the background, where we can end it.
@@ -65,12 +66,19 @@ def master(options: Options, instance: int | None) -> str:
 def module_loads(options: Options, config: Path | None) -> list[str]:
     """One `module load` command per module."""
     settings: dict[str, object] = {"host": options.host, "port": options.port, "sysid": options.sysid}
+    names = ModuleSettings.all_names()
+    settings["origins"] = {
+        **dict.fromkeys(settings, DEFAULT),
+        **{name: origin for name, origin in options.origins.items() if name in names},
+    }
     if config is not None:
         settings["config"] = str(config)
     loads = [module_load("uavapi", settings)]
-    if options.gradys_gs is not None:
-        loads.append(module_load("gradys", {"gs": options.gradys_gs}))
-    return loads + [f"module load {name}" for name in options.module]
+    gradys = {"config": options.gradys_config, "gs": options.gradys_gs}
+    given = {name: value for name, value in gradys.items() if value is not None}
+    if given:
+        loads.append(module_load("gradys", given))
+    return loads + [f"module load {name}" for name in options.module if not (given and name == "gradys")]
 
 
 def module_load(name: str, settings: Mapping[str, object]) -> str:

@@ -25,7 +25,7 @@ def split_log_path(log_path: str | None, sysid: int) -> tuple[Path, str | None]:
     if log_path is None:
         return state_root(), None
     given = Path(log_path).expanduser().absolute()
-    if given.suffix and not given.is_dir():
+    if given.suffix and not given.is_dir() or given.is_file():
         return given.parent, str(given)
     return given, str(given / f"uav_{sysid}.log")
 

@@ -13,6 +13,7 @@ from pathlib import Path
 import mavproxy_uavapi
 from mavproxy_uavapi.launcher.commands import WINDOW_VARIABLES
 from mavproxy_uavapi.launcher.errors import LaunchError
+from mavproxy_uavapi.launcher.options import VARIABLES
 
 
 def mavproxy_program() -> list[str]:
@@ -37,7 +38,7 @@ def ardupilot_python() -> str:
 
 
 def for_python(environ: Mapping[str, str]) -> dict[str, str]:
-    """The environment for MAVProxy, the embedded vehicle and the watchdog.
+    """The environment for the embedded vehicle and the watchdog, and most of MAVProxy's.
 
     Out of a checkout that is not installed they would not find our modules. What they print must reach
     their logs at once: that is where we look for the vehicle's being ready.
@@ -47,6 +48,14 @@ def for_python(environ: Mapping[str, str]) -> dict[str, str]:
     if (root / "setup.py").is_file():
         env["PYTHONPATH"] = os.pathsep.join(filter(None, (str(root), environ.get("PYTHONPATH"))))
     return env
+
+
+def for_mavproxy(environ: Mapping[str, str]) -> dict[str, str]:
+    """The environment for MAVProxy: without the settings that we read already and hand over.
+
+    The module would take them from its environment, over what the command line said.
+    """
+    return {name: value for name, value in for_python(environ).items() if name not in VARIABLES}
 
 
 def for_sim_vehicle(environ: Mapping[str, str], run_dir: Path) -> dict[str, str]:

@@ -11,7 +11,7 @@ import configparser
 import os
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -24,7 +24,12 @@ from mavproxy_uavapi.settings import ModuleSettings, SettingError
 class Options:
     """What to start. `None` and empty tuples mean "not given".
 
-    `further` are settings of the `uavapi` module that the file has and the command line does not know.
+    Attributes:
+        further: settings of the `uavapi` module that the file has and the command line does not know.
+        gradys_config: the file, where it has a section for the module `gradys`, which reads it itself.
+        origins: where each option came from: the file's name, "environment" or "command line"; none for a default.
+
+    The others are the rows of TABLE.
     """
 
     port: int = 8000
@@ -48,6 +53,8 @@ class Options:
     script_logs: str | None = None
     module: tuple[str, ...] = ()
     further: tuple[tuple[str, str], ...] = ()
+    gradys_config: str | None = None
+    origins: Mapping[str, str] = field(default_factory=dict, compare=False)
     mavproxy_args: tuple[str, ...] = ()
 
 
@@ -106,7 +113,9 @@ TABLE = (
     Row("script_logs", "logs", path, "directory for the output of uploaded scripts"),
 )
 PREFIX = "UAVAPI_"  # of the environment variables
+VARIABLES = {PREFIX + row.name.upper(): row for row in TABLE}
 SECTIONS = frozenset(row.section for row in TABLE)
+GRADYS = "gradys"  # a module that has a section of its own
 
 
 class _Parser(argparse.ArgumentParser):
@@ -147,7 +156,10 @@ def parse(argv: Sequence[str], environ: Mapping[str, str] | None = None) -> Opti
     given = vars(build_parser().parse_args(arguments[:cut]))
     config = given.pop("config", None)
     merged = read_ini(Path(config).expanduser()) if config is not None else {}
-    merged.update(read_environment(os.environ if environ is None else environ))
+    origins = dict.fromkeys([*merged, *dict(merged.get("further", ()))], str(config))
+    from_environment = read_environment(os.environ if environ is None else environ)
+    merged.update(from_environment)
+    origins.update(dict.fromkeys(from_environment, "environment"))
     merged["module"] = tuple(name for text in given.pop("module", ()) for name in _read_module(text))
     for row in TABLE:
         if row.name in given:
@@ -157,7 +169,8 @@ def parse(argv: Sequence[str], environ: Mapping[str, str] | None = None) -> Opti
                 merged.pop(row.name, None)
             else:
                 merged[row.name] = row.read(text, f"--{row.name}")
-    options = Options(**merged, mavproxy_args=tuple(arguments[cut + 1 :]))
+                origins[row.name] = "command line"
+    options = Options(**merged, mavproxy_args=tuple(arguments[cut + 1 :]), origins=origins)
     check(options)
     return options
 
@@ -175,10 +188,9 @@ def read_environment(environ: Mapping[str, str]) -> dict[str, Any]:
     Raises:
         OptionError: a value is wrong.
     """
-    names = {PREFIX + row.name.upper(): row for row in TABLE}
     return {
         row.name: row.read(environ[variable], variable)
-        for variable, row in names.items()
+        for variable, row in VARIABLES.items()
         if not values.is_unset(environ.get(variable, ""))
     }
 
@@ -203,6 +215,9 @@ def read_ini(file: Path) -> dict[str, Any]:
     found: dict[str, Any] = {}
     if parser.has_section("simulated"):
         found["simulated"] = True
+    if parser.has_section(GRADYS):
+        found["gradys_config"] = str(file.absolute())
+        parser.remove_section(GRADYS)
     for section in parser.sections():
         if section not in SECTIONS:
             raise OptionError(f"--config {file}: unknown section [{section}]")
@@ -217,11 +232,24 @@ def _read_section(file: Path, section: str, texts: Mapping[str, str]) -> dict[st
     for key, text in texts.items():
         if key in ModuleSettings.all_names() and key not in rows and section != "simulated":
             continue
+        if key == "udp" and (values.is_unset(text) or not _read_udp(file, text)):
+            continue
         if key not in rows:
             raise OptionError(f"--config {file}: unknown key {key!r} in [{section}]")
         if not values.is_unset(text):
             found[key] = rows[key].read(text, f"--config {file}: {key} in [{section}]")
     return found
+
+
+def _read_udp(file: Path, text: str) -> bool:
+    """The original service's switch for HTTP/3; always False.
+
+    Raises:
+        OptionError: it is on, or no switch.
+    """
+    if Row("udp", "api", values.boolean, "").read(text, f"--config {file}: udp"):
+        raise OptionError(f"--config {file}: udp: there is no HTTP/3 here; certfile and keyfile switch to TLS")
+    return False
 
 
 def _modules_own(file: Path, parser: configparser.ConfigParser) -> tuple[tuple[str, str], ...]:

@@ -171,7 +171,7 @@ class Supervisor:
         to_file = self.options.headless and not self.options.log_console
         self.mavproxy = await self._start(
             command,
-            environment.for_python(os.environ),
+            environment.for_mavproxy(os.environ),
             "mavproxy.log" if to_file else None,
             own_terminal=not self.options.headless,
         )

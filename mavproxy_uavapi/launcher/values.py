@@ -6,19 +6,14 @@ import math
 import re
 from collections.abc import Callable
 
+from mavproxy_uavapi import logs
+
 TRUE = frozenset({"true", "yes", "on", "1"})
 FALSE = frozenset({"false", "no", "off", "0"})
 UNSET = frozenset({"", "none", "[]"})
 
-# The names of the original service on the left, those of the logs here on the right.
-LOG_COMPONENTS = {
-    "COPTER": "COPTER",
-    "VEHICLE": "COPTER",
-    "API": "API",
-    "UVICORN": "API",
-    "SCRIPT": "API",
-    "GRADYS_GS": "GRADYS_GS",
-}
+# The names that may be written, those of the original service too, and the components that they stand for.
+LOG_COMPONENTS = {**{name: name for name in logs.COMPONENTS}, **logs.ALIASES}
 _MODULE = re.compile(r"[A-Za-z_]\w*(:\{[^;\s]*\})?")
 
 

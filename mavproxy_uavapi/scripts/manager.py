@@ -36,6 +36,13 @@ class Scripts:
 
     def __init__(self, host: Host, settings: Settings) -> None:
         self._host = host
+        self.renew(settings)
+        self._watched: dict[str, Run] = {}
+        self._watches: dict[str, asyncio.Task[None]] = {}
+        self._launching = asyncio.Lock()
+
+    def renew(self, settings: Settings) -> None:
+        """Take up other settings. Scripts that run go on as they were started."""
         self._settings = settings
         self.store = Store(
             Path(settings.scripts_path).expanduser().absolute(),
@@ -43,9 +50,6 @@ class Scripts:
             settings.script_quota * 1024 * 1024,
         )
         self.logs = Path(settings.script_logs).expanduser().absolute()
-        self._watched: dict[str, Run] = {}
-        self._watches: dict[str, asyncio.Task[None]] = {}
-        self._launching = asyncio.Lock()
 
     # -- life ---------------------------------------------------------------------------------------------
 

@@ -55,8 +55,8 @@ def ini(tmp_path, text):
 
 
 def test_the_table_and_the_options_name_the_same_things():
-    table = {row.name for row in options.TABLE} | {"module", "mavproxy_args", "further"}
-    assert table == {field.name for field in dataclasses.fields(Options)}
+    others = {"module", "mavproxy_args", "further", "gradys_config", "origins"}
+    assert {row.name for row in options.TABLE} | others == {field.name for field in dataclasses.fields(Options)}
 
 
 def test_defaults_are_those_of_the_original_service():
@@ -116,7 +116,7 @@ def test_file_of_the_original_service_loads(tmp_path):
         simulated=True,
         speedup=5.0,
         gs_connection=("192.168.1.5:14550", "192.168.1.6:14550"),
-        log_console=("COPTER", "API"),
+        log_console=("COPTER", "API", "SCRIPT"),
     )
 
 
@@ -237,7 +237,9 @@ def test_mavproxy_command_for_a_real_vehicle():
         *("mavproxy.py", "--master=udpin:127.0.0.1:17171", "--target-system=3", "--logfile=/run/mav.tlog")
     ]
     loads = [word.removeprefix("--cmd=") for word in line if word.startswith("--cmd=")]
-    assert as_mavproxy_reads(loads[0]) == ("uavapi", {"host": "127.0.0.1", "port": 8001, "sysid": 3})
+    default = {"host": "default", "port": "default", "sysid": "default"}
+    expected = {"host": "127.0.0.1", "port": 8001, "sysid": 3, "origins": default}
+    assert as_mavproxy_reads(loads[0]) == ("uavapi", expected)
     assert as_mavproxy_reads(loads[1]) == ("gradys", {"gs": "10.0.2.5:8000"})
     assert loads[2] == "module load vision"
     assert line[-1] == "--map"
@@ -295,7 +297,7 @@ def test_token_is_on_no_command_line_and_in_no_greeting(monkeypatch):
         commands.settings_file(given) or "",
     ]
     assert "very-secret" not in " ".join(lines)
-    assert environment.for_python(os.environ)["UAVAPI_TOKEN"] == "very-secret"
+    assert environment.for_mavproxy(os.environ)["UAVAPI_TOKEN"] == "very-secret"
 
 
 def test_greeting_has_three_lines_to_try_for_a_simulated_vehicle():
@@ -643,3 +645,42 @@ def test_the_environment_stands_between_file_and_command_line(tmp_path: Path) ->
     file.write_text("[api]\nport = 8005\nsysid = 5\n", encoding="utf-8")
     read = parse(["--config", str(file), "--sysid", "7"], environ={"UAVAPI_PORT": "8006", "UAVAPI_SYSID": "6"})
     assert (read.port, read.sysid) == (8006, 7)
+
+
+def test_module_is_told_where_each_setting_came_from(tmp_path: Path) -> None:
+    file = tmp_path / "uav.ini"
+    file.write_text("[api]\nport = 8005\nsysid = 5\nscript_grace = 20\n", encoding="utf-8")
+    read = parse(["--config", str(file), "--sysid", "7"], environ={"UAVAPI_LOG_PATH": "/l/u.log"})
+    name, given = as_mavproxy_reads(commands.module_loads(read, Path("/run/uavapi.ini"))[0])
+    assert name == "uavapi"
+    assert given["origins"] == {
+        "host": "default",
+        "port": str(file),
+        "sysid": "command line",
+        "script_grace": str(file),
+        "log_path": "environment",
+    }
+
+
+def test_environment_that_was_read_does_not_come_back_over_the_command_line() -> None:
+    given = {"UAVAPI_SCRIPTS_PATH": "/e", "UAVAPI_PORT": "1", "UAVAPI_SCRIPT_GRACE": "20", "UAVAPI_TOKEN": "t"}
+    passed = environment.for_mavproxy(given)
+    assert {name for name in passed if name.startswith("UAVAPI_")} == {"UAVAPI_SCRIPT_GRACE", "UAVAPI_TOKEN"}
+
+
+def test_section_of_the_module_gradys_is_its_own_to_read(tmp_path: Path) -> None:
+    file = tmp_path / "uav.ini"
+    file.write_text("[api]\ngradys_gs = 10.0.2.5:8000\n[gradys]\nperiod = 2\n", encoding="utf-8")
+    read = parse(["--config", str(file), "--module", "gradys,vision"], environ={})
+    loads = commands.module_loads(read, None)
+    assert as_mavproxy_reads(loads[1]) == ("gradys", {"config": str(file), "gs": "10.0.2.5:8000"})
+    assert loads[2:] == ["module load vision"]
+
+
+def test_http3_of_the_original_service_may_be_off_only(tmp_path: Path) -> None:
+    file = tmp_path / "uav.ini"
+    file.write_text("[api]\nudp = false\n", encoding="utf-8")
+    parse(["--config", str(file)], environ={})
+    file.write_text("[api]\nudp = true\n", encoding="utf-8")
+    with pytest.raises(OptionError, match="there is no HTTP/3"):
+        parse(["--config", str(file)], environ={})

@@ -6,6 +6,7 @@ import logging
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -78,3 +79,35 @@ def test_nothing_is_left_behind(logs: Logs, said: list[str], tmp_path: Path) -> 
     logging.getLogger("uavapi.http").warning("after")
     assert said == ["API: once"]
     assert logging.getLogger("uavapi").handlers == []
+
+
+def test_file_that_cannot_be_opened_leaves_the_logs_as_they_were(logs: Logs, said: list[str], tmp_path: Path) -> None:
+    logs.open(frozenset({"API"}), frozenset(), str(tmp_path / "uav.log"), 1)
+    (tmp_path / "file").touch()
+    with pytest.raises(OSError, match="file"):
+        logs.open(frozenset(), frozenset(), str(tmp_path / "file" / "uav.log"), 1)
+    logging.getLogger("uavapi.http").info("still here")
+    logs.close()
+    assert said == ["API: still here"]
+    assert "still here" in (tmp_path / "uav.log").read_text(encoding="utf-8")
+
+
+def test_full_disk_is_told_of_once_and_breaks_nothing(logs: Logs, said: list[str], capsys: Any) -> None:
+    logs.open(frozenset(), frozenset(), "/dev/full", 1)
+    for _ in range(3):
+        logging.getLogger("uavapi.http").info("a request")
+    logs.close()
+    assert len(said) == 1 and "cannot write /dev/full: [Errno 28]" in said[0]
+    assert capsys.readouterr().err == ""
+
+
+def test_file_is_rotated(logs: Logs, tmp_path: Path, monkeypatch: Any) -> None:
+    monkeypatch.setattr("mavproxy_uavapi.logs.FILE_BYTES", 1000)
+    logs.open(frozenset(), frozenset(), str(tmp_path / "uav.log"), 1)
+    for number in range(200):
+        logging.getLogger("uavapi.http").info("request %d", number)
+    logs.close()
+    files = sorted(file.name for file in tmp_path.iterdir())
+    assert files == ["uav.log", "uav.log.1", "uav.log.2", "uav.log.3"]
+    assert all(file.stat().st_size <= 1000 for file in tmp_path.iterdir())
+    assert "request 199" in (tmp_path / "uav.log").read_text(encoding="utf-8")

@@ -323,3 +323,26 @@ def test_unload_takes_its_descriptors_back_from_a_host_that_goes_on(
         assert not listens(port)
     assert len(other.host.bridge._open_sockets) == before
     assert other.host.bridge.running
+
+
+def test_setting_that_needs_no_other_listening_leaves_calls_in_flight_alone(
+    module: Any, main_loop: Any, port: int, msg: Any, tmp_path: Any, capsys: Any
+) -> None:
+    answers: list[Any] = []
+    module.mavlink_packet(msg("heartbeat"))
+    main_loop.until(lambda: 1 in module.host.fleet.vehicles)
+    client = threading.Thread(target=lambda: answers.append(ask(port, "/command/arm")))
+    client.start()
+    main_loop.until(module.host.jobs.running)
+    module.command(["set", "debug", "COPTER"])
+    module.command(["set", "script_grace", "3"])
+    (tmp_path / "file").touch()
+    module.command(["set", "log_path", str(tmp_path / "file" / "uav.log")])
+    assert "the logs stay as they were" in capsys.readouterr().out
+    assert len(module.host.jobs.running()) == 1 and answers == []
+    assert module.api._server.service.settings.script_grace == 3
+    module.command(["set", "max_rate", "1"])
+    assert listens(port)
+    module.command(["stop"])
+    client.join(5.0)
+    assert answers[0][1]["code"] == "aborted"

@@ -146,3 +146,52 @@ def test_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
 
 def test_percent_signs_are_taken_as_they_are(ini: Any) -> None:
     assert ModuleSettings({"config": ini("[logs]\nscript_logs = /tmp/%Y\n")}).snapshot().port == 8000
+
+
+def origins(settings: ModuleSettings) -> dict[str, str]:
+    return {line.split()[0]: line.split()[-1] for line in settings.listing()}
+
+
+def test_later_origins_win_and_each_is_told(ini: Any) -> None:
+    file = ini("[api]\nport = 8001\nmax_age = 1\nscript_grace = 1\nlink_timeout = 1\n")
+    environ = {"UAVAPI_MAX_AGE": "2", "UAVAPI_SCRIPT_GRACE": "2", "UAVAPI_LINK_TIMEOUT": "2"}
+    settings = ModuleSettings({"config": file, "script_grace": 3, "link_timeout": 3}, environ)
+    settings.set("link_timeout", 4)
+    now = settings.snapshot()
+    assert (now.port, now.max_age, now.script_grace, now.link_timeout) == (8001, 2, 3, 4)
+    told = origins(settings)
+    assert (told["host"], told["port"], told["max_age"]) == ("default", file, "environment")
+    assert (told["script_grace"], told["link_timeout"]) == ("load", "set")  # `module load`, `uavapi set`
+
+
+def test_launcher_tells_where_it_had_them_from(ini: Any) -> None:
+    given = {"config": ini("[api]\nscript_grace = 1\n"), "port": 8001, "sysid": 3}
+    given["origins"] = {"port": "uav.ini", "script_grace": "uav.ini", "max_age": "uav.ini"}
+    told = origins(ModuleSettings(given, {"UAVAPI_MAX_AGE": "2"}))
+    assert (told["port"], told["script_grace"], told["max_age"]) == ("uav.ini", "uav.ini", "environment")
+
+
+def test_refused_value_leaves_the_origin_as_it_was() -> None:
+    settings = ModuleSettings()
+    with pytest.raises(SettingError, match="anybody on that network"):
+        settings.set("host", "0.0.0.0")
+    assert origins(settings)["host"] == "default"
+
+
+def test_each_key_that_is_ignored_is_told_of_in_one_line(ini: Any) -> None:
+    keys = {"api": ["uav_connection", "connection_type", "gradys_gs", "vehicle", "udp"]}
+    keys["simulated"] = ["simulated", "ardupilot_path", "location", "speedup", "headless", "gs_connection"]
+    file = ini("".join(f"[{section}]\n" + "".join(f"{name} = 1\n" for name in keys[section]) for section in keys))
+    notes = ModuleSettings({"config": file}).notes
+    assert [note.removeprefix(f"{file}: ").split()[0] for note in notes] == [*keys["api"], *keys["simulated"]]
+    assert notes[0].endswith("uav_connection is ignored here, MAVProxy has the link (--master)")
+
+
+def test_what_is_listened_on_and_who_may_call_needs_listening_anew() -> None:
+    settings = ModuleSettings()
+    before = settings.snapshot()
+    settings.set("script_grace", 3)
+    settings.set("log_console", "API")
+    assert settings.snapshot().listens_as(before)
+    settings.set("token", "secret")
+    assert not settings.snapshot().listens_as(before)
