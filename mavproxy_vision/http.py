@@ -91,9 +91,9 @@ class Pages:
             Route("/vision/frame.jpg", self.frame, Empty),
             Route("/vision/stream.mjpg", self.stream, StreamRequest),
             Route("/vision/frame", self.post_frame, FrameRequest, POST, raw=True),
-            Route("/vision/land", self.land, LandRequest, POST),
-            Route("/vision/search", self.search, SearchRequest, POST),
-            Route("/vision/mission", self.mission, MissionRequest, POST),
+            Route("/vision/land", self.land, LandRequest, POST, job=True),
+            Route("/vision/search", self.search, SearchRequest, POST, job=True),
+            Route("/vision/mission", self.mission, MissionRequest, POST, job=True),
             Route("/vision/stop", self.stop, Empty, EITHER),
         ]
 

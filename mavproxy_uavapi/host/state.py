@@ -14,6 +14,8 @@ mavlink = mavutil.mavlink
 
 RATE_SMOOTHING = 0.2  # weight of the newest interval in the smoothed rate
 STATUSTEXTS_KEPT = 200
+CHUNK = 50  # characters of a full chunk of a STATUSTEXT
+CHUNK_TIMEOUT = 2.0  # s after which the chunks of a text that are missing are taken as lost
 RECENT = 5.0  # s before the newest heartbeat; a state that was told earlier is the present one no more
 SEQUENCE_REORDER = 128  # a step back of less than this is a message out of order, not a loss
 FAILING = {mavlink.MAV_STATE_CRITICAL, mavlink.MAV_STATE_EMERGENCY}
@@ -65,6 +67,30 @@ class StatusText:
 
 
 @dataclass
+class ChunkedText:
+    """A STATUSTEXT of more than 50 characters, which comes in chunks: MAV_SEVERITY, and when the newest came (s)."""
+
+    severity: int
+    heard_at: float = 0.0
+    _chunks: dict[int, str] = field(default_factory=dict)
+
+    def add(self, number: int, text: str, now: float) -> None:
+        """Take chunk `number`, from 0."""
+        self._chunks[number], self.heard_at = text, now
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether its last chunk, the one that is not full, is here; a chunk before it may be lost."""
+        return len(self._chunks[max(self._chunks)]) < CHUNK
+
+    def __str__(self) -> str:
+        """What is here of it, with one … for chunks in a row that are lost."""
+        numbers = sorted(self._chunks)
+        gaps = [n for n, before in zip(numbers, [-1, *numbers], strict=False) if n > before + 1]
+        return "".join(("…" if n in gaps else "") + self._chunks[n] for n in numbers)
+
+
+@dataclass
 class VehicleState:
     """What we know of one vehicle: the autopilot component of one system id.
 
@@ -98,7 +124,7 @@ class VehicleState:
     lost: int = 0
     time_ratio: TimeRatio = field(default_factory=TimeRatio)
     _sequence: int | None = None
-    _chunks: dict[int, list[str]] = field(default_factory=dict)
+    _chunks: dict[int, ChunkedText] = field(default_factory=dict)
 
     def newest(self, name: str) -> Received | None:
         """The newest message of that name; the autopilot's own before another component's."""
@@ -173,6 +199,8 @@ class VehicleState:
             self._take_statustext(message, now)
         elif name == "PARAM_VALUE":
             self.parameters[message.param_id] = message.param_value
+        for number in [n for n, text in self._chunks.items() if now - text.heard_at > CHUNK_TIMEOUT]:
+            self._say_chunked(number, now)
 
     def _take_heartbeat(self, message: Any, now: float) -> None:
         self.heartbeat_at = now
@@ -186,14 +214,14 @@ class VehicleState:
         if not message.id:
             self.statustexts.append(StatusText(now, message.severity, message.text))
             return
-        chunks = self._chunks.setdefault(message.id, [])
-        lost = message.chunk_seq - len(chunks)
-        if lost > 0:  # what there is will have to do
-            chunks += ["…", *[""] * (lost - 1)]
-        chunks.append(message.text)
-        if len(message.text) < 50:  # the last chunk is the one that is not full
-            self.statustexts.append(StatusText(now, message.severity, "".join(chunks)))
-            del self._chunks[message.id]
+        text = self._chunks.setdefault(message.id, ChunkedText(message.severity))
+        text.add(message.chunk_seq, message.text, now)
+        if text.is_complete:
+            self._say_chunked(message.id, now)
+
+    def _say_chunked(self, number: int, now: float) -> None:
+        text = self._chunks.pop(number)
+        self.statustexts.append(StatusText(now, text.severity, str(text)))
 
     def _count_loss(self, sequence: int) -> None:
         if self._sequence is not None:

@@ -22,8 +22,6 @@ BACKLOG = 512  # connections that wait to be accepted
 MAX_BODY = 1024 * 1024  # bytes
 SHUTDOWN_TIMEOUT = 1.0  # s for answers that are being written when we stop
 
-PATHS = {route.path: route.methods for route in ROUTES}
-
 
 def make_app(service: Service) -> web.Application:
     """The application with every route, each with and without a trailing slash."""
@@ -52,14 +50,20 @@ def _handler(route: Route) -> Handler:
 async def _extension(request: web.Request) -> web.StreamResponse:
     """A path that another module serves, which may be loaded and unloaded while we listen."""
     path = request.path.rstrip("/")
-    if path in PATHS:
-        raise web.HTTPMethodNotAllowed(request.method, PATHS[path])
+    allowed = methods_of(path)
+    if allowed:
+        raise web.HTTPMethodNotAllowed(request.method, allowed)
     route: Route | None = request.app[SERVICE].host.extensions.get(path)
     if route is None:
         raise NotFound("no such path")
     if request.method not in route.methods:
         raise web.HTTPMethodNotAllowed(request.method, route.methods)
     return await _answer(route, request)
+
+
+def methods_of(path: str) -> set[str]:
+    """What may be asked of a path of ours: the methods of all routes that match it."""
+    return {method for route in ROUTES if route.matches(path) for method in route.methods}
 
 
 async def _answer(route: Route, request: web.Request) -> web.StreamResponse:

@@ -10,7 +10,7 @@ from typing import Any, TypeVar, cast
 from aiohttp import web
 
 from mavproxy_uavapi.audit import Audit, Entry, noting_sent, utc_now
-from mavproxy_uavapi.errors import BadRequest, NotSupported, NoVehicle, TooManyRequests, UavApiError
+from mavproxy_uavapi.errors import BadRequest, Invalid, NotSupported, NoVehicle, TooManyRequests, UavApiError
 from mavproxy_uavapi.host.host import Host
 from mavproxy_uavapi.http.requests import Request, parse
 from mavproxy_uavapi.http.responses import envelope
@@ -23,6 +23,9 @@ from mavproxy_uavapi.vehicle.vehicle import Vehicle
 R = TypeVar("R", bound=Request)
 Answer = dict[str, Any] | web.StreamResponse
 Action = Callable[["Call"], Awaitable[Answer]]
+
+WAITS = {"true", "1", "yes"}  # values of the query's `wait`
+HURRIES = {"false", "0", "no"}
 
 
 @dataclass
@@ -97,7 +100,7 @@ class Call:
             vehicle: whose seat the job takes.
             verb: what to do.
             result: the text of its success, or what makes it afterwards.
-            outlives_client: whether it goes on when the client hangs up.
+            outlives_client: whether it goes on when the client hangs up; then no limit of jobs refuses it.
         """
 
         async def body(job: Job) -> str:
@@ -105,7 +108,7 @@ class Call:
             return result if isinstance(result, str) else result()
 
         jobs = self.service.host.jobs
-        if len(jobs.running()) >= self.service.settings.max_jobs:
+        if len(jobs.running()) >= self.service.settings.max_jobs and not outlives_client:
             raise TooManyRequests(f"{len(jobs.running())} verbs are in flight already (max_jobs)")
         job = jobs.begin(
             vehicle.seat,
@@ -117,11 +120,12 @@ class Call:
             timeout=getattr(self._params, "timeout", None),
         )
         if self.is_async:
-            return self._accepted(job)
+            return self.accepted(job)
         try:
             return self.answer(await job.outcome())
         except asyncio.CancelledError:
-            if self.service.settings.on_disconnect == "hold" and job.ended_by_hang_up and isinstance(vehicle, Copter):
+            hold = self.service.settings.on_disconnect == "hold" and job.ended_by_hang_up and vehicle.seat.job is job
+            if hold and isinstance(vehicle, Copter):
                 jobs.begin(vehicle.seat, "hold", {}, lambda _: _held(vehicle))
             raise
 
@@ -139,9 +143,13 @@ class Call:
     def is_async(self) -> bool:
         """Whether the client wants the job's number rather than its outcome."""
         prefers = self.request.headers.get("Prefer", "").replace(" ", "").lower().split(",")
-        return self.request.query.get("wait", "").lower() in ("false", "0", "no") or "respond-async" in prefers
+        wait = self.request.query.get("wait", "true").lower()
+        if wait not in WAITS | HURRIES:
+            raise Invalid(f"{wait!r} is neither true nor false", "query", "wait")
+        return wait in HURRIES or "respond-async" in prefers
 
-    def _accepted(self, job: Job) -> web.Response:
+    def accepted(self, job: Job) -> web.Response:
+        """202: the job goes on, and where it is to be found."""
         body = self.answer(f"Job {job.id} accepted", job=job.id)
         return web.json_response(body, status=202, headers={"Location": f"/jobs/{job.id}"})
 

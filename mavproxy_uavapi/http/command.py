@@ -61,8 +61,8 @@ async def set_mode(call: Call) -> Answer:
 
 async def _set_speed(call: Call, kind: str, name: str) -> Answer:
     speed = call.params(NewSpeed).new_v
-    await call.vehicle.set_speed(kind, speed)
-    return call.answer(f"{name} speed set to {speed}m/s")
+    vehicle = call.vehicle
+    return await call.fly(vehicle, lambda _: vehicle.set_speed(kind, speed), f"{name} speed set to {speed}m/s")
 
 
 async def set_air_speed(call: Call) -> Answer:
@@ -87,12 +87,12 @@ async def set_descent_speed(call: Call) -> Answer:
 
 async def set_sim_speedup(call: Call) -> Answer:
     """Set how much faster than the clock a simulated vehicle flies."""
-    factor = call.params(SimFactor).sim_factor
-    await call.vehicle.set_sim_speedup(factor)
-    return call.answer(f"Simulation speedup set to {factor}x")
+    vehicle, factor = call.vehicle, call.params(SimFactor).sim_factor
+    result = f"Simulation speedup set to {factor}x"
+    return await call.fly(vehicle, lambda _: vehicle.set_sim_speedup(factor), result)
 
 
 async def set_home(call: Call) -> Answer:
     """Make the current position home."""
-    await call.vehicle.set_home()
-    return call.answer("Home location set successfully!")
+    vehicle = call.vehicle
+    return await call.fly(vehicle, lambda _: vehicle.set_home(), "Home location set successfully!")

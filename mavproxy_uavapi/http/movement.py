@@ -120,25 +120,23 @@ async def travel_at_ned(call: Call) -> Answer:
 
 async def set_heading(call: Call) -> Answer:
     """Turn to a heading, the shorter way round."""
-    heading = call.params(Heading).heading
-    await call.copter.set_heading(heading)
-    return call.answer(f"Heading set to {heading} degrees")
+    copter, heading = call.copter, call.params(Heading).heading
+    return await call.fly(copter, lambda _: copter.set_heading(heading), f"Heading set to {heading} degrees")
 
 
 async def set_yaw_rate(call: Call) -> Answer:
     """Turn at a rate."""
-    rate = call.params(YawRate).yaw_rate
-    await call.copter.set_yaw_rate(rate)
-    return call.answer(f"Yaw rate set to {rate} deg/s")
+    copter, rate = call.copter, call.params(YawRate).yaw_rate
+    return await call.fly(copter, lambda _: copter.set_yaw_rate(rate), f"Yaw rate set to {rate} deg/s")
 
 
 async def stop(call: Call) -> Answer:
     """Pause the guided movement."""
-    await call.copter.pause()
-    return call.answer("Copter has stopped")
+    copter = call.copter
+    return await call.fly(copter, lambda _: copter.pause(), "Copter has stopped", outlives_client=True)
 
 
 async def resume(call: Call) -> Answer:
     """Continue the guided movement."""
-    await call.copter.resume()
-    return call.answer("Copter has resumed")
+    copter = call.copter
+    return await call.fly(copter, lambda _: copter.resume(), "Copter has resumed")

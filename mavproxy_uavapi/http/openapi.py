@@ -118,6 +118,34 @@ FAILURE = {
 }
 
 
+HURRY = [
+    {
+        "name": "wait",
+        "in": "query",
+        "required": False,
+        "schema": {"type": "boolean", "default": True},
+        "description": "false: answer 202 at once, with the number of the job that goes on",
+    },
+    {
+        "name": "Prefer",
+        "in": "header",
+        "required": False,
+        "schema": {"type": "string", "enum": ["respond-async"]},
+        "description": "respond-async: as wait=false",
+    },
+]
+ACCEPTED = {
+    "description": "It goes on as a job.",
+    "headers": {"Location": {"description": "where the job is", "schema": {"type": "string"}}},
+    "content": {
+        "application/json": {
+            "schema": {"$ref": "#/components/schemas/Success"},
+            "example": {"device": "uav", "id": "1", "result": "Job 12 accepted", "job": "12"},
+        }
+    },
+}
+
+
 def document(routes: Sequence[Route]) -> dict[str, Any]:
     """The whole description."""
     paths: dict[str, dict[str, Any]] = {}
@@ -153,6 +181,9 @@ def operation(route: Route, method: str) -> dict[str, Any]:
         "parameters": _path_parameters(route),
         "responses": {"200": _success(route, method), **_failures(errors_of(route))},
     }
+    if route.job:
+        told["parameters"] += HURRY
+        told["responses"]["202"] = ACCEPTED
     if method == "POST" and (route.raw or route.model.model_fields):
         told["requestBody"] = _body(route)
     elif method == "GET":

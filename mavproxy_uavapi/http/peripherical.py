@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from mavproxy_uavapi.http.call import Call
+from mavproxy_uavapi.http.call import Answer, Call
 from mavproxy_uavapi.http.requests import Servo
 
 
-async def servo_output(call: Call) -> dict[str, Any]:
+async def servo_output(call: Call) -> Answer:
     """Set a servo output."""
-    servo = call.params(Servo)
-    await call.vehicle.set_servo(servo.channel, servo.pwm)
-    return call.answer(f"Servo {servo.channel} set to {servo.pwm} PWM")
+    vehicle, servo = call.vehicle, call.params(Servo)
+    result = f"Servo {servo.channel} set to {servo.pwm} PWM"
+    return await call.fly(vehicle, lambda _: vehicle.set_servo(servo.channel, servo.pwm), result)

@@ -16,9 +16,9 @@ SMALLEST = 1e-30  # more than single precision's least number
 NED_REACH = 100_000.0  # m; farther than that NED is no flat patch any more
 
 
-def _no_boolean(value: Any) -> Any:
-    """Refuse what Python, and JSON's `true`, would pass off as 1."""
-    if isinstance(value, bool):
+def _written_as_number(value: Any) -> Any:
+    """Refuse what only Python would take for a number: true and false, and `1_000`."""
+    if isinstance(value, bool) or (isinstance(value, str) and "_" in value):
         raise ValueError("Input should be a valid number")
     return value
 
@@ -32,7 +32,7 @@ def _not_nothing(value: float) -> float:
 
 def _number(value: Any) -> Any:
     """Keep what the client wrote: `30` stays an int and `30.5` is a float, so that answers repeat it."""
-    value = _no_boolean(value)
+    value = _written_as_number(value)
     if isinstance(value, str):
         try:
             return int(value)
@@ -45,11 +45,11 @@ def _number(value: Any) -> Any:
 
 Number = Annotated[int | float, BeforeValidator(_number)]
 NotNothing = AfterValidator(_not_nothing)
-NoBoolean = BeforeValidator(_no_boolean)
+Written = BeforeValidator(_written_as_number)
 Speed = Annotated[Number, Field(gt=0, le=50, description="m/s"), NotNothing]
-Timeout = Annotated[float | None, Field(gt=0, le=86400, description="s that the call may take"), NoBoolean]
+Timeout = Annotated[float | None, Field(gt=0, le=86400, description="s that the call may take"), Written]
 Looking = Annotated[bool, Field(description="point to where it goes")]
-Tolerance = Annotated[float, Field(gt=0, le=100, description="m, horizontally and vertically"), NoBoolean]
+Tolerance = Annotated[float, Field(gt=0, le=100, description="m, horizontally and vertically"), Written]
 Argument = Annotated[str, Field(max_length=4096, pattern=r"^[^\x00]*$")]  # no command line can hold a 0
 
 
@@ -136,7 +136,7 @@ class NedVelocity(Request):
     vy: Annotated[Number, Field(ge=-50, le=50, description="m/s east")]
     vz: Annotated[Number, Field(ge=-50, le=50, description="m/s down")]
     look_at_target: Looking = False
-    duration: Annotated[float | None, Field(gt=0, le=3600, description="s of the vehicle's clock"), NoBoolean] = None
+    duration: Annotated[float | None, Field(gt=0, le=3600, description="s of the vehicle's clock"), Written] = None
 
 
 class Heading(Request):
@@ -154,8 +154,8 @@ class YawRate(Request):
 class Servo(Request):
     """`channel` from 1, `pwm` in microseconds."""
 
-    channel: Annotated[int, Field(ge=1, le=16, description="servo output, from 1"), NoBoolean]
-    pwm: Annotated[int, Field(ge=800, le=2200, description="microseconds"), NoBoolean]
+    channel: Annotated[int, Field(ge=1, le=16, description="servo output, from 1"), Written]
+    pwm: Annotated[int, Field(ge=800, le=2200, description="microseconds"), Written]
 
 
 class ScriptName(Request):
@@ -195,22 +195,22 @@ class Photo(Request):
 
     command: Annotated[str, Field(description="fswebcam, rpicam-still, libcamera-still, or vision")]
     resolution: Annotated[str, Field(description="width x height in pixels")] = "1280x720"
-    capture_time: Annotated[float, Field(gt=0, le=10_000, description="ms of exposure"), NoBoolean] = 150
-    focus_distance: Annotated[float | None, Field(ge=0.01, le=1000, description="m"), NoBoolean] = None
+    capture_time: Annotated[float, Field(gt=0, le=10_000, description="ms of exposure"), Written] = 150
+    focus_distance: Annotated[float | None, Field(ge=0.01, le=1000, description="m"), Written] = None
 
 
 class Read(Request):
     """A telemetry read: `max_age` is the age (s) up to which the answer is wanted."""
 
-    max_age: Annotated[float | None, Field(gt=0, le=86400, description="s; the oldest wanted"), NoBoolean] = None
+    max_age: Annotated[float | None, Field(gt=0, le=86400, description="s; the oldest wanted"), Written] = None
 
 
 class StreamFilter(Request):
     """What a telemetry stream carries: message names by comma, a system id, and at most `rate` Hz of each name."""
 
     names: Annotated[str, Field(description="message names by comma; none for all")] = ""
-    sysid: Annotated[int | None, Field(ge=1, le=255, description="system id; none for all"), NoBoolean] = None
-    rate: Annotated[float | None, Field(gt=0, le=1000, description="Hz at most, of each"), NoBoolean] = None
+    sysid: Annotated[int | None, Field(ge=1, le=255, description="system id; none for all"), Written] = None
+    rate: Annotated[float | None, Field(gt=0, le=1000, description="Hz at most, of each"), Written] = None
 
 
 def parse(model: type[Request], source: str, values: dict[str, Any]) -> Request:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 from mavproxy_uavapi.http import (
@@ -29,47 +30,53 @@ class Route:
     model: type[requests.Request]
     methods: tuple[str, ...] = ("GET",)
     raw: bool = False  # whether the action itself reads the body, which holds no parameters
+    job: bool = False  # whether the action runs as a job, which a client need not wait for
 
     @property
     def commands(self) -> bool:
         """Whether it does something; what can only be read with GET does not."""
         return self.methods != ("GET",)
 
+    def matches(self, path: str) -> bool:
+        """Whether `path` is this one, with something in the place of each `{name}`."""
+        pattern = re.sub(r"\\{\w+\\}", "[^/]+", re.escape(self.path))
+        return re.fullmatch(pattern, path) is not None
+
 
 EITHER = ("GET", "POST")
 POST = ("POST",)
 
 COMMAND = [
-    Route("/command/arm", command.arm, requests.Blocking, EITHER),
-    Route("/command/disarm", command.disarm, requests.Disarm, EITHER),
-    Route("/command/takeoff", command.takeoff, requests.Takeoff, EITHER),
-    Route("/command/land", command.land, requests.Blocking, EITHER),
-    Route("/command/rtl", command.rtl, requests.Blocking, EITHER),
-    Route("/command/brake", command.brake, requests.Empty, EITHER),
-    Route("/command/guided", command.guided, requests.Empty, EITHER),
-    Route("/command/set_mode", command.set_mode, requests.ModeName, EITHER),
-    Route("/command/set_air_speed", command.set_air_speed, requests.NewSpeed, EITHER),
-    Route("/command/set_ground_speed", command.set_ground_speed, requests.NewSpeed, EITHER),
-    Route("/command/set_climb_speed", command.set_climb_speed, requests.NewSpeed, EITHER),
-    Route("/command/set_descent_speed", command.set_descent_speed, requests.NewSpeed, EITHER),
-    Route("/command/set_sim_speedup", command.set_sim_speedup, requests.SimFactor, EITHER),
-    Route("/command/set_home", command.set_home, requests.Empty, EITHER),
+    Route("/command/arm", command.arm, requests.Blocking, EITHER, job=True),
+    Route("/command/disarm", command.disarm, requests.Disarm, EITHER, job=True),
+    Route("/command/takeoff", command.takeoff, requests.Takeoff, EITHER, job=True),
+    Route("/command/land", command.land, requests.Blocking, EITHER, job=True),
+    Route("/command/rtl", command.rtl, requests.Blocking, EITHER, job=True),
+    Route("/command/brake", command.brake, requests.Empty, EITHER, job=True),
+    Route("/command/guided", command.guided, requests.Empty, EITHER, job=True),
+    Route("/command/set_mode", command.set_mode, requests.ModeName, EITHER, job=True),
+    Route("/command/set_air_speed", command.set_air_speed, requests.NewSpeed, EITHER, job=True),
+    Route("/command/set_ground_speed", command.set_ground_speed, requests.NewSpeed, EITHER, job=True),
+    Route("/command/set_climb_speed", command.set_climb_speed, requests.NewSpeed, EITHER, job=True),
+    Route("/command/set_descent_speed", command.set_descent_speed, requests.NewSpeed, EITHER, job=True),
+    Route("/command/set_sim_speedup", command.set_sim_speedup, requests.SimFactor, EITHER, job=True),
+    Route("/command/set_home", command.set_home, requests.Empty, EITHER, job=True),
 ]
 
 MOVEMENT = [
-    Route("/movement/go_to_gps", movement.go_to_gps, requests.GpsTarget, POST),
-    Route("/movement/go_to_gps_wait", movement.go_to_gps_wait, requests.GpsTarget, POST),
-    Route("/movement/go_to_ned", movement.go_to_ned, requests.NedPlace, POST),
-    Route("/movement/go_to_ned_wait", movement.go_to_ned_wait, requests.NedPlace, POST),
-    Route("/movement/drive", movement.drive, requests.NedPlace, POST),
-    Route("/movement/drive_wait", movement.drive_wait, requests.NedPlace, POST),
-    Route("/movement/drive_body", movement.drive_body, requests.BodyOffset, POST),
-    Route("/movement/drive_body_wait", movement.drive_body_wait, requests.BodyOffset, POST),
-    Route("/movement/travel_at_ned", movement.travel_at_ned, requests.NedVelocity, POST),
-    Route("/movement/set_heading", movement.set_heading, requests.Heading, EITHER),
-    Route("/movement/set_yaw_rate", movement.set_yaw_rate, requests.YawRate, EITHER),
-    Route("/movement/stop", movement.stop, requests.Empty, EITHER),
-    Route("/movement/resume", movement.resume, requests.Empty, EITHER),
+    Route("/movement/go_to_gps", movement.go_to_gps, requests.GpsTarget, POST, job=True),
+    Route("/movement/go_to_gps_wait", movement.go_to_gps_wait, requests.GpsTarget, POST, job=True),
+    Route("/movement/go_to_ned", movement.go_to_ned, requests.NedPlace, POST, job=True),
+    Route("/movement/go_to_ned_wait", movement.go_to_ned_wait, requests.NedPlace, POST, job=True),
+    Route("/movement/drive", movement.drive, requests.NedPlace, POST, job=True),
+    Route("/movement/drive_wait", movement.drive_wait, requests.NedPlace, POST, job=True),
+    Route("/movement/drive_body", movement.drive_body, requests.BodyOffset, POST, job=True),
+    Route("/movement/drive_body_wait", movement.drive_body_wait, requests.BodyOffset, POST, job=True),
+    Route("/movement/travel_at_ned", movement.travel_at_ned, requests.NedVelocity, POST, job=True),
+    Route("/movement/set_heading", movement.set_heading, requests.Heading, EITHER, job=True),
+    Route("/movement/set_yaw_rate", movement.set_yaw_rate, requests.YawRate, EITHER, job=True),
+    Route("/movement/stop", movement.stop, requests.Empty, EITHER, job=True),
+    Route("/movement/resume", movement.resume, requests.Empty, EITHER, job=True),
 ]
 
 TELEMETRY = [
@@ -105,16 +112,16 @@ MISSION = [
     Route("/mission/clear", mission.clear_scripts, requests.Empty, ("DELETE",)),
     Route("/mission/scripts/{name}", mission.show_script, requests.Empty),
     Route("/mission/scripts/{name}/log", mission.script_log, requests.ScriptLog),
-    Route("/mission/waypoints", waypoints.upload, requests.Empty, POST, raw=True),
+    Route("/mission/waypoints", waypoints.upload, requests.Empty, POST, raw=True, job=True),
     Route("/mission/waypoints", waypoints.download, requests.Empty),
-    Route("/mission/waypoints", waypoints.clear, requests.Empty, ("DELETE",)),
-    Route("/mission/start", waypoints.start, requests.StartMission, POST),
+    Route("/mission/waypoints", waypoints.clear, requests.Empty, ("DELETE",), job=True),
+    Route("/mission/start", waypoints.start, requests.StartMission, POST, job=True),
     Route("/mission/progress", waypoints.progress, requests.Read),
 ]
 
 PERIPHERICAL = [
     Route("/peripherical/take_photo", photo.take_photo, requests.Photo),
-    Route("/peripherical/servo_output", peripherical.servo_output, requests.Servo, POST),
+    Route("/peripherical/servo_output", peripherical.servo_output, requests.Servo, POST, job=True),
 ]
 
 DOCS = [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
 from typing import Any
 
@@ -11,7 +12,7 @@ from mavproxy_uavapi.http import telemetry_views as views
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import Read
 from mavproxy_uavapi.vehicle.flyable import status as status_of
-from mavproxy_uavapi.vehicle.messages import MESSAGE_IDS, request_message
+from mavproxy_uavapi.vehicle.messages import MESSAGE_IDS
 
 FIRST_TIMEOUT = 2.0  # s for a message that was never told and is asked for
 HOME_AGE = 1.0  # s for which a home position that was asked for serves further readers
@@ -39,12 +40,10 @@ async def _newest(call: Call, name: str) -> Received:
 
 async def _ask_for(call: Call, name: str) -> None:
     vehicle = call.vehicle
-    with vehicle.waiting.expecting({name}, lambda message: message) as told:
-        try:
-            await vehicle.commands.send(request_message(MESSAGE_IDS[name]))
-            await told.within(FIRST_TIMEOUT, f"tell {name}")
-        except (Rejected, TimedOut) as error:
-            raise Stale(f"vehicle {vehicle.state.system} has not told {name} yet") from error
+    try:
+        await asyncio.wait_for(vehicle.request(name), FIRST_TIMEOUT)
+    except (Rejected, TimedOut, asyncio.TimeoutError) as error:
+        raise Stale(f"vehicle {vehicle.state.system} has not told {name} yet") from error
 
 
 def _age(call: Call, received: Received) -> float:

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import itertools
 import logging
-from collections import defaultdict
+from collections import defaultdict, deque
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 from pymavlink import mavutil
@@ -30,8 +32,17 @@ SENDINGS = 4  # the first one and three more
 IN_PROGRESS_TIMEOUT = 10.0  # s that each IN_PROGRESS buys
 IN_PROGRESS_LIMIT = 60.0  # s until a command that is still in progress is given up
 PATIENCE_PAUSE = 1.0  # s before a patient command is asked again
+LATE_ACK = 10.0  # s after a sending in which its ack may still come
 LAST_WORDS = 0.5  # s that a refusal's STATUSTEXT may come after its ack
 WORTH_ASKING_AGAIN = {mavlink.MAV_RESULT_TEMPORARILY_REJECTED, mavlink.MAV_RESULT_FAILED}
+
+
+@dataclass(frozen=True)
+class Sending:
+    """A command that was sent and not answered yet: its parameters, and when (s)."""
+
+    params: tuple[float, ...]
+    at: float
 
 
 class Commands:
@@ -42,6 +53,7 @@ class Commands:
         self._link = link
         self._waiting = waiting
         self._locks: defaultdict[int, asyncio.Lock] = defaultdict(asyncio.Lock)
+        self._unanswered: defaultdict[int, deque[Sending]] = defaultdict(deque)  # oldest first
 
     async def send(self, command: Command, patience: float = 20.0, shown: Callable[[], bool] = lambda: False) -> None:
         """Send `command`; returns when the vehicle has accepted it.
@@ -71,22 +83,45 @@ class Commands:
                 if shown():
                     return
 
+    def _late_acks(self, command: Command) -> int:
+        """How many acks of earlier commands of that number, with other parameters, may still come."""
+        unanswered = self._unanswered[command.number]
+        while unanswered and unanswered[0].at < self._waiting.clock() - LATE_ACK:
+            unanswered.popleft()
+        return sum(sending.params != command.params for sending in unanswered)
+
     async def _ask(self, command: Command, shown: Callable[[], bool]) -> int:
-        """One exchange: the MAV_RESULT that ends it."""
+        """One exchange: the MAV_RESULT that ends it.
+
+        MAVLink does not number commands. Where the ack is the only proof, as many acks do not count as may
+        still come for earlier commands; each one that comes is followed by one more sending.
+        """
+        late = self._late_acks(command) if command.proven_by_ack else 0
+        unanswered = self._unanswered[command.number]
         address = Address(self._state.system, self._state.component)
         sendings = SENDINGS if command.repeatable else 1
         give_up_at = self._waiting.clock() + IN_PROGRESS_LIMIT
-        for confirmation in range(sendings):
+        silences = 0
+        for confirmation in itertools.count():
             with self._waiting.acks(command.number, self._link.source, shown) as acks:
                 await self._link.send(command.to(address, confirmation), self._state.system)
+                unanswered.append(Sending(command.params, self._waiting.clock()))
                 result = await acks.next(ACK_TIMEOUT)
                 while result == mavlink.MAV_RESULT_IN_PROGRESS:
                     if self._waiting.clock() >= give_up_at:
                         waited = f"{IN_PROGRESS_LIMIT:g} s"
                         raise TimedOut(f"vehicle {self._state.system} was not done with {command.name} in {waited}")
                     result = await acks.next(IN_PROGRESS_TIMEOUT)
-            if result is not None:
+            if result is None:
+                silences += 1
+                if silences == sendings:
+                    break
+                continue
+            if unanswered:
+                unanswered.popleft()
+            if not late:
                 return result
+            late -= 1
         times = "" if sendings == 1 else f", sent {sendings} times"
         raise TimedOut(f"vehicle {self._state.system} did not acknowledge {command.name}{times}")
 

@@ -14,7 +14,6 @@ from typing import Any
 from mavproxy_uavapi.errors import Aborted, Superseded, TimedOut, UavApiError
 
 FINISHED_KEPT = 100
-GRACE = 2.0  # s; a verb that runs into its own deadline says what it still waited for
 CONSOLE = "console"  # the client of what was typed at MAVProxy's prompt
 
 
@@ -76,8 +75,12 @@ class Job:
         """Run `body`, whose text is the result; it never outlives `timeout` (s)."""
         self._task = self._loop.create_task(self._run(body))
         if timeout is not None:
-            late = TimedOut(f"{self.verb} was not done within {timeout:g} s")
-            self._limit = self._loop.call_later(timeout + GRACE, self.abort, late)
+            self._limit = self._loop.call_later(timeout, self._overdue, timeout)
+
+    def _overdue(self, timeout: float) -> None:
+        left = self.progress.get("distance_to_go")
+        to_go = "" if left is None else f": {left:.1f} m to go"
+        self.abort(TimedOut(f"{self.verb} was not done within {timeout:g} s{to_go}"))
 
     async def _run(self, body: Callable[[Job], Awaitable[str]]) -> None:
         try:

@@ -49,6 +49,8 @@ class Command:
         patient: whether TEMPORARILY_REJECTED (and what else a settling estimator answers) is worth asking
             again for.
         again_after: the MAV_RESULTs after which an impatient one is asked again all the same.
+        proven_by_ack: whether nothing but the ack shows that it was done, so that an ack which may be an
+            earlier one's does not do.
     """
 
     number: int
@@ -56,6 +58,7 @@ class Command:
     repeatable: bool = True
     patient: bool = False
     again_after: frozenset[int] = frozenset()
+    proven_by_ack: bool = False
 
     @property
     def name(self) -> str:
@@ -100,7 +103,7 @@ def takeoff(alt: float, pitch: float = 0.0) -> Command:
 
 def change_speed(kind: str, speed: float) -> Command:
     """Set the `kind` of speed (air, ground, climb, descent) to `speed` m/s; throttle unchanged."""
-    return Command(mavlink.MAV_CMD_DO_CHANGE_SPEED, (SPEED_TYPES[kind], speed, -1))
+    return Command(mavlink.MAV_CMD_DO_CHANGE_SPEED, (SPEED_TYPES[kind], speed, -1), proven_by_ack=True)
 
 
 def set_home_here() -> Command:
@@ -110,17 +113,17 @@ def set_home_here() -> Command:
 
 def yaw_to(heading: float) -> Command:
     """Turn to `heading` degrees clockwise from north, the shorter way round, at the default rate."""
-    return Command(mavlink.MAV_CMD_CONDITION_YAW, (heading, 0, 0, 0))
+    return Command(mavlink.MAV_CMD_CONDITION_YAW, (heading, 0, 0, 0), proven_by_ack=True)
 
 
 def pause(paused: bool) -> Command:
     """Pause the guided movement, or continue it."""
-    return Command(mavlink.MAV_CMD_DO_PAUSE_CONTINUE, (0 if paused else 1,))
+    return Command(mavlink.MAV_CMD_DO_PAUSE_CONTINUE, (0 if paused else 1,), proven_by_ack=True)
 
 
 def set_servo(channel: int, pwm: int) -> Command:
     """Set servo output `channel` (from 1) to `pwm` microseconds."""
-    return Command(mavlink.MAV_CMD_DO_SET_SERVO, (channel, pwm))
+    return Command(mavlink.MAV_CMD_DO_SET_SERVO, (channel, pwm), proven_by_ack=True)
 
 
 def set_mission_current(seq: int) -> Command:

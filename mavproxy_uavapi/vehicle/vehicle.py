@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import math
 from collections.abc import Callable, Iterable
@@ -66,6 +67,7 @@ class Vehicle:
         self.speeds: dict[str, float] = {}  # what DO_CHANGE_SPEED set (m/s), by kind
         self._speeds_at = 0.0
         self._parameter_askings: dict[tuple[int, str], int] = {}  # by boot and name
+        self._requests: dict[str, asyncio.Task[Any]] = {}  # REQUEST_MESSAGE in flight, by message name
 
     # -- what it is ---------------------------------------------------------------------------------------
 
@@ -324,15 +326,37 @@ class Vehicle:
             NotFound: the vehicle has no home yet.
         """
 
+        try:
+            return await self.request("HOME_POSITION")
+        except Rejected as error:
+            raise NotFound(f"the vehicle has no home position yet ({error.ack})") from error
+
+    async def request(self, name: str) -> Any:
+        """Ask for a message of that name; the autopilot's answer. Several who ask at a time share one request.
+
+        Raises:
+            Rejected: it has no such message.
+            TimedOut, LinkLost.
+        """
+        asking = self._requests.get(name)
+        if asking is None:
+            asking = asyncio.get_running_loop().create_task(self._request(name))
+            self._requests[name] = asking
+            asking.add_done_callback(lambda task: self._requested(name, task))
+        return await asyncio.shield(asking)
+
+    def _requested(self, name: str, asking: asyncio.Task[Any]) -> None:
+        del self._requests[name]
+        if not asking.cancelled():
+            asking.exception()  # whoever asked may have gone, and asyncio would call it unheeded
+
+    async def _request(self, name: str) -> Any:
         def from_autopilot(message: Any) -> Any:
             return message if message.get_srcComponent() == self.state.component else None
 
-        with self.waiting.expecting({"HOME_POSITION"}, from_autopilot) as told:
-            try:
-                await self.commands.send(messages.request_message(messages.MESSAGE_IDS["HOME_POSITION"]))
-            except Rejected as error:
-                raise NotFound(f"the vehicle has no home position yet ({error.ack})") from error
-            return await told.within(HEARTBEAT_TIMEOUT, "tell its home position")
+        with self.waiting.expecting({name}, from_autopilot) as told:
+            await self.commands.send(messages.request_message(messages.MESSAGE_IDS[name]))
+            return await told.within(HEARTBEAT_TIMEOUT, f"tell {name}")
 
     async def set_servo(self, channel: int, pwm: int) -> None:
         """Set servo output `channel` (from 1) to `pwm` microseconds."""

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from pymavlink import mavutil
 
-from mavproxy_uavapi.host.state import STATUSTEXTS_KEPT, Fleet, Received, VehicleState
+from mavproxy_uavapi.host.state import CHUNK_TIMEOUT, STATUSTEXTS_KEPT, Fleet, Received, VehicleState
 
 mavlink = mavutil.mavlink
 QUADROTOR = mavlink.MAV_TYPE_QUADROTOR
@@ -159,6 +159,20 @@ def test_lost_chunk_leaves_one_gap(state: VehicleState, hear: Any, lost: tuple[i
             hear("statustext", text=letter * (50 if letter != "d" else 3), id=7, chunk_seq=number)
     expected = "".join(letter if letter == "…" else letter * (50 if letter != "d" else 3) for letter in text)
     assert state.said_since(0.0) == [expected]
+
+
+def test_text_whose_last_chunk_is_lost_is_told_after_a_while(state: VehicleState, hear: Any) -> None:
+    hear("statustext", at=3.0, text="a" * 50, id=7, chunk_seq=0)
+    hear("attitude", at=3.0 + CHUNK_TIMEOUT - 0.1)
+    assert state.said_since(0.0) == []
+    hear("attitude", at=3.1 + CHUNK_TIMEOUT)
+    assert state.said_since(0.0) == ["a" * 50]
+
+
+def test_chunk_that_comes_twice_is_told_once(state: VehicleState, hear: Any) -> None:
+    for number, text in ((0, "a" * 50), (0, "a" * 50), (1, "end")):
+        hear("statustext", text=text, id=7, chunk_seq=number)
+    assert state.said_since(0.0) == ["a" * 50 + "end"]
 
 
 def test_said_since_begins_with_its_moment(state: VehicleState, hear: Any) -> None:

@@ -50,6 +50,8 @@ def test_unknown_path_is_404(api: Any, loop: Any, method: str, path: str) -> Non
         ("POST", "/telemetry/gps/", "GET"),
         ("DELETE", "/command/arm", "GET,POST"),
         ("GET", "/peripherical/servo_output", "POST"),
+        ("POST", "/telemetry/message/ATTITUDE", "GET"),
+        ("POST", "/jobs/1", "GET,DELETE"),
     ],
 )
 def test_wrong_method_is_405_with_those_that_are_allowed(

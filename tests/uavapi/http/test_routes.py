@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from mavproxy_uavapi.http.routes import ROUTES, Route
@@ -47,6 +49,44 @@ def test_methods_are_those_of_the_contract(route: Route) -> None:
         assert set(route.methods) == {"GET", "POST"}
     elif route.path.startswith(("/movement/", "/telemetry/")):
         assert "GET" in route.methods
+
+
+VALUES = {
+    "/command/set_mode": {"mode": "LOITER"},
+    "/command/set_sim_speedup": {"sim_factor": 2},
+    "/peripherical/servo_output": {"channel": 1, "pwm": 1500},
+    "/movement/go_to_gps": {"lat": -35, "long": 149, "alt": 20},
+    "/movement/go_to_ned": {"x": 0, "y": 0, "z": -20},
+    "/movement/drive": {"x": 0, "y": 0, "z": 0},
+    "/movement/drive_body": {"front": 0, "right": 0},
+    "/movement/travel_at_ned": {"vx": 0, "vy": 0, "vz": 0},
+    "/movement/set_heading": {"heading": 90},
+    "/movement/set_yaw_rate": {"yaw_rate": 5},
+}
+VALUES |= {
+    f"{path}_wait": values for path, values in VALUES.items() if path.startswith(("/movement/go", "/movement/d"))
+}
+JOBS = [route for route in ROUTES if route.job and not route.raw]
+
+
+@pytest.mark.parametrize("route", JOBS, ids=lambda route: f"{route.methods[0]} {route.path}")
+def test_every_verb_can_be_called_without_waiting(flying: Any, api: Any, loop: Any, route: Route) -> None:
+    values = VALUES.get(route.path, {"new_v": 5} if route.path.endswith("speed") else {})
+    answer = loop.run(api.ask(route.methods[-1], f"{route.path}?wait=false", json=values))
+    assert answer.status == 202, answer.body
+    assert answer.headers["Location"] == f"/jobs/{answer.body['job']}"
+    assert api.get(answer.headers["Location"]).body["verb"] == route.path
+
+
+def test_every_command_and_movement_is_a_job() -> None:
+    assert {r.path for r in JOBS} >= {r.path for r in ROUTES if r.path.startswith(("/command/", "/movement/"))}
+
+
+@pytest.mark.parametrize("wait", ["maybe", "", "2"])
+def test_wait_that_is_neither_true_nor_false_is_refused(flying: Any, api: Any, loop: Any, wait: str) -> None:
+    answer = api.get(f"/command/brake?wait={wait}")
+    assert (answer.status, answer.body["detail"][0]["loc"]) == (422, ["query", "wait"])
+    assert flying.orders() == []
 
 
 @pytest.mark.parametrize("route", ROUTES, ids=lambda route: route.path)

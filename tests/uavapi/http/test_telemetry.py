@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 from pymavlink import mavutil
 
-from mavproxy_uavapi.http.telemetry import HOME_AGE
+from mavproxy_uavapi.http.telemetry import FIRST_TIMEOUT, HOME_AGE
 
 mavlink = mavutil.mavlink
 POSITION = {"lat": -35.0, "lon": 149.0, "alt": 604.0}
@@ -176,6 +176,21 @@ def test_message_that_was_never_told_is_asked_for(api: Any, loop: Any, host: Any
     assert command.param1 == mavlink.MAVLINK_MSG_ID_VFR_HUD
     drone.send("vfr_hud", heading=12)
     assert loop.run(request).body["info"]["heading"] == 12
+
+
+def test_readers_of_what_was_never_told_share_one_request_and_none_waits_for_the_others(
+    api: Any, loop: Any, host: Any, drone: Any
+) -> None:
+    for name in ("VFR_HUD", "GPS_RAW_INT"):
+        del host.fleet.vehicles[1].messages[name]
+        drone.mute.add(name)
+    drone.answers[mavlink.MAV_CMD_REQUEST_MESSAGE] = [None]
+    began = loop.time()
+    asked = [api.begin("GET", f"/telemetry/{path}") for path in ("general", "gps_raw") * 3]
+    assert [loop.run(request).body["code"] for request in asked] == ["stale"] * 6
+    assert loop.time() - began == pytest.approx(FIRST_TIMEOUT, abs=0.2)
+    assert {command.param1 for command in drone.commands(mavlink.MAV_CMD_REQUEST_MESSAGE)} == {74}
+    assert len(drone.commands(mavlink.MAV_CMD_REQUEST_MESSAGE)) == 2
 
 
 @pytest.mark.parametrize("result", [mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENIED])

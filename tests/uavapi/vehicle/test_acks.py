@@ -7,7 +7,7 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.errors import LinkLost, Rejected, TimedOut
 from mavproxy_uavapi.vehicle import messages
-from mavproxy_uavapi.vehicle.acks import ACK_TIMEOUT, IN_PROGRESS_TIMEOUT, SENDINGS, result_name
+from mavproxy_uavapi.vehicle.acks import ACK_TIMEOUT, IN_PROGRESS_TIMEOUT, LATE_ACK, SENDINGS, result_name
 
 mavlink = mavutil.mavlink
 SERVO = mavlink.MAV_CMD_DO_SET_SERVO
@@ -98,6 +98,54 @@ def test_ack_that_came_before_the_command_does_not_count(loop: Any, drone: Any, 
     drone.acknowledge(SERVO, DENIED)
     loop.settle()
     assert send() < 0.1
+
+
+OTHER = messages.set_servo(1, 1900)
+
+
+@pytest.mark.parametrize("late", [OK, DENIED])
+def test_late_ack_of_an_earlier_command_does_not_count(loop: Any, drone: Any, send: Any, late: int) -> None:
+    drone.answers[SERVO] = [None]
+    with pytest.raises(TimedOut):
+        send()
+    loop.call_later(0.5, drone.acknowledge, SERVO, late)  # of the first: the vehicle has not heard the second
+    with pytest.raises(TimedOut):
+        send(OTHER)
+
+
+def test_answers_to_the_second_command_count_once_the_late_ones_are_through(drone: Any, send: Any) -> None:
+    drone.answers[SERVO] = [None, None, None, None, OK]
+    with pytest.raises(TimedOut):
+        send()
+    assert send(OTHER) < 0.5
+    assert len(drone.commands(SERVO)) == 2 * SENDINGS + 1  # any of the first four acks may be the first command's
+
+
+def test_late_ack_of_the_same_command_is_as_good_as_its_own(loop: Any, drone: Any, send: Any) -> None:
+    drone.answers[SERVO] = [None]
+    with pytest.raises(TimedOut):
+        send()
+    loop.call_later(0.5, drone.acknowledge, SERVO, OK)
+    assert send() == pytest.approx(0.5, abs=0.05)
+
+
+def test_ack_does_not_come_later_than_late(loop: Any, drone: Any, send: Any) -> None:
+    drone.answers[SERVO] = [None, None, None, None, OK]
+    with pytest.raises(TimedOut):
+        send()
+    loop.pass_time(LATE_ACK + 0.1)
+    send(OTHER)
+    assert len(drone.commands(SERVO)) == SENDINGS + 1
+
+
+def test_command_given_up_in_flight_leaves_its_late_ack_behind(loop: Any, drone: Any, copter: Any, send: Any) -> None:
+    drone.answers[SERVO] = [None]
+    task = loop.create_task(copter.commands.send(COMMAND))
+    loop.pass_time(0.1)
+    task.cancel()
+    loop.call_later(0.2, drone.acknowledge, SERVO, DENIED)
+    loop.call_later(0.4, drone.acknowledge, SERVO, OK)
+    assert send(OTHER) == pytest.approx(0.4, abs=0.05)
 
 
 def test_in_progress_extends_the_wait(loop: Any, drone: Any, send: Any) -> None:
@@ -222,7 +270,7 @@ def test_cancelled_command_lets_the_next_one_through(loop: Any, drone: Any, copt
     loop.pass_time(0.1)
     first.cancel()
     loop.run(second)
-    assert [command.param1 for command in drone.commands(SERVO)] == [1, 2]
+    assert [command.param1 for command in drone.commands(SERVO)] == [1, 2, 2]  # the first ack may be the late one
 
 
 def test_link_loss_ends_the_wait_and_nothing_more_is_sent(loop: Any, drone: Any, send: Any, host: Any) -> None:

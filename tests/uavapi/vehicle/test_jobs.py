@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.errors import Aborted, NotArmed, Superseded, UavApiError
+from mavproxy_uavapi.errors import Aborted, NotArmed, Superseded, TimedOut, UavApiError
 from mavproxy_uavapi.vehicle.jobs import FINISHED_KEPT, Job, JobBook, Seat
 
 
@@ -199,3 +199,20 @@ def test_first_outcome_counts(bench: Bench) -> None:
     job.abort(Aborted("second"))
     with pytest.raises(Superseded, match="first"):
         bench.loop.run(job.outcome())
+
+
+def test_job_never_outlives_its_timeout_and_says_how_far_it_had_to_go(bench: Bench) -> None:
+    async def body(job: Job) -> str:
+        bench.seat.take(job)
+        job.progress = {"distance_to_go": 12.34, "altitude": 5.0}
+        await asyncio.sleep(100)
+        return "never"
+
+    async def begin() -> Job:
+        return bench.book.begin(bench.seat, "/a", {}, body, timeout=3.0)
+
+    began = bench.loop.time()
+    job = bench.loop.run(begin())
+    with pytest.raises(TimedOut, match="/a was not done within 3 s: 12.3 m to go"):
+        bench.loop.run(job.outcome())
+    assert bench.loop.time() - began == pytest.approx(3.0)

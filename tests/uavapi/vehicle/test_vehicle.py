@@ -259,7 +259,7 @@ def test_home_that_is_not_set_is_not_found(loop: Any, drone: Any, copter: Any) -
 
 def test_home_that_does_not_come_is_a_timeout(loop: Any, drone: Any, copter: Any) -> None:
     drone.answers[mavlink.MAV_CMD_REQUEST_MESSAGE] = [mavlink.MAV_RESULT_ACCEPTED]
-    with pytest.raises(TimedOut, match="did not tell its home position"):
+    with pytest.raises(TimedOut, match="did not tell HOME_POSITION"):
         loop.run(copter.home())
 
 
