@@ -273,14 +273,15 @@ def embedded(directory: Path, *arguments: str, speedup: float = SPEEDUP, **setti
     return rig
 
 
-def ardupilot(directory: Path) -> Rig:
+def ardupilot(directory: Path, *, speedup: int = SPEEDUP, **settings: Any) -> Rig:
     """A rig with ArduPilot's own copter, started as its users do: our module in sim_vehicle.py's MAVProxy."""
     rig = Rig(directory, free_port())
     config = directory / "uavapi.ini"
-    config.write_text(f"[api]\nport = {rig.port}\n", encoding="utf-8")
+    lines = [f"{name} = {value}\n" for name, value in {"port": rig.port, **settings}.items()]
+    config.write_text("[api]\n" + "".join(lines), encoding="utf-8")
     script = Path(os.environ["ARDUPILOT_HOME"], "Tools", "autotest", "sim_vehicle.py")
     command = [sys.executable, str(script), "-v", "ArduCopter", "-N", "-w", f"-I{free_instance()}"]
-    command += ["--speedup", str(SPEEDUP), "-l", HOME, "--use-dir", str(directory)]
+    command += ["--speedup", str(speedup), "-l", HOME, "--use-dir", str(directory)]
     command += ["-m", f'--load-module=uavapi:{{"config":"{config}"}}']
     env = {"PATH": f"{SCRIPTS}{os.pathsep}{os.environ['PATH']}"}
     for variable in ("DISPLAY", "TMUX", "STY", "SITL_RITW_TERMINAL"):
