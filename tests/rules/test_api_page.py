@@ -1,0 +1,28 @@
+"""docs/api.md has a line for every endpoint, those of the other modules too."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from mavproxy_gradys.http import Handlers
+from mavproxy_uavapi.http.routes import ROUTES
+from mavproxy_vision.http import Pages
+
+LINES = (Path(__file__).parents[2] / "docs" / "api.md").read_text(encoding="utf-8").lower().splitlines()
+# Neither asks its module for anything until a request comes.
+OTHERS = [*Handlers(None).routes(), *Pages(None, None).routes()]  # type: ignore[arg-type]
+
+
+def tells_of(line: str, path: str) -> bool:
+    """Whether a line names the path: whole, or by its last word beside another path of that folder."""
+    folder, _, last = path.rpartition("/")
+    whole = any(f"{path}{end}" in line for end in ("`", " ", "?"))
+    waiting = last.endswith("_wait") and f"{path.removesuffix('_wait')}`, `…_wait`" in line
+    return whole or waiting or (f"{folder}/" in line and f"`{last}`" in line)
+
+
+@pytest.mark.parametrize("path", sorted({route.path for route in [*ROUTES, *OTHERS]}))
+def test_endpoint_is_in_the_list(path: str) -> None:
+    assert any(tells_of(line, path) for line in LINES), f"docs/api.md does not tell of {path}"
