@@ -58,27 +58,27 @@ async def _info(
 
 
 async def general(call: Call) -> dict[str, Any]:
-    """Speeds, heading, throttle, altitude AMSL."""
+    """Speeds (m/s), heading (degrees), throttle (%), altitude (m AMSL)."""
     return await _info(call, "VFR_HUD", views.general)
 
 
 async def gps(call: Call) -> dict[str, Any]:
-    """Fused global position and velocity."""
+    """Fused position (degrees, m AMSL, m above home), velocity (m/s: north, east, down), heading (degrees)."""
     return await _info(call, "GLOBAL_POSITION_INT", views.gps)
 
 
 async def gps_raw(call: Call) -> dict[str, Any]:
-    """The GPS receiver's own position."""
+    """The GPS receiver's own position (degrees, m AMSL), speed (m/s) and course (degrees)."""
     return await _info(call, "GPS_RAW_INT", views.gps_raw)
 
 
 async def ned(call: Call) -> dict[str, Any]:
-    """Fused local position and velocity."""
+    """Fused position (m) and velocity (m/s): north, east, down of the EKF origin."""
     return await _info(call, "LOCAL_POSITION_NED", views.ned)
 
 
 async def attitude(call: Call) -> dict[str, Any]:
-    """Roll, pitch, yaw and their rates."""
+    """Roll, pitch, yaw (degrees) and their rates (deg/s)."""
     return await _info(call, "ATTITUDE", views.attitude)
 
 
@@ -93,7 +93,7 @@ async def sensor_status(call: Call) -> dict[str, Any]:
 
 
 async def battery_info(call: Call) -> dict[str, Any]:
-    """Voltage, current, charge."""
+    """Voltage (mV), current (cA), charge (%)."""
     return await _info(call, "SYS_STATUS", views.battery, "success")
 
 
@@ -114,7 +114,7 @@ async def compass(call: Call) -> dict[str, Any]:
 
 
 async def home_info(call: Call) -> dict[str, Any]:
-    """The home position, asked of the vehicle."""
+    """The home position, asked of the vehicle: degrees, m AMSL; x, y, z m north, east, down of the EKF origin."""
     vehicle = call.vehicle
     age = vehicle.state.age("HOME_POSITION", vehicle.clock())
     if age is None or age > HOME_AGE:
@@ -134,7 +134,7 @@ async def status(call: Call) -> dict[str, Any]:
 
 
 async def message(call: Call) -> dict[str, Any]:
-    """Any MAVLink message: its fields, how many came, and how often."""
+    """Any MAVLink message: its fields as MAVLink has them, how many came, and how often (Hz)."""
     name = call.request.match_info["name"].upper()
     if name.partition("[")[0] not in MESSAGE_IDS:
         raise NotFound(f"there is no MAVLink message {name}")
