@@ -7,6 +7,7 @@ sim_vehicle.py, where ARDUPILOT_HOME names a built copy.
 from __future__ import annotations
 
 import contextlib
+import importlib.util
 import json
 import os
 import signal
@@ -27,15 +28,6 @@ MAVPROXY = [sys.executable, str(SCRIPTS / "mavproxy.py")]
 HOME = "-35.363261,149.165230,584,353"
 SPEEDUP = 10
 PATIENCE = 30.0  # s for a process to show what it should
-
-
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Without ArduPilot there is nothing that the tests marked `sitl` could run on."""
-    if os.environ.get("ARDUPILOT_HOME"):
-        return
-    without = [item for item in items if item.get_closest_marker("sitl") is None]
-    config.hook.pytest_deselected(items=[item for item in items if item.get_closest_marker("sitl") is not None])
-    items[:] = without
 
 
 def eventually(look: Callable[[], Any], timeout: float = PATIENCE, what: str = "it") -> Any:
@@ -171,6 +163,7 @@ class Rig:
         self.url = f"http://127.0.0.1:{port}"
         self.processes: list[Process] = []
         self.control: Control | None = None
+        self.is_ardupilot = False
         self.mavproxy: Process
 
     def get(self, path: str, timeout: float = 120, **params: Any) -> requests.Response:
@@ -210,8 +203,6 @@ class Rig:
 
     def in_the_air(self, alt: float = 10) -> None:
         """Get it to `alt` m above home, in GUIDED, whatever it was doing."""
-        if self.control is not None:  # a pilot keeps the throttle in the middle: LOITER then holds the height
-            self.control.fault("pilot_sticks", throttle=1500)
         status = self.status()
         if status["armed"] and status["landed_state"] != "on_ground":
             self.ok(self.get("/command/guided"))
@@ -219,12 +210,20 @@ class Rig:
             self.ok(self.post("/movement/go_to_ned_wait", x=x, y=y, z=-alt))
             return
         self.ok(self.get("/command/disarm"))  # armed and forgotten on the ground it may disarm at any moment
+        self._throttle(1000)
         self.ok(self.get("/command/arm"))
         self.ok(self.get("/command/takeoff", alt=alt))
+        self._throttle(1500)
 
     def on_the_ground(self) -> None:
         """Get it down and disarmed."""
         self.ok(self.get("/command/land"))
+        self._throttle(1000)
+
+    def _throttle(self, pwm: int) -> None:
+        """Move the pilot's throttle: low to arm; in the middle to fly, so that LOITER holds the height."""
+        if self.control is not None:
+            self.control.fault("pilot_sticks", throttle=pwm)
 
     def start(self, name: str, command: list[str], env: dict[str, str] | None = None) -> Process:
         process = Process(command, self.directory / f"{name}.log", self.directory, env)
@@ -273,6 +272,12 @@ def embedded(directory: Path, *arguments: str, speedup: float = SPEEDUP, **setti
     return rig
 
 
+def headless() -> dict[str, str]:
+    """The environment in which sim_vehicle.py opens no window, and finds our MAVProxy."""
+    env = {"PATH": f"{SCRIPTS}{os.pathsep}{os.environ['PATH']}"}
+    return env | dict.fromkeys(("DISPLAY", "TMUX", "STY", "SITL_RITW_TERMINAL"), "")
+
+
 def ardupilot(directory: Path, *, speedup: int = SPEEDUP, **settings: Any) -> Rig:
     """A rig with ArduPilot's own copter, started as its users do: our module in sim_vehicle.py's MAVProxy."""
     rig = Rig(directory, free_port())
@@ -283,11 +288,8 @@ def ardupilot(directory: Path, *, speedup: int = SPEEDUP, **settings: Any) -> Ri
     command = [sys.executable, str(script), "-v", "ArduCopter", "-N", "-w", f"-I{free_instance()}"]
     command += ["--speedup", str(speedup), "-l", HOME, "--use-dir", str(directory)]
     command += ["-m", f'--load-module=uavapi:{{"config":"{config}"}}']
-    env = {"PATH": f"{SCRIPTS}{os.pathsep}{os.environ['PATH']}"}
-    for variable in ("DISPLAY", "TMUX", "STY", "SITL_RITW_TERMINAL"):
-        env[variable] = ""
     try:
-        rig.mavproxy = rig.start("sim_vehicle", command, env)
+        rig.mavproxy = rig.start("sim_vehicle", command, headless())
         rig.wait_until_up(120)
         rig.be_patient()
     except BaseException:
@@ -309,6 +311,43 @@ def rig(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 def embedded_rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
     """A rig with the embedded vehicle, for tests that need its back door."""
     made = embedded(tmp_path_factory.mktemp("embedded"))
+    yield made
+    made.stop()
+
+
+def ardupilot_with_faults(directory: Path, **settings: Any) -> Rig:
+    """A rig with ArduPilot's own copter behind a wire that records and misbehaves."""
+    rig, instance = Rig(directory, free_port()), free_instance()
+    script = Path(os.environ["ARDUPILOT_HOME"], "Tools", "autotest", "sim_vehicle.py")
+    command = [sys.executable, str(script), "-v", "ArduCopter", "-N", "-w", f"-I{instance}", "--no-mavproxy"]
+    command += ["--speedup", str(SPEEDUP), "-l", HOME, "--use-dir", str(directory)]
+    relay = _load("relay")
+    try:
+        rig.start("sim_vehicle", command, headless())
+        rig.control, rig.is_ardupilot = relay.Relay(5760 + 10 * instance), True
+        master = f"--master=tcp:127.0.0.1:{rig.control.port}"
+        rig.mavproxy = rig.start("mavproxy", [*MAVPROXY, master, "--retries=20", load(rig.port, **settings)])
+        rig.wait_until_up(120)
+        rig.be_patient()
+    except BaseException:
+        rig.stop()
+        raise
+    return rig
+
+
+def _load(name: str) -> Any:
+    spec = importlib.util.spec_from_file_location(f"end_to_end_{name}", Path(__file__).with_name(f"{name}.py"))
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module", params=["embedded", pytest.param("ardupilot", marks=pytest.mark.sitl)])
+def faulty_rig(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
+    """A rig with a back door: what was sent can be seen, and the link, the pilot and the vehicle can misbehave."""
+    directory = tmp_path_factory.mktemp(request.param)
+    made = embedded(directory) if request.param == "embedded" else ardupilot_with_faults(directory)
     yield made
     made.stop()
 

@@ -47,8 +47,8 @@ WAITING = {
 
 
 @pytest.mark.parametrize("verb", WAITING)
-def test_pilot_mode_change_ends_the_verb_and_nothing_more_is_sent(embedded_rig, verb):
-    rig = embedded_rig
+def test_pilot_mode_change_ends_the_verb_and_nothing_more_is_sent(faulty_rig, verb):
+    rig = faulty_rig
     rig.in_the_air(30)
     waiting = Background(lambda: WAITING[verb](rig))
     time.sleep(0.4)
@@ -68,8 +68,8 @@ def assert_nothing_is_sent(rig, seconds):
     assert [m for m in received if m["name"] in OURS] == []
 
 
-def test_pilot_rc_switch_ends_a_takeoff(embedded_rig):
-    rig = embedded_rig
+def test_pilot_rc_switch_ends_a_takeoff(faulty_rig):
+    rig = faulty_rig
     rig.in_the_air(5)
     rig.on_the_ground()
     rig.ok(rig.get("/command/arm"))
@@ -83,8 +83,8 @@ def test_pilot_rc_switch_ends_a_takeoff(embedded_rig):
     rig.ok(rig.get("/command/guided"))
 
 
-def test_arm_does_not_take_a_flying_vehicle_from_its_pilot(embedded_rig, harness):
-    rig = embedded_rig
+def test_arm_does_not_take_a_flying_vehicle_from_its_pilot(faulty_rig, harness):
+    rig = faulty_rig
     rig.in_the_air(10)
     rig.mavproxy.type("mode LOITER")
     harness.eventually(lambda: rig.status()["mode"] == "LOITER", 5, "mode LOITER")
@@ -94,8 +94,8 @@ def test_arm_does_not_take_a_flying_vehicle_from_its_pilot(embedded_rig, harness
     assert rig.status()["mode"] == "LOITER"
 
 
-def test_a_newer_command_supersedes_the_one_in_flight(embedded_rig):
-    rig = embedded_rig
+def test_a_newer_command_supersedes_the_one_in_flight(faulty_rig):
+    rig = faulty_rig
     rig.in_the_air(10)
     waiting = Background(lambda: rig.post("/movement/go_to_ned_wait", **far(rig)))
     time.sleep(0.3)
@@ -108,8 +108,8 @@ def test_a_newer_command_supersedes_the_one_in_flight(embedded_rig):
     assert newer.join(60).status_code == 200
 
 
-def test_link_loss_ends_the_verb_and_all_recovers(embedded_rig, harness):
-    rig = embedded_rig
+def test_link_loss_ends_the_verb_and_all_recovers(faulty_rig, harness):
+    rig = faulty_rig
     rig.in_the_air(10)
     waiting = Background(lambda: rig.post("/movement/go_to_ned_wait", **far(rig)))
     time.sleep(0.3)
@@ -121,11 +121,24 @@ def test_link_loss_ends_the_verb_and_all_recovers(embedded_rig, harness):
     harness.eventually(lambda: rig.get("/telemetry/gps").json().get("code") == "stale", 10, "going stale")
     rig.control.ask("clear")
     harness.eventually(lambda: rig.get("/telemetry/gps").status_code == 200, 10, "the link's return")
+    harness.eventually(lambda: rig.ok(rig.get("/telemetry/status"))["age_s"] < 2, 10, "the next heartbeat")
     rig.ok(rig.post("/movement/drive_wait", x=1, y=0, z=0))
 
 
-def test_lost_and_foreign_acks(embedded_rig):
-    rig = embedded_rig
+def test_stream_that_somebody_turned_off_is_asked_for_again(faulty_rig, harness):
+    rig = faulty_rig
+    rig.mavproxy.ask("long SET_MESSAGE_INTERVAL 33 -1", "ACCEPTED")  # GLOBAL_POSITION_INT
+    before = rig.ok(rig.get("/telemetry/message/GLOBAL_POSITION_INT", max_age=60))["info"]["count"]
+    harness.eventually(
+        lambda: rig.ok(rig.get("/telemetry/message/GLOBAL_POSITION_INT", max_age=60))["info"]["count"] > before + 10,
+        20,
+        "its coming again",
+    )
+    assert rig.ok(rig.get("/telemetry/gps"))["age_s"] < 2
+
+
+def test_lost_and_foreign_acks(faulty_rig):
+    rig = faulty_rig
     rig.in_the_air(10)
     rig.control.fault("lose_acks", command=178, count=2)
     rig.ok(rig.get("/command/set_ground_speed", new_v=5))

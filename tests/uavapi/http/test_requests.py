@@ -21,7 +21,23 @@ def test_numbers_stay_as_the_client_wrote_them(given: Any, value: float) -> None
 
 @pytest.mark.parametrize(
     "given",
-    [math.nan, math.inf, -math.inf, "nan", "inf", "-Infinity", "1e400", True, None, [], {}, "", "ten", "9" * 5000],
+    [
+        math.nan,
+        math.inf,
+        -math.inf,
+        "nan",
+        "inf",
+        "-Infinity",
+        "1e400",
+        True,
+        None,
+        [],
+        {},
+        "",
+        "ten",
+        "1_0",
+        "9" * 5000,
+    ],
 )
 def test_what_is_no_finite_number_is_invalid(given: Any) -> None:
     with pytest.raises(Invalid) as caught:
