@@ -170,9 +170,10 @@ def greeting(options: Options, with_token: bool) -> str:
     lines = [f"API of vehicle {options.sysid}: {url}"]
     if options.simulated:
         curl = 'curl -H "Authorization: Bearer $UAVAPI_TOKEN"' if with_token else "curl"
+        go = "set_mode?mode=HOLD" if options.vehicle == "rover" else "takeoff?alt=10"
         lines += [
             f"  {curl} {url}/command/arm",
-            f"  {curl} '{url}/command/takeoff?alt=10'",
+            f"  {curl} '{url}/command/{go}'",
             f"  {curl} {url}/telemetry/gps",
         ]
     return "\n".join(lines)

@@ -153,7 +153,7 @@ def parse(argv: Sequence[str], environ: Mapping[str, str] | None = None) -> Opti
     """
     arguments = list(argv)
     cut = arguments.index("--") if "--" in arguments else len(arguments)
-    given = vars(build_parser().parse_args(arguments[:cut]))
+    given = vars(build_parser().parse_args(_southern(arguments[:cut])))
     config = given.pop("config", None)
     merged = read_ini(Path(config).expanduser()) if config is not None else {}
     origins = dict.fromkeys([*merged, *dict(merged.get("further", ()))], str(config))
@@ -173,6 +173,17 @@ def parse(argv: Sequence[str], environ: Mapping[str, str] | None = None) -> Opti
     options = Options(**merged, mavproxy_args=tuple(arguments[cut + 1 :]), origins=origins)
     check(options)
     return options
+
+
+def _southern(words: Sequence[str]) -> list[str]:
+    """The words with `--location -35.3,149.1` as one word: argparse takes a minus for the beginning of an option."""
+    joined: list[str] = []
+    for word in words:
+        if joined[-1:] == ["--location"] and re.match(r"-[\d.]", word):
+            joined[-1] += f"={word}"
+        else:
+            joined.append(word)
+    return joined
 
 
 def _read_module(text: str) -> tuple[str, ...]:

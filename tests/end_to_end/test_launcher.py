@@ -11,12 +11,29 @@ from pathlib import Path
 import pytest
 import requests
 
+HOME = (-35.2, 149.1)
+
+
+@pytest.fixture
+def station():
+    """A ground station's socket."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as made:
+        made.bind(("127.0.0.1", 0))
+        made.settimeout(30)
+        yield made
+
 
 @pytest.fixture(params=["embedded", pytest.param("ardupilot", marks=pytest.mark.sitl)])
-def launched(request, harness, tmp_path):
+def launched(request, harness, station, tmp_path):
     port = harness.free_port()
     command = [str(harness.SCRIPTS / "mavproxy-uavapi"), "--simulated", "true", "--speedup", "10"]
     command += ["--port", str(port), "--sysid", "42", "--log_path", str(tmp_path)]
+    command += [
+        "--location",
+        f"{HOME[0]},{HOME[1]},600,90",
+        "--gs_connection",
+        f"127.0.0.1:{station.getsockname()[1]}",
+    ]
     if request.param == "ardupilot":
         command += ["--ardupilot_path", os.environ["ARDUPILOT_HOME"]]
     process = harness.Process([sys.executable, *command], tmp_path / "launcher.log", tmp_path)
@@ -38,7 +55,7 @@ def of_this_run(directory: Path) -> list[str]:
     return found
 
 
-def test_one_command_gives_a_vehicle_to_fly_and_ends_all_it_started(launched, harness):
+def test_one_command_gives_a_vehicle_to_fly_and_ends_all_it_started(launched, station, harness):
     process, url, directory = launched
     said = process.says("/telemetry/gps", timeout=120)
     lines = [line.strip() for line in said.splitlines() if "curl" in line]
@@ -47,6 +64,9 @@ def test_one_command_gives_a_vehicle_to_fly_and_ends_all_it_started(launched, ha
         answer = requests.get(url + path, timeout=120)
         assert answer.status_code == 200, answer.text
         assert answer.json()["id"] == "42"
+    place = requests.get(url + "/telemetry/gps", timeout=10).json()["info"]["position"]
+    assert (place["lat"], place["lon"]) == pytest.approx(HOME, abs=1e-4)
+    assert station.recv(2048)[0] in (0xFE, 0xFD)  # a MAVLink frame
     os.kill(process.pid, signal.SIGTERM)
     assert process.popen.wait(30) == 0
     harness.eventually(lambda: of_this_run(directory) == [], 10, "the end of all its processes")

@@ -199,6 +199,11 @@ def test_both_spellings_lists_modules_and_the_rest():
 # Locations
 
 
+def test_location_may_be_in_the_south():
+    assert parse(["--location", "-35.3,-149.1,600,90", "--speedup", "2"]).location == "-35.3,-149.1,600,90"
+    assert parse(["--location=-35.3,149.1,600,90"]).location == "-35.3,149.1,600,90"
+
+
 def test_location_by_name_numbers_and_files(tmp_path):
     assert locations.resolve("CMAC") == (-35.363261, 149.165230, 584, 353)
     assert locations.resolve("1.5,2.5,30,90") == (1.5, 2.5, 30, 90)
@@ -309,6 +314,8 @@ def test_greeting_has_three_lines_to_try_for_a_simulated_vehicle():
         "  curl http://127.0.0.1:8001/telemetry/gps",
     ]
     assert commands.greeting(Options(), with_token=False).count("\n") == 0
+    rover = commands.greeting(Options(simulated=True, vehicle="rover"), with_token=False)
+    assert "takeoff" not in rover and rover.count("\n") == 3
 
 
 def test_sim_vehicle_gets_no_window_and_no_working_pkill(tmp_path):
