@@ -1,4 +1,4 @@
-"""A wire between MAVProxy and ArduPilot that records and misbehaves, with the words of the embedded vehicle's back door.
+"""A wire between MAVProxy and ArduPilot that records and misbehaves; its words are the embedded vehicle's.
 
 The faults of the link (`silence`, `lose_acks`, `delay_acks`, `foreign_ack`, `refuse`, `in_progress`) are the wire's
 own. What the pilot does (`pilot_mode`, `pilot_sticks`, `pilot_disarm`) and `reboot` go to the vehicle as another
