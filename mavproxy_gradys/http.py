@@ -14,7 +14,7 @@ from mavproxy_gradys.track_flight import VERB
 from mavproxy_gradys.tracking import REACH
 from mavproxy_gradys.tracks import parse, waypoints
 from mavproxy_uavapi.errors import NoVehicle
-from mavproxy_uavapi.http.call import Call
+from mavproxy_uavapi.http.call import Answer, Call
 from mavproxy_uavapi.http.requests import Empty, Request
 from mavproxy_uavapi.http.routes import EITHER, POST, Route
 
@@ -74,13 +74,12 @@ class Track(Request):
     """A track to fly: its text, in either of CentMesh's formats.
 
     `ground` is the AMSL altitude (m) that heights count from, by default the track's lowest; every waypoint must
-    lie within `reach` m of here; with `wait` false the answer comes when the flight has begun.
+    lie within `reach` m of here.
     """
 
     track: Annotated[str, Field(min_length=1)]
     ground: Annotated[float | None, Field(ge=-500, le=9000)] = None
     reach: Annotated[float, Field(gt=0, le=100_000)] = REACH
-    wait: bool = True
 
 
 class Handlers:
@@ -95,7 +94,7 @@ class Handlers:
             Route("/gradys/status", self.status, Empty),
             Route("/gradys/readings", self.readings, Readings, POST),
             Route("/gradys/flush", self.flush, Empty, EITHER),
-            Route(VERB, self.fly_track, Track, POST),
+            Route(VERB, self.fly_track, Track, POST, job=True),
         ]
 
     async def status(self, call: Call) -> dict[str, Any]:
@@ -120,8 +119,8 @@ class Handlers:
             "seq": numbers,
         }
 
-    async def fly_track(self, call: Call) -> dict[str, Any]:
-        """Take off, fly through a track's places, return and land; `/gradys/status` tells the progress."""
+    async def fly_track(self, call: Call) -> Answer:
+        """Take off, fly through a track's places, return and land."""
         given = call.params(Track)
         readings = parse(given.track)
         job = self._gradys.tracks.fly(
@@ -130,10 +129,11 @@ class Handlers:
             given.reach,
             request=given.model_dump(),
             client=call.request.remote or "unknown",
-            outlives_client=not given.wait,
+            outlives_client=call.is_async,
         )
-        result = await job.outcome() if given.wait else "The track is being flown"
-        return call.answer(result, job=job.id)
+        if call.is_async:
+            return call.accepted(job)
+        return call.answer(await job.outcome(), job=job.id)
 
     def _reading(self, call: Call, given: OneReading, now: float) -> Reading:
         system = given.sysid or call.seen.state.system

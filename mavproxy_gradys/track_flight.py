@@ -40,19 +40,25 @@ class Flight:
             UavApiError: as the verbs `arm`, `takeoff`, `go_to` and `rtl`; nothing more is sent then.
         """
         self.job = job
+        self._enter("arming")
         if self.copter.state.armed is False or self.copter.state.landed:
             await self.copter.arm(job)
-            self.stage = "taking off"
+            self._enter("taking off")
             await self.copter.takeoff(job, self.places[0].alt)
-        self.stage = "flying"
         for place in self.places:
             self.leg += 1
+            self._enter("flying")
             target = GlobalTarget(place.lat, place.lon, place.alt)
             await self.copter.go_to(job, target, wait=True, tolerance=self.tolerance)
-        self.stage = "returning"
+        self._enter("returning")
         await self.copter.rtl(job)
-        self.stage = "done"
+        self._enter("done")
         return f"Flew {len(self.places)} legs and landed at home"
+
+    def _enter(self, stage: str) -> None:
+        self.stage = stage
+        if self.job is not None:
+            self.job.stage = {"stage": stage, "leg": self.leg, "legs": len(self.places)}
 
     def report(self) -> dict[str, Any]:
         """What the status says."""

@@ -18,7 +18,7 @@ def describe(job: Job, now: float) -> dict[str, Any]:
         "request": job.request,
         "client": job.client,
         "state": job.outcome_name,
-        "progress": job.progress,
+        "progress": {**job.stage, **job.progress},
         "seconds": round((job.ended_at or now) - job.began_at, 3),
         "result": job.result,
         "error": None if job.error is None else error_of(job),

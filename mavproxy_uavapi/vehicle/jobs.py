@@ -29,6 +29,7 @@ class Job:
         began_at, ended_at: on the loop's clock (s); ended_at is None while it runs.
         ended_by_hang_up: whether it ended because its last client hung up.
         outlives_client: whether it goes on when its client hangs up (land, rtl).
+        stage: of a verb that is made of others, which one it is at: its name and numbers.
         progress: what it last said of itself, such as distance_to_go (m) and altitude (m above home).
         result: the text of its success.
         error: why it failed.
@@ -43,6 +44,7 @@ class Job:
         self.request = dict(request)
         self.seat = seat
         self.outlives_client = outlives_client
+        self.stage: dict[str, str | int] = {}
         self.progress: dict[str, float] = {}
         self.result: str | None = None
         self.error: UavApiError | None = None

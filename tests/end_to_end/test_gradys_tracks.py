@@ -59,19 +59,32 @@ def seen_while(rig: Any, harness: Any, over: Any) -> list[tuple[float, float, fl
 
 
 def test_a_track_is_flown_again_over_http_with_progress_and_ends_at_home(rig, track, harness):
-    answer = rig.ok(rig.post("/mission/fly-track", track=track.read_text(), wait=False))
-    assert answer["result"] == "The track is being flown" and answer["job"]
-    seen = seen_while(rig, harness, lambda: flight(rig)["state"] != "running")
+    answer = rig.post("/mission/fly-track?wait=false", track=track.read_text())
+    assert answer.status_code == 202
+    legs = len(waypoints(parse(track.read_text())))
+    told = []
+
+    def over() -> bool:
+        job = rig.get(answer.headers["Location"]).json()
+        told.append(job["progress"])
+        return job["state"] != "running"
+
+    seen = seen_while(rig, harness, over)
+    assert rig.get(answer.headers["Location"]).json()["result"] == f"Flew {legs} legs and landed at home"
+    assert {2, legs} <= {progress["leg"] for progress in told if "leg" in progress}
+    assert all(progress["legs"] == legs for progress in told if "legs" in progress)
+    assert any(progress.get("stage") == "returning" for progress in told)
     assert flight(rig)["state"] == "done"
-    assert flight(rig)["leg"] == flight(rig)["legs"] == len(waypoints(parse(track.read_text())))
+    assert flight(rig)["leg"] == flight(rig)["legs"] == legs
     for corner in ((25, 0, -8), (25, 25, -14)):
         assert min(math.dist(corner, place) for place in seen) < 8.0  # the track has a place every 3 s
     status = rig.status()
     assert (status["armed"], status["landed_state"]) == (False, "on_ground")
 
 
-def test_a_track_is_flown_at_the_prompt(rig, track):
-    rig.mavproxy.ask(f"gradys track fly {track}", "legs with vehicle 1")
+@pytest.mark.parametrize("command", ["gradys track fly", "uavapi fly"])
+def test_a_track_is_flown_at_the_prompt(rig, track, command):
+    rig.mavproxy.ask(f"{command} {track}", "legs with vehicle 1")
     rig.mavproxy.ask("gradys track", "track flight running")
     rig.mavproxy.says("legs and landed at home", timeout=120)
 
