@@ -68,9 +68,14 @@ class Session:
         raise SystemExit("the vehicle did not get ready to arm")
 
     def stop(self) -> None:
-        """End it."""
-        self.process.terminate()
-        self.process.wait(10)
+        """End it; a MAVProxy that waits for a line heeds its end rather than a signal."""
+        assert self.process.stdin is not None
+        self.process.stdin.close()
+        try:
+            self.process.wait(10)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
 
 
 def fly(session: Session, seed: int, method: str, fps: float) -> dict[str, Any]:
@@ -102,7 +107,7 @@ def fly(session: Session, seed: int, method: str, fps: float) -> dict[str, Any]:
             return {**case, "failed": str(answer), "error": math.inf}
     answer = session.post("/vision/land", method=method)
     report = answer.get("info", {})
-    case.update({name: report.get(name) for name in ("attempts", "duration", "last_offset")})
+    case.update({name: report.get(name) for name in ("attempts", "duration", "phases", "last_offset")})
     case["error"] = report.get("touchdown_error", math.inf) if "result" in answer else math.inf
     if "result" not in answer:
         case["failed"] = answer.get("detail", str(answer))
@@ -115,6 +120,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--master", required=True)
     parser.add_argument("--landings", type=int, default=20)
+    parser.add_argument("--first", type=int, default=1, help="first seed")
     parser.add_argument("--method", choices=("velocity", "landing_target"), default="velocity")
     parser.add_argument("--fps", type=float, default=15)
     parser.add_argument("--json", type=Path, help="append each landing there")
@@ -123,7 +129,7 @@ def main() -> int:
     cases = []
     try:
         session.ready()
-        for seed in range(1, chosen.landings + 1):
+        for seed in range(chosen.first, chosen.first + chosen.landings):
             case = fly(session, seed, chosen.method, chosen.fps)
             cases.append(case)
             print(f"{chosen.method} {seed}: {case.get('failed') or case['error']}", file=sys.stderr, flush=True)

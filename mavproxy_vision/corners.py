@@ -1,6 +1,7 @@
 """Corners to a tenth of a pixel: lines through the edge points of each side, intersected. Pure.
 
 OpenCV's own corners lie inside the true edge, so that a far tag seems farther: 0.17 m at 5 m, 1.04 m at 9 m.
+Of a tag with few pixels to a cell `pattern` makes them better still.
 """
 
 from __future__ import annotations
@@ -72,24 +73,30 @@ def _edges(
 
 
 def _fit(points: NDArray[np.float64], weights: NDArray[np.float64], along: Corners) -> list[Any]:
-    """For each side a point on its line and its normal; None where too little is seen."""
-    lines: list[Any] = []
-    for side in range(4):
-        xy, weight = points[side], weights[side].copy()
-        line = None
-        for _ in range(3):
-            if np.count_nonzero(weight) < 6:
-                line = None
-                break
-            centre = np.average(xy, axis=0, weights=weight)
-            spread = (xy - centre) * np.sqrt(weight)[:, None]
-            direction = np.linalg.svd(spread, full_matrices=False)[2][0]
-            normal = np.array([direction[1], -direction[0]])
-            away = np.abs((xy - centre) @ normal)
-            line = (centre, normal)
-            weight = np.where(away > max(2.5 * float(np.median(away[weight > 0])), 0.15), 0.0, weight)
-        lines.append(line if line is not None and abs(float(line[1] @ along[side])) < 0.2 else None)
-    return lines
+    """For each side a point on its line and its normal; None where too little is seen.
+
+    Args:
+        points: (4, n, 2) px.
+        weights: (4, n).
+        along: (4, 2) the sides' rough directions.
+    """
+    centres, normals = points[:, 0], along
+    enough = np.full(4, True)
+    for _ in range(3):
+        enough &= np.count_nonzero(weights, axis=1) >= 6
+        shares = weights / np.maximum(weights.sum(axis=1, keepdims=True), 1e-9)
+        centres = (shares[..., None] * points).sum(axis=1)
+        x, y = np.moveaxis(points - centres[:, None], 2, 0)
+        xx, xy, yy = (shares * x * x).sum(axis=1), (shares * x * y).sum(axis=1), (shares * y * y).sum(axis=1)
+        angle = np.arctan2(2 * xy, xx - yy) / 2  # of the longer axis
+        normals = np.stack([-np.sin(angle), np.cos(angle)], axis=1)
+        away = np.abs(x * normals[:, :1] + y * normals[:, 1:])
+        typical = np.array(
+            [np.median(a[w > 0]) if (w > 0).any() else 0.0 for a, w in zip(away, weights, strict=True)]
+        )
+        weights = np.where(away > np.maximum(2.5 * typical, 0.15)[:, None], 0.0, weights)
+    enough &= np.abs((normals * along).sum(axis=1)) < 0.2
+    return [(c, n) if good else None for c, n, good in zip(centres, normals, enough, strict=True)]
 
 
 def _intersect(lines: list[Any], rough: Corners) -> Corners:

@@ -10,6 +10,7 @@ from mavproxy_vision.detector import Detector, Options, locate
 from mavproxy_vision.dictionaries import family, marker_image
 from mavproxy_vision.geometry import Attitude, Mount, vector
 from mavproxy_vision.model import CameraModel
+from mavproxy_vision.pattern import Pattern, align
 from mavproxy_vision.rendering import Look, PlacedTag, Renderer
 
 MODEL = CameraModel()
@@ -117,3 +118,27 @@ def test_a_square_is_located():
     position, _, error = locate(MODEL, corners, SIZE)
     assert position == pytest.approx([0, 0, 2.0], abs=1e-6)
     assert error < 1e-3
+
+
+@pytest.mark.parametrize("blur", [0.4, 0.7, 1.0])
+def test_the_range_of_a_small_tag_is_right_however_sharp_the_lens_is(blur):
+    def off(refine: bool) -> float:
+        detector = Detector(MODEL, Options(sizes={0: SIZE}, far=True, refine=refine))
+        look = Look(noise=3, blur=blur)
+        seen = [
+            detector.detect(frame(6.0, attitude=Attitude(yaw=0.4 * seed), look=look, seed=seed)) for seed in range(6)
+        ]
+        return float(np.mean([one.distance for (one,) in seen])) - 6.0
+
+    assert off(refine=True) == pytest.approx(0, abs=0.03)
+    assert off(refine=False) > 0.1  # the control: OpenCV's own corners
+
+
+def test_a_pattern_that_does_not_fit_leaves_the_corners():
+    image, half = frame(6.0, look=Look(noise=0)), SIZE / 2 / 6.0 * MODEL.fx
+    true = np.array([[-half, -half], [half, -half], [half, half], [-half, half]]) + (MODEL.cx, MODEL.cy)
+    rough, words = true + np.array([[0.3, 0.2], [-0.3, 0.2], [0.2, -0.3], [0.1, 0.3]]), family("36h11", [0, 1])
+    cell = 2 * half / 8
+    assert align(image, rough, Pattern.of(words.bits(0), cell)) == pytest.approx(true, abs=0.1)
+    assert (align(image, rough, Pattern.of(words.bits(1), cell)) == rough).all()
+    assert (align(255 - image, rough, Pattern.of(words.bits(0), cell)) == rough).all()
