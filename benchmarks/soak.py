@@ -424,13 +424,15 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--minutes", type=float, default=10.0)
     parser.add_argument("--seed", type=int, default=random.randrange(1 << 30))
-    parser.add_argument("--keep", type=Path, help="a folder that keeps MAVProxy's log")
+    parser.add_argument("--keep", type=Path, help="a new folder, which keeps MAVProxy's log")
     options = parser.parse_args()
+    if options.keep is not None and options.keep.exists():
+        parser.error(f"{options.keep} is there already")
     print(f"soak: {options.minutes:g} min, seed {options.seed}; {machine()}", flush=True)
     notes = Notes()
     with tempfile.TemporaryDirectory(prefix="uavapi-soak-") as temporary:
         directory = options.keep or Path(temporary)
-        directory.mkdir(parents=True, exist_ok=True)
+        directory.mkdir(parents=True, exist_ok=options.keep is None)
         rig = start(directory)
         try:
             asyncio.run(Soak(rig, notes, options.seed).run(options.minutes * 60))

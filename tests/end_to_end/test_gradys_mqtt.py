@@ -23,7 +23,7 @@ mqtt = pytest.importorskip("paho.mqtt.client")
 class Broker:
     """A Mosquitto with a user and a password."""
 
-    def __init__(self, rig: Any, harness: Any, directory: Path) -> None:
+    def __init__(self, rig: Any, harness: Any, directory: Path, *lines: str) -> None:
         self._rig, self._harness, self._directory = rig, harness, directory
         self.port = harness.free_port()
         passwords = directory / "passwords"
@@ -36,6 +36,7 @@ class Broker:
         self._config = directory / "mosquitto.conf"
         self._config.write_text(
             f"listener {self.port} 127.0.0.1\nallow_anonymous false\npassword_file {passwords}\nuser root\n"
+            + "".join(f"{line}\n" for line in lines)
         )
         self.start()
 
@@ -52,11 +53,13 @@ class Broker:
 class Subscriber:
     """Hears all that the broker has; `heard` is (topic, payload, retained)."""
 
-    def __init__(self, port: int, topic: str = "fleet/#") -> None:
+    def __init__(self, port: int, topic: str = "fleet/#", ca_file: Path | None = None) -> None:
         self.heard: list[tuple[str, Any, bool]] = []
         self._subscribed = threading.Event()
         self._client = mqtt.Client(mqtt.CallbackAPIVersion.VERSION2)
         self._client.username_pw_set("uav", "secret")
+        if ca_file is not None:
+            self._client.tls_set(str(ca_file))
         self._client.on_message = self._take
         self._client.on_subscribe = lambda *_: self._subscribed.set()
         self._client.on_connect = lambda *_: self._client.subscribe(topic, qos=1)
@@ -137,6 +140,27 @@ def test_a_wrong_password_is_said(rig, harness, tmp_path):
     rig.mavproxy.ask(f"module load gradys:{settings}", "Loaded module gradys")
     error = harness.eventually(lambda: _sink(rig)["last_error"], 15, "the refusal")
     assert "Not authorized" in error and "wrong" not in error
+    rig.mavproxy.ask("module unload gradys", "Unloaded module gradys")
+
+
+@pytest.mark.needs("openssl")
+def test_tls_is_checked_by_the_ca_file(rig, harness, tmp_path):
+    key, cert = tmp_path / "key.pem", tmp_path / "cert.pem"
+    make = ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=broker"]
+    make += ["-addext", "subjectAltName=IP:127.0.0.1", "-keyout", str(key), "-out", str(cert)]
+    subprocess.run(make, check=True, capture_output=True)
+    broker = Broker(rig, harness, tmp_path, f"certfile {cert}", f"keyfile {key}")
+    subscriber = Subscriber(broker.port, ca_file=cert)
+    sink = f"mqtts://uav:secret@127.0.0.1:{broker.port}/fleet/{{sysid}}/{{quantity}}"
+    settings = json.dumps({"sink": sink, "spool": f"{tmp_path}/spool.db"}, separators=(",", ":"))
+    rig.mavproxy.ask(f"module load gradys:{settings}", "Loaded module gradys")
+    error = harness.eventually(lambda: _sink(rig)["last_error"], 20, "a certificate that nobody vouches for")
+    assert "certificate" in error.lower()
+    assert subscriber.heard == []
+    rig.mavproxy.ask(f"gradys set ca_file {cert}", "gradys: no ground station")
+    rig.mavproxy.ask("gradys flush", "tried now")
+    harness.eventually(lambda: len(subscriber.readings("fleet/10/position")) >= 3, 20, "three positions")
+    subscriber.stop()
     rig.mavproxy.ask("module unload gradys", "Unloaded module gradys")
 
 
