@@ -17,9 +17,9 @@ from mavproxy_gradys.tracks import parse, waypoints
 EXAMPLES = Path(__file__).parents[2] / "examples" / "centmesh"
 
 
-@pytest.fixture(scope="module")
-def rig(harness, tmp_path_factory) -> Iterator:
-    made = harness.embedded(tmp_path_factory.mktemp("tracks"))
+@pytest.fixture(scope="module", params=["embedded", pytest.param("ardupilot", marks=pytest.mark.sitl)])
+def rig(request, harness, tmp_path_factory) -> Iterator:
+    made = getattr(harness, request.param)(tmp_path_factory.mktemp("tracks"))
     made.mavproxy.ask(f'module load gradys:{{"spool":"{made.directory}/spool.db"}}', "Loaded module gradys")
     yield made
     made.stop()
