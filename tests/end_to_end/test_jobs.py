@@ -108,6 +108,25 @@ def test_client_that_hangs_up_stops_the_vehicle_where_that_is_wanted(faulty_rig,
         set_on_disconnect(rig, "continue")
 
 
+def test_hanging_up_on_a_command_that_steers_nothing_stops_no_flight(faulty_rig, harness):
+    rig = faulty_rig
+    rig.in_the_air(10)
+    set_on_disconnect(rig, "hold")
+    rig.control.fault("lose_acks", command=178)
+    try:
+        rig.post("/movement/go_to_ned_wait?wait=false", **far(rig))
+        hang_up(rig, "/command/set_ground_speed?new_v=6")
+        harness.eventually(lambda: running(rig) == ["/movement/go_to_ned_wait"], 5, "the end of the speed's job")
+        before = rig.ned()
+        time.sleep(0.5)
+        assert math.dist(before, rig.ned()) > 5
+    finally:
+        rig.control.ask("clear")
+        set_on_disconnect(rig, "continue")
+        rig.ok(rig.get("/command/brake"))
+        rig.ok(rig.get("/command/guided"))
+
+
 @pytest.mark.parametrize("verb", ["rtl", "land"])
 def test_going_home_is_not_undone_by_hanging_up(faulty_rig, harness, verb):
     rig = faulty_rig
