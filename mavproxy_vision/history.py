@@ -15,6 +15,7 @@ from mavproxy_vision.geometry import Attitude, Vector, vector, wrap
 
 KEPT = 12.0  # s of the vehicle's clock
 BEYOND = 0.3  # s that the newest telemetry is carried on by its rates
+GAP = 0.6  # s between two messages within which nobody knows what the vehicle did
 CLOCK_WINDOW = 1.5  # s of the faster clock over which the least delayed message sets the clocks' offset
 REBOOT = 3.0  # s that a clock may step back without a reboot
 
@@ -45,6 +46,12 @@ class VehicleClock:
         if self._best is None:
             return 0.0
         return self._best[1] + self.ratio * (host - self._best[0])
+
+    def host(self, vehicle: float) -> float:
+        """The host's time at the vehicle's time `vehicle`; infinite before any message."""
+        if self._best is None:
+            return math.inf
+        return self._best[0] + (vehicle - self._best[1]) / max(self.ratio, 0.01)
 
 
 @dataclass(frozen=True)
@@ -121,6 +128,8 @@ class History:
             if after > BEYOND:
                 return None
             return _moved(attitude, [rate * after for rate in rates])
+        if times[index] - time > GAP:
+            return None
         following, share = attitudes[index][1], (at - time) / (times[index] - time)
         turn = (following.roll - attitude.roll, following.pitch - attitude.pitch, wrap(following.yaw - attitude.yaw))
         return _moved(attitude, [share * angle for angle in turn])
@@ -136,6 +145,8 @@ class History:
         if index == len(times):
             return before.later(at - before.at) if at - before.at <= BEYOND else None
         after = motions[index]
+        if after.at - before.at > GAP:
+            return None
         share = (at - before.at) / (after.at - before.at)
         return Motion(
             at,

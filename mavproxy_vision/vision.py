@@ -31,6 +31,8 @@ from mavproxy_vision.truth import Pose, Truth
 from mavproxy_vision.worker import Health, Worker
 
 FRESH = 1.0  # s; older sightings are not shown as what is in view
+SOON = 0.06  # s of the vehicle's clock that telemetry is carried on to a frame; one that is ahead by more waits for it
+AFTER = 0.05  # s of the vehicle's clock, at least, that a SIM_STATE may be younger than the ATTITUDE before it
 
 
 class Vision:
@@ -60,8 +62,10 @@ class Vision:
         self.changed = asyncio.Event()
         self.latencies: deque[float] = deque(maxlen=1000)  # s from a frame's arrival to the setpoint that knows it
         self._fixer: Fixer | None = None
+        self._unplaced: deque[Seen] = deque(maxlen=50)  # newer than the telemetry that tells where they were taken
         self._system = 0
         self._home_down = 0.0
+        self._attitude_at = self._attitude_gap = 0.0  # the newest one's time, and from the one before (s, vehicle's)
         self._watching: asyncio.Task[None] | None = None
         self._truth_needed = contextlib.ExitStack()
         self._extra_sizes: dict[int, float] = {}
@@ -138,10 +142,19 @@ class Vision:
     def take(self, seen: Seen, image: Image) -> None:
         """An outcome."""
         self.seen, self.image = seen, image
-        if self.target is not None and self._fixer is not None:
-            self.target.take(self._fixer.fixes(seen, self.history, self.clock, self._home_down))
+        if self.target is not None:
+            self._unplaced.append(seen)
+            self._place()
         self.changed.set()
         self.changed = asyncio.Event()
+
+    def _place(self) -> None:
+        """Tell the target what was seen, as far as telemetry says where that was."""
+        while self._unplaced and self.target is not None and self._fixer is not None:
+            if self.clock.vehicle(self._unplaced[0].captured_at) > self.history.newest + SOON:
+                return
+            fixes = self._fixer.fixes(self._unplaced.popleft(), self.history, self.clock, self._home_down)
+            self.target.take(fixes)
 
     def _hear(self, state: VehicleState, message: Any, now: float) -> None:
         name = message.get_type()
@@ -158,11 +171,13 @@ class Vision:
             return
         self.clock.hear(now, at, state.time_ratio.ratio)
         if name == "ATTITUDE":
+            self._attitude_gap, self._attitude_at = at - self._attitude_at, at
             attitude = Attitude(message.roll, message.pitch, message.yaw)
             self.history.add_attitude(at, attitude, (message.rollspeed, message.pitchspeed, message.yawspeed))
         else:
             position, velocity = vector(message.x, message.y, message.z), vector(message.vx, message.vy, message.vz)
             self.history.add_motion(at, position, velocity)
+        self._place()
 
     def _is_ours(self, state: VehicleState) -> bool:
         system = self.host.target or next(iter(self.host.fleet.vehicles), 0)
@@ -174,7 +189,10 @@ class Vision:
     def _hear_truth(self, state: VehicleState, message: Any, now: float) -> None:
         lat, lon = message.lat_int / 1e7, message.lon_int / 1e7
         attitude = Attitude(message.roll, message.pitch, message.yaw)
-        pose = Pose(now, lat, lon, message.alt, (message.vn, message.ve, message.vd), attitude)
+        # SIM_STATE has no time of its own. A busy machine hears many at once; what came before them tells when.
+        gap = max(1.25 * self._attitude_gap, AFTER)
+        at = min(now, self.clock.host(self._attitude_at + gap))
+        pose = Pose(at, lat, lon, message.alt, (message.vn, message.ve, message.vd), attitude)
         height = (state.field("GLOBAL_POSITION_INT", "relative_alt") or 0) / 1000.0
         self.truth.add(pose, state.armed, height)
 
@@ -215,6 +233,7 @@ class Vision:
         wanted = Wanted(settings.families[0], tags, settings.ground)
         self._fixer = Fixer(settings.model, settings.camera_mount, wanted)
         self.target = Target()
+        self._unplaced.clear()
         return self.target
 
     def aim_no_more(self) -> None:

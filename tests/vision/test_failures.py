@@ -156,6 +156,21 @@ def test_a_camera_turned_from_what_mount_says_is_noticed(flying, mount):
     assert rig.truth.down < -2  # it holds where it noticed
 
 
+@pytest.mark.parametrize("burst", [0.2, 0.4])
+def test_a_machine_that_hears_of_the_vehicle_in_bursts_does_not_suspect_the_mount(flying, burst):
+    rig = flying(alt=5.0, sim_tags="0:0.30@1.6,-1.2")
+    rig.burst = burst
+    assert rig.outcome(rig.land()).startswith("Landed on tag 0")
+    assert landed_off(rig, 1.6, -1.2) < 0.2
+
+
+def test_a_turned_camera_is_noticed_on_a_busy_machine_too(flying):
+    rig = flying(alt=5.0, sim_tags="0:0.30@1.6,-1.2")
+    rig.burst = 0.2
+    rig.eye.source.renderer.mount = type(rig.eye.source.renderer.mount)(yaw=180.0)
+    assert "mount" in str(rig.outcome(rig.land()))
+
+
 @pytest.mark.parametrize("mount", ["90", "180"])
 def test_a_camera_turned_as_mount_says_lands(flying, mount):
     rig = flying(mount=mount)
@@ -172,6 +187,40 @@ def test_a_wrong_tag_size_is_refused_with_the_reason(flying, size):
     assert "tags" in str(error)
     assert rig.mode == "GUIDED"
     assert rig.truth.down < -2
+
+
+NESTED = {"tags": "0:0.5 1:0.08@0.35,0", "sim_tags": "0:0.5@0.8,-0.6 1:0.08@0.8,-0.25"}
+
+
+def sights(rig: Any) -> list[tuple[float, int]]:
+    """Collects height and id of what it descends by."""
+    found: list[tuple[float, int]] = []
+
+    def look() -> None:
+        target = rig.vision.target
+        if target is not None and target.last is not None and rig.flights.phase == "descending":
+            found.append((-rig.truth.down, target.last.tag))
+
+    rig.each_step.append(look)
+    return found
+
+
+def test_a_small_tag_beside_the_large_one_takes_over_low_down(flying):
+    rig = flying(alt=5.0, **NESTED)
+    by = sights(rig)
+    assert rig.outcome(rig.land()).startswith("Landed on tag 0")
+    assert landed_off(rig) < 0.2
+    assert by[0][1] == 0  # from 5 m the small one cannot be read
+    assert by[-1][1] == 1
+    assert by[-1][0] < 0.6
+
+
+def test_control_without_the_small_tag_the_last_metre_is_blind(flying):
+    rig = flying(alt=5.0, **{name: text.partition(" ")[0] for name, text in NESTED.items()})
+    by = sights(rig)
+    assert rig.outcome(rig.land()).startswith("Landed on tag 0")
+    assert by[-1][1] == 0
+    assert by[-1][0] > 0.8
 
 
 def test_occlusion_is_waited_out(flying):

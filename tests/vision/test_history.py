@@ -32,6 +32,23 @@ def test_an_offset_that_was_learned_is_forgotten():
     assert clock.vehicle(104) == pytest.approx(8.7, abs=0.01)
 
 
+def test_the_hosts_time_is_the_vehicles_the_other_way_round():
+    clock = VehicleClock()
+    assert clock.host(5) == math.inf
+    for step in range(50):
+        clock.hear(100 + 0.02 * step, 5 + 0.1 * step, 5.0)
+    assert clock.host(clock.vehicle(101.3)) == pytest.approx(101.3)
+
+
+def test_what_happened_in_a_silence_is_not_known():
+    made = history()
+    made.add_attitude(3.0, Attitude(), (0, 0, 0))
+    made.add_motion(3.0, vector(3, 0, -5), vector(1, 0, 0))
+    assert made.attitude(2.0) is None
+    assert made.motion(2.0) is None
+    assert made.attitude(0.9) is not None
+
+
 def history() -> History:
     made = History()
     for step in range(21):
