@@ -2,7 +2,7 @@
 
 A list of tags is written `ID:SIZE[@X,Y]`, separated by spaces or semicolons: the size in m is that of the black
 square; X and Y in m are where the tag's centre lies from the target, to the right and to the top of the tags.
-The first one is the main tag. `0:0.30 1:0.06@0.25,0` is a large tag with a small one to its right.
+The first one is the main tag. `1:0.06 0:0.30@-0.25,0` is a small tag with a large one to its left.
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ from mavproxy_vision.truth import Pose, Truth
 from mavproxy_vision.worker import Health, Worker
 
 FRESH = 1.0  # s; older sightings are not shown as what is in view
-SOON = 0.06  # s of the vehicle's clock that telemetry is carried on to a frame; one that is ahead by more waits for it
+SOON = 0.06  # s of the vehicle's clock that telemetry is carried on to a frame; one farther ahead waits for it
 AFTER = 0.05  # s of the vehicle's clock, at least, that a SIM_STATE may be younger than the ATTITUDE before it
 
 
