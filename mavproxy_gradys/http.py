@@ -133,7 +133,7 @@ class Handlers:
         )
         if call.is_async:
             return call.accepted(job)
-        return call.answer(await job.outcome(), job=job.id)
+        return call.answer(await call.outcome(job), job=job.id)
 
     def _reading(self, call: Call, given: OneReading, now: float) -> Reading:
         system = given.sysid or call.seen.state.system

@@ -17,6 +17,7 @@ from mavproxy_uavapi.http.limits import BUCKET, Bucket, at_a_bearable_rate, head
 from mavproxy_uavapi.http.responses import Handler, errors_as_answers, success
 from mavproxy_uavapi.http.routes import ROUTES, Route
 from mavproxy_uavapi.http.security import name_the_trusted, only_for_us
+from mavproxy_uavapi.http.trail import audited
 
 BACKLOG = 512  # connections that wait to be accepted
 MAX_BODY = 1024 * 1024  # bytes
@@ -69,7 +70,7 @@ def methods_of(path: str) -> set[str]:
 async def _answer(route: Route, request: web.Request) -> web.StreamResponse:
     params = await parameters(request, route.model, body=request.method == "POST" and not route.raw)
     call = Call(request.app[SERVICE], request, params)
-    answer = await (call.audited(route.action) if route.commands else route.action(call))
+    answer = await (audited(call, route.action) if route.commands else route.action(call))
     return answer if isinstance(answer, web.StreamResponse) else success(answer)
 
 

@@ -9,8 +9,8 @@ from typing import Any, TypeVar, cast
 
 from aiohttp import web
 
-from mavproxy_uavapi.audit import Audit, Entry, noting_sent, utc_now
-from mavproxy_uavapi.errors import BadRequest, Invalid, NotSupported, NoVehicle, TooManyRequests, UavApiError
+from mavproxy_uavapi.audit import Audit
+from mavproxy_uavapi.errors import BadRequest, Invalid, NotSupported, TooManyRequests
 from mavproxy_uavapi.host.host import Host
 from mavproxy_uavapi.http.requests import Request, parse
 from mavproxy_uavapi.http.responses import envelope
@@ -55,6 +55,7 @@ class Call:
         self.service = service
         self.request = request
         self._params = params
+        self.job: Job | None = None  # what the call has begun, or joined
 
     def params(self, model: type[R]) -> R:
         """The parameters, which the route has validated by `model`."""
@@ -93,6 +94,7 @@ class Call:
         verb: Callable[[Job], Awaitable[None]],
         result: str | Callable[[], str],
         outlives_client: bool = False,
+        asked: Request | None = None,
     ) -> Answer:
         """Run a flight verb as a job and await it; or answer 202 at once, where the client wants it so.
 
@@ -101,7 +103,9 @@ class Call:
             verb: what to do.
             result: the text of its success, or what makes it afterwards.
             outlives_client: whether it goes on when the client hangs up; then no limit of jobs refuses it.
+            asked: what tells one request from another, where the parameters do not.
         """
+        params = asked or self._params
 
         async def body(job: Job) -> str:
             await verb(job)
@@ -113,21 +117,35 @@ class Call:
         job = jobs.begin(
             vehicle.seat,
             self.path,
-            self._params.model_dump(),
+            params.model_dump(),
             body,
             client=self.client,
             outlives_client=outlives_client or self.is_async,
-            timeout=getattr(self._params, "timeout", None),
+            timeout=getattr(params, "timeout", None),
         )
         if self.is_async:
             return self.accepted(job)
         try:
-            return self.answer(await job.outcome())
+            return self.answer(await self.outcome(job))
         except asyncio.CancelledError:
             hold = self.service.settings.on_disconnect == "hold" and job.ended_by_hang_up and vehicle.seat.job is job
             if hold and isinstance(vehicle, Copter):
-                jobs.begin(vehicle.seat, "hold", {}, lambda _: _held(vehicle))
+                self.job = jobs.begin(vehicle.seat, "hold", {}, lambda _: _held(vehicle))
             raise
+
+    async def outcome(self, job: Job) -> str:
+        """Await a job for the client.
+
+        Raises:
+            UavApiError: what the job failed with.
+        """
+        self.job = job
+        return await job.outcome()
+
+    @property
+    def asked(self) -> dict[str, Any]:
+        """The parameters that were given, or have a default."""
+        return self._params.model_dump(exclude_none=True)
 
     @property
     def path(self) -> str:
@@ -150,41 +168,9 @@ class Call:
 
     def accepted(self, job: Job) -> web.Response:
         """202: the job goes on, and where it is to be found."""
+        self.job = job
         body = self.answer(f"Job {job.id} accepted", job=job.id)
         return web.json_response(body, status=202, headers={"Location": f"/jobs/{job.id}"})
-
-    async def audited(self, action: Action) -> Answer:
-        """Run an action that commands, and leave a trace of it."""
-        began = self.service.host.clock()
-        with noting_sent() as sent:
-            try:
-                answer = await action(self)
-            except UavApiError as error:
-                self._leave_trace(began, sent, error.code, str(error))
-                raise
-            except asyncio.CancelledError:
-                self._leave_trace(began, sent, "client_gone", "the client hung up")
-                raise
-        self._leave_trace(began, sent, "ok", answer.get("result", "") if isinstance(answer, dict) else "")
-        return answer
-
-    def _leave_trace(self, began: float, sent: list[str], outcome: str, detail: str) -> None:
-        try:
-            system = self.seen.state.system
-        except NoVehicle:
-            system = 0
-        entry = Entry(
-            time=utc_now(),
-            client=self.client,
-            verb=self.path,
-            request=self._params.model_dump(exclude_none=True),
-            system=system,
-            outcome=outcome,
-            detail=detail,
-            seconds=round(self.service.host.clock() - began, 3),
-            sent=tuple(sent),
-        )
-        self.service.audit.add(entry)
 
 
 async def _held(copter: Copter) -> str:

@@ -21,7 +21,7 @@ async def upload(call: Call) -> Answer:
     vehicle = call.vehicle
     body = await _body(call)
     items = await asyncio.to_thread(plans.read, body)
-    request = MissionFile(digest=hashlib.sha256(body.encode()).hexdigest(), items=len(items))
+    asked = MissionFile(digest=hashlib.sha256(body.encode()).hexdigest(), items=len(items))
 
     async def verb(job: Job) -> None:
         _require_no_flown_mission(vehicle)
@@ -31,9 +31,9 @@ async def upload(call: Call) -> Answer:
 
         await vehicle.waypoints.upload(items, told)
 
-    uploading = Call(call.service, call.request, request)
     # A client that hangs up must not leave half a mission.
-    return await uploading.fly(vehicle, verb, f"Mission of {len(items)} items uploaded", outlives_client=True)
+    result = f"Mission of {len(items)} items uploaded"
+    return await call.fly(vehicle, verb, result, outlives_client=True, asked=asked)
 
 
 async def download(call: Call) -> Answer:

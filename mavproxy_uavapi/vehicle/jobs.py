@@ -56,6 +56,7 @@ class Job:
         self._limit: asyncio.TimerHandle | None = None
         self._finished = asyncio.Event()
         self._clients = 0
+        self._when_ended: list[Callable[[], None]] = []
 
     @property
     def running(self) -> bool:
@@ -111,6 +112,12 @@ class Job:
             if self._limit is not None:
                 self._limit.cancel()
             self._finished.set()
+            for callback in self._when_ended:
+                callback()
+
+    def when_ended(self, callback: Callable[[], None]) -> None:
+        """Have `callback` called when the outcome of a running job is known."""
+        self._when_ended.append(callback)
 
     async def outcome(self) -> str:
         """Await its result for a client; when the last client hangs up, the job ends too.

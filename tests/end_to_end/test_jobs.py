@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import threading
 import time
@@ -206,12 +207,17 @@ def test_reboot_in_flight_ends_the_verb_and_resets_what_is_known(faulty_rig, har
     rig.ok(rig.get("/command/disarm"))
 
 
-def test_the_trail_tells_who_asked_for_what_and_what_was_sent(faulty_rig):
+def test_the_trail_tells_who_asked_for_what_and_what_was_sent(faulty_rig, harness):
     rig = faulty_rig
     rig.ok(rig.get("/command/set_home"))
     rig.get("/command/takeoff?alt=3")
+    location = rig.get("/command/guided?wait=false").headers["Location"]
+    harness.eventually(lambda: job_of(rig, location)["state"] == "succeeded", 10, "GUIDED")
     said = rig.mavproxy.ask("uavapi log 5", "all of them:")
     assert "127.0.0.1 /command/set_home()" in said
-    lines = (rig.directory / "uavapi-audit.jsonl").read_text(encoding="utf-8")
-    assert '"verb": "/command/set_home"' in lines
-    assert '"outcome": "not_armed"' in lines and '"sent": []' in lines
+    file = rig.directory / "uavapi-audit.jsonl"
+    entries = {entry["verb"]: entry for entry in map(json.loads, file.read_text(encoding="utf-8").splitlines())}
+    home, takeoff, guided = (entries[f"/command/{verb}"] for verb in ("set_home", "takeoff", "guided"))
+    assert (home["outcome"], set(home["sent"])) == ("ok", {"COMMAND_LONG"})
+    assert (takeoff["outcome"], takeoff["sent"], takeoff["request"]["alt"]) == ("not_armed", [], 3)
+    assert (guided["outcome"], guided["client"], set(guided["sent"])) == ("ok", "127.0.0.1", {"COMMAND_LONG"})

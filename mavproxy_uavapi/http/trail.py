@@ -1,0 +1,77 @@
+"""What the audit trail learns of a call: when its answer is known, and of a job that goes on, when that has ended."""
+
+from __future__ import annotations
+
+import asyncio
+
+from mavproxy_uavapi.audit import Entry, noting_sent, utc_now
+from mavproxy_uavapi.errors import NoVehicle, UavApiError
+from mavproxy_uavapi.http.call import Action, Answer, Call
+
+GONE = "the client hung up"
+
+
+async def audited(call: Call, action: Action) -> Answer:
+    """Run an action that commands, and leave a trace of it."""
+    with noting_sent() as sent:
+        trace = Trace(call, sent)
+        try:
+            answer = await action(call)
+        except UavApiError as error:
+            trace.leave(error.code, str(error))
+            raise
+        except asyncio.CancelledError:
+            trace.leave_at_end("client_gone", GONE)
+            raise
+    trace.leave_at_end("ok", answer.get("result", "") if isinstance(answer, dict) else "")
+    return answer
+
+
+class Trace:
+    """One call, from its request on.
+
+    Args:
+        call: the call.
+        sent: names of the messages that it sends, as they go out.
+    """
+
+    def __init__(self, call: Call, sent: list[str]) -> None:
+        self._call = call
+        self._sent = sent
+        self._clock = call.service.host.clock
+        self._began = self._clock()
+        try:
+            self._system = call.seen.state.system
+        except NoVehicle:
+            self._system = 0
+
+    def leave_at_end(self, outcome: str, detail: str) -> None:
+        """Leave the trace when the call's job has ended: now, unless that goes on without its client."""
+        job = self._call.job
+        if job is None or not job.running:
+            self.leave(outcome, detail)
+        else:
+            job.when_ended(lambda: self._leave_with_job(outcome, detail))
+
+    def _leave_with_job(self, outcome: str, detail: str) -> None:
+        job = self._call.job
+        assert job is not None
+        of_job = job.result if job.error is None else str(job.error)
+        if outcome == "ok" and job.error is not None:
+            outcome = job.error.code
+        self.leave(outcome, "; ".join(text for text in (detail, of_job) if text))
+
+    def leave(self, outcome: str, detail: str) -> None:
+        """Leave the trace."""
+        entry = Entry(
+            time=utc_now(),
+            client=self._call.client,
+            verb=self._call.path,
+            request=self._call.asked,
+            system=self._system,
+            outcome=outcome,
+            detail=detail,
+            seconds=round(self._clock() - self._began, 3),
+            sent=tuple(self._sent),
+        )
+        self._call.service.audit.add(entry)
