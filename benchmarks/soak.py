@@ -214,7 +214,9 @@ class Clients:
         await self._ask(path, method, path, bound, **options)
 
     async def _read(self) -> None:
-        await self._ask("reads", "GET", f"/telemetry/{self._dice.choice(READS)}", QUICK)
+        name = self._dice.choice(READS)
+        # Home is asked of the vehicle, up to four times, and an ack must not be all that comes.
+        await self._ask("reads", "GET", f"/telemetry/{name}", QUICK + 10 if name == "home_info" else QUICK)
 
     async def _job(self) -> None:
         """A verb whose number is taken, looked at, and perhaps aborted."""
