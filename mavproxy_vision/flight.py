@@ -55,7 +55,8 @@ class Flight:
         self.plnd: PrecisionLanding | None = None
         self.phase = "on its way"
         self._in_land = False
-        self._timed = 0  # number of the frame whose way to a setpoint was timed last
+        # Number of the frame whose way to a setpoint was timed last; what is there before the flight waited for it.
+        self._timed = 0 if vision.seen is None else vision.seen.number
 
     # -- verbs ---------------------------------------------------------------------------------------------
 

@@ -154,7 +154,9 @@ class Worker:
                 self._stop.wait(RECONNECT_PAUSE)
 
     def _read_until_it_fails(self) -> None:
-        self._watch.any_at = self._watch.fresh_at = opened = self._clock()
+        opened = self._clock()
+        if not self._reconnects:  # later on it is not well until it gives a frame
+            self._watch.any_at = self._watch.fresh_at = opened
         while not self._stop.is_set():
             frame = self.source.read()
             if frame is not None and self._watch.is_new(frame):

@@ -7,6 +7,9 @@ twice the speed at most. What goes wrong in flight is tested in lock step, in te
 from __future__ import annotations
 
 import json
+import math
+import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,7 +17,7 @@ from typing import Any
 import pytest
 import requests
 
-pytest.importorskip("cv2")
+cv2 = pytest.importorskip("cv2")
 
 SPEEDUP = 1.5
 
@@ -37,6 +40,10 @@ def seeing(harness: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[A
 
 def camera(rig: Any) -> str:
     return str(rig.ok(rig.get("/vision/status"))["info"]["camera"])
+
+
+def in_flight(rig: Any) -> bool:
+    return bool(rig.ok(rig.get("/vision/status"))["info"].get("flight", {}).get("running"))
 
 
 def test_the_seeds_mission_lands_on_the_tag(seeing: Any, harness: Any) -> None:
@@ -89,13 +96,11 @@ def test_bad_requests_are_refused_before_anything_flies(seeing: Any) -> None:
 
 
 def test_the_pilots_hand_ends_a_landing(seeing: Any, harness: Any) -> None:
-    import threading  # noqa: PLC0415
-
     seeing.in_the_air(6)
     answers: list[requests.Response] = []
     landing = threading.Thread(target=lambda: answers.append(seeing.post("/vision/land", id=3)))
     landing.start()
-    harness.eventually(lambda: seeing.ok(seeing.get("/vision/status"))["info"]["flight"]["running"])
+    harness.eventually(lambda: in_flight(seeing))
     seeing.control.fault("pilot_mode", mode="LOITER")
     landing.join(20)
     assert answers[0].status_code == 409
@@ -103,10 +108,98 @@ def test_the_pilots_hand_ends_a_landing(seeing: Any, harness: Any) -> None:
     assert seeing.control.ask("state")["mode"] == "LOITER"
 
 
+class Poster:
+    """A camera on a gimbal, of somebody else's: draws what the vehicle's truth would show and posts it."""
+
+    def __init__(self, rig: Any, north: float, east: float) -> None:
+        from mavproxy_vision.geometry import Mount  # noqa: PLC0415
+        from mavproxy_vision.model import CameraModel  # noqa: PLC0415
+        from mavproxy_vision.rendering import Look, PlacedTag, Renderer  # noqa: PLC0415
+
+        model = CameraModel.from_field_of_view(480, 360, 56.145)
+        self._renderer = Renderer(model, Mount(gimbal=True), (PlacedTag("36h11", 0, 0.30, north, east),), Look())
+        self._rig, self._stop = rig, threading.Event()
+        self.answers: list[int] = []
+        self._thread = threading.Thread(target=self._run)
+
+    def __enter__(self) -> Poster:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stop.set()
+        self._thread.join(10)
+
+    def _run(self) -> None:
+        from mavproxy_vision.geometry import Attitude, vector  # noqa: PLC0415
+
+        session = requests.Session()
+        while not self._stop.wait(0.04):
+            light, state = time.monotonic(), self._rig.control.ask("state")
+            attitude = Attitude(yaw=math.radians(state["yaw_degrees"]))
+            image = self._renderer.render(vector(*state["position"]), attitude)
+            data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 90])[1].tobytes()
+            query = {"latency": 1000 * (time.monotonic() - light)}
+            answer = session.post(self._rig.url + "/vision/frame", params=query, data=data, timeout=10)
+            self.answers.append(answer.status_code)
+
+
+def test_frames_that_are_posted_land_it_too(seeing: Any, harness: Any) -> None:
+    refused = requests.post(seeing.url + "/vision/frame", data=b"x", timeout=10)
+    assert refused.status_code == 400
+    assert "source http" in refused.json()["detail"]
+    seeing.in_the_air(5)
+    seeing.mavproxy.type("vision set gimbal true")
+    seeing.mavproxy.ask("vision set source http", "through http")
+    try:
+        assert requests.post(seeing.url + "/vision/frame", data=b"no image", timeout=10).status_code == 400
+        harness.eventually(lambda: camera(seeing) == "no frames", 10, "noticing that no frames come")
+        assert seeing.post("/vision/land").status_code == 503
+        north, east, _ = seeing.control.ask("state")["position"]
+        with Poster(seeing, north + 0.8, east - 0.5) as poster:
+            harness.eventually(lambda: seeing.ok(seeing.get("/vision/status"))["info"]["in_view"], 30, "the tag")
+            assert seeing.ok(seeing.post("/vision/land", timeout=100))["result"] == "Landed on tag 0"
+        assert set(poster.answers) == {200}
+        assert seeing.control.ask("state")["position"][:2] == pytest.approx([north + 0.8, east - 0.5], abs=0.3)
+    finally:
+        seeing.mavproxy.type("vision set gimbal false")
+        seeing.mavproxy.ask("vision set source sim", "through sim")
+
+
+def test_a_film_and_a_folder_are_sources(seeing: Any, harness: Any, tmp_path: Path) -> None:
+    from mavproxy_vision.dictionaries import marker_image  # noqa: PLC0415
+
+    picture = marker_image("36h11", 0, 16)
+    film = cv2.VideoWriter(str(tmp_path / "film.avi"), cv2.VideoWriter_fourcc(*"MJPG"), 20, (480, 360))
+    (tmp_path / "folder").mkdir()
+    for number in range(60):
+        image = cv2.cvtColor(
+            cv2.copyMakeBorder(picture, 60, 140, 60 + number, 260 - number, 0, value=200), cv2.COLOR_GRAY2BGR
+        )
+        film.write(image)
+        if number % 20 == 0:
+            cv2.imwrite(str(tmp_path / "folder" / f"{number}.png"), image)
+    film.release()
+    try:
+        for source in ("film.avi", "folder"):
+            seeing.mavproxy.ask(f"vision set source {tmp_path / source}", "looking for")
+            seen = harness.eventually(lambda: shown(seeing), 20, f"a tag in {source}")
+            assert [tag["id"] for tag in seen] == [0]
+    finally:
+        seeing.mavproxy.ask("vision set source sim", "through sim")
+        harness.eventually(lambda: camera(seeing) == "ok", 30, "frames' coming")
+
+
+def shown(rig: Any) -> Any:
+    """The tags in view; none without a camera."""
+    answer = rig.get("/vision/tags")
+    return answer.json()["info"]["tags"] if answer.status_code == 200 else None
+
+
 def test_unloaded_in_flight_the_vehicle_holds(seeing: Any, harness: Any) -> None:
     seeing.in_the_air(6)
     seeing.mavproxy.type("vision search 3")
-    harness.eventually(lambda: seeing.ok(seeing.get("/vision/status"))["info"]["flight"]["running"])
+    harness.eventually(lambda: in_flight(seeing))
     seeing.mavproxy.ask("module unload vision", "Unloaded module vision")
     assert seeing.get("/vision/status").status_code == 404
     harness.eventually(lambda: max(map(abs, seeing.control.ask("state")["velocity"])) < 0.3, 20, "holding")

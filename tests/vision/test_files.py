@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import threading
 from types import SimpleNamespace
 
 import cv2
@@ -114,6 +115,24 @@ def test_the_worker_looks_at_the_newest_frame_and_ends(tmp_path):
     assert told[0].size == (64, 48)
     assert worker.health.state == "closed"
     assert worker.health.frames == 1
+
+
+def test_a_camera_that_opens_again_but_gives_nothing_is_not_well(tmp_path):
+    clock, verdicts = Clock(), []
+
+    class Dead(Posted):
+        def read(self):
+            clock.now += 0.1
+            verdicts.append(worker.verdict())
+
+    worker = Worker(Dead(0.0), SimpleNamespace(detect=lambda _: ()), lambda *_: None, clock)
+    worker._threads[0] = threading.current_thread()  # it lives
+    worker._read_until_it_fails()
+    worker._reconnects += 1
+    assert verdicts[-1] == "no frames"
+    verdicts.clear()
+    worker._read_until_it_fails()
+    assert set(verdicts) == {"no frames"}
 
 
 def test_calibration_from_rendered_chessboards(tmp_path):
