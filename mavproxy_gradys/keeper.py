@@ -42,6 +42,7 @@ class Keeper:
         self._spool: Spool | None = None
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="gradys-spool")
         self._waiting: deque[Reading] = deque()
+        self._in_hand = 0  # readings that the other thread is writing
         self._unnoted: dict[str, set[int]] = {}  # acknowledgements that the disk did not take
         self._after: dict[str, int] = {}  # the number up to which a sink has acknowledged all
         self._news: dict[str, asyncio.Event] = {}
@@ -107,11 +108,14 @@ class Keeper:
         if not self._waiting:
             return
         readings = [self._waiting.popleft() for _ in range(len(self._waiting))]
+        self._in_hand = len(readings)
         try:
             await self._do(lambda spool: spool.append(readings))
         except NotStored:
             self._waiting.extendleft(reversed(readings))
             raise
+        finally:
+            self._in_hand = 0
         self._tell()
 
     def _tell(self) -> None:
@@ -220,7 +224,7 @@ class Keeper:
     @property
     def waiting(self) -> int:
         """Readings that are not on the disk yet."""
-        return len(self._waiting)
+        return len(self._waiting) + self._in_hand
 
     @property
     def oldest_age(self) -> float | None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import socket
 import ssl
 from pathlib import Path
 from typing import Any
 
 from aiohttp import web
+from aiohttp.http_exceptions import HttpProcessingError
 
 from mavproxy_uavapi.errors import NotFound
 from mavproxy_uavapi.http.call import SERVICE, Call, Service, parameters
@@ -19,6 +21,7 @@ from mavproxy_uavapi.http.routes import ROUTES, Route
 from mavproxy_uavapi.http.security import name_the_trusted, only_for_us
 from mavproxy_uavapi.http.trail import audited
 
+log = logging.getLogger("uavapi.api.server")
 BACKLOG = 512  # connections that wait to be accepted
 MAX_BODY = 1024 * 1024  # bytes
 SHUTDOWN_TIMEOUT = 1.0  # s for answers that are being written when we stop
@@ -74,6 +77,14 @@ async def _answer(route: Route, request: web.Request) -> web.StreamResponse:
     return answer if isinstance(answer, web.StreamResponse) else success(answer)
 
 
+def is_ours(record: logging.LogRecord) -> bool:
+    """Whether a line of aiohttp's is about us, rather than about a client that speaks no HTTP: it has its 400."""
+    return record.exc_info is None or not isinstance(record.exc_info[1], HttpProcessingError)
+
+
+log.addFilter(is_ours)
+
+
 class Server:
     """A listening server; all methods belong to the asyncio thread."""
 
@@ -81,7 +92,11 @@ class Server:
         self.service = service
         # A handler is cancelled when its client hangs up: that is how a verb learns that nobody awaits it.
         self._runner = web.AppRunner(
-            make_app(service), access_log=None, handler_cancellation=True, shutdown_timeout=SHUTDOWN_TIMEOUT
+            make_app(service),
+            access_log=None,
+            logger=log,
+            handler_cancellation=True,
+            shutdown_timeout=SHUTDOWN_TIMEOUT,
         )
         self._socket: socket.socket | None = None
         self._server: asyncio.Server | None = None

@@ -83,12 +83,12 @@ class Commands:
                 if shown():
                     return
 
-    def _late_acks(self, command: Command) -> int:
-        """How many acks of earlier commands of that number, with other parameters, may still come."""
-        unanswered = self._unanswered[command.number]
+    def _outstanding(self, number: int) -> deque[Sending]:
+        """The sendings of that command whose ack may still come, oldest first."""
+        unanswered = self._unanswered[number]
         while unanswered and unanswered[0].at < self._waiting.clock() - LATE_ACK:
             unanswered.popleft()
-        return sum(sending.params != command.params for sending in unanswered)
+        return unanswered
 
     async def _ask(self, command: Command, shown: Callable[[], bool]) -> int:
         """One exchange: the MAV_RESULT that ends it.
@@ -96,8 +96,9 @@ class Commands:
         MAVLink does not number commands. Where the ack is the only proof, as many acks do not count as may
         still come for earlier commands; each one that comes is followed by one more sending.
         """
-        late = self._late_acks(command) if command.proven_by_ack else 0
-        unanswered = self._unanswered[command.number]
+        unanswered = self._outstanding(command.number)
+        others = sum(sending.params != command.params for sending in unanswered)
+        late = others if command.proven_by_ack else 0
         address = Address(self._state.system, self._state.component)
         sendings = SENDINGS if command.repeatable else 1
         give_up_at = self._waiting.clock() + IN_PROGRESS_LIMIT
