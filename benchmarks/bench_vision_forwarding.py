@@ -85,14 +85,15 @@ def measure(made: Any, forwarding: Forwarding, case: Case, seconds: float) -> No
 def run(made: Any, forwarding: Forwarding, folder: str, options: argparse.Namespace) -> dict[str, Case]:
     """All rounds of all cases."""
     cases = {name: Case() for name in CASES}
-    given = json.dumps({"far": True, "fps": 240}, separators=(",", ":"))
-    made.mavproxy.ask(f"module load vision:{given}", "Loaded module vision")
+    given = json.dumps({"source": folder, "far": True, "fps": 240}, separators=(",", ":"))
+    made.mavproxy.ask(f"module load vision:{given}", "looking for")
+    made.mavproxy.ask("vision stop", "stopped")
     context = multiprocessing.get_context("spawn")
     for _ in range(options.rounds):
         for name, case in cases.items():
             other = None
             if name == LOOKING:
-                made.mavproxy.ask(f"vision set source {folder}", "looking for")
+                made.mavproxy.ask("vision start", "looking for")
             elif name == ELSEWHERE:
                 other = context.Process(target=look, args=(folder,), daemon=True)
                 other.start()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import logging
 import threading
@@ -105,11 +106,13 @@ class Worker:
 
     def start(self) -> None:
         """Start both threads."""
+        atexit.register(self.stop)  # a thread that is inside OpenCV when Python ends aborts the process
         for thread in self._threads:
             thread.start()
 
     def stop(self) -> None:
         """End both; a driver that hangs in a read is left behind. Any other thread."""
+        atexit.unregister(self.stop)
         self._stop.set()
         with self._changed:
             self._changed.notify_all()
