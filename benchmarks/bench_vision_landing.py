@@ -1,6 +1,6 @@
 """Landings in lock step: the embedded vehicle, the rendered camera, both ways to land; truth from the simulator.
 
-    python benchmarks/bench_vision_landing.py [--landings 20] [--method velocity] [--first 1] [--json FILE]
+    python benchmarks/bench_vision_landing.py [--landings 100] [--method velocity] [--first 1] [--json FILE]
 
 Each landing begins 5 to 7 m up, up to 3 m beside the tag (36h11, 0.30 m), with a random heading, wind up to
 5 m/s, a GPS error that wanders by up to 0.2 m (1 sigma), and a camera latency of 50 to 250 ms with a jitter of
@@ -93,7 +93,7 @@ def table(cases: list[dict[str, Any]]) -> str:
 def main() -> int:
     """Fly, print the table; 1 when a figure is missed."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--landings", type=int, default=20, help="of each method")
+    parser.add_argument("--landings", type=int, default=5, help="of each method")
     parser.add_argument("--method", choices=("velocity", "landing_target"), default=None)
     parser.add_argument("--first", type=int, default=1, help="first seed")
     parser.add_argument("--json", type=Path, help="append each landing there")
