@@ -29,8 +29,11 @@ LOWEST = 2.0  # m above home: what lies lower is flown at this height
 HIGHEST = 10_000.0  # m above home
 CLOSEST = 1.0  # m between waypoints: what lies closer is not flown to
 MOST_WAYPOINTS = 10_000
+LONGEST_LINE = 1000  # characters
+GROUND = (-500.0, 9000.0)  # m AMSL: where the ground may lie
 TEXT_LINE = re.compile(r"GPS_RAW_INT\s*\{(?P<body>[^{}]*)\}")
-TUPLE_LINE = re.compile(r"\((?P<body>[-+0-9,\s]*)\)")
+TUPLE_LINE = re.compile(r"\((?P<body>[-0-9,\s]*)\)")
+INTEGER = re.compile(r"-?[0-9]{1,20}")
 # As pymavlink prints the message, which is not the order of the wire.
 PRINTED = (
     "time_usec", "fix_type", "lat", "lon", "alt", "eph", "epv", "vel", "cog", "satellites_visible",
@@ -113,10 +116,11 @@ def parse_line(line: str, number: int) -> Reading:
     Raises:
         Invalid: it is none, or at no place on Earth; the text has the line's `number`.
     """
-    values = _of_text(line) or _of_tuple(line)
+    if len(line) > LONGEST_LINE:
+        raise Invalid(f"line {number} is longer than {LONGEST_LINE} characters: {line[:60]!r}", "body", "track")
     try:
-        reading = Reading(**values)
-    except TypeError as error:
+        reading = Reading(**(_of_text(line) or _of_tuple(line)))
+    except (TypeError, ValueError) as error:
         raise Invalid(f"line {number} is no GPS_RAW_INT reading: {line[:60]!r}", "body", "track") from error
     if abs(reading.lat) > 90e7 or abs(reading.lon) > 180e7:
         raise Invalid(f"line {number} is no place on Earth: {line[:60]!r}", "body", "track")
@@ -125,18 +129,23 @@ def parse_line(line: str, number: int) -> Reading:
 
 def _of_text(line: str) -> dict[str, int]:
     match = TEXT_LINE.fullmatch(line)
-    pairs = re.findall(r"(\w+)\s*:\s*(-?\d+)", match["body"]) if match else []
-    return {name: int(value) for name, value in pairs if name in PRINTED}
+    pairs = [part.partition(":") for part in match["body"].split(",")] if match else []
+    named = {name.strip(): value for name, _, value in pairs}
+    return {name: _integer(value) for name, value in named.items() if name in PRINTED}
 
 
 def _of_tuple(line: str) -> dict[str, int]:
     match = TUPLE_LINE.fullmatch(line)
     numbers = [part for part in match["body"].split(",") if part.strip()] if match else []
     names = [field.name for field in fields(Reading)]
-    try:
-        return dict(zip(names, map(int, numbers), strict=True)) if numbers else {}
-    except ValueError:  # too few, too many, or no numbers
-        return {}
+    return dict(zip(names, map(_integer, numbers), strict=True)) if numbers else {}
+
+
+def _integer(text: str) -> int:
+    """The whole of `text` as a number: half of `35.77` would be another place."""
+    if not INTEGER.fullmatch(text.strip()):
+        raise ValueError(text)
+    return int(text)
 
 
 def waypoints(track: Sequence[Reading], ground: float | None = None) -> list[Waypoint]:
@@ -155,8 +164,8 @@ def waypoints(track: Sequence[Reading], ground: float | None = None) -> list[Way
         raise Invalid("the track holds no reading with a 3D fix", "body", "track")
     level = min(reading.alt for reading in fixed) / 1e3 if ground is None else ground
     places = [Waypoint(r.lat / 1e7, r.lon / 1e7, round(max(r.alt / 1e3 - level, LOWEST), 3)) for r in fixed]
-    highest = max(place.alt for place in places)
-    if highest > HIGHEST:
+    if not all(place.alt <= HIGHEST for place in places):
+        highest = max(place.alt for place in places)
         raise Invalid(f"the track leads {highest:.0f} m above its ground; {HIGHEST:g} are the most", "body", "track")
     found = list(thinned(places))
     if len(found) > MOST_WAYPOINTS:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 import xml.etree.ElementTree as ET
 from typing import Any
 
@@ -49,6 +50,20 @@ def test_what_is_no_track_is_refused(text: str) -> None:
         parse(text)
 
 
+@pytest.mark.parametrize("wrong", ["35.7713121", "35 7713121", "0x1F", "٣٥", "", "1e8", "9" * 21, "1" * 5000])
+def test_a_number_is_read_whole_or_not_at_all(wrong: str) -> None:
+    with pytest.raises(Invalid, match="line 1"):
+        parse(TEXT.replace("lat : 357713121", f"lat : {wrong}"))
+    with pytest.raises(Invalid, match="line 1"):
+        parse(TUPLE.replace("357713121", wrong))
+
+
+@pytest.mark.parametrize("line", ["GPS_RAW_INT {" + "a" * 1_000_000 + "}", "(" + "1" * 1_000_000 + ")"])
+def test_a_line_without_end_is_refused_at_once(line: str) -> None:
+    with pytest.raises(Invalid, match="longer than 1000"):
+        parse(line)
+
+
 def test_the_line_that_is_wrong_is_named() -> None:
     with pytest.raises(Invalid, match="line 3"):
         parse(f"{TEXT}\n{TUPLE}\nnonsense\n")
@@ -86,3 +101,8 @@ def test_readings_without_a_fix_are_no_places() -> None:
 def test_a_track_into_space_is_refused() -> None:
     with pytest.raises(Invalid, match="above its ground"):
         waypoints([at(0, 100), at(10, 20_000)])
+
+
+def test_a_ground_that_is_no_number_is_refused() -> None:
+    with pytest.raises(Invalid, match="above its ground"):
+        waypoints([at(0, 100)], ground=math.nan)
