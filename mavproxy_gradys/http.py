@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 import time
 from typing import Annotated, Any
@@ -10,13 +11,14 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from mavproxy_gradys.readings import NAME, Reading, Value, device_of
 from mavproxy_gradys.service import Gradys
-from mavproxy_gradys.track_flight import VERB
-from mavproxy_gradys.tracking import REACH
-from mavproxy_gradys.tracks import parse, waypoints
+from mavproxy_gradys.track_flight import VERB, flight_of
+from mavproxy_gradys.track_request import Track, TrackFile
+from mavproxy_gradys.tracks import places_of
 from mavproxy_uavapi.errors import NoVehicle
 from mavproxy_uavapi.http.call import Answer, Call
 from mavproxy_uavapi.http.requests import Empty, Request
 from mavproxy_uavapi.http.routes import EITHER, POST, Route
+from mavproxy_uavapi.vehicle.jobs import Job
 
 MOST_READINGS = 1000  # in one request
 LONGEST_TEXT = 4096
@@ -70,18 +72,6 @@ class Readings(Request):
         return given if not isinstance(given, dict) or "readings" in given else {"readings": [given]}
 
 
-class Track(Request):
-    """A track to fly: its text, in either of CentMesh's formats.
-
-    `ground` is the AMSL altitude (m) that heights count from, by default the track's lowest; every waypoint must
-    lie within `reach` m of here.
-    """
-
-    track: Annotated[str, Field(min_length=1)]
-    ground: Annotated[float | None, Field(ge=-500, le=9000)] = None
-    reach: Annotated[float, Field(gt=0, le=100_000)] = REACH
-
-
 class Handlers:
     """Answers, by the module's service."""
 
@@ -122,18 +112,14 @@ class Handlers:
     async def fly_track(self, call: Call) -> Answer:
         """Take off, fly through a track's places, return and land."""
         given = call.params(Track)
-        readings = parse(given.track)
-        job = self._gradys.tracks.fly(
-            call.vehicle,
-            waypoints(readings, given.ground),
-            given.reach,
-            request=given.model_dump(),
-            client=call.request.remote or "unknown",
-            outlives_client=call.is_async,
-        )
-        if call.is_async:
-            return call.accepted(job)
-        return call.answer(await call.outcome(job), job=job.id)
+        call.remembered = TrackFile.of(given)
+        places = await asyncio.to_thread(places_of, given.track, given.ground)
+        flight = flight_of(call.vehicle, places, given.reach, given.transit)
+
+        async def verb(job: Job) -> None:
+            await self._gradys.tracks.fly(flight, job)
+
+        return await call.fly(flight.copter, verb, lambda: flight.result)
 
     def _reading(self, call: Call, given: OneReading, now: float) -> Reading:
         system = given.sysid or call.seen.state.system

@@ -8,8 +8,17 @@ from collections.abc import Callable, Coroutine, Mapping
 from pathlib import Path
 from typing import Any, NoReturn
 
+from mavproxy_gradys.track_flight import (
+    HIGHEST_TAKEOFF,
+    LARGEST_REACH,
+    LOWEST_TRANSIT,
+    REACH,
+    TRANSIT,
+    VERB,
+    flight_of,
+)
 from mavproxy_gradys.tracking import Tracking
-from mavproxy_gradys.tracks import FORMATS, parse, style_of, waypoints
+from mavproxy_gradys.tracks import FORMATS, GROUND, Waypoint, places_of, style_of
 from mavproxy_uavapi.errors import BadRequest, UavApiError
 from mavproxy_uavapi.host.host import Host
 
@@ -17,7 +26,7 @@ HELP = """\
 gradys track                            what is recorded, and what is flown
 gradys track record FILE [SECONDS=5] [--format text|tuple|gpx] [--latest FILE] [--sysid N]
 gradys track stop                       end the recording
-gradys track fly FILE [--ground M] [--reach M]   take off, fly through the track, return and land"""
+gradys track fly FILE [--ground M] [--reach M] [--transit M]   take off, fly through the track, return and land"""
 
 
 class Words(argparse.ArgumentParser):
@@ -26,6 +35,17 @@ class Words(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Raises BadRequest."""
         raise BadRequest(f"{message}\n{HELP}")
+
+
+def within(low: float, high: float) -> Callable[[str], float]:
+    """What reads an option's number, which must lie between both."""
+
+    def number(text: str) -> float:
+        if not low <= float(text) <= high:
+            raise argparse.ArgumentTypeError(f"{text} is not from {low:g} to {high:g}")
+        return float(text)
+
+    return number
 
 
 def words() -> argparse.ArgumentParser:
@@ -41,8 +61,9 @@ def words() -> argparse.ArgumentParser:
     verbs.add_parser("stop", add_help=False)
     fly = verbs.add_parser("fly", add_help=False)
     fly.add_argument("file", type=Path)
-    fly.add_argument("--ground", type=float)
-    fly.add_argument("--reach", type=float, default=10_000.0)
+    fly.add_argument("--ground", type=within(*GROUND))
+    fly.add_argument("--reach", type=within(1.0, LARGEST_REACH), default=REACH)
+    fly.add_argument("--transit", type=within(LOWEST_TRANSIT, HIGHEST_TAKEOFF), default=TRANSIT)
     verbs.add_parser("help", add_help=False)
     return made
 
@@ -113,23 +134,33 @@ class TrackConsole:
         return "nothing is recorded" if recorder is None else f"{recorder.written} readings are in {recorder.file}"
 
     async def _fly(self, given: argparse.Namespace) -> str:
-        try:
-            text = await asyncio.get_running_loop().run_in_executor(None, given.file.expanduser().read_text)
-        except (OSError, UnicodeDecodeError) as error:
-            raise BadRequest(f"{given.file}: {error}") from error
-        places = waypoints(parse(text), given.ground)
         vehicle = self._host.hangar.commandable(0)
-        request = {"file": str(given.file), "places": [(place.lat, place.lon, place.alt) for place in places]}
-        job = self._tracks.fly(vehicle, places, given.reach, request=request)
+        places = await asyncio.to_thread(read, given.file.expanduser(), given.ground)
+        flight = flight_of(vehicle, places, given.reach, given.transit)
+        request = {**{name: str(value) for name, value in vars(given).items()}, "digest": hash(tuple(places))}
+        job = self._host.jobs.begin(vehicle.seat, VERB, request, lambda job: self._tracks.fly(flight, job))
         self._say(
             f"flying {len(places)} legs with vehicle {vehicle.state.system}; `gradys track` tells how far it is"
         )
         return await job.outcome()
 
 
+def read(file: Path, ground: float | None) -> list[Waypoint]:
+    """The places that a file's track leads through.
+
+    Raises:
+        BadRequest: it cannot be read.
+        Invalid: as `places_of`.
+    """
+    try:
+        return places_of(file.read_text(encoding="utf-8"), ground)
+    except (OSError, UnicodeDecodeError) as error:
+        raise BadRequest(f"{file}: {error}") from error
+
+
 def shown(report: Mapping[str, Any]) -> str:
     """What is recorded and flown, in a few lines."""
-    recording, flight = report["recording"], report["flight"]
+    recording = report["recording"]
     lines = []
     if recording is not None:
         latest = f", the latest in {recording['latest']}" if recording["latest"] else ""
@@ -138,8 +169,8 @@ def shown(report: Mapping[str, Any]) -> str:
         )
         if recording["problem"]:
             lines.append(f"  {recording['problem']}")
-    if flight is not None:
+    for flight in report["flights"]:
         to_go = f", {flight['distance_to_go']:.0f} m to go" if "distance_to_go" in flight else ""
         how = flight["error"] or f"{flight['stage']}, leg {flight['leg']} of {flight['legs']}{to_go}"
-        lines.append(f"track flight {flight['state']}: {how}")
+        lines.append(f"track flight {flight['state']}, vehicle {flight['vehicle']}: {how}")
     return "\n".join(lines) or "no track is recorded or flown"

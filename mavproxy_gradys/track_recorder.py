@@ -11,6 +11,7 @@ from typing import Any
 
 from mavproxy_gradys.cadence import Cadence
 from mavproxy_gradys.errors import NotStored
+from mavproxy_gradys.tasks import begin, end
 from mavproxy_gradys.tracks import GPX, GPX_HEAD, GPX_TAIL, Reading
 from mavproxy_uavapi.host.host import Host
 from mavproxy_uavapi.host.state import VehicleState
@@ -45,7 +46,7 @@ class Recorder:
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="gradys-track")
         self._task: asyncio.Task[None] | None = None
         self._newest: Reading | None = None
-        self._writing_latest = False
+        self._replacing: asyncio.Task[None] | None = None
         self._recorded_at = -1.0
 
     async def start(self) -> None:
@@ -60,17 +61,18 @@ class Recorder:
         except OSError as error:
             self._thread.shutdown(wait=False)
             raise NotStored(f"{self.file}: {error.strerror}") from error
-        self._task = asyncio.get_running_loop().create_task(self._record())
+        self._task = begin(self._record(), f"the recording of {self.file}")
         if self.latest is not None:
             self._host.listeners.append(self._heard)
 
     async def stop(self) -> None:
-        """End it."""
+        """End it; what was heard last is in its file."""
         if self._heard in self._host.listeners:
             self._host.listeners.remove(self._heard)
         if self._task is not None:
-            self._task.cancel()
-            await asyncio.gather(self._task, return_exceptions=True)
+            await end([self._task])
+        if self._replacing is not None:
+            await self._replacing
         self._thread.shutdown(wait=False)
 
     async def _run(self, call: Any, *args: Any) -> None:
@@ -104,9 +106,8 @@ class Recorder:
         if state.system != self.system or message.get_type() != "GPS_RAW_INT":
             return
         self._newest = Reading.of(message)
-        if not self._writing_latest:  # a disk that is slower than the link gets the newest, not all
-            self._writing_latest = True
-            self._host.bridge.loop.create_task(self._write_latest())
+        if self._replacing is None or self._replacing.done():  # a slow disk gets the newest, not all
+            self._replacing = self._host.bridge.loop.create_task(self._write_latest())
 
     async def _write_latest(self) -> None:
         try:
@@ -115,8 +116,6 @@ class Recorder:
                 await self._run(replace, self.latest, line + "\n")
         except OSError as error:
             self.problem = f"{self.latest}: {error.strerror}"
-        finally:
-            self._writing_latest = False
 
     def report(self) -> dict[str, Any]:
         """What the status says."""

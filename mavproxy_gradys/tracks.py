@@ -148,6 +148,15 @@ def _integer(text: str) -> int:
     return int(text)
 
 
+def places_of(text: str, ground: float | None = None) -> list[Waypoint]:
+    """The places that a track's text leads through; long ones take their time.
+
+    Raises:
+        Invalid: as `parse` and `waypoints`.
+    """
+    return waypoints(parse(text), ground)
+
+
 def waypoints(track: Sequence[Reading], ground: float | None = None) -> list[Waypoint]:
     """The places that a track leads through.
 

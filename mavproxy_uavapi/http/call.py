@@ -49,13 +49,18 @@ class Service:
 
 
 class Call:
-    """One request: its service, and its parameters, validated by the route's model."""
+    """One request: its service, and its parameters, validated by the route's model.
+
+    Attributes:
+        job: what the call has begun, or joined.
+        remembered: what stands for the parameters in the job and in the trail: themselves, unless they are long.
+    """
 
     def __init__(self, service: Service, request: web.Request, params: Request) -> None:
         self.service = service
         self.request = request
-        self._params = params
-        self.job: Job | None = None  # what the call has begun, or joined
+        self._params = self.remembered = params
+        self.job: Job | None = None
 
     def params(self, model: type[R]) -> R:
         """The parameters, which the route has validated by `model`."""
@@ -105,7 +110,7 @@ class Call:
             outlives_client: whether it goes on when the client hangs up; then no limit of jobs refuses it.
             asked: what tells one request from another, where the parameters do not.
         """
-        params = asked or self._params
+        params = self.remembered = asked or self.remembered
 
         async def body(job: Job) -> str:
             await verb(job)
@@ -144,8 +149,8 @@ class Call:
 
     @property
     def asked(self) -> dict[str, Any]:
-        """The parameters that were given, or have a default."""
-        return self._params.model_dump(exclude_none=True)
+        """The parameters that were given, or have a default; or what stands for them."""
+        return self.remembered.model_dump(exclude_none=True)
 
     @property
     def path(self) -> str:

@@ -4,7 +4,8 @@ from typing import Any
 
 import pytest
 
-from mavproxy_gradys.http import LONGEST_LIST, LONGEST_TEXT, MOST_READINGS, Readings, Track
+from mavproxy_gradys.http import LONGEST_LIST, LONGEST_TEXT, MOST_READINGS, Readings
+from mavproxy_gradys.track_request import Track
 from mavproxy_uavapi.errors import Invalid
 from mavproxy_uavapi.http.requests import parse
 
@@ -60,6 +61,12 @@ def test_what_is_no_reading_is_refused(body: Any) -> None:
 
 
 def test_a_track_has_limits() -> None:
-    for body in ({}, {"track": ""}, {"track": "x", "reach": 0}, {"track": "x", "ground": 1e6}):
+    for body in (
+        {},
+        {"track": ""},
+        {"track": "x", "reach": 0},
+        {"track": "x", "ground": 1e6},
+        {"track": "x", "transit": 501},
+    ):
         with pytest.raises(Invalid):
             parse(Track, "body", body)

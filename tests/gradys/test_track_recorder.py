@@ -61,6 +61,17 @@ def test_the_latest_is_written_on_every_message(loop: Any, host: Any, teller: An
     assert host.listeners == []
 
 
+def test_stopping_writes_what_was_heard_last(loop: Any, host: Any, teller: Any, tmp_path: Path) -> None:
+    latest = tmp_path / "latest"
+    made = recorder(loop, host, tmp_path / "track", latest=latest)
+    telling(loop, teller, 1)
+    for number in (7, 8):
+        teller.tell("gps_raw_int", time_usec=number, lat=357713121, lon=-786743912, alt=584090, fix_type=3)
+    loop.run(made.stop())
+    loop.settle()
+    assert parse(latest.read_text())[0].time_usec == 8
+
+
 def test_nothing_old_is_recorded(loop: Any, host: Any, teller: Any, tmp_path: Path) -> None:
     made = recorder(loop, host, tmp_path / "track")
     telling(loop, teller, 6)
