@@ -48,6 +48,12 @@ class UavApiError(Exception):
         return {}
 
 
+def without_frames(error: UavApiError) -> UavApiError:
+    """The same error without traceback and causes: a job keeps its error, and those every object on their way."""
+    error.__cause__ = error.__context__ = None
+    return error.with_traceback(None)
+
+
 class BadRequest(UavApiError):
     """The request's body or an argument of it makes no sense."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import functools
 import logging
 import socket
 import ssl
@@ -24,24 +25,35 @@ from mavproxy_uavapi.http.trail import audited
 log = logging.getLogger("uavapi.api.server")
 BACKLOG = 512  # connections that wait to be accepted
 MAX_BODY = 1024 * 1024  # bytes
+MIDDLEWARES = (headers_are_here, errors_as_answers, at_a_bearable_rate, only_for_us)
 SHUTDOWN_TIMEOUT = 1.0  # s for answers that are being written when we stop
 
 
 def make_app(service: Service) -> web.Application:
     """The application with every route, each with and without a trailing slash."""
-    middlewares = [headers_are_here, errors_as_answers, at_a_bearable_rate, only_for_us]
-    app = web.Application(middlewares=middlewares, client_max_size=MAX_BODY)
+    app = web.Application(client_max_size=MAX_BODY)
     app[SERVICE] = service
     app[TABLE] = ROUTES
     app[BUCKET] = Bucket()
     app.on_response_prepare.append(name_the_trusted)
     for route in ROUTES:
-        handler = _handler(route)
+        handler = guarded(_handler(route))
         for method in route.methods:
             for path in (route.path, route.path + "/"):
                 app.router.add_route(method, path, handler)
-    app.router.add_route("*", "/{path:.*}", _extension)
+    app.router.add_route("*", "/{path:.*}", guarded(_extension))
     return app
+
+
+def guarded(handler: Handler) -> Handler:
+    """`handler` behind the middlewares, the first of them outermost.
+
+    They are not given to the application: aiohttp would keep what it makes of them in a cache of the process, and
+    with it the application of every reload.
+    """
+    for middleware in reversed(MIDDLEWARES):
+        handler = functools.partial(middleware, handler=handler)
+    return handler
 
 
 def _handler(route: Route) -> Handler:

@@ -10,7 +10,7 @@ from typing import Any
 
 from aiohttp import web
 
-from mavproxy_uavapi.errors import BadRequest, NotFound, TooManyRequests, UavApiError, Unauthorized
+from mavproxy_uavapi.errors import BadRequest, NotFound, TooManyRequests, UavApiError, Unauthorized, without_frames
 
 log = logging.getLogger("uavapi.http")
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
@@ -72,7 +72,7 @@ async def errors_as_answers(request: web.Request, handler: Handler) -> web.Strea
     try:
         return await handler(request)
     except UavApiError as error:
-        return failure(error)
+        return failure(without_frames(error))
     except web.HTTPException as error:
         return of_http_exception(error) if error.status >= 400 else error
     except Exception as error:

@@ -11,7 +11,7 @@ import itertools
 from collections.abc import Awaitable, Callable, Mapping
 from typing import Any
 
-from mavproxy_uavapi.errors import Aborted, Superseded, TimedOut, UavApiError
+from mavproxy_uavapi.errors import Aborted, Superseded, TimedOut, UavApiError, without_frames
 
 FINISHED_KEPT = 100
 CONSOLE = "console"  # the client of what was typed at MAVProxy's prompt
@@ -107,7 +107,7 @@ class Job:
 
     def _finish(self, result: str | None = None, error: UavApiError | None = None) -> None:
         if self.running:
-            self.result, self.error = result, error
+            self.result, self.error = result, None if error is None else without_frames(error)
             self.ended_at = self._loop.time()
             if self._limit is not None:
                 self._limit.cancel()

@@ -1,15 +1,18 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import io
 import json
 import socket
+import weakref
 from typing import Any
 
 import pytest
 from aiohttp import ClientSession
+from aiohttp.test_utils import TestClient, TestServer
 
-from mavproxy_uavapi.http.app import MAX_BODY, Server, listening_socket
+from mavproxy_uavapi.http.app import MAX_BODY, Server, listening_socket, make_app
 from mavproxy_uavapi.http.requests import Servo
 from mavproxy_uavapi.http.routes import Route
 from mavproxy_uavapi.settings import ModuleSettings
@@ -203,3 +206,17 @@ def test_descriptors_are_those_of_the_port_and_of_every_connection(
 def test_listening_socket_of_a_foreign_address_is_an_os_error() -> None:
     with pytest.raises(OSError, match="assign"):
         listening_socket("192.0.2.1", 0)
+
+
+def test_application_that_has_served_is_forgotten(loop: Any, service: Any) -> None:
+    loop.patience = 0.002
+    app = make_app(service)
+    server = TestServer(app)
+    loop.run(server.start_server(access_log=None))
+    client = TestClient(server)
+    assert loop.run(client.get("/telemetry/gps")).status == 503
+    loop.run(client.close())
+    forgotten = weakref.ref(app)
+    del app, server, client
+    gc.collect()
+    assert forgotten() is None

@@ -216,3 +216,17 @@ def test_job_never_outlives_its_timeout_and_says_how_far_it_had_to_go(bench: Ben
     with pytest.raises(TimedOut, match="/a was not done within 3 s: 12.3 m to go"):
         bench.loop.run(job.outcome())
     assert bench.loop.time() - began == pytest.approx(3.0)
+
+
+def test_job_keeps_its_error_without_what_led_to_it(bench: Bench) -> None:
+    async def body(job: Job) -> str:
+        try:
+            raise TimeoutError
+        except TimeoutError as error:
+            raise NotArmed("the vehicle is not armed") from error
+
+    job = bench.begin_body(body)
+    with pytest.raises(NotArmed):
+        bench.loop.run(job.outcome())
+    assert job.error is not None
+    assert job.error.__cause__ is job.error.__context__ is None
