@@ -9,7 +9,7 @@ import weakref
 from typing import Any
 
 import pytest
-from aiohttp import ClientSession
+from aiohttp import ClientSession, web
 from aiohttp.test_utils import TestClient, TestServer
 
 from mavproxy_uavapi.http.app import MAX_BODY, Server, listening_socket, make_app
@@ -210,13 +210,13 @@ def test_listening_socket_of_a_foreign_address_is_an_os_error() -> None:
 
 def test_application_that_has_served_is_forgotten(loop: Any, service: Any) -> None:
     loop.patience = 0.002
-    app = make_app(service)
-    server = TestServer(app)
-    loop.run(server.start_server(access_log=None))
-    client = TestClient(server)
-    assert loop.run(client.get("/telemetry/gps")).status == 503
-    loop.run(client.close())
-    forgotten = weakref.ref(app)
-    del app, server, client
+
+    async def served() -> weakref.ref[web.Application]:
+        app = make_app(service)
+        async with TestClient(TestServer(app)) as client:
+            assert (await client.get("/telemetry/gps")).status == 503
+        return weakref.ref(app)
+
+    forgotten = loop.run(served())
     gc.collect()
     assert forgotten() is None
