@@ -37,6 +37,38 @@ TRY_IT = """
 })()
 """  # noqa: E501
 
+# Every operation as the page itself would ask it: with its examples, and where it is a job, without waiting.
+TRY_ALL = """
+(async () => {
+  while (!(window.ui && ui.specSelectors.specJson().get("paths"))) await new Promise(r => setTimeout(r, 100));
+  const spec = ui.specSelectors.specJson().toJS();
+  const parts = "multipart/form-data";
+  const answers = {};
+  for (const [path, methods] of Object.entries(spec.paths))
+    for (const [method, told] of Object.entries(methods)) {
+      const content = told.requestBody ? told.requestBody.content : {};
+      const [type, body] = Object.entries(content)[0] || [];
+      const parameters = {};
+      for (const one of told.parameters) if (one.example !== undefined) parameters[one.name] = one.example;
+      if (told.parameters.some(one => one.name === "wait")) parameters.wait = false;
+      const example = body && body.example;
+      const text_of = value => typeof value === "string" ? value : JSON.stringify(value);
+      const given = type === parts ? {file: new File(["print('hello')"], "hello.py")} : example && text_of(example);
+      const options = {spec, operationId: told.operationId, parameters, requestBody: given, requestContentType: type};
+      const stop = new AbortController();
+      const asked = ui.fn.buildRequest(options);
+      if (type === parts) delete asked.headers["Content-Type"];  // the browser knows the form's boundary
+      setTimeout(() => stop.abort(), 30000);
+      const answer = await fetch(asked.url, {...asked, signal: stop.signal});
+      const kind = answer.headers.get("Content-Type") || "";
+      const text = kind.startsWith("application/json") ? await answer.text() : "";
+      stop.abort();
+      answers[`${method.toUpperCase()} ${path}`] = [answer.status, text.slice(0, 300)];
+    }
+  return answers;
+})()
+"""
+
 
 class Page:
     """A browser's tab, by the DevTools protocol."""
@@ -88,13 +120,13 @@ def browser(directory: Path):
         process.wait()
 
 
-async def tried(devtools, url, picture):
+async def tried(devtools, url, picture, script):
     async with ClientSession() as session:
         async with session.get(f"{devtools}/json") as answer:
             tab = next(tab for tab in await answer.json() if tab["type"] == "page")
         async with session.ws_connect(tab["webSocketDebuggerUrl"], max_msg_size=0) as socket:
             page = Page(socket)
-            result = await page.look_at(url, TRY_IT)
+            result = await page.look_at(url, script)
             shot = await page.ask("Page.captureScreenshot")
             picture.write_bytes(base64.b64decode(shot["data"]))
             return result, page.refused
@@ -106,12 +138,27 @@ def test_page_shows_all_endpoints_without_internet_and_one_can_be_tried(embedded
     operations = sum(len(methods) for methods in described["paths"].values())
     with browser(tmp_path / "profile") as devtools:
         url = f"{embedded_rig.url}/docs"
-        result, refused = asyncio.run(tried(devtools, url, tmp_path / "docs.png"))
+        result, refused = asyncio.run(tried(devtools, url, tmp_path / "docs.png", TRY_IT))
     shown, body, errors = result["value"]
     assert shown == operations
     assert errors == ""
     assert json.loads(body[body.index("{") :])["info"]["vehicle_type"] == "copter"
     assert refused == []  # neither by the page's policy, nor for want of a network
+
+
+@pytest.mark.needs("chromium")
+def test_every_endpoint_takes_what_the_page_would_ask(embedded_rig, tmp_path):
+    described = embedded_rig.ok(embedded_rig.get("/openapi.json"))
+    operations = {f"{method.upper()} {path}" for path, methods in described["paths"].items() for method in methods}
+    with browser(tmp_path / "profile") as devtools:
+        url = f"{embedded_rig.url}/docs"
+        result, refused = asyncio.run(tried(devtools, url, tmp_path / "docs.png", TRY_ALL))
+    answers = result["value"]
+    assert set(answers) == operations
+    print("\n".join(f"{status} {name} {text}" for name, (status, text) in answers.items()))
+    misunderstood = {name: answer for name, answer in answers.items() if answer[0] in (400, 401, 403, 405, 422)}
+    assert misunderstood == {}
+    assert [url for url in refused if "Failed to load resource" not in url] == []  # the browser's word for a 4xx
 
 
 def test_page_and_its_files_are_served_with_their_policy(embedded_rig):
