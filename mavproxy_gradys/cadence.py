@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 FIRST_PAUSE = 1.0  # s
 LONGEST_PAUSE = 30.0  # s
+LONGEST_OF_SINKS = 20.0  # s: all readings are to be there within 30 s of a receiver's return
 
 
 class Cadence:
@@ -30,22 +31,24 @@ class Cadence:
 
 
 class Backoff:
-    """Pauses after failures in a row: 1, 2, 4 … 30 s, each shortened by up to a half at random.
+    """Pauses after failures in a row: 1, 2, 4 … s up to the longest, each shortened by up to a half at random.
 
     The chance keeps a fleet that lost its station from coming back all at once.
 
     Args:
         random: numbers from 0 to 1.
+        longest: s of the longest pause.
     """
 
-    def __init__(self, random: Callable[[], float]) -> None:
+    def __init__(self, random: Callable[[], float], longest: float = LONGEST_PAUSE) -> None:
         self._random = random
+        self._longest = longest
         self.failures = 0
         self.until = -math.inf
 
     def failed(self, now: float) -> float:
         """Count a failure at `now` (s); the seconds to wait."""
-        longest = min(FIRST_PAUSE * 2.0 ** min(self.failures, 16), LONGEST_PAUSE)
+        longest = min(FIRST_PAUSE * 2.0 ** min(self.failures, 16), self._longest)
         self.failures += 1
         pause = longest * (1.0 - 0.5 * self._random())
         self.until = now + pause

@@ -16,6 +16,8 @@ CONNECTIONS = 8  # to one receiver at a time
 LARGEST_ANSWER = 1024 * 1024  # bytes; a receiver that says more is not heard out
 FORM = "application/x-www-form-urlencoded"
 JSON = "application/json"
+# Answers about the address, the sender or the moment; all others are taken for answers about what was sent.
+NOT_FOR_CONTENT = {401, 403, 404, 405, 407, 408, 425, 429, 502, 503, 504}
 
 
 class Poster(Protocol):
@@ -81,7 +83,7 @@ class Client:
                 raise refusal(answer.status, answer.headers.get("Location", ""))
         try:
             return json.loads(said)
-        except ValueError:
+        except (ValueError, RecursionError):
             return None  # a 200 is an acknowledgement, whatever it says
 
 
@@ -105,7 +107,8 @@ def refusal(status: int, location: str) -> NotDelivered:
         where = f" to {location}" if location else ""
         return NotDelivered(f"it redirects{where} ({status}), which is refused: set its real address", reached=True)
     why = {401: " (does it want a token?)", 403: " (is the token the right one?)"}.get(status, "")
-    return NotDelivered(f"it answers {status}{why}", reached=True, too_large=status == 413)
+    for_content = status >= 400 and status not in NOT_FOR_CONTENT
+    return NotDelivered(f"it answers {status}{why}", reached=True, too_large=status == 413, for_content=for_content)
 
 
 def tls_context(ca_file: str) -> ssl.SSLContext | bool:

@@ -29,11 +29,15 @@ class NotDelivered(Unavailable):
     Attributes:
         reached: whether somebody answered at all; if not, the next one need not be tried either.
         too_large: whether it was refused for its size.
+        for_content: whether something else, or less of it, may be taken.
     """
 
     code = "not_delivered"
 
-    def __init__(self, sentence: str, reached: bool = False, too_large: bool = False) -> None:
+    def __init__(
+        self, sentence: str, reached: bool = False, too_large: bool = False, for_content: bool = False
+    ) -> None:
         super().__init__(sentence)
         self.reached = reached
         self.too_large = too_large
+        self.for_content = for_content or too_large

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import sqlite3
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -12,10 +13,14 @@ from pathlib import Path
 from typing import TypeVar
 
 from mavproxy_gradys.errors import NotStored
+from mavproxy_gradys.outages import Drops, Outage
+from mavproxy_gradys.owed import Owed
 from mavproxy_gradys.readings import Reading, Stored
 from mavproxy_gradys.spool import Spool, uptime
+from mavproxy_gradys.tasks import begin
 
 T = TypeVar("T")
+log = logging.getLogger("gradys.spool")
 
 COMMIT_EVERY = 0.5  # s that sampled readings wait for one transaction
 TRIM_EVERY = 10.0  # s
@@ -29,7 +34,7 @@ class Keeper:
         count: readings in the spool.
         problem: why the spool takes nothing just now; empty when it does.
         set_aside: corrupt files that were replaced.
-        dropped: readings that were dropped, by cause: `size`, `age`, `disk`.
+        dropped: readings that were dropped, by cause: `size`, `age`, `disk`, `value` (none that can be told).
 
     Args:
         make: opens the spool; may raise NotStored.
@@ -43,41 +48,47 @@ class Keeper:
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="gradys-spool")
         self._waiting: deque[Reading] = deque()
         self._in_hand = 0  # readings that the other thread is writing
-        self._unnoted: dict[str, set[int]] = {}  # acknowledgements that the disk did not take
-        self._after: dict[str, int] = {}  # the number up to which a sink has acknowledged all
-        self._news: dict[str, asyncio.Event] = {}
+        self._owed: dict[str, Owed] = {}
         self._writer: asyncio.Task[None] | None = None
         self._stopping = asyncio.Event()
+        self._closed = False
+        self._outage = Outage(log, "the spool fails", "the spool works again")
+        self._drops = Drops(log, clock)
         self._oldest_since: float | None = None
         self.count = 0
         self.problem = ""
         self.set_aside: list[Path] = []
         self.dropped: dict[str, int] = {}
 
-    async def start(self, sinks: Sequence[str]) -> None:
-        """Open the spool for these sinks; when it cannot be opened, `problem` says why and it is tried again."""
-        self._news = {sink: asyncio.Event() for sink in sinks}
-        self._after = dict.fromkeys(sinks, -1)
-        with contextlib.suppress(NotStored):  # `problem` has it
-            await self._do(lambda spool: None)
-        self._writer = asyncio.get_running_loop().create_task(self._write())
+    def start(self, sinks: Sequence[str]) -> None:
+        """Begin to open the spool for these sinks; until it is open `problem` says why, and it is tried again."""
+        self._owed = {sink: Owed() for sink in sinks}
+        self.problem = "it is being opened"
+        self._writer = begin(self._write(), "the spool")
 
-    async def stop(self) -> None:
-        """Keep what still waits, and close the file."""
+    async def stop(self) -> list[Reading]:
+        """Keep what still waits, and close the file; the readings that the disk did not take."""
         self._stopping.set()  # not cancelled: a transaction in flight must not be forgotten
-        if self._writer is not None:
-            await self._writer
-        with contextlib.suppress(NotStored):
-            await self._commit()
-        spool, self._spool = self._spool, None
-        if spool is not None:
-            await self._run(spool.close)
-        self._thread.shutdown()  # it has nothing left to do
+        try:
+            if self._writer is not None:
+                await asyncio.gather(self._writer, return_exceptions=True)
+            with contextlib.suppress(NotStored):
+                await self._commit()
+        finally:
+            self._closed = True
+            closing = self._thread.submit(self._close)  # also when nobody waits for it any more
+            self._thread.shutdown(wait=False)
+        await asyncio.wrap_future(closing)
+        self._drops.tell(self.dropped, at_once=True)
+        return list(self._waiting)
 
     # -- in -----------------------------------------------------------------------------------------------
 
     def put(self, reading: Reading) -> None:
         """Take a sampled reading; it is on the disk within COMMIT_EVERY."""
+        if not reading.is_storable:
+            self._count_drop("value")
+            return
         self._waiting.append(reading)
         if len(self._waiting) > HELD:
             self._waiting.popleft()
@@ -94,15 +105,18 @@ class Keeper:
         return numbers
 
     async def _write(self) -> None:
+        with contextlib.suppress(NotStored):  # `problem` has it; the readings wait for the next time
+            await self._do(lambda spool: None)
         trimmed = self._clock()
         while not self._stopping.is_set():
             with contextlib.suppress(asyncio.TimeoutError):
                 await asyncio.wait_for(self._stopping.wait(), COMMIT_EVERY)
-            with contextlib.suppress(NotStored):  # `problem` has it; the readings wait for the next time
+            with contextlib.suppress(NotStored):
                 await self._commit()
                 if self._clock() - trimmed >= TRIM_EVERY:
                     trimmed = self._clock()
                     await self._do(lambda spool: None, trim=True)
+            self._drops.tell(self.dropped)
 
     async def _commit(self) -> None:
         if not self._waiting:
@@ -111,7 +125,7 @@ class Keeper:
         self._in_hand = len(readings)
         try:
             await self._do(lambda spool: spool.append(readings))
-        except NotStored:
+        except BaseException:
             self._waiting.extendleft(reversed(readings))
             raise
         finally:
@@ -119,8 +133,8 @@ class Keeper:
         self._tell()
 
     def _tell(self) -> None:
-        for news in self._news.values():
-            news.set()
+        for owed in self._owed.values():
+            owed.news.set()
 
     # -- out ----------------------------------------------------------------------------------------------
 
@@ -130,35 +144,37 @@ class Keeper:
         Raises:
             NotStored: the file cannot be read.
         """
+        owed = self._owed[sink]
         while True:
-            self._news[sink].clear()
-            found = await self._batch(sink, limit)
+            owed.news.clear()
+            found = await self._batch(sink, owed, limit)
             if found:
                 return found
             with contextlib.suppress(asyncio.TimeoutError):
-                await asyncio.wait_for(self._news[sink].wait(), TRIM_EVERY)
+                await asyncio.wait_for(owed.news.wait(), TRIM_EVERY)
 
-    async def _batch(self, sink: str, limit: int) -> list[Stored]:
-        unnoted = self._unnoted.get(sink, set())
-        if unnoted:
-            await self._note(sink, set())
-        after = self._after[sink]
-        found = await self._do(lambda spool: spool.batch(sink, after, limit + len(unnoted)))
-        return [stored for stored in found if stored.seq not in unnoted][:limit]
+    async def _batch(self, sink: str, owed: Owed, limit: int) -> list[Stored]:
+        if owed.unnoted:
+            await self._note(sink, owed, set())
+        found = await self._do(lambda spool: spool.batch(sink, owed.after, limit + owed.passed_over))
+        return owed.choose(found, limit)
 
     async def acknowledge(self, sink: str, batch: Sequence[Stored], numbers: set[int]) -> None:
         """Remove what a sink has acknowledged: those of `batch` that are in `numbers`, and no others."""
-        taken = {stored.seq for stored in batch} & numbers
-        if len(taken) == len(batch):
-            self._after[sink] = batch[-1].seq
-        await self._note(sink, taken)
+        owed, taken = self._owed[sink], {stored.seq for stored in batch} & numbers
+        owed.take(batch, taken)
+        await self._note(sink, owed, taken)
 
-    async def _note(self, sink: str, numbers: set[int]) -> None:
-        numbers = numbers | self._unnoted.pop(sink, set())
-        try:
-            await self._do(lambda spool: spool.acknowledge(sink, sorted(numbers)))
-        except NotStored:  # a full disk: they are not sent again while we remember
-            self._unnoted[sink] = numbers
+    async def _note(self, sink: str, owed: Owed, numbers: set[int]) -> None:
+        owed.unnoted |= numbers  # they are not sent again while we remember, also on a full disk
+        noted = sorted(owed.unnoted)
+        with contextlib.suppress(NotStored):
+            await self._do(lambda spool: spool.acknowledge(sink, noted))
+            owed.unnoted.difference_update(noted)
+
+    def put_last(self, sink: str, refused: Stored) -> None:
+        """Have a reading that a sink refuses by itself sent to it when there is nothing else."""
+        self._owed[sink].put_last(refused.seq)
 
     def flush(self) -> None:
         """Have waiting senders look at once."""
@@ -172,46 +188,60 @@ class Keeper:
         Raises:
             NotStored: it failed; `problem` says why until something succeeds.
         """
+        if self._closed:
+            raise NotStored("gradys is stopping")
         try:
-            result = await self._run(lambda: self._work(work, trim))
+            result, self.problem = await asyncio.get_running_loop().run_in_executor(
+                self._thread, self._work, work, trim
+            )
         except NotStored as error:
             self.problem = str(error)
+            self._outage.now(self.problem)
             raise
-        self.problem = ""
+        self._outage.now(self.problem)
         return result
 
-    async def _run(self, call: Callable[[], T]) -> T:
-        return await asyncio.get_running_loop().run_in_executor(self._thread, call)
-
-    def _work(self, work: Callable[[Spool], T], trim: bool) -> T:
+    def _work(self, work: Callable[[Spool], T], trim: bool) -> tuple[T, str]:
+        """The outcome, and what is wrong although it is done."""
         spool = self._spool or self._open()
         try:
             result = work(spool)
-            if trim or spool.size > spool.largest:
-                spool.trim()
-        except sqlite3.OperationalError as error:
+        except (sqlite3.OperationalError, sqlite3.IntegrityError) as error:
             raise NotStored(f"{spool.path}: {error}") from error
         except sqlite3.DatabaseError as error:  # corrupt: the next opening sets the file aside
-            self._spool = None
-            spool.close()
+            self._close()
             raise NotStored(f"{spool.path}: {error}") from error
-        self._look(spool)
-        return result
+        try:
+            if trim or spool.size > spool.largest:
+                spool.trim()
+            self._look(spool)
+        except sqlite3.Error as error:
+            return result, f"{spool.path}: {error}"
+        return result, ""
 
     def _open(self) -> Spool:
+        if self._closed:
+            raise NotStored("gradys is stopping")
         spool = self._make()
         if spool.set_aside is not None:
             self.set_aside.append(spool.set_aside)
+            log.warning("the file of the readings was corrupt; it was set aside: %s", spool.set_aside)
+        self._drops.known(spool.dropped)
         try:
-            spool.use_sinks(list(self._news))
+            spool.use_sinks(list(self._owed))
             spool.trim()
         except sqlite3.Error as error:
             spool.close()
             raise NotStored(f"{spool.path}: {error}") from error
-        self._after = dict.fromkeys(self._after, -1)  # a new file may begin with lower numbers
-        self._unnoted.clear()
+        for owed in self._owed.values():
+            owed.forget()
         self._spool = spool
         return spool
+
+    def _close(self) -> None:
+        spool, self._spool = self._spool, None
+        if spool is not None:
+            spool.close()
 
     def _look(self, spool: Spool) -> None:
         self.count = spool.count

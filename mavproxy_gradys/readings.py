@@ -11,6 +11,7 @@ out. `position@1` is built in: [degrees, degrees, m above home].
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from dataclasses import dataclass, field
@@ -25,7 +26,7 @@ NAME = r"[A-Za-z0-9_.-]{1,64}"  # fits into an MQTT topic
 NUMBER = r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?"
 GRAMMAR = re.compile(
     rf"(?P<name>{NAME})"
-    r"(?:=(?P<message>[A-Z0-9_]+)(?:\[(?P<instance>\d+)\])?\.(?P<attribute>[a-z0-9_]+)(?:\[(?P<index>\d+)\])?"
+    r"(?:=(?P<message>[A-Z0-9_]+)(?:\[(?P<instance>\d+)\])?\.(?P<attribute>[A-Za-z0-9_]+)(?:\[(?P<index>\d+)\])?"
     rf"(?:\*(?P<scale>{NUMBER}))?(?P<offset>[-+]{NUMBER.removeprefix('[-+]?')})?)?"
     rf"(?:@(?P<period>{NUMBER}))?(?:\[(?P<representation>[^\[\]]*)\])?"
 )
@@ -75,6 +76,15 @@ class Reading:
     representation: str
     value: Value
     time: float
+
+    @property
+    def is_storable(self) -> bool:
+        """Whether it can be told as JSON."""
+        try:
+            json.dumps(self.value, allow_nan=False)
+        except ValueError:
+            return False
+        return math.isfinite(self.time)
 
 
 @dataclass(frozen=True)
@@ -133,6 +143,8 @@ def parse_quantity(text: str) -> Quantity:
     except ValueError as error:
         raise SettingError(f"quantities: {text!r}: {error}") from error
     scale, offset, period = numbers
+    if not math.isfinite(scale) or not math.isfinite(offset):
+        raise SettingError(f"quantities: {text!r}: scale and offset are finite numbers")
     if not SHORTEST_PERIOD <= period <= LONGEST_PERIOD:
         raise SettingError(f"quantities: {text!r}: a period is {SHORTEST_PERIOD:g} to {LONGEST_PERIOD:g} s")
     if given["message"] is None:
@@ -171,28 +183,31 @@ class Sampler:
             wall: the same moment in s since 1970.
             max_age: s after which a message is too old to be a measurement.
         """
-        received = state.messages.get(self.quantity.message)
-        why = self._why_not(state.system, received, now, max_age)
-        if received is None or why:
-            self.skip(state.system, why)
+        received = state.newest(self.quantity.message)
+        value, why = self._read(received, now, max_age)
+        if received is None or value is None:
+            self.skip(state.system, f"{self.quantity.message} {why}")
             return None
-        value = self._value(received.message)
-        if value is None:
-            self.skip(state.system, f"{self.quantity.message} has no such number")
-            return None
-        self._sampled_at[state.system] = received.at
-        return self.take(state.system, value, wall - (now - received.at))
+        return self.take(state.system, value, received.at, wall - (now - received.at))
 
-    def _why_not(self, system: int, received: Received | None, now: float, max_age: float) -> str:
-        message = self.quantity.message
+    def _read(self, received: Received | None, now: float, max_age: float) -> tuple[Value | None, str]:
+        """The value, or why there is none."""
         if received is None:
-            return f"{message} has not come yet"
+            return None, "has not come yet"
         if now - received.at > max_age:
-            return f"{message} is {now - received.at:.1f} s old"
-        return f"{message} has not come anew" if self._sampled_at.get(system) == received.at else ""
+            return None, f"is {now - received.at:.1f} s old"
+        return self._value(received.message), "has no such number"
 
-    def take(self, system: int, value: Value, at: float) -> Reading:
-        """A reading of `value`, measured at `at` (s since 1970)."""
+    def take(self, system: int, value: Value, told_at: float, at: float) -> Reading | None:
+        """A reading of `value`, measured at `at` (s since 1970); None when it has been taken already.
+
+        Args:
+            told_at: when its message came, on the clock of arrivals (s).
+        """
+        if self._sampled_at.get(system) == told_at:
+            self.skip(system, f"{self.quantity.message or self.quantity.name} has not come anew")
+            return None
+        self._sampled_at[system] = told_at
         self.why_not.pop(system, None)
         self.taken += 1
         quantity = self.quantity
@@ -212,7 +227,8 @@ class Sampler:
             return None
         if self.quantity.scale == 1.0 and self.quantity.offset == 0.0:
             return found
-        return float(f"{found * self.quantity.scale + self.quantity.offset:.12g}")  # without 20.123000000000001
+        scaled = float(f"{found * self.quantity.scale + self.quantity.offset:.12g}")  # without 20.123000000000001
+        return scaled if math.isfinite(scaled) else None
 
 
 def _element(found: Any, index: int) -> Any:

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import random
 from collections.abc import Callable
 from typing import Any
 
-from mavproxy_gradys.cadence import Backoff
+from mavproxy_gradys.cadence import LONGEST_OF_SINKS, Backoff
 from mavproxy_gradys.errors import NotDelivered, NotStored
 from mavproxy_gradys.keeper import Keeper
+from mavproxy_gradys.outages import Outage
+from mavproxy_gradys.readings import Stored
 from mavproxy_gradys.settings import Settings, masked
 from mavproxy_gradys.sinks import Sink, make_sink
 from mavproxy_gradys.tally import RoundTrips
 
 BATCH = 200  # readings
+log = logging.getLogger("gradys.delivery")
 
 
 class Sender:
@@ -25,6 +29,7 @@ class Sender:
         batches: how many were sent.
         sent: readings that went out, repeats included.
         acknowledged: readings that were acknowledged.
+        put_last: readings that were refused by themselves, and are sent when there is nothing else.
         last_error: why the newest failed batch failed; empty since the last success.
 
     Args:
@@ -38,13 +43,16 @@ class Sender:
         self, url: str, keeper: Keeper, clock: Callable[[], float], chance: Callable[[], float] = random.random
     ) -> None:
         self.url = url
-        self.batches = self.sent = self.acknowledged = 0
+        self.batches = self.sent = self.acknowledged = self.put_last = 0
         self.last_error = ""
         self.round_trips = RoundTrips()
         self._keeper = keeper
         self._clock = clock
-        self._backoff = Backoff(chance)
-        self._size = BATCH
+        self._backoff = Backoff(chance, LONGEST_OF_SINKS)
+        self._batch: list[Stored] = []  # on its way, or the last one
+        self._size = self._largest = BATCH
+        self._outage = Outage(log, f"{masked(url)} takes no readings", f"{masked(url)} takes readings again")
+        self._defects: set[str] = set()
         self._hurry = asyncio.Event()
 
     async def run(self, settings: Settings) -> None:
@@ -56,11 +64,15 @@ class Sender:
                     if sink is None:
                         sink = make_sink(self.url, settings)
                     await self._turn(sink)
-                except (NotDelivered, NotStored) as error:
+                    continue
+                except NotStored as error:  # the spool says so itself
                     self.last_error = str(error)
-                    if isinstance(error, NotDelivered) and error.too_large:
-                        self._size = max(1, self._size // 2)
-                    await self._pause()
+                except NotDelivered as error:
+                    self._failed(error)
+                except Exception as error:  # noqa: BLE001  a defect must not end the delivery for ever
+                    self._report(error)
+                    self._failed(NotDelivered(f"{type(error).__name__}: {error}", for_content=True))
+                await self._pause()
         finally:
             if sink is not None:
                 await sink.close()
@@ -71,7 +83,8 @@ class Sender:
         Raises:
             NotDelivered, NotStored: it came to nothing.
         """
-        batch = await self._keeper.batch(self.url, self._size)
+        self._batch = []
+        self._batch = batch = await self._keeper.batch(self.url, self._size)
         self.batches += 1
         self.sent += len(batch)
         started = self._clock()
@@ -80,10 +93,34 @@ class Sender:
         self.acknowledged += len(taken)
         await self._keeper.acknowledge(self.url, batch, taken)
         if not taken:
-            raise NotDelivered("it acknowledges nothing", reached=True)
+            raise NotDelivered("it acknowledges nothing", reached=True, for_content=True)
         self.last_error = ""
+        self._outage.now("")
         self._backoff.succeeded()
-        self._size = min(BATCH, self._size * 2)
+        self._size = min(self._largest, self._size * 2)
+
+    def _failed(self, error: NotDelivered) -> None:
+        """Look for the reading that is refused: by halves, and once it is alone it is sent last."""
+        self.last_error = str(error)
+        self._outage.now(self.last_error)
+        count = len(self._batch)
+        if not error.for_content or not count:
+            return
+        if count == 1:
+            self._keeper.put_last(self.url, self._batch[0])
+            self.put_last += 1
+            return
+        self._size = count // 2
+        self._backoff.succeeded()  # a smaller one is another one
+        if error.too_large:
+            self._largest = self._size
+
+    def _report(self, error: Exception) -> None:
+        """Tell of a defect, of each kind once."""
+        if repr(error) not in self._defects:
+            self._defects = {*list(self._defects)[-9:], repr(error)}
+            context = {"message": f"gradys: a defect in the delivery to {masked(self.url)}", "exception": error}
+            asyncio.get_running_loop().call_exception_handler(context)
 
     async def _pause(self) -> None:
         self._hurry.clear()
@@ -107,6 +144,7 @@ class Sender:
             "batches": self.batches,
             "sent": self.sent,
             "acknowledged": self.acknowledged,
+            "put_last": self.put_last,
             "last_error": self.last_error or None,
             "next_try_s": round(self._backoff.until - now, 1) if waits else None,
             "round_trip_ms": self.round_trips.summary(),

@@ -36,25 +36,23 @@ class Sensing:
         self._wall = wall
         self._settings: Settings | None = None
         self._keeper: Keeper | None = None
-        self._opening = asyncio.Lock()
+        self._left: list[Reading] = []  # what the disk did not take before the last stop
         self._senders: dict[str, Sender] = {}
         self._samplers: list[Sampler] = []
         self._tasks: list[asyncio.Task[None]] = []
 
-    async def start(self, settings: Settings) -> None:
+    def start(self, settings: Settings) -> None:
         """Sample and send, if there is a sink."""
         self._settings = settings
-        self._opening = asyncio.Lock()
-        if not settings.sink:
-            return
-        keeper = await self._kept()
+        if settings.sink or self._left:
+            self._kept()
         for url in settings.sink:
-            sender = self._senders[url] = Sender(url, keeper, self._host.clock)
+            sender = self._senders[url] = Sender(url, self._kept(), self._host.clock)
             self._tasks.append(begin(sender.run(settings), f"the delivery to {masked(url)}"))
-        for quantity in settings.quantities:
+        for quantity in settings.quantities if settings.sink else ():
             sampler = Sampler(quantity)
             self._samplers.append(sampler)
-            self._tasks.append(begin(self._sample(sampler, keeper), f"the sampling of {quantity.name}"))
+            self._tasks.append(begin(self._sample(sampler, self._kept()), f"the sampling of {quantity.name}"))
 
     async def stop(self) -> None:
         """End it, and close the spool."""
@@ -65,20 +63,21 @@ class Sensing:
         self._senders.clear()
         keeper, self._keeper = self._keeper, None
         if keeper is not None:
-            await keeper.stop()
+            self._left = await keeper.stop()
 
-    async def _kept(self) -> Keeper:
+    def _kept(self) -> Keeper:
         """The spool's keeper, started if need be."""
         settings = self._settings
         if settings is None:
             raise NotStored("gradys is stopped: `gradys start`")
-        async with self._opening:
-            if self._keeper is None:
-                largest, longest = settings.spool_mb * MEGABYTE, settings.spool_hours * 3600
-                keeper = Keeper(lambda: Spool(settings.spool, largest, longest))
-                await keeper.start(settings.sink)
-                self._keeper = keeper
-            return self._keeper
+        if self._keeper is None:
+            largest, longest = settings.spool_mb * MEGABYTE, settings.spool_hours * 3600
+            self._keeper = Keeper(lambda: Spool(settings.spool, largest, longest))
+            self._keeper.start(settings.sink)
+            for reading in self._left:
+                self._keeper.put(reading)
+            self._left = []
+        return self._keeper
 
     async def keep(self, readings: Sequence[Reading]) -> list[int]:
         """Keep what was posted; the sequence numbers, when it is on the disk.
@@ -86,7 +85,7 @@ class Sensing:
         Raises:
             NotStored: it is not.
         """
-        return await (await self._kept()).keep(readings)
+        return await self._kept().keep(readings)
 
     def flush(self) -> None:
         """Try all sinks now."""
@@ -123,7 +122,8 @@ class Sensing:
         except Unavailable as nothing:
             sampler.skip(state.system, str(nothing))
             return None
-        return sampler.take(state.system, [where.lat, where.lng, where.alt], wall - where.age)
+        told_at = state.messages["GLOBAL_POSITION_INT"].at
+        return sampler.take(state.system, [where.lat, where.lng, where.alt], told_at, wall - where.age)
 
     # -- what the status says -------------------------------------------------------------------------------
 
@@ -132,7 +132,7 @@ class Sensing:
         keeper = self._keeper
         oldest = None if keeper is None else keeper.oldest_age
         return {
-            "spooled": 0 if keeper is None else keeper.count + keeper.waiting,
+            "spooled": len(self._left) if keeper is None else keeper.count + keeper.waiting,
             "oldest_unsent_s": None if oldest is None else round(oldest, 1),
             "spool": None if keeper is None else self._spool_report(keeper),
             "sinks": [sender.report() for sender in self._senders.values()],

@@ -50,7 +50,7 @@ class Gradys:
         pushers = [self._pusher(station, settings) for station in settings.gs]
         self.settings = settings
         self._tasks = [begin(pusher.run(), f"the push to {pusher.station.url}") for pusher in pushers]
-        await self.sensing.start(settings)
+        self.sensing.start(settings)
 
     def _pusher(self, station: Station, settings: Settings) -> Pusher:
         client = Client(settings.timeout, settings.token, settings.ca_file)

@@ -74,5 +74,5 @@ def acknowledged(answer: Any, sent: set[int]) -> set[int]:
         return sent
     numbers = answer["acknowledged"]
     if not isinstance(numbers, list) or not all(isinstance(n, int) and not isinstance(n, bool) for n in numbers):
-        raise NotDelivered("its `acknowledged` is not a list of numbers", reached=True)
+        raise NotDelivered("its `acknowledged` is not a list of numbers", reached=True, for_content=True)
     return sent & set(numbers)

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import contextlib
+import math
 import sqlite3
 from collections.abc import Iterator
 from pathlib import Path
@@ -45,10 +47,20 @@ def disk(loop: Any, tmp_path: Path, at_once: None) -> Disk:
     return Disk(loop, tmp_path / "spool.db")
 
 
+def begin(loop: Any, keeper: Keeper) -> None:
+    """Start it, and let it open its file."""
+
+    async def started() -> None:
+        keeper.start([SINK])
+
+    loop.run(started())
+    loop.settle()
+
+
 @pytest.fixture
 def keeper(loop: Any, disk: Disk) -> Iterator[Keeper]:
     keeper = Keeper(disk.make, loop.time)
-    loop.run(keeper.start([SINK]))
+    begin(loop, keeper)
     yield keeper
     loop.run(keeper.stop())
 
@@ -139,7 +151,7 @@ def test_acknowledgements_that_the_disk_does_not_take_are_remembered(
 def test_a_spool_that_cannot_be_opened_is_tried_again(loop: Any, disk: Disk) -> None:
     disk.broken = "no room"
     keeper = Keeper(disk.make, loop.time)
-    loop.run(keeper.start([SINK]))
+    begin(loop, keeper)
     assert keeper.problem == "no room"
     keeper.put(reading(5))
     loop.pass_time(2)
@@ -169,7 +181,7 @@ def test_a_file_that_turns_out_corrupt_is_set_aside(loop: Any, keeper: Keeper, d
 
 def test_stopping_keeps_what_still_waits(loop: Any, disk: Disk) -> None:
     keeper = Keeper(disk.make, loop.time)
-    loop.run(keeper.start([SINK]))
+    begin(loop, keeper)
     keeper.put(reading(1))
     loop.run(keeper.stop())
     spool = Spool(disk.path, 1e9, 1e9)
@@ -182,3 +194,110 @@ def test_the_oldest_has_an_age(loop: Any, keeper: Keeper) -> None:
     loop.run(keeper.keep([reading()]))
     loop.pass_time(30)
     assert keeper.oldest_age == pytest.approx(30, abs=0.5)
+
+
+@contextlib.contextmanager
+def failing(monkeypatch: pytest.MonkeyPatch, name: str, error: Exception) -> Iterator[None]:
+    """That method of every spool fails."""
+
+    def fail(*_: Any) -> None:
+        raise error
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Spool, name, fail)
+        yield
+
+
+@pytest.mark.parametrize("name", ["trim", "oldest_since"])
+def test_what_fails_after_readings_were_kept_does_not_keep_them_twice(
+    loop: Any, keeper: Keeper, disk: Disk, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    assert disk.spool is not None
+    disk.spool.largest = 1 if name == "trim" else 1e9
+    with failing(monkeypatch, name, sqlite3.OperationalError("database or disk is full")):
+        assert len(loop.run(keeper.keep([reading(0)]))) == 1
+        keeper.put(reading(1))
+        loop.pass_time(3)
+        assert "full" in keeper.problem and keeper.waiting == 0
+        assert taken(loop, keeper) == [0, 1]
+    disk.spool.largest = 1e9
+    keeper.put(reading(2))
+    loop.pass_time(1)
+    assert (keeper.problem, taken(loop, keeper)) == ("", [0, 1, 2])
+
+
+@pytest.mark.parametrize("wrong", [math.inf, math.nan, [math.inf]])
+def test_a_value_that_cannot_be_told_is_dropped_alone_and_counted(loop: Any, keeper: Keeper, wrong: Any) -> None:
+    for value in (1, wrong, 2):
+        keeper.put(reading(value))
+    loop.pass_time(1)
+    keeper.put(reading(3))
+    loop.pass_time(1)
+    assert taken(loop, keeper) == [1, 2, 3]
+    assert keeper.dropped == {"value": 1}
+
+
+def test_a_defect_loses_no_reading_and_leaves_no_file_open(
+    loop: Any, disk: Disk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    keeper = Keeper(disk.make, loop.time)
+    begin(loop, keeper)
+    with failing(monkeypatch, "append", RuntimeError("a defect")):
+        keeper.put(reading(1))
+        loop.pass_time(1)
+        assert keeper.waiting == 1
+        with pytest.raises(RuntimeError):
+            loop.run(keeper.stop())
+    assert [str(defect["exception"]) for defect in loop.defects] == ["a defect"]
+    loop.defects.clear()
+    Spool(disk.path, 1e9, 1e9).close()  # not locked
+
+
+def test_what_the_disk_does_not_take_is_handed_back_at_the_end(loop: Any, disk: Disk) -> None:
+    keeper = Keeper(disk.make, loop.time)
+    begin(loop, keeper)
+    disk.fill()
+    for value in range(3):
+        keeper.put(reading(f"{value}" * 3000))
+    loop.pass_time(1)
+    assert [left.value[0] for left in loop.run(keeper.stop())] == ["0", "1", "2"]
+    with pytest.raises(NotStored, match="stopping"):
+        loop.run(keeper.keep([reading(1)]))
+
+
+def test_while_the_file_is_being_opened_it_says_so(loop: Any, disk: Disk) -> None:
+    keeper = Keeper(disk.make, loop.time)
+
+    async def started() -> str:
+        keeper.start([SINK])
+        return keeper.problem
+
+    assert "opened" in loop.run(started())
+    loop.settle()
+    assert keeper.problem == ""
+    loop.run(keeper.stop())
+
+
+def test_the_log_tells_of_a_full_disk_once_and_of_drops_once_a_minute(
+    loop: Any, keeper: Keeper, disk: Disk, monkeypatch: pytest.MonkeyPatch, caplog: Any
+) -> None:
+    monkeypatch.setattr(keepers, "HELD", 10)
+    disk.fill()
+    for value in range(160):
+        keeper.put(reading(value))
+        loop.pass_time(1)
+    disk.make_room()
+    loop.pass_time(1)
+    said = [record.message for record in caplog.records]
+    assert said[0] == f"the spool fails: {disk.path}: database or disk is full"
+    assert said[-1] == "the spool works again"
+    assert said[1] == "readings were dropped: 1 by disk"
+    assert len(said) == 4
+
+
+def test_the_log_names_the_file_that_was_set_aside(loop: Any, disk: Disk, caplog: Any) -> None:
+    disk.path.write_bytes(b"SQLite format 3\0" + b"\xff" * 8192)
+    keeper = Keeper(disk.make, loop.time)
+    begin(loop, keeper)
+    assert [record.message.rpartition("/")[2] for record in caplog.records] == ["spool.db.corrupt-1"]
+    loop.run(keeper.stop())

@@ -39,6 +39,8 @@ def test_a_list_by_comma_semicolon_or_space() -> None:
         "a/b=X.y",
         "a b",
         "alt=X.y*1.2.3",
+        "alt=X.y*1e400",
+        "alt=X.y+1e400",
         "alt=X.y,alt=X.z",
     ],
 )
@@ -83,6 +85,23 @@ def test_what_is_no_number_is_no_measurement(teller: Any, loop: Any) -> None:
         sampler = Sampler(parse_quantity(text))
         assert sample(sampler, teller, loop.time()) is None
         assert "no such number" in sampler.why_not[10]
+
+
+def test_what_scaling_makes_too_large_is_no_measurement(teller: Any, loop: Any) -> None:
+    sampler = Sampler(parse_quantity("a=VFR_HUD.heading*1e308"))
+    assert sample(sampler, teller, loop.time()) is None
+    assert "no such number" in sampler.why_not[10]
+
+
+def test_a_field_with_capitals(teller: Any, loop: Any) -> None:
+    teller.tell("power_status", Vcc=5012)
+    assert sample(Sampler(parse_quantity("vcc=POWER_STATUS.Vcc*0.001[V]")), teller, loop.time()).value == 5.012
+
+
+def test_a_message_of_another_component(host: Any, msg: Any, teller: Any, loop: Any) -> None:
+    host._receive(msg("distance_sensor", 10, 158, current_distance=250, quaternion=[0.0] * 4))
+    sampler = Sampler(parse_quantity("range=DISTANCE_SENSOR.current_distance*0.01[m]"))
+    assert sample(sampler, teller, loop.time()).value == 2.5
 
 
 def test_an_element_of_an_array(teller: Any, loop: Any) -> None:

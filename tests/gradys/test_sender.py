@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from mavproxy_gradys.client import refusal
 from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.keeper import Keeper
 from mavproxy_gradys.readings import Reading
@@ -20,7 +21,11 @@ SINK = "http://a/readings"
 @pytest.fixture
 def keeper(loop: Any, tmp_path: Path, at_once: None) -> Iterator[Keeper]:
     keeper = Keeper(lambda: Spool(tmp_path / "spool.db", 1e9, 1e9, clock=loop.time), loop.time)
-    loop.run(keeper.start([SINK]))
+
+    async def started() -> None:
+        keeper.start([SINK])
+
+    loop.run(started())
     yield keeper
     loop.run(keeper.stop())
 
@@ -80,7 +85,7 @@ def test_a_receiver_that_is_down_gets_them_in_order_when_it_is_back(
     for _ in range(600):
         kept += keep(loop, keeper, 11)
         loop.pass_time(1)
-    assert len(poster.posts) < 30
+    assert len(poster.posts) < 40
     assert sender.last_error == "cannot connect"
     poster.answer = answers
     poster.posts.clear()
@@ -109,13 +114,101 @@ def test_a_receiver_that_acknowledges_nothing_is_not_asked_again_at_once(
     assert keeper.count == 1 and "acknowledges nothing" in sender.last_error
 
 
-def test_batches_that_are_too_large_get_smaller(loop: Any, keeper: Any, sender: Any, poster: Any) -> None:
-    answers = poster.answer
-    too_large = NotDelivered("it answers 413", reached=True, too_large=True)
-    poster.answer = lambda body: too_large if len(json.loads(body)["readings"]) > 60 else answers(body)
-    keep(loop, keeper, 200)
-    loop.pass_time(60)
+def refusing(poster: Any, refuses: Any, **given: Any) -> None:
+    """Have it refuse the batches for which that holds, of their values."""
+    answers, refusal = poster.answer, NotDelivered("it answers 400", reached=True, **{"for_content": True, **given})
+    poster.answer = lambda body: refusal if refuses(values(body)) else answers(body)
+
+
+def values(body: bytes) -> list[float]:
+    return [reading["value"] for reading in json.loads(body)["readings"]]
+
+
+def test_batches_that_are_too_large_get_smaller_and_stay_so(loop: Any, keeper: Any, sender: Any, poster: Any) -> None:
+    refusing(poster, lambda found: len(found) > 60, too_large=True)
+    keep(loop, keeper, 1000)
+    loop.pass_time(20)
     assert keeper.count == 0
+    sizes = [len(batch) for batch in poster.batches]
+    assert sizes == [200, 100] + [50] * 20  # refused twice, and never tried again
+
+
+def test_one_that_is_refused_by_itself_holds_up_nobody_and_is_sent_last(
+    loop: Any, keeper: Any, sender: Any, poster: Any
+) -> None:
+    refusing(poster, lambda found: 150.0 in found)
+    keep(loop, keeper, 300)
+    loop.pass_time(20)
+    assert keeper.count == 1 and sender.report()["put_last"] >= 1
+    keep(loop, keeper, 3)
+    loop.pass_time(40)
+    assert keeper.count == 1 and values(poster.posts[-1][2]) == [150.0]  # it is still tried, alone
+    refusing(poster, lambda found: False)
+    poster.answer = None
+    loop.pass_time(30)
+    assert keeper.count == 0
+
+
+def test_those_that_are_sent_last_take_turns(loop: Any, keeper: Any, sender: Any, poster: Any) -> None:
+    refused = {3.0, 7.0}
+    refusing(poster, lambda found: refused & set(found))
+    keep(loop, keeper, 10)
+    loop.pass_time(60)
+    assert keeper.count == 2
+    refused.remove(7.0)
+    loop.pass_time(60)
+    assert keeper.count == 1
+
+
+@pytest.mark.parametrize("status", [301, 401, 403, 404, 429, 503])
+def test_a_receiver_that_is_not_ready_is_offered_the_same_again(
+    loop: Any, keeper: Any, sender: Any, poster: Any, status: int
+) -> None:
+    answers, poster.answer = poster.answer, refusal(status, "")
+    kept = keep(loop, keeper, 300)
+    loop.pass_time(100)
+    assert {len(batch) for batch in poster.batches} == {BATCH}
+    poster.answer = answers
+    loop.pass_time(30)
+    assert sum(poster.batches[-2:], []) == kept
+
+
+def test_a_defect_is_told_once_and_does_not_end_the_delivery(
+    loop: Any, keeper: Any, sender: Any, poster: Any
+) -> None:
+    answers, poster.answer = poster.answer, RecursionError("too deep")
+    keep(loop, keeper, 2)
+    loop.pass_time(60)
+    assert [str(defect["exception"]) for defect in loop.defects] == ["too deep"]
+    assert "too deep" in sender.last_error
+    loop.defects.clear()
+    poster.answer = answers
+    loop.pass_time(30)
+    assert (keeper.count, sender.last_error) == (0, "")
+
+
+def test_the_log_tells_of_an_outage_once(
+    loop: Any, keeper: Any, sender: Any, poster: Any, down: Any, caplog: Any
+) -> None:
+    answers, poster.answer = poster.answer, down
+    keep(loop, keeper, 1)
+    loop.pass_time(100)
+    poster.answer = answers
+    loop.pass_time(30)
+    assert [(record.name, record.message) for record in caplog.records] == [
+        ("gradys.delivery", f"{SINK} takes no readings: cannot connect"),
+        ("gradys.delivery", f"{SINK} takes readings again"),
+    ]
+
+
+def test_after_a_receivers_return_nobody_waits_longer_than_it_is_said(
+    loop: Any, keeper: Any, sender: Any, poster: Any, down: Any
+) -> None:
+    poster.answer = down
+    keep(loop, keeper, 1)
+    loop.pass_time(300)
+    gaps = [after - before for before, after in zip(poster.times, poster.times[1:], strict=False)]
+    assert max(gaps) == pytest.approx(20.0)
 
 
 @pytest.mark.parametrize("numbers", ["all", [1, "2"], [True], {"1": 2}, None])

@@ -48,7 +48,8 @@ def place(north: float, alt: float) -> Waypoint:
 
 
 def flown(loop: Any, copter: Any, *places: Waypoint, **given: Any) -> list[Any]:
-    loop.run(Flight(copter, places, **given).fly(SimpleNamespace(stage={})))
+    job: Any = SimpleNamespace(stage={})
+    loop.run(Flight(copter, places, **given).fly(job))
     assert copter.did[-1] == "rtl"
     did: list[Any] = copter.did[:-1]
     return did
