@@ -22,7 +22,7 @@ from mavproxy_uavapi.http.routes import ROUTES, Route
 from mavproxy_uavapi.http.security import name_the_trusted, only_for_us
 from mavproxy_uavapi.http.trail import audited
 
-log = logging.getLogger("uavapi.api.server")
+log = logging.getLogger("uavapi.http.server")
 BACKLOG = 512  # connections that wait to be accepted
 MAX_BODY = 1024 * 1024  # bytes
 MIDDLEWARES = (headers_are_here, errors_as_answers, at_a_bearable_rate, only_for_us)
