@@ -109,6 +109,25 @@ def test_bad_requests_are_refused_before_anything_flies(looking: Any) -> None:
     assert looking.post("/vision/land").status_code == 409  # on the ground
 
 
+def test_a_search_ends_at_the_tag_and_one_for_no_tag_can_be_stopped(looking: Any, harness: Any) -> None:
+    looking.in_the_air(6)
+    x, y, z = looking.ned()  # the simulated tag is 8 m north and 5 m west of where it was armed
+    looking.ok(looking.post("/movement/go_to_ned_wait", x=x + 4, y=y - 2, z=z))
+    assert "Found tag 0" in looking.ok(looking.post("/vision/search", id=0, timeout=150))["result"]
+    assert math.dist(looking.ned()[:2], (x + 8, y - 5)) < 4
+    answers: list[requests.Response] = []
+    searching = threading.Thread(target=lambda: answers.append(looking.post("/vision/search", id=3)))
+    searching.start()
+    harness.eventually(lambda: in_flight(looking))
+    looking.ok(looking.post("/vision/stop"))
+    searching.join(20)
+    assert (answers[0].status_code, answers[0].json()["code"]) == (409, "aborted")
+    place = looking.ned()
+    time.sleep(2)
+    assert math.dist(place, looking.ned()) < 2
+    looking.on_the_ground()
+
+
 def test_the_pilots_hand_ends_a_landing(seeing: Any, harness: Any) -> None:
     seeing.in_the_air(6)
     answers: list[requests.Response] = []
