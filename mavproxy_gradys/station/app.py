@@ -18,11 +18,12 @@ import io
 import json
 from collections.abc import Awaitable, Callable, Iterable, Sequence
 from typing import Any
+from urllib.parse import urlsplit
 
 from aiohttp import web
 
 from mavproxy_gradys.station.page import PAGE
-from mavproxy_gradys.station.store import COLUMNS, DEVICE_COLUMNS, Store, parse
+from mavproxy_gradys.station.store import COLUMNS, DEVICE_COLUMNS, Store, parse, whole
 
 RECEIVED, DROPPED = 103, 101
 LARGEST_BODY = 16 * 1024 * 1024  # bytes
@@ -47,7 +48,7 @@ class Station:
 
     def app(self) -> web.Application:
         """The application."""
-        app = web.Application(client_max_size=LARGEST_BODY, middlewares=[self._only_with_token])
+        app = web.Application(client_max_size=LARGEST_BODY, middlewares=[self._from_here, self._only_with_token])
         for path in ("/update-info/", "/update-info"):
             app.router.add_post(path, self.update)
         for path in ("/readings", "/readings/"):
@@ -59,6 +60,14 @@ class Station:
         app.router.add_get("/watch", self.watch)
         app.router.add_get("/", self.page)
         return app
+
+    @web.middleware
+    async def _from_here(self, request: web.Request, handler: Handler) -> web.StreamResponse:
+        """Refuse what a page of another site sends."""
+        origin = request.headers.get("Origin")
+        if origin is not None and urlsplit(origin).netloc != request.host:
+            return web.json_response({"detail": f"a page of {origin} may not call"}, status=403)
+        return await handler(request)
 
     @web.middleware
     async def _only_with_token(self, request: web.Request, handler: Handler) -> web.StreamResponse:
@@ -84,7 +93,7 @@ class Station:
         try:
             given = json.loads(await request.read())
             numbers = self.store.add(given["readings"])
-        except (ValueError, KeyError, TypeError) as error:
+        except (ValueError, KeyError, TypeError, RecursionError) as error:
             return web.json_response({"detail": f"cannot read that: {error}"}, status=400)
         return web.json_response({"acknowledged": numbers})
 
@@ -99,7 +108,9 @@ class Station:
         """Readings."""
         query = request.query
         try:
-            after, limit = int(query.get("after", -1)), min(int(query.get("limit", 1000)), MOST_ROWS)
+            after, limit = whole(query.get("after", "-1")), whole(query.get("limit", "1000"))
+            if not 0 <= limit <= MOST_ROWS:
+                raise ValueError(f"limit is from 0 to {MOST_ROWS}")
         except ValueError as error:
             return web.json_response({"detail": str(error)}, status=400)
         rows = self.store.readings(query.get("device", ""), query.get("quantity", ""), after, limit)
@@ -134,4 +145,5 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> web.Response
     writer = csv.writer(text)
     writer.writerow(columns)
     writer.writerows([json.dumps(cell) if isinstance(cell, list | dict) else cell for cell in row] for row in rows)
-    return web.Response(text=text.getvalue(), content_type="text/csv")
+    body = text.getvalue().encode("utf-8", "replace")  # JSON may name half a letter, which UTF-8 has not
+    return web.Response(body=body, content_type="text/csv", charset="utf-8")

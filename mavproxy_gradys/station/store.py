@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sqlite3
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -13,12 +14,38 @@ ACTIVE = 5.0  # s without an update after which a device is `on_hold`
 INACTIVE = 10.0  # s after which it is `inactive`
 COLUMNS = ("device", "seq", "id", "quantity", "representation", "value", "time", "received")
 DEVICE_COLUMNS = ("id", "device", "lat", "lng", "alt", "heading", "battery_percent", "ip", "seq", "age_s", "status")
-NUMBERS = {"id": int, "type": int, "seq": int, "lat": float, "lng": float, "alt": float}
 SCHEMA = """
 CREATE TABLE IF NOT EXISTS readings (
     device TEXT, seq INTEGER, id TEXT, quantity TEXT, representation TEXT, value TEXT, time REAL, received REAL,
     PRIMARY KEY (device, seq)) WITHOUT ROWID
 """
+
+
+def whole(text: Any) -> int:
+    """An integer that SQLite can hold.
+
+    Raises:
+        ValueError: it is none.
+    """
+    number = int(text)
+    if not -(2**63) <= number < 2**63:
+        raise ValueError(f"{text!r:.40} is too large")
+    return number
+
+
+def finite(text: Any) -> float:
+    """A number.
+
+    Raises:
+        ValueError: it is none, NaN, or infinite.
+    """
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f"{text!r:.40} is not finite")
+    return number
+
+
+NUMBERS = {"id": whole, "type": whole, "seq": whole, "lat": finite, "lng": finite, "alt": finite}
 
 
 def parse(form: Mapping[str, str]) -> dict[str, Any]:
@@ -93,14 +120,14 @@ class Store:
 
     def _row(self, reading: Mapping[str, Any]) -> tuple[Any, ...]:
         try:
-            device, seq, at = str(reading["device"]), reading["seq"], float(reading["time"])
+            device, seq, at = str(reading["device"]), reading["seq"], finite(reading["time"])
             named = str(reading.get("id", "")), str(reading["quantity"]), str(reading.get("representation", ""))
             value = json.dumps(reading["value"], allow_nan=False)
-        except (KeyError, TypeError, AttributeError) as error:
+        except (KeyError, TypeError, AttributeError, OverflowError) as error:
             raise ValueError(f"not a reading: {error!r}") from error
         if not isinstance(seq, int) or isinstance(seq, bool):
             raise ValueError(f"seq {seq!r} is no number")
-        return (device, seq, *named, value, at, self._clock())
+        return (device, whole(seq), *named, value, at, self._clock())
 
     def count(self) -> int:
         """How many readings there are."""
