@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import asyncio
 import ipaddress
 import socket
 from dataclasses import dataclass
 from urllib.parse import SplitResult, urlsplit
 
+from mavproxy_gradys.names import Names
 from mavproxy_uavapi.settings import SettingError
 
 PORTS = {"http": 80, "https": 443, "mqtt": 1883, "mqtts": 8883}
@@ -72,6 +72,12 @@ def split_url(text: str, schemes: tuple[str, ...]) -> tuple[SplitResult, int]:
         raise SettingError(f"{text!r}: it begins with one of {', '.join(f'{scheme}://' for scheme in schemes)}")
     if not parts.hostname or any(letter.isspace() for letter in text):
         raise SettingError(f"{text!r} is not an address: it names no host")
+    if "%" in parts.hostname:
+        raise SettingError(f"{text!r}: a URL has no place for an address's zone (%…)")
+    try:
+        parts.hostname.encode("idna")
+    except UnicodeError as error:
+        raise SettingError(f"{text!r} is not an address: no host has such a name ({error})") from error
     return parts, PORTS[parts.scheme] if port is None else port
 
 
@@ -80,13 +86,13 @@ def bracketed(host: str) -> str:
     return f"[{host.partition('%')[0]}]" if ":" in host else host
 
 
-async def own_address(host: str, port: int) -> str:
+async def own_address(names: Names, host: str, port: int) -> str:
     """Our address on the interface that reaches `host`; nothing is sent.
 
     Raises:
         OSError: there is no such host, or no way there.
     """
-    found = await asyncio.get_running_loop().getaddrinfo(host, port, type=socket.SOCK_DGRAM)
+    found = await names.look_up(host, port, kind=socket.SOCK_DGRAM)
     family, kind, protocol, _, peer = found[0]
     with socket.socket(family, kind, protocol) as probe:
         probe.connect(peer)

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import aiohttp
 
 from mavproxy_gradys.errors import NotDelivered
+from mavproxy_gradys.names import Names
 
 CONNECTIONS = 8  # to one receiver at a time
 LARGEST_ANSWER = 1024 * 1024  # bytes; a receiver that says more is not heard out
@@ -48,7 +49,7 @@ class Client:
             headers["Authorization"] = f"Bearer {token}"
         self._timeout = timeout
         self._session = aiohttp.ClientSession(
-            connector=aiohttp.TCPConnector(limit=CONNECTIONS, ssl=tls_context(ca_file)),
+            connector=aiohttp.TCPConnector(limit=CONNECTIONS, ssl=tls_context(ca_file), resolver=Names()),
             timeout=aiohttp.ClientTimeout(total=timeout),
             headers=headers,
             cookie_jar=aiohttp.DummyCookieJar(),

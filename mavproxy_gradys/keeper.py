@@ -79,6 +79,7 @@ class Keeper:
             closing = self._thread.submit(self._close)  # also when nobody waits for it any more
             self._thread.shutdown(wait=False)
         await asyncio.wrap_future(closing)
+        self._thread.shutdown()  # it has nothing left to do
         self._drops.tell(self.dropped, at_once=True)
         return list(self._waiting)
 

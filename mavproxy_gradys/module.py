@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 from collections.abc import Callable
 from typing import Any
 
 try:
     from mavproxy_gradys import console
+    from mavproxy_gradys.errands import Errands
     from mavproxy_gradys.http import Handlers
     from mavproxy_gradys.service import Gradys
-    from mavproxy_gradys.settings import ModuleSettings
+    from mavproxy_gradys.settings import ModuleSettings, Settings
     from mavproxy_gradys.track_console import HELP as TRACK_HELP
     from mavproxy_gradys.track_console import TrackConsole
 except ModuleNotFoundError as missing:  # MAVProxy prints the text of an ImportError as one line
     raise ImportError(f"gradys needs {missing.name}: pip install mavproxy-uavapi") from missing
-from mavproxy_uavapi.errors import UavApiError
 from mavproxy_uavapi.host.member import HostedModule
 from mavproxy_uavapi.settings import SettingError
 
 NAME = "gradys"
+LONGEST_END = 3.0  # s that MAVProxy waits for it to end
 COMPLETION = "(GRADYSSETTING)"
 COMPLETIONS = [
     "<status|stats|start|stop|flush|help>",
@@ -58,6 +61,7 @@ class GradysModule(HostedModule):
         super().__init__(mpstate, NAME, "GrADyS ground station push", actions, COMPLETIONS)
         self.add_completion_function(COMPLETION, self.gradys_settings.mp.completion)
         self.gradys = Gradys(self.host)
+        self._errands = Errands(self.host)
         self._track = TrackConsole(self.host, self.gradys.tracks)
         self._routes = Handlers(self.gradys).routes()
 
@@ -76,7 +80,8 @@ class GradysModule(HostedModule):
         if self.host.commands.get("fly") == self._fly:
             del self.host.commands["fly"]
         await self.gradys.tracks.close()
-        await self.gradys.stop()
+        with contextlib.suppress(asyncio.TimeoutError):  # the spool is closed in its own thread
+            await asyncio.wait_for(self.gradys.stop(), LONGEST_END)
 
     def unload(self) -> None:
         """Give back what is ours alone, then the rest."""
@@ -100,17 +105,19 @@ class GradysModule(HostedModule):
 
     def _start(self) -> None:
         settings = self.gradys_settings.snapshot()
-        try:
-            self.host.bridge.run(self.gradys.start(settings))
-        except UavApiError as error:
-            print(f"gradys: {error}")
-            return
-        told = ", ".join(station.url for station in settings.gs)
-        print(f"gradys: telling {told}" if told else "gradys: no ground station is set; `gradys set gs HOST:PORT`")
+
+        async def start() -> str:
+            await self.gradys.start(settings)
+            return told(settings)
+
+        self._errands.send(start)
 
     def _stop(self) -> None:
-        self.host.bridge.run(self.gradys.stop())
-        print("gradys: stopped")
+        async def stop() -> str:
+            await self.gradys.stop()
+            return "stopped"
+
+        self._errands.send(stop)
 
     def _flush(self) -> None:
         self.host.bridge.call_soon(self.gradys.flush)
@@ -137,9 +144,19 @@ class GradysModule(HostedModule):
         except SettingError as error:
             print(f"gradys: {error}")
             return
-        if self.gradys_settings.snapshot() != before and self.gradys.running:
-            self.host.bridge.run(self.gradys.stop())
-            self._start()
+        settings = self.gradys_settings.snapshot()
+
+        async def restart() -> str:
+            return told(settings) if await self.gradys.restart(settings) else ""
+
+        if settings != before and self._begun:
+            self._errands.send(restart)
+
+
+def told(settings: Settings) -> str:
+    """Which stations are told."""
+    urls = ", ".join(station.url for station in settings.gs)
+    return f"telling {urls}" if urls else "no ground station is set; `gradys set gs HOST:PORT`"
 
 
 def init(mpstate: Any, **kwargs: Any) -> GradysModule:

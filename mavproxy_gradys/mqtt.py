@@ -11,9 +11,10 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import socket
 import ssl
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Awaitable, Sequence
 from urllib.parse import unquote
 
 import aiomqtt
@@ -21,13 +22,14 @@ import aiomqtt
 from mavproxy_gradys.address import split_url
 from mavproxy_gradys.client import tls_context
 from mavproxy_gradys.errors import NotDelivered
-from mavproxy_gradys.readings import POSITION, Reading, Stored
+from mavproxy_gradys.names import Names
+from mavproxy_gradys.readings import POSITION, STATUS, Reading, Stored, device_of
+from mavproxy_gradys.tasks import begin
 
 KEEP_ALIVE = 15  # s; the broker gives a silent connection up after one and a half of it
 WINDOW = 20  # readings on their way at once, on one connection
 GOODBYE = 1.0  # s
 DEFAULT_TOPIC = "fleet/{sysid}/{quantity}"
-STATUS = "status"
 ONLINE, OFFLINE = "online", "offline"
 
 
@@ -46,13 +48,16 @@ class MqttSink:
         self._timeout = timeout
         self._ca_file = ca_file
         self._clients: dict[str, aiomqtt.Client] = {}  # by status topic
+        self._names = Names()
         self._connecting: defaultdict[str, asyncio.Lock] = defaultdict(asyncio.Lock)
+        self._leaving: dict[str, asyncio.Task[None]] = {}  # attempts that were given up, by status topic
 
     async def send(self, batch: Sequence[Stored]) -> set[int]:
         """See `Sink.send`; in order on each connection."""
         by_status: defaultdict[str, list[Stored]] = defaultdict(list)
         for stored in batch:
             by_status[status_topic(self._topic, stored.reading)].append(stored)
+        await self._reach(next(iter(by_status)))
         sending = [self._send(status, part) for status, part in by_status.items()]
         results = await asyncio.gather(*sending, return_exceptions=True)
         taken: set[int] = set()
@@ -67,6 +72,13 @@ class MqttSink:
         if failed and not taken:
             raise failed[0]
         return taken
+
+    async def _reach(self, status: str) -> None:
+        """One connection finds out whether the broker is there; if not, the others need not try."""
+        try:
+            await self._client(status)
+        except aiomqtt.MqttError as error:
+            raise NotDelivered(self._explain(error)) from error
 
     async def _send(self, status: str, batch: Sequence[Stored]) -> set[int]:
         try:
@@ -90,7 +102,7 @@ class MqttSink:
         topic = topic_of(self._topic, stored.reading)
         payload = json.dumps(stored.body(), allow_nan=False)
         async with window:
-            await client.publish(topic, payload, qos=1, retain=stored.reading.quantity == POSITION)
+            await client.publish(topic, payload, qos=1, retain=is_position(stored.reading))
 
     async def _client(self, status: str) -> aiomqtt.Client:
         """The connection whose last will is for that topic, made if need be.
@@ -100,11 +112,39 @@ class MqttSink:
         """
         async with self._connecting[status]:
             if status not in self._clients:
-                client = self._make(status)
-                await client.__aenter__()
-                self._clients[status] = client
-                await client.publish(status, ONLINE, qos=1, retain=True)
+                self._clients[status] = await self._connect(status)
             return self._clients[status]
+
+    async def _connect(self, status: str) -> aiomqtt.Client:
+        """A connection that has said `online`. One that comes too late is closed, not forgotten.
+
+        Raises:
+            aiomqtt.MqttError: the broker does not take it in time.
+        """
+        if status in self._leaving:
+            raise aiomqtt.MqttError("the attempt to connect before has not ended yet")
+        await self._within(self._names.look_up(self._parts.hostname or "", self._port))  # no thread that others need
+        client = self._make(status)
+        connecting = asyncio.ensure_future(client.__aenter__())
+        try:
+            await self._within(asyncio.shield(connecting))
+            await client.publish(status, ONLINE, qos=1, retain=True)
+        except BaseException:
+            leaving = self._leaving[status] = begin(leave(client, connecting), f"the leaving of {self._port}")
+            leaving.add_done_callback(lambda _: self._leaving.pop(status))
+            raise
+        return client
+
+    async def _within(self, answer: Awaitable[object]) -> None:
+        """Await that for as long as the setting says.
+
+        Raises:
+            aiomqtt.MqttError: it took longer, or failed.
+        """
+        try:
+            await asyncio.wait_for(answer, self._timeout)
+        except (asyncio.TimeoutError, OSError) as error:
+            raise aiomqtt.MqttError(str(error) or f"no answer within {self._timeout:g} s") from error
 
     def _make(self, status: str) -> aiomqtt.Client:
         parts = self._parts
@@ -132,18 +172,40 @@ class MqttSink:
         """Give a connection up; the next batch makes a new one."""
         client = self._clients.pop(status, None)
         if client is not None:
-            with contextlib.suppress(aiomqtt.MqttError, asyncio.TimeoutError):
-                await asyncio.wait_for(client.__aexit__(None, None, None), GOODBYE)
+            await disconnect(client)
 
     async def close(self) -> None:
         """Say `offline` ourselves, since the broker keeps the will for those who go without a word."""
 
-        async def leave(status: str, client: aiomqtt.Client) -> None:
+        async def say(status: str, client: aiomqtt.Client) -> None:
             with contextlib.suppress(aiomqtt.MqttError, asyncio.TimeoutError):
                 await asyncio.wait_for(client.publish(status, OFFLINE, qos=1, retain=True), GOODBYE)
             await self._drop(status)
 
-        await asyncio.gather(*(leave(status, client) for status, client in list(self._clients.items())))
+        if self._leaving:
+            await asyncio.wait(self._leaving.values(), timeout=GOODBYE)
+        await asyncio.gather(*(say(status, client) for status, client in list(self._clients.items())))
+
+
+async def leave(client: aiomqtt.Client, connecting: asyncio.Future[aiomqtt.Client]) -> None:
+    """Close a connection once the attempt to make it has ended, which nobody can hurry."""
+    await asyncio.gather(connecting, return_exceptions=True)
+    await disconnect(client)
+
+
+async def disconnect(client: aiomqtt.Client) -> None:
+    """Take leave; a broker that does not answer finds the connection closed."""
+    with contextlib.suppress(aiomqtt.MqttError, asyncio.TimeoutError):
+        await asyncio.wait_for(client.__aexit__(None, None, None), GOODBYE)
+    left = client._client.socket()  # aiomqtt itself leaves it open when the broker was too slow
+    if isinstance(left, socket.socket):
+        with contextlib.suppress(OSError):
+            left.shutdown(socket.SHUT_RDWR)
+
+
+def is_position(reading: Reading) -> bool:
+    """Whether that is where a vehicle is, which new subscribers are to learn at once."""
+    return reading.quantity == POSITION and reading.device == device_of(reading.system)
 
 
 def topic_of(template: str, reading: Reading) -> str:

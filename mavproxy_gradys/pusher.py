@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from typing import Any
 
 from mavproxy_gradys import payload
@@ -10,6 +11,8 @@ from mavproxy_gradys.address import Station, api_note, ip_field, own_address
 from mavproxy_gradys.cadence import Cadence
 from mavproxy_gradys.client import FORM, Poster
 from mavproxy_gradys.errors import NotDelivered
+from mavproxy_gradys.names import Names
+from mavproxy_gradys.outages import Outage
 from mavproxy_gradys.settings import Settings
 from mavproxy_gradys.tally import StationTally, VehicleTally
 from mavproxy_uavapi.errors import Unavailable
@@ -17,6 +20,7 @@ from mavproxy_uavapi.host.host import Host
 from mavproxy_uavapi.host.state import VehicleState
 
 DROPPED = 101  # the station's `type` when it received an update but no browser took it; 103 when one did
+log = logging.getLogger("gradys.push")
 ADDRESS_KEPT = 30.0  # s for which our own address is not looked up again
 
 
@@ -38,6 +42,9 @@ class Pusher:
         self._settings = settings
         self._poster = poster
         self._in_flight: dict[int, asyncio.Task[None]] = {}
+        self._names = Names()
+        self._outage = Outage(log, f"{station.url} does not answer", f"{station.url} answers again")
+        self._refusals: dict[int, Outage] = {}
         self._own = ""
         self._own_at = -ADDRESS_KEPT
 
@@ -53,7 +60,11 @@ class Pusher:
             for task in list(self._in_flight.values()):
                 task.cancel()
             await asyncio.gather(*self._in_flight.values(), return_exceptions=True)
-            await self._poster.close()
+            await self.close()
+
+    async def close(self) -> None:
+        """Close the connections."""
+        await self._poster.close()
 
     def turn(self) -> None:
         """Begin an update for every vehicle that has one to tell.
@@ -104,18 +115,29 @@ class Pusher:
             started = self._host.clock()
             answer = await self._poster.post(self.station.update_url, body, FORM)
         except NotDelivered as error:
-            self._failed(vehicle, error)
+            self._failed(state.system, vehicle, error)
             return
         now = self._host.clock()
         self.tally.round_trips.add(now - started)
         self.tally.backoff.succeeded()
         vehicle.answered(was_dropped(answer), now)
+        self._outage.now("")
+        self._refusal(state.system).now("")
 
-    def _failed(self, vehicle: VehicleTally, error: NotDelivered) -> None:
+    def _refusal(self, system: int) -> Outage:
+        began, ended = (
+            f"{self.station.url} refuses vehicle {system}",
+            f"{self.station.url} takes vehicle {system} again",
+        )
+        return self._refusals.setdefault(system, Outage(log, began, ended))
+
+    def _failed(self, system: int, vehicle: VehicleTally, error: NotDelivered) -> None:
         now = self._host.clock()
         vehicle.refused(str(error))
         self.tally.failed(str(error), now)
+        self._outage.now("" if error.reached else str(error))
         if error.reached:
+            self._refusal(system).now(str(error))
             self.tally.backoff.succeeded()
             vehicle.backoff.failed(now)
         elif not self.tally.backoff.waits(now):  # several updates that fail together are one failure
@@ -145,7 +167,7 @@ class Pusher:
             return ip_field(self._settings.ip, "", api)
         now = self._host.clock()
         if now - self._own_at >= ADDRESS_KEPT:
-            look_up = own_address(self.station.host, self.station.port)
+            look_up = own_address(self._names, self.station.host, self.station.port)
             try:
                 self._own = await asyncio.wait_for(look_up, self._settings.timeout)
             except asyncio.TimeoutError as error:

@@ -21,6 +21,7 @@ from mavproxy_uavapi.host.state import Received, VehicleState
 from mavproxy_uavapi.settings import SettingError
 
 POSITION = "position"
+STATUS = "status"  # the MQTT sink's word on whether a vehicle is online
 POSITION_REPRESENTATION = "degrees, degrees, m above home"
 NAME = r"[A-Za-z0-9_.-]{1,64}"  # fits into an MQTT topic
 NUMBER = r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?"

@@ -32,7 +32,9 @@ class Gradys:
         self.sensing = Sensing(host)
         self.tracks = Tracking(host)
         self.settings: Settings | None = None
+        self._pushers: list[Pusher] = []
         self._tasks: list[asyncio.Task[None]] = []
+        self._changing = asyncio.Lock()  # a start waits for the stop before it, which may take its time
 
     @property
     def running(self) -> bool:
@@ -45,10 +47,13 @@ class Gradys:
         Raises:
             NotDelivered: the CA file cannot be used.
         """
-        if self.running:
-            return
+        async with self._changing:
+            if not self.running:
+                self._start(settings)
+
+    def _start(self, settings: Settings) -> None:
         pushers = [self._pusher(station, settings) for station in settings.gs]
-        self.settings = settings
+        self.settings, self._pushers = settings, pushers
         self._tasks = [begin(pusher.run(), f"the push to {pusher.station.url}") for pusher in pushers]
         self.sensing.start(settings)
 
@@ -63,9 +68,28 @@ class Gradys:
 
     async def stop(self) -> None:
         """End it; what is not acknowledged stays in the spool."""
+        async with self._changing:
+            await self._stop()
+
+    async def restart(self, settings: Settings) -> bool:
+        """Take up other settings, if it runs; whether it does.
+
+        Raises:
+            NotDelivered: as `start`; then it is stopped.
+        """
+        async with self._changing:
+            if not self.running:
+                return False
+            await self._stop()
+            self._start(settings)
+            return True
+
+    async def _stop(self) -> None:
         self.settings = None
         tasks, self._tasks = self._tasks, []
         await end(tasks)
+        for pusher in self._pushers:  # also those that had not begun
+            await pusher.close()
         await self.sensing.stop()
 
     def flush(self) -> None:

@@ -9,6 +9,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 from MAVProxy.modules.lib.mp_settings import MPSetting, MPSettings
 
@@ -192,11 +193,13 @@ def sinks(text: str) -> list[str]:
     """The sinks of a list by comma.
 
     Raises:
-        SettingError: one is no URL of a scheme that we know.
+        SettingError: one is no URL of a scheme that we know, or no topic.
     """
     found = [part.strip() for part in text.split(",") if part.strip()]
     for part in found:
         split_url(part, SINK_SCHEMES)
+        if part.startswith("mqtt") and set("+#?") & set(unquote(part.partition("://")[2].partition("/")[2])):
+            raise SettingError(f"{masked(part)}: a topic holds none of + # ?")
     return list(dict.fromkeys(found))
 
 

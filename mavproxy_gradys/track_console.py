@@ -8,6 +8,7 @@ from collections.abc import Callable, Coroutine, Mapping
 from pathlib import Path
 from typing import Any, NoReturn
 
+from mavproxy_gradys.errands import Errands
 from mavproxy_gradys.track_flight import (
     HIGHEST_TAKEOFF,
     LARGEST_REACH,
@@ -19,7 +20,7 @@ from mavproxy_gradys.track_flight import (
 )
 from mavproxy_gradys.tracking import Tracking
 from mavproxy_gradys.tracks import FORMATS, GROUND, Waypoint, places_of, style_of
-from mavproxy_uavapi.errors import BadRequest, UavApiError
+from mavproxy_uavapi.errors import BadRequest
 from mavproxy_uavapi.host.host import Host
 
 HELP = """\
@@ -79,7 +80,7 @@ class TrackConsole:
     def __init__(self, host: Host, tracks: Tracking) -> None:
         self._host = host
         self._tracks = tracks
-        self._tasks: set[asyncio.Task[None]] = set()
+        self._errands = Errands(host)
 
     def command(self, args: list[str]) -> None:
         """What was typed. Main loop only."""
@@ -99,23 +100,7 @@ class TrackConsole:
             "stop": self._stop,
             "fly": self._fly,
         }
-        self._host.bridge.call_soon(self._begin, verbs[given.verb], given)
-
-    def _begin(
-        self, verb: Callable[[argparse.Namespace], Coroutine[Any, Any, str]], given: argparse.Namespace
-    ) -> None:
-        async def run() -> None:
-            try:
-                self._say(await verb(given))
-            except UavApiError as error:
-                self._say(str(error))
-
-        task = asyncio.get_running_loop().create_task(run())
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
-
-    def _say(self, text: str) -> None:
-        self._host.bridge.post(lambda: print(f"gradys: {text}"))
+        self._errands.send(lambda: verbs[given.verb](given))
 
     async def _show(self, _given: argparse.Namespace) -> str:
         return shown(self._tracks.report())
@@ -139,7 +124,7 @@ class TrackConsole:
         flight = flight_of(vehicle, places, given.reach, given.transit)
         request = {**{name: str(value) for name, value in vars(given).items()}, "digest": hash(tuple(places))}
         job = self._host.jobs.begin(vehicle.seat, VERB, request, lambda job: self._tracks.fly(flight, job))
-        self._say(
+        self._errands.say(
             f"flying {len(places)} legs with vehicle {vehicle.state.system}; `gradys track` tells how far it is"
         )
         return await job.outcome()

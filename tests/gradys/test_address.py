@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 
 from mavproxy_gradys.address import api_note, check_ip, ip_field, own_address, station, stations
+from mavproxy_gradys.names import Names
 from mavproxy_uavapi.settings import SettingError
 
 
@@ -25,7 +26,20 @@ def test_a_station_as_people_write_it(text: str, url: str, host: str, port: int)
 
 
 @pytest.mark.parametrize(
-    "text", ["10.0.0.5:many", "10.0.0.5:70000", "::1:8000", "ftp://x", "http://", "a b:80", "x:1/path", "u:p@x:1"]
+    "text",
+    [
+        "10.0.0.5:many",
+        "10.0.0.5:70000",
+        "::1:8000",
+        "ftp://x",
+        "http://",
+        "a b:80",
+        "x:1/path",
+        "u:p@x:1",
+        "a..b:80",
+        f"{'x' * 70}.lan:80",
+        "[fe80::1%eth0]:8000",
+    ],
 )
 def test_what_is_no_station_is_refused(text: str) -> None:
     with pytest.raises(SettingError):
@@ -68,7 +82,7 @@ def test_the_note_says_when_the_station_cannot_command_us() -> None:
 
 
 def test_own_address_is_that_of_the_interface_that_reaches_the_station(loop: Any) -> None:
-    loop.patience = 1.0
-    assert loop.run(own_address("127.0.0.1", 9)) == "127.0.0.1"
+    names = Names()
+    assert loop.run(own_address(names, "127.0.0.1", 9)) == "127.0.0.1"
     with pytest.raises(OSError):
-        loop.run(own_address("no.such.host.invalid", 9))
+        loop.run(own_address(names, "no.such.host.invalid", 9))

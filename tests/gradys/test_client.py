@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from aiohttp import web
 
-from mavproxy_gradys.client import FORM, LARGEST_ANSWER, Client
+from mavproxy_gradys.client import FORM, LARGEST_ANSWER, Client, refusal
 from mavproxy_gradys.errors import NotDelivered
 
 
@@ -68,8 +68,9 @@ def test_one_connection_is_used_again(loop: Any, peer: Peer) -> None:
     assert len(set(peer.connections)) == 1
 
 
-def test_a_200_that_is_no_json_is_none(loop: Any, peer: Peer) -> None:
-    peer.answer = lambda request: web.Response(text="OK")
+@pytest.mark.parametrize("text", ["OK", "[" * 100_000, "9" * 5000])
+def test_a_200_that_is_no_json_is_none(loop: Any, peer: Peer, text: str) -> None:
+    peer.answer = lambda request: web.Response(text=text)
     assert asked(loop, peer) == [None]
 
 
@@ -92,6 +93,17 @@ def test_what_is_no_200_is_a_refusal(loop: Any, peer: Peer, answer: Any, text: s
     with pytest.raises(NotDelivered, match=text) as raised:
         asked(loop, peer)
     assert raised.value.reached and raised.value.too_large == too_large
+
+
+@pytest.mark.parametrize(
+    "status,of_content",
+    [
+        *((status, True) for status in (400, 413, 422, 500)),
+        *((status, False) for status in (301, 401, 404, 429, 503)),
+    ],
+)
+def test_what_less_of_it_may_help_against(status: int, of_content: bool) -> None:
+    assert refusal(status, "").for_content == of_content
 
 
 def test_a_connection_that_was_closed_meanwhile_is_replaced_once(loop: Any, peer: Peer) -> None:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import asyncio
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -8,6 +9,7 @@ from typing import Any
 import pytest
 
 import gradys
+from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.module import HELP
 
 
@@ -73,14 +75,37 @@ def test_routes_come_and_go_with_it(make: Any) -> None:
     assert host.extensions == {}
 
 
-def test_setting_takes_effect_at_once(make: Any, capsys: Any) -> None:
+def test_setting_takes_effect_at_once(make: Any, main_loop: Any, capsys: Any) -> None:
     module = make(gs="127.0.0.1:9")
     module.command(["set", "gs", "127.0.0.1:8,127.0.0.1:7"])
-    capsys.readouterr()
+    main_loop.until(lambda: "telling http://127.0.0.1:8, http://127.0.0.1:7" in capsys.readouterr().out)
     module.command(["status"])
     said = capsys.readouterr().out
     assert "ground station http://127.0.0.1:8" in said and "ground station http://127.0.0.1:7" in said
     assert "127.0.0.1:9" not in said
+
+
+def test_the_prompt_waits_for_no_goodbye(make: Any, main_loop: Any, capsys: Any, monkeypatch: Any) -> None:
+    leaving, left = threading.Event(), threading.Event()
+
+    class Slow:
+        async def send(self, batch: Any) -> Any:
+            raise NotDelivered("nobody is there")
+
+        async def close(self) -> None:
+            leaving.set()
+            await asyncio.to_thread(left.wait, 20)
+
+    monkeypatch.setattr("mavproxy_gradys.sender.make_sink", lambda *_: Slow())
+    module = make(sink="http://127.0.0.1:9/r", quantities="")
+    main_loop.until(lambda: "no ground station" in capsys.readouterr().out)
+    module.command(["set", "gs", "127.0.0.1:8"])
+    module.command(["stop"])
+    module.command(["set", "period", "2"])
+    assert leaving.wait(10)
+    assert "telling" not in capsys.readouterr().out  # the prompt was free all the time
+    left.set()
+    main_loop.until(lambda: "stopped" in capsys.readouterr().out)
 
 
 def test_a_stopped_module_stays_stopped_when_a_setting_changes(make: Any, capsys: Any) -> None:

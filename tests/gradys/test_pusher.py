@@ -191,7 +191,7 @@ def test_ip_is_found_out_when_it_is_not_set_and_asked_again_only_now_and_then(
 ) -> None:
     asked: list[float] = []
 
-    async def own_address(host: str, port: int) -> str:
+    async def own_address(_names: Any, host: str, port: int) -> str:
         asked.append(loop.time())
         return "192.0.2.7"
 
@@ -206,7 +206,7 @@ def test_ip_is_found_out_when_it_is_not_set_and_asked_again_only_now_and_then(
 def test_a_name_that_nobody_knows_is_an_error_like_any_other(
     loop: Any, teller: Any, poster: Any, push: Any, monkeypatch: Any
 ) -> None:
-    async def own_address(host: str, port: int) -> str:
+    async def own_address(_names: Any, host: str, port: int) -> str:
         raise OSError(-2, "Name or service not known")
 
     monkeypatch.setattr("mavproxy_gradys.pusher.own_address", own_address)
@@ -220,7 +220,7 @@ def test_a_name_that_nobody_knows_is_an_error_like_any_other(
 def test_a_name_server_that_is_silent_holds_up_nobody(
     loop: Any, teller: Any, poster: Any, push: Any, monkeypatch: Any
 ) -> None:
-    async def own_address(host: str, port: int) -> str:
+    async def own_address(_names: Any, host: str, port: int) -> str:
         await asyncio.sleep(1000)
         raise AssertionError("not reached")
 
@@ -228,6 +228,22 @@ def test_a_name_server_that_is_silent_holds_up_nobody(
     pusher = push(poster, ip="", timeout=2)
     telling(loop, 3, teller)
     assert "no answer about the name" in pusher.tally.last_error
+
+
+def test_the_log_tells_of_an_outage_and_of_a_refusal_once(
+    loop: Any, teller: Any, poster: Any, push: Any, down: Any, caplog: Any
+) -> None:
+    push(poster)
+    for answer in (down, {"type": 103}, NotDelivered("it answers 500", reached=True), {"type": 103}):
+        poster.answer = answer
+        telling(loop, 40, teller)
+    url = "http://127.0.0.1:9"
+    assert [(record.name, record.message) for record in caplog.records] == [
+        ("gradys.push", f"{url} does not answer: cannot connect"),
+        ("gradys.push", f"{url} answers again"),
+        ("gradys.push", f"{url} refuses vehicle 10: it answers 500"),
+        ("gradys.push", f"{url} takes vehicle 10 again"),
+    ]
 
 
 def test_a_dead_station_does_not_delay_another(loop: Any, teller: Any, poster: Any, push: Any, down: Any) -> None:

@@ -32,7 +32,9 @@ def test_an_ini_file_that_means_nothing_is_refused(tmp_path: Path, text: str) ->
 @pytest.mark.parametrize(
     "name,value",
     [("gs", "x:y"), ("ip", "a b"), ("period", float("nan")), ("period", "inf"), ("timeout", 0), ("token", "a\nb"),
-     ("sink", "ftp://x"), ("quantities", "x"), ("ca_file", "/no/such"), ("spool_mb", -1), ("nope", 1)],
+     ("sink", "ftp://x"), ("quantities", "x"), ("ca_file", "/no/such"), ("spool_mb", -1), ("nope", 1),
+     ("sink", "mqtt://broker/fleet/+/x"), ("sink", "mqtt://broker/a#b"), ("sink", "mqtts://broker/a?b"),
+     ("sink", "mqtt://broker/a%23"), ("gs", "a..b:80")],
 )  # fmt: skip
 def test_what_cannot_work_is_refused(name: str, value: Any) -> None:
     with pytest.raises(SettingError):

@@ -1,0 +1,89 @@
+"""Names -> addresses, in threads of our own: a name server that is silent holds up no other lookup."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import ipaddress
+import socket
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from aiohttp.abc import AbstractResolver, ResolveResult
+
+Info = tuple[Any, ...]  # family, kind, protocol, canonical name, address: as getaddrinfo has them
+NUMERIC = socket.AI_NUMERICHOST | socket.AI_NUMERICSERV
+
+
+class Names(AbstractResolver):
+    """Looks names up; while the answer about one is awaited, nobody asks for it again.
+
+    Args:
+        ask: as socket.getaddrinfo, blocking.
+    """
+
+    def __init__(self, ask: Callable[..., list[Info]] = socket.getaddrinfo) -> None:
+        self._ask = ask
+        self._asked: dict[tuple[Any, ...], asyncio.Future[list[Info]]] = {}
+
+    async def look_up(self, host: str, port: int, family: int = 0, kind: int = socket.SOCK_STREAM) -> list[Info]:
+        """The addresses of a host; an IP address is one at once.
+
+        Raises:
+            OSError: there is no such host.
+        """
+        if is_address(host):
+            return list(socket.getaddrinfo(host, port, family, kind, flags=NUMERIC))
+        question = (host, port, family, kind)
+        if question not in self._asked:
+            self._asked[question] = self._begin(question)
+        return await asyncio.shield(self._asked[question])
+
+    def _begin(self, question: tuple[Any, ...]) -> asyncio.Future[list[Info]]:
+        loop = asyncio.get_running_loop()
+        answer: asyncio.Future[list[Info]] = loop.create_future()
+
+        def settle(found: list[Info], error: OSError | None) -> None:
+            self._asked.pop(question, None)
+            if error is None:
+                answer.set_result(found)
+            else:
+                answer.set_exception(error)
+                answer.exception()  # perhaps nobody waits any more
+
+        def ask() -> None:
+            found: list[Info] = []
+            error: OSError | None = None
+            try:
+                found = self._ask(*question)
+            except OSError as failure:
+                error = failure
+            except UnicodeError as failure:  # no name that DNS could know
+                error = socket.gaierror(socket.EAI_NONAME, f"not a host's name ({failure})")
+            with contextlib.suppress(RuntimeError):  # the loop has ended meanwhile
+                loop.call_soon_threadsafe(settle, found, error)
+
+        threading.Thread(target=ask, name=f"gradys-name-{question[0]}", daemon=True).start()
+        return answer
+
+    async def resolve(
+        self, host: str, port: int = 0, family: socket.AddressFamily = socket.AF_INET
+    ) -> list[ResolveResult]:
+        """As aiohttp's connector asks."""
+        return [
+            ResolveResult(hostname=host, host=address[0], port=address[1], family=kin, proto=protocol, flags=NUMERIC)
+            for kin, _, protocol, _, address in await self.look_up(host, port, family)
+        ]
+
+    async def close(self) -> None:
+        """A thread that still waits ends by itself."""
+
+
+def is_address(host: str) -> bool:
+    """Whether that is an IP address rather than a name."""
+    try:
+        ipaddress.ip_address(host)
+    except ValueError:
+        return False
+    return True
