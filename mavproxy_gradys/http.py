@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import math
+import re
 import time
 from typing import Annotated, Any
 
@@ -14,7 +15,7 @@ from mavproxy_gradys.service import Gradys
 from mavproxy_gradys.track_flight import VERB, flight_of
 from mavproxy_gradys.track_request import Track, TrackFile
 from mavproxy_gradys.tracks import places_of
-from mavproxy_uavapi.errors import NoVehicle
+from mavproxy_uavapi.errors import Invalid, NoVehicle
 from mavproxy_uavapi.http.call import Answer, Call
 from mavproxy_uavapi.http.requests import Empty, Request
 from mavproxy_uavapi.http.routes import EITHER, POST, Route
@@ -23,6 +24,7 @@ from mavproxy_uavapi.vehicle.jobs import Job
 MOST_READINGS = 1000  # in one request
 LONGEST_TEXT = 4096
 LONGEST_LIST = 64
+VEHICLE = re.compile(rf"{device_of(0)[:-1]}[0-9]+")  # what vehicles are called as devices
 Name = Annotated[str, Field(pattern=rf"^{NAME}$", description="letters, digits, _ . -")]
 
 
@@ -32,21 +34,21 @@ def checked(value: Any) -> Value:
     Raises:
         ValueError: none that can be told.
     """
-    if isinstance(value, bool | int) or (isinstance(value, str) and len(value) <= LONGEST_TEXT):
-        return value
-    if isinstance(value, float) and math.isfinite(value):
-        return value
+    if isinstance(value, bool) or is_number(value) or (isinstance(value, str) and len(value) <= LONGEST_TEXT):
+        return value  # type: ignore[no-any-return]
     if isinstance(value, list) and len(value) <= LONGEST_LIST and all(map(is_number, value)):
         return value
     raise ValueError(
-        f"Input should be a finite number, true or false, a text of at most {LONGEST_TEXT} letters,"
-        f" or a list of at most {LONGEST_LIST} finite numbers"
+        f"Input should be a finite number (an integer of 64 bits), true or false, a text of at most {LONGEST_TEXT}"
+        f" letters, or a list of at most {LONGEST_LIST} finite numbers"
     )
 
 
 def is_number(value: Any) -> bool:
-    """Whether that is a finite number."""
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    """Whether that is a finite number, and an integer one of 64 bits."""
+    if isinstance(value, float):
+        return math.isfinite(value)
+    return isinstance(value, int) and not isinstance(value, bool) and -(2**63) <= value < 2**63
 
 
 class OneReading(Request):
@@ -125,6 +127,8 @@ class Handlers:
         system = given.sysid or call.seen.state.system
         at = now if given.time is None else given.time
         device = given.device or device_of(system)
+        if given.quantity in self._gradys.sensing.reserved and VEHICLE.fullmatch(device):
+            raise Invalid(f"{given.quantity} of {device} is told by the vehicle itself", "body", "quantity")
         return Reading(device, system, given.quantity, given.representation, given.value, at)
 
     def _id(self, call: Call) -> str | None:

@@ -58,16 +58,17 @@ def position(state: VehicleState, now: float, *, max_age: float, link_timeout: f
     age = now - received.at
     if age > max_age:
         raise Stale(f"the position of vehicle {state.system} is {age:.1f} s old")
-    require_fix(state, has_position)
+    require_fix(state, now, max_age, has_position)
     told = received.message
     if not (told.lat or told.lon) or abs(told.lat) > 90e7 or abs(told.lon) > 180e7:
         raise NoFix(f"vehicle {state.system} does not know where it is")
     return Position(told.lat / 1e7, told.lon / 1e7, told.relative_alt / 1000, age)
 
 
-def require_fix(state: VehicleState, has_position: bool) -> None:
-    """Raises NoFix unless a satellite receiver has a 3D fix, or there is none and the estimator has a position."""
-    told = [state.field(name, "fix_type") for name in RECEIVERS]
+def require_fix(state: VehicleState, now: float, max_age: float, has_position: bool) -> None:
+    """Raises NoFix unless a receiver that tells has a 3D fix, or there is none and the estimator has a position."""
+    ages = {name: state.age(name, now) for name in RECEIVERS}
+    told = [state.field(name, "fix_type") for name, age in ages.items() if age is not None and age <= max_age]
     fixes = [fix for fix in told if fix not in (None, mavlink.GPS_FIX_TYPE_NO_GPS)]
     fixed = max(fixes) >= mavlink.GPS_FIX_TYPE_3D_FIX if fixes else has_position
     if not fixed:
@@ -117,11 +118,12 @@ def motion(state: VehicleState, now: float, max_age: float) -> dict[str, str]:
 
 
 def battery(state: VehicleState, now: float, max_age: float) -> dict[str, str]:
-    """battery_percent by SYS_STATUS; -1 where the autopilot does not measure it, as MAVLink has it."""
+    """battery_percent by SYS_STATUS; none where the autopilot does not measure it, which MAVLink tells as -1."""
     age = state.age("SYS_STATUS", now)
     if age is None or age > max_age:
         return {}
-    return {"battery_percent": str(state.messages["SYS_STATUS"].message.battery_remaining)}
+    left = state.messages["SYS_STATUS"].message.battery_remaining
+    return {} if left < 0 else {"battery_percent": str(left)}
 
 
 def encode(fields: dict[str, str]) -> bytes:

@@ -11,7 +11,7 @@ from mavproxy_gradys import payload
 from mavproxy_gradys.cadence import Cadence
 from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.keeper import Keeper
-from mavproxy_gradys.readings import POSITION, Quantity, Reading, Sampler
+from mavproxy_gradys.readings import POSITION, STATUS, Quantity, Reading, Sampler
 from mavproxy_gradys.sender import Sender
 from mavproxy_gradys.settings import Settings, masked
 from mavproxy_gradys.spool import Spool
@@ -86,6 +86,12 @@ class Sensing:
             NotStored: it is not.
         """
         return await self._kept().keep(readings)
+
+    @property
+    def reserved(self) -> set[str]:
+        """The quantities that only a vehicle itself tells: those that are sampled, and whether it is online."""
+        sampled = () if self._settings is None else self._settings.quantities
+        return {POSITION, STATUS, *(quantity.name for quantity in sampled)}
 
     def flush(self) -> None:
         """Try all sinks now."""

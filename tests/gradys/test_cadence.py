@@ -34,6 +34,8 @@ def test_pauses_double_up_to_half_a_minute_and_chance_shortens_them() -> None:
     backoff.succeeded()
     assert not backoff.waits(0.0)
     assert Backoff(lambda: 1.0).failed(0.0) == 0.5
+    shorter = Backoff(lambda: 0.0, longest=20.0)
+    assert [shorter.failed(0.0) for _ in range(6)] == [1, 2, 4, 8, 16, 20]
 
 
 def test_hurry_ends_the_pause_but_not_the_memory() -> None:

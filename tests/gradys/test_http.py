@@ -1,12 +1,15 @@
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from mavproxy_gradys.http import LONGEST_LIST, LONGEST_TEXT, MOST_READINGS, Readings
+from mavproxy_gradys.http import LONGEST_LIST, LONGEST_TEXT, MOST_READINGS, Handlers, Readings
+from mavproxy_gradys.service import Gradys
 from mavproxy_gradys.track_request import Track
 from mavproxy_uavapi.errors import Invalid
+from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import parse
 
 
@@ -16,7 +19,7 @@ def readings(body: Any) -> list[Any]:
     return found.readings
 
 
-@pytest.mark.parametrize("value", [1, 0, 2.5, True, False, "yes", "12", [1, 2.5], ""])
+@pytest.mark.parametrize("value", [1, 0, 2**63 - 1, 2.5, True, False, "yes", "12", [1, 2.5], ""])
 def test_a_value_stays_what_it_was(value: Any) -> None:
     (found,) = readings({"quantity": "a", "value": value})
     assert found.value == value and type(found.value) is type(value)
@@ -30,6 +33,9 @@ def test_a_value_stays_what_it_was(value: Any) -> None:
         float("inf"),
         {},
         [1, "a"],
+        2**63,
+        -(2**63) - 1,
+        [10**400],
         [float("nan")],
         "x" * (LONGEST_TEXT + 1),
         [0] * (LONGEST_LIST + 1),
@@ -58,6 +64,23 @@ def test_a_value_that_cannot_be_told_is_refused_once(value: Any) -> None:
 def test_what_is_no_reading_is_refused(body: Any) -> None:
     with pytest.raises(Invalid):
         readings(body)
+
+
+def test_nobody_poses_as_a_vehicle(loop: Any, host: Any, teller: Any, settings: Any, at_once: Any) -> None:
+    gradys = Gradys(host)
+    loop.run(gradys.start(settings(quantities="position@1,alt=VFR_HUD.alt")))
+    service: Any = SimpleNamespace(host=host, settings=SimpleNamespace(sysid=0))
+
+    def post(**body: Any) -> Any:
+        call = Call(service, SimpleNamespace(), parse(Readings, "body", {"value": 1, **body}))  # type: ignore[arg-type]
+        return loop.run(Handlers(gradys).readings(call))
+
+    for body in ({"quantity": "position"}, {"quantity": "alt", "device": "uav-1"}, {"quantity": "status"}):
+        with pytest.raises(Invalid, match="told by the vehicle itself"):
+            post(**body)
+    assert post(quantity="position", device="buoy")["result"] == "Kept 1 reading"
+    assert post(quantity="temperature")["result"] == "Kept 1 reading"
+    loop.run(gradys.stop())
 
 
 def test_a_track_has_limits() -> None:

@@ -61,6 +61,20 @@ def test_a_second_receiver_with_a_fix_will_do(teller: Any, loop: Any) -> None:
     assert where(teller, loop.time()).lat == -15.840081
 
 
+def test_a_receiver_that_has_fallen_silent_does_not_count(teller: Any, loop: Any) -> None:
+    teller.tell("gps2_raw", fix_type=3)
+    loop.now += 6
+    teller.tell_all()
+    teller.tell("gps_raw_int", fix_type=1)
+    with pytest.raises(NoFix, match="no position fix"):
+        where(teller, loop.time())
+
+
+def test_a_battery_that_is_not_measured_is_left_out(teller: Any, loop: Any) -> None:
+    teller.tell("sys_status", battery_remaining=-1)
+    assert "battery_percent" not in form(teller, loop.time())
+
+
 def test_without_a_receiver_the_estimator_decides(teller: Any, loop: Any) -> None:
     teller.tell("gps_raw_int", fix_type=0)
     assert where(teller, loop.time(), has_position=True)
