@@ -1,12 +1,16 @@
 """MAVProxy's select loop <-> one asyncio loop in one thread.
 
-Two queues, one each way. In: the main loop hands over what it received (`feed`); out: the asyncio side
-hands calls to the main loop (`on_main`), which is the only thread that sends.
+Two queues, one each way. In: the main loop hands over what it received (`feed`), all of one turn at a time; out:
+the asyncio side hands calls to the main loop (`on_main`), which is the only thread that sends.
+
+Python runs one thread at a time. A vehicle's messages come in bursts, each of which MAVProxy parses, logs and
+forwards: so long the asyncio side is not woken by us, and new work of its own waits (`calm`).
 """
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
 import weakref
 from collections import deque
@@ -17,6 +21,7 @@ from mavproxy_uavapi.host.loop_thread import LoopThread
 from mavproxy_uavapi.host.outbox import Outbox
 
 T = TypeVar("T")
+GIVE_WAY = 0.05  # s that new work waits for the main loop at most
 
 _bridges: weakref.WeakSet[Bridge] = weakref.WeakSet()
 
@@ -35,6 +40,10 @@ class Bridge:
         self._select_extra = select_extra
         self._receive = receive
         self._inbox: deque[Any] = deque()
+        self._delivering = False  # whether `_deliver` is on its way
+        self._busy = False  # whether the main loop is at messages
+        self._waited_for = False
+        self._calm = asyncio.Event()
         self._outbox = Outbox()
         self._thread = LoopThread("uavapi-loop")
         self._open_sockets: list[Callable[[], list[int]]] = [self._outbox.filenos]
@@ -57,11 +66,31 @@ class Bridge:
 
     def feed(self, message: Any) -> None:
         """Hand a received message over. Main loop only; never blocks, never raises."""
-        self._inbox.append(message)  # before its length is looked at: the loop empties the inbox meanwhile
-        if len(self._inbox) == 1 and not self._thread.call_soon(self._deliver):
-            self._inbox.clear()  # the loop has ended: nobody will read
+        self._busy = True
+        self._inbox.append(message)
+
+    def _hand_over(self) -> None:
+        """Wake the asyncio side for what was fed since the last turn, and for what has waited for its end."""
+        self._busy = False
+        if self._inbox and not self._delivering:
+            self._delivering = True  # first: the other thread may be there before `call_soon` returns
+            if not self._thread.call_soon(self._deliver):
+                self._inbox.clear()  # the loop has ended: nobody will read
+        if self._waited_for:
+            self._waited_for = False
+            self._thread.call_soon(self._calm.set)
+
+    async def calm(self) -> None:
+        """Await the end of the main loop's turn, if it is at messages just now; GIVE_WAY s at most."""
+        if not self._busy:
+            return
+        self._calm.clear()
+        self._waited_for = True
+        with contextlib.suppress(asyncio.TimeoutError):
+            await asyncio.wait_for(self._calm.wait(), GIVE_WAY)
 
     def _deliver(self) -> None:
+        self._delivering = False  # what comes from now on needs another call
         for _ in range(len(self._inbox)):
             message = self._inbox.popleft()
             try:
@@ -69,11 +98,10 @@ class Bridge:
             except Exception as error:  # noqa: BLE001  one bad message must not stop the next
                 context = {"message": f"uavapi: defect on {message.get_type()}", "exception": error}
                 self.loop.call_exception_handler(context)
-        if self._inbox:
-            self.loop.call_soon(self._deliver)
 
-    def drain(self) -> None:
-        """Run what the asyncio side asked for. Main loop only."""
+    def turn(self) -> None:
+        """Between two turns of the main loop: hand over what was fed, run what the asyncio side asked for."""
+        self._hand_over()
         self._outbox.drain()
 
     def post(self, call: Callable[[], None]) -> None:

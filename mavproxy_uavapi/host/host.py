@@ -76,7 +76,7 @@ class Host:
         if target != self._told_target:
             self._told_target = target
             self.bridge.call_soon(setattr, self, "target", target)
-        self.bridge.drain()
+        self.bridge.turn()
 
     # -- the asyncio thread -----------------------------------------------------------------------------
 

@@ -16,7 +16,7 @@ from aiohttp.http_exceptions import HttpProcessingError
 from mavproxy_uavapi.errors import NotFound
 from mavproxy_uavapi.http.call import SERVICE, Call, Service, parameters
 from mavproxy_uavapi.http.docs_page import TABLE
-from mavproxy_uavapi.http.limits import BUCKET, Bucket, at_a_bearable_rate, headers_are_here, patient
+from mavproxy_uavapi.http.limits import BUCKET, Bucket, at_a_bearable_rate, give_way, headers_are_here, patient
 from mavproxy_uavapi.http.responses import Handler, errors_as_answers, success
 from mavproxy_uavapi.http.routes import ROUTES, Route
 from mavproxy_uavapi.http.security import name_the_trusted, only_for_us
@@ -25,7 +25,7 @@ from mavproxy_uavapi.http.trail import audited
 log = logging.getLogger("uavapi.http.server")
 BACKLOG = 512  # connections that wait to be accepted
 MAX_BODY = 1024 * 1024  # bytes
-MIDDLEWARES = (headers_are_here, errors_as_answers, at_a_bearable_rate, only_for_us)
+MIDDLEWARES = (headers_are_here, errors_as_answers, give_way, at_a_bearable_rate, only_for_us)
 SHUTDOWN_TIMEOUT = 1.0  # s for answers that are being written when we stop
 
 

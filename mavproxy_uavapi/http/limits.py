@@ -48,6 +48,13 @@ BUCKET = web.AppKey("bucket", Bucket)
 
 
 @web.middleware
+async def give_way(request: web.Request, handler: Handler) -> web.StreamResponse:
+    """Let MAVProxy's main loop finish what it is at: its messages are not to wait for our answers."""
+    await request.app[SERVICE].host.bridge.calm()
+    return await handler(request)
+
+
+@web.middleware
 async def at_a_bearable_rate(request: web.Request, handler: Handler) -> web.StreamResponse:
     """Refuse a client that asks more often than it may."""
     service = request.app[SERVICE]

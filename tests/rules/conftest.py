@@ -205,6 +205,7 @@ class World:
             if self.loop.time() >= self.cut_until and data:
                 for message in self._parser.parse_buffer(data) or []:
                     self.host.bridge.feed(message)
+                self.host.bridge.turn()
             await asyncio.sleep(TICK)
 
     def _deliver(self, message: Any) -> None:

@@ -344,8 +344,12 @@ def make_drone(loop: Any, host: Host, msg: Callable[..., Any]) -> Callable[..., 
         for drone in drones:
             drone.on_send(message, system)
 
+    def receive(message: Any) -> None:
+        host.bridge.feed(message)
+        host.bridge.turn()
+
     def make(system: int = 1) -> Drone:
-        drone = Drone(loop, host.bridge.feed, msg, system)
+        drone = Drone(loop, receive, msg, system)
         drones.append(drone)
         host.link.on_send = on_send
         drone.power_on()

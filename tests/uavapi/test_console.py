@@ -70,6 +70,7 @@ def test_vehicles_are_a_line_each(loop: Any, host: Any, api: Api, make_drone: An
     make_drone(7)
     make_drone(2).fly("LOITER")
     host.bridge.feed(msg("heartbeat", system=5, type=mavlink.MAV_TYPE_FIXED_WING, custom_mode=15, armed=True))
+    host.bridge.turn()
     loop.settle()
     assert [line.split(" (")[0] for line in vehicles(api).splitlines()] == [
         "vehicle 2: copter, LOITER, armed, link ok",

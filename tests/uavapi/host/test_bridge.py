@@ -5,13 +5,13 @@ import os
 import subprocess
 import sys
 import threading
-from collections import deque
+import time
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.host.bridge import Bridge
+from mavproxy_uavapi.host.bridge import GIVE_WAY, Bridge
 
 
 class Received(list[Any]):
@@ -53,6 +53,7 @@ def in_loop(bridge: Bridge) -> None:
 def test_fed_messages_arrive_in_order_in_the_asyncio_thread(bridge: Bridge, received: Received) -> None:
     for number in range(100):
         bridge.feed(number)
+    bridge.turn()
     in_loop(bridge)
     assert received == [(number, "uavapi-loop") for number in range(100)]
 
@@ -62,35 +63,70 @@ def test_bad_message_does_not_stop_the_next(bridge: Bridge, received: Received) 
     bridge.loop.set_exception_handler(lambda _, context: defects.append(context["message"]))
     for message in ("one", BadMessage(), "two"):
         bridge.feed(message)
+    bridge.turn()
     in_loop(bridge)
     assert [message for message, _ in received] == ["one", "two"]
     assert defects == ["uavapi: defect on BAD"]
 
 
-def test_feed_never_goes_deaf_when_the_loop_empties_the_inbox_meanwhile(bridge: Bridge, received: Received) -> None:
-    class Preempted(deque[Any]):
-        """An inbox whose `append` the asyncio thread always precedes by taking all there is."""
-
-        def append(self, message: Any) -> None:
-            hold.set()
-            in_loop(bridge)
-            super().append(message)
-
-    hold, held = threading.Event(), threading.Event()
-    bridge._inbox = Preempted()
-
-    def hold_the_loop() -> None:
-        held.set()
-        hold.wait(2.0)
-
-    bridge.call_soon(hold_the_loop)
-    held.wait(2.0)
-    deque.append(bridge._inbox, "first")  # as fed, its delivery under way
-    bridge.call_soon(bridge._deliver)
-    bridge.feed("second")
-    bridge.feed("third")
+def test_nothing_is_handed_over_before_the_main_loops_turn_is_over(bridge: Bridge, received: Received) -> None:
+    bridge.feed("one")
+    bridge.feed("two")
     in_loop(bridge)
-    assert [message for message, _ in received] == ["first", "second", "third"]
+    assert received == []
+    bridge.turn()
+    in_loop(bridge)
+    assert [message for message, _ in received] == ["one", "two"]
+
+
+def test_feed_never_goes_deaf_when_the_loop_is_faster_than_the_main_loop(
+    bridge: Bridge, received: Received, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    call_soon = bridge._thread.call_soon
+
+    def overtaken(call: Any, *args: Any) -> bool:
+        done = call_soon(call, *args)
+        in_loop(bridge)  # the call is over before the main loop hears that it was taken
+        return done
+
+    monkeypatch.setattr(bridge._thread, "call_soon", overtaken)
+    for message in ("one", "two", "three"):
+        bridge.feed(message)
+        bridge.turn()
+    assert [message for message, _ in received] == ["one", "two", "three"]
+
+
+def test_messages_that_are_fed_while_others_are_delivered_come_with_the_next_turn(
+    bridge: Bridge, received: Received
+) -> None:
+    hold = threading.Event()
+    bridge.call_soon(hold.wait, 2.0)
+    for message in ("one", "two"):  # both turns are over before the asyncio side comes to the first
+        bridge.feed(message)
+        bridge.turn()
+    hold.set()
+    in_loop(bridge)
+    bridge.feed("three")
+    bridge.turn()
+    in_loop(bridge)
+    assert [message for message, _ in received] == ["one", "two", "three"]
+
+
+def test_new_work_waits_while_the_main_loop_is_at_messages(bridge: Bridge) -> None:
+    bridge.run(bridge.calm())  # it is at none
+    bridge.feed("one")
+    waiting = asyncio.run_coroutine_threadsafe(bridge.calm(), bridge.loop)
+    in_loop(bridge)
+    assert not waiting.done()
+    bridge.turn()
+    waiting.result(2.0)
+
+
+def test_new_work_does_not_wait_for_ever(bridge: Bridge) -> None:
+    bridge.feed("one")
+    began = time.monotonic()
+    bridge.run(bridge.calm())
+    assert time.monotonic() - began >= GIVE_WAY
 
 
 def test_feed_after_the_end_is_dropped(mpstate: Any, received: Received) -> None:
@@ -99,6 +135,7 @@ def test_feed_after_the_end_is_dropped(mpstate: Any, received: Received) -> None
     bridge.stop()
     for number in range(3):
         bridge.feed(number)
+    bridge.turn()
     assert received == []
     assert len(bridge._inbox) == 0
 
@@ -128,7 +165,7 @@ def test_on_main_that_was_cancelled_before_it_ran_is_never_run(bridge: Bridge, m
 
     bridge.run(cancel_at_once())
     main_loop.turn()
-    bridge.drain()
+    bridge.turn()
     assert ran == []
 
 
@@ -155,6 +192,7 @@ def test_fifty_starts_and_stops_leave_no_thread_and_no_descriptor(mpstate: Any, 
         if number % 2:
             bridge.start()
             bridge.feed("hello")
+            bridge.turn()
         bridge.stop()
     assert threading.active_count() == threads
     assert descriptors() == before
@@ -163,7 +201,7 @@ def test_fifty_starts_and_stops_leave_no_thread_and_no_descriptor(mpstate: Any, 
 FORK = """
 import os, socket, warnings
 warnings.simplefilter("ignore")
-from mavproxy_uavapi.host.bridge import Bridge
+from mavproxy_uavapi.host.bridge import GIVE_WAY, Bridge
 
 def is_open(fd):
     try:

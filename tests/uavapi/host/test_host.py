@@ -19,6 +19,7 @@ def hear(loop: Any, host: Host, msg: Callable[..., Any]) -> Callable[..., None]:
 
     def hear(name: str, **fields: Any) -> None:
         host.bridge.feed(msg(name, **fields))
+        host.bridge.turn()
         loop.settle()
 
     return hear
@@ -162,9 +163,11 @@ def test_only_the_first_members_feed_counts_and_it_moves_on_when_that_leaves(mps
         host.feed("vision", heartbeat)
         host.feed("uavapi", msg("attitude", sequence=1))
         host.feed("vision", msg("attitude", sequence=2))
+        host.idle("uavapi")
         assert received(host) == [2]
         hosts.leave(mpstate, "uavapi")
         host.feed("vision", msg("attitude", sequence=2))
+        host.idle("vision")
         assert received(host) == [3]
     finally:
         hosts.leave(mpstate, "vision")

@@ -22,7 +22,7 @@ def send(loop: Any, mpstate: Any, host: Any) -> Callable[..., None]:
         task = loop.create_task(link.send(message, system))
         loop.settle()
         assert not task.done()
-        host.bridge.drain()
+        host.bridge.turn()
         loop.run(task)
 
     return send

@@ -185,6 +185,7 @@ def test_verb_that_the_type_does_not_have_is_404_not_supported(
     api: Any, loop: Any, host: Any, msg: Any, path: str
 ) -> None:
     host.bridge.feed(msg("heartbeat", type=mavlink.MAV_TYPE_ANTENNA_TRACKER))
+    host.bridge.turn()
     answer = api.get(f"/command/{path}/")
     assert (answer.status, answer.body["code"]) == (404, "not_supported")
     assert answer.body["detail"].endswith(f"does not have /command/{path}")

@@ -116,6 +116,7 @@ def test_slow_reader_delays_nobody(flying: Any, api: Any, loop: Any, host: Any, 
     api.until(lambda: host.listeners)
     for number in range(3 * QUEUED):
         host.bridge.feed(msg("statustext", text=f"{number:050d}"))
+        host.bridge.turn()
     started = loop.time()
     assert api.get("/telemetry/gps").status == 200
     assert loop.time() - started < 0.5

@@ -17,6 +17,7 @@ mavlink = mavutil.mavlink
 def hear(loop: Any, host: Any, msg: Any) -> Any:
     def hear(**fields: Any) -> None:
         host.bridge.feed(msg("heartbeat", **fields))
+        host.bridge.turn()
         loop.settle()
 
     return hear
