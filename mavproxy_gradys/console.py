@@ -73,6 +73,8 @@ def readings_lines(report: Report) -> list[str]:
     for sink in report["sinks"]:
         counts = f"{sink['acknowledged']} acknowledged of {sink['sent']} sent, in {sink['batches']} batches"
         lines += [f"sink {sink['sink']}: {counts}{trips(sink['round_trip_ms'])}", *error_lines(sink)]
+        if sink["put_last"]:
+            lines.append(f"  {sink['put_last']} times one was refused alone: it is sent when there is nothing else")
     for quantity in report["quantities"]:
         why = "; ".join(f"vehicle {system}: {why}" for system, why in quantity["why_not"].items())
         taken = f"  {quantity['quantity']} every {quantity['period_s']:g} s: {quantity['taken']} taken"

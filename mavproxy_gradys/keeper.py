@@ -107,7 +107,7 @@ class Keeper:
 
     async def _write(self) -> None:
         with contextlib.suppress(NotStored):  # `problem` has it; the readings wait for the next time
-            await self._do(lambda spool: None)
+            await self._do(lambda spool: None, trim=True)
         trimmed = self._clock()
         while not self._stopping.is_set():
             with contextlib.suppress(asyncio.TimeoutError):
@@ -230,7 +230,6 @@ class Keeper:
         self._drops.known(spool.dropped)
         try:
             spool.use_sinks(list(self._owed))
-            spool.trim()
         except sqlite3.Error as error:
             spool.close()
             raise NotStored(f"{spool.path}: {error}") from error

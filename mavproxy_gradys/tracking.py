@@ -51,9 +51,12 @@ class Tracking:
 
     async def fly(self, flight: Flight, job: Job) -> str:
         """Fly a track, by `Flight.fly`."""
-        others = [other for other in self._flights if other.running or other.copter is not flight.copter]
-        self._flights = [*others, flight]
+        self._flights = [*self._told(), flight]
         return await flight.fly(job)
+
+    def _told(self) -> list[Flight]:
+        newest = {flight.copter: flight for flight in self._flights}
+        return [flight for flight in self._flights if flight.running or newest[flight.copter] is flight]
 
     async def close(self) -> None:
         """End the recording and the flights: the vehicles keep their last setpoints."""
@@ -66,5 +69,5 @@ class Tracking:
         """What the status says."""
         return {
             "recording": None if self._recorder is None else self._recorder.report(),
-            "flights": [flight.report() for flight in self._flights],
+            "flights": [flight.report() for flight in self._told()],
         }

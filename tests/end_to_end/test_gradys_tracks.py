@@ -43,7 +43,7 @@ def track(rig, tmp_path_factory) -> Path:
 
 def flight(rig: Any) -> dict[str, Any]:
     found = rig.ok(rig.get("/gradys/status"))["info"]["tracks"]["flights"]
-    return found[0] if found else {"state": None}
+    return found[-1] if found else {"state": None}
 
 
 def seen_while(rig: Any, harness: Any, over: Any) -> list[tuple[float, float, float]]:

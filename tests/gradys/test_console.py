@@ -67,6 +67,20 @@ def test_the_spools_troubles_are_said() -> None:
     ]
 
 
+def test_readings_that_are_refused_alone_are_said(gradys: Gradys) -> None:
+    counts = dict.fromkeys(("batches", "sent", "acknowledged"), 3)
+    sink = {
+        "sink": "http://a",
+        **counts,
+        "put_last": 2,
+        "last_error": None,
+        "next_try_s": None,
+        "round_trip_ms": None,
+    }
+    said = console.readings_lines({**gradys.report(), "sinks": [sink]})
+    assert said[-1] == "  2 times one was refused alone: it is sent when there is nothing else"
+
+
 def test_round_trips_are_of_the_last_hundred() -> None:
     trips = RoundTrips()
     assert trips.summary() is None

@@ -253,6 +253,19 @@ def test_a_defect_loses_no_reading_and_leaves_no_file_open(
     Spool(disk.path, 1e9, 1e9).close()  # not locked
 
 
+def test_a_disk_that_is_full_from_the_start_still_gives_what_it_has(
+    loop: Any, disk: Disk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with contextlib.closing(Spool(disk.path, 1e9, 1e9)) as before:
+        before.append([reading(1)])
+    keeper = Keeper(disk.make, loop.time)
+    with failing(monkeypatch, "trim", sqlite3.OperationalError("database or disk is full")):
+        begin(loop, keeper)
+        assert "full" in keeper.problem
+        assert taken(loop, keeper) == [1]
+    loop.run(keeper.stop())
+
+
 def test_what_the_disk_does_not_take_is_handed_back_at_the_end(loop: Any, disk: Disk) -> None:
     keeper = Keeper(disk.make, loop.time)
     begin(loop, keeper)
@@ -282,17 +295,16 @@ def test_the_log_tells_of_a_full_disk_once_and_of_drops_once_a_minute(
     loop: Any, keeper: Keeper, disk: Disk, monkeypatch: pytest.MonkeyPatch, caplog: Any
 ) -> None:
     monkeypatch.setattr(keepers, "HELD", 10)
-    disk.fill()
-    for value in range(160):
-        keeper.put(reading(value))
-        loop.pass_time(1)
-    disk.make_room()
+    with failing(monkeypatch, "append", sqlite3.OperationalError("database or disk is full")):
+        for value in range(100):
+            keeper.put(reading(value))
+            loop.pass_time(1)
     loop.pass_time(1)
-    said = [record.message for record in caplog.records]
-    assert said[0] == f"the spool fails: {disk.path}: database or disk is full"
-    assert said[-1] == "the spool works again"
-    assert said[1] == "readings were dropped: 1 by disk"
-    assert len(said) == 4
+    failed, first, second, works = (record.message for record in caplog.records)
+    assert failed == f"the spool fails: {disk.path}: database or disk is full"
+    assert first == "readings were dropped: 1 by disk"
+    assert second.endswith(" by disk")
+    assert works == "the spool works again"
 
 
 def test_the_log_names_the_file_that_was_set_aside(loop: Any, disk: Disk, caplog: Any) -> None:

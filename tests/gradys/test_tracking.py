@@ -48,10 +48,11 @@ def test_the_flights_of_all_vehicles_are_told_and_end_with_the_module(loop: Any,
 
 def test_of_a_vehicle_the_newest_flight_is_told(loop: Any, host: Any, fleet: Any) -> None:
     tracks = Tracking(host)
-    for name in "abc":
-        job = begin(loop, host, tracks, 11, name)
-        job.abort(Aborted("enough"))
-    assert [flight["job"] for flight in tracks.report()["flights"]] == [job.id]
+    jobs = [begin(loop, host, tracks, 11, name) for name in "abc"]
+    assert [job.running for job in jobs] == [False, False, True]
+    assert [flight["job"] for flight in tracks.report()["flights"]] == [jobs[-1].id]
+    jobs[-1].abort(Aborted("enough"))
+    assert [flight["state"] for flight in tracks.report()["flights"]] == ["failed"]
 
 
 def test_of_two_recordings_that_begin_at_once_one_is_refused(
