@@ -41,7 +41,7 @@ def make_app(service: Service) -> web.Application:
         for method in route.methods:
             for path in (route.path, route.path + "/"):
                 app.router.add_route(method, path, handler)
-    app.router.add_route("*", "/{path:.*}", guarded(_extension))
+    app.router.add_route("*", r"/{path:[\s\S]*}", guarded(_extension))
     return app
 
 
