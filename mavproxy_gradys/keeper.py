@@ -91,7 +91,10 @@ class Keeper:
             self._count_drop("value")
             return
         self._waiting.append(reading)
-        if len(self._waiting) > HELD:
+        self._drop_excess()
+
+    def _drop_excess(self) -> None:
+        while len(self._waiting) > HELD:
             self._waiting.popleft()
             self._count_drop("disk")
 
@@ -128,6 +131,7 @@ class Keeper:
             await self._do(lambda spool: spool.append(readings))
         except BaseException:
             self._waiting.extendleft(reversed(readings))
+            self._drop_excess()  # others may have come meanwhile
             raise
         finally:
             self._in_hand = 0
