@@ -63,9 +63,10 @@ def readings_lines(report: Report) -> list[str]:
     """The spool, the sinks, the quantities."""
     if not report["sinks"] and report["spool"] is None:
         return ["readings: no sink is set; `gradys set sink http://HOST/readings` or mqtt://HOST/TOPIC"]
-    oldest = report["oldest_unsent_s"]
+    oldest, unsent = report["oldest_unsent_s"], report["spooled"]
     lines = [
-        f"readings: {report['spooled']} unsent" + (f", the oldest {oldest:.1f} s old" if oldest is not None else "")
+        f"readings: {'?' if unsent is None else unsent} unsent"
+        + (f", the oldest {oldest:.1f} s old" if oldest is not None else "")
     ]
     spool = report["spool"]
     if spool is not None:

@@ -31,7 +31,7 @@ class Keeper:
     """Keeps readings; all methods belong to the asyncio thread, all work on the disk is done in another.
 
     Attributes:
-        count: readings in the spool.
+        count: readings in the spool; None until it was opened.
         problem: why the spool takes nothing just now; empty when it does.
         set_aside: corrupt files that were replaced.
         dropped: readings that were dropped, by cause: `size`, `age`, `disk`, `value` (none that can be told).
@@ -55,7 +55,7 @@ class Keeper:
         self._outage = Outage(log, "the spool fails", "the spool works again")
         self._drops = Drops(log, clock)
         self._oldest_since: float | None = None
-        self.count = 0
+        self.count: int | None = None
         self.problem = ""
         self.set_aside: list[Path] = []
         self.dropped: dict[str, int] = {}

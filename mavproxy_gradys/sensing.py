@@ -138,7 +138,7 @@ class Sensing:
         keeper = self._keeper
         oldest = None if keeper is None else keeper.oldest_age
         return {
-            "spooled": len(self._left) if keeper is None else keeper.count + keeper.waiting,
+            "spooled": len(self._left) if keeper is None else spooled(keeper),
             "oldest_unsent_s": None if oldest is None else round(oldest, 1),
             "spool": None if keeper is None else self._spool_report(keeper),
             "sinks": [sender.report() for sender in self._senders.values()],
@@ -153,6 +153,11 @@ class Sensing:
             "dropped": dict(keeper.dropped),
             "set_aside": [str(file) for file in keeper.set_aside],
         }
+
+
+def spooled(keeper: Keeper) -> int | None:
+    """How many readings are kept; None while nobody knows."""
+    return None if keeper.count is None else keeper.count + keeper.waiting
 
 
 def quantity_report(sampler: Sampler) -> dict[str, Any]:
