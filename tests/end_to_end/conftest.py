@@ -278,16 +278,21 @@ def headless() -> dict[str, str]:
     return env | dict.fromkeys(("DISPLAY", "TMUX", "STY", "SITL_RITW_TERMINAL"), "")
 
 
+def sim_vehicle(directory: Path, instance: int, *arguments: str, speedup: int = SPEEDUP) -> list[str]:
+    """ArduPilot's own launcher with its copter."""
+    script = Path(os.environ["ARDUPILOT_HOME"], "Tools", "autotest", "sim_vehicle.py")
+    command = [sys.executable, str(script), "-v", "ArduCopter", "-N", "-w", f"-I{instance}"]
+    return [*command, "--speedup", str(speedup), "-l", HOME, "--use-dir", str(directory), *arguments]
+
+
 def ardupilot(directory: Path, *, speedup: int = SPEEDUP, **settings: Any) -> Rig:
     """A rig with ArduPilot's own copter, started as its users do: our module in sim_vehicle.py's MAVProxy."""
     rig = Rig(directory, free_port())
     config = directory / "uavapi.ini"
     lines = [f"{name} = {value}\n" for name, value in {"port": rig.port, **settings}.items()]
     config.write_text("[api]\n" + "".join(lines), encoding="utf-8")
-    script = Path(os.environ["ARDUPILOT_HOME"], "Tools", "autotest", "sim_vehicle.py")
-    command = [sys.executable, str(script), "-v", "ArduCopter", "-N", "-w", f"-I{free_instance()}"]
-    command += ["--speedup", str(speedup), "-l", HOME, "--use-dir", str(directory)]
-    command += ["-m", f'--load-module=uavapi:{{"config":"{config}"}}']
+    module = f'--load-module=uavapi:{{"config":"{config}"}}'
+    command = sim_vehicle(directory, free_instance(), "-m", module, speedup=speedup)
     try:
         rig.mavproxy = rig.start("sim_vehicle", command, headless())
         rig.wait_until_up(120)
@@ -318,9 +323,7 @@ def embedded_rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
 def ardupilot_with_faults(directory: Path, **settings: Any) -> Rig:
     """A rig with ArduPilot's own copter behind a wire that records and misbehaves."""
     rig, instance = Rig(directory, free_port()), free_instance()
-    script = Path(os.environ["ARDUPILOT_HOME"], "Tools", "autotest", "sim_vehicle.py")
-    command = [sys.executable, str(script), "-v", "ArduCopter", "-N", "-w", f"-I{instance}", "--no-mavproxy"]
-    command += ["--speedup", str(SPEEDUP), "-l", HOME, "--use-dir", str(directory)]
+    command = sim_vehicle(directory, instance, "--no-mavproxy")
     relay = _load("relay")
     try:
         rig.start("sim_vehicle", command, headless())
