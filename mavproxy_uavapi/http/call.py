@@ -98,7 +98,9 @@ class Call:
         vehicle: Vehicle,
         verb: Callable[[Job], Awaitable[None]],
         result: str | Callable[[], str],
+        *,
         outlives_client: bool = False,
+        urgent: bool = False,
         asked: Request | None = None,
     ) -> Answer:
         """Run a flight verb as a job and await it; or answer 202 at once, where the client wants it so.
@@ -107,7 +109,8 @@ class Call:
             vehicle: whose seat the job takes.
             verb: what to do.
             result: the text of its success, or what makes it afterwards.
-            outlives_client: whether it goes on when the client hangs up; then no limit of jobs refuses it.
+            outlives_client: whether it goes on when the client hangs up.
+            urgent: whether it ends a flight or a movement, so that no limit of jobs refuses it.
             asked: what tells one request from another, where the parameters do not.
         """
         params = self.remembered = asked or self.remembered
@@ -117,7 +120,7 @@ class Call:
             return result if isinstance(result, str) else result()
 
         jobs = self.service.host.jobs
-        if len(jobs.running()) >= self.service.settings.max_jobs and not outlives_client:
+        if len(jobs.running()) >= self.service.settings.max_jobs and not urgent:
             raise TooManyRequests(f"{len(jobs.running())} verbs are in flight already (max_jobs)")
         job = jobs.begin(
             vehicle.seat,

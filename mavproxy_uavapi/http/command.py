@@ -15,7 +15,7 @@ async def arm(call: Call) -> Answer:
 async def disarm(call: Call) -> Answer:
     """Disarm; refused in flight unless forced."""
     vehicle, p = call.vehicle, call.params(Disarm)
-    return await call.fly(vehicle, lambda job: vehicle.disarm(job, p.force), "Disarmed vehicle")
+    return await call.fly(vehicle, lambda job: vehicle.disarm(job, p.force), "Disarmed vehicle", urgent=True)
 
 
 async def takeoff(call: Call) -> Answer:
@@ -29,21 +29,21 @@ async def land(call: Call) -> Answer:
     """Land here and disarm."""
     copter, p = call.copter, call.params(Blocking)
     result = "Landed at home successfully"
-    return await call.fly(copter, lambda job: copter.land(job, p.timeout), result, outlives_client=True)
+    return await call.fly(copter, lambda job: copter.land(job, p.timeout), result, outlives_client=True, urgent=True)
 
 
 async def rtl(call: Call) -> Answer:
     """Return to launch, land there and disarm."""
     copter, p = call.copter, call.params(Blocking)
     result = "Landed at home successfully"
-    return await call.fly(copter, lambda job: copter.rtl(job, p.timeout), result, outlives_client=True)
+    return await call.fly(copter, lambda job: copter.rtl(job, p.timeout), result, outlives_client=True, urgent=True)
 
 
 async def brake(call: Call) -> Answer:
     """Stop at once, in BRAKE mode."""
     copter = call.copter
     result = "Copter braking. Use /command/guided to enable movement commands again"
-    return await call.fly(copter, lambda job: copter.set_mode(job, "BRAKE"), result)
+    return await call.fly(copter, lambda job: copter.set_mode(job, "BRAKE"), result, urgent=True)
 
 
 async def guided(call: Call) -> Answer:

@@ -133,7 +133,7 @@ async def set_yaw_rate(call: Call) -> Answer:
 async def stop(call: Call) -> Answer:
     """Pause the guided movement."""
     copter = call.copter
-    return await call.fly(copter, lambda _: copter.pause(), "Copter has stopped", outlives_client=True)
+    return await call.fly(copter, lambda _: copter.pause(), "Copter has stopped", outlives_client=True, urgent=True)
 
 
 async def resume(call: Call) -> Answer:

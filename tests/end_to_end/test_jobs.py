@@ -209,6 +209,7 @@ def test_reboot_in_flight_ends_the_verb_and_resets_what_is_known(faulty_rig, har
 
 def test_the_trail_tells_who_asked_for_what_and_what_was_sent(faulty_rig, harness):
     rig = faulty_rig
+    rig.on_the_ground()
     rig.ok(rig.get("/command/set_home"))
     rig.get("/command/takeoff?alt=3")
     location = rig.get("/command/guided?wait=false").headers["Location"]

@@ -36,10 +36,16 @@ def test_command_and_telemetry_follow_mavproxys_current_vehicle(
     assert second.mode == "GUIDED"
 
 
-def test_no_limit_of_jobs_keeps_a_vehicle_from_landing(flying: Any, service: Any, api: Any, loop: Any) -> None:
+URGENT = ["/command/land", "/command/rtl", "/command/brake", "/command/disarm?force=true", "/movement/stop"]
+
+
+@pytest.mark.parametrize("path", URGENT)
+def test_no_limit_of_jobs_keeps_a_vehicle_from_being_stopped(
+    flying: Any, service: Any, api: Any, loop: Any, path: str
+) -> None:
     service.settings = ModuleSettings({"max_jobs": 1}, environ={}).snapshot()
     waiting = api.begin("POST", "/movement/go_to_ned_wait", json={"x": 500, "y": 0, "z": -20})
     api.until(service.host.jobs.running)
     assert api.get("/command/set_ground_speed?new_v=5").body["code"] == "too_many_requests"
-    assert loop.run(api.ask("GET", "/command/land?wait=false")).status == 202
-    assert loop.run(waiting).body["code"] == "superseded"
+    assert loop.run(api.ask("GET", path, headers={"Prefer": "respond-async"})).status == 202
+    waiting.cancel()
