@@ -18,6 +18,8 @@ BEYOND = 0.3  # s that the newest telemetry is carried on by its rates
 GAP = 0.6  # s between two messages within which nobody knows what the vehicle did
 CLOCK_WINDOW = 1.5  # s of the faster clock over which the least delayed message sets the clocks' offset
 REBOOT = 3.0  # s that a clock may step back without a reboot
+AFTER = 0.05  # s of the vehicle's clock, at least, that an unstamped message may be younger than a stamped one
+STOPPED = 0.5  # s of ours without a stamped message until it tells nothing
 
 
 class VehicleClock:
@@ -52,6 +54,27 @@ class VehicleClock:
         if self._best is None:
             return math.inf
         return self._best[0] + (vehicle - self._best[1]) / max(self.ratio, 0.01)
+
+
+class Unstamped:
+    """When a message without a time was sent, by a stamped one that comes regularly.
+
+    A busy machine hears many at once: what was heard before a message tells when it was sent, while it comes at all.
+    """
+
+    def __init__(self) -> None:
+        self._vehicle = self._gap = 0.0
+        self._host = -math.inf
+
+    def hear(self, host: float, vehicle: float) -> None:
+        """A message stamped `vehicle` arrived at `host`."""
+        self._gap, self._vehicle, self._host = vehicle - self._vehicle, vehicle, host
+
+    def sent(self, host: float, clock: VehicleClock) -> float:
+        """Host time at which a message was sent that arrived at `host`."""
+        if host - self._host > STOPPED:
+            return host
+        return min(host, clock.host(self._vehicle + max(1.25 * self._gap, AFTER)))
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from mavproxy_vision.detector import Detector, Options
 from mavproxy_vision.errors import NoCamera
 from mavproxy_vision.fixes import Fixer, Wanted
 from mavproxy_vision.geometry import Attitude, vector
-from mavproxy_vision.history import History, VehicleClock
+from mavproxy_vision.history import History, Unstamped, VehicleClock
 from mavproxy_vision.rates import TRUTH, Rates
 from mavproxy_vision.rendering import Renderer
 from mavproxy_vision.settings import Settings
@@ -32,7 +32,6 @@ from mavproxy_vision.worker import Health, Worker
 
 FRESH = 1.0  # s; older sightings are not shown as what is in view
 SOON = 0.06  # s of the vehicle's clock that telemetry is carried on to a frame; one farther ahead waits for it
-AFTER = 0.05  # s of the vehicle's clock, at least, that a SIM_STATE may be younger than the ATTITUDE before it
 
 
 class Vision:
@@ -55,6 +54,7 @@ class Vision:
         self.host, self.settings = host, settings
         self.history, self.clock, self.truth = History(), VehicleClock(), Truth()
         self.rates = Rates(host.clock)
+        self._unstamped = Unstamped()  # SIM_STATE has no time of its own; ATTITUDE tells it
         self.worker: Worker | None = None
         self.seen: Seen | None = None
         self.image: Image | None = None
@@ -65,7 +65,6 @@ class Vision:
         self._unplaced: deque[Seen] = deque(maxlen=50)  # newer than the telemetry that tells where they were taken
         self._system = 0
         self._home_down = 0.0
-        self._attitude_at = self._attitude_gap = 0.0  # the newest one's time, and from the one before (s, vehicle's)
         self._watching: asyncio.Task[None] | None = None
         self._truth_needed = contextlib.ExitStack()
         self._extra_sizes: dict[int, float] = {}
@@ -171,7 +170,7 @@ class Vision:
             return
         self.clock.hear(now, at, state.time_ratio.ratio)
         if name == "ATTITUDE":
-            self._attitude_gap, self._attitude_at = at - self._attitude_at, at
+            self._unstamped.hear(now, at)
             attitude = Attitude(message.roll, message.pitch, message.yaw)
             self.history.add_attitude(at, attitude, (message.rollspeed, message.pitchspeed, message.yawspeed))
         else:
@@ -184,14 +183,13 @@ class Vision:
         if system != self._system:  # another vehicle: what was known is of no use
             self._system = system
             self.history, self.clock, self.truth = History(), VehicleClock(), Truth()
+            self._unstamped = Unstamped()
         return state.system == system
 
     def _hear_truth(self, state: VehicleState, message: Any, now: float) -> None:
         lat, lon = message.lat_int / 1e7, message.lon_int / 1e7
         attitude = Attitude(message.roll, message.pitch, message.yaw)
-        # SIM_STATE has no time of its own. A busy machine hears many at once; what came before them tells when.
-        gap = max(1.25 * self._attitude_gap, AFTER)
-        at = min(now, self.clock.host(self._attitude_at + gap))
+        at = self._unstamped.sent(now, self.clock)
         pose = Pose(at, lat, lon, message.alt, (message.vn, message.ve, message.vd), attitude)
         height = (state.field("GLOBAL_POSITION_INT", "relative_alt") or 0) / 1000.0
         self.truth.add(pose, state.armed, height)

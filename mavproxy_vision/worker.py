@@ -53,6 +53,7 @@ class Watch:
     def __init__(self, live: bool, now: float) -> None:
         self._live = live
         self._mark: int | None = None
+        self._begun = False
         self.fresh_at = now  # the last new frame
         self.any_at = now  # the last frame of any kind
 
@@ -62,13 +63,13 @@ class Watch:
         mark = zlib.crc32(frame.image[::4, ::4].tobytes())
         if self._live and mark == self._mark:
             return False
-        self._mark, self.fresh_at = mark, frame.received_at
+        self._mark, self.fresh_at, self._begun = mark, frame.received_at, True
         return True
 
     def verdict(self, now: float) -> str:
-        """`ok`, `frozen` or `no frames`."""
+        """`ok`, `frozen` or `no frames`; `starting` for a moment before the first one."""
         if now - self.fresh_at <= SILENT_AFTER:
-            return "ok"
+            return "ok" if self._begun else "starting"
         return "frozen" if now - self.any_at <= SILENT_AFTER else "no frames"
 
 
@@ -90,8 +91,9 @@ class Worker:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.source, self.detector = source, detector
-        # Each of these has one thread that writes it.
         self._state, self._error = "starting", ""
+        self._open = False  # then the watch knows the state
+        # Each of these has one thread that writes it.
         self._repeated = self._skipped = self._reconnects = self._frames = 0
         self._rate = 0.0
         self._tell, self._clock = tell, clock
@@ -113,12 +115,15 @@ class Worker:
     def stop(self) -> None:
         """End both; a driver that hangs in a read is left behind. Any other thread."""
         atexit.unregister(self.stop)
-        self._stop.set()
-        with self._changed:
-            self._changed.notify_all()
+        self._end()
         for thread in self._threads:
             thread.join(JOIN)
         self._state = "closed"
+
+    def _end(self) -> None:
+        self._stop.set()
+        with self._changed:
+            self._changed.notify_all()
 
     @property
     def health(self) -> Health:
@@ -129,15 +134,14 @@ class Worker:
 
     def verdict(self) -> str:
         """How the camera does just now: `ok`, `frozen`, `no frames`, `starting` or `closed`."""
-        if self._state in ("starting", "closed") or not self._threads[0].is_alive():
-            return self._state
-        return self._watch.verdict(self._clock())
+        return self._watch.verdict(self._clock()) if self._open and not self._stop.is_set() else self._state
 
     def _guarded(self, body: Callable[[], None]) -> None:
         try:
             body()
         except Exception as error:  # a defect of ours; the thread ends, and the status says so
-            self._error = f"a defect of this program: {error!r}"
+            self._error, self._state = f"a defect of this program: {error!r}", "closed"
+            self._end()
             log.exception("vision: the camera's thread ended")
 
     # -- the camera's thread -------------------------------------------------------------------------------
@@ -147,7 +151,7 @@ class Worker:
             try:
                 self.source.open()
             except UavApiError as error:
-                self._error, self._state = str(error), "no frames"
+                self._error, self._state, self._open = str(error), "no frames", False
                 self._stop.wait(RECONNECT_PAUSE)
                 continue
             with contextlib.closing(self.source):
@@ -160,6 +164,7 @@ class Worker:
         opened = self._clock()
         if not self._reconnects:  # later on it is not well until it gives a frame
             self._watch.any_at = self._watch.fresh_at = opened
+        self._open = True
         while not self._stop.is_set():
             frame = self.source.read()
             if frame is not None and self._watch.is_new(frame):
@@ -167,9 +172,8 @@ class Worker:
             elif frame is not None:
                 self._repeated += 1
             now = self._clock()
-            self._state = state = self._watch.verdict(now)
             if now - max(self._watch.fresh_at, opened) > RECONNECT_AFTER:
-                self._error = f"{state} for {now - self._watch.fresh_at:.1f} s"
+                self._error = f"{self._watch.verdict(now)} for {now - self._watch.fresh_at:.1f} s"
                 return
 
     def _keep(self, frame: Frame) -> None:

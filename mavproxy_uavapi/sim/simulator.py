@@ -32,6 +32,7 @@ from .mission import Mission
 from .mission_protocol import MissionProtocol
 from .options import Options
 from .parameters import Parameter, Parameters
+from .streams import RATE_PARAMETERS
 from .telemetry import Telemetry
 
 STEP = 0.01
@@ -238,7 +239,8 @@ class Simulator:
 
     def _request_stream(self, link: Link, message: Any) -> None:
         rate = message.req_message_rate if message.start_stop == 1 else 0
-        link.streams.request_group(message.req_stream_id, rate, self.copter.now)
+        for group in link.streams.request_group(message.req_stream_id, rate, self.copter.now):
+            self.parameters.set(RATE_PARAMETERS[group], rate)  # as ArduPilot: it is the stream's default from now on
 
     def _parameter_list(self, link: Link, message: Any) -> None:
         del message

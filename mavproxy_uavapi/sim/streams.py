@@ -76,12 +76,17 @@ class Streams:
             self._due[name] = now
         self._next = min(self._due.values(), default=math.inf)
 
-    def request_group(self, stream: int, rate: float, now: float) -> None:
-        """REQUEST_DATA_STREAM: rate in Hz for all messages of a stream, 0 stops them; stream 0 is all."""
-        streams = GROUPS if stream == mavlink.MAV_DATA_STREAM_ALL else {stream: GROUPS.get(stream, ())}
-        for names in streams.values():
-            for name in names:
+    def request_group(self, stream: int, rate: float, now: float) -> list[int]:
+        """REQUEST_DATA_STREAM: rate in Hz for all messages of a stream, 0 stops them; stream 0 is all.
+
+        Returns:
+            The streams that now have this rate.
+        """
+        groups = [group for group in GROUPS if stream in (group, mavlink.MAV_DATA_STREAM_ALL)]
+        for group in groups:
+            for name in GROUPS[group]:
                 self.set(name, 1 / rate if rate > 0 else None, now)
+        return groups
 
     def due(self, now: float) -> list[str]:
         """Messages to send now. A rate beyond the caller's own is limited to one message for each call."""

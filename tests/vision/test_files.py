@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import threading
 from types import SimpleNamespace
 
 import cv2
@@ -126,13 +125,32 @@ def test_a_camera_that_opens_again_but_gives_nothing_is_not_well(tmp_path):
             verdicts.append(worker.verdict())
 
     worker = Worker(Dead(0.0), SimpleNamespace(detect=lambda _: ()), lambda *_: None, clock)
-    worker._threads[0] = threading.current_thread()  # it lives
     worker._read_until_it_fails()
     worker._reconnects += 1
-    assert verdicts[-1] == "no frames"
+    assert (verdicts[0], verdicts[-1]) == ("starting", "no frames")  # but not for a moment "ok"
+    assert "ok" not in verdicts
     verdicts.clear()
     worker._read_until_it_fails()
     assert set(verdicts) == {"no frames"}
+
+
+@pytest.mark.parametrize("broken", ["camera", "detector"])
+def test_a_defect_in_either_thread_is_no_camera(broken):
+    def fail(*_):
+        raise RuntimeError("broken")
+
+    source = Posted(0.0)
+    if broken == "camera":
+        source.read = fail
+    worker = Worker(source, SimpleNamespace(detect=fail), lambda *_: None)
+    worker.start()
+    source.post(picture(7))
+    for thread in worker._threads:
+        thread.join(10)
+    assert not any(thread.is_alive() for thread in worker._threads)
+    assert worker.health.state == "closed"
+    assert "RuntimeError('broken')" in worker.health.error
+    worker.stop()
 
 
 def test_calibration_from_rendered_chessboards(tmp_path):

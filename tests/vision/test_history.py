@@ -7,7 +7,7 @@ import math
 import pytest
 
 from mavproxy_vision.geometry import Attitude, vector
-from mavproxy_vision.history import History, VehicleClock
+from mavproxy_vision.history import History, Unstamped, VehicleClock
 
 
 def test_the_least_delayed_message_sets_the_offset():
@@ -38,6 +38,26 @@ def test_the_hosts_time_is_the_vehicles_the_other_way_round():
     for step in range(50):
         clock.hear(100 + 0.02 * step, 5 + 0.1 * step, 5.0)
     assert clock.host(clock.vehicle(101.3)) == pytest.approx(101.3)
+
+
+def test_a_message_without_a_time_is_dated_by_those_heard_before_it():
+    clock, dated = VehicleClock(), Unstamped()
+    for step in range(20):
+        clock.hear(100 + 0.1 * step, 5 + 0.1 * step, 1.0)
+        dated.hear(100 + 0.1 * step, 5 + 0.1 * step)
+    assert dated.sent(101.95, clock) == pytest.approx(101.95)
+    for step in range(20, 30):  # a busy machine: a second's worth arrives at once
+        clock.hear(103, 5 + 0.1 * step, 1.0)
+        dated.hear(103, 5 + 0.1 * step)
+        assert dated.sent(103, clock) == pytest.approx(min(100 + 0.1 * step + 0.125, 103))
+
+
+def test_nothing_is_dated_by_what_comes_no_more():
+    clock, dated = VehicleClock(), Unstamped()
+    assert dated.sent(90.0, clock) == 90.0
+    clock.hear(100, 5, 1.0)
+    dated.hear(100, 5)
+    assert dated.sent(102.0, clock) == 102.0
 
 
 def test_what_happened_in_a_silence_is_not_known():

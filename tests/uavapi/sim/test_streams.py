@@ -76,6 +76,17 @@ def test_intervals_can_be_read_stopped_and_set_to_the_default(ground):
     assert ground.command(SET_INTERVAL, ATTITUDE, 1000) == mavlink.MAV_RESULT_DENIED
 
 
+def test_the_default_is_the_rate_that_a_stream_was_asked_for_last(ground):
+    stream(ground, mavlink.MAV_DATA_STREAM_ALL, 4)
+    ground.command(SET_INTERVAL, ATTITUDE, 20000)
+    ground.command(SET_INTERVAL, ATTITUDE, 0)
+    ground.run(1.0)
+    assert count(ground.run(5.0), "ATTITUDE") == pytest.approx(20, abs=1)
+    stream(ground, 99, 10)
+    ground.command(SET_INTERVAL, ATTITUDE, 0)
+    assert count(ground.run(5.0), "ATTITUDE") == pytest.approx(20, abs=1)
+
+
 def test_a_late_caller_is_not_flooded():
     streams = Streams()
     streams.set("ATTITUDE", 0.1, 0.0)
