@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mavproxy_vision.corners import refine
-from mavproxy_vision.detector import Detector, Options, locate
+from mavproxy_vision.detector import Detector, Options, lit, locate
 from mavproxy_vision.dictionaries import family, marker_image
 from mavproxy_vision.geometry import Attitude, Mount, vector
 from mavproxy_vision.model import CameraModel
@@ -95,6 +95,30 @@ def test_the_far_setting_sees_farther():
     images = [frame(7.0, tags=tags, seed=seed, attitude=Attitude(yaw=0.3 * seed)) for seed in range(8)]
     far = Detector(MODEL, Options(("25h9",), {0: SIZE}, far=True))
     assert sum(bool(far.detect(image)) for image in images) >= 7
+
+
+@pytest.mark.parametrize("apart", [0.22, 0.5])
+def test_each_tag_is_told_once_however_often_it_is_looked_for(apart):
+    tags = (PlacedTag("36h11", 0, SIZE, 0, 0), PlacedTag("36h11", 0, SIZE, 0, apart))
+    for height in (1.5, 4.0):
+        seen = Detector(MODEL, Options(sizes={0: SIZE}, far=True)).detect(frame(height, tags=tags))
+        assert sorted(one.position[0] for one in seen) == pytest.approx([0, apart], abs=0.02)
+
+
+@pytest.mark.parametrize("exposure", [0.3, 0.15, 0.1])
+@pytest.mark.parametrize("far", [False, True])
+def test_a_dim_picture_is_seen_through(exposure, far):
+    detector = Detector(MODEL, Options(sizes={0: SIZE}, far=far))
+    for height in (0.8, 2.0, 4.0):
+        (seen,) = detector.detect(frame(height, look=Look(exposure=exposure, noise=1.5)))
+        assert seen.distance == pytest.approx(height, rel=0.02)
+
+
+def test_a_picture_that_is_bright_enough_is_left_as_it_is():
+    image = frame()
+    assert lit(image) is image
+    dark = np.zeros((480, 640), np.uint8)
+    assert not lit(dark).any()
 
 
 def test_a_picture_that_is_read_wrong_tells_how_many_bits():
