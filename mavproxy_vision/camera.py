@@ -1,12 +1,12 @@
-"""Where frames come from: cameras, streams, files, folders, and frames that are posted.
+"""Where frames come from: what every source gives, folders of images, and frames that are posted.
 
+Cameras, streams and video files are in `capture`, GStreamer in `pipeline`, the rendered camera in `simulated`.
 A source is opened, read and closed by one thread, the worker's.
 """
 
 from __future__ import annotations
 
 import queue
-import re
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,7 +22,6 @@ from mavproxy_vision.errors import BadImage, NoCamera
 Image = NDArray[np.uint8]
 
 IMAGES = {".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".pgm"}
-BEHIND = 1.0  # s; a driver's time stamp that is farther from now is on another clock
 POSTED_KEPT = 2  # posted frames that wait
 
 
@@ -79,82 +78,6 @@ def decode(data: bytes) -> Image:
     return np.asarray(image, np.uint8)
 
 
-class Capture:
-    """A camera, a stream or a video file, by OpenCV.
-
-    Args:
-        spec: `camera:0`, `/dev/video0`, an URL, a file, or a GStreamer pipeline (`… ! appsink`).
-        latency: s from light to our having the frame, taken off the time of arrival.
-        size: width and height to ask a camera for, px.
-        rate: frames per second to ask a camera for, and at which a file is played.
-        clock: monotonic seconds.
-    """
-
-    live = True
-
-    def __init__(
-        self,
-        spec: str,
-        latency: float,
-        size: tuple[int, int],
-        rate: float,
-        clock: Callable[[], float] = time.monotonic,
-    ) -> None:
-        self._spec, self._latency, self._size, self._rate, self._clock = spec, latency, size, rate, clock
-        self._capture: Any = None
-        self._is_file = Path(spec).is_file()
-        self._next = 0.0
-
-    def open(self) -> None:
-        """Open it and ask for size and rate."""
-        what, backend = self._where()
-        self._capture = cv2.VideoCapture(what, backend)
-        if not self._capture.isOpened():
-            self.close()
-            raise NoCamera(f"cannot open {self._spec!r}")
-        if not self._is_file:
-            self._capture.set(cv2.CAP_PROP_FRAME_WIDTH, self._size[0])
-            self._capture.set(cv2.CAP_PROP_FRAME_HEIGHT, self._size[1])
-            self._capture.set(cv2.CAP_PROP_FPS, self._rate)
-            self._capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
-
-    def _where(self) -> tuple[Any, int]:
-        number = re.fullmatch(r"(?:camera:|/dev/video)(\d+)", self._spec)
-        if number:
-            return int(number[1]), cv2.CAP_V4L2
-        return self._spec, cv2.CAP_GSTREAMER if "!" in self._spec else cv2.CAP_ANY
-
-    def read(self) -> Frame | None:
-        """The next frame; a file plays at its rate, and ends."""
-        if self._is_file:
-            self._wait_for_its_time()
-        good, image = self._capture.read()
-        now = self._clock()
-        if not good:
-            time.sleep(0.02)  # a dead camera answers at once: do not spin
-            return None
-        return Frame(grey(image), self._captured_at(now), now)
-
-    def _wait_for_its_time(self) -> None:
-        now = self._clock()
-        self._next = max(self._next + 1.0 / self._rate, now - 1.0)
-        if self._next > now:
-            time.sleep(self._next - now)
-
-    def _captured_at(self, now: float) -> float:
-        """V4L2 stamps its frames with the monotonic clock; else arrival less the camera's latency."""
-        stamped: float = self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
-        if not self._is_file and 0.0 <= now - stamped < BEHIND:
-            return stamped
-        return now - self._latency
-
-    def close(self) -> None:
-        """Release it."""
-        if self._capture is not None:
-            self._capture.release()
-            self._capture = None
-
-
 class Folder:
     """The images of a folder, in the order of their names, over and over."""
 
@@ -168,8 +91,15 @@ class Folder:
         self._index = 0
 
     def open(self) -> None:
-        """Look what there is."""
-        self._files = sorted(file for file in self._folder.iterdir() if file.suffix.lower() in IMAGES)
+        """Look what there is.
+
+        Raises:
+            NoCamera: no images.
+        """
+        try:
+            self._files = sorted(file for file in self._folder.iterdir() if file.suffix.lower() in IMAGES)
+        except OSError as error:
+            raise NoCamera(f"{self._folder}: {error.strerror}") from error
         if not self._files:
             raise NoCamera(f"no images in {self._folder}")
 

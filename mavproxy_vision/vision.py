@@ -14,12 +14,14 @@ import cv2
 from mavproxy_uavapi.host.host import Host
 from mavproxy_uavapi.host.state import VehicleState
 from mavproxy_uavapi.vehicle.vehicle import Vehicle
-from mavproxy_vision.camera import Capture, Folder, Image, Posted, Source
+from mavproxy_vision.camera import Folder, Image, Posted, Source
+from mavproxy_vision.capture import Capture
 from mavproxy_vision.detector import Detector, Options
 from mavproxy_vision.errors import NoCamera
 from mavproxy_vision.fixes import Fixer, Wanted
 from mavproxy_vision.geometry import Attitude, vector
 from mavproxy_vision.history import History, Unstamped, VehicleClock
+from mavproxy_vision.pipeline import Pipeline
 from mavproxy_vision.rates import TRUTH, Rates
 from mavproxy_vision.rendering import Renderer
 from mavproxy_vision.settings import Settings
@@ -283,8 +285,10 @@ def make_source(settings: Settings, where: Any, clock: Callable[[], float]) -> S
     folder = Path(spec).expanduser()
     if folder.is_dir():
         return Folder(folder, latency, settings.fps, clock)
-    name = str(folder) if folder.is_file() else spec
-    return Capture(name, latency, (settings.width, settings.height), settings.fps, clock)
+    size = (settings.width, settings.height)
+    if "!" in spec and not folder.is_file():
+        return Pipeline(spec, latency, size, clock)
+    return Capture(str(folder) if folder.is_file() else spec, latency, size, settings.fps, clock)
 
 
 def in_view(seen: Seen | None) -> list[dict[str, Any]]:

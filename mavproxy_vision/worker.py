@@ -94,7 +94,7 @@ class Worker:
         self._state, self._error = "starting", ""
         self._open = False  # then the watch knows the state
         # Each of these has one thread that writes it.
-        self._repeated = self._skipped = self._reconnects = self._frames = 0
+        self._repeated = self._skipped = self._openings = self._frames = 0
         self._rate = 0.0
         self._tell, self._clock = tell, clock
         self._newest: Frame | None = None
@@ -128,8 +128,9 @@ class Worker:
     @property
     def health(self) -> Health:
         """How the camera does. Any thread."""
+        reconnects = max(self._openings - 1, 0)
         return Health(
-            self.verdict(), self._frames, self._repeated, self._skipped, self._reconnects, self._rate, self._error
+            self.verdict(), self._frames, self._repeated, self._skipped, reconnects, self._rate, self._error
         )
 
     def verdict(self) -> str:
@@ -150,20 +151,17 @@ class Worker:
         while not self._stop.is_set():
             try:
                 self.source.open()
+                with contextlib.closing(self.source):
+                    self._read_until_it_fails()
             except UavApiError as error:
                 self._error, self._state, self._open = str(error), "no frames", False
-                self._stop.wait(RECONNECT_PAUSE)
-                continue
-            with contextlib.closing(self.source):
-                self._read_until_it_fails()
-            if not self._stop.is_set():
-                self._reconnects += 1
-                self._stop.wait(RECONNECT_PAUSE)
+            self._stop.wait(RECONNECT_PAUSE)
 
     def _read_until_it_fails(self) -> None:
         opened = self._clock()
-        if not self._reconnects:  # later on it is not well until it gives a frame
+        if not self._openings:  # later on it is not well until it gives a frame
             self._watch.any_at = self._watch.fresh_at = opened
+        self._openings += 1
         self._open = True
         while not self._stop.is_set():
             frame = self.source.read()

@@ -226,6 +226,6 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         return
     for item in items:
         for marker in item.iter_markers("needs"):
-            program = marker.args[0]
+            program, package = marker.args[0], marker.args[-1]
             if shutil.which(program, path=os.environ["PATH"] + ":/usr/sbin") is None:
-                item.add_marker(pytest.mark.skip(reason=f"{program} is not installed (apt-get install {program})"))
+                item.add_marker(pytest.mark.skip(reason=f"{program} is not installed (apt-get install {package})"))

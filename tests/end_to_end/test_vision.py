@@ -199,23 +199,29 @@ def test_frames_that_are_posted_land_it_too(seeing: Any, harness: Any) -> None:
         seeing.mavproxy.ask("vision set source sim", "through sim")
 
 
-def test_a_film_and_a_folder_are_sources(seeing: Any, harness: Any, tmp_path: Path) -> None:
+@pytest.mark.needs("gst-launch-1.0", "gstreamer1.0-tools")
+def test_a_film_a_folder_and_a_pipeline_are_sources(seeing: Any, harness: Any, tmp_path: Path) -> None:
     from mavproxy_vision.dictionaries import marker_image  # noqa: PLC0415
 
     picture = marker_image("36h11", 0, 16)
     film = cv2.VideoWriter(str(tmp_path / "film.avi"), cv2.VideoWriter_fourcc(*"MJPG"), 20, (480, 360))
     (tmp_path / "folder").mkdir()
+    raw = b""
     for number in range(60):
         image = cv2.cvtColor(
             cv2.copyMakeBorder(picture, 60, 140, 60 + number, 260 - number, 0, value=200), cv2.COLOR_GRAY2BGR
         )
         film.write(image)
+        raw += cv2.cvtColor(image, cv2.COLOR_BGR2GRAY).tobytes()
         if number % 20 == 0:
             cv2.imwrite(str(tmp_path / "folder" / f"{number}.png"), image)
     film.release()
+    (tmp_path / "film.raw").write_bytes(raw)
+    grey = "rawvideoparse format=gray8 width=480 height=360 framerate=20/1"
+    pipeline = f"filesrc location={tmp_path / 'film.raw'} ! {grey} ! identity sync=true ! appsink"
     try:
-        for source in ("film.avi", "folder"):
-            seeing.mavproxy.ask(f"vision set source {tmp_path / source}", "looking for")
+        for source in (tmp_path / "film.avi", tmp_path / "folder", pipeline):
+            seeing.mavproxy.ask(f"vision set source {source}", "looking for")
             seen = harness.eventually(lambda: shown(seeing), 20, f"a tag in {source}")
             assert [tag["id"] for tag in seen] == [0]
     finally:
