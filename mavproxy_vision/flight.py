@@ -178,7 +178,7 @@ class Flight:
                     blind_since = None
                 elif blind_since is None:
                     blind_since = now
-                elif now - blind_since > BLIND and landing.phase is not Phase.LAND:
+                elif now - blind_since > BLIND and landing.phase is not Phase.LAST_METRE:
                     landing.fail(f"the camera: {vision.health.state}")
                 order = landing.step(now, motion, vision.height(float(motion.position[2])))
                 self._note(landing, motion)

@@ -1,8 +1,11 @@
 """The landing as a state machine: time, motion and target in, velocity and phase out. Pure.
 
-    LOOK -> DESCEND -> (done: land)
+    LOOK -> DESCEND -> LAST_METRE -> (done: land)
       ^       | lost for 0.5 s, above BLIND_BELOW: HOLD -> 2 s: CLIMB -> LOOK -> SEARCH -> … -> (failed)
-      |       | lost below BLIND_BELOW: straight down (done: land)
+      |       | lost below BLIND_BELOW: LAST_METRE all the same
+
+The last metre is flown by where the tag was and how the vehicle has moved since, because the autopilot's LAND holds a
+position that wanders with its GPS.
 
 An attempt is a time of looking: in place, then along one more ring of the expanding square each.
 Times are on the vehicle's clock (s), velocities m/s NED, places m NED in the frame of `Motion.travelled`.
@@ -33,6 +36,11 @@ VERTICAL_GAIN = 0.8  # 1/s
 CONE = ((3.0, math.radians(20)), (1.0, math.radians(10)))  # height (m) and half angle: wide high up, narrow low
 SLOWDOWN = (0.20, 0.45)  # descent rate: m/s, and 1/s of the height
 SLOWEST = 0.15  # m/s of descent
+LAST_DESCENT = 0.35  # m/s on the last metre
+LAST_GAIN = 1.3  # 1/s: no camera's latency is in what is flown by there
+LAST_SPEED = 0.4  # m/s, horizontally there
+TOUCH = 0.2  # m above the target from which the autopilot's LAND is left alone
+LATE = 1.0  # s longer than the last metre should take: it stands already, on legs that are higher than that
 NEAR = 0.4  # m from a waypoint that count as there
 STEP_TIME = 0.2  # s between two steps at most that are reckoned with
 
@@ -45,6 +53,7 @@ class Phase(enum.Enum):
     HOLD = "holding: tag lost"
     CLIMB = "climbing to the last fix"
     SEARCH = "searching"
+    LAST_METRE = "descending the last metre"
     LAND = "touching down"
     FAILED = "failed"
 
@@ -56,8 +65,8 @@ class Plan:
     Attributes:
         attempts: times of looking.
         look: s of each in place.
-        tolerance: m from the target within which it may touch down.
-        final: m above the target below which the autopilot's LAND takes over.
+        tolerance: m from the target within which it may begin the last metre.
+        final: m above the target at which the last metre begins.
         speed: m/s, horizontally.
         descent: m/s, at most.
         climb: m/s, at most.
@@ -115,6 +124,7 @@ class Landing:
         self._height = 0.0  # m above the ground that it holds there
         self._corners: Iterator[Waypoint] = iter(())
         self._corner: Waypoint | None = None
+        self._down_by = math.inf  # when the last metre should be over
         self._reason = ""
 
     def step(self, now: float, motion: Motion, height: float) -> Order:
@@ -168,6 +178,8 @@ class Landing:
         assert self.began is not None
         if self.phase is Phase.FAILED:
             return self._reason
+        if self.phase is Phase.LAST_METRE:
+            return None
         self.refused = self.target.ambiguous >= 5 or self.target.contradiction is not None
         if self.target.ambiguous >= 5:
             return "two tags of the same id are in view: it is not clear on which to land"
@@ -189,6 +201,8 @@ class Landing:
             self.phase, self._since = Phase.DESCEND, now
         if self.phase is Phase.DESCEND:
             return self._descend(now, motion, height, elapsed)
+        if self.phase is Phase.LAST_METRE:
+            return self._touch_down(now, motion)
         if self.phase is Phase.HOLD:
             return self._hold(now, motion, height)
         if self.phase is Phase.CLIMB:
@@ -207,18 +221,34 @@ class Landing:
         distance = float(np.linalg.norm(offset))
         if self.target.age(now) > COAST:
             if above < BLIND_BELOW:
-                self.phase = Phase.LAND
-                return REST
+                return self._go_down(now, motion)
             self._stay(now, Phase.HOLD, motion.travelled, height)
             return REST
         self.offset = distance
         if above <= self.plan.final and distance <= self.plan.tolerance:
-            self.phase = Phase.LAND
-            return REST
+            return self._go_down(now, motion)
         if distance < 1.0:
             self._integral = limited(self._integral + INTEGRAL * offset * elapsed, INTEGRAL_LIMIT)
         sideways = limited(GAIN * offset + self._integral, self.plan.speed)
         return vector(sideways[0], sideways[1], self._descent(distance, above))
+
+    def _go_down(self, now: float, motion: Motion) -> Vector:
+        place = self.target.place
+        assert place is not None
+        above = float(place[2] - motion.travelled[2])
+        self.phase, self._since = Phase.LAST_METRE, now
+        self._down_by = now + max(above - TOUCH, 0.0) / LAST_DESCENT + LATE
+        return self._touch_down(now, motion)
+
+    def _touch_down(self, now: float, motion: Motion) -> Vector:
+        place = self.target.place
+        assert place is not None
+        relative = place - motion.travelled
+        if relative[2] <= TOUCH or now >= self._down_by:
+            self.phase = Phase.LAND
+            return REST
+        sideways = limited(LAST_GAIN * relative[:2] + self._integral, LAST_SPEED)
+        return vector(sideways[0], sideways[1], LAST_DESCENT)
 
     def _descent(self, distance: float, above: float) -> float:
         if above <= self.plan.final:

@@ -320,10 +320,10 @@ def embedded_rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
     made.stop()
 
 
-def ardupilot_with_faults(directory: Path, **settings: Any) -> Rig:
+def ardupilot_with_faults(directory: Path, *, speedup: int = SPEEDUP, **settings: Any) -> Rig:
     """A rig with ArduPilot's own copter behind a wire that records and misbehaves."""
     rig, instance = Rig(directory, free_port()), free_instance()
-    command = sim_vehicle(directory, instance, "--no-mavproxy")
+    command = sim_vehicle(directory, instance, "--no-mavproxy", speedup=speedup)
     relay = _load("relay")
     try:
         rig.start("sim_vehicle", command, headless())
@@ -353,6 +353,13 @@ def faulty_rig(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPath
     made = embedded(directory) if request.param == "embedded" else ardupilot_with_faults(directory)
     yield made
     made.stop()
+
+
+@pytest.fixture(scope="session")
+def poster() -> Any:
+    """The module `poster`; a machine without OpenCV has none."""
+    pytest.importorskip("cv2")
+    return _load("poster")
 
 
 @pytest.fixture(scope="session")

@@ -141,64 +141,6 @@ def test_the_pilots_hand_ends_a_landing(seeing: Any, harness: Any) -> None:
     assert seeing.control.ask("state")["mode"] == "LOITER"
 
 
-class Poster:
-    """A camera on a gimbal, of somebody else's: draws what the vehicle's truth would show and posts it."""
-
-    def __init__(self, rig: Any, north: float, east: float) -> None:
-        from mavproxy_vision.geometry import Mount  # noqa: PLC0415
-        from mavproxy_vision.model import CameraModel  # noqa: PLC0415
-        from mavproxy_vision.rendering import Look, PlacedTag, Renderer  # noqa: PLC0415
-
-        model = CameraModel.from_field_of_view(480, 360, 56.145)
-        self._renderer = Renderer(model, Mount(gimbal=True), (PlacedTag("36h11", 0, 0.30, north, east),), Look())
-        self._rig, self._stop = rig, threading.Event()
-        self.answers: list[int] = []
-        self._thread = threading.Thread(target=self._run)
-
-    def __enter__(self) -> Poster:
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._stop.set()
-        self._thread.join(10)
-
-    def _run(self) -> None:
-        from mavproxy_vision.geometry import Attitude, vector  # noqa: PLC0415
-
-        session = requests.Session()
-        while not self._stop.wait(0.04):
-            light, state = time.monotonic(), self._rig.control.ask("state")
-            attitude = Attitude(yaw=math.radians(state["yaw_degrees"]))
-            image = self._renderer.render(vector(*state["position"]), attitude)
-            data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 90])[1].tobytes()
-            query = {"latency": 1000 * (time.monotonic() - light)}
-            answer = session.post(self._rig.url + "/vision/frame", params=query, data=data, timeout=10)
-            self.answers.append(answer.status_code)
-
-
-def test_frames_that_are_posted_land_it_too(seeing: Any, harness: Any) -> None:
-    refused = requests.post(seeing.url + "/vision/frame", data=b"x", timeout=10)
-    assert refused.status_code == 400
-    assert "source http" in refused.json()["detail"]
-    seeing.in_the_air(5)
-    seeing.mavproxy.type("vision set gimbal true")
-    seeing.mavproxy.ask("vision set source http", "through http")
-    try:
-        assert requests.post(seeing.url + "/vision/frame", data=b"no image", timeout=10).status_code == 400
-        harness.eventually(lambda: camera(seeing) == "no frames", 10, "noticing that no frames come")
-        assert seeing.post("/vision/land").status_code == 503
-        north, east, _ = seeing.control.ask("state")["position"]
-        with Poster(seeing, north + 0.8, east - 0.5) as poster:
-            harness.eventually(lambda: seeing.ok(seeing.get("/vision/status"))["info"]["in_view"], 30, "the tag")
-            assert seeing.ok(seeing.post("/vision/land", timeout=100))["result"] == "Landed on tag 0"
-        assert set(poster.answers) == {200}
-        assert seeing.control.ask("state")["position"][:2] == pytest.approx([north + 0.8, east - 0.5], abs=0.3)
-    finally:
-        seeing.mavproxy.type("vision set gimbal false")
-        seeing.mavproxy.ask("vision set source sim", "through sim")
-
-
 @pytest.mark.needs("gst-launch-1.0", "gstreamer1.0-tools")
 def test_a_film_a_folder_and_a_pipeline_are_sources(seeing: Any, harness: Any, tmp_path: Path) -> None:
     from mavproxy_vision.dictionaries import marker_image  # noqa: PLC0415

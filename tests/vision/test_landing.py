@@ -62,9 +62,9 @@ class Point:
 def test_it_centres_and_touches_down():
     point = Point()
     assert point.run().phase is Phase.LAND
-    assert math.dist(point.at[:2], point.tag) <= 0.12
-    assert point.height <= 0.6
-    assert point.phases == [Phase.LOOK, Phase.DESCEND, Phase.LAND]
+    assert math.dist(point.at[:2], point.tag) <= 0.05
+    assert point.height <= 0.2
+    assert point.phases == [Phase.LOOK, Phase.DESCEND, Phase.LAST_METRE, Phase.LAND]
     assert point.landing.attempt == 1
 
 
@@ -130,6 +130,28 @@ def test_lost_below_one_metre_it_goes_on_straight_down():
     point.sees = lambda p: p.height > 0.95
     assert point.run().phase is Phase.LAND
     assert Phase.HOLD not in point.phases
+    assert point.height <= 0.2
+    assert math.dist(point.at[:2], point.tag) <= 0.12  # it went on to above where the tag was
+
+
+def test_what_pushes_it_on_the_last_metre_is_answered_without_seeing():
+    point = Point()
+    point.sees = lambda p: p.height > 0.5
+    while not point.orders or point.orders[-1].phase is not Phase.LAND:
+        point.step()
+        if point.orders[-1].phase is Phase.LAST_METRE:
+            point.at = point.at + vector(0.10 * STEP, 0, 0)  # what its velocity estimate notices
+    assert math.dist(point.at[:2], point.tag) < 0.1
+
+
+def test_on_legs_that_are_higher_than_the_last_metre_expects_it_ends_all_the_same():
+    point = Point()
+    while not point.orders or point.orders[-1].phase is not Phase.LAND:
+        point.step()
+        point.at[2] = min(point.at[2], -0.45)
+        assert point.now < 160
+    began = next(i for i, order in enumerate(point.orders) if order.phase is Phase.LAST_METRE)
+    assert (len(point.orders) - began) * STEP < 3.0
 
 
 def test_without_a_tag_it_searches_and_fails_after_its_attempts():
