@@ -11,6 +11,7 @@ from mavproxy_vision.geometry import Matrix
 
 PIXELS_PER_CELL = 2.4  # measured: fewer pixels per cell of a tag, and less than 90 % of frames show it
 CLIP_MARGIN = 1.25  # of a tag's side, with its white border, that must fit into the view
+SAME_SHAPE = 0.02  # by which the ratio of width to height may differ: a lens that is scaled keeps its pixels square
 
 
 @dataclass(frozen=True)
@@ -45,8 +46,14 @@ class CameraModel:
         given = self.distortion or (0.0,) * 5
         return np.array(given, dtype=np.float64)
 
+    def misfit(self, width: int, height: int) -> str:
+        """Why frames of that size (px) are not this lens's, scaled, in a sentence; empty when they may be."""
+        if abs(width * self.height / (height * self.width) - 1.0) <= SAME_SHAPE:
+            return ""
+        return f"asked for is {self.width}x{self.height} px or another size of that shape, and {width}x{height} came"
+
     def scaled_to(self, width: int, height: int) -> CameraModel:
-        """The same lens with frames of another size."""
+        """The same lens with frames of another size, of the same shape."""
         if (width, height) == (self.width, self.height):
             return self
         sx, sy = width / self.width, height / self.height

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mavproxy_vision.dictionaries import marker_image
 from mavproxy_vision.errors import BadSetting
-from mavproxy_vision.tags import FAMILIES
+from mavproxy_vision.tags import FAMILIES, require_id, require_size
 
 POINTS_PER_METRE = 72 / 0.0254
 PAPER = {"A4": (0.210, 0.297), "A3": (0.297, 0.420), "A2": (0.420, 0.594), "A1": (0.594, 0.841), "A0": (0.841, 1.189)}
@@ -19,11 +19,9 @@ def tag_pdf(family: str, number: int, size: float) -> bytes:
     """
     if family not in FAMILIES:
         raise BadSetting(f"family {family!r} is none of {', '.join(FAMILIES)}", "family")
-    cells, count = FAMILIES[family]
-    if not 0 <= number < count:
-        raise BadSetting(f"{family} has the ids 0 to {count - 1}", "id")
-    if not size > 0:
-        raise BadSetting(f"a size of {size:g} m", "size")
+    require_id("id", family, number)
+    require_size("size", size)
+    cells = FAMILIES[family][0]
     whole = size * (cells + 2) / cells  # the white border is one cell wide, and part of the tag
     for name, (width, height) in PAPER.items():
         if whole + 2 * MARGIN <= width:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable
-from dataclasses import dataclass
-from pathlib import Path
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 from MAVProxy.modules.lib.mp_settings import MPSetting, MPSettings
@@ -14,12 +14,21 @@ from mavproxy_vision.calibration import load
 from mavproxy_vision.errors import BadSetting
 from mavproxy_vision.geometry import Mount
 from mavproxy_vision.model import CameraModel
+from mavproxy_vision.paths import path_of
 from mavproxy_vision.rendering import Look
 from mavproxy_vision.simulated import Timing, parse_placed
-from mavproxy_vision.tags import FAMILIES, Tag, parse_families, parse_tags
+from mavproxy_vision.tags import FAMILIES, NUMBER, Tag, parse_families, parse_tags
 
 METHODS = ("velocity", "landing_target")
 ON_FAILURE = ("rtl", "land", "hold")
+TURN, ARM = 360.0, 10.0  # degrees that a camera may be turned, and m that it may be off the vehicle's centre
+YES = ("1", "true", "yes")
+WRITTEN = {  # how values of a type are written; its constructor takes all that
+    str: re.compile(r"(?s).*"),
+    bool: re.compile(r"1|true|yes|0|false|no", re.IGNORECASE),
+    int: re.compile(r"[-+]?[0-9]{1,9}"),
+    float: re.compile(NUMBER),
+}
 
 
 @dataclass(frozen=True)
@@ -68,21 +77,21 @@ class Settings:
     @property
     def tag_list(self) -> tuple[Tag, ...]:
         """The target's tags, the main one first."""
-        return parse_tags(self.tags)
+        return parse_tags(self.tags, self.families[0])
 
     @property
     def model(self) -> CameraModel:
         """The calibration's camera, or one of the field of view."""
         if self.calibration:
-            return load(Path(self.calibration).expanduser())
+            return load(path_of(self.calibration, "calibration"))
         return CameraModel.from_field_of_view(self.width, self.height, self.fov)
 
     @property
     def camera_mount(self) -> Mount:
         """How the camera sits on the vehicle."""
-        angles = numbers(self.mount, "mount")
+        angles = numbers(self.mount, "mount", TURN)
         roll, pitch, yaw = angles if len(angles) == 3 else (0.0, 0.0, angles[0])
-        offset = numbers(self.offset, "offset")
+        offset = numbers(self.offset, "offset", ARM)
         if len(offset) != 3:
             raise BadSetting("offset: forward,right,down in m, such as 0.1,0,0.05", "offset")
         return Mount(roll, pitch, yaw, (offset[0], offset[1], offset[2]), self.gimbal)
@@ -99,18 +108,18 @@ class Settings:
         return Look(self.sim_noise, self.sim_blur, self.sim_exposure, self.sim_occlusion)
 
 
-def numbers(text: str, name: str) -> list[float]:
-    """One number, or three with commas.
+def numbers(text: str, name: str, most: float) -> list[float]:
+    """One number, or three with commas, between -`most` and `most`.
 
     Raises:
-        BadSetting: neither.
+        BadSetting: neither, or beyond that.
     """
-    try:
-        found = [float(part) for part in text.split(",")]
-    except ValueError:
-        found = []
-    if len(found) not in (1, 3):
+    parts = [part.strip() for part in text.split(",")]
+    if len(parts) not in (1, 3) or not all(re.fullmatch(NUMBER, part) for part in parts):
         raise BadSetting(f"{name}: {text!r} is not one number, nor three with commas", name)
+    found = [float(part) for part in parts]
+    if max(abs(number) for number in found) > most:
+        raise BadSetting(f"{name}: {text!r} goes beyond {most:g}", name)
     return found
 
 
@@ -155,52 +164,67 @@ def table() -> list[Any]:
     ]
 
 
-CHECKED: dict[str, Callable[[Settings], object]] = {
-    "family": lambda now: now.families,
-    "tags": lambda now: now.tag_list,
-    "calibration": lambda now: now.model,
-    "mount": lambda now: now.camera_mount,
-    "offset": lambda now: now.camera_mount,
-    "sim_tags": lambda now: parse_placed(now.sim_tags, now.families[0]),
-}
+# What is looked at when one of some settings changes: each raises BadSetting.
+CHECKS: tuple[tuple[set[str], Callable[[Settings], object]], ...] = (
+    ({"source"}, lambda now: path_of(now.source, "source")),
+    ({"directory"}, lambda now: path_of(now.directory, "directory")),
+    ({"family", "tags"}, lambda now: now.tag_list),
+    ({"calibration"}, lambda now: now.model),
+    ({"mount", "offset"}, lambda now: now.camera_mount),
+    ({"family", "sim_tags"}, lambda now: parse_placed(now.sim_tags, now.families[0])),
+)
 
 
 class ModuleSettings:
     """The settings of the loaded module: validated, whichever way they come in."""
 
-    def __init__(self, given: dict[str, Any] | None = None) -> None:
-        """Take `given` settings.
+    def __init__(self, given: Mapping[str, Any] | None = None) -> None:
+        """Take `given` settings, all together.
 
         Raises:
             BadSetting: as `set`.
         """
         self.mp = MPSettings(table())
-        for name, value in dict(given or {}).items():
-            self.set(name, value)
+        self._take(given or {})
 
     def set(self, name: str, value: Any) -> None:
-        """Set one.
+        """Set one; a value that is refused leaves everything as it was.
 
         Raises:
-            BadSetting: unknown, of the wrong type, out of range, or not to be understood.
+            BadSetting: unknown, of the wrong type, out of range, not to be understood, or against the others.
         """
+        self._take({name: value})
+
+    def _take(self, given: Mapping[str, Any]) -> None:
+        values = {name: self._typed(name, value) for name, value in given.items()}
+        wanted = replace(self.snapshot(), **values)
+        for names, check in CHECKS:
+            if not names.isdisjoint(values):
+                check(wanted)
+        for name, value in values.items():
+            self.mp.set(name, value)
+
+    def _typed(self, name: str, value: Any) -> Any:
+        """The value as the setting's type has it; MPSettings would print lines of its own about a bad one."""
         if name not in self.mp.list():
             near = difflib.get_close_matches(name, self.mp.list(), n=1)
             hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(self.mp.list())}"
             raise BadSetting(f"no setting {name!r}; {hint}", name)
-        setting, before = self.mp.get_setting(name), self.mp.get(name)
+        setting = self.mp.get_setting(name)
         if setting.choice and value not in setting.choice:
             raise BadSetting(f"{name} = {value!r}: it is one of {', '.join(setting.choice)}", name)
-        if not self.mp.set(name, value):
-            limits = f" from {setting.range[0]} to {setting.range[1]}" if setting.range else ""
-            raise BadSetting(f"{name} = {value!r}: it takes a {setting.type.__name__}{limits}", name)
-        try:
-            if name in CHECKED:
-                CHECKED[name](self.snapshot())
-        except BadSetting:
-            self.mp.set(name, before)
-            raise
+        kind, limits = setting.type, setting.range
+        written = isinstance(value, str | int | float) and WRITTEN[kind].fullmatch(str(value))
+        typed = _converted(kind, str(value)) if written else None
+        if typed is None or (limits and not limits[0] <= typed <= limits[1]):
+            told = f" from {limits[0]} to {limits[1]}" if limits else ""
+            raise BadSetting(f"{name} = {value!r}: it takes a {kind.__name__}{told}", name)
+        return typed
 
     def snapshot(self) -> Settings:
         """The settings as they are now."""
         return Settings(**{name: self.mp.get(name) for name in self.mp.list()})
+
+
+def _converted(kind: type, text: str) -> Any:
+    return text.lower() in YES if kind is bool else kind(text)

@@ -12,11 +12,12 @@ from mavproxy_vision.camera import Frame
 from mavproxy_vision.errors import BadSetting
 from mavproxy_vision.geometry import Attitude, Vector
 from mavproxy_vision.rendering import PlacedTag, Renderer
-from mavproxy_vision.tags import FAMILIES
+from mavproxy_vision.tags import FAMILIES, ID, NUMBER, require_id, require_size
 
 SHORTEST = 0.01  # s of latency: what is drawn must have been heard of
+FARTHEST = 10_000.0  # m from home that a tag may lie
 PATTERN = re.compile(
-    r"(?:(\w+):)?(\d+):([0-9.]+)@(-?[0-9.]+),(-?[0-9.]+)(?:,(-?[0-9.]+))?"  # family, id, size, north, east, heading
+    rf"(?:(\w+):)?({ID}):({NUMBER})@({NUMBER}),({NUMBER})(?:,({NUMBER}))?"  # family, id, size, north, east, heading
 )
 
 Where = Callable[[float], tuple[Vector, Attitude] | None]
@@ -111,9 +112,10 @@ def parse_placed(text: str, family: str) -> tuple[PlacedTag, ...]:
         match = PATTERN.fullmatch(word)
         if match is None or (match[1] or family) not in FAMILIES:
             raise BadSetting(f"sim_tags: {word!r} is not ID:SIZE@NORTH,EAST or …,HEADING", "sim_tags")
-        name = match[1] or family
-        if int(match[2]) >= FAMILIES[name][1]:
-            raise BadSetting(f"sim_tags: {name} has no id {match[2]}", "sim_tags")
-        numbers = [float(part or 0) for part in match.groups()[2:]]
-        found.append(PlacedTag(name, int(match[2]), *numbers))
+        tag = PlacedTag(match[1] or family, int(match[2]), *(float(part or 0) for part in match.groups()[2:]))
+        require_id("sim_tags", tag.family, tag.id)
+        require_size("sim_tags", tag.size)
+        if not (max(abs(tag.north), abs(tag.east)) <= FARTHEST and abs(tag.heading) <= 360):
+            raise BadSetting(f"sim_tags: {word!r} lies too far away, or heads beyond 360 degrees", "sim_tags")
+        found.append(tag)
     return tuple(found)

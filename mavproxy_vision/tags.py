@@ -15,7 +15,11 @@ from mavproxy_vision.errors import BadSetting
 
 # Family -> cells along the black square, and how many ids it has.
 FAMILIES = {"36h11": (8, 587), "25h9": (7, 35), "16h5": (6, 30), "36h10": (8, 2320)}
-PATTERN = re.compile(r"(\d+):([0-9.]+)(?:@(-?[0-9.]+),(-?[0-9.]+))?")
+NUMBER = r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"  # float() takes all that this matches
+ID = r"[0-9]{1,6}"
+PATTERN = re.compile(rf"({ID}):({NUMBER})(?:@({NUMBER}),({NUMBER}))?")
+SIZES = (0.005, 10.0)  # m
+REACH = 50.0  # m that a tag may lie from the target
 
 
 @dataclass(frozen=True)
@@ -28,8 +32,8 @@ class Tag:
     up: float = 0.0
 
 
-def parse_tags(text: str) -> tuple[Tag, ...]:
-    """Read a list of tags.
+def parse_tags(text: str, family: str | None = None) -> tuple[Tag, ...]:
+    """Read a list of tags, whose ids `family` must have.
 
     Raises:
         BadSetting: it is no such list.
@@ -39,13 +43,29 @@ def parse_tags(text: str) -> tuple[Tag, ...]:
         match = PATTERN.fullmatch(word)
         if match is None:
             raise BadSetting(f"tags: {word!r} is not ID:SIZE or ID:SIZE@RIGHT,UP, in m", "tags")
-        size = float(match[2])
-        if not 0.005 <= size <= 10:
-            raise BadSetting(f"tags: a size of {size:g} m", "tags")
-        found.append(Tag(int(match[1]), size, float(match[3] or 0), float(match[4] or 0)))
+        tag = Tag(int(match[1]), float(match[2]), float(match[3] or 0), float(match[4] or 0))
+        require_size("tags", tag.size)
+        if max(abs(tag.right), abs(tag.up)) > REACH:
+            raise BadSetting(f"tags: {word!r} lies farther than {REACH:g} m from the target", "tags")
+        if family is not None:
+            require_id("tags", family, tag.id)
+        found.append(tag)
     if len({tag.id for tag in found}) != len(found):
         raise BadSetting("tags: an id twice", "tags")
     return tuple(found)
+
+
+def require_size(setting: str, size: float) -> None:
+    """Raises BadSetting unless a tag may have this size (m)."""
+    if not SIZES[0] <= size <= SIZES[1]:
+        raise BadSetting(f"{setting}: a size of {size:g} m; tags have {SIZES[0]:g} to {SIZES[1]:g} m", setting)
+
+
+def require_id(setting: str, family: str, number: int) -> None:
+    """Raises BadSetting unless the family has this id."""
+    count = FAMILIES[family][1]
+    if not 0 <= number < count:
+        raise BadSetting(f"{setting}: {family} has no id {number}, only 0 to {count - 1}", setting)
 
 
 def parse_families(text: str) -> tuple[str, ...]:
