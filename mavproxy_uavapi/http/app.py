@@ -85,7 +85,7 @@ def methods_of(path: str) -> set[str]:
 async def _answer(route: Route, request: web.Request) -> web.StreamResponse:
     params = await parameters(request, route.model, body=request.method == "POST" and not route.raw)
     call = Call(request.app[SERVICE], request, params)
-    answer = await (audited(call, route.action) if route.commands else route.action(call))
+    answer = await (audited(call, route.action) if route.commands and route.trail else route.action(call))
     return answer if isinstance(answer, web.StreamResponse) else success(answer)
 
 

@@ -21,6 +21,7 @@ from mavproxy_uavapi.vehicle.jobs import Job
 from mavproxy_uavapi.vehicle.vehicle import Vehicle
 
 R = TypeVar("R", bound=Request)
+T = TypeVar("T")
 Answer = dict[str, Any] | web.StreamResponse
 Action = Callable[["Call"], Awaitable[Answer]]
 
@@ -190,6 +191,20 @@ BODY_TIMEOUT = 10.0  # s from the headers to the end of the body
 SERVICE = web.AppKey("service", Service)
 
 
+async def in_time(body: Awaitable[T]) -> T:
+    """The body, once it has arrived.
+
+    Raises:
+        BadRequest: it has not, within BODY_TIMEOUT, or the client hung up.
+    """
+    try:
+        return await asyncio.wait_for(body, BODY_TIMEOUT)
+    except asyncio.TimeoutError as error:
+        raise BadRequest(f"the body did not arrive within {BODY_TIMEOUT:g} s") from error
+    except ConnectionError as error:
+        raise BadRequest("the client hung up before its body had arrived") from error
+
+
 async def _body(request: web.Request, form: bool) -> Any:
     return dict(await request.post()) if form else await request.json()
 
@@ -206,11 +221,7 @@ async def parameters(request: web.Request, model: type[Request], body: bool) -> 
         return parse(model, "query", values)
     form = request.content_type == "application/x-www-form-urlencoded"
     try:
-        given = await asyncio.wait_for(_body(request, form), BODY_TIMEOUT)
-    except asyncio.TimeoutError as error:
-        raise BadRequest(f"the body did not arrive within {BODY_TIMEOUT:g} s") from error
-    except ConnectionError as error:
-        raise BadRequest("the client hung up before its body had arrived") from error
+        given = await in_time(_body(request, form))
     except (ValueError, LookupError, RecursionError) as error:  # no such charset; nested without end
         raise BadRequest(f"the body is not {'a form' if form else 'JSON'}: {error}") from error
     if not isinstance(given, dict):

@@ -31,6 +31,7 @@ class Route:
     methods: tuple[str, ...] = ("GET",)
     raw: bool = False  # whether the action itself reads the body, which holds no parameters
     job: bool = False  # whether the action runs as a job, which a client need not wait for
+    trail: bool = True  # whether a call that commands is audited; one that comes many times a second would flush it
 
     @property
     def commands(self) -> bool:

@@ -1,11 +1,13 @@
 from __future__ import annotations
 
+import asyncio
 from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.http.call import Call
+from mavproxy_uavapi.http.call import BODY_TIMEOUT, Call, in_time
 from mavproxy_uavapi.http.requests import Blocking, Empty, Servo
+from mavproxy_uavapi.http.routes import POST, Route
 from mavproxy_uavapi.settings import ModuleSettings
 
 
@@ -34,6 +36,22 @@ def test_command_and_telemetry_follow_mavproxys_current_vehicle(
     assert api.get("/telemetry/gps").body["id"] == "2"
     assert first.orders() == []
     assert second.mode == "GUIDED"
+
+
+@pytest.mark.parametrize("raw", [True, False])
+def test_body_that_does_not_arrive_is_400(api: Any, loop: Any, host: Any, raw: bool) -> None:
+    async def take(call: Any) -> dict[str, Any]:
+        return {"body": str(await in_time(call.request.read()))}
+
+    async def body() -> Any:
+        yield b"{"
+        await asyncio.sleep(2 * BODY_TIMEOUT)
+
+    host.extensions["/take"] = Route("/take", take, Empty, POST, raw=raw)
+    began = loop.time()
+    answer = api.post("/take", data=body())
+    assert (answer.status, answer.body["detail"]) == (400, "the body did not arrive within 10 s")
+    assert loop.time() - began < BODY_TIMEOUT + 1
 
 
 URGENT = ["/command/land", "/command/rtl", "/command/brake", "/command/disarm?force=true", "/movement/stop"]

@@ -2,6 +2,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from mavproxy_uavapi.http.requests import Empty
+from mavproxy_uavapi.http.routes import POST, Route
+
 FAR = {"x": 500, "y": 0, "z": -20}
 
 
@@ -39,3 +42,14 @@ def test_job_that_succeeds_without_its_client_is_traced_with_its_result(
     (entry,) = service.audit.entries
     assert entry.outcome == "ok"
     assert "Copter braking" in entry.detail
+
+
+def test_route_without_a_trail_leaves_no_trace(service: Any, api: Any, host: Any) -> None:
+    async def take(_call: Any) -> dict[str, Any]:
+        return {}
+
+    for trail in (True, False):
+        host.extensions["/take"] = Route("/take", take, Empty, POST, trail=trail)
+        for _ in range(3):
+            assert api.post("/take").status == 200
+        assert len(service.audit.entries) == 3
