@@ -18,11 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mavproxy_vision.errors import BadImage, NoCamera
+from mavproxy_vision.headers import size_of
 
 Image = NDArray[np.uint8]
 
 IMAGES = {".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".pgm"}
 POSTED_KEPT = 2  # posted frames that wait
+MOST_PIXELS = 40_000_000  # of a posted frame
 
 
 @dataclass(frozen=True)
@@ -53,28 +55,60 @@ class Source(Protocol):
         """Get ready. Raises NoCamera."""
 
     def read(self) -> Frame | None:
-        """The next frame; None when there is none just now. Blocks for a fraction of a second at most."""
+        """The next frame; None when there is none just now. Blocks for a fraction of a second at most.
+
+        Raises:
+            NoCamera: it has failed, and must be opened again.
+        """
 
     def close(self) -> None:
         """Let go."""
 
 
 def grey(image: Any) -> Image:
-    """A frame as OpenCV gives it, in grey."""
-    if image.ndim == 3:
-        image = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) if image.shape[2] == 3 else image[..., 0]
-    return np.ascontiguousarray(image, np.uint8)
+    """A frame as OpenCV gives it, in grey of 8 bits; of 16 bits these are the upper ones.
+
+    Raises:
+        NoCamera: it is no picture.
+    """
+    if image.dtype == np.uint16:
+        image = (image >> 8).astype(np.uint8)
+    channels = 1 if image.ndim == 2 else image.shape[2]
+    if image.dtype != np.uint8 or channels > 4:
+        raise NoCamera(f"the camera gives {channels} channels of {image.dtype}: no picture")
+    if channels > 2:
+        image = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY if channels == 3 else cv2.COLOR_BGRA2GRAY)
+    elif image.ndim == 3:
+        image = image[..., 0]  # of two channels, YUYV, the first is the brightness
+    return np.ascontiguousarray(image)
 
 
 def decode(data: bytes) -> Image:
-    """A JPEG, PNG … in grey.
+    """A JPEG or PNG of up to MOST_PIXELS, in grey.
 
     Raises:
         BadImage: it is none.
     """
-    image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE) if data else None
+    size = size_of(data)
+    if size is None or 0 in size:
+        raise BadImage("the body is not an image, JPEG or PNG")
+    if size[0] * size[1] > MOST_PIXELS:
+        raise BadImage(f"an image of {size[0]}x{size[1]} px; at most {MOST_PIXELS // 1_000_000} megapixels are taken")
+    return decode_any(data)
+
+
+def decode_any(data: bytes) -> Image:
+    """An image of whatever kind OpenCV knows, in grey.
+
+    Raises:
+        BadImage: it is none.
+    """
+    try:
+        image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE) if data else None
+    except cv2.error as error:
+        raise BadImage(f"the image cannot be read: {error.err}") from error
     if image is None:
-        raise BadImage("the body is not an image")
+        raise BadImage("that is not an image")
     return np.asarray(image, np.uint8)
 
 
@@ -104,15 +138,22 @@ class Folder:
             raise NoCamera(f"no images in {self._folder}")
 
     def read(self) -> Frame | None:
-        """The next image."""
+        """The next image; None for a file that holds none.
+
+        Raises:
+            NoCamera: the file, or the folder, has gone.
+        """
         time.sleep(1.0 / self._rate)
         file = self._files[self._index % len(self._files)]
         self._index += 1
-        image = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)
-        if image is None:
+        try:
+            image = decode_any(file.read_bytes())
+        except OSError as error:
+            raise NoCamera(f"{file}: {error.strerror}") from error
+        except BadImage:
             return None
         now = self._clock()
-        return Frame(np.asarray(image, np.uint8), now - self._latency, now)
+        return Frame(image, now - self._latency, now)
 
     def close(self) -> None:
         """Nothing to let go."""

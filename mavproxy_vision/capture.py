@@ -7,7 +7,6 @@ import re
 import time
 from collections import deque
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 # The state of a camera is told by `vision status`; FFmpeg and OpenCV would write into the pilot's prompt.
@@ -65,7 +64,7 @@ class Capture:
     ) -> None:
         self._spec, self._latency, self._size, self._rate, self._clock = spec, latency, size, rate, clock
         self._capture: Any = None
-        self._is_file, self._is_stream = Path(spec).is_file(), "://" in spec
+        self._is_file, self._is_stream = os.path.isfile(spec), "://" in spec  # pathlib's raises on a long URL
         self._is_stamped = spec.partition("://")[0].lower() in STAMPED
         self._stream_clock = StreamClock()
         self._next = 0.0
@@ -90,7 +89,7 @@ class Capture:
             self._capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
 
     def _opened(self) -> Any:
-        number = re.fullmatch(r"(?:camera:|/dev/video)(\d+)", self._spec)
+        number = re.fullmatch(r"(?:camera:|/dev/video)([0-9]{1,3})", self._spec)
         if number:
             return cv2.VideoCapture(int(number[1]), cv2.CAP_V4L2)
         if self._is_stream:
@@ -109,11 +108,18 @@ class Capture:
             before = now
 
     def read(self) -> Frame | None:
-        """The next frame; a file plays at its rate, and ends."""
+        """The next frame; a file plays at its rate, and ends.
+
+        Raises:
+            NoCamera: what comes is no picture, or cannot be read.
+        """
         if self._is_file:
             self._wait_for_its_time()
         asked = self._clock()
-        good, image = self._capture.read()
+        try:
+            good, image = self._capture.read()
+        except cv2.error as error:
+            raise NoCamera(f"{self._spec}: {error.err}") from error
         now = self._clock()
         if not good:
             time.sleep(0.02)  # a dead camera answers at once: do not spin

@@ -8,7 +8,6 @@ Raises:
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import NoReturn
 
 import cv2
@@ -17,6 +16,7 @@ from mavproxy_vision.annotate import annotated
 from mavproxy_vision.calibration import Board, calibrate, save
 from mavproxy_vision.camera import Image
 from mavproxy_vision.errors import BadSetting
+from mavproxy_vision.paths import path_of
 from mavproxy_vision.printing import tag_pdf
 from mavproxy_vision.sighting import Seen
 from mavproxy_vision.tags import Tag
@@ -33,8 +33,8 @@ def calibrated(args: list[str]) -> str:
     """`FOLDER BOARD [FILE]`: make a camera model of the folder's images."""
     if len(args) not in (2, 3):
         raise BadSetting("calibrate FOLDER charuco:7x5:0.03:0.022|chessboard:9x6:0.025 [FILE]")
-    file = Path(args[2] if len(args) == 3 else "camera.json").expanduser()
-    made = calibrate(Path(args[0]).expanduser(), Board.parse(args[1]))
+    file = path_of(args[2] if len(args) == 3 else "camera.json", "FILE")
+    made = calibrate(path_of(args[0], "FOLDER"), Board.parse(args[1]))
     save(made.model, file)
     focal = f"fx {made.model.fx:.1f}, fy {made.model.fy:.1f}"
     return f"{made.views} views, error {made.error:.2f} px, {focal}; wrote {file}: `vision set calibration {file}`"
@@ -46,10 +46,13 @@ def snapshot(args: list[str], seen: Seen | None, image: Image | None) -> str:
         raise BadSetting("snapshot FILE.png")
     if seen is None or image is None:
         return "there is no frame yet"
-    file = Path(args[0]).expanduser()
-    good, data = cv2.imencode(file.suffix or ".png", annotated(image, seen, []))
+    file = path_of(args[0], "FILE")
+    try:
+        good, data = cv2.imencode(file.suffix or ".png", annotated(image, seen, []))
+    except cv2.error:  # which kinds there are depends on how OpenCV was built
+        good = False
     if not good:
-        raise BadSetting(f"cannot write {file.suffix} files")
+        raise BadSetting(f"{file.name}: OpenCV writes no {file.suffix} files; .png and .jpg it does")
     file.write_bytes(data.tobytes())
     return f"wrote {file}"
 
@@ -57,10 +60,11 @@ def snapshot(args: list[str], seen: Seen | None, image: Image | None) -> str:
 def tag(args: list[str], family: str, main: Tag) -> str:
     """`FILE.pdf [--family F] [--id N] [--size M]`: write a tag to scale; `main` and `family` are the defaults."""
     parser = _Words("vision tag", add_help=False)
-    parser.add_argument("file", type=Path)
+    parser.add_argument("file")
     parser.add_argument("--family", default=family)
     parser.add_argument("--id", type=int, default=main.id)
     parser.add_argument("--size", type=float, default=main.size)
     chosen = parser.parse_args(args)
-    chosen.file.expanduser().write_bytes(tag_pdf(chosen.family, chosen.id, chosen.size))
-    return f"wrote {chosen.file}"
+    file = path_of(chosen.file, "FILE")
+    file.write_bytes(tag_pdf(chosen.family, chosen.id, chosen.size))
+    return f"wrote {file}"

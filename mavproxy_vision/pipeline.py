@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import select
 import shlex
@@ -20,10 +21,22 @@ LAUNCH = "gst-launch-1.0"
 PATIENCE = 0.2  # s that a read waits
 ENDING = 1.0  # s that the program gets to end by itself
 PIECE = 1 << 16  # bytes that a pipe holds
+# What each pipeline ends in. A camera that has frames of the size is asked for them. Others come on a canvas that is
+# so high that videoscale, which keeps pixels square, always fills its width; then the canvas is cut to the size.
+ENDED = (
+    "queue leaky=downstream max-size-buffers=1 "
+    "! videoconvert ! video/x-raw,width={width},height={height};video/x-raw "
+    "! videoscale ! video/x-raw,format=GRAY8,width={width},height={canvas},pixel-aspect-ratio=1/1 "
+    "! videocrop top={width} bottom={width} ! video/x-raw,format=GRAY8,width={width},height={height} "
+    "! fdsink fd=1 sync=false"
+)
 
 
 class Pipeline:
-    """What comes out of a GStreamer pipeline, scaled to a size, in grey.
+    """What comes out of a GStreamer pipeline, scaled to a width, in grey.
+
+    A frame keeps its whole width, to which the field of view belongs, and its shape: what is then too high is cut off
+    at the top and the bottom, and what is not high enough has black bars there.
 
     Args:
         spec: as for gst-launch-1.0; a last `! appsink …`, as OpenCV wants it, may be there or not.
@@ -47,22 +60,23 @@ class Pipeline:
         """Start the program.
 
         Raises:
-            NoCamera: it is not installed, or the pipeline cannot be read.
+            NoCamera: it is not installed, it cannot be run, or the pipeline cannot be read.
         """
         self._received.clear()
-        self._said = tempfile.TemporaryFile()  # noqa: SIM115 — `close` closes it
         try:
-            command = launch_command(self._spec, self._size)
+            self._said = tempfile.TemporaryFile()  # noqa: SIM115 — `close` closes it
             self._process = subprocess.Popen(
-                command,
+                launch_command(self._spec, self._size),
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=self._said,
                 start_new_session=True,  # the pilot's Ctrl-C is for MAVProxy, which then ends it
             )
-        except FileNotFoundError as error:
+        except OSError as error:
             self.close()
-            raise NoCamera(f"a pipeline wants {LAUNCH}: install gstreamer1.0-tools") from error
+            if error.filename == LAUNCH and isinstance(error, FileNotFoundError):
+                raise NoCamera(f"a pipeline wants {LAUNCH}: install gstreamer1.0-tools") from error
+            raise NoCamera(f"{LAUNCH} cannot be run: {error.strerror}") from error
         except ValueError as error:  # shlex
             self.close()
             raise NoCamera(f"the pipeline cannot be read: {error}") from error
@@ -94,7 +108,8 @@ class Pipeline:
     def _last_words(self) -> str:
         assert self._process is not None
         assert self._said is not None
-        self._process.wait(ENDING)
+        with contextlib.suppress(subprocess.TimeoutExpired):  # it gives no frames, but goes on: `close` ends it
+            self._process.wait(ENDING)
         self._said.seek(0)
         lines = [line.strip() for line in self._said.read().decode(errors="replace").splitlines()]
         told = [line for line in lines if line.startswith(("ERROR", "WARNING"))] or lines[-1:]
@@ -130,6 +145,6 @@ def launch_command(spec: str, size: tuple[int, int]) -> list[str]:
     stages = spec.split("!")
     if stages[-1].split()[:1] == ["appsink"]:
         stages.pop()
-    caps = f"video/x-raw,format=GRAY8,width={size[0]},height={size[1]}"
-    last = f"queue leaky=downstream max-size-buffers=1 ! videoconvert ! videoscale ! {caps} ! fdsink fd=1 sync=false"
+    width, height = size
+    last = ENDED.format(width=width, height=height, canvas=height + 2 * width)
     return [LAUNCH, "-q", *shlex.split("!".join(stages)), "!", *shlex.split(last)]

@@ -29,13 +29,13 @@ class Health:
     """How the camera does.
 
     Attributes:
-        state: `starting`, `ok`, `frozen`, `no frames`, `closed`.
+        state: `starting`, `ok`, `frozen`, `no frames`, `wrong shape`, `closed`.
         frames: frames that were looked at.
         repeated: frames that were the one before again, and were not looked at.
         skipped: frames that a newer one overtook.
         reconnects: times that the source was opened again.
         rate: frames per second, lately.
-        error: what the source said last, if it was an error.
+        error: what is wrong, until a frame comes that is looked at.
     """
 
     state: str = "starting"
@@ -91,7 +91,9 @@ class Worker:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.source, self.detector = source, detector
-        self._state, self._error = "starting", ""
+        self._state = "starting"
+        self._error = self._defect = ""
+        self._misfit = ""  # why the newest frame is not looked at
         self._open = False  # then the watch knows the state
         # Each of these has one thread that writes it.
         self._repeated = self._skipped = self._openings = self._frames = 0
@@ -129,19 +131,21 @@ class Worker:
     def health(self) -> Health:
         """How the camera does. Any thread."""
         reconnects = max(self._openings - 1, 0)
-        return Health(
-            self.verdict(), self._frames, self._repeated, self._skipped, reconnects, self._rate, self._error
-        )
+        error = self._defect or self._error
+        return Health(self.verdict(), self._frames, self._repeated, self._skipped, reconnects, self._rate, error)
 
     def verdict(self) -> str:
-        """How the camera does just now: `ok`, `frozen`, `no frames`, `starting` or `closed`."""
-        return self._watch.verdict(self._clock()) if self._open and not self._stop.is_set() else self._state
+        """How the camera does just now, in a word of `Health.state`."""
+        if not self._open or self._stop.is_set():
+            return self._state
+        verdict = self._watch.verdict(self._clock())
+        return "wrong shape" if verdict == "ok" and self._misfit else verdict
 
     def _guarded(self, body: Callable[[], None]) -> None:
         try:
             body()
         except Exception as error:  # a defect of ours; the thread ends, and the status says so
-            self._error, self._state = f"a defect of this program: {error!r}", "closed"
+            self._defect, self._state = f"a defect of this program: {error!r}", "closed"
             self._end()
             log.exception("vision: the camera's thread ended")
 
@@ -165,14 +169,22 @@ class Worker:
         self._open = True
         while not self._stop.is_set():
             frame = self.source.read()
-            if frame is not None and self._watch.is_new(frame):
-                self._keep(frame)
-            elif frame is not None:
-                self._repeated += 1
+            if frame is not None:
+                self._take(frame)
             now = self._clock()
             if now - max(self._watch.fresh_at, opened) > RECONNECT_AFTER:
                 self._error = f"{self._watch.verdict(now)} for {now - self._watch.fresh_at:.1f} s"
                 return
+
+    def _take(self, frame: Frame) -> None:
+        """Keep a frame that is new, unless it is no frame of this lens: what it shows would be placed wrongly."""
+        if not self._watch.is_new(frame):
+            self._repeated += 1
+            return
+        height, width = frame.image.shape
+        self._error = self._misfit = self.detector.model.misfit(width, height)
+        if not self._misfit:
+            self._keep(frame)
 
     def _keep(self, frame: Frame) -> None:
         with self._changed:

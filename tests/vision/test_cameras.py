@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import time
+from types import SimpleNamespace
 
+import cv2
+import numpy as np
 import pytest
 
+from mavproxy_vision import pipeline
 from mavproxy_vision.capture import COMPARED, Capture, StreamClock
 from mavproxy_vision.errors import NoCamera
 from mavproxy_vision.pipeline import Pipeline, launch_command
@@ -58,6 +62,7 @@ def test_a_pipeline_ends_in_grey_frames_of_our_size():
     ]
     assert "appsink" not in command
     assert command[-5:] == ["video/x-raw,format=GRAY8,width=66,height=48", "!", "fdsink", "fd=1", "sync=false"]
+    assert "video/x-raw,width=66,height=48;video/x-raw" in command  # a camera that has this size gives it
 
 
 def frames(source, count):
@@ -83,6 +88,25 @@ def test_a_pipeline_gives_frames(width):
     assert {frame.image.shape for frame in seen} == {(48, width)}
     assert all((frame.image > 230).all() for frame in seen)
     assert seen[0].received_at - seen[0].captured_at == pytest.approx(0.05)
+
+
+@gstreamer
+@pytest.mark.parametrize(("width", "height", "bars"), [(1280, 960, 0), (1280, 720, 60), (640, 640, 0), (480, 640, 0)])
+def test_a_pipelines_pixels_stay_square_and_its_whole_width_is_seen(tmp_path, width, height, bars):
+    file = tmp_path / "square.png"
+    side, image = width // 4, np.full((height, width), 255, np.uint8)
+    top = (height - side) // 2
+    image[top : top + side, :side] = 60  # a square at the left edge
+    cv2.imwrite(str(file), image)
+    source = Pipeline(f"filesrc location={file} ! pngdec ! imagefreeze", 0.0, (640, 480))
+    source.open()
+    try:
+        seen = frames(source, 1)[0].image
+    finally:
+        source.close()
+    assert np.count_nonzero(seen[:, 600] < 30) == 2 * bars
+    assert np.count_nonzero(np.abs(seen[240].astype(int) - 60) < 30) == pytest.approx(160, abs=2)
+    assert np.count_nonzero(np.abs(seen[:, 2].astype(int) - 60) < 30) == pytest.approx(160, abs=2)
 
 
 @gstreamer
@@ -120,6 +144,71 @@ def test_without_gstreamer_one_line_says_what_to_install(monkeypatch):
     monkeypatch.setenv("PATH", "/nonexistent")
     with pytest.raises(NoCamera, match="install gstreamer1.0-tools"):
         Pipeline(BALL.format("ball"), 0.0, (64, 48)).open()
+
+
+def test_a_program_that_cannot_be_run_is_no_camera(monkeypatch, tmp_path):
+    monkeypatch.setattr(pipeline, "LAUNCH", str(tmp_path))
+    with pytest.raises(NoCamera, match="cannot be run: Permission denied"):
+        Pipeline(BALL.format("ball"), 0.0, (64, 48)).open()
+
+
+def test_without_room_for_a_file_there_is_no_camera(monkeypatch):
+    def full():
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(pipeline.tempfile, "TemporaryFile", full)
+    with pytest.raises(NoCamera, match="No space left"):
+        Pipeline(BALL.format("ball"), 0.0, (64, 48)).open()
+
+
+def test_a_program_that_falls_silent_but_goes_on_is_no_camera(monkeypatch, tmp_path):
+    program = tmp_path / "gst-launch-1.0"
+    program.write_text("#!/bin/sh\nexec 1>&-\nexec sleep 60\n")
+    program.chmod(0o755)
+    monkeypatch.setattr(pipeline, "LAUNCH", str(program))
+    monkeypatch.setattr(pipeline, "ENDING", 0.05)
+    source = Pipeline("libcamerasrc", 0.0, (64, 48))
+    source.open()
+    process = source._process
+    with pytest.raises(NoCamera, match="the pipeline ended"):
+        for _ in range(100):
+            source.read()
+    source.close()
+    assert process.returncode in (-15, -9)
+
+
+def camera(monkeypatch, spec, **given):
+    """A capture of OpenCV's that does as told, and what it was asked for."""
+    asked = {}
+    device = SimpleNamespace(isOpened=lambda: True, set=asked.__setitem__, get=lambda _: 0.0, **given)
+    monkeypatch.setattr(cv2, "VideoCapture", lambda *_: device)
+    source = make_source(ModuleSettings({"source": spec}).snapshot(), lambda _: None, time.monotonic)
+    source.open()
+    return source, asked
+
+
+def test_a_camera_gives_what_opencv_gives_in_grey(monkeypatch):
+    source, asked = camera(monkeypatch, "camera:0", read=lambda: (True, np.full((48, 64), 0x1234, np.uint16)))
+    assert source.read().image[0, 0] == 0x12
+    assert (asked[cv2.CAP_PROP_FRAME_WIDTH], asked[cv2.CAP_PROP_FRAME_HEIGHT]) == (640, 480)
+
+
+def test_a_camera_that_opencv_cannot_read_is_no_camera(monkeypatch):
+    def fail():
+        cv2.cvtColor(np.zeros((1, 1)), cv2.COLOR_BGR2GRAY)
+
+    source, _ = camera(monkeypatch, "camera:0", read=fail)
+    with pytest.raises(NoCamera, match="camera:0: "):
+        source.read()
+    source, _ = camera(monkeypatch, "camera:0", read=lambda: (True, np.zeros((4, 4), np.float32)))
+    with pytest.raises(NoCamera, match="float32: no picture"):
+        source.read()
+
+
+@pytest.mark.parametrize("spec", ["camera:99999999999999", "rtsp://127.0.0.1:1/" + "a" * 5000])
+def test_an_absurd_camera_is_no_camera(spec):
+    with pytest.raises(NoCamera, match="cannot open"):
+        Capture(spec, 0.0, (64, 48), 25.0).open()
 
 
 @pytest.mark.parametrize(

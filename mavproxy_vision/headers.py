@@ -1,0 +1,35 @@
+"""The size that the header of a PNG or JPEG tells: a few kB may decode to a picture that fills the memory. Pure."""
+
+from __future__ import annotations
+
+import struct
+
+PNG, JPEG = b"\x89PNG\r\n\x1a\n", b"\xff\xd8"
+# JPEG's markers (ITU T.81, table B.1): SOF0 to SOF15 tell the size; tables, extensions and comments may come before.
+SIZE_OF_FRAME = {*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC}
+BEFORE_IT = {0xC4, 0xCC, 0xDB, 0xDD, *range(0xE0, 0xF0), 0xFE}
+FILL = 0xFF  # may come before a marker, any number of times
+
+
+def size_of(data: bytes) -> tuple[int, int] | None:
+    """Width and height (px); None for what is neither a PNG nor a JPEG."""
+    if data.startswith(PNG) and data[12:16] == b"IHDR" and len(data) >= 24:
+        width, height = struct.unpack_from(">II", data, 16)
+        return width, height
+    return _of_jpeg(data) if data.startswith(JPEG) else None
+
+
+def _of_jpeg(data: bytes) -> tuple[int, int] | None:
+    at = len(JPEG)
+    while at + 9 <= len(data) and data[at] == FILL:
+        marker = data[at + 1]
+        if marker == FILL:
+            at += 1
+        elif marker in SIZE_OF_FRAME:
+            height, width = struct.unpack_from(">HH", data, at + 5)
+            return width, height
+        elif marker in BEFORE_IT:
+            at += 2 + int.from_bytes(data[at + 2 : at + 4], "big")
+        else:
+            break
+    return None
