@@ -10,23 +10,24 @@ from aiohttp import web
 from pydantic import Field, model_validator
 
 from mavproxy_uavapi.errors import BadRequest
-from mavproxy_uavapi.http.call import Call
-from mavproxy_uavapi.http.requests import NED_REACH, Blocking, Empty, Number, Request
+from mavproxy_uavapi.http.call import Call, in_time
+from mavproxy_uavapi.http.requests import NED_REACH, Blocking, Empty, Number, Request, Written
 from mavproxy_uavapi.http.responses import envelope
 from mavproxy_uavapi.http.routes import EITHER, POST, Route
 from mavproxy_vision.annotate import annotated, jpeg
-from mavproxy_vision.camera import Posted, decode
+from mavproxy_vision.camera import Image, Posted, decode
 from mavproxy_vision.console import caption, status
-from mavproxy_vision.errors import NoCamera
-from mavproxy_vision.flights import Flights
+from mavproxy_vision.errors import BadImage, NoCamera
+from mavproxy_vision.flights import Flights, Sortie
 from mavproxy_vision.mission import Errand
 from mavproxy_vision.settings import METHODS
-from mavproxy_vision.vision import Vision, in_view
+from mavproxy_vision.sighting import Seen
+from mavproxy_vision.vision import FRESH, Vision, in_view
 
 BOUNDARY = "frame"
 FRAME_TIMEOUT = 5.0  # s without a frame until a stream ends
 
-TagId = Annotated[int | None, Field(ge=0, le=100_000, description="of the tag; none for the main tag")]
+TagId = Annotated[int | None, Field(ge=0, le=100_000, description="of the tag; none for the main tag"), Written]
 Method = Annotated[str | None, Field(pattern=f"^({'|'.join(METHODS)})$", description="none for the setting")]
 
 
@@ -41,7 +42,7 @@ class SearchRequest(Blocking):
     """`id` of the tag; `leash` m that the search may go away."""
 
     id: TagId = None
-    leash: Annotated[float | None, Field(gt=0, le=500)] = None
+    leash: Annotated[float | None, Field(gt=0, le=500), Written] = None
 
 
 class MissionRequest(Blocking):
@@ -68,13 +69,13 @@ class MissionRequest(Blocking):
 class StreamRequest(Request):
     """`rate` frames per second at most."""
 
-    rate: Annotated[float, Field(gt=0, le=60)] = 10
+    rate: Annotated[float, Field(gt=0, le=60), Written] = 10
 
 
 class FrameRequest(Request):
     """`latency` ms from light to arrival; none for the setting."""
 
-    latency: Annotated[float | None, Field(ge=0, le=10_000)] = None
+    latency: Annotated[float | None, Field(ge=0, le=10_000), Written] = None
 
 
 class Pages:
@@ -90,7 +91,7 @@ class Pages:
             Route("/vision/tags", self.tags, Empty),
             Route("/vision/frame.jpg", self.frame, Empty),
             Route("/vision/stream.mjpg", self.stream, StreamRequest),
-            Route("/vision/frame", self.post_frame, FrameRequest, POST, raw=True),
+            Route("/vision/frame", self.post_frame, FrameRequest, POST, raw=True, trail=False),
             Route("/vision/land", self.land, LandRequest, POST, job=True),
             Route("/vision/search", self.search, SearchRequest, POST, job=True),
             Route("/vision/mission", self.mission, MissionRequest, POST, job=True),
@@ -121,17 +122,26 @@ class Pages:
     async def newest_frame(self) -> bytes:
         """The newest frame as it came, as JPEG: what take_photo answers with `command=vision`."""
         self.vision.require_camera()
-        image = self.vision.image
-        if image is None:
-            raise NoCamera("there is no frame yet")
+        _, image = self._newest()
         return await asyncio.get_running_loop().run_in_executor(None, jpeg, image)
 
-    async def _picture(self) -> bytes:
-        vision = self.vision
-        seen, image = vision.seen, vision.image
-        if seen is None or image is None:
+    def _newest(self) -> tuple[Seen, Image]:
+        """The newest frame, and what was seen in it.
+
+        Raises:
+            NoCamera: there is none yet, or it is old: only a folder's frames keep.
+        """
+        seen, image, worker = self.vision.seen, self.vision.image, self.vision.worker
+        if seen is None or image is None or worker is None:
             raise NoCamera("there is no frame yet")
-        lines = caption(vision, self.flights)
+        age = self.vision.host.clock() - seen.received_at
+        if age > FRESH and worker.source.live:
+            raise NoCamera(f"the newest frame is {age:.1f} s old; the camera: {self.vision.health.state}")
+        return seen, image
+
+    async def _picture(self) -> bytes:
+        seen, image = self._newest()
+        lines = caption(self.vision, self.flights)
         loop = asyncio.get_running_loop()
         return await loop.run_in_executor(None, lambda: jpeg(annotated(image, seen, lines)))
 
@@ -156,13 +166,15 @@ class Pages:
     async def post_frame(self, call: Call) -> dict[str, Any]:
         """Take a frame: the body is a JPEG or PNG; source `http`."""
         worker = self.vision.worker
-        source = None if worker is None else worker.source
-        if not isinstance(source, Posted):
+        if worker is None or not isinstance(worker.source, Posted):
             raise BadRequest("frames are taken with `vision set source http` only")
-        data = await call.request.read()
+        data = await in_time(call.request.read())
         image = await asyncio.get_running_loop().run_in_executor(None, decode, data)
         latency = call.params(FrameRequest).latency
-        source.post(image, None if latency is None else latency / 1000)
+        worker.source.post(image, None if latency is None else latency / 1000)
+        why_not = worker.detector.model.misfit(image.shape[1], image.shape[0])
+        if why_not:  # posted all the same: the status says so too
+            raise BadImage(why_not)
         return self._answer("Frame taken")
 
     # -- flying --------------------------------------------------------------------------------------------
