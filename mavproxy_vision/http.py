@@ -18,7 +18,7 @@ from mavproxy_vision.annotate import annotated, jpeg
 from mavproxy_vision.camera import Image, Posted, decode
 from mavproxy_vision.console import caption, status
 from mavproxy_vision.errors import BadImage, NoCamera
-from mavproxy_vision.flights import Flights, Sortie
+from mavproxy_vision.flights import Flights
 from mavproxy_vision.mission import Errand
 from mavproxy_vision.settings import METHODS
 from mavproxy_vision.sighting import Seen
