@@ -69,7 +69,7 @@ def report(vision: Vision, flights: Flights) -> str:
         lines.append(f"detector {told['detector_ms']} ms, newest frame {1000 * told['frame_age_s']:.0f} ms old")
     if flights.report is not None:
         flight = flights.report
-        what = flights.phase if flights.running else flight.reason or flights.result()
+        what = flights.phase if flights.running else flight.reason or flight.line()
         lines.append(f"{flight.verb}: {what}; attempt {flight.attempts}, {flight.duration:.0f} s")
     return "\n".join(lines)
 

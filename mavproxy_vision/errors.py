@@ -13,7 +13,7 @@ UavApiError
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable
 from typing import Any
 
 from mavproxy_uavapi.errors import Aborted, BadRequest, Invalid, Unavailable
@@ -24,12 +24,17 @@ class LandingFailed(Aborted):
 
     Args:
         sentence: why.
-        report: what was tried, and what was done instead.
+        tell: tells what was tried, and what was done instead: all of it, once the flight is over.
     """
 
-    def __init__(self, sentence: str, report: Mapping[str, Any]) -> None:
+    def __init__(self, sentence: str, tell: Callable[[], dict[str, Any]]) -> None:
         super().__init__(sentence)
-        self.report = dict(report)
+        self._tell = tell
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """What was tried, and what was done instead."""
+        return self._tell()
 
     def extras(self) -> dict[str, Any]:
         """`info`: the report."""

@@ -26,12 +26,12 @@ class Wanted:
     Attributes:
         family: the tags' family.
         tags: the tags that tell where the target is, by id.
-        ground: m by which the target lies higher than home.
+        floor: of the target's ground, m down of the EKF origin.
     """
 
     family: str
     tags: Mapping[int, Tag]
-    ground: float = 0.0
+    floor: float = 0.0
 
 
 class Fixer:
@@ -46,20 +46,19 @@ class Fixer:
     def __init__(self, model: CameraModel, mount: Mount, wanted: Wanted) -> None:
         self.model, self.mount, self.wanted = model, mount, wanted
 
-    def fixes(self, seen: Seen, history: History, clock: VehicleClock, home_down: float) -> list[Fix]:
+    def fixes(self, seen: Seen, history: History, clock: VehicleClock) -> list[Fix]:
         """The fixes of one frame; none when nobody knows where the vehicle was at its capture time.
 
         Args:
             seen: the frame's outcome.
             history: of the vehicle.
             clock: host time to vehicle time.
-            home_down: home in m down of the EKF origin.
         """
         at = clock.vehicle(seen.captured_at)
         attitude, motion = history.attitude(at), history.motion(at)
         if attitude is None or motion is None:
             return []
-        height = home_down - float(motion.position[2]) - self.wanted.ground
+        height = self.wanted.floor - float(motion.position[2])
         found = []
         for sighting in seen.sightings:
             tag = self.wanted.tags.get(sighting.id)

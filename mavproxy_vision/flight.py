@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from typing import Any
+from collections.abc import Awaitable, Callable, Iterator
+from typing import TYPE_CHECKING, Any
 
-from pymavlink import mavutil
-
-from mavproxy_uavapi.errors import Invalid, LinkLost, ModeChanged, Superseded
+from mavproxy_uavapi.errors import Invalid, LinkLost, Rejected, Stale, Superseded
 from mavproxy_uavapi.vehicle import messages
 from mavproxy_uavapi.vehicle.copter import Copter
 from mavproxy_uavapi.vehicle.jobs import Job
@@ -16,8 +15,8 @@ from mavproxy_uavapi.vehicle.modes import mode_number
 from mavproxy_vision.errors import LandingFailed
 from mavproxy_vision.geometry import Vector
 from mavproxy_vision.history import Motion
-from mavproxy_vision.landing import BLIND_BELOW, COAST, REST, Landing, Order, Phase, Plan
-from mavproxy_vision.plnd import PrecisionLanding, landing_target
+from mavproxy_vision.landing import REST, Landing, Order, Phase, Plan
+from mavproxy_vision.plnd import PrecisionLanding
 from mavproxy_vision.rates import FLIGHT
 from mavproxy_vision.report import Report
 from mavproxy_vision.search import step_for
@@ -26,41 +25,68 @@ from mavproxy_vision.tags import FAMILIES, Tag
 from mavproxy_vision.target import Target
 from mavproxy_vision.vision import Vision
 
-mavlink = mavutil.mavlink
+if TYPE_CHECKING:
+    from mavproxy_vision.descent import Descent
 
 PERIOD = 0.05  # s of the vehicle's clock between two setpoints
-SHORTEST = 0.01  # s of ours
+SHORTEST = 0.03  # s of ours, whatever the camera's rate and the vehicle's clock
 STALE = 0.5  # s of the vehicle's clock without telemetry until it rests
+UNTOLD = 10.0  # s of it until a landing is given up
 BLIND = 5.0  # s without a frame until a landing is given up
-PLND_LOST = 1.2  # s without a sighting until we take the vehicle back from LAND
-PLND_HEARD = 3.0  # s until the autopilot must have said that it has a target
+FIRST = 3.0  # s of ours for the first telemetry
 FINAL = 1.3  # of the height at which the tag fills the view
 LOWEST_FINAL = 0.4  # m
 DEPENDABLE = 0.85  # of the detection range
-DISARM = 60.0  # s for the autopilot to land from low and disarm
+DID = {"rtl": "returned to launch", "land": "landed in place", "hold": "the vehicle holds"}
 
 
 class Flight:
     """A flight that is under way.
+
+    Attributes:
+        autopilot: the mode in which the autopilot flies for us just now (LAND, RTL), None in GUIDED.
+        plnd: the vehicle's precision landing, when this flight has touched it.
+        phase: what it is doing.
+        ended: set when it is over, and has sent its last message.
 
     Args:
         vision: the eye.
         vehicle: what carries it.
         job: who flies.
         report: filled in on the way.
+        succeed: awaits the end of the flight of ours that had the vehicle.
     """
 
-    def __init__(self, vision: Vision, vehicle: Copter, job: Job, report: Report) -> None:
+    def __init__(
+        self,
+        vision: Vision,
+        vehicle: Copter,
+        job: Job,
+        report: Report,
+        succeed: Callable[[Flight], Awaitable[None]],
+    ) -> None:
         self.vision, self.vehicle, self.job, self.report = vision, vehicle, job, report
         self.plnd: PrecisionLanding | None = None
         self.phase = "on its way"
-        self._in_land = False
+        self.autopilot: str | None = None
+        self.ended = asyncio.Event()
+        self._succeed = succeed
+        self._floor = 0.0  # of the target's ground, m down of the EKF origin: as it was when the flight began
+        self._sent_at = vision.host.clock()
         # Number of the frame whose way to a setpoint was timed last; what is there before the flight waited for it.
         self._timed = 0 if vision.seen is None else vision.seen.number
 
+    async def take_over(self) -> None:
+        """Take the vehicle; a flight of ours that had it has ended then, and given back what it had changed.
+
+        To be called when nothing is left that would refuse the flight.
+        """
+        self.vehicle.seat.take(self.job)
+        await self._succeed(self)
+
     # -- verbs ---------------------------------------------------------------------------------------------
 
-    async def land(self, number: int | None, method: str) -> None:
+    async def land(self, number: int | None, method: str, way_down: Callable[[Flight], Descent]) -> None:
         """Land on the tag from wherever the vehicle is; done when it stands on it, disarmed.
 
         A camera that gives no frames is a refusal at first, and a failure like that of a lost tag later.
@@ -72,21 +98,15 @@ class Flight:
         self.vehicle.require_guided_flight()
         if self.report.verb == "land":
             self.vision.require_camera()
-        self.vehicle.seat.take(self.job)
-        tags = await self._tags(number)
-        main = next(iter(tags.values()))
-        self.report.tag, self.report.method = main.id, method
-        began = self.vision.now()
-        try:
-            with self._watched(tags) as target:
-                landing = Landing(self._plan(tags, method != "landing_target"), target)
-                if method == "landing_target":
-                    await self._land_by_plnd(landing, target)
-                else:
-                    await self._land_by_velocity(landing)
-        finally:
-            self.report.duration = self.vision.now() - began
-        self.report.touchdown_error = self.vision.touchdown_error(main.id)
+        tags = self.tags(number)
+        await self.take_over()
+        with self._watched(), self._lasting():
+            await self._look_for(tags)
+            self.report.tag, self.report.method = next(iter(tags)), method
+            descend = way_down(self)
+            with self.vision.aimed_at(tags, self._floor) as target:
+                await descend(Landing(self._plan(tags, descend.by_velocity), target))
+            self.report.touchdown_error = self.vision.touchdown_error(self.report.tag)
 
     async def search(self, number: int | None, leash: float | None) -> None:
         """Fly an expanding square until the tag is in sight, and stay above where it was seen.
@@ -96,19 +116,19 @@ class Flight:
         """
         self.vehicle.require_guided_flight()
         self.vision.require_camera()
-        self.vehicle.seat.take(self.job)
-        tags = await self._tags(number)
-        self.report.tag = next(iter(tags))
-        plan = self._plan(tags, False, attempts=1000, leash=leash or self.vision.settings.leash)
-        began = self.vision.now()
-        with self._watched(tags) as target:
-            order = await self._fly(Landing(plan, target))
-            await self._send(REST)
-            self.report.duration = self.vision.now() - began
-            if order.phase is Phase.FAILED:
-                self.report.action = "hold"
-                raise self._failed(order.reason)
-            self.report.place = self._place_of(target)
+        tags = self.tags(number)
+        await self.take_over()
+        with self._watched(), self._lasting():
+            await self._look_for(tags)
+            self.report.tag = next(iter(tags))
+            plan = self._plan(tags, False, attempts=1000, leash=leash or self.vision.settings.leash)
+            with self.vision.aimed_at(tags, self._floor) as target:
+                order = await self.fly(Landing(plan, target))
+                await self.send(REST)
+                if order.phase is Phase.FAILED:
+                    self.report.action = "hold"
+                    raise self._failed(order.reason)
+                self.report.place = self._place_of(target)
 
     def _place_of(self, target: Target) -> tuple[float, float, float] | None:
         """The target in m NED from the EKF origin."""
@@ -121,23 +141,52 @@ class Flight:
     # -- what they share -----------------------------------------------------------------------------------
 
     @contextlib.contextmanager
-    def _watched(self, tags: dict[int, Tag]) -> Any:
-        with self.vision.rates.at(FLIGHT):
-            try:
-                yield self.vision.aim(tags)
-            finally:
-                self.vision.aim_no_more()
+    def _watched(self) -> Iterator[None]:
+        with self.vision.carried_by(self.vehicle.state.system), self.vision.rates.at(FLIGHT):
+            yield
 
-    async def _tags(self, number: int | None) -> dict[int, Tag]:
+    @contextlib.contextmanager
+    def _lasting(self) -> Iterator[None]:
+        began = self.vision.now()
+        try:
+            yield
+        finally:
+            self.report.duration = self.vision.now() - began
+
+    def tags(self, number: int | None) -> dict[int, Tag]:
+        """The tags that tell where the target is, the main one first.
+
+        Raises:
+            Invalid: the family has no such id.
+        """
         settings = self.vision.settings
         tags = settings.tag_list
         if number is None or number == tags[0].id:
             return {tag.id: tag for tag in tags}
         if number >= FAMILIES[settings.families[0]][1]:
             raise Invalid(f"{settings.families[0]} has no id {number}", "body", "id")
-        await self.vision.want(number)
         size = next((tag.size for tag in tags if tag.id == number), tags[0].size)
         return {number: Tag(number, size)}
+
+    async def _look_for(self, tags: dict[int, Tag]) -> None:
+        """Have the detector look for them, and wait for the first telemetry.
+
+        Raises:
+            Stale: none came.
+        """
+        for number in tags:
+            await self.vision.want(number)
+        vision, deadline = self.vision, self.vision.host.clock() + FIRST
+        while vision.floor is None or vision.history.motion(vision.now()) is None:
+            if vision.host.clock() > deadline:
+                raise Stale(f"vehicle {vision.system} has not told where it is for {FIRST:g} s")
+            await self.pause()
+        self._floor = vision.floor
+        self.vehicle.held_by("GUIDED")
+
+    def height(self, motion: Motion) -> float:
+        """Metres above the target's ground."""
+        return self._floor - float(motion.position[2])
 
     def _plan(self, tags: dict[int, Tag], descend: bool, **changes: Any) -> Plan:
         settings, model = self.vision.settings, self.vision.settings.model
@@ -146,7 +195,7 @@ class Flight:
         smallest = min(tag.size for tag in tags.values())
         reach = DEPENDABLE * model.detection_range(largest, cells)
         motion = self.vision.history.last_motion
-        here = self.vision.height(float(motion.position[2])) if motion is not None else reach
+        here = self.height(motion) if motion is not None else reach
         offset = settings.camera_mount.offset[2]
         final = max(FINAL * model.clip_height(smallest) + offset, LOWEST_FINAL)
         known = {
@@ -163,30 +212,37 @@ class Flight:
         }
         return Plan(**{**known, **changes})
 
-    async def _fly(self, landing: Landing) -> Order:
+    def motion(self, now: float) -> Motion | None:
+        """Where the vehicle is; None when nobody knows."""
+        if now - self.vision.history.newest > STALE:
+            return None
+        return self.vision.history.motion(now)
+
+    async def fly(self, landing: Landing) -> Order:
         """Send setpoints as the landing wants them until it is to touch down, or has failed."""
         vision, vehicle = self.vision, self.vehicle
-        blind_since: float | None = None
+        blind, untold = Since(), Since()
+        if landing.began is None:
+            landing.begin(vision.now())
         while True:
             vehicle.held_by("GUIDED")
             now = vision.now()
-            motion = vision.history.motion(now)
-            if motion is None or now - vision.history.newest > STALE:
-                await self._send(REST)  # nobody knows where it is; should it hear us, it shall rest
+            motion = self.motion(now)
+            if untold(motion is None, now) > UNTOLD:
+                return landing.fail(f"the vehicle has not told where it is for {UNTOLD:g} s")
+            if motion is None:
+                await self.send(REST)  # nobody knows where it is; should it hear us, it shall rest
             else:
-                if vision.health.state in ("ok", "starting"):
-                    blind_since = None
-                elif blind_since is None:
-                    blind_since = now
-                elif now - blind_since > BLIND and landing.phase is not Phase.LAST_METRE:
-                    landing.fail(f"the camera: {vision.health.state}")
-                order = landing.step(now, motion, vision.height(float(motion.position[2])))
-                self._note(landing, motion)
+                state = vision.health.state
+                if blind(state not in ("ok", "starting"), now) > BLIND and landing.phase is not Phase.LAST_METRE:
+                    landing.fail(f"the camera: {state}")
+                order = landing.step(now, motion, self.height(motion))
+                self.note(landing, motion)
                 if order.phase in (Phase.LAND, Phase.FAILED):
                     return order
-                await self._send(order.velocity)
+                await self.send(order.velocity)
                 self._time_latency()
-            await self._pause()
+            await self.pause()
 
     def _time_latency(self) -> None:
         """Note how long the newest frame took from its arrival to the first setpoint that knows it."""
@@ -195,161 +251,105 @@ class Flight:
             self._timed = seen.number
             self.vision.latencies.append(self.vision.host.clock() - seen.received_at)
 
-    async def _pause(self) -> None:
+    async def pause(self) -> None:
         """Until the next setpoint is due, or a frame was looked at.
 
         Raises:
             LinkLost: the vehicle's heartbeats stopped.
         """
+        clock = self.vision.host.clock
         seconds = max(PERIOD / max(self.vehicle.state.time_ratio.ratio, 0.1), SHORTEST)
         with contextlib.suppress(asyncio.TimeoutError):
             await asyncio.wait_for(self.vision.changed.wait(), seconds)
+        await asyncio.sleep(max(self._sent_at + SHORTEST - clock(), 0.0))
         if not self.vision.host.is_alive(self.vehicle.state):
-            silent = self.vision.host.clock() - self.vehicle.state.heartbeat_at
-            raise LinkLost.since(self.vehicle.state.system, silent)
+            raise LinkLost.since(self.vehicle.state.system, clock() - self.vehicle.state.heartbeat_at)
 
-    def _note(self, landing: Landing, motion: Motion) -> None:
+    def note(self, landing: Landing, motion: Motion) -> None:
+        """Write down how far it is."""
         report = self.report
         report.attempts, report.last_offset = landing.attempt, landing.offset
         report.phases = dict(landing.phases)
-        self.phase = "landing by LANDING_TARGET" if self._in_land else landing.phase.value
-        height = self.vision.height(float(motion.position[2]))
-        self.job.progress = {"altitude": round(height, 2), "attempt": float(landing.attempt)}
+        self.phase = "landing by LANDING_TARGET" if self.autopilot else landing.phase.value
+        self.job.progress = {"altitude": round(self.height(motion), 2), "attempt": float(landing.attempt)}
         if landing.offset is not None:
             self.job.progress["offset"] = round(landing.offset, 3)
 
-    async def _send(self, velocity: Vector) -> None:
+    async def send(self, velocity: Vector) -> None:
+        """Send a velocity (m/s NED) to a vehicle that is still in GUIDED."""
         self.vehicle.held_by("GUIDED")
         attitude = self.vision.history.attitude(self.vision.now())
-        await self.vehicle.link.send(
-            setpoint(self.vehicle.address, velocity, None if attitude is None else attitude.yaw),
-            self.vehicle.state.system,
-        )
+        yaw = None if attitude is None else attitude.yaw
+        self._sent_at = self.vision.host.clock()
+        await self.vehicle.link.send(setpoint(self.vehicle.address, velocity, yaw), self.vehicle.state.system)
+
+    async def fly_by(self, mode: str, verb: Callable[[Job], Awaitable[None]]) -> None:
+        """Let the autopilot fly in a mode of its own, until that is done."""
+        self.autopilot = mode
+        await verb(self.job)
+        self.autopilot = None
+
+    # -- when it fails -------------------------------------------------------------------------------------
 
     def _failed(self, reason: str) -> LandingFailed:
         self.report.reason = reason
-        did = {"rtl": "returned to launch", "land": "landed in place", "hold": "the vehicle holds"}
-        done = f"; {did[self.report.action]}" if self.report.action else ""
-        return LandingFailed(f"{reason}{done}", self.report.told())
+        done = f"; {DID[self.report.action]}" if self.report.action else ""
+        return LandingFailed(f"{reason}{done}", self.report.told)
 
-    async def _give_up(self, landing: Landing, reason: str) -> None:
+    async def give_up(self, landing: Landing, reason: str) -> None:
         """What the settings say for a landing that failed, then the error."""
         action = self.vision.settings.on_failure
         if landing.refused and self.report.verb == "land":
             action = "hold"  # nothing was wrong with where it is
         self.report.action = action
+        await self.send(REST)
         if self.plnd is not None:
-            await self.plnd.put_back()  # it would act in RTL too
+            try:
+                await self.plnd.switch_off()  # it would act in RTL too
+            except Rejected as error:
+                reason = f"{reason} ({error})"
         self.vehicle.held_by("GUIDED")
         if action == "rtl":
-            await self.vehicle.rtl(self.job)
+            await self.fly_by("RTL", self.vehicle.rtl)
         elif action == "land":
-            await self.vehicle.land(self.job)
+            await self.fly_by("LAND", self.vehicle.land)
         else:
-            await self._send(REST)
+            await self.send(REST)
         raise self._failed(reason)
 
-    # -- by velocities ---------------------------------------------------------------------------------------
+    # -- the end -------------------------------------------------------------------------------------------
 
-    async def _land_by_velocity(self, landing: Landing) -> None:
-        order = await self._fly(landing)
-        if order.phase is Phase.FAILED:
-            await self._give_up(landing, order.reason)
-        self.vehicle.held_by("GUIDED")
-        self.phase = Phase.LAND.value
-        await self.vehicle.land(self.job)
-
-    # -- by LANDING_TARGET -----------------------------------------------------------------------------------
-
-    async def _land_by_plnd(self, landing: Landing, target: Target) -> None:
-        self.plnd = PrecisionLanding(self.vehicle)
-        try:
-            await self.plnd.set_up()
-            await self._descend_by_plnd(landing, target)
-        except asyncio.CancelledError:
-            raise  # it may not wait any more: see `parting`
-        except Exception:
-            await self._put_back()
-            raise
-        await self._put_back()
-
-    async def _descend_by_plnd(self, landing: Landing, target: Target) -> None:
-        while True:
-            order = await self._fly(landing)
-            if order.phase is Phase.FAILED:
-                await self._give_up(landing, order.reason)
-            await self._be_heard(target)
-            if await self._follow_down(landing, target):
-                return
-
-    async def _put_back(self) -> None:
-        if self.plnd is not None and self.vision.host.is_alive(self.vehicle.state):
-            await self.plnd.put_back()
-
-    async def _be_heard(self, target: Target) -> None:
-        """Send targets until the autopilot says that it has one."""
-        vision, began = self.vision, self.vision.host.clock()
-        ratio = max(self.vehicle.state.time_ratio.ratio, 0.1)
-        while vision.host.clock() - began < max(PLND_HEARD / ratio, 1.0):
-            await self._tell_target(target)
-            await self._send(REST)
-            if any("Target Found" in text for text in self.vehicle.state.said_since(began - 30.0)):
-                return
-            await self._pause()
-        # It says so once only for a target that it did not lose meanwhile: go on, and see whether it follows.
-
-    async def _follow_down(self, landing: Landing, target: Target) -> bool:
-        """Let LAND fly and tell it where the target is: True when disarmed, False when it was taken back."""
-        vehicle, vision = self.vehicle, self.vision
-        vehicle.held_by("GUIDED")
-        self._in_land = True
-        await vehicle.switch_to("LAND")
-        try:
-            while vehicle.state.armed is not False:
-                if vehicle.mode != "LAND":
-                    raise ModeChanged(f"the vehicle left LAND: it is in {vehicle.mode} now")
-                now = vision.now()
-                motion = vision.history.motion(now)
-                if motion is not None and target.place is not None:
-                    above = float(target.place[2] - motion.travelled[2])
-                    landing.offset = float(((target.place - motion.travelled)[:2] ** 2).sum() ** 0.5)
-                    self._note(landing, motion)
-                    if above > BLIND_BELOW and (target.age(now) > PLND_LOST or target.contradiction):
-                        await vehicle.switch_to("GUIDED")
-                        landing.resume(now, motion, vision.height(float(motion.position[2])))
-                        return False
-                    if target.age(now) <= COAST or above <= BLIND_BELOW:
-                        await self._tell_target(target)
-                await self._pause()
-            return True
-        finally:
-            self._in_land = False
-
-    async def _tell_target(self, target: Target) -> None:
-        vision = self.vision
-        now = vision.now()
-        motion, attitude = vision.history.motion(now), vision.history.attitude(now)
-        if motion is None or attitude is None or target.place is None:
-            return
-        message = landing_target(now, target.place - motion.travelled, attitude)
-        await self.vehicle.link.send(message, self.vehicle.state.system)
-
-    # -- the end -----------------------------------------------------------------------------------------------
+    @property
+    def is_ours(self) -> bool:
+        """Whether the vehicle flies, and flies for this flight: no pilot has it, and no newer command."""
+        vehicle = self.vehicle
+        if isinstance(self.job.error, Superseded) or vehicle.seat.job is not self.job:
+            return False
+        in_air = vehicle.state.armed and not vehicle.state.landed
+        return bool(in_air) and vehicle.mode in ("GUIDED", self.autopilot)
 
     def parting(self) -> list[Any]:
-        """What makes the vehicle hold, and puts its parameters back, when this flight is ended from outside.
-
-        Nothing for a vehicle that is no longer ours: the pilot has it, or a newer command.
-        """
-        vehicle, found = self.vehicle, []
-        if self.plnd is not None:
-            found += self.plnd.remaining()
-            self.plnd.before.clear()
-        if isinstance(self.job.error, Superseded) or vehicle.seat.job is not self.job or not vehicle.state.armed:
+        """What ends it from outside: gives its parameters back, and makes a vehicle that is ours hold."""
+        vehicle = self.vehicle
+        found = [] if self.plnd is None else self.plnd.remaining()
+        if not self.is_ours:
             return found
-        if vehicle.mode == "GUIDED":
-            found.append(setpoint(vehicle.address, REST, None))
-        elif vehicle.mode == "LAND" and self._in_land:
+        if self.autopilot is not None:
             guided = messages.set_mode(mode_number(vehicle.state.vehicle_type, "GUIDED"))
             found.append(guided.to(vehicle.address, 0))
-        return found
+        return [*found, setpoint(vehicle.address, REST, None)]
+
+
+class Since:
+    """How long something has been so without a break."""
+
+    def __init__(self) -> None:
+        self._since: float | None = None
+
+    def __call__(self, so: bool, now: float) -> float:
+        """Seconds for which it has been so, at `now` (s)."""
+        if not so:
+            self._since = None
+        elif self._since is None:
+            self._since = now
+        return 0.0 if self._since is None else now - self._since

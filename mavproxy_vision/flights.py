@@ -1,31 +1,105 @@
-"""The flights of this module as jobs: begun at the prompt or by HTTP, one at a time for a vehicle."""
+"""The flights of this module as jobs: begun at the prompt or by HTTP, one at a time."""
 
 from __future__ import annotations
 
 import asyncio
-import math
 import time
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
 
+import cv2
+
 from mavproxy_uavapi.errors import Aborted, NotSupported, UavApiError
 from mavproxy_uavapi.host.state import VehicleState
 from mavproxy_uavapi.vehicle.copter import Copter
-from mavproxy_uavapi.vehicle.geodesy import METRES_PER_DEGREE
 from mavproxy_uavapi.vehicle.jobs import CONSOLE, Job
 from mavproxy_vision import mission
+from mavproxy_vision.descent import Descent, PrecisionDescent
 from mavproxy_vision.flight import Flight
 from mavproxy_vision.mission import Errand
+from mavproxy_vision.plnd import PrecisionLanding
 from mavproxy_vision.report import Report
 from mavproxy_vision.track import Track
 from mavproxy_vision.vision import Vision
 
-Verb = Callable[[Job], Awaitable[None]]
+TIDY_EVERY = 1.0  # s between two tries to give parameters back
+
+
+class Sortie:
+    """A flight that is asked for: the body of a job, and what it tells of itself.
+
+    Args:
+        flights: to which it belongs.
+        copter: what flies.
+        name: the verb, for the report.
+        fly: flies it.
+    """
+
+    def __init__(self, flights: Flights, copter: Copter, name: str, fly: Callable[[Flight], Awaitable[None]]) -> None:
+        self._flights, self._copter, self._fly = flights, copter, fly
+        self.report = Report(name)
+        self.begun = False
+
+    async def __call__(self, job: Job) -> None:
+        """Fly it, as that job."""
+        self.begun = True
+        flight = Flight(self._flights.vision, self._copter, job, self.report, self._flights.succeed)
+        try:
+            await self._fly(flight)
+        except UavApiError as error:
+            self.report.reason = str(error)
+            raise
+        except BaseException:  # ended from outside, or a defect of ours: the vehicle is not left flying
+            for message in flight.parting():
+                await self._copter.link.send(message, self._copter.state.system)
+            raise
+        finally:
+            self._flights.over(flight)
+
+    def result(self) -> str:
+        """One line about the flight, which ended well."""
+        return self.report.line()
+
+
+class ErrandSortie(Sortie):
+    """A whole mission, with its track.
+
+    Args:
+        flights: to which it belongs.
+        copter: what flies.
+        errand: where to.
+    """
+
+    def __init__(self, flights: Flights, copter: Copter, errand: Errand) -> None:
+        way_down = flights.way_down(errand.method)
+        super().__init__(flights, copter, "mission", lambda flight: mission.fly(flight, errand, way_down))
+        self._errand, self._track = errand, Track()
+
+    async def __call__(self, job: Job) -> None:
+        """Fly it, and write down its track when it is over."""
+        listeners = self._flights.vision.host.listeners
+        listeners.append(self._follow)
+        try:
+            await super().__call__(job)
+        finally:
+            listeners.remove(self._follow)
+            home = self._copter.state.messages.get("HOME_POSITION")
+            if home is not None:
+                where = home.message.latitude / 1e7, home.message.longitude / 1e7
+                self._track.target = self._errand.place(where)
+            await self._flights.keep(self._track, self.report)
+
+    def _follow(self, state: VehicleState, message: Any, _now: float) -> None:
+        if state is self._copter.state and message.get_type() == "GLOBAL_POSITION_INT":
+            self._track.add(message)
 
 
 class Flights:
     """What is in flight, and what the last flight told. All methods belong to the asyncio thread.
+
+    Attributes:
+        report: of the flight under way, or the last one.
 
     Args:
         vision: the eye.
@@ -37,83 +111,77 @@ class Flights:
         self.report: Report | None = None
         self._directory = directory
         self._flight: Flight | None = None
-        self._ends: set[asyncio.Task[None]] = set()
+        self._plnd: dict[int, PrecisionLanding] = {}
+        self._tasks: set[asyncio.Task[None]] = set()
 
     def copter(self) -> Copter:
-        """The vehicle. Raises NoVehicle, LinkLost, NotSupported."""
+        """MAVProxy's current vehicle. Raises NoVehicle, LinkLost, NotSupported."""
         return copter_of(self.vision.vehicle())
 
-    # -- verbs, to be run as jobs ----------------------------------------------------------------------------
+    # -- flights, to be run as jobs --------------------------------------------------------------------------
 
-    def landing(self, copter: Copter, number: int | None, method: str) -> Verb:
+    def landing(self, copter: Copter, number: int | None, method: str) -> Sortie:
         """Land on a tag from here."""
-        return self._verb("land", copter, lambda flight: flight.land(number, method))
+        way_down = self.way_down(method)
+        return Sortie(self, copter, "land", lambda flight: flight.land(number, method, way_down))
 
-    def searching(self, copter: Copter, number: int | None, leash: float | None) -> Verb:
+    def searching(self, copter: Copter, number: int | None, leash: float | None) -> Sortie:
         """Find a tag from here."""
-        return self._verb("search", copter, lambda flight: flight.search(number, leash))
+        return Sortie(self, copter, "search", lambda flight: flight.search(number, leash))
 
-    def errand(self, copter: Copter, errand: Errand) -> Verb:
+    def errand(self, copter: Copter, errand: Errand) -> Sortie:
         """A whole mission, with its track."""
+        return ErrandSortie(self, copter, errand)
 
-        async def fly(flight: Flight) -> None:
-            track = Track()
+    def way_down(self, method: str) -> Callable[[Flight], Descent]:
+        """What descends by that method."""
+        if method != "landing_target":
+            return Descent
 
-            def follow(state: VehicleState, message: Any, _now: float) -> None:
-                if state is copter.state and message.get_type() == "GLOBAL_POSITION_INT":
-                    track.add(message)
+        def by_plnd(flight: Flight) -> Descent:
+            vehicle = flight.vehicle
+            plnd = self._plnd.get(vehicle.state.system)
+            if plnd is None or plnd.vehicle is not vehicle:
+                plnd = self._plnd[vehicle.state.system] = PrecisionLanding(vehicle)
+            return PrecisionDescent(flight, plnd)
 
-            self.vision.host.listeners.append(follow)
-            try:
-                await mission.fly(flight, errand)
-            finally:
-                self.vision.host.listeners.remove(follow)
-                track.target = await self._target(flight, errand)
-                await self._keep(track, flight.report)
+        return by_plnd
 
-        return self._verb("mission", copter, fly)
+    async def succeed(self, flight: Flight) -> None:
+        """Make it the flight under way, and await the end of the one before."""
+        before, self._flight = self._flight, flight
+        self.report = flight.report
+        if before is not None and before is not flight:
+            before.job.abort(
+                Aborted(f"{flight.job.verb} took over")
+            )  # of another vehicle; ours lost its seat already
+            await before.ended.wait()
 
-    def _verb(self, name: str, copter: Copter, fly: Callable[[Flight], Awaitable[None]]) -> Verb:
-        async def verb(job: Job) -> None:
-            self.report = Report(name)
-            flight = self._flight = Flight(self.vision, copter, job, self.report)
-            try:
-                await fly(flight)
-            except asyncio.CancelledError:
-                for message in flight.parting():
-                    await copter.link.send(message, copter.state.system)
-                raise
-            except UavApiError as error:
-                flight.report.reason = str(error)
-                raise
-            finally:
-                if self._flight is flight:
-                    self._flight = None
+    def over(self, flight: Flight) -> None:
+        """It has sent its last message."""
+        if self._flight is flight:
+            self._flight = None
+        flight.ended.set()
+        if flight.plnd is not None and flight.plnd.before:
+            self._do(self._tidy(flight.plnd))
 
-        return verb
-
-    async def _target(self, flight: Flight, errand: Errand) -> tuple[float, float] | None:
-        home = flight.vehicle.state.messages.get("HOME_POSITION")
-        if errand.lat is not None and errand.lon is not None:
-            return errand.lat, errand.lon
-        if home is None or errand.north is None or errand.east is None or not flight.job.running:
-            return None
-        lat, lon = home.message.latitude / 1e7, home.message.longitude / 1e7
-        return lat + errand.north / METRES_PER_DEGREE, lon + errand.east / METRES_PER_DEGREE / math.cos(
-            math.radians(lat)
-        )
-
-    async def _keep(self, track: Track, report: Report) -> None:
-        """Write track and plot; a disk that is full ends no flight."""
-        base = self._directory().absolute() / time.strftime("vision_mission_%Y%m%d_%H%M%S")
+    async def keep(self, track: Track, report: Report) -> None:
+        """Write track and plot; what cannot be written is said in the report."""
         loop = asyncio.get_running_loop()
         try:
+            base = self._directory().absolute() / time.strftime("vision_mission_%Y%m%d_%H%M%S")
             await loop.run_in_executor(None, track.write, base.with_suffix(".csv"))
             report.track = str(base.with_suffix(".csv"))
             await loop.run_in_executor(None, track.plot, base.with_suffix(".png"))
             report.plot = str(base.with_suffix(".png"))
         except OSError as error:
             report.track = f"not written: {error.strerror}"
+        except (
+            RuntimeError,
+            ValueError,
+            cv2.error,
+        ) as error:  # a `~user` that is none, a name with a null, no encoder
+            report.track = f"not written: {error}"
 
     @property
     def running(self) -> bool:
@@ -125,21 +193,37 @@ class Flights:
         """What it is doing."""
         return self._flight.phase if self._flight is not None else "over"
 
+    # -- parameters that are still to be given back ----------------------------------------------------------
+
+    def _do(self, work: Any) -> None:
+        self._tasks.add(task := asyncio.get_running_loop().create_task(work))
+        task.add_done_callback(self._tasks.discard)
+
+    async def _tidy(self, plnd: PrecisionLanding) -> None:
+        """Give parameters back as soon as the vehicle hears us, and no flight needs them."""
+        while plnd.before:
+            await asyncio.sleep(TIDY_EVERY)
+            if self._flight is not None or not self.vision.host.is_alive(plnd.vehicle.state):
+                continue
+            try:
+                await plnd.give_back()
+            except UavApiError:
+                continue  # at the next turn; what it had is not forgotten
+
     # -- from the prompt, and at the end ---------------------------------------------------------------------
 
     def begin(
-        self, copter: Copter, verb: Verb, path: str, request: dict[str, Any], tell: Callable[[str], None]
+        self, copter: Copter, sortie: Sortie, path: str, request: dict[str, Any], tell: Callable[[str], None]
     ) -> Job:
         """Start a flight that nobody awaits over the network; `tell` is called with one line at its end."""
 
         async def body(job: Job) -> str:
-            await verb(job)
-            return self.result()
+            await sortie(job)
+            return sortie.result()
 
         jobs = self.vision.host.jobs
         job = jobs.begin(copter.seat, path, request, body, client=CONSOLE, outlives_client=True)
-        self._ends.add(task := asyncio.get_running_loop().create_task(self._tell_end(job, tell)))
-        task.add_done_callback(self._ends.discard)
+        self._do(self._tell_end(job, tell))
         return job
 
     async def _tell_end(self, job: Job, tell: Callable[[str], None]) -> None:
@@ -148,37 +232,37 @@ class Flights:
         except UavApiError as error:
             tell(str(error))
 
-    def result(self) -> str:
-        """One line about the flight that just ended well."""
-        report = self.report
-        if report is None:
-            return "done"
-        if report.verb == "search" and report.place is not None:
-            north, east, _ = report.place
-            return f"Found tag {report.tag} at {north:.2f} m north, {east:.2f} m east of the EKF origin"
-        if report.tag is None:
-            return "Landed"
-        off = "" if report.touchdown_error is None else f", {report.touchdown_error:.2f} m off it"
-        return f"Landed on tag {report.tag}{off}"
-
     def stop(self, reason: str) -> bool:
-        """End the flight; the vehicle holds. Whether there was one."""
+        """End the flight; a vehicle that is ours holds. Whether there was one."""
         flight = self._flight
         if flight is None or not flight.job.running:
             return False
-        flight.job.abort(Aborted(reason))
+        flight.job.abort(_ended(flight, reason))
         return True
 
     def abandon(self) -> list[tuple[Any, int]]:
-        """End the flight without sending anything: what would be sent, and to which system."""
-        flight = self._flight
-        if flight is None or not flight.job.running:
-            return []
-        system = flight.vehicle.state.system
-        last = [(message, system) for message in flight.parting()]
-        flight.vehicle.seat.job = None  # so that its own end finds nothing more to send
-        flight.job.abort(Aborted("vision was unloaded; the vehicle holds"))
+        """End all without sending anything: what would be sent, and to which system."""
+        last: list[tuple[Any, int]] = []
+        flight, self._flight = self._flight, None
+        for task in self._tasks:
+            task.cancel()
+        for plnd in self._plnd.values():
+            if plnd.before and (flight is None or flight.plnd is not plnd):
+                last += [(message, plnd.vehicle.state.system) for message in plnd.remaining()]
+        if flight is not None and flight.job.running:
+            last += [(message, flight.vehicle.state.system) for message in flight.parting()]
+            error = _ended(flight, "vision was unloaded")
+            flight.vehicle.seat.job = None  # so that its own end finds nothing more to send
+            flight.job.abort(error)
+        for plnd in self._plnd.values():
+            plnd.before.clear()
         return last
+
+
+def _ended(flight: Flight, reason: str) -> Aborted:
+    vehicle = flight.vehicle
+    left = "the vehicle holds" if flight.is_ours else f"nothing was sent: the vehicle is in {vehicle.mode}"
+    return Aborted(f"{reason}; {left}")
 
 
 def copter_of(vehicle: Any) -> Copter:

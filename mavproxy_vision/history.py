@@ -126,7 +126,9 @@ class History:
         travelled = vector(0.0, 0.0, 0.0)
         if self._motions:
             last = self._motions[-1]
-            travelled = last.travelled + (last.velocity + velocity) * ((at - last.at) / 2)
+            heard = at - last.at <= GAP  # of a silence the positions tell more than two velocities
+            moved = (last.velocity + velocity) * ((at - last.at) / 2) if heard else position - last.position
+            travelled = last.travelled + moved
         self._motions.append(Motion(at, position, velocity, travelled))
         if at - self._motions[0].at > 2 * KEPT:
             self._motions = self._motions[len(self._motions) // 2 :]

@@ -18,7 +18,7 @@ from mavproxy_vision.annotate import annotated, jpeg
 from mavproxy_vision.camera import Image, Posted, decode
 from mavproxy_vision.console import caption, status
 from mavproxy_vision.errors import BadImage, NoCamera
-from mavproxy_vision.flights import Flights
+from mavproxy_vision.flights import Flights, Sortie
 from mavproxy_vision.mission import Errand
 from mavproxy_vision.settings import METHODS
 from mavproxy_vision.sighting import Seen
@@ -182,36 +182,32 @@ class Pages:
     async def land(self, call: Call) -> Any:
         """Land on a tag from here; answers when it stands on it."""
         p = call.params(LandRequest)
-        copter = self.flights.copter()
-        verb = self.flights.landing(copter, p.id, p.method or self.vision.settings.method)
-        return self._reported(await call.fly(copter, verb, self.flights.result, outlives_client=True))
+        sortie = self.flights.landing(call.copter, p.id, p.method or self.vision.settings.method)
+        return await self._fly(call, sortie)
 
     async def search(self, call: Call) -> Any:
         """Fly an expanding square until the tag is in sight."""
         p = call.params(SearchRequest)
-        copter = self.flights.copter()
-        verb = self.flights.searching(copter, p.id, p.leash)
-        return self._reported(await call.fly(copter, verb, self.flights.result, outlives_client=True))
+        return await self._fly(call, self.flights.searching(call.copter, p.id, p.leash))
 
     async def mission(self, call: Call) -> Any:
         """Take off, fly there, land on the tag or without one; return when there is none."""
         p = call.params(MissionRequest)
-        copter = self.flights.copter()
         method = p.method or self.vision.settings.method
         errand = Errand(p.alt, p.north, p.east, p.lat, p.long, p.id, p.tag, method)
-        verb = self.flights.errand(copter, errand)
-        return self._reported(await call.fly(copter, verb, self.flights.result, outlives_client=True))
+        return await self._fly(call, self.flights.errand(call.copter, errand))
 
     async def stop(self, _call: Call) -> dict[str, Any]:
         """End the landing, search or mission in flight; the vehicle holds where it is."""
-        was = self.flights.stop("it was stopped; the vehicle holds")
+        was = self.flights.stop("it was stopped")
         return self._answer("Stopped" if was else "Nothing was in flight")
 
-    def _reported(self, answer: Any) -> Any:
-        if isinstance(answer, dict) and self.flights.report is not None:
-            answer["info"] = self.flights.report.told()
+    async def _fly(self, call: Call, sortie: Sortie) -> Any:
+        answer = await call.fly(call.copter, sortie, sortie.result, outlives_client=True)
+        report = sortie.report if sortie.begun else self.flights.report  # of the flight in progress that it joined
+        if isinstance(answer, dict) and report is not None:
+            answer["info"] = report.told()
         return answer
 
     def _answer(self, result: str, **members: Any) -> dict[str, Any]:
-        system = self.vision.host.target or next(iter(self.vision.host.fleet.vehicles), 0)
-        return envelope(system, result, **members)
+        return envelope(self.vision.system, result, **members)

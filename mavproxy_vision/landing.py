@@ -117,7 +117,7 @@ class Landing:
         self.began: float | None = None
         self.phases: dict[str, float] = {}  # s that each phase took
         self._since = 0.0
-        self._last_step = 0.0
+        self._last_step: float | None = None
         self._velocity = REST
         self._integral = np.zeros(2)
         self._anchor: Vector = REST  # where it holds, climbs to, or searches from
@@ -136,7 +136,10 @@ class Landing:
             height: above the target's ground by its own estimate, m.
         """
         if self.began is None:
-            self._begin(now, motion, height)
+            self.begin(now)
+        if self._last_step is None:
+            self._start_from(now, motion, height)
+        assert self._last_step is not None
         elapsed = min(max(now - self._last_step, 0.0), STEP_TIME)
         self._last_step = now
         self.phases[self.phase.value] = self.phases.get(self.phase.value, 0.0) + elapsed
@@ -151,8 +154,12 @@ class Landing:
         self._velocity = vector(self._velocity[0] + change[0], self._velocity[1] + change[1], wanted[2])
         return Order(self.phase, self._velocity)
 
-    def _begin(self, now: float, motion: Motion, height: float) -> None:
-        self.began = self._last_step = now
+    def begin(self, now: float) -> None:
+        """Its time begins to run."""
+        self.began = now
+
+    def _start_from(self, now: float, motion: Motion, height: float) -> None:
+        self._last_step = now
         self.attempt = 1
         self._velocity = motion.velocity.copy()
         self._stay(now, Phase.LOOK, motion.travelled, min(height, self.plan.ceiling))
@@ -171,8 +178,9 @@ class Landing:
 
     def fail(self, reason: str) -> Order:
         """End it for that reason."""
-        self.phase, self._reason, self._velocity = Phase.FAILED, reason, REST
-        return Order(Phase.FAILED, REST, reason)
+        if self.phase is not Phase.FAILED:
+            self.phase, self._reason, self._velocity = Phase.FAILED, reason, REST
+        return Order(Phase.FAILED, REST, self._reason)
 
     def _failure(self, now: float) -> str | None:
         assert self.began is not None
@@ -185,9 +193,13 @@ class Landing:
             return "two tags of the same id are in view: it is not clear on which to land"
         if self.target.contradiction:
             return self.target.contradiction
-        if now - self.began > self.plan.time_limit:
-            return f"not landed within {self.plan.time_limit:.0f} s"
-        return None
+        return self.overdue(now)
+
+    def overdue(self, now: float) -> str | None:
+        """Why it has to end, when its time is over."""
+        if self.began is None or now - self.began <= self.plan.time_limit:
+            return None
+        return f"not landed within {self.plan.time_limit:.0f} s"
 
     # -- the phases ----------------------------------------------------------------------------------------
 
@@ -203,12 +215,9 @@ class Landing:
             return self._descend(now, motion, height, elapsed)
         if self.phase is Phase.LAST_METRE:
             return self._touch_down(now, motion)
-        if self.phase is Phase.HOLD:
-            return self._hold(now, motion, height)
-        if self.phase is Phase.CLIMB:
-            return self._climb(now, motion, height)
-        if self.phase is Phase.SEARCH:
-            return self._search(now, motion, height)
+        stepping = {Phase.HOLD: self._hold, Phase.CLIMB: self._climb, Phase.SEARCH: self._search}.get(self.phase)
+        if stepping is not None:
+            return stepping(now, motion, height)
         if self.phase is Phase.LOOK and now - self._since > self.plan.look:
             self._look_farther(now)
         return self._towards(self._anchor, motion, height)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from mavproxy_uavapi.errors import Invalid
 from mavproxy_uavapi.vehicle.geodesy import METRES_PER_DEGREE
 from mavproxy_uavapi.vehicle.messages import GlobalTarget
+from mavproxy_vision.descent import Descent
 from mavproxy_vision.flight import Flight
 
 
@@ -33,8 +35,22 @@ class Errand:
     on_tag: bool = True
     method: str = "velocity"
 
+    def place(self, home: tuple[float, float]) -> tuple[float, float]:
+        """Latitude and longitude (degrees), for a home there.
 
-async def fly(flight: Flight, errand: Errand) -> None:
+        Raises:
+            Invalid: neither metres nor degrees are given.
+        """
+        if self.lat is not None and self.lon is not None:
+            return self.lat, self.lon
+        if self.north is None or self.east is None:
+            raise Invalid("a mission needs north and east, or lat and long", "body")
+        lat, lon = home
+        there = lon + self.east / (METRES_PER_DEGREE * math.cos(math.radians(lat)))
+        return lat + self.north / METRES_PER_DEGREE, (there + 180.0) % 360.0 - 180.0
+
+
+async def fly(flight: Flight, errand: Errand, way_down: Callable[[Flight], Descent]) -> None:
     """Arm, take off, fly there, land; done when disarmed there.
 
     A vehicle that flies already in GUIDED goes there from where it is.
@@ -44,28 +60,22 @@ async def fly(flight: Flight, errand: Errand) -> None:
         UavApiError: as the copter's verbs.
     """
     vehicle, job = flight.vehicle, flight.job
+    grounded = not vehicle.state.armed or vehicle.state.landed is not False
     if errand.on_tag:
         flight.vision.require_camera()
-    if not vehicle.state.armed or vehicle.state.landed is not False:
+        flight.tags(errand.tag)
+    if not grounded:
+        vehicle.require_guided_flight()
+    await flight.take_over()
+    if grounded:
         await vehicle.arm(job)
         await vehicle.takeoff(job, errand.alt)
-    place = await _place(flight, errand)
+    home = await vehicle.home()
+    lat, lon = errand.place((home.latitude / 1e7, home.longitude / 1e7))
     vehicle.held_by("GUIDED")
-    await vehicle.go_to(job, place, wait=True)
+    await vehicle.go_to(job, GlobalTarget(lat, lon, errand.alt), wait=True)
     vehicle.held_by("GUIDED")
     if errand.on_tag:
-        await flight.land(errand.tag, errand.method)
+        await flight.land(errand.tag, errand.method, way_down)
     else:
-        await vehicle.land(job)
-
-
-async def _place(flight: Flight, errand: Errand) -> GlobalTarget:
-    if errand.lat is not None and errand.lon is not None:
-        return GlobalTarget(errand.lat, errand.lon, errand.alt)
-    if errand.north is None or errand.east is None:
-        raise Invalid("a mission needs north and east, or lat and long", "body")
-    home = await flight.vehicle.home()
-    lat, lon = home.latitude / 1e7, home.longitude / 1e7
-    north = errand.north / METRES_PER_DEGREE
-    east = errand.east / (METRES_PER_DEGREE * math.cos(math.radians(lat)))
-    return GlobalTarget(lat + north, lon + east, errand.alt)
+        await flight.fly_by("LAND", vehicle.land)

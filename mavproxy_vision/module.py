@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from pathlib import Path
 from typing import Any
 
@@ -23,10 +24,10 @@ from mavproxy_uavapi.host.member import HostedModule
 from mavproxy_uavapi.vehicle.jobs import Job
 from mavproxy_vision import console, files
 from mavproxy_vision.errors import BadSetting
-from mavproxy_vision.flights import Flights, Verb
+from mavproxy_vision.flights import Flights, Sortie
 from mavproxy_vision.http import Pages
 from mavproxy_vision.mission import Errand
-from mavproxy_vision.settings import METHODS, ModuleSettings
+from mavproxy_vision.settings import METHODS, ModuleSettings, Settings
 from mavproxy_vision.vision import Vision
 
 NAME = "vision"
@@ -67,6 +68,7 @@ class VisionModule(HostedModule):
         self.add_completion_function(COMPLETION, self.vision_settings.mp.completion)
         self.vision = Vision(self.host, self.vision_settings.snapshot())
         self.flights = Flights(self.vision, self._directory)
+        self._tasks: set[asyncio.Task[None]] = set()
         self._pages = Pages(self.vision, self.flights)
         self._routes = {route.path: route for route in self._pages.routes()}
 
@@ -143,26 +145,37 @@ class VisionModule(HostedModule):
         print(self._run(told()) if self._begun else tell())
 
     def _start(self) -> None:
-        if not self._awake():
-            return
-        settings = self.vision_settings.snapshot()
+        if self._awake():
+            self._do(self._started(self.vision_settings.snapshot()))
+
+    async def _started(self, settings: Settings) -> None:
         try:
-            self._run(self.vision.start(settings))
+            await self.vision.start(settings)
         except UavApiError as error:
-            print(f"vision: {error}")
+            self._say(str(error))
         else:
-            print(f"vision: looking for {settings.family} through {settings.source}")
+            self._say(f"looking for {settings.family} through {settings.source}")
 
     def _stop(self) -> None:
-        if not self._awake():
-            return
-        self._abort(quiet=True)
-        self._run(self.vision.stop())
-        print("vision: stopped")
+        if self._awake():
+            self._abort(quiet=True)
+            self._do(self._stopped())
+
+    async def _stopped(self) -> None:
+        await self.vision.stop()
+        self._say("stopped")
+
+    def _do(self, work: Coroutine[Any, Any, None]) -> None:
+        """Have the asyncio thread do what may take long: the main loop, which flies the vehicle, does not wait."""
+        self.host.bridge.call_soon(self._begin, work)
+
+    def _begin(self, work: Coroutine[Any, Any, None]) -> None:
+        self._tasks.add(task := asyncio.get_running_loop().create_task(work))
+        task.add_done_callback(self._tasks.discard)
 
     def _abort(self, quiet: bool = False) -> None:
         async def stopped() -> bool:
-            return self.flights.stop("it was stopped at the prompt; the vehicle holds")
+            return self.flights.stop("it was stopped at the prompt")
 
         if self._awake() and not self._run(stopped()) and not quiet:
             print("vision: nothing is in flight")
@@ -172,6 +185,10 @@ class VisionModule(HostedModule):
             self.vision_settings.mp.show_pattern(args[0] if args else "*")
             return
         before = self.vision_settings.snapshot()
+        reopens = args[0] in RESTARTS or args[0].startswith("sim_")
+        if reopens and self._flying():
+            print(f"vision: {args[0]} is not changed in flight (`vision abort` ends it)")
+            return
         try:
             self.vision_settings.set(args[0], " ".join(args[1:]))
         except BadSetting as error:
@@ -180,10 +197,18 @@ class VisionModule(HostedModule):
         after = self.vision_settings.snapshot()
         if after == before or not self._begun:
             return
-        if args[0] in RESTARTS or args[0].startswith("sim_"):
-            self._start() if after.source else self._stop()
+        if reopens and after.source:
+            self._start()
+        elif before.source and not after.source:
+            self._stop()
         else:
             self.host.bridge.call_soon(setattr, self.vision, "settings", after)
+
+    def _flying(self) -> bool:
+        async def flying() -> bool:
+            return self.flights.running
+
+        return self._begun and bool(self._run(flying()))
 
     # -- flying ----------------------------------------------------------------------------------------------
 
@@ -194,7 +219,7 @@ class VisionModule(HostedModule):
         if number is not False:
             self._fly("/vision/land", {"id": number, "method": method}, self._landing)
 
-    def _landing(self, request: dict[str, Any]) -> Verb:
+    def _landing(self, request: dict[str, Any]) -> Sortie:
         return self.flights.landing(self.flights.copter(), request["id"], request["method"])
 
     def _search(self, args: list[str]) -> None:
@@ -202,7 +227,7 @@ class VisionModule(HostedModule):
         if number is not False:
             self._fly("/vision/search", {"id": number}, self._searching)
 
-    def _searching(self, request: dict[str, Any]) -> Verb:
+    def _searching(self, request: dict[str, Any]) -> Sortie:
         return self.flights.searching(self.flights.copter(), request["id"], None)
 
     def _id(self, words: list[str]) -> Any:
@@ -232,12 +257,12 @@ class VisionModule(HostedModule):
         request = {"alt": alt, "north": north, "east": east, "id": number, "tag": tag != "none", "method": method}
         self._fly("/vision/mission", request, self._errand)
 
-    def _errand(self, request: dict[str, Any]) -> Verb:
+    def _errand(self, request: dict[str, Any]) -> Sortie:
         r = request
         errand = Errand(r["alt"], r["north"], r["east"], None, None, r["id"], r["tag"], r["method"])
         return self.flights.errand(self.flights.copter(), errand)
 
-    def _fly(self, path: str, request: dict[str, Any], make: Callable[[dict[str, Any]], Verb]) -> None:
+    def _fly(self, path: str, request: dict[str, Any], make: Callable[[dict[str, Any]], Sortie]) -> None:
         """Begin a flight and say so; its end is printed when it comes."""
 
         async def begin() -> Job:

@@ -33,7 +33,7 @@ class Rates:
     def __init__(self, clock: Any) -> None:
         self._clock = clock
         self._needed: list[dict[str, float]] = []
-        self._asked: dict[str, float] = {}
+        self._asked: dict[tuple[Vehicle, str], float] = {}  # when
         self._pause: dict[str, float] = {}
 
     @property
@@ -71,15 +71,15 @@ class Rates:
             )
             if not slow:
                 self._pause[name] = ASK_AGAIN
-            elif now - self._asked.get(name, -RARELY) >= self._pause.get(name, ASK_AGAIN):
-                if name in self._asked:  # it did not help: a slow link, or a vehicle that cannot
+            elif now - self._asked.get((vehicle, name), -RARELY) >= self._pause.get(name, ASK_AGAIN):
+                if (vehicle, name) in self._asked:  # it did not help: a slow link, or a vehicle that cannot
                     self._pause[name] = min(2 * self._pause.get(name, ASK_AGAIN), RARELY)
-                self._asked[name] = now
+                self._asked[vehicle, name] = now
                 await self._send(vehicle, set_interval(MESSAGE_IDS[name], rate))
-        for name in [name for name in self._asked if name not in needed]:
-            del self._asked[name]
+        for asked, name in [key for key in self._asked if key[0] is not vehicle or key[1] not in needed]:
+            del self._asked[asked, name]
             self._pause.pop(name, None)
-            await self._send(vehicle, default_interval(MESSAGE_IDS[name]))
+            await self._send(asked, default_interval(MESSAGE_IDS[name]))
 
     async def _send(self, vehicle: Vehicle, command: Command) -> None:
         # No ack is awaited: what arrives is the proof.

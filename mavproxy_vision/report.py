@@ -24,6 +24,16 @@ class Report:
     track: str | None = None
     plot: str | None = None
 
+    def line(self) -> str:
+        """One line about a flight that ended well."""
+        if self.verb == "search" and self.place is not None:
+            north, east, _ = self.place
+            return f"Found tag {self.tag} at {north:.2f} m north, {east:.2f} m east of the EKF origin"
+        if self.tag is None:
+            return "Landed"
+        off = "" if self.touchdown_error is None else f", {self.touchdown_error:.2f} m off it"
+        return f"Landed on tag {self.tag}{off}"
+
     def told(self) -> dict[str, Any]:
         """As JSON has it; what is not known is left out, lengths in m, times in s of the vehicle's clock."""
         rounded = {name: round(value, 2) for name, value in self.phases.items()}

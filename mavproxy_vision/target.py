@@ -117,12 +117,6 @@ class Target:
         self.seen_at = max(self.seen_at, fix.at)
         self.last = fix
 
-    def forget(self) -> None:
-        """Look for it anew: what is found next may lie elsewhere."""
-        self.place, self.fixes, self._rejected = None, 0, 0
-        self._recent.clear()
-        self._wrong_way = 0
-
     # -- what does not fit together ------------------------------------------------------------------------
 
     def _watch(self, fix: Fix) -> None:

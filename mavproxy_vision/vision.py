@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -64,12 +65,14 @@ class Vision:
         self.changed = asyncio.Event()
         self.latencies: deque[float] = deque(maxlen=1000)  # s from a frame's arrival to the setpoint that knows it
         self._fixer: Fixer | None = None
+        self._carrier = 0  # the vehicle that a flight carries it on; 0 for MAVProxy's current one
         self._unplaced: deque[Seen] = deque(maxlen=50)  # newer than the telemetry that tells where they were taken
         self._system = 0
-        self._home_down = 0.0
+        self._home_down: float | None = None
         self._watching: asyncio.Task[None] | None = None
         self._truth_needed = contextlib.ExitStack()
-        self._extra_sizes: dict[int, float] = {}
+        self._extra: set[int] = set()  # ids that `tags` does not name, but a flight
+        self._changing = asyncio.Lock()
 
     # -- life ----------------------------------------------------------------------------------------------
 
@@ -85,18 +88,23 @@ class Vision:
             BadSetting: they make no sense together.
             NoCamera: they name no camera.
         """
-        await self.stop()
-        self.settings = settings
-        if not settings.source:
-            raise NoCamera("no camera is set: `vision set source camera:0`, sim, http, a path or a URL")
-        loop = asyncio.get_running_loop()
-        self.worker = await loop.run_in_executor(None, self._make_worker, settings)
-        self.worker.start()
-        if settings.source == "sim":
-            self._truth_needed.enter_context(self.rates.at(TRUTH))
+        async with self._changing:
+            await self._close_camera()
+            self.settings = settings
+            if not settings.source:
+                raise NoCamera("no camera is set: `vision set source camera:0`, sim, http, a path or a URL")
+            loop = asyncio.get_running_loop()
+            self.worker = await loop.run_in_executor(None, self._make_worker, settings)
+            self.worker.start()
+            if settings.source == "sim":
+                self._truth_needed.enter_context(self.rates.at(TRUTH))
 
     async def stop(self) -> None:
         """Close the camera."""
+        async with self._changing:
+            await self._close_camera()
+
+    async def _close_camera(self) -> None:
         self._truth_needed.close()
         worker, self.worker = self.worker, None
         self.seen = self.image = None
@@ -116,29 +124,36 @@ class Vision:
     def _make_worker(self, settings: Settings) -> Worker:
         cv2.setNumThreads(settings.threads)
         detector = Detector(settings.model, self.options(settings))
-        return Worker(make_source(settings, self._where, self.host.clock), detector, self.deliver, self.host.clock)
+        source = make_source(settings, self._where, self.host.clock)
+        worker = Worker(source, detector, lambda seen, image: self.deliver(worker, seen, image), self.host.clock)
+        return worker
 
     def options(self, settings: Settings) -> Options:
         """How the detector is to look."""
-        sizes = {tag.id: tag.size for tag in settings.tag_list}
-        return Options(settings.families, {**self._extra_sizes, **sizes}, settings.any_id, settings.far)
+        tags = settings.tag_list
+        sizes = dict.fromkeys(self._extra, tags[0].size) | {tag.id: tag.size for tag in tags}
+        return Options(settings.families, sizes, settings.any_id, settings.far)
 
     async def want(self, number: int) -> None:
         """Look for that id too; it has the main tag's size unless `tags` says otherwise."""
-        tags = self.settings.tag_list
-        if number in self._extra_sizes or any(tag.id == number for tag in tags):
+        settings = self.settings
+        if number in self._extra or any(tag.id == number for tag in settings.tag_list):
             return
-        self._extra_sizes[number] = tags[0].size
+        self._extra.add(number)
         if self.worker is not None:
-            settings, model = self.settings, self.settings.model
             loop = asyncio.get_running_loop()
-            self.worker.detector = await loop.run_in_executor(None, Detector, model, self.options(settings))
+            self.worker.detector = await loop.run_in_executor(None, Detector, settings.model, self.options(settings))
 
     # -- what comes in -------------------------------------------------------------------------------------
 
-    def deliver(self, seen: Seen, image: Image) -> None:
+    def deliver(self, worker: Worker, seen: Seen, image: Image) -> None:
         """An outcome. The worker's thread."""
-        self.host.bridge.call_soon(self.take, seen, image)
+
+        def arrive() -> None:
+            if worker is self.worker:  # else it comes late, from a camera that was closed
+                self.take(seen, image)
+
+        self.host.bridge.call_soon(arrive)
 
     def take(self, seen: Seen, image: Image) -> None:
         """An outcome."""
@@ -154,13 +169,15 @@ class Vision:
         while self._unplaced and self.target is not None and self._fixer is not None:
             if self.clock.vehicle(self._unplaced[0].captured_at) > self.history.newest + SOON:
                 return
-            fixes = self._fixer.fixes(self._unplaced.popleft(), self.history, self.clock, self._home_down)
+            fixes = self._fixer.fixes(self._unplaced.popleft(), self.history, self.clock)
             self.target.take(fixes)
 
     def _hear(self, state: VehicleState, message: Any, now: float) -> None:
         name = message.get_type()
         if name not in HEARD or message.get_srcComponent() != state.component or not self._is_ours(state):
             return
+        if not all(math.isfinite(getattr(message, field)) for field in HEARD[name]):
+            return  # it would be in every setpoint from now on
         if name == "SIM_STATE":
             self._hear_truth(state, message, now)
             return
@@ -180,13 +197,30 @@ class Vision:
             self.history.add_motion(at, position, velocity)
         self._place()
 
-    def _is_ours(self, state: VehicleState) -> bool:
-        system = self.host.target or next(iter(self.host.fleet.vehicles), 0)
-        if system != self._system:  # another vehicle: what was known is of no use
-            self._system = system
+    @property
+    def system(self) -> int:
+        """The system id of the vehicle that carries the camera; 0 while there is none."""
+        return self._carrier or self.host.target or next(iter(self.host.fleet.vehicles), 0)
+
+    @contextlib.contextmanager
+    def carried_by(self, system: int) -> Iterator[None]:
+        """Look from that vehicle for as long as the context lasts, whichever MAVProxy's current one is."""
+        self._carrier = system
+        self._follow_carrier()
+        try:
+            yield
+        finally:
+            self._carrier = 0
+
+    def _follow_carrier(self) -> None:
+        if self.system != self._system:  # another vehicle: what was known is of no use
+            self._system = self.system
             self.history, self.clock, self.truth = History(), VehicleClock(), Truth()
-            self._unstamped = Unstamped()
-        return state.system == system
+            self._unstamped, self._home_down = Unstamped(), None
+
+    def _is_ours(self, state: VehicleState) -> bool:
+        self._follow_carrier()
+        return state.system == self._system
 
     def _hear_truth(self, state: VehicleState, message: Any, now: float) -> None:
         lat, lon = message.lat_int / 1e7, message.lon_int / 1e7
@@ -206,13 +240,13 @@ class Vision:
         attitude, motion = self.history.attitude(at), self.history.motion(at)
         if attitude is None or motion is None:
             return None
-        return motion.position - vector(0.0, 0.0, self._home_down), attitude
+        return motion.position - vector(0.0, 0.0, self._home_down or 0.0), attitude
 
     # -- what is asked of it -------------------------------------------------------------------------------
 
     def vehicle(self) -> Vehicle:
         """The vehicle that carries the camera, with a link that is alive."""
-        return self.host.hangar.commandable(0)
+        return self.host.hangar.commandable(self._carrier)
 
     @property
     def health(self) -> Health:
@@ -227,26 +261,31 @@ class Vision:
         if health.state not in ("ok", "starting"):
             raise NoCamera(f"the camera: {health.state}{f' ({health.error})' if health.error else ''}")
 
-    def aim(self, tags: dict[int, Tag]) -> Target:
-        """Begin to keep track of a target."""
+    @contextlib.contextmanager
+    def aimed_at(self, tags: dict[int, Tag], floor: float) -> Iterator[Target]:
+        """Keep track of a target, for as long as the context lasts.
+
+        Args:
+            tags: what tells where it is, by id.
+            floor: of its ground, m down of the EKF origin.
+        """
         settings = self.settings
-        wanted = Wanted(settings.families[0], tags, settings.ground)
-        self._fixer = Fixer(settings.model, settings.camera_mount, wanted)
+        self._fixer = Fixer(settings.model, settings.camera_mount, Wanted(settings.families[0], tags, floor))
         self.target = Target()
         self._unplaced.clear()
-        return self.target
-
-    def aim_no_more(self) -> None:
-        """The landing is over."""
-        self.target = self._fixer = None
+        try:
+            yield self.target
+        finally:
+            self.target = self._fixer = None
 
     def now(self) -> float:
         """The vehicle's time."""
         return self.clock.vehicle(self.host.clock())
 
-    def height(self, down: float) -> float:
-        """Metres above the target's ground, for m down of the EKF origin."""
-        return self._home_down - down - self.settings.ground
+    @property
+    def floor(self) -> float | None:
+        """The target's ground, m down of the EKF origin, by the home and the `ground` of now; None while unknown."""
+        return None if self._home_down is None else self._home_down - self.settings.ground
 
     def touchdown_error(self, tag: int) -> float | None:
         """Metres from the simulated vehicle to the simulated tag; None where nobody knows the truth."""
@@ -266,7 +305,12 @@ class Vision:
         return self.seen
 
 
-HEARD = {"ATTITUDE", "LOCAL_POSITION_NED", "GLOBAL_POSITION_INT", "SIM_STATE"}
+HEARD: dict[str, tuple[str, ...]] = {  # with the fields that a faulty estimator may make no numbers of
+    "ATTITUDE": ("roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed"),
+    "LOCAL_POSITION_NED": ("x", "y", "z", "vx", "vy", "vz"),
+    "GLOBAL_POSITION_INT": (),
+    "SIM_STATE": ("roll", "pitch", "yaw", "alt", "vn", "ve", "vd"),
+}
 
 
 def make_source(settings: Settings, where: Any, clock: Callable[[], float]) -> Source:

@@ -6,7 +6,7 @@ import contextlib
 import math
 from collections.abc import Callable
 
-from mavproxy_uavapi.errors import Busy, Invalid, NotArmed, Stale, TimedOut
+from mavproxy_uavapi.errors import Busy, Invalid, ModeChanged, NotArmed, Stale, TimedOut
 from mavproxy_uavapi.host.link import Link
 from mavproxy_uavapi.host.pending import Pending
 from mavproxy_uavapi.host.state import VehicleState
@@ -82,7 +82,7 @@ class Copter(Vehicle):
         if self.state.armed is False:
             return
         self.seat.take(job)
-        limits = await self.limits()
+        limits = await self._limits_in_this_mode()
         expected = deadlines.landing_time(limits, self.height)
         await self.switch_to("LAND")
         await self._flown_home(job, "LAND", limits, self.allowed(expected, timeout))
@@ -105,10 +105,22 @@ class Copter(Vehicle):
                 raise NotArmed(f"the vehicle is disarmed, {distance:.0f} m from home")
             return
         self.seat.take(job)
-        limits = await self.limits()
+        limits = await self._limits_in_this_mode()
         expected = deadlines.return_time(limits, distance or 0.0, self.height)
         await self.switch_to("RTL")
         await self._flown_home(job, "RTL", limits, self.allowed(expected, timeout))
+
+    async def _limits_in_this_mode(self) -> deadlines.Limits:
+        """Its speeds, which it may have to be asked for.
+
+        Raises:
+            ModeChanged: meanwhile the pilot switched the mode, after the command that is on its way.
+        """
+        before = self.mode
+        limits = await self.limits()
+        if self.mode != before:
+            raise ModeChanged(f"the vehicle is in {self.mode} now: somebody else switched it meanwhile")
+        return limits
 
     async def _flown_home(self, job: Job, mode: str, limits: deadlines.Limits, timeout: float) -> None:
         """Wait until it has landed and disarmed in that mode; motors that stop in flight are no landing."""

@@ -225,7 +225,7 @@ class Lockstep:
     def begin(self, verb: Any, name: str = "/vision/test") -> Any:
         async def body(job: Any) -> str:
             await verb(job)
-            return self.flights.result()
+            return str(verb.result()) if hasattr(verb, "result") else "done"
 
         async def start() -> Any:
             return self.host.jobs.begin(self.copter.seat, name, {"n": self.loop.time()}, body, outlives_client=True)

@@ -6,12 +6,15 @@ import builtins
 import importlib
 import sys
 import threading
+import time
 from typing import Any
 
 import pytest
 
 import vision
 from mavproxy_vision.console import HELP
+
+SOURCES = "`vision set source camera:0`, sim, http, a path or a URL"
 
 
 @pytest.fixture
@@ -34,6 +37,14 @@ def said(module: Any, capsys: Any, *words: str) -> str:
     capsys.readouterr()
     module.command(list(words))
     return capsys.readouterr().out
+
+
+def said_later(module: Any, capsys: Any, main_loop: Any, *words: str) -> str:
+    """What is printed in a later turn of the main loop."""
+    assert said(module, capsys, *words) == ""
+    printed: list[str] = []
+    main_loop.until(lambda: printed.append(capsys.readouterr().out) or printed[-1])
+    return printed[-1].strip()
 
 
 def test_module_is_what_mavproxy_looks_for(module: Any, mpstate: Any) -> None:
@@ -67,8 +78,8 @@ def test_a_running_camera_ends_with_the_module(mpstate: Any, main_loop: Any) -> 
     threads = threading.active_count()
     module = vision.init(mpstate, source="http")
     main_loop.modules.append(module)
-    main_loop.turn()
-    assert {"vision-camera", "vision-detector"} <= {thread.name for thread in threading.enumerate()}
+    both = {"vision-camera", "vision-detector"}
+    main_loop.until(lambda: both <= {thread.name for thread in threading.enumerate()})
     main_loop.modules.clear()
     module.unload()
     assert threading.active_count() == threads
@@ -87,7 +98,7 @@ def test_without_a_vehicle_nothing_flies(running: Any, capsys: Any) -> None:
         assert "no vehicle" in said(running, capsys, *words)
 
 
-def test_bad_words_are_explained(running: Any, capsys: Any) -> None:
+def test_bad_words_are_explained(running: Any, capsys: Any, main_loop: Any) -> None:
     assert "not an id" in said(running, capsys, "land", "x")
     assert "ALT NORTH EAST" in said(running, capsys, "mission", "a")
     assert "did you mean" in said(running, capsys, "set", "famly", "16h5")
@@ -95,7 +106,7 @@ def test_bad_words_are_explained(running: Any, capsys: Any) -> None:
     assert "not ID:SIZE" in said(running, capsys, "set", "tags", "0")
     assert running.vision_settings.snapshot().tags == "0:0.30"
     assert "one of velocity, landing_target" in said(running, capsys, "set", "method", "magic")
-    assert "no camera" in said(running, capsys, "start")
+    assert said_later(running, capsys, main_loop, "start") == "vision: no camera is set: " + SOURCES
 
 
 def test_a_setting_that_does_not_exist_is_an_import_error(mpstate: Any) -> None:
@@ -128,3 +139,25 @@ def test_nothing_else_of_the_project_needs_opencv() -> None:
     code = "import mavproxy_uavapi.module, mavproxy_gradys.module, sys; print('cv2' in sys.modules)"
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60).stdout
     assert out.split()[0] == "False"
+
+
+def test_a_camera_that_hangs_does_not_hold_up_the_main_loop(running: Any, capsys: Any, main_loop: Any) -> None:
+    assert "looking for 36h11 through http" in said_later(running, capsys, main_loop, "set", "source", "http")
+    hang = threading.Event()
+    running.vision.worker.source.read = lambda: hang.wait(5) and None
+    time.sleep(0.3)  # its thread is in there now
+    began = time.monotonic()
+    try:
+        assert said(running, capsys, "set", "latency", "20") == ""
+        assert said(running, capsys, "stop") == ""
+        assert time.monotonic() - began < 0.5
+    finally:
+        hang.set()
+
+
+def test_settings_that_need_no_camera_end_no_flight(running: Any, capsys: Any, main_loop: Any) -> None:
+    assert said(running, capsys, "set", "tags", "0:0.5") == ""
+    main_loop.turn()
+    time.sleep(0.1)
+    assert running.vision.settings.tags == "0:0.5"
+    assert said(running, capsys, "status").startswith("vision: source none")

@@ -1,0 +1,158 @@
+"""The two ways down onto a target: by velocities, or in ArduPilot's LAND, which is told where it is."""
+
+from __future__ import annotations
+
+import contextlib
+
+from mavproxy_uavapi.errors import NotArmed, Rejected
+from mavproxy_uavapi.vehicle.touchdown import Touchdown
+from mavproxy_vision.flight import Flight
+from mavproxy_vision.history import Motion
+from mavproxy_vision.landing import BLIND_BELOW, COAST, REST, Landing, Phase
+from mavproxy_vision.plnd import PrecisionLanding, landing_target
+
+LOST = 1.2  # s without a sighting, or without telemetry, until we take the vehicle back from LAND
+HEARD = 3.0  # s until the autopilot must have said that it has a target
+
+
+class Descent:
+    """A way down onto the target: by velocities, then the autopilot's LAND.
+
+    Attributes:
+        by_velocity: whether the landing's own velocities descend.
+    """
+
+    by_velocity = True
+
+    def __init__(self, flight: Flight) -> None:
+        self.flight = flight
+
+    async def __call__(self, landing: Landing) -> None:
+        """Land.
+
+        Raises:
+            LandingFailed: it was given up.
+        """
+        flight = self.flight
+        order = await flight.fly(landing)
+        if order.phase is Phase.FAILED:
+            await flight.give_up(landing, order.reason)
+        flight.vehicle.held_by("GUIDED")
+        flight.phase = Phase.LAND.value
+        await flight.fly_by("LAND", flight.vehicle.land)
+
+
+class PrecisionDescent(Descent):
+    """A way down in LAND by LANDING_TARGET: lets LAND fly, and takes the vehicle back when the target is lost.
+
+    Args:
+        flight: whose.
+        plnd: the vehicle's precision landing.
+    """
+
+    by_velocity = False
+
+    def __init__(self, flight: Flight, plnd: PrecisionLanding) -> None:
+        super().__init__(flight)
+        flight.plnd = self.plnd = plnd
+
+    async def __call__(self, landing: Landing) -> None:
+        """Land.
+
+        Raises:
+            LandingFailed: it was given up.
+            NotSupported, Rejected: the autopilot has no precision landing, or does not take its parameters.
+        """
+        flight = self.flight
+        await self.plnd.set_up()
+        while True:
+            order = await flight.fly(landing)
+            if order.phase is Phase.FAILED:
+                await flight.give_up(landing, order.reason)
+            await self._be_heard(landing)
+            if await self._follow_down(landing):
+                break
+        with contextlib.suppress(Rejected):  # `Flights` goes on trying
+            await self.plnd.give_back()
+
+    async def _be_heard(self, landing: Landing) -> None:
+        """Send targets until the autopilot says that it has one."""
+        flight, vision = self.flight, self.flight.vision
+        state, began = flight.vehicle.state, vision.host.clock()
+        while vision.host.clock() - began < max(HEARD / max(state.time_ratio.ratio, 0.1), 1.0):
+            await self._tell(landing)
+            await flight.send(REST)
+            if any("Target Found" in text for text in state.said_since(began - 30.0)):
+                return
+            await flight.pause()
+        # It says so once only for a target that it did not lose meanwhile: go on, and see whether it follows.
+
+    async def _follow_down(self, landing: Landing) -> bool:
+        """Let LAND fly and tell it where the target is: True when it stands disarmed, False when taken back."""
+        flight, vehicle, vision = self.flight, self.flight.vehicle, self.flight.vision
+        touchdown = Touchdown(await vehicle.limits())
+        vehicle.held_by("GUIDED")
+        flight.autopilot = "LAND"
+        await vehicle.switch_to("LAND")
+        while not self._stands(touchdown):
+            now = vision.now()
+            reason = self._why_not(landing, now)
+            if reason is not None:
+                await vehicle.switch_to("GUIDED")
+                flight.autopilot = None
+                motion = vision.history.last_motion
+                assert motion is not None
+                landing.resume(now, motion, flight.height(motion))
+                return False
+            await self._tell(landing)
+            await flight.pause()
+        flight.autopilot = None
+        return True
+
+    def _stands(self, touchdown: Touchdown) -> bool:
+        """Whether it has landed and disarmed.
+
+        Raises:
+            NotArmed: its motors stopped in flight.
+            ModeChanged: somebody else has it.
+        """
+        vehicle = self.flight.vehicle
+        touchdown.sinks_at((vehicle.state.field("GLOBAL_POSITION_INT", "vz") or 0) / 100.0)
+        if vehicle.state.armed is not False or vehicle.mode != "LAND":
+            vehicle.held_by("LAND")
+            return False
+        if touchdown.fell:
+            raise NotArmed("the vehicle was disarmed in flight, and fell")
+        return bool(touchdown.is_over(vehicle.clock(), vehicle.state.age("GLOBAL_POSITION_INT", vehicle.clock())))
+
+    def _why_not(self, landing: Landing, now: float) -> str | None:
+        """Why it may not go down any farther; None when it may."""
+        flight, target = self.flight, landing.target
+        late = landing.overdue(now)
+        if late:
+            return late
+        motion = flight.motion(now)
+        if self._above(landing, flight.vision.history.last_motion) <= BLIND_BELOW:
+            return None
+        if motion is None:
+            silent = now - flight.vision.history.newest
+            return "nobody knows where the vehicle is" if silent > LOST else None
+        return "the target is lost" if target.age(now) > LOST or target.contradiction else None
+
+    def _above(self, landing: Landing, motion: Motion | None) -> float:
+        """Metres above the target."""
+        place = landing.target.place
+        return 0.0 if place is None or motion is None else float(place[2] - motion.travelled[2])
+
+    async def _tell(self, landing: Landing) -> None:
+        """Tell the autopilot where the target is, if that is known."""
+        flight, vision, place = self.flight, self.flight.vision, landing.target.place
+        now = vision.now()
+        motion, attitude = flight.motion(now), vision.history.attitude(now)
+        if motion is None or attitude is None or place is None:
+            return
+        relative = place - motion.travelled
+        landing.offset = float((relative[:2] ** 2).sum() ** 0.5)
+        flight.note(landing, motion)
+        if landing.target.age(now) <= COAST or relative[2] <= BLIND_BELOW:
+            await vision.host.link.send(landing_target(now, relative, attitude), flight.vehicle.state.system)

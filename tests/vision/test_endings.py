@@ -1,0 +1,368 @@
+"""How a flight ends from outside, and what else has the vehicle: stops, newer flights, another vehicle, silence."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from mavproxy_uavapi.errors import Invalid, LinkLost, ModeChanged, NotArmed
+from mavproxy_vision.errors import LandingFailed
+from mavproxy_vision.mission import Errand
+
+TAG = "0:0.30@0.8,-0.6"
+FAR_TAG = "0:0.30@1.6,-1.2"
+LARGE = {"tags": "0:0.6", "sim_tags": "0:0.6@0.8,-0.6"}
+SMALL = {"width": 320, "height": 240, "fps": 12.0, "sim_noise": 3.0, "sim_jitter": 0.0}
+SWITCH_MODE = 176
+PLND = ("PLND_ENABLED", "PLND_STRICT", "PLND_RET_MAX", "PLND_ALT_MIN", "PLND_ALT_MAX")
+
+
+@pytest.fixture
+def flying(lockstep: Any) -> Any:
+    """A vehicle some metres above home: `flying(alt=6, sim_tags=…)`."""
+
+    def make(alt: float = 5.0, **settings: Any) -> Any:
+        rig = lockstep(**{"sim_tags": TAG, **SMALL, **settings})
+        rig.start(alt)
+        return rig
+
+    return make
+
+
+def height(rig: Any) -> float:
+    return -float(rig.truth.down)
+
+
+def until(rig: Any, condition: Any, limit: float = 60.0) -> None:
+    for _ in range(round(limit / 0.05)):
+        if condition():
+            return
+        rig.pass_time(0.05)
+    raise AssertionError("it did not happen")
+
+
+def sent(rig: Any, kind: str, since: int = 0) -> list[Any]:
+    return [message for message in rig.wire.sent[since:] if message.get_type() == kind]
+
+
+def plnd(rig: Any) -> dict[str, float]:
+    return {name: rig.simulator.parameters[name] for name in PLND}
+
+
+def silent(rig: Any, name: str) -> None:
+    """From now on nobody hears that message."""
+    hear = rig.host._receive
+    rig.host._receive = lambda message: None if message.get_type() == name else hear(message)
+
+
+def holds(rig: Any, seconds: float = 10.0) -> bool:
+    rig.pass_time(3.0)
+    before = height(rig)
+    rig.pass_time(seconds)
+    return rig.mode == "GUIDED" and rig.simulator.copter.armed and abs(height(rig) - before) < 0.5
+
+
+# -- stopped while the autopilot flies for us ----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("action", ["land", "rtl"])
+def test_stopped_in_what_a_failed_landing_does_it_holds(flying, action):
+    rig = flying(alt=6.0, sim_tags="", attempts=1, leash=1.0, on_failure=action)
+    job = rig.land()
+    until(rig, lambda: rig.mode == action.upper())
+    rig.pass_time(1.0)
+    assert rig.flights.stop("stopped")
+    assert str(rig.outcome(job)) == "stopped; the vehicle holds"
+    assert holds(rig)
+
+
+def test_stopped_in_land_by_landing_target_it_holds_and_plnd_is_as_before(flying):
+    rig = flying(alt=6.0, plnd=True, **LARGE)
+    before = plnd(rig)
+    job = rig.land(method="landing_target")
+    until(rig, lambda: rig.mode == "LAND")
+    rig.pass_time(2.0)
+    assert rig.flights.stop("stopped")
+    rig.outcome(job)
+    assert holds(rig)
+    assert plnd(rig) == before
+
+
+def test_stopped_in_the_pilots_mode_nothing_is_sent_and_nothing_else_is_said(flying):
+    rig = flying()
+    job = rig.land()
+    rig.pass_time(2.0)
+    rig.simulator.copter.sticks.move(3, 1500)
+    rig.simulator.copter.set_mode(5)
+    mark = len(rig.wire.sent)
+    until(rig, lambda: rig.copter.mode == "LOITER" or not job.running)
+    if job.running:
+        rig.flights.stop("stopped")
+    rig.outcome(job)
+    rig.pass_time(2.0)
+    assert rig.mode == "LOITER"
+    assert not [m for m in sent(rig, "COMMAND_LONG", mark) if m.command == SWITCH_MODE]
+
+
+def test_unloaded_in_the_autopilots_land_it_holds(flying):
+    rig = flying(alt=6.0, sim_tags="", attempts=1, leash=1.0, on_failure="land")
+    job = rig.land()
+    until(rig, lambda: rig.mode == "LAND")
+
+    async def abandon() -> list[Any]:
+        return rig.flights.abandon()
+
+    for message, _system in rig.run(abandon()):
+        rig.wire.deliver(message)
+    assert not job.running
+    assert holds(rig)
+
+
+def test_a_mission_that_is_stopped_holds_before_it_writes_its_track(flying):
+    rig = flying()
+    rig.flights._directory = lambda: (_ for _ in ()).throw(RuntimeError("no home directory"))
+    job = rig.begin(rig.flights.errand(rig.copter, Errand(alt=20, north=60, east=0)))
+    rig.pass_time(4.0)
+    assert rig.flights.stop("stopped")
+    error = rig.outcome(job)
+    assert "holds" in str(error)
+    assert holds(rig)
+    assert rig.flights.report.track == "not written: no home directory"
+
+
+# -- newer flights -------------------------------------------------------------------------------------------
+
+
+def test_a_landing_that_supersedes_another_sees(flying):
+    rig = flying(sim_tags=FAR_TAG)
+    first = rig.land()
+    rig.pass_time(2.0)
+    second = rig.land()
+    assert rig.outcome(second).startswith("Landed on tag 0")
+    assert rig.outcome(first).code == "superseded"
+
+
+def test_a_landing_target_that_supersedes_another_gives_back_what_was_before_both(flying):
+    rig = flying(alt=6.0, plnd=True, **LARGE)
+    before = plnd(rig)
+    rig.land(method="landing_target")
+    until(rig, lambda: rig.simulator.parameters["PLND_ENABLED"] == 1)
+    second = rig.land(method="landing_target")
+    during: list[float] = []
+    rig.each_step.append(
+        lambda: during.append(rig.simulator.parameters["PLND_ENABLED"]) if rig.mode == "LAND" else None
+    )
+    assert rig.outcome(second).startswith("Landed on tag 0")
+    assert set(during[:-50]) == {1}
+    assert plnd(rig) == before
+
+
+def test_a_flight_that_is_refused_leaves_the_one_under_way_alone(flying):
+    rig = flying(sim_tags=FAR_TAG)
+    first = rig.land()
+    rig.pass_time(2.0)
+    refused = rig.outcome(rig.land(99999))
+    assert isinstance(refused, Invalid)
+    assert rig.flights.running
+    assert rig.outcome(first).startswith("Landed on tag 0")
+
+
+def test_a_flight_that_is_refused_in_land_does_not_hide_the_one_under_way(flying):
+    rig = flying()
+    first = rig.land()
+    until(rig, lambda: rig.mode == "LAND")
+    assert isinstance(rig.outcome(rig.begin(rig.flights.searching(rig.copter, 3, None))), ModeChanged)
+    assert rig.flights.running
+    assert rig.flights.report.verb == "land"
+    assert rig.outcome(first).startswith("Landed on tag 0")
+
+
+# -- another vehicle -----------------------------------------------------------------------------------------
+
+
+def other_vehicle(rig: Any) -> None:
+    """A second copter on the link, parked elsewhere and turned round."""
+    encode, decode = mavlink.MAVLink(None, srcSystem=2, srcComponent=1), mavlink.MAVLink(None)
+    count = [0]
+
+    def say() -> None:
+        count[0] += 1
+        if count[0] % 40:
+            return
+        at = int((rig.loop.time() - 900) * 1000)
+        for message in (
+            mavlink.MAVLink_heartbeat_message(2, 3, 81, 4, 3, 3),
+            mavlink.MAVLink_attitude_message(at, 0, 0, math.radians(173), 0, 0, 0),
+            mavlink.MAVLink_local_position_ned_message(at, 40, 30, 0, 0, 0, 0),
+            mavlink.MAVLink_global_position_int_message(at, 0, 0, 0, 0, 0, 0, 0, 0),
+        ):
+            for decoded in decode.parse_buffer(message.pack(encode)):
+                rig.host._receive(decoded)
+
+    rig.each_step.append(say)
+
+
+def test_a_change_of_mavproxys_vehicle_does_not_change_who_lands(flying):
+    rig = flying(sim_tags=FAR_TAG)
+    other_vehicle(rig)
+    job = rig.land()
+    rig.pass_time(1.5)
+    rig.host.target = 2
+    result = rig.outcome(job)
+    assert str(result).startswith("Landed on tag 0"), result
+    assert math.hypot(rig.truth.north - 1.6, rig.truth.east + 1.2) < 0.2
+    assert {m.target_system for m in sent(rig, "SET_POSITION_TARGET_LOCAL_NED")} == {1}
+
+
+# -- what is not told, or no number --------------------------------------------------------------------------
+
+
+def test_what_is_no_number_never_reaches_a_setpoint(flying):
+    rig = flying(sim_tags=FAR_TAG)
+    job = rig.land()
+    rig.pass_time(1.0)
+    hear, count = rig.host._receive, [0]
+
+    def poisoned(message: Any) -> None:
+        count[0] += 1
+        if message.get_type() in ("LOCAL_POSITION_NED", "ATTITUDE") and count[0] % 7 == 0:
+            for field in ("vx", "x", "yaw", "roll"):
+                if hasattr(message, field):
+                    setattr(message, field, math.nan)
+        hear(message)
+
+    rig.host._receive = poisoned
+    assert rig.outcome(job).startswith("Landed on tag 0")
+    assert all(math.isfinite(m.vx + m.vy + m.vz) for m in sent(rig, "SET_POSITION_TARGET_LOCAL_NED"))
+
+
+def test_without_positions_a_landing_ends(flying):
+    rig = flying(sim_tags=FAR_TAG)
+    job = rig.land()
+    rig.pass_time(2.0)
+    silent(rig, "LOCAL_POSITION_NED")
+    error = rig.outcome(job)
+    assert isinstance(error, LandingFailed)
+    assert "has not told where it is" in str(error)
+    assert error.report["action"] == "rtl"
+
+
+def test_without_positions_land_is_taken_back_and_ends(flying):
+    rig = flying(alt=6.0, plnd=True, **LARGE)
+    job = rig.land(method="landing_target")
+    until(rig, lambda: rig.mode == "LAND")
+    rig.pass_time(2.0)
+    silent(rig, "LOCAL_POSITION_NED")
+    until(rig, lambda: rig.mode == "GUIDED", 10)
+    error = rig.outcome(job)
+    assert isinstance(error, LandingFailed)
+    rig.pass_time(5.0)
+    assert rig.simulator.parameters["PLND_ENABLED"] == 0
+
+
+def test_a_landing_by_landing_target_ends_at_the_time_limit(flying):
+    rig = flying(alt=7.0, plnd=True, time_limit=10, **LARGE)
+    rig.simulator.parameters.set("LAND_SPEED", 30)
+    rig.simulator.parameters.set("LAND_SPEED_HIGH", 30)
+    error = rig.outcome(rig.land(method="landing_target"))
+    assert isinstance(error, LandingFailed)
+    assert "not landed within 10 s" in str(error)
+    assert error.report["action"] == "rtl"
+
+
+def test_parameters_are_given_back_when_a_lost_link_returns(flying):
+    rig = flying(alt=6.0, plnd=True, **LARGE)
+    before = plnd(rig)
+    job = rig.land(method="landing_target")
+    until(rig, lambda: rig.mode == "LAND")
+    rig.pass_time(1.0)
+    rig.simulator.faults.silence(rig.simulator.copter.now, 7.0, sending=True, receiving=True)
+    assert isinstance(rig.outcome(job), LinkLost)
+    assert plnd(rig) != before
+    rig.pass_time(20.0)
+    assert plnd(rig) == before
+
+
+def test_a_parameter_that_cannot_be_given_back_does_not_keep_it_from_returning(flying):
+    rig = flying(alt=6.0, plnd=True, attempts=1, **LARGE)
+    job = rig.land(method="landing_target")
+    until(rig, lambda: rig.mode == "LAND")
+    rig.eye.blind = lambda _: True
+    keep = rig.simulator.parameters.set
+    rig.simulator.parameters.set = lambda name, value: (
+        rig.simulator.parameters[name] and None if name == "PLND_ALT_MAX" else keep(name, value)
+    )
+    error = rig.outcome(job)
+    assert isinstance(error, LandingFailed)
+    assert error.report["action"] == "rtl"
+
+
+def test_motors_that_stop_in_flight_are_no_landing(flying):
+    rig = flying(alt=6.0, plnd=True, **LARGE)
+    job = rig.land(method="landing_target")
+    until(rig, lambda: rig.mode == "LAND")
+    rig.pass_time(1.5)
+    rig.wire.deliver(mavlink.MAVLink_command_long_message(1, 1, 400, 0, 0, 21196, 0, 0, 0, 0, 0))
+    error = rig.outcome(job)
+    assert isinstance(error, NotArmed)
+    assert "fell" in str(error)
+
+
+def test_another_home_in_flight_changes_no_height(flying):
+    rig = flying(alt=4.0, sim_tags="", attempts=3, leash=6.0, on_failure="hold")
+    job = rig.land()
+    rig.pass_time(2.0)
+    rig.vision._home_down += 4.0
+    lowest: list[float] = []
+    rig.each_step.append(lambda: lowest.append(height(rig)))
+    rig.outcome(job)
+    assert min(lowest) > 3.0
+
+
+def test_after_a_silence_it_knows_how_high_it_is(flying):
+    rig = flying(alt=7.0, **LARGE)
+    job = rig.land()
+    until(rig, lambda: height(rig) < 3.0)
+    heights: list[float] = []
+    rig.each_step.append(lambda: heights.append(height(rig)) if "last metre" in rig.flights.phase else None)
+    rig.simulator.faults.silence(rig.simulator.copter.now, 3.0, sending=True, receiving=True)
+    rig.outcome(job)
+    assert heights[0] < 1.1
+
+
+# -- somebody switches in the middle -------------------------------------------------------------------------
+
+
+def test_a_pilot_who_switches_before_the_return_has_it(flying):
+    rig = flying(sim_tags="", attempts=1, leash=1.0)
+    job = rig.land()
+    ask = type(rig.copter).limits
+
+    async def slowly(self: Any) -> Any:
+        rig.simulator.copter.sticks.move(3, 1500)
+        rig.simulator.copter.set_mode(5)
+        await asyncio.sleep(1.5)
+        return await ask(self)
+
+    rig.copter.limits = slowly.__get__(rig.copter)
+    assert isinstance(rig.outcome(job), ModeChanged)
+    rig.pass_time(3.0)
+    assert rig.mode == "LOITER"
+
+
+def test_pilot_in_the_last_metre_ends_it_and_nothing_more_is_sent(flying):
+    rig = flying()
+    job = rig.land()
+    until(rig, lambda: "last metre" in rig.flights.phase)
+    rig.simulator.copter.sticks.move(3, 1500)
+    rig.simulator.copter.set_mode(5)
+    rig.pass_time(0.1)
+    mark = len(rig.wire.sent)
+    assert isinstance(rig.outcome(job), ModeChanged)
+    rig.pass_time(2.0)
+    assert not sent(rig, "SET_POSITION_TARGET_LOCAL_NED", mark)
+    assert rig.mode == "LOITER"
