@@ -27,6 +27,7 @@ from mavproxy_vision.settings import ModuleSettings
 from mavproxy_vision.sighting import Seen
 from mavproxy_vision.tags import Tag
 from mavproxy_vision.track import SIDE, Track
+from mavproxy_vision.vision import Vision
 from mavproxy_vision.worker import Watch, Worker
 
 
@@ -246,6 +247,13 @@ def test_frames_of_another_shape_are_not_looked_at():
     assert told[4].error == ""
     assert worker._newest.image.shape == (960, 1280)
     assert worker.health.skipped == 1  # the two wide ones were not even kept
+
+
+def test_a_camera_of_the_wrong_shape_is_no_camera_to_fly_by():
+    worker, told = watched(np.full((720, 1280), 9, np.uint8))
+    assert told[1].state == "wrong shape"
+    with pytest.raises(NoCamera, match=r"the camera: wrong shape \(asked for is 640x480 px .* 1280x720 came\)"):
+        Vision.require_camera(SimpleNamespace(worker=worker, health=told[1]))
 
 
 def test_a_lens_that_is_scaled_keeps_its_shape():
