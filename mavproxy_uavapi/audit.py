@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import contextvars
+import itertools
 import json
 import logging
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
@@ -16,6 +17,7 @@ from typing import Any
 
 log = logging.getLogger("uavapi.audit")
 KEPT = 500
+MANY = 3  # of a name in a row are counted
 FILE = "uavapi-audit.jsonl"
 
 # The names of the messages that the present call has sent; a task of it inherits the same list.
@@ -53,7 +55,7 @@ class Entry:
         outcome: `ok`, or the error's code.
         detail: the result, or the error's sentence.
         seconds: from request to answer.
-        sent: names of the messages that reached the link for it.
+        sent: names of the messages that reached the link for it, as `counted` has them.
     """
 
     time: str
@@ -69,6 +71,15 @@ class Entry:
     def __str__(self) -> str:
         given = ", ".join(f"{name}={value}" for name, value in self.request.items() if value is not None)
         return f"{self.time} {self.client} {self.verb}({given}): {self.outcome} after {self.seconds:.1f} s"
+
+
+def counted(names: Iterable[str]) -> tuple[str, ...]:
+    """Names in their order; one that comes thrice or more in a row is there once, with its number: `NAME x240`."""
+    told: list[str] = []
+    for name, same in itertools.groupby(names):
+        count = len(list(same))
+        told += [name] * count if count < MANY else [f"{name} x{count}"]
+    return tuple(told)
 
 
 def utc_now() -> str:

@@ -11,6 +11,7 @@ from typing import Any
 
 # The state of a camera is told by `vision status`; FFmpeg and OpenCV would write into the pilot's prompt.
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+os.environ.setdefault("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT", "1")  # s that a read of a silent camera blocks, not 10
 
 import cv2  # noqa: E402
 
@@ -23,6 +24,12 @@ COMPARED = 100  # frames of a stream, the most punctual of which tells how its c
 JUMP = 5.0  # s between two frames of a stream that are not a pause but another clock
 OPENING, SILENCE = 5000, 3000  # ms that a stream has to open, and to give the next frame
 BACKLOG = 2.0  # s in which a stream that was just opened may give what it had kept
+
+
+def be_silent() -> None:
+    """Have OpenCV write no log; its versions differ in where that is set."""
+    set_level = getattr(cv2, "setLogLevel", None) or cv2.utils.logging.setLogLevel
+    set_level(0)
 
 
 class StreamClock:
@@ -68,6 +75,7 @@ class Capture:
         self._is_stamped = spec.partition("://")[0].lower() in STAMPED
         self._stream_clock = StreamClock()
         self._next = 0.0
+        self._on_our_clock = False  # whether the driver's time stamps are
 
     def open(self) -> None:
         """Open it; ask a camera for size and rate, skip what a stream had kept.
@@ -75,7 +83,8 @@ class Capture:
         Raises:
             NoCamera: it cannot be opened.
         """
-        cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+        be_silent()
+        self._on_our_clock = False
         self._capture = self._opened()
         if not self._capture.isOpened():
             self.close()
@@ -111,7 +120,7 @@ class Capture:
         """The next frame; a file plays at its rate, and ends.
 
         Raises:
-            NoCamera: what comes is no picture, or cannot be read.
+            NoCamera: what comes is no picture, or cannot be read; or the camera was unplugged.
         """
         if self._is_file:
             self._wait_for_its_time()
@@ -122,11 +131,18 @@ class Capture:
             raise NoCamera(f"{self._spec}: {error.err}") from error
         now = self._clock()
         if not good:
+            if self._is_gone():
+                raise NoCamera(f"{self._spec} is gone")
             time.sleep(0.02)  # a dead camera answers at once: do not spin
             return None
         if self._is_stream and now - asked > 0.9 * SILENCE / 1000:
             return None  # what the decoder still held when the stream fell silent
         return Frame(grey(image), self._captured_at(now), now)
+
+    def _is_gone(self) -> bool:
+        """Whether a camera was unplugged: let go at once, it gets its number again when it returns."""
+        node = self._spec.replace("camera:", "/dev/video", 1)
+        return node.startswith("/dev/") and not os.path.exists(node)
 
     def _wait_for_its_time(self) -> None:
         now = self._clock()
@@ -139,9 +155,9 @@ class Capture:
         stamp: float = self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
         if self._is_stamped:
             return self._stream_clock.sent(now, stamp) - self._latency
-        if not self._is_file and not self._is_stream and 0.0 <= now - stamp < BEHIND:
-            return stamp
-        return now - self._latency
+        if not self._is_file and not self._is_stream and abs(now - stamp) < BEHIND:
+            self._on_our_clock = True  # and stays: a frame that waited for longer is old, not on another clock
+        return min(stamp, now) if self._on_our_clock else now - self._latency
 
     def close(self) -> None:
         """Release it."""

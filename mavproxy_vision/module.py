@@ -21,6 +21,7 @@ if not hasattr(getattr(cv2, "aruco", None), "ArucoDetector"):
 
 from mavproxy_uavapi.errors import UavApiError
 from mavproxy_uavapi.host.member import HostedModule
+from mavproxy_uavapi.http.requests import NED_REACH
 from mavproxy_uavapi.vehicle.jobs import Job
 from mavproxy_vision import console, files
 from mavproxy_vision.errors import BadSetting
@@ -249,6 +250,9 @@ class VisionModule(HostedModule):
         if not 0 < alt <= 500:
             print("vision: the altitude is more than 0 and at most 500 m above home")
             return
+        if not max(abs(north), abs(east)) <= NED_REACH:  # nor is what is no number
+            print(f"vision: north and east are at most {NED_REACH:g} m")
+            return
         tag = args[3] if len(args) > 3 else ""
         number = None if tag in ("", "none") else self._id([tag])
         if number is False:
@@ -302,8 +306,10 @@ class VisionModule(HostedModule):
                 return work()
             except OSError as error:
                 return f"{error.filename or 'a file'}: {os.strerror(error.errno or 0)}"
-            except (UavApiError, cv2.error) as error:
+            except UavApiError as error:
                 return str(error)
+            except cv2.error as error:
+                return str(error.err)
 
         def done() -> None:
             text = said()

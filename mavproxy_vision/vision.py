@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
+import os
 from collections import deque
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -326,13 +327,14 @@ def make_source(settings: Settings, where: Any, clock: Callable[[], float]) -> S
         return SimulatedCamera(renderer, where, settings.timing, clock)
     if spec == "http":
         return Posted(latency, clock)
-    folder = Path(spec).expanduser()
-    if folder.is_dir():
-        return Folder(folder, latency, settings.fps, clock)
-    size = (settings.width, settings.height)
-    if "!" in spec and not folder.is_file():
+    path = os.path.expanduser(spec)
+    if os.path.isdir(path):  # pathlib's raises on a long pipeline
+        return Folder(Path(path), latency, settings.fps, clock)
+    size = (settings.model.width, settings.model.height)
+    is_file = os.path.isfile(path)
+    if "!" in spec and not is_file:
         return Pipeline(spec, latency, size, clock)
-    return Capture(str(folder) if folder.is_file() else spec, latency, size, settings.fps, clock)
+    return Capture(path if is_file else spec, latency, size, settings.fps, clock)
 
 
 def in_view(seen: Seen | None) -> list[dict[str, Any]]:

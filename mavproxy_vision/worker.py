@@ -21,7 +21,8 @@ log = logging.getLogger("vision")
 SILENT_AFTER = 0.5  # s without a new frame until the camera counts as dead or frozen
 RECONNECT_AFTER = 1.5  # s without a new frame until the source is opened anew
 RECONNECT_PAUSE = 1.0  # s between two tries
-JOIN = 2.0  # s that a thread gets to end; a driver that hangs is left behind
+FIRST_FRAME = 5.0  # s that a source which was just opened has for its first frame
+JOIN = 2.0  # s that both threads get to end; a driver that hangs is left behind
 
 
 @dataclass(frozen=True)
@@ -118,8 +119,9 @@ class Worker:
         """End both; a driver that hangs in a read is left behind. Any other thread."""
         atexit.unregister(self.stop)
         self._end()
+        until = time.monotonic() + JOIN
         for thread in self._threads:
-            thread.join(JOIN)
+            thread.join(max(until - time.monotonic(), 0.0))
         self._state = "closed"
 
     def _end(self) -> None:
@@ -132,11 +134,15 @@ class Worker:
         """How the camera does. Any thread."""
         reconnects = max(self._openings - 1, 0)
         error = self._defect or self._error
-        return Health(self.verdict(), self._frames, self._repeated, self._skipped, reconnects, self._rate, error)
+        verdict = self.verdict()
+        rate = self._rate if verdict == "ok" else 0.0
+        return Health(verdict, self._frames, self._repeated, self._skipped, reconnects, rate, error)
 
     def verdict(self) -> str:
         """How the camera does just now, in a word of `Health.state`."""
-        if not self._open or self._stop.is_set():
+        if self._stop.is_set():
+            return "closed"
+        if not self._open:
             return self._state
         verdict = self._watch.verdict(self._clock())
         return "wrong shape" if verdict == "ok" and self._misfit else verdict
@@ -172,7 +178,8 @@ class Worker:
             if frame is not None:
                 self._take(frame)
             now = self._clock()
-            if now - max(self._watch.fresh_at, opened) > RECONNECT_AFTER:
+            patience = RECONNECT_AFTER if self._watch.fresh_at > opened else FIRST_FRAME
+            if now - max(self._watch.fresh_at, opened) > patience:
                 self._error = f"{self._watch.verdict(now)} for {now - self._watch.fresh_at:.1f} s"
                 return
 
@@ -196,7 +203,7 @@ class Worker:
     # -- the detector's thread -----------------------------------------------------------------------------
 
     def _look(self) -> None:
-        last = self._clock()
+        last, gap = self._clock(), 0.0
         while True:
             with self._changed:
                 self._changed.wait_for(lambda: self._newest is not None or self._stop.is_set())
@@ -205,8 +212,8 @@ class Worker:
                 return
             self._tell(self.look_at(frame), frame.image)
             now = self._clock()
-            self._rate += 0.1 * (1.0 / max(now - last, 1e-3) - self._rate)
-            last = now
+            gap = gap + 0.1 * (now - last - gap) if gap else now - last
+            self._rate, last = 1.0 / max(gap, 1e-3), now
 
     def look_at(self, frame: Frame) -> Seen:
         """Look for tags in a frame."""

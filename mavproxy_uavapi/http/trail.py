@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 
-from mavproxy_uavapi.audit import Entry, noting_sent, utc_now
+from mavproxy_uavapi.audit import Entry, counted, noting_sent, utc_now
 from mavproxy_uavapi.errors import NoVehicle, UavApiError
 from mavproxy_uavapi.http.call import Action, Answer, Call
 
@@ -72,6 +72,6 @@ class Trace:
             outcome=outcome,
             detail=detail,
             seconds=round(self._clock() - self._began, 3),
-            sent=tuple(self._sent),
+            sent=counted(self._sent),
         )
         self._call.service.audit.add(entry)

@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 
 from mavproxy_vision import pipeline
+from mavproxy_vision.calibration import save
 from mavproxy_vision.capture import COMPARED, Capture, StreamClock
 from mavproxy_vision.errors import NoCamera
+from mavproxy_vision.model import CameraModel
 from mavproxy_vision.pipeline import Pipeline, launch_command
 from mavproxy_vision.settings import ModuleSettings
 from mavproxy_vision.vision import make_source
@@ -177,12 +179,13 @@ def test_a_program_that_falls_silent_but_goes_on_is_no_camera(monkeypatch, tmp_p
     assert process.returncode in (-15, -9)
 
 
-def camera(monkeypatch, spec, **given):
+def camera(monkeypatch, spec, settings=None, clock=time.monotonic, **given):
     """A capture of OpenCV's that does as told, and what it was asked for."""
     asked = {}
-    device = SimpleNamespace(isOpened=lambda: True, set=asked.__setitem__, get=lambda _: 0.0, **given)
+    given = {"get": lambda _: 0.0, "release": lambda: None, **given}
+    device = SimpleNamespace(isOpened=lambda: True, set=asked.__setitem__, **given)
     monkeypatch.setattr(cv2, "VideoCapture", lambda *_: device)
-    source = make_source(ModuleSettings({"source": spec}).snapshot(), lambda _: None, time.monotonic)
+    source = make_source(ModuleSettings({"source": spec, **(settings or {})}).snapshot(), lambda _: None, clock)
     source.open()
     return source, asked
 
@@ -223,3 +226,39 @@ def test_an_absurd_camera_is_no_camera(spec):
 def test_a_source_is_told_by_its_spelling(spec, kind):
     settings = ModuleSettings({"source": spec}).snapshot()
     assert isinstance(make_source(settings, lambda _: None, time.monotonic), kind)
+
+
+def test_a_calibrated_camera_is_asked_for_the_size_it_was_calibrated_at(monkeypatch, tmp_path):
+    save(CameraModel(1280, 720, 900.0, 900.0, 640.0, 360.0), tmp_path / "camera.json")
+    _, asked = camera(monkeypatch, "camera:0", {"calibration": str(tmp_path / "camera.json")})
+    assert (asked[cv2.CAP_PROP_FRAME_WIDTH], asked[cv2.CAP_PROP_FRAME_HEIGHT]) == (1280, 720)
+
+
+def test_a_drivers_time_stamps_are_taken_once_they_are_known_to_be_on_our_clock(monkeypatch):
+    now, stamp = [100.0], [99.99]
+    picture = np.zeros((4, 4), np.uint8)
+    source, _ = camera(
+        monkeypatch,
+        "camera:0",
+        {"latency": 80},
+        lambda: now[0],
+        read=lambda: (True, picture),
+        get=lambda _: 1000.0 * stamp[0],
+    )
+    assert source.read().captured_at == pytest.approx(99.99)
+    now[0], stamp[0] = 103.0, 100.0  # nobody read for three seconds
+    assert source.read().captured_at == pytest.approx(100.0)
+    now[0], stamp[0] = 104.0, 104.03  # some drivers stamp the end of a frame ahead of time
+    assert source.read().captured_at == pytest.approx(104.0)
+    source.close()
+    source.open()
+    now[0], stamp[0] = 200.0, 5.0  # another clock
+    assert source.read().captured_at == pytest.approx(199.92)
+
+
+def test_a_camera_that_was_unplugged_is_let_go_at_once(monkeypatch):
+    source, _ = camera(monkeypatch, "camera:987", read=lambda: (False, None))
+    with pytest.raises(NoCamera, match="camera:987 is gone"):
+        source.read()
+    source, _ = camera(monkeypatch, "http://there/stream", read=lambda: (False, None), grab=lambda: False)
+    assert source.read() is None

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from mavproxy_uavapi.audit import counted
 from mavproxy_uavapi.http.requests import Empty
 from mavproxy_uavapi.http.routes import POST, Route
 
@@ -53,3 +54,10 @@ def test_route_without_a_trail_leaves_no_trace(service: Any, api: Any, host: Any
         for _ in range(3):
             assert api.post("/take").status == 200
         assert len(service.audit.entries) == 3
+
+
+def test_setpoints_are_counted_rather_than_listed() -> None:
+    names = ["COMMAND_LONG", "COMMAND_LONG", *["SET_POSITION_TARGET_LOCAL_NED"] * 240, "COMMAND_LONG"]
+    told = ("COMMAND_LONG", "COMMAND_LONG", "SET_POSITION_TARGET_LOCAL_NED x240", "COMMAND_LONG")
+    assert counted(names) == told
+    assert counted([]) == ()
