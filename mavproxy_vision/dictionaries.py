@@ -50,12 +50,14 @@ def family(name: str, wanted: Iterable[int] | None = None) -> Family:
     """The dictionary of a family with just the wanted ids, or all with None."""
     whole = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, NAMES[name]))
     correction = 0.0 if name in NO_CORRECTION else 0.6
-    if wanted is None:
-        return Family(name, None, whole, correction)
-    ids = tuple(sorted(number for number in set(wanted) if number < FAMILIES[name][1]))
-    rows = np.ascontiguousarray(whole.bytesList[list(ids)])
-    cut = cv2.aruco.Dictionary(rows, whole.markerSize, whole.maxCorrectionBits)
-    return Family(name, ids, cut, correction)
+    ids = None if wanted is None else tuple(sorted({one for one in wanted if one < FAMILIES[name][1]}))
+    rows = whole.bytesList if ids is None else np.ascontiguousarray(whole.bytesList[list(ids)])
+    return Family(name, ids, cv2.aruco.Dictionary(rows, whole.markerSize, correctable(name)), correction)
+
+
+def correctable(name: str) -> int:
+    """Bits that can be corrected: less than half of the family's distance. OpenCV 4 says that none can."""
+    return (int(name.partition("h")[2]) - 1) // 2
 
 
 def marker_image(name: str, number: int, pixels_per_cell: int = 8, border: int = 1) -> NDArray[np.uint8]:

@@ -130,6 +130,12 @@ def test_a_picture_that_is_read_wrong_tells_how_many_bits():
     assert seen.hamming == 1
 
 
+@pytest.mark.parametrize(("name", "bits"), [("36h11", 5), ("25h9", 4), ("16h5", 2), ("36h10", 4)])
+def test_as_many_bits_are_corrected_as_the_family_allows(name, bits):
+    assert family(name).dictionary.maxCorrectionBits == bits
+    assert family(name, [0, 1]).dictionary.maxCorrectionBits == bits
+
+
 def test_a_family_keeps_its_numbers():
     cut = family("36h11", [7, 3, 9999])
     assert cut.ids == (3, 7)
