@@ -116,7 +116,7 @@ class Flights:
 
     def copter(self) -> Copter:
         """MAVProxy's current vehicle. Raises NoVehicle, LinkLost, NotSupported."""
-        return copter_of(self.vision.vehicle())
+        return copter_of(self.vision.host.hangar.commandable())
 
     # -- flights, to be run as jobs --------------------------------------------------------------------------
 

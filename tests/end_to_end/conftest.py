@@ -356,10 +356,10 @@ def faulty_rig(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPath
 
 
 @pytest.fixture(scope="session")
-def poster() -> Any:
+def poster(helper: Callable[[str], Any]) -> Any:
     """The module `poster`; a machine without OpenCV has none."""
     pytest.importorskip("cv2")
-    return _load("poster")
+    return helper("end_to_end/poster.py")
 
 
 @pytest.fixture(scope="session")

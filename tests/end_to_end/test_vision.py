@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import requests
 
@@ -95,6 +96,34 @@ def test_the_prompt_tells_the_same(looking: Any) -> None:
     looking.mavproxy.ask("vision set famly x", "did you mean family")
     looking.mavproxy.ask("vision tag tag.pdf --size 0.15", "wrote tag.pdf")
     looking.mavproxy.ask("vision snapshot here.png", "wrote here.png")
+
+
+def test_a_camera_is_calibrated_at_the_prompt_and_looked_through(looking: Any, boards: Any, tmp_path: Path) -> None:
+    from mavproxy_vision.model import CameraModel  # noqa: PLC0415
+
+    looking.mavproxy.ask(f"vision calibrate {tmp_path} {boards.KIND}", "no images")
+    boards.draw(tmp_path, CameraModel(480, 360, 450.0, 450.0, 240.0, 180.0, (-0.1, 0.02, 0.0, 0.0, 0.0)))
+    made = looking.mavproxy.ask(f"vision calibrate {tmp_path} {boards.KIND} {tmp_path}/camera.json", "wrote ")
+    assert "9 views" in made
+    model = json.loads((tmp_path / "camera.json").read_text(encoding="utf-8"))
+    assert model["fx"] == pytest.approx(450, rel=0.01)
+    try:
+        looking.mavproxy.ask(f"vision set calibration {tmp_path}/camera.json", "looking for")
+        picture = cv2.imdecode(np.frombuffer(frame_of(looking), np.uint8), cv2.IMREAD_COLOR)
+        assert picture.shape == (360, 480, 3)
+    finally:
+        looking.mavproxy.ask("vision set calibration ''", "looking for")
+
+
+def frame_of(rig: Any) -> bytes:
+    """The newest frame, once there is one."""
+    until = time.monotonic() + 20
+    while time.monotonic() < until:
+        answer = rig.get("/vision/frame.jpg")
+        if answer.status_code == 200:
+            return bytes(answer.content)
+        time.sleep(0.1)
+    raise AssertionError(answer.text)
 
 
 def test_bad_requests_are_refused_before_anything_flies(looking: Any) -> None:

@@ -11,7 +11,10 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.errors import Invalid, LinkLost, ModeChanged, NotArmed
 from mavproxy_vision.errors import LandingFailed
+from mavproxy_vision.geometry import Attitude, vector
 from mavproxy_vision.mission import Errand
+from mavproxy_vision.plnd import landing_target
+from mavproxy_vision.setpoints import setpoint
 
 TAG = "0:0.30@0.8,-0.6"
 FAR_TAG = "0:0.30@1.6,-1.2"
@@ -287,18 +290,24 @@ def test_parameters_are_given_back_when_a_lost_link_returns(flying):
     assert plnd(rig) == before
 
 
-def test_a_parameter_that_cannot_be_given_back_does_not_keep_it_from_returning(flying):
+@pytest.mark.parametrize("stuck", ["PLND_ENABLED", "PLND_ALT_MAX"])
+def test_a_parameter_that_cannot_be_given_back_does_not_keep_it_from_returning(flying, stuck):
     rig = flying(alt=6.0, plnd=True, attempts=1, **LARGE)
+    rig.simulator.parameters.set("PLND_ALT_MAX", 8)
+    before = plnd(rig)
     job = rig.land(method="landing_target")
     until(rig, lambda: rig.mode == "LAND")
     rig.eye.blind = lambda _: True
-    keep = rig.simulator.parameters.set
-    rig.simulator.parameters.set = lambda name, value: (
-        rig.simulator.parameters[name] and None if name == "PLND_ALT_MAX" else keep(name, value)
-    )
+    parameters = rig.simulator.parameters
+    take = parameters.set
+    parameters.set = lambda name, value: take(name, parameters[name] if name == stuck else value)
     error = rig.outcome(job)
     assert isinstance(error, LandingFailed)
     assert error.report["action"] == "rtl"
+    assert ("does not take PLND_ENABLED = 0" in str(error)) == (stuck == "PLND_ENABLED")
+    parameters.set = take  # it was a bad link, say
+    rig.pass_time(30.0)
+    assert plnd(rig) == before
 
 
 def test_motors_that_stop_in_flight_are_no_landing(flying):
@@ -366,3 +375,27 @@ def test_pilot_in_the_last_metre_ends_it_and_nothing_more_is_sent(flying):
     rig.pass_time(2.0)
     assert not sent(rig, "SET_POSITION_TARGET_LOCAL_NED", mark)
     assert rig.mode == "LOITER"
+
+
+@pytest.mark.parametrize(("forward", "right"), [(1.0, 0.5), (-1.0, 0.5), (0.3, -2.0)])
+def test_the_angles_of_landing_target_mean_the_same_as_its_position(forward, right):
+    message = landing_target(1.0, vector(forward, right, 4.0), Attitude())
+    told = (-math.tan(message.angle_y), math.tan(message.angle_x))  # as AC_PrecLand_MAVLink.cpp reads them
+    assert told == pytest.approx((forward / 4.0, right / 4.0))
+    assert (message.x, message.y, message.z) == pytest.approx((forward, right, 4.0))
+
+
+def test_what_is_no_number_is_never_packed():
+    for velocity in (vector(math.nan, 0, 0), vector(0, math.inf, 0)):
+        with pytest.raises(ValueError, match="no velocity"):
+            setpoint((1, 1), velocity, 0.0)
+    with pytest.raises(ValueError, match="no place"):
+        landing_target(1.0, vector(math.nan, 0, 1), Attitude())
+
+
+def test_an_id_that_tags_does_not_name_has_the_size_of_the_main_tag_of_now(lockstep):
+    rig = lockstep(sim_tags=TAG, **SMALL)
+    rig.run(rig.vision.want(5))
+    assert rig.vision.options(rig.vision.settings).sizes == {0: 0.3, 5: 0.3}
+    rig.put(tags="0:0.6")
+    assert rig.vision.options(rig.vision.settings).sizes == {0: 0.6, 5: 0.6}

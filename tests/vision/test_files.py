@@ -306,24 +306,9 @@ def test_a_defect_in_either_thread_is_no_camera(broken):
     worker.stop()
 
 
-def test_calibration_from_rendered_chessboards(tmp_path):
+def test_calibration_from_rendered_chessboards(tmp_path, boards):
     true = CameraModel(640, 480, 610.0, 605.0, 325.0, 236.0, (-0.1, 0.02, 0.0, 0.0, 0.0))
-    squares = np.kron(np.indices((7, 10)).sum(axis=0) % 2, np.ones((40, 40))) * 200 + 30
-    board = np.pad(squares, 60, constant_values=230).astype(np.uint8)
-    random = np.random.default_rng(5)
-    from mavproxy_vision.rendering import distortion_maps
-
-    maps = distortion_maps(true)
-    scale = 0.03 / 40
-    for index in range(9):
-        turn, _ = cv2.Rodrigues(random.uniform(-0.45, 0.45, 3))
-        at = np.array([*random.uniform(-0.05, 0.05, 2), random.uniform(0.5, 0.8)])
-        middle = np.array(
-            [[scale, 0, -scale * board.shape[1] / 2], [0, scale, -scale * board.shape[0] / 2], [0, 0, 1]]
-        )
-        pose = np.column_stack([turn[:, 0], turn[:, 1], at])
-        flat = cv2.warpPerspective(board, true.matrix @ pose @ middle, (640, 480), borderValue=120)
-        cv2.imwrite(str(tmp_path / f"{index}.png"), cv2.remap(flat, *maps, cv2.INTER_LINEAR))
+    boards.draw(tmp_path, true)
     made = calibrate(tmp_path, Board.parse("chessboard:10x7:0.03"))
     assert made.views >= 5
     assert made.error < 0.3
