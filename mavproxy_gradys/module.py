@@ -17,7 +17,7 @@ try:
     from mavproxy_gradys.track_console import TrackConsole
 except ModuleNotFoundError as missing:  # MAVProxy prints the text of an ImportError as one line
     raise ImportError(f"gradys needs {missing.name}: pip install mavproxy-uavapi") from missing
-from mavproxy_uavapi.host.member import HostedModule
+from mavproxy_uavapi.host.member import HostedModule, value_of
 from mavproxy_uavapi.settings import SettingError
 
 NAME = "gradys"
@@ -140,7 +140,7 @@ class GradysModule(HostedModule):
             return
         before = self.gradys_settings.snapshot()
         try:
-            self.gradys_settings.set(args[0], " ".join(args[1:]))
+            self.gradys_settings.set(args[0], value_of(args[1:]))
         except SettingError as error:
             print(f"gradys: {error}")
             return

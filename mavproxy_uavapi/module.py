@@ -14,7 +14,7 @@ except ModuleNotFoundError as missing:  # MAVProxy prints the text of an ImportE
     raise ImportError(f"uavapi needs {missing.name}: pip install mavproxy-uavapi") from missing
 from mavproxy_uavapi.audit import Audit
 from mavproxy_uavapi.console import address_of, report, vehicles
-from mavproxy_uavapi.host.member import HostedModule
+from mavproxy_uavapi.host.member import HostedModule, value_of
 from mavproxy_uavapi.logs import Logs, print_above_prompt
 from mavproxy_uavapi.settings import ModuleSettings, SettingError, Settings
 
@@ -148,7 +148,7 @@ class UavApiModule(HostedModule):
             return
         before = self.api_settings.snapshot()
         try:
-            self.api_settings.set(args[0], " ".join(args[1:]))
+            self.api_settings.set(args[0], value_of(args[1:]))
         except SettingError as error:
             print(f"uavapi: {error}")
             return

@@ -20,7 +20,7 @@ if not hasattr(getattr(cv2, "aruco", None), "ArucoDetector"):
     )
 
 from mavproxy_uavapi.errors import UavApiError
-from mavproxy_uavapi.host.member import HostedModule
+from mavproxy_uavapi.host.member import HostedModule, value_of
 from mavproxy_uavapi.http.requests import NED_REACH
 from mavproxy_uavapi.vehicle.jobs import Job
 from mavproxy_vision import console, files
@@ -191,7 +191,7 @@ class VisionModule(HostedModule):
             print(f"vision: {args[0]} is not changed in flight (`vision abort` ends it)")
             return
         try:
-            self.vision_settings.set(args[0], " ".join(args[1:]))
+            self.vision_settings.set(args[0], value_of(args[1:]))
         except BadSetting as error:
             print(f"vision: {error}")
             return

@@ -13,6 +13,12 @@ from mavproxy_uavapi.host import host as hosts
 Action = Callable[[list[str]], None]
 
 
+def value_of(words: list[str]) -> str:
+    """The value that was typed: MAVProxy leaves the quotation marks where they are, and an empty pair is nothing."""
+    text = " ".join(words)
+    return text[1:-1] if len(text) > 1 and text[0] == text[-1] and text[0] in "'\"" else text
+
+
 class HostedModule(mp_module.MPModule):  # type: ignore[misc]
     """A MAVProxy module that shares the host.
 

@@ -101,7 +101,7 @@ def test_the_prompt_tells_the_same(looking: Any) -> None:
 def test_a_camera_is_calibrated_at_the_prompt_and_looked_through(looking: Any, boards: Any, tmp_path: Path) -> None:
     from mavproxy_vision.model import CameraModel  # noqa: PLC0415
 
-    looking.mavproxy.ask(f"vision calibrate {tmp_path} {boards.KIND}", "no images")
+    looking.mavproxy.ask(f"vision calibrate {tmp_path} {boards.KIND}", "0 images in")
     boards.draw(tmp_path, CameraModel(480, 360, 450.0, 450.0, 240.0, 180.0, (-0.1, 0.02, 0.0, 0.0, 0.0)))
     made = looking.mavproxy.ask(f"vision calibrate {tmp_path} {boards.KIND} {tmp_path}/camera.json", "wrote ")
     assert "9 views" in made
@@ -112,7 +112,7 @@ def test_a_camera_is_calibrated_at_the_prompt_and_looked_through(looking: Any, b
         picture = cv2.imdecode(np.frombuffer(frame_of(looking), np.uint8), cv2.IMREAD_COLOR)
         assert picture.shape == (360, 480, 3)
     finally:
-        looking.mavproxy.ask("vision set calibration ''", "looking for")
+        looking.mavproxy.ask('vision set calibration ""', "looking for")
 
 
 def frame_of(rig: Any) -> bytes:

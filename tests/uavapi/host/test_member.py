@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.host import host as hosts
-from mavproxy_uavapi.host.member import HostedModule
+from mavproxy_uavapi.host.member import HostedModule, value_of
 
 
 class Demo(HostedModule):
@@ -105,3 +105,20 @@ def test_second_module_goes_on_when_the_first_is_unloaded(demo: Demo, mpstate: A
     main_loop.until(lambda: 4 in other.host.fleet.vehicles)
     other.unload()
     assert not hasattr(mpstate, hosts.ATTRIBUTE)
+
+
+@pytest.mark.parametrize(
+    ("words", "value"),
+    [
+        ([], ""),
+        (['""'], ""),
+        (["''"], ""),
+        (["a"], "a"),
+        (['"'], '"'),
+        (["0:0.3", "1:0.1"], "0:0.3 1:0.1"),
+        (['"my camera.json"'], "my camera.json"),
+        (["v4l2src", 'device="/dev/video0"'], 'v4l2src device="/dev/video0"'),
+    ],
+)
+def test_value_is_what_was_typed_without_the_quotation_marks_around_it(words: list[str], value: str) -> None:
+    assert value_of(words) == value
