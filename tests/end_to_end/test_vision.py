@@ -217,6 +217,23 @@ def test_unloaded_in_flight_the_vehicle_holds(seeing: Any, harness: Any) -> None
     seeing.on_the_ground()
 
 
+def test_without_uavapi_the_prompt_is_all_it_takes(harness: Any, tmp_path: Path) -> None:
+    rig = harness.Rig(tmp_path, harness.free_port())
+    try:
+        instance = harness.start_embedded(rig, speedup=2)
+        given = {"source": "sim", "fps": 12, "width": 480, "height": 360, "sim_tags": "0:0.30@4,-3"}
+        load = f"--cmd=module load vision:{json.dumps(given, separators=(',', ':'))}"
+        rig.mavproxy = rig.start("mavproxy", harness.mavproxy_command(instance, load))
+        rig.mavproxy.says("looking for 36h11 through sim")
+        rig.mavproxy.says("Received", timeout=60)  # the parameters
+        assert "no vehicle" not in rig.mavproxy.ask("vision mission 4 4 -3", "mission begins (job 1)")
+        told = rig.mavproxy.says("vision: Landed on tag 0", timeout=90)
+        assert "uavapi" not in told
+        assert rig.control.ask("state")["position"][:2] == pytest.approx([4, -3], abs=0.3)
+    finally:
+        rig.stop()
+
+
 def test_interrupted_while_the_camera_runs_mavproxy_ends_as_it_should(seeing: Any) -> None:
     seeing.mavproxy.ask('module load vision:{"source":"sim"}', "looking for")
     seeing.mavproxy.popen.send_signal(signal.SIGINT)
