@@ -182,5 +182,5 @@ def test_too_large_a_body_is_refused(embedded_rig):
         timeout=10,
     )
     assert answer.status_code == 413
-    answer = requests.get(embedded_rig.url + "/jobs", headers={"X-Long": "a" * 100_000}, timeout=10)
+    answer = requests.get(embedded_rig.url + "/jobs", headers={"X-Long": "a" * 20_000}, timeout=10)
     assert answer.status_code == 400
