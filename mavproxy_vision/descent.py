@@ -96,8 +96,7 @@ class PrecisionDescent(Descent):
         await vehicle.switch_to("LAND")
         while not self._stands(touchdown):
             now = vision.now()
-            reason = self._why_not(landing, now)
-            if reason is not None:
+            if self._must_come_back(landing, now):
                 await vehicle.switch_to("GUIDED")
                 flight.autopilot = None
                 motion = vision.history.last_motion
@@ -125,19 +124,14 @@ class PrecisionDescent(Descent):
             raise NotArmed("the vehicle was disarmed in flight, and fell")
         return bool(touchdown.is_over(vehicle.clock(), vehicle.state.age("GLOBAL_POSITION_INT", vehicle.clock())))
 
-    def _why_not(self, landing: Landing, now: float) -> str | None:
-        """Why it may not go down any farther; None when it may."""
-        flight, target = self.flight, landing.target
-        late = landing.overdue(now)
-        if late:
-            return late
-        motion = flight.motion(now)
-        if self._above(landing, flight.vision.history.last_motion) <= BLIND_BELOW:
-            return None
-        if motion is None:
-            silent = now - flight.vision.history.newest
-            return "nobody knows where the vehicle is" if silent > LOST else None
-        return "the target is lost" if target.age(now) > LOST or target.contradiction else None
+    def _must_come_back(self, landing: Landing, now: float) -> bool:
+        """Whether it may not go down any farther: it takes too long, or the target or the vehicle is lost."""
+        history, target = self.flight.vision.history, landing.target
+        if self._above(landing, history.last_motion) <= BLIND_BELOW:
+            return False  # too low to climb away from what may be the ground already
+        if landing.overdue(now) or now - history.newest > LOST:
+            return True
+        return self.flight.motion(now) is not None and (target.age(now) > LOST or target.contradiction is not None)
 
     def _above(self, landing: Landing, motion: Motion | None) -> float:
         """Metres above the target."""
