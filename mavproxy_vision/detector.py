@@ -23,8 +23,10 @@ from mavproxy_vision.tags import FAMILIES
 
 Image = NDArray[np.uint8]
 
-WINDOWS = (3, 23)  # px of the adaptive threshold: small for small tags, large for what is near, dim or blurred
-FAR_ZOOM, FAR_WINDOW = 2, 7  # the far setting looks at the frame enlarged so much too
+# How often a frame is looked at: enlarged so much, windows (px) and constant of the adaptive threshold. A small
+# window finds small tags, a large one what is near, dim or blurred; noise costs time, and less with a larger constant.
+PASSES: tuple[tuple[int, tuple[int, ...], float], ...] = ((1, (3, 23), 14.0),)
+FAR_PASSES = ((1, (3, 23), 20.0), (2, (7,), 15.0))
 FEW_IDS = 8  # of so few all correctable errors may be corrected without seeing ghosts
 SQUARE = 0.35  # the shorter diagonal of a tag in view is at least so much of the longer one
 SAME = 0.25  # of a tag's side between the corners of two finds of it
@@ -41,7 +43,7 @@ class Options:
         families: names of `tags.FAMILIES`.
         sizes: side of the black square (m) by id.
         any_id: look for all ids, not only for those of `sizes`; slower, and 16h5 sees ghosts then.
-        far: look once more, at the frame enlarged: see a fifth farther, for one and a half times the time.
+        far: look once more, at the frame enlarged: see a fifth farther, for a third more time.
         refine: sharpen the corners.
     """
 
@@ -66,9 +68,7 @@ class Detector:
         wanted: Iterable[int] | None = None if options.any_id or not self._sizes else self._sizes
         families = [family(name, wanted) for name in options.families]
         self._families = [one for one in families if one.ids is None or one.ids]
-        passes: list[tuple[int, tuple[int, ...], float]] = [(1, WINDOWS, 14.0)]
-        if options.far:
-            passes.append((FAR_ZOOM, (FAR_WINDOW,), 15.0))
+        passes = FAR_PASSES if options.far else PASSES
         self._passes = [
             (zoom, one, cv2.aruco.ArucoDetector(one.dictionary, parameters(one, windows, constant)))
             for zoom, windows, constant in passes

@@ -130,7 +130,7 @@ def table() -> list[Any]:
         MPSetting("family", str, "36h11", f"one or several of {', '.join(FAMILIES)}; landed on is the first"),
         MPSetting("tags", str, "0:0.30", "ID:SIZE or ID:SIZE@RIGHT,UP in m; the main tag first"),
         MPSetting("any_id", bool, False, "look for all ids of the families, not only for those of tags"),
-        MPSetting("far", bool, False, "see a fifth farther, for one and a half times the time"),
+        MPSetting("far", bool, False, "see a fifth farther, for a third more time"),
         MPSetting("calibration", str, "", "file that `vision calibrate` wrote; replaces fov, width, height"),
         MPSetting("fov", float, 56.145, "degrees, horizontal", range=(5, 170)),
         MPSetting("width", int, 640, "px", range=(64, 8192)),

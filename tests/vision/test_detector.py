@@ -158,7 +158,9 @@ def test_the_range_of_a_small_tag_is_right_however_sharp_the_lens_is(blur):
         seen = [
             detector.detect(frame(6.0, attitude=Attitude(yaw=0.4 * seed), look=look, seed=seed)) for seed in range(6)
         ]
-        return float(np.mean([one.distance for (one,) in seen])) - 6.0
+        distances = [one.distance for sightings in seen for one in sightings]
+        assert len(distances) >= 5  # so blurred and so far away one may be missed
+        return float(np.mean(distances)) - 6.0
 
     assert off(refine=True) == pytest.approx(0, abs=0.03)
     assert off(refine=False) > 0.1  # the control: OpenCV's own corners
