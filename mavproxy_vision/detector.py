@@ -24,9 +24,10 @@ from mavproxy_vision.tags import FAMILIES
 Image = NDArray[np.uint8]
 
 # How often a frame is looked at: enlarged so much, windows (px) and constant of the adaptive threshold. A small
-# window finds small tags, a large one what is near, dim or blurred; noise costs time, and less with a larger constant.
+# window finds small tags, a large one what is near, dim or blurred; noise costs time, less with a larger constant.
+# Enlarged, 9 px see as far as 7 do, and farther through a lens that is less than sharp.
 PASSES: tuple[tuple[int, tuple[int, ...], float], ...] = ((1, (3, 23), 14.0),)
-FAR_PASSES = ((1, (3, 23), 20.0), (2, (7,), 15.0))
+FAR_PASSES = ((1, (3, 23), 20.0), (2, (9,), 15.0))
 FEW_IDS = 8  # of so few all correctable errors may be corrected without seeing ghosts
 SQUARE = 0.35  # the shorter diagonal of a tag in view is at least so much of the longer one
 SAME = 0.25  # of a tag's side between the corners of two finds of it

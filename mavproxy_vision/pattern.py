@@ -26,9 +26,9 @@ BLUR = 0.7  # px, sigma, that a picture begins with: how much more or less it tr
 FINEST = 4  # places to a cell and side at which it is compared, at most
 SIZES = 0.25  # px for a cell: steps in which pictures are kept
 LARGE = 5.0  # px for a cell from which lines are as good
-STEPS = 5
+STEPS = 8
 ENOUGH = 0.02  # px: a corner that moves less has arrived
-MOVED = 1.0  # px that a corner may move; farther, it went astray
+MOVED = 1.6  # px that a corner may move; farther, it went astray
 ALIKE = 0.85  # correlation of picture and frame that is believed
 
 
