@@ -18,6 +18,7 @@ from mavproxy_gradys.owed import Owed
 from mavproxy_gradys.readings import Reading, Stored
 from mavproxy_gradys.spool import Spool, uptime
 from mavproxy_gradys.tasks import begin
+from mavproxy_uavapi.host.patience import within
 
 T = TypeVar("T")
 log = logging.getLogger("gradys.spool")
@@ -114,7 +115,7 @@ class Keeper:
         trimmed = self._clock()
         while not self._stopping.is_set():
             with contextlib.suppress(asyncio.TimeoutError):
-                await asyncio.wait_for(self._stopping.wait(), COMMIT_EVERY)
+                await within(COMMIT_EVERY, self._stopping.wait())
             with contextlib.suppress(NotStored):
                 await self._commit()
                 if self._clock() - trimmed >= TRIM_EVERY:
@@ -156,7 +157,7 @@ class Keeper:
             if found:
                 return found
             with contextlib.suppress(asyncio.TimeoutError):
-                await asyncio.wait_for(owed.news.wait(), TRIM_EVERY)
+                await within(TRIM_EVERY, owed.news.wait())
 
     async def _batch(self, sink: str, owed: Owed, limit: int) -> list[Stored]:
         if owed.unnoted:

@@ -18,6 +18,7 @@ try:
 except ModuleNotFoundError as missing:  # MAVProxy prints the text of an ImportError as one line
     raise ImportError(f"gradys needs {missing.name}: pip install mavproxy-uavapi") from missing
 from mavproxy_uavapi.host.member import HostedModule, value_of
+from mavproxy_uavapi.host.patience import within
 from mavproxy_uavapi.settings import SettingError
 
 NAME = "gradys"
@@ -81,7 +82,7 @@ class GradysModule(HostedModule):
             del self.host.commands["fly"]
         await self.gradys.tracks.close()
         with contextlib.suppress(asyncio.TimeoutError):  # the spool is closed in its own thread
-            await asyncio.wait_for(self.gradys.stop(), LONGEST_END)
+            await within(LONGEST_END, self.gradys.stop())
 
     def unload(self) -> None:
         """Give back what is ours alone, then the rest."""

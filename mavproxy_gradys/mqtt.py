@@ -25,6 +25,7 @@ from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.names import Names
 from mavproxy_gradys.readings import POSITION, STATUS, Reading, Stored, device_of
 from mavproxy_gradys.tasks import begin
+from mavproxy_uavapi.host.patience import within
 
 KEEP_ALIVE = 15  # s; the broker gives a silent connection up after one and a half of it
 WINDOW = 20  # readings on their way at once, on one connection
@@ -142,7 +143,7 @@ class MqttSink:
             aiomqtt.MqttError: it took longer, or failed.
         """
         try:
-            await asyncio.wait_for(answer, self._timeout)
+            await within(self._timeout, answer)
         except (asyncio.TimeoutError, OSError) as error:
             raise aiomqtt.MqttError(str(error) or f"no answer within {self._timeout:g} s") from error
 
@@ -179,7 +180,7 @@ class MqttSink:
 
         async def say(status: str, client: aiomqtt.Client) -> None:
             with contextlib.suppress(aiomqtt.MqttError, asyncio.TimeoutError):
-                await asyncio.wait_for(client.publish(status, OFFLINE, qos=1, retain=True), GOODBYE)
+                await within(GOODBYE, client.publish(status, OFFLINE, qos=1, retain=True))
             await self._drop(status)
 
         if self._leaving:
@@ -196,7 +197,7 @@ async def leave(client: aiomqtt.Client, connecting: asyncio.Future[aiomqtt.Clien
 async def disconnect(client: aiomqtt.Client) -> None:
     """Take leave; a broker that does not answer finds the connection closed."""
     with contextlib.suppress(aiomqtt.MqttError, asyncio.TimeoutError):
-        await asyncio.wait_for(client.__aexit__(None, None, None), GOODBYE)
+        await within(GOODBYE, client.__aexit__(None, None, None))
     left = client._client.socket()  # aiomqtt itself leaves it open when the broker was too slow
     if isinstance(left, socket.socket):
         with contextlib.suppress(OSError):

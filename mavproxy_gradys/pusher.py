@@ -17,6 +17,7 @@ from mavproxy_gradys.settings import Settings
 from mavproxy_gradys.tally import StationTally, VehicleTally
 from mavproxy_uavapi.errors import Unavailable
 from mavproxy_uavapi.host.host import Host
+from mavproxy_uavapi.host.patience import within
 from mavproxy_uavapi.host.state import VehicleState
 
 DROPPED = 101  # the station's `type` when it received an update but no browser took it; 103 when one did
@@ -169,7 +170,7 @@ class Pusher:
         if now - self._own_at >= ADDRESS_KEPT:
             look_up = own_address(self._names, self.station.host, self.station.port)
             try:
-                self._own = await asyncio.wait_for(look_up, self._settings.timeout)
+                self._own = await within(self._settings.timeout, look_up)
             except asyncio.TimeoutError as error:
                 raise NotDelivered(f"no answer about the name {self.station.host}") from error
             except OSError as error:

@@ -16,6 +16,7 @@ from mavproxy_gradys.readings import Stored
 from mavproxy_gradys.settings import Settings, masked
 from mavproxy_gradys.sinks import Sink, make_sink
 from mavproxy_gradys.tally import RoundTrips
+from mavproxy_uavapi.host.patience import within
 
 BATCH = 200  # readings
 log = logging.getLogger("gradys.delivery")
@@ -126,7 +127,7 @@ class Sender:
         self._hurry.clear()
         pause = self._backoff.failed(self._clock())
         try:
-            await asyncio.wait_for(self._hurry.wait(), pause)
+            await within(pause, self._hurry.wait())
         except asyncio.TimeoutError:
             return
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mavproxy_uavapi.errors import TimedOut, ToolFailed
+from mavproxy_uavapi.host.patience import within
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ async def run_tool(command: Sequence[str], timeout: float, cwd: Path | None = No
     except OSError as error:
         raise ToolFailed(f"cannot run {name}: {error.strerror}") from error
     try:
-        out, err = await asyncio.wait_for(process.communicate(), timeout)
+        out, err = await within(timeout, process.communicate())
     except asyncio.TimeoutError:
         raise TimedOut(f"{name} did not end within {timeout:g} s") from None
     finally:

@@ -8,6 +8,7 @@ from collections.abc import Awaitable, Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 from mavproxy_uavapi.errors import Invalid, LinkLost, Rejected, Stale, Superseded
+from mavproxy_uavapi.host.patience import within
 from mavproxy_uavapi.vehicle import messages
 from mavproxy_uavapi.vehicle.copter import Copter
 from mavproxy_uavapi.vehicle.jobs import Job
@@ -260,7 +261,7 @@ class Flight:
         clock = self.vision.host.clock
         seconds = max(PERIOD / max(self.vehicle.state.time_ratio.ratio, 0.1), SHORTEST)
         with contextlib.suppress(asyncio.TimeoutError):
-            await asyncio.wait_for(self.vision.changed.wait(), seconds)
+            await within(seconds, self.vision.changed.wait())
         await asyncio.sleep(max(self._sent_at + SHORTEST - clock(), 0.0))
         if not self.vision.host.is_alive(self.vehicle.state):
             raise LinkLost.since(self.vehicle.state.system, clock() - self.vehicle.state.heartbeat_at)

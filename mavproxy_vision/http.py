@@ -10,6 +10,7 @@ from aiohttp import web
 from pydantic import Field, model_validator
 
 from mavproxy_uavapi.errors import BadRequest
+from mavproxy_uavapi.host.patience import within
 from mavproxy_uavapi.http.call import Call, in_time
 from mavproxy_uavapi.http.requests import NED_REACH, Blocking, Empty, Number, Request, Written
 from mavproxy_uavapi.http.responses import envelope
@@ -156,7 +157,7 @@ class Pages:
             ConnectionError, NoCamera, asyncio.TimeoutError
         ):  # the client, or the camera, has gone
             while True:
-                await asyncio.wait_for(self.vision.changed.wait(), FRAME_TIMEOUT)
+                await within(FRAME_TIMEOUT, self.vision.changed.wait())
                 picture = await self._picture()
                 head = f"--{BOUNDARY}\r\nContent-Type: image/jpeg\r\nContent-Length: {len(picture)}\r\n\r\n"
                 await response.write(head.encode() + picture + b"\r\n")

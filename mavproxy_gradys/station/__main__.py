@@ -14,6 +14,7 @@ from aiohttp import web
 
 from mavproxy_gradys.station.app import Station
 from mavproxy_gradys.station.store import Store
+from mavproxy_uavapi.host.patience import within
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -66,7 +67,7 @@ async def serve(chosen: argparse.Namespace, store: Store) -> None:
         await over.wait()
     finally:
         with contextlib.suppress(asyncio.TimeoutError):
-            await asyncio.wait_for(runner.cleanup(), 5.0)
+            await within(5.0, runner.cleanup())
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ from typing import Any, TypeVar
 
 from mavproxy_uavapi.host.loop_thread import LoopThread
 from mavproxy_uavapi.host.outbox import Outbox
+from mavproxy_uavapi.host.patience import within
 
 T = TypeVar("T")
 GIVE_WAY = 0.05  # s that new work waits for the main loop at most
@@ -87,7 +88,7 @@ class Bridge:
         self._calm.clear()
         self._waited_for = True
         with contextlib.suppress(asyncio.TimeoutError):
-            await asyncio.wait_for(self._calm.wait(), GIVE_WAY)
+            await within(GIVE_WAY, self._calm.wait())
 
     def _deliver(self) -> None:
         self._delivering = False  # what comes from now on needs another call

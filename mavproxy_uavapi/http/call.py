@@ -12,6 +12,7 @@ from aiohttp import web
 from mavproxy_uavapi.audit import Audit
 from mavproxy_uavapi.errors import BadRequest, Invalid, NotSupported, TooManyRequests
 from mavproxy_uavapi.host.host import Host
+from mavproxy_uavapi.host.patience import within
 from mavproxy_uavapi.http.requests import Request, parse
 from mavproxy_uavapi.http.responses import envelope
 from mavproxy_uavapi.scripts.manager import Scripts
@@ -198,7 +199,7 @@ async def in_time(body: Awaitable[T]) -> T:
         BadRequest: it has not, within BODY_TIMEOUT, or the client hung up.
     """
     try:
-        return await asyncio.wait_for(body, BODY_TIMEOUT)
+        return await within(BODY_TIMEOUT, body)
     except asyncio.TimeoutError as error:
         raise BadRequest(f"the body did not arrive within {BODY_TIMEOUT:g} s") from error
     except ConnectionError as error:

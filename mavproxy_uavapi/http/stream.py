@@ -11,6 +11,7 @@ from typing import Any
 from aiohttp import WSMsgType, web
 
 from mavproxy_uavapi.host.host import Host
+from mavproxy_uavapi.host.patience import within
 from mavproxy_uavapi.host.state import VehicleState
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import StreamFilter
@@ -107,7 +108,7 @@ async def _events(request: web.Request, subscription: Subscription) -> web.Strea
     with suppress(ConnectionError):  # the client has gone: that is how a stream ends
         while True:
             try:
-                event = await asyncio.wait_for(subscription.next(), KEEP_ALIVE)
+                event = await within(KEEP_ALIVE, subscription.next())
             except asyncio.TimeoutError:
                 await response.write(b": still here\n\n")
             else:

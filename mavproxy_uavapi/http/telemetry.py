@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from mavproxy_uavapi.errors import NotFound, Rejected, Stale, TimedOut
+from mavproxy_uavapi.host.patience import within
 from mavproxy_uavapi.host.state import Received
 from mavproxy_uavapi.http import telemetry_views as views
 from mavproxy_uavapi.http.call import Call
@@ -41,7 +42,7 @@ async def _newest(call: Call, name: str) -> Received:
 async def _ask_for(call: Call, name: str) -> None:
     vehicle = call.vehicle
     try:
-        await asyncio.wait_for(vehicle.request(name), FIRST_TIMEOUT)
+        await within(FIRST_TIMEOUT, vehicle.request(name))
     except (Rejected, TimedOut, asyncio.TimeoutError) as error:
         raise Stale(f"vehicle {vehicle.state.system} has not told {name} yet") from error
 

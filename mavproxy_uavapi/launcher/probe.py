@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from urllib.parse import urlsplit
 
+from mavproxy_uavapi.host.patience import within
 from mavproxy_uavapi.launcher.commands import api_url
 from mavproxy_uavapi.launcher.options import Options
 
@@ -16,7 +17,7 @@ async def answers(options: Options) -> int | None:
     sent, for it is not certain who listens on the port.
     """
     try:
-        return await asyncio.wait_for(_status(api_url(options)), TIMEOUT_S)
+        return await within(TIMEOUT_S, _status(api_url(options)))
     except (OSError, asyncio.TimeoutError, EOFError, ValueError):
         return None
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from mavproxy_uavapi.errors import LinkLost
 from mavproxy_uavapi.host.link import Address
+from mavproxy_uavapi.host.patience import within
 from mavproxy_uavapi.host.pending import Pending, Wait
 from mavproxy_uavapi.host.state import VehicleState
 
@@ -53,7 +54,7 @@ class Conversation:
             LinkLost: the vehicle's heartbeats stopped.
         """
         try:
-            message = await asyncio.wait_for(self._said.get(), timeout)
+            message = await within(timeout, self._said.get())
         except asyncio.TimeoutError:
             return None
         if message is None:

@@ -11,6 +11,7 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.errors import LinkLost, TimedOut
 from mavproxy_uavapi.host.link import Address
+from mavproxy_uavapi.host.patience import within
 from mavproxy_uavapi.host.pending import Pending, Wait
 from mavproxy_uavapi.host.state import VehicleState
 from mavproxy_uavapi.vehicle.conversation import Conversation
@@ -105,7 +106,7 @@ class Expected(Generic[T]):
             TimedOut, LinkLost: as `Waiting.message`; and whatever the test raises.
         """
         try:
-            await asyncio.wait_for(self._done.wait(), timeout)
+            await within(timeout, self._done.wait())
         except asyncio.TimeoutError:
             sentence = f"vehicle {self._wait.system} did not {what} within {timeout:.1f} s"
             raise TimedOut(sentence) from None
@@ -162,7 +163,7 @@ class Acks:
             LinkLost: the vehicle's heartbeats stopped.
         """
         try:
-            result = await asyncio.wait_for(self._results.get(), timeout)
+            result = await within(timeout, self._results.get())
         except asyncio.TimeoutError:
             return None
         if result is None:
