@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import contextlib
 
-from mavproxy_uavapi.errors import NotArmed, Rejected
+from mavproxy_uavapi.errors import NotArmed, TimedOut, UavApiError
+from mavproxy_uavapi.vehicle import deadlines
 from mavproxy_uavapi.vehicle.touchdown import Touchdown
 from mavproxy_vision.flight import Flight
-from mavproxy_vision.history import Motion
 from mavproxy_vision.landing import BLIND_BELOW, COAST, REST, Landing, Phase
 from mavproxy_vision.plnd import PrecisionLanding, landing_target
 
 LOST = 1.2  # s without a sighting, or without telemetry, until we take the vehicle back from LAND
+SLOWER = 3.0  # times what a LAND should take, until it is given up low above the target
 HEARD = 3.0  # s until the autopilot must have said that it has a target
 
 
@@ -26,6 +27,9 @@ class Descent:
 
     def __init__(self, flight: Flight) -> None:
         self.flight = flight
+
+    async def prepare(self) -> None:
+        """See whether it can be done, before the vehicle is taken over."""
 
     async def __call__(self, landing: Landing) -> None:
         """Land.
@@ -56,12 +60,21 @@ class PrecisionDescent(Descent):
         super().__init__(flight)
         flight.plnd = self.plnd = plnd
 
+    async def prepare(self) -> None:
+        """See whether it can be done, before the vehicle is taken over.
+
+        Raises:
+            NotSupported, Rejected: the autopilot has no precision landing, or has to be rebooted for it.
+        """
+        await self.plnd.check()
+
     async def __call__(self, landing: Landing) -> None:
         """Land.
 
         Raises:
             LandingFailed: it was given up.
-            NotSupported, Rejected: the autopilot has no precision landing, or does not take its parameters.
+            Rejected: the autopilot does not take its parameters.
+            TimedOut: it stays low above the target, in LAND.
         """
         flight = self.flight
         await self.plnd.set_up()
@@ -72,7 +85,8 @@ class PrecisionDescent(Descent):
             await self._be_heard(landing)
             if await self._follow_down(landing):
                 break
-        with contextlib.suppress(Rejected):  # `Flights` goes on trying
+        self.plnd.in_use = False
+        with contextlib.suppress(UavApiError):  # it has landed all the same; `Flights` goes on trying
             await self.plnd.give_back()
 
     async def _be_heard(self, landing: Landing) -> None:
@@ -90,12 +104,17 @@ class PrecisionDescent(Descent):
     async def _follow_down(self, landing: Landing) -> bool:
         """Let LAND fly and tell it where the target is: True when it stands disarmed, False when taken back."""
         flight, vehicle, vision = self.flight, self.flight.vehicle, self.flight.vision
-        touchdown = Touchdown(await vehicle.limits())
+        limits = await vehicle.limits()
+        touchdown = Touchdown(limits)
         vehicle.held_by("GUIDED")
         flight.autopilot = "LAND"
         await vehicle.switch_to("LAND")
+        late = vision.now() + SLOWER * deadlines.landing_time(limits, vehicle.height)
         while not self._stands(touchdown):
             now = vision.now()
+            if now > late and not self._is_high(landing):
+                flight.autopilot = None  # it is almost down: nobody takes it back
+                raise TimedOut(f"vehicle {vehicle.state.system} has not landed and disarmed; it is in LAND")
             if self._must_come_back(landing, now):
                 await vehicle.switch_to("GUIDED")
                 flight.autopilot = None
@@ -127,16 +146,16 @@ class PrecisionDescent(Descent):
     def _must_come_back(self, landing: Landing, now: float) -> bool:
         """Whether it may not go down any farther: it takes too long, or the target or the vehicle is lost."""
         history, target = self.flight.vision.history, landing.target
-        if self._above(landing, history.last_motion) <= BLIND_BELOW:
+        if not self._is_high(landing):
             return False  # too low to climb away from what may be the ground already
         if landing.overdue(now) or now - history.newest > LOST:
             return True
         return self.flight.motion(now) is not None and (target.age(now) > LOST or target.contradiction is not None)
 
-    def _above(self, landing: Landing, motion: Motion | None) -> float:
-        """Metres above the target."""
-        place = landing.target.place
-        return 0.0 if place is None or motion is None else float(place[2] - motion.travelled[2])
+    def _is_high(self, landing: Landing) -> bool:
+        """Whether it is high enough above the target to be taken back."""
+        place, motion = landing.target.place, self.flight.vision.history.last_motion
+        return place is not None and motion is not None and float(place[2] - motion.travelled[2]) > BLIND_BELOW
 
     async def _tell(self, landing: Landing) -> None:
         """Tell the autopilot where the target is, if that is known."""
@@ -149,4 +168,4 @@ class PrecisionDescent(Descent):
         landing.offset = float((relative[:2] ** 2).sum() ** 0.5)
         flight.note(landing, motion)
         if landing.target.age(now) <= COAST or relative[2] <= BLIND_BELOW:
-            await vision.host.link.send(landing_target(now, relative, attitude), flight.vehicle.state.system)
+            await flight.tell(landing_target(now, relative, attitude))

@@ -4,10 +4,20 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 from collections.abc import Awaitable, Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
-from mavproxy_uavapi.errors import Invalid, LinkLost, Rejected, Stale, Superseded
+from mavproxy_uavapi.errors import (
+    Invalid,
+    LinkLost,
+    ModeChanged,
+    NotArmed,
+    Rejected,
+    Stale,
+    Superseded,
+    UavApiError,
+)
 from mavproxy_uavapi.host.patience import within
 from mavproxy_uavapi.vehicle import messages
 from mavproxy_uavapi.vehicle.copter import Copter
@@ -37,6 +47,7 @@ BLIND = 5.0  # s without a frame until a landing is given up
 FIRST = 3.0  # s of ours for the first telemetry
 FINAL = 1.3  # of the height at which the tag fills the view
 LOWEST_FINAL = 0.4  # m
+HIGHEST_CLIP = 1.5  # m from which a tag would be landed on without being seen
 DEPENDABLE = 0.85  # of the detection range
 DID = {"rtl": "returned to launch", "land": "landed in place", "hold": "the vehicle holds"}
 
@@ -78,12 +89,16 @@ class Flight:
         self._timed = 0 if vision.seen is None else vision.seen.number
 
     async def take_over(self) -> None:
-        """Take the vehicle; a flight of ours that had it has ended then, and given back what it had changed.
+        """Take the vehicle; a flight of ours that had it has ended then. What flies in GUIDED rests.
 
         To be called when nothing is left that would refuse the flight.
         """
+        if self.vehicle.seat.job is self.job:
+            return
         self.vehicle.seat.take(self.job)
         await self._succeed(self)
+        if self.vehicle.mode == "GUIDED" and self.vehicle.state.armed and not self.vehicle.state.landed:
+            await self.send(REST)  # the setpoint of whoever had it would go on meanwhile
 
     # -- verbs ---------------------------------------------------------------------------------------------
 
@@ -99,13 +114,15 @@ class Flight:
         self.vehicle.require_guided_flight()
         if self.report.verb == "land":
             self.vision.require_camera()
-        tags = self.tags(number)
+        tags = self.landable(number)
+        descend = way_down(self)
+        await descend.prepare()
+        self.vehicle.require_guided_flight()
         await self.take_over()
-        with self._watched(), self._lasting():
+        with self._watched():
             await self._look_for(tags)
             self.report.tag, self.report.method = next(iter(tags)), method
-            descend = way_down(self)
-            with self.vision.aimed_at(tags, self._floor) as target:
+            with self._lasting(), self.vision.aimed_at(tags, self._floor) as target:
                 await descend(Landing(self._plan(tags, descend.by_velocity), target))
             self.report.touchdown_error = self.vision.touchdown_error(self.report.tag)
 
@@ -119,11 +136,11 @@ class Flight:
         self.vision.require_camera()
         tags = self.tags(number)
         await self.take_over()
-        with self._watched(), self._lasting():
+        with self._watched():
             await self._look_for(tags)
             self.report.tag = next(iter(tags))
             plan = self._plan(tags, False, attempts=1000, leash=leash or self.vision.settings.leash)
-            with self.vision.aimed_at(tags, self._floor) as target:
+            with self._lasting(), self.vision.aimed_at(tags, self._floor) as target:
                 order = await self.fly(Landing(plan, target))
                 await self.send(REST)
                 if order.phase is Phase.FAILED:
@@ -169,6 +186,30 @@ class Flight:
         size = next((tag.size for tag in tags if tag.id == number), tags[0].size)
         return {number: Tag(number, size)}
 
+    def landable(self, number: int | None) -> dict[int, Tag]:
+        """The tags that tell where the target is, which can be seen from low enough to land on.
+
+        Raises:
+            Invalid: the family has no such id, or the smallest of them fills the view too high up.
+        """
+        tags = self.tags(number)
+        clip = self._clip(tags)
+        if clip > HIGHEST_CLIP:
+            smallest = min(tags.values(), key=lambda tag: tag.size)
+            raise Invalid(
+                f"tag {smallest.id} of {smallest.size:g} m is not in view below {clip:.1f} m: it takes a smaller one "
+                "beside it (`tags`), or a lens that is nearer to the middle (`offset`)",
+                "body",
+                "id",
+            )
+        return tags
+
+    def _clip(self, tags: dict[int, Tag]) -> float:
+        """Metres above the target below which the smallest tag does not fit into the view."""
+        forward, right, down = self.vision.settings.camera_mount.offset
+        smallest = min(tag.size for tag in tags.values())
+        return self.vision.settings.model.clip_height(smallest, math.hypot(forward, right)) + down
+
     async def _look_for(self, tags: dict[int, Tag]) -> None:
         """Have the detector look for them, and wait for the first telemetry.
 
@@ -183,6 +224,7 @@ class Flight:
                 raise Stale(f"vehicle {vision.system} has not told where it is for {FIRST:g} s")
             await self.pause()
         self._floor = vision.floor
+        await self.vehicle.limits()  # nothing is to be waited for between the last metre and LAND
         self.vehicle.held_by("GUIDED")
 
     def height(self, motion: Motion) -> float:
@@ -193,16 +235,15 @@ class Flight:
         settings, model = self.vision.settings, self.vision.settings.model
         cells = FAMILIES[settings.families[0]][0]
         largest = max(tag.size for tag in tags.values())
-        smallest = min(tag.size for tag in tags.values())
         reach = DEPENDABLE * model.detection_range(largest, cells)
         motion = self.vision.history.last_motion
         here = self.height(motion) if motion is not None else reach
-        offset = settings.camera_mount.offset[2]
-        final = max(FINAL * model.clip_height(smallest) + offset, LOWEST_FINAL)
+        clip = self._clip(tags)
         known = {
             "attempts": settings.attempts,
             "tolerance": settings.tolerance,
-            "final": final,
+            "final": max(FINAL * clip, LOWEST_FINAL),
+            "clip": clip,
             "speed": settings.speed,
             "descent": settings.descent,
             "step": step_for(model.footprint(min(max(here, 1.0), reach)), largest),
@@ -281,8 +322,12 @@ class Flight:
         self.vehicle.held_by("GUIDED")
         attitude = self.vision.history.attitude(self.vision.now())
         yaw = None if attitude is None else attitude.yaw
+        await self.tell(setpoint(self.vehicle.address, velocity, yaw))
+
+    async def tell(self, message: Any) -> None:
+        """Send the vehicle a message; `pause` sees to it that they do not come too often."""
         self._sent_at = self.vision.host.clock()
-        await self.vehicle.link.send(setpoint(self.vehicle.address, velocity, yaw), self.vehicle.state.system)
+        await self.vehicle.link.send(message, self.vehicle.state.system)
 
     async def fly_by(self, mode: str, verb: Callable[[Job], Awaitable[None]]) -> None:
         """Let the autopilot fly in a mode of its own, until that is done."""
@@ -310,11 +355,15 @@ class Flight:
             except Rejected as error:
                 reason = f"{reason} ({error})"
         self.vehicle.held_by("GUIDED")
-        if action == "rtl":
-            await self.fly_by("RTL", self.vehicle.rtl)
-        elif action == "land":
-            await self.fly_by("LAND", self.vehicle.land)
-        else:
+        try:
+            if action == "rtl":
+                await self.fly_by("RTL", self.vehicle.rtl)
+            elif action == "land":
+                await self.fly_by("LAND", self.vehicle.land)
+        except (ModeChanged, NotArmed, LinkLost):
+            raise
+        except UavApiError as error:  # refused, or not acknowledged
+            self.report.action, reason = "hold", f"{reason} ({error})"
             await self.send(REST)
         raise self._failed(reason)
 
@@ -326,19 +375,30 @@ class Flight:
         vehicle = self.vehicle
         if isinstance(self.job.error, Superseded) or vehicle.seat.job is not self.job:
             return False
-        in_air = vehicle.state.armed and not vehicle.state.landed
-        return bool(in_air) and vehicle.mode in ("GUIDED", self.autopilot)
+        if not vehicle.state.armed:
+            return False
+        # A zero velocity keeps on the ground what is about to take off; a LAND that stands is left alone.
+        return vehicle.mode == "GUIDED" or (vehicle.mode == self.autopilot and not vehicle.state.landed)
 
     def parting(self) -> list[Any]:
-        """What ends it from outside: gives its parameters back, and makes a vehicle that is ours hold."""
-        vehicle = self.vehicle
-        found = [] if self.plnd is None else self.plnd.remaining()
-        if not self.is_ours:
-            return found
-        if self.autopilot is not None:
-            guided = messages.set_mode(mode_number(vehicle.state.vehicle_type, "GUIDED"))
-            found.append(guided.to(vehicle.address, 0))
-        return [*found, setpoint(vehicle.address, REST, None)]
+        """What ends it from outside: makes a vehicle that is ours hold, and gives its parameters back."""
+        vehicle, found = self.vehicle, []
+        if self.is_ours:
+            if self.autopilot is not None:
+                guided = messages.set_mode(mode_number(vehicle.state.vehicle_type, "GUIDED"))
+                found.append(guided.to(vehicle.address, 0))
+            found.append(setpoint(vehicle.address, REST, None))
+        return [*found, *([] if self.plnd is None else self.plnd.remaining())]
+
+    async def make_hold(self) -> None:
+        """See to it that a vehicle which the autopilot flies for us holds; what `parting` sends may be lost.
+
+        Raises:
+            UavApiError: it did not switch, or somebody else has it.
+        """
+        if self.autopilot is not None and self.is_ours:
+            await self.vehicle.switch_to("GUIDED")
+            await self.send(REST)
 
 
 class Since:

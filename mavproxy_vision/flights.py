@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import time
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any
 
 import cv2
 
-from mavproxy_uavapi.errors import Aborted, NotSupported, UavApiError
+from mavproxy_uavapi.errors import Aborted, LinkLost, ModeChanged, NotArmed, NotSupported, UavApiError
 from mavproxy_uavapi.host.state import VehicleState
 from mavproxy_uavapi.vehicle.copter import Copter
 from mavproxy_uavapi.vehicle.jobs import CONSOLE, Job
@@ -24,6 +25,8 @@ from mavproxy_vision.track import Track
 from mavproxy_vision.vision import Vision
 
 TIDY_EVERY = 1.0  # s between two tries to give parameters back
+TIDY_TRIES = 10
+log = logging.getLogger("vision")
 
 
 class Sortie:
@@ -44,18 +47,23 @@ class Sortie:
     async def __call__(self, job: Job) -> None:
         """Fly it, as that job."""
         self.begun = True
-        flight = Flight(self._flights.vision, self._copter, job, self.report, self._flights.succeed)
+        flights = self._flights
+        flight = Flight(flights.vision, self._copter, job, self.report, flights.succeed)
         try:
             await self._fly(flight)
-        except UavApiError as error:
+        except (ModeChanged, NotArmed, LinkLost) as error:  # it has another master, or none
             self.report.reason = str(error)
             raise
+        except UavApiError as error:
+            self.report.reason = str(error)
+            if flights.has(flight):
+                await flights.part(flight)
+            raise
         except BaseException:  # ended from outside, or a defect of ours: the vehicle is not left flying
-            for message in flight.parting():
-                await self._copter.link.send(message, self._copter.state.system)
+            await flights.part(flight)
             raise
         finally:
-            self._flights.over(flight)
+            flights.over(flight)
 
     def result(self) -> str:
         """One line about the flight, which ended well."""
@@ -111,7 +119,9 @@ class Flights:
         self.report: Report | None = None
         self._directory = directory
         self._flight: Flight | None = None
+        self._unfinished: set[Flight] = set()  # that have not sent their last message
         self._plnd: dict[int, PrecisionLanding] = {}
+        self._tidying: set[PrecisionLanding] = set()
         self._tasks: set[asyncio.Task[None]] = set()
 
     def copter(self) -> Copter:
@@ -148,22 +158,48 @@ class Flights:
         return by_plnd
 
     async def succeed(self, flight: Flight) -> None:
-        """Make it the flight under way, and await the end of the one before."""
-        before, self._flight = self._flight, flight
-        self.report = flight.report
-        if before is not None and before is not flight:
-            before.job.abort(
-                Aborted(f"{flight.job.verb} took over")
-            )  # of another vehicle; ours lost its seat already
-            await before.ended.wait()
+        """Make it the flight under way, and await the end of those before."""
+        before = self._unfinished - {flight}
+        self._flight, self.report = flight, flight.report
+        self._unfinished.add(flight)
+        for one in before:
+            if one.job.running:  # of another vehicle; of this one it has lost its seat already
+                one.job.abort(Aborted(f"{flight.job.verb} took over"))
+            await one.ended.wait()
+
+    def has(self, flight: Flight) -> bool:
+        """Whether it has taken its vehicle over, and has not ended."""
+        return flight in self._unfinished
+
+    async def part(self, flight: Flight) -> None:
+        """Send what ends it, whatever else is cancelled meanwhile."""
+
+        async def send() -> None:
+            for message in flight.parting():
+                await flight.tell(message)
+
+        self._do(self._see_to_it(flight))
+        await asyncio.shield(asyncio.get_running_loop().create_task(send()))
+
+    async def _see_to_it(self, flight: Flight) -> None:
+        """One message may be lost: the vehicle is asked for GUIDED until it shows it, or has another master."""
+        await flight.ended.wait()
+        try:
+            await flight.make_hold()
+        except UavApiError as error:
+            log.warning("vision: %s", error)
 
     def over(self, flight: Flight) -> None:
         """It has sent its last message."""
+        self._unfinished.discard(flight)
         if self._flight is flight:
             self._flight = None
         flight.ended.set()
-        if flight.plnd is not None and flight.plnd.before:
-            self._do(self._tidy(flight.plnd))
+        plnd = flight.plnd
+        if plnd is not None and not any(one.plnd is plnd for one in self._unfinished):
+            plnd.in_use = False
+            if plnd.before and plnd not in self._tidying:
+                self._do(self._tidy(plnd))
 
     async def keep(self, track: Track, report: Report) -> None:
         """Write track and plot; what cannot be written is said in the report."""
@@ -201,14 +237,19 @@ class Flights:
 
     async def _tidy(self, plnd: PrecisionLanding) -> None:
         """Give parameters back as soon as the vehicle hears us, and no flight needs them."""
-        while plnd.before:
+        self._tidying.add(plnd)
+        tries = 0
+        while plnd.before and tries < TIDY_TRIES:
             await asyncio.sleep(TIDY_EVERY)
-            if self._flight is not None or not self.vision.host.is_alive(plnd.vehicle.state):
+            if plnd.in_use or not self.vision.host.is_alive(plnd.vehicle.state):
                 continue
             try:
                 await plnd.give_back()
-            except UavApiError:
-                continue  # at the next turn; what it had is not forgotten
+            except UavApiError as error:
+                tries += 1
+                if tries == TIDY_TRIES:
+                    log.warning("vision: %s", error)
+        self._tidying.discard(plnd)
 
     # -- from the prompt, and at the end ---------------------------------------------------------------------
 
@@ -232,36 +273,35 @@ class Flights:
         except UavApiError as error:
             tell(str(error))
 
-    def stop(self, reason: str) -> bool:
-        """End the flight; a vehicle that is ours holds. Whether there was one."""
+    def stop(self, reason: str) -> str | None:
+        """End the flight; a vehicle that is ours is told to hold. What was done; None without a flight."""
         flight = self._flight
         if flight is None or not flight.job.running:
-            return False
-        flight.job.abort(_ended(flight, reason))
-        return True
+            return None
+        error = _ended(flight, reason)
+        flight.job.abort(error)
+        return str(error)
 
     def abandon(self) -> list[tuple[Any, int]]:
         """End all without sending anything: what would be sent, and to which system."""
         last: list[tuple[Any, int]] = []
-        flight, self._flight = self._flight, None
         for task in self._tasks:
             task.cancel()
-        for plnd in self._plnd.values():
-            if plnd.before and (flight is None or flight.plnd is not plnd):
-                last += [(message, plnd.vehicle.state.system) for message in plnd.remaining()]
-        if flight is not None and flight.job.running:
+        for flight in self._unfinished:  # those too that were stopped a moment ago, and could not send it yet
             last += [(message, flight.vehicle.state.system) for message in flight.parting()]
             error = _ended(flight, "vision was unloaded")
             flight.vehicle.seat.job = None  # so that its own end finds nothing more to send
             flight.job.abort(error)
         for plnd in self._plnd.values():
+            last += [(message, plnd.vehicle.state.system) for message in plnd.remaining()]
             plnd.before.clear()
+        self._flight = None
         return last
 
 
 def _ended(flight: Flight, reason: str) -> Aborted:
     vehicle = flight.vehicle
-    left = "the vehicle holds" if flight.is_ours else f"nothing was sent: the vehicle is in {vehicle.mode}"
+    left = "the vehicle is told to hold" if flight.is_ours else f"the vehicle is left alone: it is in {vehicle.mode}"
     return Aborted(f"{reason}; {left}")
 
 

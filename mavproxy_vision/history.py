@@ -16,6 +16,7 @@ from mavproxy_vision.geometry import Attitude, Vector, vector, wrap
 KEPT = 12.0  # s of the vehicle's clock
 BEYOND = 0.3  # s that the newest telemetry is carried on by its rates
 GAP = 0.6  # s between two messages within which nobody knows what the vehicle did
+SILENCE = 2.0  # s between them from which on two velocities tell less of the way than two positions
 CLOCK_WINDOW = 1.5  # s of the faster clock over which the least delayed message sets the clocks' offset
 REBOOT = 3.0  # s that a clock may step back without a reboot
 AFTER = 0.05  # s of the vehicle's clock, at least, that an unstamped message may be younger than a stamped one
@@ -126,9 +127,7 @@ class History:
         travelled = vector(0.0, 0.0, 0.0)
         if self._motions:
             last = self._motions[-1]
-            heard = at - last.at <= GAP  # of a silence the positions tell more than two velocities
-            moved = (last.velocity + velocity) * ((at - last.at) / 2) if heard else position - last.position
-            travelled = last.travelled + moved
+            travelled = last.travelled + _moved_between(last, at, position, velocity)
         self._motions.append(Motion(at, position, velocity, travelled))
         if at - self._motions[0].at > 2 * KEPT:
             self._motions = self._motions[len(self._motions) // 2 :]
@@ -184,6 +183,21 @@ class History:
     def last_motion(self) -> Motion | None:
         """The newest motion, however old."""
         return self._motions[-1] if self._motions else None
+
+
+def _moved_between(last: Motion, at: float, position: Vector, velocity: Vector) -> Vector:
+    """The way (m NED) from one message to the next, by the velocities.
+
+    After a gap the height is taken from the positions, whose wander is less than what a descent may have done; after
+    a longer silence all of it is.
+    """
+    seconds = at - last.at
+    moved = (last.velocity + velocity) * (seconds / 2)
+    if seconds > SILENCE:
+        return position - last.position
+    if seconds > GAP:
+        moved[2] = position[2] - last.position[2]
+    return moved
 
 
 def _moved(attitude: Attitude, by: list[float]) -> Attitude:

@@ -200,8 +200,8 @@ class Pages:
 
     async def stop(self, _call: Call) -> dict[str, Any]:
         """End the landing, search or mission in flight; the vehicle holds where it is."""
-        was = self.flights.stop("it was stopped")
-        return self._answer("Stopped" if was else "Nothing was in flight")
+        done = self.flights.stop("stopped")
+        return self._answer("Nothing was in flight" if done is None else done.capitalize())
 
     async def _fly(self, call: Call, sortie: Sortie) -> Any:
         answer = await call.fly(call.copter, sortie, sortie.result, outlives_client=True)

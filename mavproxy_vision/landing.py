@@ -67,6 +67,7 @@ class Plan:
         look: s of each in place.
         tolerance: m from the target within which it may begin the last metre.
         final: m above the target at which the last metre begins.
+        clip: m above the target below which the tag does not fit into the view.
         speed: m/s, horizontally.
         descent: m/s, at most.
         climb: m/s, at most.
@@ -82,6 +83,7 @@ class Plan:
     look: float = 2.0
     tolerance: float = 0.12
     final: float = 0.6
+    clip: float = 0.4
     speed: float = 1.5
     descent: float = 1.0
     climb: float = 1.0
@@ -207,20 +209,28 @@ class Landing:
         target = self.target
         visible = target.found and target.age(now) <= COAST
         if visible and self.phase in (Phase.LOOK, Phase.HOLD, Phase.CLIMB, Phase.SEARCH):
-            if not self.plan.descend:
-                self.phase = Phase.LAND
-                return REST
-            self.phase, self._since = Phase.DESCEND, now
+            return self._found(now, motion, height, elapsed)
         if self.phase is Phase.DESCEND:
             return self._descend(now, motion, height, elapsed)
         if self.phase is Phase.LAST_METRE:
-            return self._touch_down(now, motion)
+            return self._touch_down(now, motion, height)
         stepping = {Phase.HOLD: self._hold, Phase.CLIMB: self._climb, Phase.SEARCH: self._search}.get(self.phase)
         if stepping is not None:
             return stepping(now, motion, height)
         if self.phase is Phase.LOOK and now - self._since > self.plan.look:
             self._look_farther(now)
         return self._towards(self._anchor, motion, height)
+
+    def _found(self, now: float, motion: Motion, height: float, elapsed: float) -> Vector:
+        """The tag is in sight."""
+        if not self.plan.descend:
+            self.phase = Phase.LAND
+            return REST
+        lost = self.phase is Phase.CLIMB  # on the way down, and seen again from higher up
+        if lost and not self._next_attempt("the tag was lost on the way down"):
+            return REST
+        self.phase, self._since = Phase.DESCEND, now
+        return self._descend(now, motion, height, elapsed)
 
     def _descend(self, now: float, motion: Motion, height: float, elapsed: float) -> Vector:
         place = self.target.place
@@ -230,29 +240,34 @@ class Landing:
         distance = float(np.linalg.norm(offset))
         if self.target.age(now) > COAST:
             if above < BLIND_BELOW:
-                return self._go_down(now, motion)
+                return self._go_down(now, motion, height)
             self._stay(now, Phase.HOLD, motion.travelled, height)
             return REST
         self.offset = distance
         if above <= self.plan.final and distance <= self.plan.tolerance:
-            return self._go_down(now, motion)
+            return self._go_down(now, motion, height)
         if distance < 1.0:
             self._integral = limited(self._integral + INTEGRAL * offset * elapsed, INTEGRAL_LIMIT)
         sideways = limited(GAIN * offset + self._integral, self.plan.speed)
         return vector(sideways[0], sideways[1], self._descent(distance, above))
 
-    def _go_down(self, now: float, motion: Motion) -> Vector:
+    def _go_down(self, now: float, motion: Motion, height: float) -> Vector:
         place = self.target.place
         assert place is not None
         above = float(place[2] - motion.travelled[2])
         self.phase, self._since = Phase.LAST_METRE, now
         self._down_by = now + max(above - TOUCH, 0.0) / LAST_DESCENT + LATE
-        return self._touch_down(now, motion)
+        self.target.is_final = True
+        return self._touch_down(now, motion, height)
 
-    def _touch_down(self, now: float, motion: Motion) -> Vector:
+    def _touch_down(self, now: float, motion: Motion, height: float) -> Vector:
         place = self.target.place
         assert place is not None
         relative = place - motion.travelled
+        if relative[2] > max(BLIND_BELOW, self.plan.clip) and self.target.age(now) > COAST:
+            self.target.is_final = False
+            self._stay(now, Phase.HOLD, motion.travelled, height)
+            return REST
         if relative[2] <= TOUCH or now >= self._down_by:
             self.phase = Phase.LAND
             return REST
@@ -283,12 +298,14 @@ class Landing:
             self._next_attempt()
         return self._towards(self._anchor, motion, height)
 
-    def _next_attempt(self) -> None:
+    def _next_attempt(self, why: str = "no tag in sight") -> bool:
+        """Begin another attempt; false when there is none left, and the landing has failed."""
         if self.attempt >= self.plan.attempts:
             times = f"{self.attempt} attempt{'' if self.attempt == 1 else 's'}"
-            self.fail(f"no tag in sight after {times}")
-            return
+            self.fail(f"{why} after {times}" if why == "no tag in sight" else f"{why} in each of {times}")
+            return False
         self.attempt += 1
+        return True
 
     def _look_farther(self, now: float) -> None:
         """Nothing in sight from here: along the next leg of the search."""

@@ -63,7 +63,8 @@ async def fly(flight: Flight, errand: Errand, way_down: Callable[[Flight], Desce
     grounded = not vehicle.state.armed or vehicle.state.landed is not False
     if errand.on_tag:
         flight.vision.require_camera()
-        flight.tags(errand.tag)
+        flight.landable(errand.tag)
+        await way_down(flight).prepare()
     if not grounded:
         vehicle.require_guided_flight()
     await flight.take_over()

@@ -75,6 +75,6 @@ class CameraModel:
         """The range (m) up to which a tag of `size` m and `cells` cells along its black side is dependable."""
         return max(self.fx, self.fy) * size / (cells * PIXELS_PER_CELL)
 
-    def clip_height(self, size: float) -> float:
-        """The height (m) below which a tag of `size` m right underneath no longer fits into the view."""
-        return CLIP_MARGIN * size / min(self.width / self.fx, self.height / self.fy)
+    def clip_height(self, size: float, beside: float = 0.0) -> float:
+        """The height (m) below which a tag of `size` m, `beside` m from right underneath, is not wholly in view."""
+        return CLIP_MARGIN * (size + 2 * beside) / min(self.width / self.fx, self.height / self.fy)

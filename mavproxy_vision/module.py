@@ -175,7 +175,7 @@ class VisionModule(HostedModule):
         task.add_done_callback(self._tasks.discard)
 
     def _abort(self, quiet: bool = False) -> None:
-        async def stopped() -> bool:
+        async def stopped() -> str | None:
             return self.flights.stop("it was stopped at the prompt")
 
         if self._awake() and not self._run(stopped()) and not quiet:

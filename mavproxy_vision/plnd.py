@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 import math
 from typing import Any
 
 from pymavlink import mavutil
 
 from mavproxy_uavapi.errors import NotSupported, Rejected, TimedOut
-from mavproxy_uavapi.vehicle.messages import set_parameter
+from mavproxy_uavapi.vehicle.messages import read_parameter, set_parameter
 from mavproxy_uavapi.vehicle.vehicle import Vehicle
 from mavproxy_vision.geometry import Attitude, Vector
 
@@ -44,18 +46,21 @@ class PrecisionLanding:
     Attributes:
         vehicle: whose it is.
         before: the values that are not given back yet, by name.
+        in_use: whether a landing needs it: nothing is given back then.
     """
 
     def __init__(self, vehicle: Vehicle) -> None:
         self.vehicle = vehicle
         self.before: dict[str, float] = {}
+        self.in_use = False
+        self._lock = asyncio.Lock()
 
-    async def set_up(self) -> None:
-        """Set the parameters and read them back.
+    async def check(self) -> None:
+        """See whether the autopilot can do it, before anything is flown.
 
         Raises:
             NotSupported: the autopilot has no precision landing.
-            Rejected: a parameter did not take its value, or the type was another one at boot.
+            Rejected: the type was another one at boot.
         """
         if not mavutil.mavlink20():
             raise NotSupported("LANDING_TARGET has a position in MAVLink 2 only: start MAVProxy without --mav10")
@@ -65,11 +70,21 @@ class PrecisionLanding:
         if told.get(AT_BOOT, WANTED[AT_BOOT]) != WANTED[AT_BOOT]:
             await self._set(AT_BOOT, WANTED[AT_BOOT])
             raise Rejected("PLND_TYPE is 1 now, but the autopilot reads it at boot: reboot it, then try again")
-        for name, value in WANTED.items():
-            if name not in told or (told[name] == value and name not in self.before):
-                continue
-            self.before.setdefault(name, told[name])  # of a landing that was cut short it is still the first value
-            await self._set(name, value)
+
+    async def set_up(self) -> None:
+        """Set the parameters and read them back.
+
+        Raises:
+            Rejected: a parameter did not take its value.
+        """
+        self.in_use = True
+        async with self._lock:
+            told = await self.vehicle.parameters(WANTED)
+            for name, value in WANTED.items():
+                if name not in told or (told[name] == value and name not in self.before):
+                    continue
+                self.before.setdefault(name, told[name])  # of a landing cut short it is still the first value
+                await self._set(name, value)
 
     async def switch_off(self) -> None:
         """Give the switch back, without which the others mean nothing: LAND and RTL heed no target then.
@@ -77,48 +92,65 @@ class PrecisionLanding:
         Raises:
             Rejected: it did not take its value.
         """
-        if ENABLE in self.before:
+        async with self._lock:
             await self._give_back(ENABLE)
 
     async def give_back(self) -> None:
-        """Give every parameter the value that it had, the switch first.
+        """Give every parameter the value that it had, the switch first, unless a landing begins that needs them.
+
+        What somebody has set to another value meanwhile stays as it is.
 
         Raises:
             Rejected: some did not take it; the others were given back all the same.
         """
         refused = []
-        for name in sorted(self.before, key=lambda name: name != ENABLE):
-            try:
-                await self._give_back(name)
-            except Rejected:
-                refused.append(f"{name} = {self.before[name]:g}")
+        async with self._lock:
+            for name in self._in_order():
+                try:
+                    if not self.in_use:
+                        await self._give_back(name)
+                except Rejected:
+                    refused.append(f"{name} = {self.before[name]:g}")
         if refused:
             raise Rejected(f"the autopilot does not take {', '.join(refused)}, which it had before the landing")
 
+    def _in_order(self) -> list[str]:
+        return sorted(self.before, key=lambda name: name != ENABLE)
+
     async def _give_back(self, name: str) -> None:
-        await self._set(name, self.before[name])
-        del self.before[name]
+        if name in self.before and await self._told(name) == WANTED[name]:
+            await self._set(name, self.before[name])
+        self.before.pop(name, None)
 
     def remaining(self) -> list[Any]:
         """The PARAM_SETs that give everything back, for when nobody can wait."""
-        return [set_parameter(self.vehicle.address, name, value) for name, value in self.before.items()]
+        return [set_parameter(self.vehicle.address, name, self.before[name]) for name in self._in_order()]
+
+    async def _told(self, name: str) -> float:
+        """The parameter's value now, asked for: somebody may have set it while nobody heard the vehicle."""
+        message = await self._asked(name, read_parameter(self.vehicle.address, name), None)
+        if message is None:
+            raise Rejected(f"the autopilot does not tell {name}")
+        return float(message.param_value)
 
     async def _set(self, name: str, value: float) -> None:
+        if await self._asked(name, set_parameter(self.vehicle.address, name, value), value) is None:
+            raise Rejected(f"the autopilot does not take {name} = {value:g}")
+
+    async def _asked(self, name: str, request: Any, value: float | None) -> Any:
+        """The PARAM_VALUE that answers a request, sent up to TRIES times; with `value` only one that tells that."""
         vehicle = self.vehicle
 
-        def read_back(message: Any) -> bool | None:
-            same = message.param_id == name and math.isclose(message.param_value, value, rel_tol=1e-5, abs_tol=1e-5)
-            return True if same else None
+        def answer(message: Any) -> Any:
+            same = value is None or math.isclose(message.param_value, value, rel_tol=1e-5, abs_tol=1e-5)
+            return message if message.param_id == name and same else None
 
         for _ in range(TRIES):
-            with vehicle.waiting.expecting({"PARAM_VALUE"}, read_back) as told:
-                await vehicle.link.send(set_parameter(vehicle.address, name, value), vehicle.state.system)
-                try:
-                    await told.within(READ_BACK, f"take {name} = {value:g}")
-                except TimedOut:
-                    continue
-                return
-        raise Rejected(f"the autopilot does not take {name} = {value:g}")
+            with vehicle.waiting.expecting({"PARAM_VALUE"}, answer) as told:
+                await vehicle.link.send(request, vehicle.state.system)
+                with contextlib.suppress(TimedOut):
+                    return await told.within(READ_BACK, f"answer for {name}")
+        return None
 
 
 def landing_target(time: float, relative: Vector, attitude: Attitude) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import functools
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -79,9 +80,9 @@ class Settings:
         """The target's tags, the main one first."""
         return parse_tags(self.tags, self.families[0])
 
-    @property
+    @functools.cached_property
     def model(self) -> CameraModel:
-        """The calibration's camera, or one of the field of view."""
+        """The calibration's camera, as its file was when it was first asked for, or one of the field of view."""
         if self.calibration:
             return load(path_of(self.calibration, "calibration"))
         return CameraModel.from_field_of_view(self.width, self.height, self.fov)

@@ -61,6 +61,7 @@ class Target:
         self.fixes = 0
         self.ambiguous = 0  # frames in a row that showed two tags of the same id
         self.last: Fix | None = None
+        self.is_final = False  # no other place is believed any more, whatever is seen
         self._variance = np.zeros(3)
         self._rejected = 0
         self._recent: deque[Fix] = deque()
@@ -98,7 +99,7 @@ class Target:
         self._variance += WANDER**2 * max(fix.at - self.seen_at, 0.0)
         if self._distance(fix) > GATE + 0.08 * fix.range + math.sqrt(float(self._variance.max())):
             self._rejected += 1
-            if self._rejected >= REJECTED_IN_A_ROW:
+            if self._rejected >= REJECTED_IN_A_ROW and not self.is_final:
                 self._begin(fix, noise)
             return False
         gain = self._variance / (self._variance + noise)

@@ -243,8 +243,8 @@ class Lockstep:
 
         return self.run(wait())
 
-    def start(self, alt: float = 6.0) -> None:
-        """Switch everything on, and take off."""
+    def switch_on(self) -> None:
+        """Switch everything on but the camera."""
 
         async def listen() -> None:
             self.vision.listen()
@@ -252,6 +252,10 @@ class Lockstep:
         self.run(listen())
         self._truth.enter_context(self.vision.rates.at(TRUTH))
         self.pass_time(3.0)
+
+    def start(self, alt: float = 6.0) -> None:
+        """Switch everything on, and take off."""
+        self.switch_on()
 
         async def up(job: Any) -> None:
             await self.copter.arm(job)

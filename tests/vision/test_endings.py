@@ -10,17 +10,18 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.errors import Invalid, LinkLost, ModeChanged, NotArmed
+from mavproxy_uavapi.vehicle.messages import NedTarget, VelocityTarget
 from mavproxy_vision.errors import LandingFailed
 from mavproxy_vision.geometry import Attitude, vector
 from mavproxy_vision.mission import Errand
-from mavproxy_vision.plnd import landing_target
+from mavproxy_vision.plnd import WANTED, landing_target
 from mavproxy_vision.setpoints import setpoint
 
 TAG = "0:0.30@0.8,-0.6"
 FAR_TAG = "0:0.30@1.6,-1.2"
 LARGE = {"tags": "0:0.6", "sim_tags": "0:0.6@0.8,-0.6"}
 SMALL = {"width": 320, "height": 240, "fps": 12.0, "sim_noise": 3.0, "sim_jitter": 0.0}
-SWITCH_MODE = 176
+SWITCH_MODE, TAKEOFF = 176, 22
 PLND = ("PLND_ENABLED", "PLND_STRICT", "PLND_RET_MAX", "PLND_ALT_MIN", "PLND_ALT_MAX")
 
 
@@ -79,7 +80,7 @@ def test_stopped_in_what_a_failed_landing_does_it_holds(flying, action):
     until(rig, lambda: rig.mode == action.upper())
     rig.pass_time(1.0)
     assert rig.flights.stop("stopped")
-    assert str(rig.outcome(job)) == "stopped; the vehicle holds"
+    assert str(rig.outcome(job)) == "stopped; the vehicle is told to hold"
     assert holds(rig)
 
 
@@ -111,6 +112,62 @@ def test_stopped_in_the_pilots_mode_nothing_is_sent_and_nothing_else_is_said(fly
     assert not [m for m in sent(rig, "COMMAND_LONG", mark) if m.command == SWITCH_MODE]
 
 
+@pytest.mark.parametrize("after", [0.0, 0.3, 0.8, 1.5])
+def test_a_mission_that_is_stopped_at_its_takeoff_does_not_take_off(lockstep, after):
+    rig = lockstep(sim_tags=TAG, **SMALL)
+    rig.switch_on()
+    rig.open_eye()
+    job = rig.begin(rig.flights.errand(rig.copter, Errand(alt=5, north=8, east=-5)))
+    until(rig, lambda: any(m.command == TAKEOFF for m in sent(rig, "COMMAND_LONG")))
+    rig.pass_time(after)
+    rig.flights.stop("stopped")
+    rig.outcome(job)
+    rig.pass_time(8.0)
+    assert height(rig) < 1.5
+
+
+def test_one_lost_message_does_not_keep_it_from_holding(flying):
+    rig = flying(alt=6.0, sim_tags="", attempts=1, leash=1.0, on_failure="land")
+    job = rig.land()
+    until(rig, lambda: rig.mode == "LAND")
+    rig.pass_time(1.0)
+    deliver, lost = rig.wire.deliver, []
+
+    def lossy(message: Any) -> None:
+        if message.get_type() == "COMMAND_LONG" and message.command == SWITCH_MODE and not lost:
+            lost.append(message)
+        else:
+            deliver(message)
+
+    rig.wire.deliver = lossy
+    rig.flights.stop("stopped")
+    rig.outcome(job)
+    assert holds(rig)
+    assert lost
+
+
+def test_stopped_and_unloaded_in_one_breath_it_holds_and_plnd_is_as_before(flying):
+    rig = flying(alt=6.0, plnd=True, **LARGE)
+    before = plnd(rig)
+    rig.land(method="landing_target")
+    until(rig, lambda: rig.mode == "LAND")
+    rig.pass_time(1.0)
+
+    async def both() -> list[Any]:
+        rig.flights.stop("stopped")
+        return rig.flights.abandon()
+
+    deliver = rig.wire.deliver
+    rig.wire.deliver = lambda _message: None  # the main loop, which waits for the unload, sends nothing more
+    last = rig.run(both())
+    for message, _system in last:
+        deliver(message)
+    rig.pass_time(12.0)
+    assert rig.mode == "GUIDED"
+    assert height(rig) > 2
+    assert plnd(rig) == before
+
+
 def test_unloaded_in_the_autopilots_land_it_holds(flying):
     rig = flying(alt=6.0, sim_tags="", attempts=1, leash=1.0, on_failure="land")
     job = rig.land()
@@ -132,7 +189,7 @@ def test_a_mission_that_is_stopped_holds_before_it_writes_its_track(flying):
     rig.pass_time(4.0)
     assert rig.flights.stop("stopped")
     error = rig.outcome(job)
-    assert "holds" in str(error)
+    assert "told to hold" in str(error)
     assert holds(rig)
     assert rig.flights.report.track == "not written: no home directory"
 
@@ -182,6 +239,91 @@ def test_a_flight_that_is_refused_in_land_does_not_hide_the_one_under_way(flying
     assert rig.flights.running
     assert rig.flights.report.verb == "land"
     assert rig.outcome(first).startswith("Landed on tag 0")
+
+
+def test_a_landing_that_cannot_be_flown_leaves_the_movement_under_way_alone(flying):
+    rig = flying()  # its PLND_TYPE was 0 at boot
+
+    async def go(job: Any) -> None:
+        await rig.copter.go_to(job, NedTarget(30.0, 0.0, -8.0), wait=True)
+
+    under_way = rig.begin(go, "/movement/go_to_ned_wait")
+    rig.pass_time(2.0)
+    assert "reboot" in str(rig.outcome(rig.land(method="landing_target")))
+    assert rig.outcome(under_way) == "done"
+    assert rig.truth.north == pytest.approx(30, abs=1.5)
+
+
+def test_a_landing_that_takes_over_stops_what_was_flown(flying):
+    rig = flying(sim_tags=FAR_TAG)
+
+    async def drive(job: Any) -> None:
+        await rig.copter.travel(job, VelocityTarget(0.0, 3.0, 0.0), duration=20)
+
+    rig.begin(drive, "/movement/travel")
+    rig.pass_time(2.0)
+    want = rig.vision.want
+
+    async def slowly(number: int) -> None:
+        await asyncio.sleep(2.0)
+        await want(number)
+
+    rig.vision.want = slowly
+    mark = len(rig.wire.sent)
+    rig.land()
+    rig.pass_time(0.2)
+    told = sent(rig, "SET_POSITION_TARGET_LOCAL_NED", mark)
+    assert told
+    assert (told[-1].vx, told[-1].vy, told[-1].vz) == (0, 0, 0)
+
+
+@pytest.mark.parametrize("pause", [0.0, 1.1])
+def test_parameters_are_given_back_after_two_landings_in_a_row(flying, pause):
+    rig = flying(alt=7.0, plnd=True, **LARGE)
+    for name, value in (("PLND_RET_MAX", 4), ("PLND_ALT_MAX", 8), ("PLND_STRICT", 2), ("PLND_ALT_MIN", 0.75)):
+        rig.simulator.parameters.set(name, value)
+    before = plnd(rig)
+    hear = rig.host._receive
+    late = [rig.loop.call_later(0, int)]
+
+    def slowly(message: Any) -> None:
+        if message.get_type() == "PARAM_VALUE":
+            late.append(rig.loop.call_at(max(rig.loop.time() + 0.15, late[-1].when() + 1e-6), hear, message))
+        else:
+            hear(message)
+
+    rig.host._receive = slowly
+    first = rig.land(method="landing_target")
+    until(rig, lambda: rig.mode == "LAND")
+    rig.flights.stop("stopped")
+    rig.outcome(first)
+    rig.pass_time(pause)
+    until(rig, lambda: rig.copter.mode == "GUIDED")
+    during: list[dict[str, float]] = []
+    rig.each_step.append(lambda: during.append(plnd(rig)) if rig.mode == "LAND" and rig.flights.running else None)
+    assert rig.outcome(rig.land(method="landing_target")).startswith("Landed on tag 0")
+    wanted = {name: WANTED[name] for name in PLND}
+    assert during[100] == wanted
+    rig.pass_time(20.0)
+    assert plnd(rig) == before
+
+
+def test_a_parting_is_not_cut_short_by_the_next_flight(flying):
+    rig = flying(alt=6.0, plnd=True, **LARGE)
+    job = rig.land(method="landing_target")
+    until(rig, lambda: rig.mode == "LAND")
+    rig.pass_time(1.0)
+    deliver = rig.wire.deliver
+
+    async def in_turns(message: Any, _system: int) -> None:  # MAVProxy's main loop turns every 20 ms
+        await asyncio.sleep(0.02)
+        deliver(message)
+
+    rig.wire.send = in_turns
+    rig.flights.stop("stopped")
+    rig.pass_time(0.05)
+    job._task.cancel()
+    assert holds(rig)
 
 
 # -- another vehicle -----------------------------------------------------------------------------------------
@@ -308,6 +450,66 @@ def test_a_parameter_that_cannot_be_given_back_does_not_keep_it_from_returning(f
     parameters.set = take  # it was a bad link, say
     rig.pass_time(30.0)
     assert plnd(rig) == before
+
+
+def test_a_landing_that_succeeded_is_one_even_when_the_battery_is_pulled_at_once(flying):
+    rig = flying(plnd=True, **LARGE)
+    job = rig.land(method="landing_target")
+    until(rig, lambda: rig.mode == "LAND")
+    until(rig, lambda: rig.simulator.copter.armed is False)
+    rig.pass_time(2.5)  # what tells a landing from a fall
+    rig.simulator.faults.silence(rig.simulator.copter.now, 1000, sending=True, receiving=True)
+    assert rig.outcome(job).startswith("Landed on tag 0")
+
+
+def test_a_return_that_is_refused_is_told_with_the_reason_of_the_landing(flying):
+    rig = flying(sim_tags="", attempts=1, leash=1.0)
+    job = rig.land()
+    rig.pass_time(1.0)
+    rig.simulator.faults.add("refuse", {"command": SWITCH_MODE})
+    error = rig.outcome(job)
+    assert isinstance(error, LandingFailed)
+    assert "no tag in sight" in str(error)
+    assert "DO_SET_MODE" in str(error)
+    assert error.report["action"] == "hold"
+    assert rig.mode == "GUIDED"
+
+
+@pytest.mark.parametrize("offset", ["0.3,0,0", "0.2,-0.2,0.1"])
+def test_a_camera_beside_the_middle_lands_it_too(flying, offset):
+    rig = flying(alt=4.0, offset=offset)
+    assert rig.outcome(rig.land()).startswith("Landed on tag 0")
+    assert math.hypot(rig.truth.north - 0.8, rig.truth.east + 0.6) < 0.25
+
+
+def test_a_tag_that_fills_the_view_high_up_is_refused(flying):
+    rig = flying(alt=8.0, tags="0:3", sim_tags="0:3@0.8,-0.6")
+    error = rig.outcome(rig.land())
+    assert isinstance(error, Invalid)
+    assert "a smaller one beside it" in str(error)
+    assert rig.mode == "GUIDED"
+
+
+def test_a_large_tag_that_is_covered_in_its_last_metres_is_climbed_from(flying):
+    rig = flying(alt=6.0, attempts=1, tags="0:0.9", sim_tags="0:0.9@0.8,-0.6", on_failure="hold")
+    phases: list[str] = []
+
+    def watch() -> None:
+        phases.append(rig.flights.phase)
+        if "last metre" in rig.flights.phase and height(rig) > 1.5:
+            rig.eye.blind = lambda _: True
+
+    rig.each_step.append(watch)
+    assert isinstance(rig.outcome(rig.land()), LandingFailed)
+    assert "holding: tag lost" in phases
+    assert height(rig) > 1.5
+
+
+def test_a_tag_that_is_lost_on_the_way_down_again_and_again_is_given_up(flying):
+    rig = flying(attempts=2, on_failure="hold")
+    rig.eye.blind = lambda pose: -pose[0][2] < 2.5
+    error = rig.outcome(rig.land())
+    assert "lost on the way down in each of 2 attempts" in str(error)
 
 
 def test_motors_that_stop_in_flight_are_no_landing(flying):
