@@ -16,7 +16,7 @@ vision tags                        the tags in view
 vision land [ID] [METHOD]          land on the tag from here (velocity or landing_target)
 vision search [ID]                 fly an expanding square until the tag is in sight
 vision mission [ALT NORTH EAST [ID|none]]   take off, fly there (m from home), land on the tag
-vision abort                       end what is in flight; the vehicle holds
+vision abort                       end what is in flight; a vehicle that it flew is told to hold
 vision calibrate FOLDER BOARD [FILE]        charuco:7x5:0.03:0.022 or chessboard:9x6:0.025
 vision snapshot FILE               write the newest frame, with its tags drawn in
 vision tag FILE.pdf [--family F] [--id N] [--size M]   a tag to scale, for printing
