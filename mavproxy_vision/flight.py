@@ -362,9 +362,11 @@ class Flight:
                 await self.fly_by("LAND", self.vehicle.land)
         except (ModeChanged, NotArmed, LinkLost):
             raise
-        except UavApiError as error:  # refused, or not acknowledged
-            self.report.action, reason = "hold", f"{reason} ({error})"
-            await self.send(REST)
+        except UavApiError as error:  # refused, or it takes very long: then it goes on
+            self.autopilot, reason = None, f"{reason} ({error})"
+            if self.vehicle.mode == "GUIDED":
+                self.report.action = "hold"
+                await self.send(REST)
         raise self._failed(reason)
 
     # -- the end -------------------------------------------------------------------------------------------

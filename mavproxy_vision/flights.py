@@ -56,8 +56,7 @@ class Sortie:
             raise
         except UavApiError as error:
             self.report.reason = str(error)
-            if flights.has(flight):
-                await flights.part(flight)
+            await flights.part(flight)
             raise
         except BaseException:  # ended from outside, or a defect of ours: the vehicle is not left flying
             await flights.part(flight)
@@ -167,12 +166,10 @@ class Flights:
                 one.job.abort(Aborted(f"{flight.job.verb} took over"))
             await one.ended.wait()
 
-    def has(self, flight: Flight) -> bool:
-        """Whether it has taken its vehicle over, and has not ended."""
-        return flight in self._unfinished
-
     async def part(self, flight: Flight) -> None:
-        """Send what ends it, whatever else is cancelled meanwhile."""
+        """Send what ends a flight that has taken its vehicle over, whatever else is cancelled meanwhile."""
+        if flight not in self._unfinished:
+            return
 
         async def send() -> None:
             for message in flight.parting():

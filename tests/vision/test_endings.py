@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from mavproxy_uavapi.errors import Invalid, LinkLost, ModeChanged, NotArmed
+from mavproxy_uavapi.errors import Aborted, Invalid, LinkLost, ModeChanged, NotArmed
 from mavproxy_uavapi.vehicle.messages import NedTarget, VelocityTarget
 from mavproxy_vision.errors import LandingFailed
 from mavproxy_vision.geometry import Attitude, vector
@@ -473,6 +473,24 @@ def test_a_return_that_is_refused_is_told_with_the_reason_of_the_landing(flying)
     assert "DO_SET_MODE" in str(error)
     assert error.report["action"] == "hold"
     assert rig.mode == "GUIDED"
+
+
+def test_a_landing_that_is_stopped_before_it_took_over_leaves_the_one_under_way_alone(flying):
+    rig = flying(alt=6.0, plnd=True, **LARGE)
+    first = rig.land(method="landing_target")
+    until(rig, lambda: rig.mode == "GUIDED" and rig.simulator.parameters["PLND_ENABLED"] == 1)
+    ask = rig.copter.parameters
+
+    async def slowly(names: Any) -> Any:
+        await asyncio.sleep(5.0)
+        return await ask(names)
+
+    rig.copter.parameters = slowly
+    second = rig.land(method="landing_target")
+    rig.pass_time(0.2)
+    second.abort(Aborted("its client hung up"))
+    rig.copter.parameters = ask
+    assert rig.outcome(first).startswith("Landed on tag 0")
 
 
 @pytest.mark.parametrize("offset", ["0.3,0,0", "0.2,-0.2,0.1"])
