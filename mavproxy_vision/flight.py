@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import math
 from collections.abc import Awaitable, Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 from mavproxy_uavapi.errors import (
-    Invalid,
     LinkLost,
     ModeChanged,
     NotArmed,
@@ -26,13 +24,13 @@ from mavproxy_uavapi.vehicle.modes import mode_number
 from mavproxy_vision.errors import LandingFailed
 from mavproxy_vision.geometry import Vector
 from mavproxy_vision.history import Motion
-from mavproxy_vision.landing import REST, Landing, Order, Phase, Plan
+from mavproxy_vision.landing import REST, Landing, Order, Phase
+from mavproxy_vision.planning import landable, plan_for, tags_for
 from mavproxy_vision.plnd import PrecisionLanding
 from mavproxy_vision.rates import FLIGHT
 from mavproxy_vision.report import Report
-from mavproxy_vision.search import step_for
 from mavproxy_vision.setpoints import setpoint
-from mavproxy_vision.tags import FAMILIES, Tag
+from mavproxy_vision.tags import Tag
 from mavproxy_vision.target import Target
 from mavproxy_vision.vision import Vision
 
@@ -45,10 +43,7 @@ STALE = 0.5  # s of the vehicle's clock without telemetry until it rests
 UNTOLD = 10.0  # s of it until a landing is given up
 BLIND = 5.0  # s without a frame until a landing is given up
 FIRST = 3.0  # s of ours for the first telemetry
-FINAL = 1.3  # of the height at which the tag fills the view
-LOWEST_FINAL = 0.4  # m
-HIGHEST_CLIP = 1.5  # m from which a tag would be landed on without being seen
-DEPENDABLE = 0.85  # of the detection range
+SEARCHES = 1000  # attempts of a search, which its leash and its time limit end
 DID = {"rtl": "returned to launch", "land": "landed in place", "hold": "the vehicle holds"}
 
 
@@ -114,7 +109,7 @@ class Flight:
         self.vehicle.require_guided_flight()
         if self.report.verb == "land":
             self.vision.require_camera()
-        tags = self.landable(number)
+        tags = landable(self.vision.settings, number)
         descend = way_down(self)
         await descend.prepare()
         self.vehicle.require_guided_flight()
@@ -123,7 +118,8 @@ class Flight:
             await self._look_for(tags)
             self.report.tag, self.report.method = next(iter(tags)), method
             with self._lasting(), self.vision.aimed_at(tags, self._floor) as target:
-                await descend(Landing(self._plan(tags, descend.by_velocity), target))
+                plan = plan_for(self.vision.settings, tags, self._here(), descend=descend.by_velocity)
+                await descend(Landing(plan, target))
             self.report.touchdown_error = self.vision.touchdown_error(self.report.tag)
 
     async def search(self, number: int | None, leash: float | None) -> None:
@@ -134,12 +130,14 @@ class Flight:
         """
         self.vehicle.require_guided_flight()
         self.vision.require_camera()
-        tags = self.tags(number)
+        tags = tags_for(self.vision.settings, number)
         await self.take_over()
         with self._watched():
             await self._look_for(tags)
             self.report.tag = next(iter(tags))
-            plan = self._plan(tags, False, attempts=1000, leash=leash or self.vision.settings.leash)
+            settings = self.vision.settings
+            given = {"attempts": SEARCHES, "leash": leash or settings.leash}
+            plan = plan_for(settings, tags, self._here(), descend=False, **given)
             with self._lasting(), self.vision.aimed_at(tags, self._floor) as target:
                 order = await self.fly(Landing(plan, target))
                 await self.send(REST)
@@ -171,45 +169,6 @@ class Flight:
         finally:
             self.report.duration = self.vision.now() - began
 
-    def tags(self, number: int | None) -> dict[int, Tag]:
-        """The tags that tell where the target is, the main one first.
-
-        Raises:
-            Invalid: the family has no such id.
-        """
-        settings = self.vision.settings
-        tags = settings.tag_list
-        if number is None or number == tags[0].id:
-            return {tag.id: tag for tag in tags}
-        if number >= FAMILIES[settings.families[0]][1]:
-            raise Invalid(f"{settings.families[0]} has no id {number}", "body", "id")
-        size = next((tag.size for tag in tags if tag.id == number), tags[0].size)
-        return {number: Tag(number, size)}
-
-    def landable(self, number: int | None) -> dict[int, Tag]:
-        """The tags that tell where the target is, which can be seen from low enough to land on.
-
-        Raises:
-            Invalid: the family has no such id, or the smallest of them fills the view too high up.
-        """
-        tags = self.tags(number)
-        clip = self._clip(tags)
-        if clip > HIGHEST_CLIP:
-            smallest = min(tags.values(), key=lambda tag: tag.size)
-            raise Invalid(
-                f"tag {smallest.id} of {smallest.size:g} m is not in view below {clip:.1f} m: it takes a smaller one "
-                "beside it (`tags`), or a lens that is nearer to the middle (`offset`)",
-                "body",
-                "id",
-            )
-        return tags
-
-    def _clip(self, tags: dict[int, Tag]) -> float:
-        """Metres above the target below which the smallest tag does not fit into the view."""
-        forward, right, down = self.vision.settings.camera_mount.offset
-        smallest = min(tag.size for tag in tags.values())
-        return self.vision.settings.model.clip_height(smallest, math.hypot(forward, right)) + down
-
     async def _look_for(self, tags: dict[int, Tag]) -> None:
         """Have the detector look for them, and wait for the first telemetry.
 
@@ -227,32 +186,13 @@ class Flight:
         await self.vehicle.limits()  # nothing is to be waited for between the last metre and LAND
         self.vehicle.held_by("GUIDED")
 
+    def _here(self) -> float | None:
+        motion = self.vision.history.last_motion
+        return None if motion is None else self.height(motion)
+
     def height(self, motion: Motion) -> float:
         """Metres above the target's ground."""
         return self._floor - float(motion.position[2])
-
-    def _plan(self, tags: dict[int, Tag], descend: bool, **changes: Any) -> Plan:
-        settings, model = self.vision.settings, self.vision.settings.model
-        cells = FAMILIES[settings.families[0]][0]
-        largest = max(tag.size for tag in tags.values())
-        reach = DEPENDABLE * model.detection_range(largest, cells)
-        motion = self.vision.history.last_motion
-        here = self.height(motion) if motion is not None else reach
-        clip = self._clip(tags)
-        known = {
-            "attempts": settings.attempts,
-            "tolerance": settings.tolerance,
-            "final": max(FINAL * clip, LOWEST_FINAL),
-            "clip": clip,
-            "speed": settings.speed,
-            "descent": settings.descent,
-            "step": step_for(model.footprint(min(max(here, 1.0), reach)), largest),
-            "leash": settings.leash,
-            "ceiling": reach,
-            "time_limit": settings.time_limit,
-            "descend": descend,
-        }
-        return Plan(**{**known, **changes})
 
     def motion(self, now: float) -> Motion | None:
         """Where the vehicle is; None when nobody knows."""

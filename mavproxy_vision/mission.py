@@ -11,6 +11,7 @@ from mavproxy_uavapi.vehicle.geodesy import METRES_PER_DEGREE
 from mavproxy_uavapi.vehicle.messages import GlobalTarget
 from mavproxy_vision.descent import Descent
 from mavproxy_vision.flight import Flight
+from mavproxy_vision.planning import landable
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ async def fly(flight: Flight, errand: Errand, way_down: Callable[[Flight], Desce
     grounded = not vehicle.state.armed or vehicle.state.landed is not False
     if errand.on_tag:
         flight.vision.require_camera()
-        flight.landable(errand.tag)
+        landable(flight.vision.settings, errand.tag)
         await way_down(flight).prepare()
     if not grounded:
         vehicle.require_guided_flight()
