@@ -227,7 +227,7 @@ class Landing:
             self.phase = Phase.LAND
             return REST
         lost = self.phase is Phase.CLIMB  # on the way down, and seen again from higher up
-        if lost and not self._next_attempt("the tag was lost on the way down"):
+        if lost and not self._next_attempt("the tag was lost again on the way down"):
             return REST
         self.phase, self._since = Phase.DESCEND, now
         return self._descend(now, motion, height, elapsed)
@@ -302,7 +302,7 @@ class Landing:
         """Begin another attempt; false when there is none left, and the landing has failed."""
         if self.attempt >= self.plan.attempts:
             times = f"{self.attempt} attempt{'' if self.attempt == 1 else 's'}"
-            self.fail(f"{why} after {times}" if why == "no tag in sight" else f"{why} in each of {times}")
+            self.fail(f"{why} after {times}")
             return False
         self.attempt += 1
         return True

@@ -21,7 +21,8 @@ from mavproxy_vision.geometry import Attitude, Mount, vector
 from mavproxy_vision.model import CameraModel
 from mavproxy_vision.rendering import Look, PlacedTag, Renderer
 
-PERIOD = 0.04  # s between two frames
+PERIOD = 0.06  # s between two frames
+FORESEEN = 0.5  # s of the vehicle's clock that it is taken to move on as it did
 SIZE, FIELD_OF_VIEW = (480, 360), 56.145
 
 
@@ -52,6 +53,7 @@ class Poster:
         self._session = requests.Session()
         self._thread = threading.Thread(target=self._run, name="poster")
         self._data = b""
+        self._told: dict[str, dict[str, Any]] = {}
         self.answers: list[int] = []
         self.height = math.nan
         self.frozen = False
@@ -89,9 +91,16 @@ class Poster:
         return cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 90])[1].tobytes()
 
     def _message(self, name: str) -> dict[str, Any]:
-        """A message's fields, and the vehicle's seconds since then as `age`."""
-        body = self._session.get(f"{self._rig.url}/telemetry/message/{name}", timeout=10).json()
-        return {**body["info"], "age": body["age_s"] * self._speedup}
+        """A message's fields, and the vehicle's seconds since then as `age`, for as long as that tells anything.
+
+        While nobody hears the vehicle, the camera goes on showing what it showed.
+        """
+        answer = self._session.get(f"{self._rig.url}/telemetry/message/{name}", timeout=10)
+        if answer.status_code == 503 and name in self._told:
+            return self._told[name]
+        body = answer.json()
+        self._told[name] = {**body["info"], "age": min(body["age_s"] * self._speedup, FORESEEN)}
+        return self._told[name]
 
 
 def tag_near(rig: Any, north: float = 0.6, east: float = -0.5, number: int = 0, size: float = 0.30) -> PlacedTag:

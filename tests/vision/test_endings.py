@@ -527,7 +527,7 @@ def test_a_tag_that_is_lost_on_the_way_down_again_and_again_is_given_up(flying):
     rig = flying(attempts=2, on_failure="hold")
     rig.eye.blind = lambda pose: -pose[0][2] < 2.5
     error = rig.outcome(rig.land())
-    assert "lost on the way down in each of 2 attempts" in str(error)
+    assert "lost again on the way down after 2 attempts" in str(error)
 
 
 def test_motors_that_stop_in_flight_are_no_landing(flying):
