@@ -7,6 +7,7 @@ import importlib.util
 import os
 import selectors
 import shutil
+import signal
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -239,6 +240,12 @@ def boards(helper: Callable[[str], Any]) -> Any:
     """The module that draws chessboards."""
     pytest.importorskip("cv2")
     return helper("vision/boards.py")
+
+
+def pytest_configure() -> None:
+    """Heed what a run in the background (nohup, `&`) ignores: what our tests start would ignore it too."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
