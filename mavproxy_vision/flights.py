@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Coroutine
 from pathlib import Path
 from typing import Any
 
@@ -176,10 +176,10 @@ class Flights:
                 await flight.tell(message)
 
         self._do(self._see_to_it(flight))
-        await asyncio.shield(asyncio.get_running_loop().create_task(send()))
+        await asyncio.shield(self._do(send()))
 
     async def _see_to_it(self, flight: Flight) -> None:
-        """One message may be lost: the vehicle is asked for GUIDED until it shows it, or has another master."""
+        """One message may be lost: GUIDED is asked for like any command, with its tries, until it shows."""
         await flight.ended.wait()
         try:
             await flight.make_hold()
@@ -209,11 +209,7 @@ class Flights:
             report.plot = str(base.with_suffix(".png"))
         except OSError as error:
             report.track = f"not written: {error.strerror}"
-        except (
-            RuntimeError,
-            ValueError,
-            cv2.error,
-        ) as error:  # a `~user` that is none, a name with a null, no encoder
+        except (RuntimeError, ValueError, cv2.error) as error:  # a `~user` that is none, a null in a name, no encoder
             report.track = f"not written: {error}"
 
     @property
@@ -228,9 +224,11 @@ class Flights:
 
     # -- parameters that are still to be given back ----------------------------------------------------------
 
-    def _do(self, work: Any) -> None:
+    def _do(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
+        """Run it beside what else there is, held until it is done: the loop itself holds no task."""
         self._tasks.add(task := asyncio.get_running_loop().create_task(work))
         task.add_done_callback(self._tasks.discard)
+        return task
 
     async def _tidy(self, plnd: PrecisionLanding) -> None:
         """Give parameters back as soon as the vehicle hears us, and no flight needs them."""
