@@ -123,7 +123,7 @@ class TrackConsole:
         places = await asyncio.to_thread(read, given.file.expanduser(), given.ground)
         flight = flight_of(vehicle, places, given.reach, given.transit)
         request = {**{name: str(value) for name, value in vars(given).items()}, "digest": hash(tuple(places))}
-        job = self._host.jobs.begin(vehicle.seat, VERB, request, lambda job: self._tracks.fly(flight, job))
+        job = self._host.jobs.begin(vehicle, VERB, request, lambda job: self._tracks.fly(flight, job))
         self._errands.say(
             f"flying {len(places)} legs with vehicle {vehicle.state.system}; `gradys track` tells how far it is"
         )

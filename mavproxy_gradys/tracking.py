@@ -9,7 +9,7 @@ from mavproxy_gradys.track_flight import VERB, Flight
 from mavproxy_gradys.track_recorder import Recorder
 from mavproxy_uavapi.errors import Aborted, Busy
 from mavproxy_uavapi.host.host import Host
-from mavproxy_uavapi.vehicle.jobs import Job
+from mavproxy_uavapi.vehicle.jobs import Ending, Job
 
 
 class Tracking:
@@ -59,10 +59,10 @@ class Tracking:
         return [flight for flight in self._flights if flight.running or newest[flight.copter] is flight]
 
     async def close(self) -> None:
-        """End the recording and the flights: the vehicles keep their last setpoints."""
+        """End the recording and the flights: the vehicles hold."""
         for flight in self._flights:
             if flight.job is not None and flight.job.running:
-                flight.job.abort(Aborted(f"{VERB}: gradys is unloaded"))
+                flight.job.abort(Aborted(f"{VERB}: gradys is unloaded"), Ending.UNLOADED)
         await self.stop_recording()
 
     def report(self) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from mavproxy_uavapi.host.host import Host
 from mavproxy_uavapi.http.app import Server
 from mavproxy_uavapi.http.call import Service
 from mavproxy_uavapi.settings import Settings
+from mavproxy_uavapi.vehicle.endings import Policy
 from mavproxy_uavapi.vehicle.freshness import Freshness
 
 
@@ -36,7 +37,7 @@ class Api:
         """
         if self._server is not None:
             return
-        self.host.link_timeout = settings.link_timeout
+        self._take_up(settings)
         server = Server(Service(self.host, settings, self.audit))
         try:
             await server.start()
@@ -52,10 +53,15 @@ class Api:
         """Take up settings that need no other listening (`Settings.listens_as`): what is in flight goes on."""
         if self._server is None:
             return
-        self.host.link_timeout = settings.link_timeout
+        self._take_up(settings)
         service = self._server.service
         service.settings = settings
         service.scripts.renew(settings)
+
+    def _take_up(self, settings: Settings) -> None:
+        self.host.link_timeout = settings.link_timeout
+        self.host.endings.on_disconnect = Policy.HOLD if settings.on_disconnect == "hold" else Policy.NOTHING
+        self.host.endings.on_script_exit = Policy(settings.on_script_exit)
 
     async def stop(self) -> None:
         """Close the port and end what is in flight."""

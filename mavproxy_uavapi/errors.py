@@ -10,6 +10,7 @@
     |  |- Superseded           409 superseded     a newer command took over
     |  |- ModeChanged          409 mode_changed   the pilot or a failsafe has the vehicle
     |  |- Busy                 409 busy           the state forbids it just now
+    |  |- Paused               409 paused         `stop` holds the vehicle
     |  |- NotArmed             409 not_armed
     |  `- Aborted              409 aborted
     |- Invalid                 422 invalid        nothing was sent
@@ -106,6 +107,12 @@ class Busy(Conflict):
     """The vehicle's state forbids it just now."""
 
     code = "busy"
+
+
+class Paused(Conflict):
+    """`stop` holds the vehicle still until somebody resumes it."""
+
+    code = "paused"
 
 
 class NotArmed(Conflict):

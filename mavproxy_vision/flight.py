@@ -7,20 +7,11 @@ import contextlib
 from collections.abc import Awaitable, Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
-from mavproxy_uavapi.errors import (
-    LinkLost,
-    ModeChanged,
-    NotArmed,
-    Rejected,
-    Stale,
-    Superseded,
-    UavApiError,
-)
+from mavproxy_uavapi.errors import Conflict, LinkLost, Rejected, Stale, UavApiError
 from mavproxy_uavapi.host.patience import within
-from mavproxy_uavapi.vehicle import messages
+from mavproxy_uavapi.vehicle.authority import Rank
 from mavproxy_uavapi.vehicle.copter import Copter
 from mavproxy_uavapi.vehicle.jobs import Job
-from mavproxy_uavapi.vehicle.modes import mode_number
 from mavproxy_vision.errors import LandingFailed
 from mavproxy_vision.geometry import Vector
 from mavproxy_vision.history import Motion
@@ -88,12 +79,18 @@ class Flight:
 
         To be called when nothing is left that would refuse the flight.
         """
-        if self.vehicle.seat.job is self.job:
+        if self.commands:
             return
-        self.vehicle.seat.take(self.job)
+        self.vehicle.authority.take(self.job, Rank.MOVEMENT)
+        self.job.steers = True
         await self._succeed(self)
         if self.vehicle.mode == "GUIDED" and self.vehicle.state.armed and not self.vehicle.state.landed:
             await self.send(REST)  # the setpoint of whoever had it would go on meanwhile
+
+    @property
+    def commands(self) -> bool:
+        """Whether the vehicle is this flight's: no newer command has it."""
+        return self.vehicle.authority.commander is self.job
 
     # -- verbs ---------------------------------------------------------------------------------------------
 
@@ -259,13 +256,18 @@ class Flight:
 
     async def send(self, velocity: Vector) -> None:
         """Send a velocity (m/s NED) to a vehicle that is still in GUIDED."""
-        self.vehicle.held_by("GUIDED")
+        self.vehicle.held_by("GUIDED")  # the rest is asked in `tell`
         attitude = self.vision.history.attitude(self.vision.now())
         yaw = None if attitude is None else attitude.yaw
         await self.tell(setpoint(self.vehicle.address, velocity, yaw))
 
     async def tell(self, message: Any) -> None:
-        """Send the vehicle a message; `pause` sees to it that they do not come too often."""
+        """Send the vehicle a message; `pause` sees to it that they do not come too often.
+
+        Raises:
+            Superseded, Paused: somebody else commands it; nothing is sent.
+        """
+        self.vehicle.authority.require(self.job)
         self._sent_at = self.vision.host.clock()
         await self.vehicle.link.send(message, self.vehicle.state.system)
 
@@ -300,7 +302,7 @@ class Flight:
                 await self.fly_by("RTL", self.vehicle.rtl)
             elif action == "land":
                 await self.fly_by("LAND", self.vehicle.land)
-        except (ModeChanged, NotArmed, LinkLost):
+        except (Conflict, LinkLost):
             raise
         except UavApiError as error:  # refused, or it takes very long: then it goes on
             self.autopilot, reason = None, f"{reason} ({error})"
@@ -308,39 +310,6 @@ class Flight:
                 self.report.action = "hold"
                 await self.send(REST)
         raise self._failed(reason)
-
-    # -- the end -------------------------------------------------------------------------------------------
-
-    @property
-    def is_ours(self) -> bool:
-        """Whether the vehicle flies, and flies for this flight: no pilot has it, and no newer command."""
-        vehicle = self.vehicle
-        if isinstance(self.job.error, Superseded) or vehicle.seat.job is not self.job:
-            return False
-        if not vehicle.state.armed:
-            return False
-        # A zero velocity keeps on the ground what is about to take off; a LAND that stands is left alone.
-        return vehicle.mode == "GUIDED" or (vehicle.mode == self.autopilot and not vehicle.state.landed)
-
-    def parting(self) -> list[Any]:
-        """What ends it from outside: makes a vehicle that is ours hold, and gives its parameters back."""
-        vehicle, found = self.vehicle, []
-        if self.is_ours:
-            if self.autopilot is not None:
-                guided = messages.set_mode(mode_number(vehicle.state.vehicle_type, "GUIDED"))
-                found.append(guided.to(vehicle.address, 0))
-            found.append(setpoint(vehicle.address, REST, None))
-        return [*found, *([] if self.plnd is None else self.plnd.remaining())]
-
-    async def make_hold(self) -> None:
-        """See to it that a vehicle which the autopilot flies for us holds; what `parting` sends may be lost.
-
-        Raises:
-            UavApiError: it did not switch, or somebody else has it.
-        """
-        if self.autopilot is not None and self.is_ours:
-            await self.vehicle.switch_to("GUIDED")
-            await self.send(REST)
 
 
 class Since:

@@ -11,10 +11,11 @@ from typing import Any
 
 import cv2
 
-from mavproxy_uavapi.errors import Aborted, LinkLost, ModeChanged, NotArmed, NotSupported, UavApiError
+from mavproxy_uavapi.errors import Aborted, NotSupported, UavApiError
 from mavproxy_uavapi.host.state import VehicleState
 from mavproxy_uavapi.vehicle.copter import Copter
-from mavproxy_uavapi.vehicle.jobs import CONSOLE, Job
+from mavproxy_uavapi.vehicle.endings import Policy
+from mavproxy_uavapi.vehicle.jobs import CONSOLE, Ending, Job
 from mavproxy_vision import mission
 from mavproxy_vision.descent import Descent, PrecisionDescent
 from mavproxy_vision.flight import Flight
@@ -51,15 +52,8 @@ class Sortie:
         flight = Flight(flights.vision, self._copter, job, self.report, flights.succeed)
         try:
             await self._fly(flight)
-        except (ModeChanged, NotArmed, LinkLost) as error:  # it has another master, or none
-            self.report.reason = str(error)
-            raise
         except UavApiError as error:
             self.report.reason = str(error)
-            await flights.part(flight)
-            raise
-        except BaseException:  # ended from outside, or a defect of ours: the vehicle is not left flying
-            await flights.part(flight)
             raise
         finally:
             flights.over(flight)
@@ -122,6 +116,7 @@ class Flights:
         self._plnd: dict[int, PrecisionLanding] = {}
         self._tidying: set[PrecisionLanding] = set()
         self._tasks: set[asyncio.Task[None]] = set()
+        vision.host.last_words.append(self.last_words)
 
     def copter(self) -> Copter:
         """MAVProxy's current vehicle. Raises NoVehicle, LinkLost, NotSupported."""
@@ -162,29 +157,9 @@ class Flights:
         self._flight, self.report = flight, flight.report
         self._unfinished.add(flight)
         for one in before:
-            if one.job.running:  # of another vehicle; of this one it has lost its seat already
+            if one.job.running:  # of another vehicle; of this one it is superseded already
                 one.job.abort(Aborted(f"{flight.job.verb} took over"))
             await one.ended.wait()
-
-    async def part(self, flight: Flight) -> None:
-        """Send what ends a flight that has taken its vehicle over, whatever else is cancelled meanwhile."""
-        if flight not in self._unfinished:
-            return
-
-        async def send() -> None:
-            for message in flight.parting():
-                await flight.tell(message)
-
-        self._do(self._see_to_it(flight))
-        await asyncio.shield(self._do(send()))
-
-    async def _see_to_it(self, flight: Flight) -> None:
-        """One message may be lost: GUIDED is asked for like any command, with its tries, until it shows."""
-        await flight.ended.wait()
-        try:
-            await flight.make_hold()
-        except UavApiError as error:
-            log.warning("vision: %s", error)
 
     def over(self, flight: Flight) -> None:
         """It has sent its last message."""
@@ -235,15 +210,14 @@ class Flights:
         self._tidying.add(plnd)
         tries = 0
         while plnd.before and tries < TIDY_TRIES:
+            if not plnd.in_use and self.vision.host.is_alive(plnd.vehicle.state):
+                try:
+                    await plnd.give_back()
+                except UavApiError as error:
+                    tries += 1
+                    if tries == TIDY_TRIES:
+                        log.warning("vision: %s", error)
             await asyncio.sleep(TIDY_EVERY)
-            if plnd.in_use or not self.vision.host.is_alive(plnd.vehicle.state):
-                continue
-            try:
-                await plnd.give_back()
-            except UavApiError as error:
-                tries += 1
-                if tries == TIDY_TRIES:
-                    log.warning("vision: %s", error)
         self._tidying.discard(plnd)
 
     # -- from the prompt, and at the end ---------------------------------------------------------------------
@@ -258,7 +232,7 @@ class Flights:
             return sortie.result()
 
         jobs = self.vision.host.jobs
-        job = jobs.begin(copter.seat, path, request, body, client=CONSOLE, outlives_client=True)
+        job = jobs.begin(copter, path, request, body, client=CONSOLE, outlives_client=True)
         self._do(self._tell_end(job, tell))
         return job
 
@@ -273,30 +247,24 @@ class Flights:
         flight = self._flight
         if flight is None or not flight.job.running:
             return None
-        error = _ended(flight, reason)
+        error = _ended(self.vision, flight, reason)
         flight.job.abort(error)
         return str(error)
 
-    def abandon(self) -> list[tuple[Any, int]]:
-        """End all without sending anything: what would be sent, and to which system."""
-        last: list[tuple[Any, int]] = []
-        for task in self._tasks:
-            task.cancel()
-        for flight in self._unfinished:  # those too that were stopped a moment ago, and could not send it yet
-            last += [(message, flight.vehicle.state.system) for message in flight.parting()]
-            error = _ended(flight, "vision was unloaded")
-            flight.vehicle.seat.job = None  # so that its own end finds nothing more to send
-            flight.job.abort(error)
-        for plnd in self._plnd.values():
-            last += [(message, plnd.vehicle.state.system) for message in plnd.remaining()]
-            plnd.before.clear()
-        self._flight = None
-        return last
+    def abandon(self) -> None:
+        """End all flights, because the module is unloaded."""
+        for flight in list(self._unfinished):
+            flight.job.abort(_ended(self.vision, flight, "vision was unloaded"), Ending.UNLOADED)
+
+    def last_words(self) -> list[tuple[Any, int]]:
+        """The parameters that are still to be given back, as messages, and the systems that they go to."""
+        return [(message, plnd.vehicle.state.system) for plnd in self._plnd.values() for message in plnd.remaining()]
 
 
-def _ended(flight: Flight, reason: str) -> Aborted:
+def _ended(vision: Vision, flight: Flight, reason: str) -> Aborted:
     vehicle = flight.vehicle
-    left = "the vehicle is told to hold" if flight.is_ours else f"the vehicle is left alone: it is in {vehicle.mode}"
+    holds = flight.commands and vision.host.endings.what_follows(vehicle, Policy.HOLD) is not None
+    left = "the vehicle is told to hold" if holds else f"the vehicle is left alone: it is in {vehicle.mode}"
     return Aborted(f"{reason}; {left}")
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import os
 from collections.abc import Callable, Coroutine
 from pathlib import Path
@@ -102,22 +101,14 @@ class VisionModule(HostedModule):
             super().unload()
 
     def _abandon(self) -> None:
-        """End what is in flight.
-
-        MAVProxy's main loop waits for us, or has ended: it cannot send what the asyncio side asks for, and
-        nobody else sends. So this thread does, here only.
-        """
+        """End what is in flight."""
         if not self.host.bridge.running:
             return
 
-        async def abandoned() -> list[tuple[Any, int]]:
-            return self.flights.abandon()
+        async def abandoned() -> None:
+            self.flights.abandon()
 
-        for message, system in self.host.bridge.run(abandoned()):
-            master = self.mpstate.master(system)
-            with contextlib.suppress(OSError):  # the link is down: nobody hears us anyhow
-                if master is not None:
-                    master.mav.send(message)
+        self.host.bridge.run(abandoned())
 
     def _directory(self) -> Path:
         """Where files go."""

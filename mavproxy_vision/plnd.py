@@ -64,7 +64,7 @@ class PrecisionLanding:
         """
         if not mavutil.mavlink20():
             raise NotSupported("LANDING_TARGET has a position in MAVLink 2 only: start MAVProxy without --mav10")
-        told = await self.vehicle.parameters(WANTED)
+        told = await self.vehicle.parameters.read((name,) for name in WANTED)
         if ENABLE not in told:
             raise NotSupported("the autopilot has no precision landing (no PLND_ENABLED)")
         if told.get(AT_BOOT, WANTED[AT_BOOT]) != WANTED[AT_BOOT]:
@@ -79,7 +79,7 @@ class PrecisionLanding:
         """
         self.in_use = True
         async with self._lock:
-            told = await self.vehicle.parameters(WANTED)
+            told = await self.vehicle.parameters.read((name,) for name in WANTED)
             for name, value in WANTED.items():
                 if name not in told or (told[name] == value and name not in self.before):
                     continue

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 import time
 from collections.abc import Awaitable, Callable
@@ -13,6 +14,7 @@ from mavproxy_uavapi.host.bridge import Bridge
 from mavproxy_uavapi.host.link import MavproxyLink
 from mavproxy_uavapi.host.pending import Pending
 from mavproxy_uavapi.host.state import Fleet, VehicleState
+from mavproxy_uavapi.vehicle.endings import FlightEndings
 from mavproxy_uavapi.vehicle.hangar import Hangar
 from mavproxy_uavapi.vehicle.jobs import JobBook
 
@@ -31,6 +33,7 @@ class Host:
         api_address: where `uavapi` listens; None while it does not.
         extensions: HTTP routes of the other modules, by path; `uavapi` serves them while it is loaded.
         commands: words after `uavapi` at the prompt that other modules serve.
+        last_words: called before the host ends: the messages to be sent then, and the systems that they go to.
         newest_frame: gives the newest camera frame as JPEG; None while no module has a camera.
 
     Args:
@@ -48,12 +51,14 @@ class Host:
         self.target = 0  # the system id that MAVProxy's own commands go to; 0 before it knows one
         self.hangar = Hangar(self)
         self.jobs = JobBook()
+        self.endings = FlightEndings(self.jobs)
         self.listeners: list[Callable[[VehicleState, Any, float], None]] = []
         self.extensions: dict[str, Any] = {}
         self.commands: dict[str, Callable[[list[str]], None]] = {}
         self.newest_frame: Callable[[], Awaitable[bytes]] | None = None
         self.api_address: tuple[str, int] | None = None
         self.members: list[Any] = []
+        self.last_words: list[Callable[[], list[tuple[Any, int]]]] = [self.endings.last_words]
         self._mpstate = mpstate
         self._told_target = 0
         self._lost: set[int] = set()
@@ -77,6 +82,21 @@ class Host:
             self._told_target = target
             self.bridge.call_soon(setattr, self, "target", target)
         self.bridge.turn()
+
+    def end(self) -> None:
+        """Say the last words, and end the asyncio thread.
+
+        MAVProxy's main loop waits for us, or has ended: nobody else sends. So this thread does, here only.
+        """
+
+        async def said() -> list[tuple[Any, int]]:
+            return [word for words in self.last_words for word in words()]
+
+        if self.bridge.running:
+            for message, system in self.bridge.run(said()):
+                with contextlib.suppress(LinkLost):  # nobody hears us anyhow
+                    self.link.write(message, system)
+        self.bridge.stop()
 
     # -- the asyncio thread -----------------------------------------------------------------------------
 
@@ -127,4 +147,4 @@ def leave(mpstate: Any, member: Any) -> None:
     host.members.remove(member)
     if not host.members:
         delattr(mpstate, ATTRIBUTE)
-        host.bridge.stop()
+        host.end()

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol
 
 from mavproxy_uavapi.audit import note_sent
-from mavproxy_uavapi.errors import LinkLost
+from mavproxy_uavapi.errors import LinkLost, UavApiError
 from mavproxy_uavapi.host.bridge import Bridge
 
 
@@ -15,6 +16,19 @@ class Address(NamedTuple):
 
     system: int
     component: int
+
+
+def is_finite(message: Any) -> bool:
+    """Whether every number in a message is finite."""
+    values = (getattr(message, name) for name in message.get_fieldnames())
+    numbers = (number for value in values for number in (value if isinstance(value, list | tuple) else (value,)))
+    return all(math.isfinite(number) for number in numbers if isinstance(number, float))
+
+
+def require_finite(message: Any) -> None:
+    """Raises UavApiError where a number in `message` is NaN or infinite: no autopilot must ever get such a one."""
+    if not is_finite(message):
+        raise UavApiError(f"not sent, because a number in it is not finite: {message}")
 
 
 class Link(Protocol):
@@ -29,6 +43,7 @@ class Link(Protocol):
 
         Raises:
             LinkLost: there is no link, or writing failed.
+            UavApiError: a number in it is not finite; nothing is sent.
         """
 
 
@@ -52,10 +67,16 @@ class MavproxyLink:
 
     async def send(self, message: Any, system: int) -> None:
         """See `Link.send`."""
+        require_finite(message)
         note_sent(message.get_type())
-        await self._bridge.on_main(lambda: self._write(message, system))
+        await self._bridge.on_main(lambda: self.write(message, system))
 
-    def _write(self, message: Any, system: int) -> None:
+    def write(self, message: Any, system: int) -> None:
+        """Write `message` now. MAVProxy's main loop only.
+
+        Raises:
+            LinkLost: as `Link.send`.
+        """
         master = self._mpstate.master(system)
         if master is None:
             raise LinkLost("MAVProxy has no link; add one with `link add`")
@@ -80,6 +101,7 @@ class FakeLink:
 
     async def send(self, message: Any, system: int) -> None:
         """Remember `message` and tell the test."""
+        require_finite(message)
         self.sent.append(message)
         if self.on_send is not None:
             self.on_send(message, system)

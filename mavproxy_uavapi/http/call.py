@@ -108,7 +108,7 @@ class Call:
         """Run a flight verb as a job and await it; or answer 202 at once, where the client wants it so.
 
         Args:
-            vehicle: whose seat the job takes.
+            vehicle: what the job commands.
             verb: what to do.
             result: the text of its success, or what makes it afterwards.
             outlives_client: whether it goes on when the client hangs up.
@@ -125,7 +125,7 @@ class Call:
         if len(jobs.running()) >= self.service.settings.max_jobs and not urgent:
             raise TooManyRequests(f"{len(jobs.running())} verbs are in flight already (max_jobs)")
         job = jobs.begin(
-            vehicle.seat,
+            vehicle,
             self.path,
             params.model_dump(),
             body,
@@ -134,14 +134,11 @@ class Call:
             timeout=getattr(params, "timeout", None),
         )
         if self.is_async:
+            peer = None if self.request.transport is None else self.request.transport.get_extra_info("peername")
+            if peer is not None:
+                job.script = await self.service.scripts.session_of(peer[:2])
             return self.accepted(job)
-        try:
-            return self.answer(await self.outcome(job))
-        except asyncio.CancelledError:
-            hold = self.service.settings.on_disconnect == "hold" and job.ended_by_hang_up and vehicle.seat.job is job
-            if hold and isinstance(vehicle, Copter):
-                self.job = jobs.begin(vehicle.seat, "hold", {}, lambda _: _held(vehicle))
-            raise
+        return self.answer(await self.outcome(job))
 
     async def outcome(self, job: Job) -> str:
         """Await a job for the client.
@@ -181,11 +178,6 @@ class Call:
         self.job = job
         body = self.answer(f"Job {job.id} accepted", job=job.id)
         return web.json_response(body, status=202, headers={"Location": f"/jobs/{job.id}"})
-
-
-async def _held(copter: Copter) -> str:
-    await copter.hold()
-    return "Holding"
 
 
 BODY_TIMEOUT = 10.0  # s from the headers to the end of the body

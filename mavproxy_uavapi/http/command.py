@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from mavproxy_uavapi.http.call import Answer, Call
 from mavproxy_uavapi.http.requests import Blocking, Disarm, ModeName, NewSpeed, SimFactor, Takeoff
+from mavproxy_uavapi.vehicle.jobs import Job
 
 
 async def arm(call: Call) -> Answer:
@@ -15,7 +16,9 @@ async def arm(call: Call) -> Answer:
 async def disarm(call: Call) -> Answer:
     """Disarm; refused in flight unless forced."""
     vehicle, p = call.vehicle, call.params(Disarm)
-    return await call.fly(vehicle, lambda job: vehicle.disarm(job, p.force), "Disarmed vehicle", urgent=True)
+    return await call.fly(
+        vehicle, lambda job: vehicle.disarm(job, p.force), "Disarmed vehicle", outlives_client=True, urgent=True
+    )
 
 
 async def takeoff(call: Call) -> Answer:
@@ -43,7 +46,9 @@ async def brake(call: Call) -> Answer:
     """Stop at once, in BRAKE mode."""
     copter = call.copter
     result = "Copter braking. Use /command/guided to enable movement commands again"
-    return await call.fly(copter, lambda job: copter.set_mode(job, "BRAKE"), result, urgent=True)
+    return await call.fly(
+        copter, lambda job: copter.set_mode(job, "BRAKE"), result, outlives_client=True, urgent=True
+    )
 
 
 async def guided(call: Call) -> Answer:
@@ -62,7 +67,16 @@ async def set_mode(call: Call) -> Answer:
 async def _set_speed(call: Call, kind: str, name: str) -> Answer:
     speed = call.params(NewSpeed).new_v
     vehicle = call.vehicle
-    return await call.fly(vehicle, lambda _: vehicle.set_speed(kind, speed), f"{name} speed set to {speed}m/s")
+    in_force: list[bool] = []
+
+    async def verb(job: Job) -> None:
+        in_force.append(await vehicle.set_speed(job, kind, speed))
+
+    def result() -> str:
+        when = "" if in_force[0] else "; it takes effect when the vehicle flies in GUIDED"
+        return f"{name} speed set to {speed}m/s{when}"
+
+    return await call.fly(vehicle, verb, result)
 
 
 async def set_air_speed(call: Call) -> Answer:
@@ -95,4 +109,4 @@ async def set_sim_speedup(call: Call) -> Answer:
 async def set_home(call: Call) -> Answer:
     """Make the current position home."""
     vehicle = call.vehicle
-    return await call.fly(vehicle, lambda _: vehicle.set_home(), "Home location set successfully!")
+    return await call.fly(vehicle, vehicle.set_home, "Home location set successfully!")

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 from typing import Any
 
-from mavproxy_uavapi.errors import Aborted, Busy, NotFound
+from mavproxy_uavapi.errors import Aborted, Busy, NotFound, UavApiError
 from mavproxy_uavapi.http.call import Call
-from mavproxy_uavapi.vehicle.copter import Copter
 from mavproxy_uavapi.vehicle.jobs import Job
 
 
@@ -51,13 +51,14 @@ async def show_job(call: Call) -> dict[str, Any]:
 
 
 async def abort_job(call: Call) -> dict[str, Any]:
-    """Abort a job; a copter stops and holds its place."""
+    """Abort a job; a vehicle that it flies stops and holds its place."""
     job, host = _job(call), call.service.host
     if not job.running:
         raise Busy(f"job {job.id} ({job.verb}) has ended already")
-    vehicle = host.hangar.with_seat(job.seat)
-    flies = vehicle is not None and vehicle.seat.job is job
     job.abort(Aborted(f"{job.verb} was aborted by DELETE /jobs/{job.id}"))
-    if flies and isinstance(vehicle, Copter):
-        await vehicle.hold()
-    return describe(job, host.clock())
+    closing = host.endings.closing(job)
+    if closing is None:
+        return {**describe(job, host.clock()), "then": "nothing is sent"}
+    with contextlib.suppress(UavApiError):  # the job that follows tells it
+        await closing.outcome()
+    return {**describe(job, host.clock()), "then": closing.result or str(closing.error)}

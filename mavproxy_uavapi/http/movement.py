@@ -121,22 +121,22 @@ async def travel_at_ned(call: Call) -> Answer:
 async def set_heading(call: Call) -> Answer:
     """Turn to a heading, the shorter way round."""
     copter, heading = call.copter, call.params(Heading).heading
-    return await call.fly(copter, lambda _: copter.set_heading(heading), f"Heading set to {heading} degrees")
+    return await call.fly(copter, lambda job: copter.set_heading(job, heading), f"Heading set to {heading} degrees")
 
 
 async def set_yaw_rate(call: Call) -> Answer:
     """Turn at a rate."""
     copter, rate = call.copter, call.params(YawRate).yaw_rate
-    return await call.fly(copter, lambda _: copter.set_yaw_rate(rate), f"Yaw rate set to {rate} deg/s")
+    return await call.fly(copter, lambda job: copter.set_yaw_rate(job, rate), f"Yaw rate set to {rate} deg/s")
 
 
 async def stop(call: Call) -> Answer:
-    """Pause the guided movement."""
+    """Hold the vehicle still until it is resumed; a movement under way waits, no other begins."""
     copter = call.copter
-    return await call.fly(copter, lambda _: copter.pause(), "Copter has stopped", outlives_client=True, urgent=True)
+    return await call.fly(copter, copter.stop, "Copter has stopped", outlives_client=True, urgent=True)
 
 
 async def resume(call: Call) -> Answer:
     """Continue the guided movement."""
     copter = call.copter
-    return await call.fly(copter, lambda _: copter.resume(), "Copter has resumed")
+    return await call.fly(copter, copter.resume, "Copter has resumed")

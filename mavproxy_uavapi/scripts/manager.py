@@ -14,7 +14,7 @@ from pathlib import Path
 
 from mavproxy_uavapi.errors import BadRequest, NoVehicle, ToolFailed
 from mavproxy_uavapi.host.host import Host
-from mavproxy_uavapi.scripts import names, on_exit, runner, runs, tmux
+from mavproxy_uavapi.scripts import clients, names, on_exit, runner, runs, tmux
 from mavproxy_uavapi.scripts.runs import Run
 from mavproxy_uavapi.scripts.store import Store
 from mavproxy_uavapi.settings import Settings
@@ -186,6 +186,11 @@ class Scripts:
         told = await asyncio.to_thread(runs.of_script, self.logs, script)
         return told[0] if told else None
 
+    async def session_of(self, peer: tuple[str, int]) -> str | None:
+        """The session of the script that a request comes from, by its end of the connection; None for others."""
+        running = list(self._watched.values())
+        return await asyncio.to_thread(clients.session_of, *peer, running) if running else None
+
     # -- what a script is given ---------------------------------------------------------------------------
 
     @property
@@ -233,11 +238,7 @@ class Scripts:
 
     async def _after_death(self, run: Run) -> None:
         others = [other.script for other in self._watched.values() if other.sysid in (0, run.sysid)]
-        if others:
-            log.warning("%s died in flight or not; left alone, because %s still runs", run.script, others[0])
-            return
-        sysid = run.sysid or self._settings.sysid
-        done = await on_exit.after_death(self._host, sysid, self._settings.on_script_exit, run.script)
+        done = await on_exit.after_death(self._host, run.sysid or self._settings.sysid, run, others)
         log.warning("%s died (status %s): %s", run.script, run.exit_status, done)
 
 

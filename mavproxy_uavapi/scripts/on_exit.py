@@ -1,70 +1,60 @@
-"""What the vehicle does when its script dies in flight (the setting `on_script_exit`)."""
+"""What happens to a vehicle when its script dies in flight (the setting `on_script_exit`)."""
 
 from __future__ import annotations
 
-from mavproxy_uavapi.errors import UavApiError
+from mavproxy_uavapi.errors import Aborted, UavApiError
 from mavproxy_uavapi.host.host import Host
-from mavproxy_uavapi.vehicle.copter import Copter
-from mavproxy_uavapi.vehicle.jobs import Job
-from mavproxy_uavapi.vehicle.messages import VelocityTarget
+from mavproxy_uavapi.scripts.runs import Run
+from mavproxy_uavapi.vehicle.jobs import Ending, Job
 from mavproxy_uavapi.vehicle.vehicle import Vehicle
 
 FLOWN_BY_SCRIPTS = "GUIDED"  # in any other mode the vehicle is its pilot's, or on its way down already
-HOLDING_MODES = {"plane": "LOITER", "rover": "HOLD"}
+GOES_ON = {"/command/land", "/command/rtl"}  # a dead script's landing or return is what is best for the vehicle
 
 
-async def after_death(host: Host, sysid: int, action: str, script: str) -> str:
-    """Do what is set, if the vehicle is in a script's hands: armed, in GUIDED, and nobody else's verb flies it.
+async def after_death(host: Host, sysid: int, run: Run, others: list[str]) -> str:
+    """End the script's own jobs, and do what is set if nobody else flies the vehicle.
 
     Args:
         host: the vehicles and the jobs.
         sysid: the vehicle; 0 is MAVProxy's current one.
-        action: one of settings.ON_SCRIPT_EXIT.
-        script: who died.
+        run: who died.
+        others: other scripts that go on with that vehicle.
 
     Returns:
         What was done, or why nothing was, for the log.
     """
-    if action == "nothing":
-        return "on_script_exit is nothing"
-    try:
-        vehicle = host.hangar.commandable(sysid)
-    except UavApiError as error:
-        return f"nothing can be done: {error}"
-    why_not = _in_other_hands(vehicle)
-    if why_not is not None:
-        return why_not
+    closing = None
+    for job in host.jobs.running():
+        if job.script == run.session and job.verb not in GOES_ON:
+            job.abort(Aborted(f"{job.verb}: its script died"), Ending.SCRIPT_GONE)
+            closing = host.endings.closing(job) or closing
+    if closing is None:
+        try:
+            vehicle = host.hangar.commandable(sysid)
+        except UavApiError as error:
+            return f"nothing can be done: {error}"
+        why_not = f"{others[0]} still runs" if others else _in_other_hands(vehicle)
+        if why_not is not None:
+            return f"left alone: {why_not}"
+        policy = host.endings.on_script_exit
+        closing = host.endings.see_to(vehicle, policy, f"on_script_exit={policy.value}", f"script {run.script}")
+        if closing is None:
+            return f"on_script_exit is {policy.value}: nothing is sent"
+    return await _outcome(closing)
 
-    async def body(job: Job) -> str:
-        await _act(vehicle, action, job)
-        return f"{action} is done"
 
-    verb, client = f"on_script_exit={action}", f"script {script}"
-    job = host.jobs.begin(vehicle.seat, verb, {"script": script}, body, client=client, outlives_client=True)
+async def _outcome(closing: Job) -> str:
     try:
-        return await job.outcome()
+        return await closing.outcome()
     except UavApiError as error:
-        return f"{action} ended: {error}"
+        return f"{closing.verb} ended: {error}"
 
 
 def _in_other_hands(vehicle: Vehicle) -> str | None:
     if not vehicle.state.armed:
         return "the vehicle is not armed"
     if vehicle.mode != FLOWN_BY_SCRIPTS:
-        return f"the vehicle is in {vehicle.mode}, which is left alone"
-    if vehicle.seat.job is not None and vehicle.seat.job.running:
-        return f"{vehicle.seat.job.verb} flies the vehicle"
-    return None
-
-
-async def _act(vehicle: Vehicle, action: str, job: Job) -> None:
-    if isinstance(vehicle, Copter):
-        if action == "land":
-            await vehicle.land(job)
-        elif action == "rtl":
-            await vehicle.rtl(job)
-        else:  # stays in GUIDED, so that the next command finds it as the script left it
-            await vehicle.travel(job, VelocityTarget(0, 0, 0))
-        return
-    holding = HOLDING_MODES.get(vehicle.kind, "RTL")
-    await vehicle.set_mode(job, holding if action == "hold" else "RTL")
+        return f"the vehicle is in {vehicle.mode}"
+    flies = vehicle.authority.flies
+    return None if flies is None else f"{flies.verb} flies the vehicle"

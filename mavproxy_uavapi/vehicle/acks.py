@@ -55,11 +55,19 @@ class Commands:
         self._locks: defaultdict[int, asyncio.Lock] = defaultdict(asyncio.Lock)
         self._unanswered: defaultdict[int, deque[Sending]] = defaultdict(deque)  # oldest first
 
-    async def send(self, command: Command, patience: float = 20.0, shown: Callable[[], bool] = lambda: False) -> None:
+    async def send(
+        self,
+        command: Command,
+        check: Callable[[], None] = lambda: None,
+        *,
+        patience: float = 20.0,
+        shown: Callable[[], bool] = lambda: False,
+    ) -> None:
         """Send `command`; returns when the vehicle has accepted it.
 
         Args:
             command: what to send.
+            check: called before each sending: what it raises ends the command, and nothing more is sent.
             patience: how long (s) a patient command is asked again while it is refused.
             shown: looked at after each heartbeat: whether the vehicle shows that it was heard although its ack was
                 lost; what it raises ends the command.
@@ -72,7 +80,7 @@ class Commands:
         async with self._locks[command.number]:
             started = self._waiting.clock()
             while True:
-                result = await self._ask(command, shown)
+                result = await self._ask(command, check, shown)
                 log.debug("%s%s: %s", command.name, command.params, result_name(result))
                 if result == mavlink.MAV_RESULT_ACCEPTED:
                     return
@@ -90,7 +98,7 @@ class Commands:
             unanswered.popleft()
         return unanswered
 
-    async def _ask(self, command: Command, shown: Callable[[], bool]) -> int:
+    async def _ask(self, command: Command, check: Callable[[], None], shown: Callable[[], bool]) -> int:
         """One exchange: the MAV_RESULT that ends it.
 
         MAVLink does not number commands. Where the ack is the only proof, as many acks do not count as may
@@ -104,6 +112,7 @@ class Commands:
         give_up_at = self._waiting.clock() + IN_PROGRESS_LIMIT
         silences = 0
         for confirmation in itertools.count():
+            check()
             with self._waiting.acks(command.number, self._link.source, shown) as acks:
                 await self._link.send(command.to(address, confirmation), self._state.system)
                 unanswered.append(Sending(command.params, self._waiting.clock()))

@@ -13,20 +13,21 @@ FACTOR = 2.0
 MARGIN = 30.0  # s of the vehicle's clock
 FLOOR = 30.0  # s of ours: acks, heartbeats and a machine's hiccups do not get faster with SIM_SPEEDUP
 
-# ArduCopter's defaults, in its own units (cm/s, cm/s/s, cm, ms, s): used until the vehicle told its own.
-DEFAULTS = {
-    "WPNAV_SPEED": 1000.0,
-    "WPNAV_SPEED_UP": 250.0,
-    "WPNAV_SPEED_DN": 150.0,
-    "WPNAV_ACCEL": 250.0,
-    "LAND_SPEED": 50.0,
-    "LAND_SPEED_HIGH": 0.0,
-    "LAND_ALT_LOW": 1000.0,
-    "RTL_ALT": 1500.0,
-    "RTL_SPEED": 0.0,
-    "RTL_LOIT_TIME": 5000.0,
-    "GUID_TIMEOUT": 3.0,
+# ArduCopter's parameters: each quantity's name up to 4.6 in cm or cm/s, its name since 4.7 in m or m/s, and the
+# default (m, m/s, m/s/s), which counts until the vehicle has told its own. Times are in ms and s in both.
+NAMES = {
+    "horizontal": ("WPNAV_SPEED", "WP_SPD", 10.0),
+    "up": ("WPNAV_SPEED_UP", "WP_SPD_UP", 2.5),
+    "down": ("WPNAV_SPEED_DN", "WP_SPD_DN", 1.5),
+    "acceleration": ("WPNAV_ACCEL", "WP_ACC", 2.5),
+    "land": ("LAND_SPEED", "LAND_SPD_MS", 0.5),
+    "land_high": ("LAND_SPEED_HIGH", "LAND_SPD_HIGH_MS", 0.0),
+    "land_low_alt": ("LAND_ALT_LOW", "LAND_ALT_LOW_M", 10.0),
+    "rtl_alt": ("RTL_ALT", "RTL_ALT_M", 15.0),
+    "rtl_speed": ("RTL_SPEED", "RTL_SPEED_MS", 0.0),
 }
+TIMES = {"RTL_LOIT_TIME": 5000.0, "GUID_TIMEOUT": 3.0}
+WANTED = [*(names[:2] for names in NAMES.values()), *((name,) for name in TIMES)]
 SLOWEST = 0.1  # m/s; a parameter of 0 or less must not make a flight endless
 
 
@@ -55,25 +56,31 @@ def limits(parameters: Mapping[str, float], speeds: Mapping[str, float]) -> Limi
         speeds: what DO_CHANGE_SPEED set since, m/s, by kind (ground, air, climb, descent). A mode change
             undoes it in the autopilot, so the slower of the two counts.
     """
-    known = {**DEFAULTS, **parameters}
-    cruise = known["WPNAV_SPEED"] / 100
+    known = {name: _value(parameters, *names) for name, names in NAMES.items()}
+    times = {name: parameters.get(name, default) for name, default in TIMES.items()}
+    cruise, up, down = known["horizontal"], known["up"], known["down"]
     horizontal = min(cruise, speeds.get("ground", cruise), speeds.get("air", cruise))
-    up = known["WPNAV_SPEED_UP"] / 100
-    down = known["WPNAV_SPEED_DN"] / 100
     down = min(down, speeds.get("descent", down))
     return Limits(
         horizontal=max(horizontal, SLOWEST),
         up=max(min(up, speeds.get("climb", up)), SLOWEST),
         down=max(down, SLOWEST),
-        acceleration=max(known["WPNAV_ACCEL"] / 100, SLOWEST),
-        land=max(known["LAND_SPEED"] / 100, SLOWEST),
-        land_high=max(known["LAND_SPEED_HIGH"] / 100 or down, SLOWEST),
-        land_low_alt=known["LAND_ALT_LOW"] / 100,
-        rtl_alt=known["RTL_ALT"] / 100,
-        rtl_speed=max(known["RTL_SPEED"] / 100 or horizontal, SLOWEST),
-        rtl_loiter=known["RTL_LOIT_TIME"] / 1000,
-        guided_timeout=max(known["GUID_TIMEOUT"], 0.1),
+        acceleration=max(known["acceleration"], SLOWEST),
+        land=max(known["land"], SLOWEST),
+        land_high=max(known["land_high"] or down, SLOWEST),
+        land_low_alt=known["land_low_alt"],
+        rtl_alt=known["rtl_alt"],
+        rtl_speed=max(known["rtl_speed"] or horizontal, SLOWEST),
+        rtl_loiter=times["RTL_LOIT_TIME"] / 1000,
+        guided_timeout=max(times["GUID_TIMEOUT"], 0.1),
     )
+
+
+def _value(parameters: Mapping[str, float], in_cm: str, in_m: str, default: float) -> float:
+    """A quantity in m, m/s or m/s/s, by whichever of its two names the firmware has."""
+    if in_m in parameters:
+        return parameters[in_m]
+    return parameters[in_cm] / 100 if in_cm in parameters else default
 
 
 def leg_time(limits: Limits, horizontal: float, up: float) -> float:

@@ -31,7 +31,10 @@ WANTED = {
     "EKF_STATUS_REPORT": 2,
     "GPS_RAW_INT": 2,
     "VFR_HUD": 2,
+    "POSITION_TARGET_LOCAL_NED": 2,
+    "POSITION_TARGET_GLOBAL_INT": 2,
 }
+IN_GUIDED = {"POSITION_TARGET_LOCAL_NED", "POSITION_TARGET_GLOBAL_INT"}  # elsewhere they say nothing
 
 
 class Freshness:
@@ -69,7 +72,8 @@ class Freshness:
         """The wanted messages that do not come and that it is time to ask for."""
         now = vehicle.clock()
         found = []
-        for name in WANTED:
+        guided = vehicle.state.armed and vehicle.mode == "GUIDED"
+        for name in [name for name in WANTED if guided or name not in IN_GUIDED]:
             age = vehicle.state.age(name, now)
             if age is not None and age < PATIENCE:
                 continue

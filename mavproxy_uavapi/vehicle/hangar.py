@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 from mavproxy_uavapi.errors import LinkLost, NoVehicle
 from mavproxy_uavapi.vehicle.copter import Copter
-from mavproxy_uavapi.vehicle.jobs import Seat
 from mavproxy_uavapi.vehicle.modes import kind_of
 from mavproxy_uavapi.vehicle.vehicle import Vehicle
 
@@ -40,10 +39,6 @@ class Hangar:
         if type(vehicle) is not make:  # the first time, or the autopilot came back with other firmware
             vehicle = self._vehicles[wanted] = make(state, self.host.link, self.host.pending, self.host.clock)
         return vehicle
-
-    def with_seat(self, seat: Seat) -> Vehicle | None:
-        """The vehicle whose seat that is."""
-        return next((vehicle for vehicle in self._vehicles.values() if vehicle.seat is seat), None)
 
     def commandable(self, system: int = 0) -> Vehicle:
         """As `find`, and its link is alive.

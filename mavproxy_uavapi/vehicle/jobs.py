@@ -1,7 +1,7 @@
 """Verbs in flight: every blocking call is a job that somebody awaits.
 
-A vehicle has one seat for a commander. A newer movement or flight command that takes it supersedes the job
-that had it; an identical request joins that job instead.
+Which of them commands a vehicle is the vehicle's CommandAuthority's to say. An identical request joins the job that
+is in flight.
 """
 
 from __future__ import annotations
@@ -9,12 +9,26 @@ from __future__ import annotations
 import asyncio
 import itertools
 from collections.abc import Awaitable, Callable, Mapping
+from enum import Enum
 from typing import Any
 
 from mavproxy_uavapi.errors import Aborted, Superseded, TimedOut, UavApiError, without_frames
 
 FINISHED_KEPT = 100
 CONSOLE = "console"  # the client of what was typed at MAVProxy's prompt
+
+
+class Ending(Enum):
+    """Why a job ended; `endings.py` says what its vehicle does then."""
+
+    DONE = "done"
+    FAILED = "failed"  # the vehicle or its pilot stood against it, or it took too long
+    SUPERSEDED = "superseded"
+    ABORTED = "aborted"  # by DELETE, or at the prompt
+    CLIENT_GONE = "client gone"
+    SCRIPT_GONE = "script gone"
+    UNLOADED = "unloaded"  # the API stops, or a module is unloaded
+    DEFECT = "defect"  # of ours
 
 
 class Job:
@@ -24,10 +38,12 @@ class Job:
         id: its number, as text.
         verb: the path that was called, `/movement/go_to_ned_wait`.
         request: the validated parameters.
-        seat: the vehicle's, which it takes.
+        vehicle: what it commands; two jobs of one vehicle have the same object here.
         client: who asked for it: an address, or CONSOLE.
         began_at, ended_at: on the loop's clock (s); ended_at is None while it runs.
-        ended_by_hang_up: whether it ended because its last client hung up.
+        ending: why it ended; None while it runs.
+        steers: whether the vehicle is flown by what the job goes on sending, so that it must not go on without it.
+        script: the session of the script that asked for it; None where none did.
         outlives_client: whether it goes on when its client hangs up (land, rtl).
         stage: of a verb that is made of others, which one it is at: its name and numbers.
         progress: what it last said of itself, such as distance_to_go (m) and altitude (m above home).
@@ -36,13 +52,13 @@ class Job:
     """
 
     def __init__(
-        self, number: int, verb: str, request: Mapping[str, Any], seat: Seat, *, client: str, outlives_client: bool
+        self, number: int, verb: str, request: Mapping[str, Any], vehicle: Any, *, client: str, outlives_client: bool
     ) -> None:
         self.id = str(number)
         self.client = client
         self.verb = verb
         self.request = dict(request)
-        self.seat = seat
+        self.vehicle = vehicle
         self.outlives_client = outlives_client
         self.stage: dict[str, str | int] = {}
         self.progress: dict[str, float] = {}
@@ -51,7 +67,9 @@ class Job:
         self._loop = asyncio.get_running_loop()
         self.began_at = self._loop.time()
         self.ended_at: float | None = None
-        self.ended_by_hang_up = False
+        self.ending: Ending | None = None
+        self.steers = False
+        self.script: str | None = None
         self._task: asyncio.Task[None] | None = None
         self._limit: asyncio.TimerHandle | None = None
         self._finished = asyncio.Event()
@@ -83,30 +101,37 @@ class Job:
     def _overdue(self, timeout: float) -> None:
         left = self.progress.get("distance_to_go")
         to_go = "" if left is None else f": {left:.1f} m to go"
-        self.abort(TimedOut(f"{self.verb} was not done within {timeout:g} s{to_go}"))
+        self.abort(TimedOut(f"{self.verb} was not done within {timeout:g} s{to_go}"), Ending.FAILED)
 
     async def _run(self, body: Callable[[Job], Awaitable[str]]) -> None:
         try:
             result = await body(self)
         except UavApiError as error:
-            self._finish(error=error)
+            self._finish(Ending.SUPERSEDED if isinstance(error, Superseded) else Ending.FAILED, error=error)
         except asyncio.CancelledError:
-            self._finish(error=Aborted(f"{self.verb} was aborted"))
+            self._finish(Ending.UNLOADED, error=Aborted(f"{self.verb} was aborted"))
             raise
         except Exception as error:  # a defect of ours: its client learns of it, and the log has the trace
-            self._finish(error=UavApiError(f"{self.verb} failed by a defect of this program: {error!r}"))
+            sentence = f"{self.verb} failed by a defect of this program: {error!r}"
+            self._finish(Ending.DEFECT, error=UavApiError(sentence))
             raise
         else:
-            self._finish(result)
+            self._finish(Ending.DONE, result)
 
-    def abort(self, error: UavApiError) -> None:
-        """End it now with that error: its clients know at once, and it sends nothing more."""
-        self._finish(error=error)
+    def abort(self, error: UavApiError, ending: Ending | None = None) -> None:
+        """End it now with that error: its clients know at once, and it sends nothing more.
+
+        Args:
+            error: what its clients are told.
+            ending: why; ABORTED, or SUPERSEDED for that error, where it is not said.
+        """
+        self._finish(ending or (Ending.SUPERSEDED if isinstance(error, Superseded) else Ending.ABORTED), error=error)
         if self._task is not None:
             self._task.cancel()
 
-    def _finish(self, result: str | None = None, error: UavApiError | None = None) -> None:
+    def _finish(self, ending: Ending, result: str | None = None, error: UavApiError | None = None) -> None:
         if self.running:
+            self.ending = ending
             self.result, self.error = result, None if error is None else without_frames(error)
             self.ended_at = self._loop.time()
             if self._limit is not None:
@@ -131,37 +156,28 @@ class Job:
         finally:
             self._clients -= 1
             if self.running and not self._clients and not self.outlives_client:
-                self.ended_by_hang_up = True
-                self.abort(Aborted(f"{self.verb}: its client hung up"))
+                self.abort(Aborted(f"{self.verb}: its client hung up"), Ending.CLIENT_GONE)
         if self.error is not None:
             raise self.error
         assert self.result is not None
         return self.result
 
 
-class Seat:
-    """Who commands a vehicle just now."""
-
-    def __init__(self) -> None:
-        self.job: Job | None = None
-
-    def take(self, job: Job) -> None:
-        """Give `job` the command; whoever had it learns which verb took over."""
-        before, self.job = self.job, job
-        if before is not None and before is not job and before.running:
-            before.abort(Superseded(f"{before.verb} was superseded by {job.verb}"))
-
-
 class JobBook:
-    """All jobs, the running ones and the last finished ones."""
+    """All jobs, the running ones and the last finished ones.
+
+    Attributes:
+        on_ended: called with each job when its outcome is known.
+    """
 
     def __init__(self) -> None:
+        self.on_ended: list[Callable[[Job], None]] = []
         self._jobs: dict[str, Job] = {}
         self._numbers = itertools.count(1)
 
     def begin(
         self,
-        seat: Seat,
+        vehicle: Any,
         verb: str,
         request: Mapping[str, Any],
         body: Callable[[Job], Awaitable[str]],
@@ -170,15 +186,20 @@ class JobBook:
         outlives_client: bool = False,
         timeout: float | None = None,
     ) -> Job:
-        """Start a job, or join the one for that seat that does just the same."""
-        for job in self.running():  # not the one in the seat: a job takes that when it has begun
-            if job.seat is seat and job.is_for(verb, request):
+        """Start a job for `vehicle`, or join the one that does just the same."""
+        for job in self.running():
+            if job.vehicle is vehicle and job.is_for(verb, request):
                 return job
-        job = Job(next(self._numbers), verb, request, seat, client=client, outlives_client=outlives_client)
+        job = Job(next(self._numbers), verb, request, vehicle, client=client, outlives_client=outlives_client)
         self._jobs[job.id] = job
+        job.when_ended(lambda: self._ended(job))
         self._forget_old()
         job.start(body, timeout)
         return job
+
+    def _ended(self, job: Job) -> None:
+        for callback in self.on_ended:
+            callback(job)
 
     def get(self, number: str) -> Job | None:
         """The job of that number; None when there is none, or it is forgotten."""
@@ -196,7 +217,7 @@ class JobBook:
         """End every running job that came over the network."""
         for job in self.running():
             if job.client != CONSOLE:
-                job.abort(Aborted(f"{job.verb}: {reason}"))
+                job.abort(Aborted(f"{job.verb}: {reason}"), Ending.UNLOADED)
 
     def _forget_old(self) -> None:
         finished = [job for job in self._jobs.values() if not job.running]

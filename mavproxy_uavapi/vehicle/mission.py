@@ -9,6 +9,7 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.errors import Busy, ModeChanged, Stale
 from mavproxy_uavapi.vehicle import messages
+from mavproxy_uavapi.vehicle.authority import Rank
 from mavproxy_uavapi.vehicle.jobs import Job
 from mavproxy_uavapi.vehicle.plans import Item
 from mavproxy_uavapi.vehicle.vehicle import Vehicle
@@ -47,14 +48,16 @@ async def fly(vehicle: Vehicle, job: Job, until_complete: bool = False, timeout:
     if not items:
         raise Busy("the vehicle has no mission; POST one to /mission/waypoints")
     _require_startable(vehicle)  # the pilot may have switched it meanwhile
-    vehicle.seat.take(job)
+    vehicle.authority.take(job, Rank.ARM)
     vehicle.waypoints.changed_at = vehicle.clock()
-    await vehicle.commands.send(messages.set_mission_current(1))
-    _require_startable(vehicle)
+
+    def startable() -> None:
+        _require_startable(vehicle)
+
+    await vehicle.commands.send(messages.set_mission_current(1), vehicle.commanding(job, startable))
     if vehicle.mode != AUTO:
-        await vehicle.switch_to(AUTO)
-    vehicle.held_by(AUTO)
-    await vehicle.commands.send(messages.start_mission())
+        await vehicle.switch_to(job, AUTO, startable)
+    await vehicle.commands.send(messages.start_mission(), vehicle.commanding(job, lambda: vehicle.held_by(AUTO)))
     started = vehicle.clock()
 
     def runs() -> bool | None:
@@ -62,6 +65,7 @@ async def fly(vehicle: Vehicle, job: Job, until_complete: bool = False, timeout:
         return True if _is_active(vehicle, started) else None
 
     await vehicle.flown(AUTO, {"MISSION_CURRENT"}, runs, START_TIMEOUT, "begin its mission")
+    vehicle.authority.shown(job)
     if until_complete:
         await _flown_to_its_end(vehicle, job, items, timeout or LONGEST)
 

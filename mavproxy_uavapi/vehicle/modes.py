@@ -31,6 +31,11 @@ def kind_of(vehicle_type: int) -> str:
     return "other"
 
 
+def flies_mission(mode: str) -> bool:
+    """Whether the autopilot flies its mission in the mode of that name."""
+    return mode in {"AUTO", "AUTO RTL", "AUTO_RTL"}
+
+
 def mode_name(vehicle_type: int, number: int | None) -> str:
     """The name of custom mode `number` of such a vehicle; `UNKNOWN` before the first heartbeat."""
     if number is None:

@@ -3,42 +3,32 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import math
 from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
 from pymavlink import mavutil
 
-from mavproxy_uavapi.errors import (
-    Busy,
-    ModeChanged,
-    NotArmed,
-    NotFound,
-    NotSupported,
-    Rejected,
-    Stale,
-    TimedOut,
-)
-from mavproxy_uavapi.host.link import Address, Link
+from mavproxy_uavapi.errors import Busy, ModeChanged, NotArmed, NotFound, NotSupported, Rejected, Stale
+from mavproxy_uavapi.host.link import Address, Link, is_finite
 from mavproxy_uavapi.host.pending import Pending
 from mavproxy_uavapi.host.state import VehicleState
-from mavproxy_uavapi.vehicle import deadlines, messages
+from mavproxy_uavapi.vehicle import arming, deadlines, messages
 from mavproxy_uavapi.vehicle.acks import Commands
+from mavproxy_uavapi.vehicle.authority import CommandAuthority, Rank
 from mavproxy_uavapi.vehicle.geodesy import offset
-from mavproxy_uavapi.vehicle.jobs import Job, Seat
+from mavproxy_uavapi.vehicle.jobs import Job
 from mavproxy_uavapi.vehicle.modes import kind_of, mode_name, mode_number
+from mavproxy_uavapi.vehicle.parameters import Parameters
+from mavproxy_uavapi.vehicle.speeds import Speeds
 from mavproxy_uavapi.vehicle.waiting import Waiting
 from mavproxy_uavapi.vehicle.waypoints import Waypoints
 
 T = TypeVar("T")
 mavlink = mavutil.mavlink
 
-ARM_TIMEOUT = 90.0  # s until an estimator that does not settle is reported
-REASON_TIME = 2.0  # s of a client's timeout that asking why it is not ready may need
 HEARTBEAT_TIMEOUT = 5.0  # s until a heartbeat must show what was acknowledged
-PARAMETER_ASKINGS = 2
-PARAMETER_TIMEOUT = 1.0  # s; ArduPilot answers a known name at once and an unknown one not at all
+STOPPING_MODES = {"LAND", "RTL", "SMART_RTL", "BRAKE", "QLAND", "QRTL", "HOLD"}
 FRESH = 3.0  # s; older positions are not flown by
 
 
@@ -60,13 +50,12 @@ class Vehicle:
         self.state = state
         self.link = link
         self.clock = clock
-        self.seat = Seat()
+        self.authority = CommandAuthority(state)
         self.waiting = Waiting(state, pending, clock)
         self.commands = Commands(state, link, self.waiting)
         self.waypoints = Waypoints(state, link, self.waiting)
-        self.speeds: dict[str, float] = {}  # what DO_CHANGE_SPEED set (m/s), by kind
-        self._speeds_at = 0.0
-        self._parameter_askings: dict[tuple[int, str], int] = {}  # by boot and name
+        self.parameters = Parameters(state, link, self.waiting)
+        self.speeds = Speeds(state)
         self._requests: dict[str, asyncio.Task[Any]] = {}  # REQUEST_MESSAGE in flight, by message name
 
     # -- what it is ---------------------------------------------------------------------------------------
@@ -128,13 +117,16 @@ class Vehicle:
         """The newest message of that name, to fly by.
 
         Raises:
-            Stale: there is none, or it is older than FRESH.
+            Stale: there is none, it is older than FRESH, or a number in it is not finite.
         """
         age = self.state.age(name, self.clock())
         if age is None or age > FRESH:
             told = "never told" if age is None else f"told {age:.1f} s ago"
             raise Stale(f"vehicle {self.state.system} does not tell where it is ({name}: {told})")
-        return self.state.messages[name].message
+        message = self.state.messages[name].message
+        if not is_finite(message):
+            raise Stale(f"vehicle {self.state.system} does not tell where it is ({name}: not a number)")
+        return message
 
     def require_armed(self) -> None:
         """Raises NotArmed unless it is armed."""
@@ -174,8 +166,23 @@ class Vehicle:
 
         return await self.waiting.until({"HEARTBEAT", *names}, guarded, timeout, what)
 
-    async def switch_to(self, mode: str) -> None:
-        """Switch the flight mode and wait until a heartbeat shows it.
+    def commanding(self, job: Job, *needs: Callable[[], None]) -> Callable[[], None]:
+        """What is asked before each message of `job`: whether it still commands, and what else it needs."""
+
+        def check() -> None:
+            self.authority.require(job)
+            for need in needs:
+                need()
+
+        return check
+
+    async def switch_to(self, job: Job, mode: str, *needs: Callable[[], None]) -> None:
+        """Switch the flight mode for `job` and wait until a heartbeat shows it.
+
+        Args:
+            job: who commands.
+            mode: the mode's name.
+            needs: what must hold each time before it is sent; they raise where it does not.
 
         Raises:
             Invalid: no such mode.
@@ -190,39 +197,20 @@ class Vehicle:
                 raise ModeChanged(f"the vehicle is in {self.mode} now: somebody else switched it meanwhile")
             return self.state.mode == number
 
-        await self.commands.send(messages.set_mode(number), shown=shown)
+        def switched_by_nobody_else() -> None:
+            shown()
+
+        check = self.commanding(job, switched_by_nobody_else, *needs)
+        await self.commands.send(messages.set_mode(number), check, shown=shown)
         before = self.state.mode  # as it was when the vehicle answered
         await self.waiting.until(
             {"HEARTBEAT"}, lambda: shown() or None, HEARTBEAT_TIMEOUT, f"show mode {mode.upper()}"
         )
-
-    async def parameters(self, names: Iterable[str]) -> dict[str, float]:
-        """Values of those of the named parameters that the vehicle has, asked for once and then remembered.
-
-        ArduPilot does not answer for a name that it does not have: those are asked for twice in a boot, since
-        a message may be lost, and then taken as absent.
-        """
-        names = list(names)
-        known = self.state.parameters
-        missing = [name for name in names if name not in known and self._asked_for(name) < PARAMETER_ASKINGS]
-        if missing:
-            for name in missing:
-                self._parameter_askings[self.state.reboots, name] = self._asked_for(name) + 1
-            with self.waiting.expecting(
-                {"PARAM_VALUE"}, lambda _: True if all(name in known for name in missing) else None
-            ) as told:
-                for name in missing:
-                    await self.link.send(messages.read_parameter(self.address, name), self.state.system)
-                with contextlib.suppress(TimedOut):
-                    await told.within(PARAMETER_TIMEOUT, f"tell {', '.join(missing)}")
-        return {name: known[name] for name in names if name in known}
-
-    def _asked_for(self, name: str) -> int:
-        return self._parameter_askings.get((self.state.reboots, name), 0)
+        self.authority.shown(job)
 
     async def limits(self) -> deadlines.Limits:
-        """Its speeds and heights, for deadlines."""
-        return deadlines.limits(await self.parameters(deadlines.DEFAULTS), self.speeds)
+        """Its speeds and heights, for deadlines; asked for where they are not known."""
+        return deadlines.limits(await self.parameters.read(deadlines.WANTED), self.speeds.in_force)
 
     def allowed(self, expected: float, timeout: float | None) -> float:
         """Seconds that a verb may take: the client's `timeout`, or what the flight should need."""
@@ -233,7 +221,8 @@ class Vehicle:
     async def arm(self, job: Job, timeout: float | None = None) -> None:
         """Wait until it is ready, switch to GUIDED, arm, and wait until it is armed.
 
-        A vehicle that flies in another mode than GUIDED belongs to its pilot: `ModeChanged`.
+        A vehicle that flies in another mode than GUIDED belongs to its pilot: `ModeChanged`. So does one that
+        somebody arms meanwhile.
 
         Raises:
             Rejected: it did not get ready, or refused; with the reasons that it gave.
@@ -242,54 +231,9 @@ class Vehicle:
             return
         if self.state.armed and not self.state.landed:
             raise ModeChanged(f"the vehicle is flying in {self.mode}; /command/guided takes it over")
-        self.seat.take(job)
-        deadline = self.clock() + (max(timeout - REASON_TIME, timeout / 2) if timeout else ARM_TIMEOUT)
-        await self._get_ready(lambda: self.has_position, deadline)
-        if self.mode != "GUIDED":
-            await self.switch_to("GUIDED")
-        await self._get_ready(lambda: self.is_ready_to_arm, deadline)
-        self.require_mode("GUIDED")
-
-        def shown() -> bool:
-            self.require_mode("GUIDED")
-            return bool(self.state.armed)
-
-        await self.commands.send(messages.arm(), shown=shown)
-        await self._until_armed(True)
-
-    async def _get_ready(self, is_ready: Callable[[], bool], deadline: float) -> None:
-        if is_ready() or self.state.armed:
-            return
-        mode = self.mode
-
-        def ready() -> bool | None:
-            if self.mode != mode and self.state.mode is not None:
-                raise ModeChanged(f"the vehicle is in {self.mode} now: somebody else switched it meanwhile")
-            return True if is_ready() else None
-
-        remaining = max(deadline - self.clock(), 0.1)
-        try:
-            await self.waiting.until({"SYS_STATUS", "EKF_STATUS_REPORT", "HEARTBEAT"}, ready, remaining, "get ready")
-        except TimedOut:
-            raise await self._why_not_ready(remaining) from None
-
-    async def _why_not_ready(self, waited: float) -> Rejected:
-        asked = self.clock()
-        with contextlib.suppress(Rejected, TimedOut):  # the texts that it makes the autopilot say are what counts
-            await self.commands.send(messages.check_prearm())
-        with contextlib.suppress(TimedOut):
-            await self.waiting.message({"STATUSTEXT"}, lambda _: None, 1.0, "fall silent")  # it has several reasons
-        said = self.state.said_since(asked)
-        because = "; ".join(said) or "it does not say why"
-        return Rejected(f"not ready to arm after {waited:.0f} s: {because}", statustext=said)
-
-    async def _until_armed(self, armed: bool) -> None:
-        await self.waiting.until(
-            {"HEARTBEAT"},
-            lambda: True if self.state.armed is armed else None,
-            HEARTBEAT_TIMEOUT,
-            "show that it is armed" if armed else "show that it is disarmed",
-        )
+        self.authority.take(job, Rank.ARM)
+        await arming.arm(self, job, timeout)
+        self.authority.shown(job)
 
     async def disarm(self, job: Job, force: bool = False) -> None:
         """Disarm and wait until a heartbeat shows it. In flight it is refused, unless `force`: then it falls."""
@@ -297,26 +241,49 @@ class Vehicle:
             return
         if not force and self.state.landed is False:
             raise Busy("the vehicle is flying; land it first (force=true stops its motors in the air)")
-        self.seat.take(job)
-        await self.commands.send(messages.disarm(force))
-        await self._until_armed(False)
+        self.authority.take(job, Rank.FORCE if force else Rank.STOP)
+        await arming.disarm(self, job, force)
+        self.authority.shown(job)
 
     async def set_mode(self, job: Job, mode: str) -> None:
-        """Switch to any mode of the vehicle's type."""
+        """Switch to any mode of the vehicle's type. What stops it goes before what does not."""
         mode_number(self.state.vehicle_type, mode)
-        self.seat.take(job)
-        await self.switch_to(mode)
+        self.authority.take(job, Rank.STOP if mode.upper() in STOPPING_MODES else Rank.ARM)
+        await self.switch_to(job, mode)
 
-    async def set_speed(self, kind: str, speed: float) -> None:
-        """Set the `kind` of speed (air, ground, climb, descent) to `speed` m/s; the ack is the proof."""
-        await self.commands.send(messages.change_speed(kind, speed))
-        if self._speeds_at < self.state.mode_since:
-            self.speeds.clear()  # a mode change undid the older ones
-        self.speeds[kind], self._speeds_at = speed, self.clock()
+    async def set_speed(self, job: Job, kind: str, speed: float) -> bool:
+        """Set the `kind` of speed (air, ground, climb, descent) to `speed` m/s; the ack is the proof.
 
-    async def set_home(self) -> None:
+        Returns:
+            Whether it is in force now; else it is remembered until the vehicle flies in GUIDED.
+        """
+        self.authority.accompany(job, f"{kind} speed", stopped_too=True)
+        if not self.takes_speeds:
+            self.speeds.remember(kind, speed)
+            return False
+        try:
+            await self.commands.send(messages.change_speed(kind, speed), self.commanding(job, self._require_speeds))
+        except (ModeChanged, Rejected):
+            if self.takes_speeds:
+                raise
+            self.speeds.remember(kind, speed)
+            return False
+        self.speeds.take(kind, speed)
+        return True
+
+    @property
+    def takes_speeds(self) -> bool:
+        """Whether its autopilot takes a speed in the mode that it is in."""
+        return True
+
+    def _require_speeds(self) -> None:
+        if not self.takes_speeds:
+            raise ModeChanged(f"the vehicle is in {self.mode} now, which takes no speed")
+
+    async def set_home(self, job: Job) -> None:
         """Make the current position home; asked again while the estimator settles."""
-        await self.commands.send(messages.set_home_here())
+        self.authority.accompany(job, "home", stopped_too=True)
+        await self.commands.send(messages.set_home_here(), self.commanding(job))
         await self.home()
 
     async def home(self) -> Any:
@@ -369,7 +336,7 @@ class Vehicle:
             NotSupported: the vehicle has no such parameter: it is no simulation.
         """
         name = "SIM_SPEEDUP"
-        if name not in await self.parameters([name]):
+        if not await self.parameters.read([(name,)]):
             raise NotSupported("the vehicle is not a simulation: it has no parameter SIM_SPEEDUP")
 
         def read_back(message: Any) -> float | None:

@@ -15,7 +15,7 @@ from pymavlink import mavutil
 from mavproxy_uavapi.host.host import Host
 from mavproxy_uavapi.host.link import FakeLink
 from mavproxy_uavapi.vehicle.hangar import Hangar
-from mavproxy_uavapi.vehicle.jobs import JobBook
+from mavproxy_uavapi.vehicle.messages import POSITION_IGNORED, VELOCITY_IGNORED
 
 mavlink = mavutil.mavlink
 
@@ -54,6 +54,7 @@ class Drone:
         says: texts by MAV_CMD, said with the ack.
         mute: message names that it does not tell.
         stuck: whether it never gets anywhere.
+        mute_requests: whether it does not answer for its target.
     """
 
     def __init__(self, loop: Any, receive: Callable[[Any], None], make: Callable[..., Any], system: int = 1) -> None:
@@ -65,14 +66,15 @@ class Drone:
         self.says: dict[int, list[str]] = {}
         self.mute: set[str] = set()
         self.parameters = dict(PARAMETERS)
-        self.stuck = False
+        self.stuck = self.mute_requests = False
         self.mode, self.armed, self.landed = "STABILIZE", False, mavlink.MAV_LANDED_STATE_ON_GROUND
         self.ready = True
         self.at = [0.0, 0.0, 0.0]
         self.velocity = [0.0, 0.0, 0.0]
-        self.yaw = 0.0
+        self.yaw = self.yaw_rate = 0.0  # rad, rad/s
         self.home = HOME
         self.target: list[float] | None = None
+        self.moving: list[float] | None = None  # the velocity that it was told (m/s); it only tells of it
         self.paused = False
         self._sequence = 0
         self._stream: asyncio.Task[None] | None = None
@@ -201,7 +203,9 @@ class Drone:
             "LOCAL_POSITION_NED": {
                 "time_boot_ms": boot_ms, "x": x, "y": y, "z": z, "vx": vx, "vy": vy, "vz": vz,
             },
-            "ATTITUDE": {"time_boot_ms": boot_ms, "yaw": self.yaw, "roll": math.radians(10)},
+            "ATTITUDE": {
+                "time_boot_ms": boot_ms, "yaw": self.yaw, "roll": math.radians(10), "yawspeed": self.yaw_rate,
+            },
             "VFR_HUD": {"airspeed": 1.5, "groundspeed": 2.5, "heading": 90, "throttle": 40, "alt": 604.0},
         }  # fmt: skip
         return tables[name]
@@ -264,14 +268,16 @@ class Drone:
         self.send("param_value", param_id=name, param_value=self.parameters[name])
 
     def _take_setpoint(self, message: Any) -> None:
+        self.yaw_rate = message.yaw_rate
         if message.type_mask & mavlink.POSITION_TARGET_TYPEMASK_X_IGNORE:
-            self.target = None
+            self.target, self.moving = None, [message.vx, message.vy, message.vz]
         elif message.get_type() == "SET_POSITION_TARGET_LOCAL_NED":
-            self.target = [message.x, message.y, message.z]
+            self.target, self.moving = [message.x, message.y, message.z], None
         else:
             north = (message.lat_int / 1e7 - self.home[0]) * METRES_PER_DEGREE
             east = (message.lon_int / 1e7 - self.home[1]) * METRES_PER_DEGREE
             self.target = [north, east * math.cos(math.radians(self.home[0])), -message.alt]
+            self.moving = None
 
     def _take_command(self, message: Any) -> None:
         number = message.command
@@ -303,6 +309,8 @@ class Drone:
             if not self.armed:
                 self.landed = mavlink.MAV_LANDED_STATE_ON_GROUND
             self.tell("HEARTBEAT")
+        elif number == mavlink.MAV_CMD_CONDITION_YAW:
+            self.yaw = math.radians(message.param1)
         elif number == mavlink.MAV_CMD_NAV_TAKEOFF:
             self.target = [self.at[0], self.at[1], -message.param7]
         elif number == mavlink.MAV_CMD_DO_PAUSE_CONTINUE:
@@ -310,6 +318,27 @@ class Drone:
         elif number == mavlink.MAV_CMD_REQUEST_MESSAGE and message.param1 == mavlink.MAVLINK_MSG_ID_HOME_POSITION:
             lat, lon = round(self.home[0] * 1e7), round(self.home[1] * 1e7)
             self.send("home_position", latitude=lat, longitude=lon, altitude=584000)
+        elif number == mavlink.MAV_CMD_REQUEST_MESSAGE:
+            self._tell_target(int(message.param1))
+
+    def _tell_target(self, message_id: int) -> None:
+        """What it flies: a place by POSITION_TARGET_GLOBAL_INT, a velocity by POSITION_TARGET_LOCAL_NED."""
+        if self.mute_requests:
+            return
+        if message_id == mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED:
+            x, y, z = self.moving or (0.0, 0.0, 0.0)
+            mask = VELOCITY_IGNORED if self.moving is None else POSITION_IGNORED
+            self.send("position_target_local_ned", coordinate_frame=1, type_mask=mask, vx=x, vy=y, vz=z)
+        elif message_id == mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT and self.target is not None:
+            lat, lon = self.place((self.target[0], self.target[1]))
+            self.send(
+                "position_target_global_int",
+                coordinate_frame=mavlink.MAV_FRAME_GLOBAL,
+                type_mask=VELOCITY_IGNORED,
+                lat_int=lat,
+                lon_int=lon,
+                alt=584.0 - self.target[2],
+            )
 
 
 @pytest.fixture
@@ -380,9 +409,9 @@ def copter(drone: Drone, hangar: Hangar) -> Any:
 
 
 @pytest.fixture
-def pilotage(loop: Any, copter: Any) -> Any:
+def pilotage(loop: Any, host: Host, copter: Any) -> Any:
     """Verbs as jobs: `start(verb, …)` begins one, `result(job)` awaits it, `do(verb, …)` is both."""
-    book = JobBook()
+    book = host.jobs
     numbers = iter(range(10_000))
 
     def start(verb: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
@@ -391,7 +420,7 @@ def pilotage(loop: Any, copter: Any) -> Any:
             return "done"
 
         async def begin() -> Any:
-            return book.begin(copter.seat, f"{verb.__name__}{next(numbers)}", {}, body)
+            return book.begin(copter, f"{verb.__name__}{next(numbers)}", {}, body)
 
         job = loop.run(begin())
         loop.settle()

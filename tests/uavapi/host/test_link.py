@@ -6,11 +6,12 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from mavproxy_uavapi.errors import LinkLost
-from mavproxy_uavapi.host.link import Address, FakeLink, MavproxyLink
+from mavproxy_uavapi.errors import LinkLost, UavApiError
+from mavproxy_uavapi.host.link import Address, FakeLink, MavproxyLink, is_finite
 
-HELLO = SimpleNamespace(get_type=lambda: "HELLO")
+HELLO = mavlink.MAVLink_attitude_message(0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @pytest.fixture
@@ -64,3 +65,17 @@ def test_fake_link_remembers_and_tells(loop: asyncio.AbstractEventLoop) -> None:
     loop.run_until_complete(link.send(HELLO, 3))
     assert link.sent == [HELLO]
     assert told == [(HELLO, 3)]
+
+
+@pytest.mark.parametrize("number", [float("nan"), float("inf"), float("-inf")])
+def test_number_that_is_not_finite_does_not_leave(send: Any, mpstate: Any, host: Any, number: float) -> None:
+    message = mavlink.MAVLink_attitude_message(0, 0.0, number, 0.0, 0.0, 0.0, 0.0)
+    link = MavproxyLink(host.bridge, mpstate)
+    with pytest.raises(UavApiError, match="not finite"):
+        asyncio.run(link.send(message, 1))
+    assert mpstate.the_master.written == []
+
+
+def test_number_that_is_not_finite_is_found_in_an_array() -> None:
+    covariance = [0.0] * 8 + [float("nan")]
+    assert not is_finite(mavlink.MAVLink_attitude_quaternion_cov_message(0, [1.0, 0, 0, 0], 0, 0, 0, covariance))

@@ -14,6 +14,7 @@ from mavproxy_uavapi.errors import (
     LinkLost,
     ModeChanged,
     NotArmed,
+    Paused,
     Rejected,
     Stale,
     Superseded,
@@ -137,16 +138,23 @@ def test_refused_takeoff_is_rejected_with_the_reason(armed: Any, copter: Any, pi
     assert caught.value.statustext == ["Takeoff: no"]
 
 
-def test_takeoff_is_not_sent_when_the_pilot_switches_while_parameters_are_read(
-    loop: Any, armed: Any, copter: Any, pilotage: Any
+@pytest.mark.parametrize("verb", ["takeoff", "land", "rtl", "go_to", "travel"])
+def test_command_goes_out_before_any_parameter_is_asked_for(
+    loop: Any, armed: Any, copter: Any, pilotage: Any, verb: str
 ) -> None:
     armed.parameters.clear()
-    job = pilotage.start(copter.takeoff, 10.0)
-    loop.pass_time(0.5)
-    armed.pilot("LOITER")
-    with pytest.raises(ModeChanged):
-        pilotage.result(job)
-    assert armed.commands(TAKEOFF) == []
+    arguments: dict[str, Any] = {
+        "takeoff": {"alt": 10.0}, "go_to": {"target": FAR, "wait": True},
+        "travel": {"velocity": VelocityTarget(1.0, 0.0, 0.0), "duration": 5.0},
+    }  # fmt: skip
+    if verb != "takeoff":
+        armed.fly()
+        loop.settle()
+    began = loop.time()
+    pilotage.start(getattr(copter, verb), **arguments.get(verb, {}))
+    first = armed.got[0]
+    assert first.get_type().startswith(("COMMAND_LONG", "SET_POSITION_TARGET"))
+    assert loop.time() == began
 
 
 def test_takeoff_takes_as_long_as_its_height_needs(loop: Any, armed: Any, copter: Any, pilotage: Any) -> None:
@@ -346,7 +354,7 @@ def test_movement_that_the_state_forbids_sends_nothing(
     loop.pass_time(0.5)
     with pytest.raises(error):
         if verb == "set_yaw_rate":
-            loop.run(copter.set_yaw_rate(10.0))
+            pilotage.do(copter.set_yaw_rate, 10.0)
         else:
             pilotage.do(getattr(copter, verb), FAR if verb == "go_to" else VelocityTarget(1, 0, 0))
     nothing_more(loop, flying)
@@ -384,12 +392,12 @@ def test_speed_that_is_set_while_another_is_repeated_disturbs_no_movement(
     loop: Any, flying: Any, copter: Any, pilotage: Any
 ) -> None:
     for kind in ("ground", "descent"):
-        loop.run(copter.set_speed(kind, 1.0))
+        pilotage.do(copter.set_speed, kind, 1.0)
     job = pilotage.start(copter.go_to, FAR)  # repeats the speeds, for the kind of setpoint has changed
-    climb = loop.create_task(copter.set_speed("climb", 1.0))
+    climb = pilotage.start(copter.set_speed, "climb", 1.0)
     assert pilotage.result(job) == "done"
-    loop.run(climb)
-    assert copter.speeds == dict.fromkeys(("ground", "descent", "climb"), 1.0)
+    assert pilotage.result(climb) == "done"
+    assert copter.speeds.in_force == dict.fromkeys(("ground", "descent", "climb"), 1.0)
 
 
 # -- travel -----------------------------------------------------------------------------------------------
@@ -437,23 +445,25 @@ def test_travel_counts_the_vehicles_seconds(loop: Any, flying: Any, copter: Any,
 # -- yaw --------------------------------------------------------------------------------------------------
 
 
-def test_heading_is_turned_to_the_shorter_way(loop: Any, flying: Any, copter: Any) -> None:
-    loop.run(copter.set_heading(359.0))
+def test_heading_is_turned_to_the_shorter_way(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+    pilotage.do(copter.set_heading, 359.0)
     assert [(m.command, m.param1, m.param3, m.param4) for m in flying.orders()] == [(YAW, 359.0, 0, 0)]
 
 
-@pytest.mark.parametrize("verb", ["set_heading", "pause", "resume"])
-def test_guided_only_verbs_leave_the_pilot_alone(loop: Any, flying: Any, copter: Any, verb: str) -> None:
+@pytest.mark.parametrize("verb", ["set_heading", "stop", "resume"])
+def test_guided_only_verbs_leave_the_pilot_alone(
+    loop: Any, flying: Any, copter: Any, verb: str, pilotage: Any
+) -> None:
     flying.pilot("LOITER")
     loop.settle()
     with pytest.raises(ModeChanged):
-        loop.run(getattr(copter, verb)(*([90.0] if verb == "set_heading" else [])))
+        pilotage.do(getattr(copter, verb), *([90.0] if verb == "set_heading" else []))
     nothing_more(loop, flying)
 
 
 def test_yaw_rate_repeats_the_position_that_is_flown_to(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
     job = pilotage.start(copter.go_to, FAR, wait=True)
-    loop.run(copter.set_yaw_rate(90.0))
+    pilotage.do(copter.set_yaw_rate, 90.0)
     first, second = flying.setpoints()
     assert (second.x, second.y, second.z) == (first.x, first.y, first.z) == (200.0, 0.0, -20.0)
     assert second.yaw_rate == pytest.approx(math.pi / 2)
@@ -462,94 +472,157 @@ def test_yaw_rate_repeats_the_position_that_is_flown_to(loop: Any, flying: Any, 
     assert job.running
 
 
-def test_yaw_rate_without_a_movement_holds_the_place(loop: Any, flying: Any, copter: Any) -> None:
-    loop.run(copter.set_yaw_rate(-45.0))
+def test_yaw_rate_without_a_movement_holds_the_place(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+    pilotage.do(copter.set_yaw_rate, -45.0)
     setpoint = flying.setpoints()[0]
     assert (setpoint.x, setpoint.y, setpoint.z) == (0.0, 0.0, -20.0)
     assert setpoint.yaw_rate == pytest.approx(-math.pi / 4)
 
 
-def test_yaw_rate_repeats_a_velocity_only_while_it_is_flown(
+def test_yaw_rate_repeats_the_velocity_that_the_autopilot_tells(
     loop: Any, flying: Any, copter: Any, pilotage: Any
 ) -> None:
-    pilotage.do(copter.travel, VelocityTarget(1.0, 0.0, 0.0))
-    loop.run(copter.set_yaw_rate(10.0))
+    flying.moving = [1.0, 0.0, 0.0]  # another station's
+    pilotage.do(copter.set_yaw_rate, 10.0)
     assert flying.setpoints()[-1].vx == 1.0
-    loop.pass_time(4.0)
-    loop.run(copter.set_yaw_rate(10.0))
+
+
+def test_yaw_rate_does_not_fly_back_to_a_target_of_ours_that_another_station_has_replaced(
+    loop: Any, flying: Any, copter: Any, pilotage: Any
+) -> None:
+    pilotage.do(copter.go_to, NedTarget(50.0, 0.0, -20.0), wait=True)
+    flying.target, flying.at = [0.0, 0.0, -20.0], [0.0, 0.0, -20.0]
+    pilotage.do(copter.set_yaw_rate, 10.0)
     last = flying.setpoints()[-1]
-    assert last.type_mask & mavlink.POSITION_TARGET_TYPEMASK_VX_IGNORE
-    assert last.z == -20.0
+    assert place(flying, 0.0, 0.0) == pytest.approx((last.lat_int / 1e7, last.lon_int / 1e7), abs=1e-6)
+    assert last.alt == pytest.approx(20.0, abs=0.1)
 
 
-def test_yaw_rate_does_not_take_up_a_target_from_before_the_pilot_had_it(
+def test_yaw_rate_holds_the_place_where_the_autopilot_does_not_tell_its_target(
     loop: Any, flying: Any, copter: Any, pilotage: Any
 ) -> None:
     pilotage.do(copter.go_to, FAR)
-    flying.pilot("LOITER")
-    loop.pass_time(5.0)
-    flying.pilot("GUIDED")
-    loop.pass_time(1.0)
-    loop.run(copter.set_yaw_rate(10.0))
-    assert flying.setpoints()[-1].x < 100.0
+    flying.target = None  # as after a take-off: POSITION_TARGET_LOCAL_NED tells an old place
+    pilotage.do(copter.set_yaw_rate, 10.0)
+    last = flying.setpoints()[-1]
+    assert (last.x, last.z) == pytest.approx((flying.at[0], flying.at[2]), abs=0.1)
 
 
-def test_yaw_rate_is_not_sent_when_the_pilot_switches_while_parameters_are_read(
+def test_yaw_rate_in_a_takeoff_is_busy(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+    flying.landed = mavlink.MAV_LANDED_STATE_TAKEOFF
+    loop.pass_time(0.3)
+    with pytest.raises(Busy, match="taking off"):
+        pilotage.do(copter.set_yaw_rate, 10.0)
+    assert flying.setpoints() == []
+
+
+def test_yaw_rate_is_not_sent_when_the_pilot_switches_while_the_target_is_asked_for(
     loop: Any, flying: Any, copter: Any, pilotage: Any
 ) -> None:
-    flying.parameters.clear()
-    pilotage.do(copter.travel, VelocityTarget(1.0, 0.0, 0.0))
-    task = loop.create_task(copter.set_yaw_rate(10.0))
+    flying.mute_requests = True
+    job = pilotage.start(copter.set_yaw_rate, 10.0)
     loop.pass_time(0.5)
     flying.pilot("LOITER")
     with pytest.raises(ModeChanged):
-        loop.run(task)
-    assert len(flying.setpoints()) == 1
+        pilotage.result(job)
+    assert flying.setpoints() == []
 
 
-# -- pause and resume -------------------------------------------------------------------------------------
+def test_heading_is_done_when_the_attitude_shows_it(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+    flying.answers[YAW] = [mavlink.MAV_RESULT_ACCEPTED]
+    job = pilotage.start(copter.set_heading, 350.0)
+    loop.pass_time(5.0)
+    assert job.running
+    flying.yaw = math.radians(-9.0)
+    assert pilotage.result(job) == "done"
 
 
-def test_pause_and_resume_leave_the_waiting_flight_waiting(
-    loop: Any, flying: Any, copter: Any, pilotage: Any
-) -> None:
+def test_movement_ends_the_turn_that_it_undoes(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+    flying.answers[YAW] = [mavlink.MAV_RESULT_ACCEPTED]
+    turn = pilotage.start(copter.set_heading, 350.0)
+    pilotage.do(copter.go_to, FAR)
+    with pytest.raises(Superseded):
+        pilotage.result(turn)
+
+
+# -- stop and resume --------------------------------------------------------------------------------------
+
+
+def test_stop_and_resume_leave_the_waiting_flight_waiting(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
     job = pilotage.start(copter.go_to, NedTarget(100.0, 0.0, -20.0), wait=True)
     loop.pass_time(3.0)
-    loop.run(copter.pause())
+    pilotage.do(copter.stop)
     loop.pass_time(5.0)
     stopped_at = list(flying.at)
     assert 20 < stopped_at[0] < 50
     assert job.running
-    loop.run(copter.resume())
+    pilotage.do(copter.resume)
     assert pilotage.result(job) == "done"
     assert [m.param1 for m in flying.commands(PAUSE)] == [0, 1]
 
 
-def test_new_target_after_a_pause_is_flown(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
-    pilotage.do(copter.go_to, FAR)
-    loop.run(copter.pause())
-    pilotage.do(copter.go_to, NedTarget(0.0, 50.0, -20.0), wait=True)
-    assert flying.at == pytest.approx([0.0, 50.0, -20.0], abs=1.0)
-    assert [m.param1 for m in flying.commands(PAUSE)] == [0, 1]
-
-
-def test_new_target_is_sent_before_the_pause_ends(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
-    loop.run(copter.pause())
+@pytest.mark.parametrize("verb", ["go_to", "travel", "set_heading", "set_yaw_rate"])
+def test_movements_are_refused_while_the_vehicle_is_stopped(
+    loop: Any, flying: Any, copter: Any, pilotage: Any, verb: str
+) -> None:
+    pilotage.do(copter.stop)
     flying.got.clear()
+    arguments = {"go_to": FAR, "travel": VelocityTarget(1.0, 0.0, 0.0), "set_heading": 90.0, "set_yaw_rate": 10.0}
+    with pytest.raises(Paused, match="/movement/resume"):
+        pilotage.do(getattr(copter, verb), arguments[verb])
+    nothing_more(loop, flying)
+
+
+def test_movement_that_streams_ends_when_the_vehicle_is_stopped(
+    loop: Any, flying: Any, copter: Any, pilotage: Any
+) -> None:
+    job = pilotage.start(copter.travel, VelocityTarget(1.0, 0.0, 0.0), duration=60.0)
+    loop.pass_time(3.0)
+    pilotage.do(copter.stop)
+    with pytest.raises(Paused):
+        pilotage.result(job)
+    nothing_more(loop, flying)
+
+
+def test_stop_is_done_when_it_stands_still(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
     pilotage.do(copter.go_to, FAR)
-    assert [m.get_type() for m in flying.orders()] == ["SET_POSITION_TARGET_LOCAL_NED", "COMMAND_LONG"]
+    flying.answers[PAUSE] = [mavlink.MAV_RESULT_ACCEPTED]  # and flies on
+    job = pilotage.start(copter.stop)
+    loop.pass_time(5.0)
+    assert job.running
+    flying.paused = True
+    assert pilotage.result(job) == "done"
 
 
-def test_movement_without_a_pause_resumes_nothing(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
-    loop.run(copter.pause())
-    loop.run(copter.resume())
+def test_refused_stop_stops_nothing(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+    flying.answers[PAUSE] = [mavlink.MAV_RESULT_DENIED]
+    with pytest.raises(Rejected):
+        pilotage.do(copter.stop)
+    pilotage.do(copter.go_to, FAR)
+
+
+def test_guided_ends_a_stop_where_it_is(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+    job = pilotage.start(copter.go_to, FAR, wait=True)
+    pilotage.do(copter.stop)
     flying.got.clear()
+    pilotage.do(copter.set_mode, "GUIDED")
+    with pytest.raises(Superseded):
+        pilotage.result(job)
+    kinds = [m.get_type() for m in flying.orders()]
+    assert kinds == ["COMMAND_LONG", "SET_POSITION_TARGET_LOCAL_NED", "COMMAND_LONG"]
+    assert [m.param1 for m in flying.commands(PAUSE)] == [1]
     pilotage.do(copter.go_to, FAR)
-    assert flying.commands(PAUSE) == []
 
 
-def test_pilots_mode_change_ends_our_pause(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
-    loop.run(copter.pause())
+def test_takeoff_ends_a_stop(loop: Any, armed: Any, copter: Any, pilotage: Any) -> None:
+    pilotage.do(copter.stop)
+    pilotage.do(copter.takeoff, 5.0)
+    assert numbers(armed) == [PAUSE, TAKEOFF, PAUSE]
+    pilotage.do(copter.go_to, FAR)
+
+
+def test_pilots_mode_change_ends_our_stop(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+    pilotage.do(copter.stop)
     flying.pilot("LOITER")
     loop.pass_time(1.0)
     flying.pilot("GUIDED")
@@ -557,6 +630,22 @@ def test_pilots_mode_change_ends_our_pause(loop: Any, flying: Any, copter: Any, 
     flying.got.clear()
     pilotage.do(copter.go_to, FAR)
     assert flying.commands(PAUSE) == []
+
+
+def test_mission_that_cannot_be_paused_is_left_for_brake(loop: Any, drone: Any, copter: Any, pilotage: Any) -> None:
+    drone.fly("AUTO")
+    loop.settle()
+    drone.answers[PAUSE] = [mavlink.MAV_RESULT_FAILED]
+    pilotage.do(copter.stop)
+    assert drone.mode == "BRAKE"
+
+
+def test_stop_in_a_pilots_mode_sends_nothing(loop: Any, drone: Any, copter: Any, pilotage: Any) -> None:
+    drone.fly("LOITER")
+    loop.settle()
+    with pytest.raises(ModeChanged, match="/command/brake"):
+        pilotage.do(copter.stop)
+    nothing_more(loop, drone)
 
 
 # -- who has the command ----------------------------------------------------------------------------------
@@ -677,7 +766,7 @@ def test_two_vehicles_are_flown_by_themselves(loop: Any, make_drone: Any, hangar
                 await copter.go_to(job, target, wait=True)
                 return "done"
 
-            jobs.append(book.begin(copter.seat, "/go", {"to": system}, body))
+            jobs.append(book.begin(copter, "/go", {"to": system}, body))
         for job in jobs:
             assert await job.outcome() == "done"
 

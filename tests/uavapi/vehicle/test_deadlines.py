@@ -32,7 +32,7 @@ def test_changed_speed_counts_when_it_is_slower(kind: str, attribute: str) -> No
 
 
 def test_no_parameter_makes_a_flight_endless() -> None:
-    still = limits(dict.fromkeys(deadlines.DEFAULTS, 0.0), {})
+    still = limits({name: 0.0 for names in deadlines.WANTED for name in names}, {})
     assert min(still.horizontal, still.up, still.down, still.land, still.land_high, still.rtl_speed) > 0
     assert deadlines.leg_time(still, 10, 10) < 1000
     assert still.guided_timeout > 0
@@ -65,3 +65,12 @@ def test_allowed_time_grows_with_the_flight_and_shrinks_with_the_speedup() -> No
 
 def test_allowed_time_never_falls_below_what_acks_need() -> None:
     assert deadlines.allowed(0, 100.0) == 30
+
+
+def test_newer_names_of_the_same_parameters_are_in_metres(usual: Limits) -> None:
+    newer = {
+        "WP_SPD": 10.0, "WP_SPD_UP": 2.5, "WP_SPD_DN": 1.5, "WP_ACC": 2.5, "LAND_SPD_MS": 0.5, "LAND_ALT_LOW_M": 10.0,
+        "RTL_ALT_M": 15.0, "RTL_LOIT_TIME": 5000.0, "GUID_TIMEOUT": 3.0,
+    }  # fmt: skip
+    assert limits(newer, {}) == usual
+    assert limits({"RTL_ALT_M": 40.0, "RTL_SPEED_MS": 7.0, "LAND_SPD_HIGH_MS": 1.0}, {}).rtl_alt == 40.0

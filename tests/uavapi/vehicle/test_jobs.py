@@ -6,21 +6,24 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.errors import Aborted, NotArmed, Superseded, TimedOut, UavApiError
-from mavproxy_uavapi.vehicle.jobs import FINISHED_KEPT, Job, JobBook, Seat
+from mavproxy_uavapi.host.state import VehicleState
+from mavproxy_uavapi.vehicle.authority import CommandAuthority, Rank
+from mavproxy_uavapi.vehicle.jobs import FINISHED_KEPT, Job, JobBook
 
 
 class Bench:
-    """A job book, a seat, and verbs that take the seat and last until they are let go."""
+    """A job book, a vehicle's authority, and verbs that take it and last until they are let go."""
 
     def __init__(self, loop: Any) -> None:
-        self.loop, self.book, self.seat = loop, JobBook(), Seat()
+        self.loop, self.book = loop, JobBook()
+        self.authority = CommandAuthority(VehicleState(1, 1, 2, 0.0))
         self.go = asyncio.Event()
         self.begun: list[str] = []
         self.ended: list[str] = []
 
     def begin(self, verb: str = "/a", settle: bool = True, outlives_client: bool = False, **request: Any) -> Job:
         async def body(job: Job) -> str:
-            self.seat.take(job)
+            self.authority.take(job, Rank.MOVEMENT)
             self.begun.append(verb)
             try:
                 await self.go.wait()
@@ -34,7 +37,7 @@ class Bench:
         self, body: Any, verb: str = "/a", settle: bool = True, outlives: bool = False, **request: Any
     ) -> Job:
         async def begin() -> Job:
-            return self.book.begin(self.seat, verb, request, body, client="10.0.0.7", outlives_client=outlives)
+            return self.book.begin(self.authority, verb, request, body, client="10.0.0.7", outlives_client=outlives)
 
         job = self.loop.run(begin())
         if settle:
@@ -117,14 +120,13 @@ def test_identical_request_joins(bench: Bench) -> None:
 
 def test_identical_request_joins_even_before_the_first_has_begun(bench: Bench) -> None:
     async def body(job: Job) -> str:
-        bench.seat.take(job)
         bench.begun.append(job.id)
         await bench.go.wait()
         return "done"
 
     async def in_one_go() -> list[Job]:
-        seats = (bench.seat, bench.seat, Seat())
-        return [bench.book.begin(seat, "/go", {"x": 1}, body) for seat in seats]
+        vehicles = (bench.authority, object())
+        return [bench.book.begin(vehicle, "/go", {"x": 1}, body) for vehicle in vehicles]
 
     first, second, for_another_vehicle = bench.loop.run(in_one_go())
     bench.loop.settle()
@@ -203,13 +205,13 @@ def test_first_outcome_counts(bench: Bench) -> None:
 
 def test_job_never_outlives_its_timeout_and_says_how_far_it_had_to_go(bench: Bench) -> None:
     async def body(job: Job) -> str:
-        bench.seat.take(job)
+        bench.authority.take(job, Rank.MOVEMENT)
         job.progress = {"distance_to_go": 12.34, "altitude": 5.0}
         await asyncio.sleep(100)
         return "never"
 
     async def begin() -> Job:
-        return bench.book.begin(bench.seat, "/a", {}, body, timeout=3.0)
+        return bench.book.begin(bench.authority, "/a", {}, body, timeout=3.0)
 
     began = bench.loop.time()
     job = bench.loop.run(begin())

@@ -17,6 +17,7 @@ from mavproxy_uavapi.errors import (
     Stale,
     TimedOut,
 )
+from mavproxy_uavapi.vehicle.messages import NedTarget
 
 mavlink = mavutil.mavlink
 ARM = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
@@ -221,28 +222,57 @@ def test_mode_request_whose_ack_was_lost_is_done_when_the_heartbeat_shows_it(
 
 
 @pytest.mark.parametrize(("kind", "number"), [("air", 0), ("ground", 1), ("climb", 2), ("descent", 3)])
-def test_speed_is_set_by_its_type_and_remembered(loop: Any, drone: Any, copter: Any, kind: str, number: int) -> None:
-    loop.run(copter.set_speed(kind, 3.5))
-    command = drone.commands(SPEED)[0]
+def test_speed_is_set_by_its_type(flying: Any, copter: Any, kind: str, number: int, pilotage: Any) -> None:
+    pilotage.do(copter.set_speed, kind, 3.5)
+    command = flying.commands(SPEED)[0]
     assert (command.param1, command.param2, command.param3) == (number, 3.5, -1)
-    assert copter.speeds == {kind: 3.5}
+    assert copter.speeds.in_force == {kind: 3.5}
 
 
-def test_refused_speed_is_not_remembered(loop: Any, drone: Any, copter: Any) -> None:
-    drone.answers[SPEED] = [DENIED]
+def test_speed_that_is_asked_for_before_guided_is_sent_once_it_flies(
+    loop: Any, drone: Any, copter: Any, pilotage: Any
+) -> None:
+    pilotage.do(copter.set_speed, "ground", 3.5)
+    assert drone.commands(SPEED) == [] and copter.speeds.in_force == {}
+    drone.fly()
+    loop.settle()
+    pilotage.do(copter.go_to, NedTarget(10.0, 0.0, -20.0))
+    assert [(m.param1, m.param2) for m in drone.commands(SPEED)] == [(1, 3.5)]
+    pilotage.do(copter.go_to, NedTarget(20.0, 0.0, -20.0))
+    assert len(drone.commands(SPEED)) == 1
+    assert copter.speeds.in_force == {"ground": 3.5}
+
+
+def test_speed_that_a_pilots_mode_refuses_is_remembered(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+    flying.answers[SPEED] = [None]
+    job = pilotage.start(copter.set_speed, "ground", 3.5)
+    loop.pass_time(0.5)
+    flying.pilot("LOITER")
+    assert pilotage.result(job) == "done"
+    assert len(flying.commands(SPEED)) == 1
+
+
+def test_remembered_speed_is_forgotten_by_a_reboot(loop: Any, drone: Any, copter: Any, pilotage: Any) -> None:
+    pilotage.do(copter.set_speed, "ground", 3.5)
+    copter.state.reboots += 1
+    assert copter.speeds.to_send(new_kind=True) == {}
+
+
+def test_refused_speed_is_not_remembered(flying: Any, copter: Any, pilotage: Any) -> None:
+    flying.answers[SPEED] = [DENIED]
     with pytest.raises(Rejected):
-        loop.run(copter.set_speed("ground", 3.5))
-    assert copter.speeds == {}
+        pilotage.do(copter.set_speed, "ground", 3.5)
+    assert copter.speeds.to_send(new_kind=True) == {}
 
 
 # -- home, servo, parameters ------------------------------------------------------------------------------
 
 
 def test_set_home_is_retried_while_the_estimator_settles_and_then_read_back(
-    loop: Any, drone: Any, copter: Any
+    drone: Any, copter: Any, pilotage: Any
 ) -> None:
     drone.answers[mavlink.MAV_CMD_DO_SET_HOME] = [FAILED, mavlink.MAV_RESULT_TEMPORARILY_REJECTED, 0]
-    loop.run(copter.set_home())
+    pilotage.do(copter.set_home)
     assert [command.param1 for command in drone.commands(mavlink.MAV_CMD_DO_SET_HOME)] == [1, 1, 1]
     assert copter.state.messages["HOME_POSITION"].message.altitude == 584000
 
@@ -275,7 +305,7 @@ def test_sim_speedup_is_set_and_read_back(loop: Any, drone: Any, copter: Any) ->
 
 
 def test_sim_speedup_that_is_not_taken_is_a_timeout(loop: Any, drone: Any, copter: Any) -> None:
-    loop.run(copter.parameters(["SIM_SPEEDUP"]))
+    loop.run(copter.parameters.read([("SIM_SPEEDUP",)]))
     del drone.parameters["SIM_SPEEDUP"]
     with pytest.raises(TimedOut, match="did not take SIM_SPEEDUP = 5"):
         loop.run(copter.set_sim_speedup(5))
@@ -289,10 +319,16 @@ def test_sim_speedup_of_a_real_vehicle_is_not_supported(loop: Any, drone: Any, c
 
 
 def test_parameters_are_asked_for_once_and_missing_ones_left_out(loop: Any, drone: Any, copter: Any) -> None:
-    assert loop.run(copter.parameters(["RTL_ALT", "NO_SUCH"])) == {"RTL_ALT": 1500.0}
+    assert loop.run(copter.parameters.read([("RTL_ALT",), ("NO_SUCH",)])) == {"RTL_ALT": 1500.0}
     drone.got.clear()
-    assert loop.run(copter.parameters(["RTL_ALT"])) == {"RTL_ALT": 1500.0}
+    assert loop.run(copter.parameters.read([("RTL_ALT",)])) == {"RTL_ALT": 1500.0}
     assert drone.got == []
+
+
+def test_one_of_a_quantitys_names_is_enough(loop: Any, drone: Any, copter: Any) -> None:
+    started = loop.time()
+    assert loop.run(copter.parameters.read([("RTL_ALT", "RTL_ALT_M")])) == {"RTL_ALT": 1500.0}
+    assert loop.time() - started < 0.1
 
 
 def test_limits_are_the_vehicles_own(loop: Any, drone: Any, copter: Any) -> None:
