@@ -125,7 +125,7 @@ def test_identical_request_joins_even_before_the_first_has_begun(bench: Bench) -
         return "done"
 
     async def in_one_go() -> list[Job]:
-        vehicles = (bench.authority, object())
+        vehicles = (bench.authority, bench.authority, object())
         return [bench.book.begin(vehicle, "/go", {"x": 1}, body) for vehicle in vehicles]
 
     first, second, for_another_vehicle = bench.loop.run(in_one_go())
