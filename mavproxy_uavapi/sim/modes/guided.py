@@ -110,9 +110,7 @@ class Guided(Mode):
         if copter.grounded:
             return self.wait_on_ground()
         if self.paused:
-            copter.position.fly_at(0.0, 0.0, dt)
-            copter.position.climb_at(0.0, dt)
-            return Demand(self.fly(dt).thrust)
+            return self.hold_still(dt)
         expired = copter.now - self._updated > max(copter.parameters["GUID_TIMEOUT"], SHORTEST_TIMEOUT)
         if expired:
             self._expire()
@@ -140,6 +138,10 @@ class Guided(Mode):
             control.climb_at(self.velocity_target.down, dt)
 
     def set_speed(self, kind: Speed, speed: float) -> bool:
+        """As in ArduCopter a new speed up brings back the default speed down, and the other way round."""
+        limits, default = self.copter.position.limits, self.copter.default_limits()
+        if kind is not Speed.HORIZONTAL:
+            limits.speed_up, limits.speed_down = default.speed_up, default.speed_down
         self.copter.change_limit(kind, speed)
         return True
 
