@@ -31,6 +31,8 @@ FAILED: int = mavlink.MAV_RESULT_FAILED
 BUSY: int = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
 UNSUPPORTED: int = mavlink.MAV_RESULT_UNSUPPORTED
 FORCE_REBOOT = 20190226
+NO_SPEED_KIND = 4
+"""The end of the enumeration SPEED_TYPE, which ArduCopter denies; it fails to change what lies beyond."""
 FASTEST_INTERVAL = 0.003
 """Seconds; ArduPilot refuses more than 0.8 of SCHED_LOOP_RATE. More than 100 Hz is not sent here."""
 LONGEST_INTERVAL = 60.0
@@ -80,6 +82,11 @@ def from_message(message: Any) -> Command | None:
     scale = 1e7 if message.command in LOCATION_COMMANDS else 1.0
     x, y = int(_finite(message.param5) * scale), int(_finite(message.param6) * scale)
     return Command(message.command, frame, *parameters, x, y, message.param7, sender)
+
+
+def _means_here(command: Command) -> bool:
+    """Zeros that stand for the present place or height in a mission; a reposition must not have them."""
+    return (command.x == 0 and command.y == 0) or (command.z == 0 and command.frame not in AMSL_FRAMES)
 
 
 def _finite(value: float) -> float:
@@ -169,7 +176,7 @@ class Commands:
         change = bool(int(command.param2) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
         if copter.mode is not copter.guided and not change:
             return DENIED
-        if not valid_location(command.x, command.y, command.z):
+        if not valid_location(command.x, command.y, command.z) or _means_here(command):
             return DENIED
         target = global_target(copter, command.frame, command.x, command.y, command.z)
         if target is None:
@@ -207,7 +214,7 @@ class Commands:
     def _change_speed(self, command: Command, link: Link) -> int:
         del link
         kind = SPEED_KINDS.get(int(command.param1))
-        if not command.param2 > 0:
+        if not command.param2 > 0 or int(command.param1) == NO_SPEED_KIND:
             return DENIED
         changed = kind is not None and self._simulator.copter.mode.set_speed(kind, command.param2)
         return ACCEPTED if changed else FAILED

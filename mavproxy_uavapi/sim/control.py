@@ -9,12 +9,19 @@ Operations::
 
 Faults: `silence` (seconds, sending, receiving), `lose_acks` (command, count), `delay_acks` (command, count,
 seconds), `foreign_ack` (command, count, result, system, component), `refuse` (command, count, result, text),
-`in_progress` (command, count, seconds), `freeze_gps` (seconds), `low_battery` (voltage), `pilot_mode` (mode),
-`pilot_sticks` (roll, pitch, throttle, yaw in microseconds), `pilot_disarm`, `reboot`, `ekf_bad` (seconds).
-`command` is a MAV_CMD number or "all", seconds are simulated ones and default to "until cleared".
+`in_progress` (command, count, seconds), `drop` (message, command, count), `nan` (message, fields, seconds),
+`freeze_gps` (seconds), `low_battery` (voltage), `pilot_mode` (mode), `pilot_sticks` (roll, pitch, throttle, yaw in
+microseconds), `pilot_arm` (throttle in microseconds), `pilot_disarm`, `other_station` (position or velocity),
+`reboot`, `ekf_bad` (seconds).
+`command` is a MAV_CMD number or "all", `message` a MAVLink name; seconds are simulated ones and default to "until
+cleared". `drop` loses messages on their way to the vehicle. `nan` sends NaN in the named fields of a message, or in
+all of its float fields. `pilot_arm` arms by radio in the present mode, with all checks off that can be, and raises
+the throttle. `other_station` is a GUIDED setpoint of another ground station, [north, east, down] in metres from the
+EKF origin or in m/s.
 
-Every answer has "ok"; with false there is an "error" that says why. What is sent while the vehicle hears nothing
-is not in "received" either. A low battery that has made its failsafe act stays low until a reboot, as in ArduPilot.
+Every answer has "ok"; with false there is an "error" that says why. What is sent while the vehicle hears nothing,
+what is dropped and what the other station sends are not in "received". A low battery that has made its failsafe act
+stays low until a reboot, as in ArduPilot.
 """
 
 from __future__ import annotations
@@ -25,10 +32,13 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from .faults import FaultError
-from .geodesy import from_ned
+from .geodesy import Ned, from_ned
+from .modes.guided import ZERO
 from .simulator import Received, Simulator
 
 LOW_VOLTAGE = 9.9
+CLIMBING_THROTTLE = 1700
+"""Microseconds of the throttle stick that climb in STABILIZE, ALT_HOLD and LOITER."""
 
 
 class Control:
@@ -48,7 +58,10 @@ class Control:
             "low_battery": self._low_battery,
             "pilot_mode": self._pilot_mode,
             "pilot_sticks": self._pilot_sticks,
+            "pilot_arm": self._pilot_arm,
             "pilot_disarm": self._pilot_disarm,
+            "other_station": self._other_station,
+            "nan": self._nan,
             "reboot": self._reboot,
             "ekf_bad": self._ekf_bad,
         }
@@ -108,6 +121,28 @@ class Control:
         for channel, name in enumerate(("roll", "pitch", "throttle", "yaw"), start=1):
             if name in request:
                 self._simulator.copter.sticks.move(channel, int(request[name]))
+
+    def _pilot_arm(self, request: Mapping[str, Any]) -> None:
+        copter, throttle = self._simulator.copter, int(request.get("throttle", CLIMBING_THROTTLE))
+        if copter.mode is copter.guided or not copter.mode.armable or not copter.arm(forced=True):
+            raise FaultError(f"the vehicle does not arm by radio in {copter.mode.name} now")
+        copter.sticks.move(3, throttle)
+
+    def _other_station(self, request: Mapping[str, Any]) -> None:
+        copter = self._simulator.copter
+        if copter.mode is not copter.guided:
+            raise FaultError("setpoints are for GUIDED only")
+        if "position" in request:
+            copter.guided.go_to(Ned(*map(float, request["position"])))
+        else:
+            copter.guided.fly_at(Ned(*map(float, request["velocity"])), ZERO)
+
+    def _nan(self, request: Mapping[str, Any]) -> None:
+        simulator, name = self._simulator, str(request["message"])
+        if not simulator.telemetry.knows(name):
+            raise FaultError(f"the vehicle sends no {name}")
+        fields = [str(field) for field in request.get("fields", ())]
+        simulator.faults.spoil(name, fields, simulator.copter.now, _seconds(request))
 
     def _pilot_disarm(self, request: Mapping[str, Any]) -> None:
         del request

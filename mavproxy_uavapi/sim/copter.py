@@ -316,12 +316,17 @@ class Copter:
             self._spool = 0.0
         elif demand.idle:
             self._spool = max(0.0, self._spool - change)
-        elif self.now - self._armed_since >= ARMING_DELAY:
+        elif self.motors_turn:
             self._spool = min(1.0, self._spool + change)
         lifting = self.armed and not self.landed and not demand.idle
         thrust = demand.thrust if lifting else Demand().thrust
         self.body.step(thrust, demand.yaw_rate if lifting else 0.0, dt)
         self.battery.drain(self.throttle, dt)
+
+    @property
+    def motors_turn(self) -> bool:
+        """Whether the motors turn, if only at ground idle: armed and past the arming delay."""
+        return self.armed and self.now - self._armed_since >= ARMING_DELAY
 
     @property
     def hover_throttle(self) -> float:

@@ -7,7 +7,7 @@ seconds. The simulator asks here before it sends, receives and acknowledges.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,17 +16,29 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 ALL_COMMANDS = -1
 FOREIGN_SYSTEM = 99
 FOREIGN_COMPONENT = 190
+FLOATS = ("float", "double")
+_NUMBERS = {str(kind.msgname): number for number, kind in mavlink.mavlink_map.items()}
 
 
 class FaultError(ValueError):
     """A fault that does not exist or lacks a field; the text says which."""
 
 
+def _known(name: str) -> str:
+    if name not in _NUMBERS:
+        raise FaultError(f"no message is called {name!r}")
+    return name
+
+
 @dataclass
 class CommandFault:
-    """A fault that concerns commands: command id or ALL_COMMANDS, how often it still happens."""
+    """A fault that concerns commands: command id or ALL_COMMANDS, how often it still happens.
+
+    `drop` concerns messages of any name; command narrows it to some commands.
+    """
 
     command: int
+    message: str = ""
     count: float = math.inf
     seconds: float = 0.0
     result: int = 0
@@ -54,7 +66,7 @@ class PlannedAck:
 class Faults:
     """Which faults are active."""
 
-    KINDS = ("lose_acks", "delay_acks", "foreign_ack", "refuse", "in_progress")
+    KINDS = ("drop", "lose_acks", "delay_acks", "foreign_ack", "refuse", "in_progress")
 
     def __init__(self) -> None:
         self.clear()
@@ -63,6 +75,7 @@ class Faults:
         """Everything works again."""
         self._mute_until = self._deaf_until = -math.inf
         self.gps_frozen_until = -math.inf
+        self._spoilt: dict[str, tuple[float, tuple[str, ...]]] = {}
         self._command: dict[str, list[CommandFault]] = {kind: [] for kind in self.KINDS}
 
     def silence(self, now: float, seconds: float, *, sending: bool, receiving: bool) -> None:
@@ -76,6 +89,24 @@ class Faults:
         """Report the present position for seconds, whatever the vehicle does."""
         self.gps_frozen_until = now + seconds
 
+    def spoil(self, name: str, fields: Sequence[str], now: float, seconds: float) -> None:
+        """Send NaN in float fields of the telemetry message NAME for seconds; without fields in all of them."""
+        kind = mavlink.mavlink_map[_NUMBERS[_known(name)]]
+        floats = [field for field, of in zip(kind.fieldnames, kind.fieldtypes, strict=True) if of in FLOATS]
+        wanted = tuple(fields) or tuple(floats)
+        if not wanted or not set(wanted) <= set(floats):
+            raise FaultError(f"{name} has the float fields {floats}")
+        self._spoilt[name] = now + seconds, wanted
+
+    def spoilt(self, message: Any, now: float) -> Any:
+        """The message as it is to be sent now."""
+        until, fields = self._spoilt.get(message.get_type(), (-math.inf, ()))
+        if now < until:
+            for field in fields:
+                value = getattr(message, field)
+                setattr(message, field, [math.nan] * len(value) if isinstance(value, list) else math.nan)
+        return message
+
     def add(self, kind: str, fields: Mapping[str, Any]) -> None:
         """Make a fault of commands active; FaultError when the fields make no sense."""
         if kind not in self._command:
@@ -83,13 +114,14 @@ class Faults:
         try:
             command = fields.get("command", "all")
             fault = CommandFault(ALL_COMMANDS if command == "all" else int(command))
+            fault.message = _known(str(fields["message"])) if kind == "drop" else ""
             fault.count = float(fields.get("count", math.inf))
             fault.seconds = float(fields.get("seconds", 0.0))
             fault.result = int(fields.get("result", mavlink.MAV_RESULT_FAILED))
             fault.text = str(fields.get("text", ""))
             fault.system = int(fields.get("system", FOREIGN_SYSTEM))
             fault.component = int(fields.get("component", FOREIGN_COMPONENT))
-        except (TypeError, ValueError) as error:
+        except (KeyError, TypeError, ValueError) as error:
             raise FaultError(f"{kind}: {error}") from error
         self._command[kind].append(fault)
 
@@ -100,6 +132,11 @@ class Faults:
     def deaf(self, now: float) -> bool:
         """Whether nothing is heard now."""
         return now < self._deaf_until
+
+    def drops(self, message: Any) -> bool:
+        """Whether this message is lost on its way to the vehicle; counts it."""
+        name, command = message.get_type(), getattr(message, "command", ALL_COMMANDS)
+        return any(fault.message == name and fault.take(command) for fault in self._command["drop"])
 
     def refusal(self, command: int) -> CommandFault | None:
         """The fault that refuses this command instead of doing it, if any."""

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from .events import StatusText
-from .frames import HIGHEST_ALTITUDE
+from .frames import HIGHEST_ALTITUDE, global_target
 from .mission import SUPPORTED, Item, home_item
 
 if TYPE_CHECKING:
@@ -24,6 +24,10 @@ LIMIT = 724
 RETRY_AFTER = 1.0
 GIVE_UP_AFTER = 8.0
 MISSION = mavlink.MAV_MISSION_TYPE_MISSION
+GUIDED_TARGET = 2
+"""Value of `current` in an item that GUIDED flies to at once."""
+ALTITUDE_CHANGE = 3
+"""Value of `current` in an item that changes the height; ArduCopter accepts it and does nothing."""
 OTHER_LISTS = (mavlink.MAV_MISSION_TYPE_FENCE, mavlink.MAV_MISSION_TYPE_RALLY)
 
 
@@ -146,9 +150,8 @@ class MissionProtocol:
             upload.link.send(mavlink.MAVLink_mission_request_message(*upload.sender, upload.next, upload.kind))
 
     def _item(self, link: Link, message: Any) -> None:
-        if message.current == 2 and message.get_type() == "MISSION_ITEM":
-            # The old way to send a guided waypoint, which nobody should use any more.
-            self._ack(link, message, mavlink.MAV_MISSION_UNSUPPORTED)
+        if message.mission_type == MISSION and message.current in (GUIDED_TARGET, ALTITUDE_CHANGE):
+            self._ack(link, message, self._take_guided(message))
             return
         upload = self._upload
         if upload is None or upload.kind != message.mission_type:
@@ -159,6 +162,29 @@ class MissionProtocol:
             self._ack(link, message, mavlink.MAV_MISSION_DENIED)
         else:
             self._take(link, message, upload)
+
+    def _take_guided(self, message: Any) -> int:
+        """An item that is for now and not for the mission; a MAV_MISSION_RESULT."""
+        refusal = _refusal(message)
+        if refusal is not None:
+            return refusal
+        done = message.current == ALTITUDE_CHANGE or self._fly_guided(_as_item(message))
+        return int(mavlink.MAV_MISSION_ACCEPTED if done else mavlink.MAV_MISSION_ERROR)
+
+    def _fly_guided(self, item: Item) -> bool:
+        copter = self.copter
+        if copter.mode is not copter.guided:
+            return False
+        if item.command == mavlink.MAV_CMD_CONDITION_YAW:
+            copter.fix_yaw(item.param1, item.param2, int(item.param3), item.param4 > 0)
+            return True
+        # Items that are not for a place have the mission frame; ArduCopter reads heights in it as AMSL.
+        frame = mavlink.MAV_FRAME_GLOBAL if item.frame == mavlink.MAV_FRAME_MISSION else item.frame
+        target = global_target(copter, frame, item.x, item.y, item.z)
+        if item.command != mavlink.MAV_CMD_NAV_WAYPOINT or target is None:
+            return False
+        copter.guided.go_to(target)
+        return True
 
     def _take(self, link: Link, message: Any, upload: Upload) -> None:
         refusal = _refusal(message) if upload.kind == MISSION and message.seq > 0 else None

@@ -7,12 +7,24 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from .geodesy import Ned, from_ned
+from .geodesy import from_ned
 from .message_source import MessageSource
+from .modes.guided import ZERO, Submode
 from .physics import GRAVITY
+from .setpoints import ACCELERATION_IGNORE, POSITION_IGNORE, VELOCITY_IGNORE, YAW_IGNORE, YAW_RATE_IGNORE
 
-IGNORE_ALL_BUT_POSITION = 0x0FF8
-IGNORE_ALL_BUT_VELOCITY = 0x0C07
+NO_YAW = YAW_IGNORE | YAW_RATE_IGNORE
+ONLY_POSITION = VELOCITY_IGNORE | ACCELERATION_IGNORE | NO_YAW
+UNUSED_MASK_BITS = 0xF000
+"""ArduCopter sets them in POSITION_TARGET_GLOBAL_INT."""
+TARGET_MASKS = {
+    Submode.TAKEOFF: ONLY_POSITION,
+    Submode.POSITION: ONLY_POSITION,
+    Submode.TRACKING: NO_YAW,
+    Submode.VELOCITY: POSITION_IGNORE | NO_YAW,
+    Submode.ACCELERATION: POSITION_IGNORE | VELOCITY_IGNORE | NO_YAW,
+}
+"""The type mask of POSITION_TARGET_LOCAL_NED in each submode of GUIDED."""
 UNKNOWN_QUATERNION = [math.nan] * 4
 
 
@@ -76,7 +88,7 @@ class MotionMessages(MessageSource):
         return mavlink.MAVLink_position_target_global_int_message(
             self._milliseconds(),
             mavlink.MAV_FRAME_GLOBAL,
-            0xF000 | IGNORE_ALL_BUT_POSITION,
+            UNUSED_MASK_BITS | ONLY_POSITION,
             round(place.latitude * 1e7),
             round(place.longitude * 1e7),
             place.altitude,
@@ -84,19 +96,19 @@ class MotionMessages(MessageSource):
         )
 
     def _build_position_target_local_ned(self) -> Any | None:
+        """GUIDED's targets. A takeoff has none of its own and reports the position that was flown to last."""
         copter = self.copter
         guided = copter.guided
         if copter.mode is not guided:
             return None
-        velocity_only = guided.submode.name in ("VELOCITY", "ACCELERATION")
-        position = Ned(0.0, 0.0, 0.0) if velocity_only else guided.position_target
+        mask = TARGET_MASKS[guided.submode]
         return mavlink.MAVLink_position_target_local_ned_message(
             self._milliseconds(),
             mavlink.MAV_FRAME_LOCAL_NED,
-            IGNORE_ALL_BUT_VELOCITY if velocity_only else IGNORE_ALL_BUT_POSITION,
-            *position,
-            *guided.velocity_target,
-            *guided.acceleration_target,
+            mask,
+            *(ZERO if mask & POSITION_IGNORE else guided.position_target),
+            *(ZERO if mask & VELOCITY_IGNORE else guided.velocity_target),
+            *(ZERO if mask & ACCELERATION_IGNORE else guided.acceleration_target),
             0.0,
             0.0,
         )

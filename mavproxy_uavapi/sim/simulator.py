@@ -131,13 +131,13 @@ class Simulator:
         """Queue a message about the present state for one link, if there is something to say."""
         message = self.telemetry.build(name)
         if message is not None:
-            link.send(message)
+            link.send(self.faults.spoilt(message, self.copter.now))
 
     def send_soon(self, link: Link, name: str) -> None:
         """The same with the next step."""
         message = self.telemetry.build(name)
         if message is not None:
-            self._plan(self.copter.now, link, message)
+            self._plan(self.copter.now, link, self.faults.spoilt(message, self.copter.now))
 
     def _plan(self, at: float, link: Link, message: Any, source: tuple[int, int] | None = None) -> None:
         heapq.heappush(self._planned, (at, next(self._order), link, message, source))
@@ -190,7 +190,7 @@ class Simulator:
     def receive(self, link: Link, message: Any, wall: float = 0.0) -> None:
         """Take a decoded message from a link; wall is the caller's clock, kept for `received` only."""
         copter = self.copter
-        if self.faults.deaf(copter.now) or not self._for_us(message):
+        if self.faults.deaf(copter.now) or not self._for_us(message) or self.faults.drops(message):
             return
         self._received_count += 1
         self.received.append(Received(self._received_count, copter.now, wall, link.name, message))

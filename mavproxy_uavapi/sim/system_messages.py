@@ -115,7 +115,8 @@ class SystemMessages(MessageSource):
 
     def _build_servo_output_raw(self) -> Any:
         copter = self.copter
-        motor = 1000 + round(1000 * min(copter.throttle * copter.hover_throttle, 1.0))
+        idle = copter.parameters["MOT_SPIN_ARM"] if copter.motors_turn else 0.0
+        motor = 1000 + round(1000 * min(max(copter.throttle * copter.hover_throttle, idle), 1.0))
         pulses = copter.servos.pulses(motor)
         return mavlink.MAVLink_servo_output_raw_message(
             self._microseconds() & 0xFFFFFFFF, 0, *pulses[:8], *pulses[8:]

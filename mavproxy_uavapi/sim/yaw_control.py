@@ -109,7 +109,7 @@ class AutoYaw:
         if self.mode is YawMode.HOLD:
             return 0.0
         if self.mode is YawMode.RATE:
-            return max(-self.slew * 3, min(self.slew * 3, self._rate))
+            return max(-self.slew, min(self.slew, self._rate))
         if self.mode is YawMode.COURSE:
             if math.hypot(*course) <= speed_limit * MIN_COURSE_SHARE:
                 self._target = yaw

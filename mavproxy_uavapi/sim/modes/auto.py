@@ -313,7 +313,7 @@ class Auto(Mode):
         return True
 
     def pause(self) -> bool:
-        if self.submode is not Submode.WAYPOINT or self._arrived_at is not None:
+        if self.submode is not Submode.WAYPOINT or self._arrived_at is not None or self.copter.arrived(self._target):
             return False
         self.paused = True
         return True

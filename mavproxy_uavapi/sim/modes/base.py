@@ -89,6 +89,13 @@ class Mode:
         """Where the vehicle is going, metres NED from the EKF origin, or None."""
         return None
 
+    def hold_still(self, dt: float) -> Demand:
+        """Brake to a stop and stay there, without turning."""
+        control, estimate = self.copter.position, self.copter.estimator
+        control.fly_at(0.0, 0.0, dt)
+        control.climb_at(0.0, dt)
+        return Demand(control.thrust(estimate.position, estimate.velocity, dt))
+
     def fly(self, dt: float) -> Demand:
         """Follow the position controller's trajectory and the automatic yaw."""
         copter = self.copter

@@ -87,12 +87,12 @@ class Guided(Mode):
     def fly_at(self, velocity: Ned, acceleration: Ned, yaw: YawSetpoint = NO_YAW) -> None:
         """Fly with velocity (m/s) until GUID_TIMEOUT passes without another setpoint."""
         self._accept(Submode.VELOCITY, yaw)
-        self.velocity_target, self.acceleration_target = velocity, acceleration
+        self.position_target, self.velocity_target, self.acceleration_target = ZERO, velocity, acceleration
 
     def accelerate_at(self, acceleration: Ned, yaw: YawSetpoint = NO_YAW) -> None:
         """Accelerate (m/s/s) until GUID_TIMEOUT passes without another setpoint."""
         self._accept(Submode.ACCELERATION, yaw)
-        self.velocity_target, self.acceleration_target = ZERO, acceleration
+        self.position_target, self.velocity_target, self.acceleration_target = ZERO, ZERO, acceleration
 
     def take_off(self, altitude: float) -> bool:
         copter = self.copter
@@ -100,8 +100,6 @@ class Guided(Mode):
             return False
         self.submode = Submode.TAKEOFF
         self.takeoff.start(copter.home_offset.down - altitude)
-        here = copter.estimator.position
-        self.position_target = Ned(here.north, here.east, self.takeoff.target_down)
         copter.auto_armed = True
         return True
 
@@ -112,22 +110,19 @@ class Guided(Mode):
         if copter.grounded:
             return self.wait_on_ground()
         if self.paused:
-            copter.position.fly_at(0.0, 0.0, dt)
-            copter.position.climb_at(0.0, dt)
-            return Demand(self.fly(dt).thrust)
-        if copter.now - self._updated > max(copter.parameters["GUID_TIMEOUT"], SHORTEST_TIMEOUT):
+            return self.hold_still(dt)
+        expired = copter.now - self._updated > max(copter.parameters["GUID_TIMEOUT"], SHORTEST_TIMEOUT)
+        if expired:
             self._expire()
-        self._move(dt)
+        self._move(expired, dt)
         return self.fly(dt)
 
     def _expire(self) -> None:
         """Nobody has renewed the setpoint: stop moving and turning. A position stays the target."""
         self.copter.yaw.stop_turning()
         self.velocity_target = self.acceleration_target = ZERO
-        if self.submode is Submode.ACCELERATION:
-            self.submode = Submode.VELOCITY
 
-    def _move(self, dt: float) -> None:
+    def _move(self, expired: bool, dt: float) -> None:
         control = self.copter.position
         if self.submode is Submode.POSITION:
             control.go_to(self.position_target, dt)
@@ -136,13 +131,17 @@ class Guided(Mode):
                 *(p + v * dt for p, v in zip(self.position_target, self.velocity_target, strict=True))
             )
             control.track(self.position_target, self.velocity_target, self.acceleration_target, dt)
-        elif self.submode is Submode.ACCELERATION:
+        elif self.submode is Submode.ACCELERATION and not expired:
             control.accelerate_at(self.acceleration_target, dt)
         else:
             control.fly_at(self.velocity_target.north, self.velocity_target.east, dt)
             control.climb_at(self.velocity_target.down, dt)
 
     def set_speed(self, kind: Speed, speed: float) -> bool:
+        """As in ArduCopter a new speed up brings back the default speed down, and the other way round."""
+        limits, default = self.copter.position.limits, self.copter.default_limits()
+        if kind is not Speed.HORIZONTAL:
+            limits.speed_up, limits.speed_down = default.speed_up, default.speed_down
         self.copter.change_limit(kind, speed)
         return True
 

@@ -140,7 +140,7 @@ class Loiter(AltHold):
 
 
 class Brake(Mode):
-    """Stop as fast as possible and stay; the sticks do nothing."""
+    """Stop as fast as possible and stay; neither sticks nor CONDITION_YAW do anything."""
 
     name = "BRAKE"
     number = 17
@@ -154,12 +154,9 @@ class Brake(Mode):
         self.copter.position.limits = limits
         # Braking begins now, not after a started acceleration has run out.
         self.copter.position.acceleration[:2] = [0.0, 0.0]
-        self.copter.yaw.hold()
         return True
 
     def step(self, dt: float) -> Demand:
         if self.copter.grounded:
             return self.wait_on_ground()
-        self.copter.position.fly_at(0.0, 0.0, dt)
-        self.copter.position.climb_at(0.0, dt)
-        return self.fly(dt)
+        return self.hold_still(dt)

@@ -123,4 +123,7 @@ class Rtl(Mode):
 
     @property
     def target(self) -> Ned | None:
-        return None if self.stage is Stage.LAND or not self._planned else self._target
+        """The waypoint of the stage; the final descent is flown without one and keeps that of the return."""
+        if self.stage is Stage.LAND or not self._planned:
+            return None
+        return self._target._replace(down=self._return_down)

@@ -38,6 +38,7 @@ class Takeoff:
         if copter.landed:
             copter.relax()
             if not copter.spooled_up:
+                self._throttle = 0.0
                 return SPOOLING
             self._throttle += dt / max(copter.parameters["TKOFF_SLEW_TIME"], 0.1)
             if self._throttle < copter.hover_throttle:

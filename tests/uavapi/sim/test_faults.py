@@ -1,4 +1,5 @@
 import json
+import math
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -146,6 +147,99 @@ def test_a_bad_estimator_is_not_ready_until_it_recovers(control):
     assert control.ground.arm() == mavlink.MAV_RESULT_ACCEPTED
 
 
+def test_nan_spoils_the_floats_of_one_message_for_its_time(flying):
+    control = Line(flying)
+    control.fault("nan", message="LOCAL_POSITION_NED", seconds=2)
+    for name in ("LOCAL_POSITION_NED", "ATTITUDE"):
+        flying.command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, getattr(mavlink, f"MAVLINK_MSG_ID_{name}"), 100000)
+    flying.run(1.0)
+    assert all(math.isnan(m.x) and math.isnan(m.vz) and m.time_boot_ms > 0 for m in flying.of("LOCAL_POSITION_NED"))
+    assert not any(math.isnan(m.yaw) for m in flying.of("ATTITUDE"))
+    flying.run(1.5)
+    assert flying.of("LOCAL_POSITION_NED")[-1].z == pytest.approx(-10.0, abs=0.1)
+
+
+def test_nan_can_concern_some_fields_and_ends_when_cleared(flying):
+    control = Line(flying)
+    control.fault("nan", message="ATTITUDE", fields=["yaw"])
+    flying.command(mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAVLINK_MSG_ID_ATTITUDE)
+    attitude = flying.of("ATTITUDE")[-1]
+    assert math.isnan(attitude.yaw)
+    assert not math.isnan(attitude.roll)
+    control.ask(op="clear")
+    flying.command(mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAVLINK_MSG_ID_ATTITUDE)
+    assert not math.isnan(flying.of("ATTITUDE")[-1].yaw)
+
+
+def test_dropped_messages_are_not_heard(control):
+    control.fault("drop", message="COMMAND_LONG", command=HOME, count=2)
+    for expected in (0, 0, 1):
+        send_command(control.ground)
+        assert len(acks(control.ground, 0.1)) == expected
+    assert len(control.ask(op="received")["messages"]) == 1
+
+
+def test_dropped_messages_leave_others_alone(flying):
+    control = Line(flying)
+    control.fault("drop", message="SET_POSITION_TARGET_LOCAL_NED", count=1)
+    send_command(flying)
+    assert len(acks(flying, 0.1)) == 1
+    flying.local((20.0, 0.0, -10.0))
+    flying.run(2.0)
+    assert flying.body.north == pytest.approx(0.0, abs=0.1)
+    flying.local((20.0, 0.0, -10.0))
+    flying.run(2.0)
+    assert flying.body.north > 1.0
+
+
+@pytest.mark.parametrize("mode", [0, 2, 5])
+def test_a_pilot_arms_by_radio_and_climbs(control, mode):
+    control.ground.mode(mode)
+    control.fault("pilot_arm")
+    assert control.ask(op="state")["armed"]
+    control.ground.run(6.0)
+    assert control.ask(op="state")["altitude_above_home"] > 1.0
+
+
+def test_a_pilot_arms_by_radio_before_the_position_is_known(ground):
+    control = Line(ground)
+    ground.run(3.0)
+    control.fault("pilot_arm", throttle=1600)
+    ground.run(5.0)
+    assert not control.ask(op="state")["landed"]
+
+
+def test_a_pilot_may_leave_the_throttle_down(control):
+    control.fault("pilot_arm", throttle=1000)
+    control.ground.run(4.0)
+    assert control.ask(op="state")["armed"]
+    assert control.ask(op="state")["landed"]
+
+
+@pytest.mark.parametrize("mode", [4, 9, 17])
+def test_a_pilot_cannot_arm_by_radio_in_every_mode(control, mode):
+    control.ground.mode(mode)
+    assert not control.ask(op="fault", name="pilot_arm")["ok"]
+    assert not control.ask(op="state")["armed"]
+
+
+def test_another_station_gives_a_position_that_is_not_listed_as_received(flying):
+    control = Line(flying)
+    last = control.ask(op="received")["last"]
+    control.fault("other_station", position=[20, 5, -12])
+    flying.run(12.0)
+    assert flying.body.position == pytest.approx((20.0, 5.0, -12.0), abs=0.3)
+    assert control.ask(op="received", since=last)["messages"] == []
+
+
+def test_another_station_gives_a_velocity_that_expires(flying):
+    Line(flying).fault("other_station", velocity=[0, 2, 0])
+    flying.run(2.5)
+    assert flying.body.velocity_east == pytest.approx(2.0, abs=0.3)
+    flying.run(5.0)
+    assert flying.body.velocity_east == pytest.approx(0.0, abs=0.1)
+
+
 def test_what_was_received_is_told_by_index(control):
     send_command(control.ground)
     control.ground.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
@@ -169,6 +263,14 @@ def test_what_was_received_is_told_by_index(control):
         "7",
         '{"op": "fault", "name": "refuse", "count": "many"}',
         '{"op": "fault", "name": "silence", "seconds": -1}',
+        '{"op": "fault", "name": "nan"}',
+        '{"op": "fault", "name": "nan", "message": "NOPE"}',
+        '{"op": "fault", "name": "nan", "message": "ATTITUDE", "fields": ["nope"]}',
+        '{"op": "fault", "name": "nan", "message": "HEARTBEAT"}',
+        '{"op": "fault", "name": "drop"}',
+        '{"op": "fault", "name": "drop", "message": "NOPE"}',
+        '{"op": "fault", "name": "other_station", "position": [1, 2, 3]}',
+        '{"op": "fault", "name": "other_station"}',
     ],
 )
 def test_nonsense_is_answered_with_an_error(control, line):

@@ -270,3 +270,81 @@ def test_the_nose_follows_the_way_unless_told_not_to(flying):
     flying.local((0.0, -60.0, -10.0))
     flying.run(8.0)
     assert flying.heading == pytest.approx(90.0, abs=2.0)
+
+
+@pytest.mark.parametrize(("x", "y", "z"), [(0, 0, 12.0), (-353632610, 1491652300, 0.0)])
+def test_a_reposition_to_no_place_or_height_is_denied(flying, x, y, z):
+    frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
+    result = flying.command_int(mavlink.MAV_CMD_DO_REPOSITION, frame, (-1, 0, 0, 0), (x, y, z))
+    assert result == mavlink.MAV_RESULT_DENIED
+    flying.run(2.0)
+    assert flying.body.position == pytest.approx((0.0, 0.0, -10.0), abs=0.1)
+
+
+def test_a_reposition_does_not_end_a_pause(flying):
+    flying.command(mavlink.MAV_CMD_DO_PAUSE_CONTINUE, 0)
+    where = (-353631610, 1491652300, 10.0)
+    reposition = mavlink.MAV_CMD_DO_REPOSITION
+    assert flying.command_int(reposition, 3, (-1, 1, 0, 0), where) == mavlink.MAV_RESULT_ACCEPTED
+    flying.run(3.0)
+    assert flying.body.position == pytest.approx((0.0, 0.0, -10.0), abs=0.1)
+    flying.command(mavlink.MAV_CMD_DO_PAUSE_CONTINUE, 1)
+    flying.run(10.0)
+    assert flying.body.north == pytest.approx(11.1, abs=0.2)
+
+
+def test_a_yaw_rate_is_held_to_the_slew_limit(flying):
+    before = flying.heading
+    flying.local((0.0, 0.0, 0.0), VELOCITY_AND_YAW_RATE, yaw_rate=2.0)
+    flying.run(2.0)
+    assert 90.0 < (flying.heading - before) % 360 < 121.0
+
+
+def test_brake_does_not_turn(flying):
+    flying.mode(17)
+    before = flying.heading
+    assert flying.command(mavlink.MAV_CMD_CONDITION_YAW, 90, 0, 1, 1) == mavlink.MAV_RESULT_ACCEPTED
+    flying.run(3.0)
+    assert flying.heading == pytest.approx(before, abs=0.5)
+
+
+@pytest.mark.parametrize(
+    ("number", "taken"), [(0, False), (2, False), (5, False), (9, False), (17, False), (4, True), (6, True)]
+)
+def test_only_modes_with_a_speed_of_their_own_take_one(flying, number, taken):
+    flying.mode(number)
+    expected = mavlink.MAV_RESULT_ACCEPTED if taken else mavlink.MAV_RESULT_FAILED
+    for kind in range(4):
+        assert flying.command(mavlink.MAV_CMD_DO_CHANGE_SPEED, kind, 3) == expected
+    assert flying.command(mavlink.MAV_CMD_DO_CHANGE_SPEED, 4, 3) == mavlink.MAV_RESULT_DENIED
+    assert flying.command(mavlink.MAV_CMD_DO_CHANGE_SPEED, 5, 3) == mavlink.MAV_RESULT_FAILED
+
+
+def test_one_vertical_speed_resets_the_other(flying):
+    flying.local((0.0, 0.0, -10.0))
+    flying.command(mavlink.MAV_CMD_DO_CHANGE_SPEED, 2, 1)
+    flying.command(mavlink.MAV_CMD_DO_CHANGE_SPEED, 3, 0.5)
+    limits = flying.copter.position.limits
+    assert (limits.speed_up, limits.speed_down) == (2.5, 0.5)
+    flying.command(mavlink.MAV_CMD_DO_CHANGE_SPEED, 2, 1)
+    assert (limits.speed_up, limits.speed_down) == (1.0, 1.5)
+
+
+def test_the_speed_for_a_takeoff_is_the_one_set_in_guided_before_it(ground):
+    ground.run(6.0)
+    ground.mode(4)
+    ground.command(mavlink.MAV_CMD_DO_CHANGE_SPEED, 2, 1)
+    ground.arm()
+    ground.command(TAKEOFF, 0, 0, 0, 0, 0, 0, 10)
+    ground.run(9.0)
+    assert ground.body.velocity_down == pytest.approx(-1.0, abs=0.1)
+
+
+def test_a_short_timeout_ends_velocity_and_yaw_rate(flying):
+    flying.send(mavlink.MAVLink_param_set_message(1, 1, b"GUID_TIMEOUT", 1.0, 9))
+    flying.local((2.0, 0.0, 0.0), VELOCITY_AND_YAW_RATE, yaw_rate=0.5)
+    flying.run(0.9)
+    assert flying.body.yaw_rate == pytest.approx(0.5, abs=0.05)
+    flying.run(3.0)
+    assert flying.body.yaw_rate == pytest.approx(0.0, abs=0.05)
+    assert flying.body.velocity_north == pytest.approx(0.0, abs=0.3)
