@@ -30,7 +30,7 @@ def begin(loop: Any, host: Any, tracks: Tracking, system: int, name: str = "a") 
     flight = flight_of(host.hangar.find(system), PLACES, 1000.0)
 
     async def begun() -> Any:
-        return host.jobs.begin(flight.copter.seat, "fly", {"name": name}, lambda job: tracks.fly(flight, job))
+        return host.jobs.begin(flight.copter, "fly", {"name": name}, lambda job: tracks.fly(flight, job))
 
     job: Job = loop.run(begun())
     loop.settle()

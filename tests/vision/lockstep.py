@@ -228,7 +228,7 @@ class Lockstep:
             return str(verb.result()) if hasattr(verb, "result") else "done"
 
         async def start() -> Any:
-            return self.host.jobs.begin(self.copter.seat, name, {"n": self.loop.time()}, body, outlives_client=True)
+            return self.host.jobs.begin(self.copter, name, {"n": self.loop.time()}, body, outlives_client=True)
 
         return self.run(start())
 
