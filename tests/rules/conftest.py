@@ -282,9 +282,15 @@ class World:
         """The messages of these, but for the watch over the telemetry."""
         return [m for _, m in sent if getattr(m, "command", None) not in HOUSEKEEPING]
 
+    def end_jobs(self) -> None:
+        """End the jobs in flight, and leave the vehicle as it is."""
+        callbacks, self.host.jobs.on_ended = self.host.jobs.on_ended, []
+        self.host.jobs.abort_remote("the test is over")
+        self.host.jobs.on_ended = callbacks
+
     def close(self) -> None:
         """End what is in flight."""
-        self.host.jobs.abort_remote("the test is over")
+        self.end_jobs()
         for task in self._tasks:
             task.cancel()
         self.loop.settle()
