@@ -8,6 +8,7 @@ from typing import Any
 
 from pymavlink import mavutil
 
+from mavproxy_uavapi.host import autopilot
 from mavproxy_uavapi.host.timeratio import TimeRatio
 
 mavlink = mavutil.mavlink
@@ -20,14 +21,6 @@ RECENT = 5.0  # s before the newest heartbeat; a state that was told earlier is 
 SEQUENCE_REORDER = 128  # a step back of less than this is a message out of order, not a loss
 FAILING = {mavlink.MAV_STATE_CRITICAL, mavlink.MAV_STATE_EMERGENCY}
 ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
-NOT_VEHICLES = {
-    mavlink.MAV_TYPE_GCS,
-    mavlink.MAV_TYPE_ADSB,
-    mavlink.MAV_TYPE_GIMBAL,
-    mavlink.MAV_TYPE_ONBOARD_CONTROLLER,
-    mavlink.MAV_TYPE_CAMERA,
-    mavlink.MAV_TYPE_ODID,
-}
 # What a reboot makes worthless; the rest is overwritten soon enough.
 FORGOTTEN_AT_REBOOT = ("HOME_POSITION", "HEARTBEAT", "EXTENDED_SYS_STATE", "SYS_STATUS", "EKF_STATUS_REPORT")
 
@@ -202,6 +195,17 @@ class VehicleState:
         for number in [n for n, text in self._chunks.items() if now - text.heard_at > CHUNK_TIMEOUT]:
             self._say_chunked(number, now)
 
+    def become(self, component: int, vehicle_type: int, now: float) -> None:
+        """Be the state of another component from now on, which has turned out to be the autopilot.
+
+        What that one told so far counts; what the former one told moves to `others`.
+        """
+        told = {(self.component, name): received for name, received in self.messages.items() if "[" not in name}
+        others = {**self.others, **told}
+        own = {name: others.pop((c, name)) for c, name in list(others) if c == component}
+        fresh = VehicleState(self.system, component, vehicle_type, now, messages=own, others=others)
+        vars(self).update(vars(fresh))  # in place: whoever flies or watches the vehicle holds this object
+
     def _take_heartbeat(self, message: Any, now: float) -> None:
         self.heartbeat_at = now
         self.vehicle_type = message.type
@@ -248,28 +252,35 @@ def _keep(store: dict[Any, Received], key: Any, message: Any, now: float) -> Non
 
 
 class Fleet:
-    """Every vehicle that was ever heard on the links, by system id."""
+    """Every vehicle that was ever heard on the links, by system id.
+
+    A system's state is its autopilot's, by `autopilot.rank`; when a better candidate is heard it becomes that one's.
+    It never goes back, not even when the better one falls silent: a second autopilot's mode and arming, told
+    from one moment to the next, would be taken for the vehicle's own. The link is lost then, and that is told.
+    """
 
     def __init__(self) -> None:
         self.vehicles: dict[int, VehicleState] = {}
+        self._ranks: dict[int, int] = {}
 
     def update(self, message: Any, now: float) -> VehicleState | None:
         """Take a message; the state of the vehicle it came from, None when it came from no vehicle."""
         system = message.get_srcSystem()
+        if message.get_type() == "HEARTBEAT":
+            self._take_candidate(message, now)
         state = self.vehicles.get(system)
-        if state is None:
-            if not is_vehicle_heartbeat(message):
-                return None
-            state = VehicleState(system, message.get_srcComponent(), message.type, now)
-            self.vehicles[system] = state
-        state.update(message, now)
+        if state is not None:
+            state.update(message, now)
         return state
 
-
-def is_vehicle_heartbeat(message: Any) -> bool:
-    """Whether `message` is the heartbeat of an autopilot, rather than of a gimbal or a ground station."""
-    return bool(
-        message.get_type() == "HEARTBEAT"
-        and message.autopilot != mavlink.MAV_AUTOPILOT_INVALID
-        and message.type not in NOT_VEHICLES
-    )
+    def _take_candidate(self, heartbeat: Any, now: float) -> None:
+        system, rank = heartbeat.get_srcSystem(), autopilot.rank(heartbeat)
+        if rank <= self._ranks.get(system, autopilot.NONE):
+            return
+        self._ranks[system] = rank
+        component = heartbeat.get_srcComponent()
+        state = self.vehicles.get(system)
+        if state is None:
+            self.vehicles[system] = VehicleState(system, component, heartbeat.type, now)
+        elif component != state.component:
+            state.become(component, heartbeat.type, now)
