@@ -43,8 +43,8 @@ def rank(heartbeat: Any) -> int:
     """
     if heartbeat.autopilot == mavlink.MAV_AUTOPILOT_INVALID or heartbeat.type in NOT_VEHICLES:
         return NONE
-    named = heartbeat.autopilot not in UNNAMED
-    first = heartbeat.get_srcComponent() == FIRST
+    named: bool = heartbeat.autopilot not in UNNAMED
+    first: bool = heartbeat.get_srcComponent() == FIRST
     if heartbeat.type == mavlink.MAV_TYPE_GENERIC and not (named and first):
         return NONE
     return 1 + 2 * named + first

@@ -10,6 +10,7 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.host import autopilot
 from mavproxy_uavapi.host.timeratio import TimeRatio
+from mavproxy_uavapi.vehicle.modes import kind_of
 
 mavlink = mavutil.mavlink
 
@@ -154,17 +155,24 @@ class VehicleState:
     def landed(self) -> bool | None:
         """Whether it stands on the ground; None while unknown.
 
-        A disarmed vehicle does. Else whichever told last: EXTENDED_SYS_STATE, or the heartbeat, whose
-        system_status is STANDBY on the ground and ACTIVE in the air (ArduCopter); CRITICAL says neither.
+        A rover or boat always does: its heartbeat says ACTIVE in every mode but HOLD, and it sends no landed state
+        (ArduRover, vehicle_system_status). Any other vehicle does while it is disarmed. Else EXTENDED_SYS_STATE
+        tells, or the heartbeat: STANDBY on the ground, ACTIVE in the air, CRITICAL says neither. A copter's word
+        is the one that came last; a plane's heartbeat counts only while EXTENDED_SYS_STATE is not told.
         """
+        kind = kind_of(self.vehicle_type)
+        if kind == "rover":
+            return True
         if self.armed is None or self.system_status is None:
             return None
         if not self.armed:
             return True
         told = self.messages.get("EXTENDED_SYS_STATE")
-        in_doubt = self.system_status in FAILING
-        if told is not None and told.message.landed_state and (in_doubt or told.at >= self.heartbeat_at):
-            return bool(told.message.landed_state == mavlink.MAV_LANDED_STATE_ON_GROUND)
+        if told is not None and told.message.landed_state:
+            in_doubt = self.system_status in FAILING
+            behind = self.heartbeat_at - told.at
+            if in_doubt or behind <= (RECENT if kind == "plane" else 0.0):
+                return bool(told.message.landed_state == mavlink.MAV_LANDED_STATE_ON_GROUND)
         return bool(self.system_status not in {mavlink.MAV_STATE_ACTIVE} | FAILING)
 
     @property

@@ -204,6 +204,32 @@ def test_landed_is_the_heartbeats_word_without_extended_sys_state(
     assert state.landed is landed
 
 
+@pytest.mark.parametrize("vehicle_type", [mavlink.MAV_TYPE_GROUND_ROVER, mavlink.MAV_TYPE_SURFACE_BOAT])
+@pytest.mark.parametrize("system_status", [mavlink.MAV_STATE_ACTIVE, mavlink.MAV_STATE_CRITICAL])
+def test_rover_stands_on_the_ground_whatever_its_heartbeat_says(
+    hear: Any, vehicle_type: int, system_status: int
+) -> None:
+    state = hear("heartbeat", type=vehicle_type, armed=True, mode="MANUAL", system_status=system_status)
+    assert state.landed is True
+    hear("extended_sys_state", landed_state=mavlink.MAV_LANDED_STATE_UNDEFINED)
+    assert state.landed is True
+
+
+@pytest.mark.parametrize("vehicle_type", [mavlink.MAV_TYPE_FIXED_WING, 20])
+def test_plane_is_where_extended_sys_state_says_until_that_is_old(hear: Any, vehicle_type: int) -> None:
+    flying = {"type": vehicle_type, "armed": True, "system_status": mavlink.MAV_STATE_ACTIVE}
+    state = hear("heartbeat", **flying)
+    assert state.landed is False  # nothing else tells
+    hear("extended_sys_state", at=2.0, landed_state=GROUND)
+    hear("heartbeat", at=2.5, **flying)
+    assert state.landed is True
+    hear("extended_sys_state", at=3.0, landed_state=AIR)
+    hear("heartbeat", at=3.5, **{**flying, "system_status": mavlink.MAV_STATE_STANDBY})
+    assert state.landed is False
+    hear("heartbeat", at=8.5, **{**flying, "system_status": mavlink.MAV_STATE_STANDBY})
+    assert state.landed is True
+
+
 def test_status_text_in_chunks_is_one_text(state: VehicleState, hear: Any) -> None:
     hear("statustext", at=3.0, text="a" * 50, id=7, chunk_seq=0)
     hear("statustext", at=3.0, text="another", id=0)
