@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -98,7 +99,7 @@ class VehicleState:
         mode_since: arrival of the heartbeat that first showed the mode (s).
         messages: newest message by name, and by `NAME[instance]` for those that come for several devices.
         others: newest message by (component, name), of the system's other components.
-        parameters: values that PARAM_VALUE told, by name.
+        parameters: values by name, that PARAM_VALUE told or MAVProxy knew. A reboot does not change them.
     """
 
     system: int
@@ -269,6 +270,7 @@ class Fleet:
 
     def __init__(self) -> None:
         self.vehicles: dict[int, VehicleState] = {}
+        self._parameters: dict[tuple[int, int], dict[str, float]] = {}  # by system and component
         self._ranks: dict[int, int] = {}
 
     def update(self, message: Any, now: float) -> VehicleState | None:
@@ -281,6 +283,11 @@ class Fleet:
             state.update(message, now)
         return state
 
+    def learn(self, parameters: Mapping[tuple[int, int], Mapping[str, float]]) -> None:
+        """Take parameters by system and component, of vehicles that were heard or are yet to be."""
+        for key, values in parameters.items():
+            self._parameters.setdefault(key, {}).update(values)
+
     def _take_candidate(self, heartbeat: Any, now: float) -> None:
         system, rank = heartbeat.get_srcSystem(), autopilot.rank(heartbeat)
         if rank <= self._ranks.get(system, autopilot.NONE):
@@ -292,3 +299,4 @@ class Fleet:
             self.vehicles[system] = VehicleState(system, component, heartbeat.type, now)
         elif component != state.component:
             state.become(component, heartbeat.type, now)
+        self.vehicles[system].parameters = self._parameters.setdefault((system, component), {})

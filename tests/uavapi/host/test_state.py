@@ -120,6 +120,26 @@ def test_generic_autopilot_counts_when_it_is_alone_and_says_what_vehicle_it_is(f
     assert (state.component, state.vehicle_type) == (5, QUADROTOR)
 
 
+def test_parameters_are_known_before_and_after_their_vehicle_and_outlive_a_reboot(fleet: Fleet, hear: Any) -> None:
+    fleet.learn({(1, 1): {"RTL_ALT": 1500.0}, (1, 191): {"RTL_ALT": 1.0}})
+    state = hear("heartbeat")
+    fleet.learn({(1, 1): {"LAND_SPEED": 50.0}, (2, 1): {"LAND_SPEED": 30.0}})
+    assert state.parameters == {"RTL_ALT": 1500.0, "LAND_SPEED": 50.0}
+    hear("param_value", param_id="RTL_ALT", param_value=2000.0)
+    hear("attitude", time_boot_ms=60_000)
+    hear("attitude", time_boot_ms=400)
+    assert (state.reboots, state.parameters) == (1, {"RTL_ALT": 2000.0, "LAND_SPEED": 50.0})
+    assert hear("heartbeat", system=2).parameters == {"LAND_SPEED": 30.0}
+
+
+def test_parameters_are_those_of_the_component_that_turns_out_to_be_the_autopilot(fleet: Fleet, hear: Any) -> None:
+    fleet.learn({(1, 1): {"RTL_ALT": 1500.0}})
+    state = hear("heartbeat", component=191, autopilot=mavlink.MAV_AUTOPILOT_GENERIC)
+    assert state.parameters == {}
+    hear("heartbeat")
+    assert state.parameters == {"RTL_ALT": 1500.0}
+
+
 def test_copter_that_does_not_know_its_frame_yet_is_a_vehicle(fleet: Fleet, hear: Any) -> None:
     state = hear("heartbeat", type=mavlink.MAV_TYPE_GENERIC)
     hear("heartbeat")
