@@ -9,7 +9,6 @@ from typing import Any
 
 try:
     from mavproxy_gradys import console
-    from mavproxy_gradys.errands import Errands
     from mavproxy_gradys.http import Handlers
     from mavproxy_gradys.service import Gradys
     from mavproxy_gradys.settings import ModuleSettings, Settings
@@ -17,6 +16,7 @@ try:
     from mavproxy_gradys.track_console import TrackConsole
 except ModuleNotFoundError as missing:  # MAVProxy prints the text of an ImportError as one line
     raise ImportError(f"gradys needs {missing.name}: pip install mavproxy-uavapi") from missing
+from mavproxy_uavapi.host.errands import Errands
 from mavproxy_uavapi.host.member import HostedModule, value_of
 from mavproxy_uavapi.host.patience import within
 from mavproxy_uavapi.settings import SettingError
@@ -62,7 +62,7 @@ class GradysModule(HostedModule):
         super().__init__(mpstate, NAME, "GrADyS ground station push", actions, COMPLETIONS)
         self.add_completion_function(COMPLETION, self.gradys_settings.mp.completion)
         self.gradys = Gradys(self.host)
-        self._errands = Errands(self.host)
+        self._errands = Errands(self.host, NAME)
         self._track = TrackConsole(self.host, self.gradys.tracks)
         self._routes = Handlers(self.gradys).routes()
 
@@ -83,6 +83,7 @@ class GradysModule(HostedModule):
         await self.gradys.tracks.close()
         with contextlib.suppress(asyncio.TimeoutError):  # the spool is closed in its own thread
             await within(LONGEST_END, self.gradys.stop())
+        await self._errands.close()
 
     def unload(self) -> None:
         """Give back what is ours alone, then the rest."""
@@ -111,14 +112,14 @@ class GradysModule(HostedModule):
             await self.gradys.start(settings)
             return told(settings)
 
-        self._errands.send(start)
+        self._errands.send(start, "starting")
 
     def _stop(self) -> None:
         async def stop() -> str:
             await self.gradys.stop()
             return "stopped"
 
-        self._errands.send(stop)
+        self._errands.send(stop, "stopping")
 
     def _flush(self) -> None:
         self.host.bridge.call_soon(self.gradys.flush)
@@ -151,7 +152,7 @@ class GradysModule(HostedModule):
             return told(settings) if await self.gradys.restart(settings) else ""
 
         if settings != before and self._begun:
-            self._errands.send(restart)
+            self._errands.send(restart, "taking up the setting")
 
 
 def told(settings: Settings) -> str:

@@ -8,7 +8,6 @@ from collections.abc import Callable, Coroutine, Mapping
 from pathlib import Path
 from typing import Any, NoReturn
 
-from mavproxy_gradys.errands import Errands
 from mavproxy_gradys.track_flight import (
     HIGHEST_TAKEOFF,
     LARGEST_REACH,
@@ -21,6 +20,7 @@ from mavproxy_gradys.track_flight import (
 from mavproxy_gradys.tracking import Tracking
 from mavproxy_gradys.tracks import FORMATS, GROUND, Waypoint, places_of, style_of
 from mavproxy_uavapi.errors import BadRequest
+from mavproxy_uavapi.host.errands import Errands
 from mavproxy_uavapi.host.host import Host
 
 HELP = """\
@@ -80,7 +80,7 @@ class TrackConsole:
     def __init__(self, host: Host, tracks: Tracking) -> None:
         self._host = host
         self._tracks = tracks
-        self._errands = Errands(host)
+        self._errands = Errands(host, "gradys")
 
     def command(self, args: list[str]) -> None:
         """What was typed. Main loop only."""
