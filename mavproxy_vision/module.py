@@ -28,7 +28,7 @@ from mavproxy_vision.errors import BadSetting
 from mavproxy_vision.flights import Flights, Sortie
 from mavproxy_vision.http import Pages
 from mavproxy_vision.mission import Errand
-from mavproxy_vision.settings import METHODS, ModuleSettings, Settings
+from mavproxy_vision.settings import METHODS, ModuleSettings
 from mavproxy_vision.vision import Vision
 
 NAME = "vision"

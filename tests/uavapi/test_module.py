@@ -355,7 +355,9 @@ def test_start_that_hangs_does_not_hold_up_the_unload(
         await asyncio.Event().wait()
 
     monkeypatch.setattr("mavproxy_uavapi.http.app.Server.start", lambda _: hang())
+    started = time.monotonic()
     main_loop.turn()
+    assert time.monotonic() - started < 0.5
     assert hanging.wait(5)
     started = time.monotonic()
     loader.unload(module)
