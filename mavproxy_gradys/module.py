@@ -19,6 +19,7 @@ except ModuleNotFoundError as missing:  # MAVProxy prints the text of an ImportE
 from mavproxy_uavapi.host.errands import Errands
 from mavproxy_uavapi.host.member import HostedModule, value_of
 from mavproxy_uavapi.host.patience import within
+from mavproxy_uavapi.host.remembered import Remembered
 from mavproxy_uavapi.settings import SettingError
 
 NAME = "gradys"
@@ -48,7 +49,8 @@ class GradysModule(HostedModule):
     """`module load gradys`."""
 
     def __init__(self, mpstate: Any, given: dict[str, Any]) -> None:
-        self.gradys_settings = ModuleSettings(given)
+        self.remembered = Remembered(mpstate, NAME, given)
+        self.gradys_settings = ModuleSettings(self.remembered.given)
         actions: dict[str, Callable[[list[str]], None]] = {
             "status": lambda _: self._show(console.status),
             "stats": lambda _: self._show(console.stats),
@@ -65,6 +67,7 @@ class GradysModule(HostedModule):
         self._errands = Errands(self.host, NAME)
         self._track = TrackConsole(self.host, self.gradys.tracks)
         self._routes = Handlers(self.gradys).routes()
+        self.remembered.keep(self.gradys_settings.shown)
 
     def begin(self) -> None:
         """Push and sense."""
@@ -142,10 +145,11 @@ class GradysModule(HostedModule):
             return
         before = self.gradys_settings.snapshot()
         try:
-            self.gradys_settings.set(args[0], value_of(args[1:]))
+            self.gradys_settings.set(args[0], value := value_of(args[1:]))
         except SettingError as error:
             print(f"gradys: {error}")
             return
+        self.remembered.change(args[0], value)
         settings = self.gradys_settings.snapshot()
 
         async def restart() -> str:

@@ -17,8 +17,9 @@ from mavproxy_uavapi.audit import Audit
 from mavproxy_uavapi.console import address_of, report, vehicles
 from mavproxy_uavapi.host.errands import Errands
 from mavproxy_uavapi.host.member import HostedModule, value_of
+from mavproxy_uavapi.host.remembered import Remembered
 from mavproxy_uavapi.logs import Logs, print_above_prompt
-from mavproxy_uavapi.settings import ModuleSettings, SettingError, Settings
+from mavproxy_uavapi.settings import SECRET, ModuleSettings, SettingError, Settings
 
 NAME = "uavapi"
 COMPLETION = "(UAVAPISETTING)"
@@ -41,7 +42,8 @@ class UavApiModule(HostedModule):
     """`module load uavapi`."""
 
     def __init__(self, mpstate: Any, given: dict[str, Any]) -> None:
-        self.api_settings = ModuleSettings(given)
+        self.remembered = Remembered(mpstate, NAME, given)
+        self.api_settings = ModuleSettings(self._given())
         self._wanted = True  # whether it is to listen; `uavapi stop` says no
         actions: dict[str, Callable[[list[str]], None]] = {
             "status": self._status,
@@ -62,6 +64,16 @@ class UavApiModule(HostedModule):
         self._errands = Errands(self.host, NAME)
         self._changing = asyncio.Lock()  # starts, stops and settings, in the order in which they were typed
         self.host.bridge.close_in_children(self.api.filenos)
+        self.remembered.keep(self._shown)
+
+    def _given(self) -> dict[str, Any]:
+        """The keywords and what was set at the prompt, and where `uavapi config` is to say that they came from."""
+        given = self.remembered.given
+        set_here = dict.fromkeys(self.remembered.changed, "uavapi set")
+        return {**given, "origins": {**given.get("origins", {}), **set_here}}
+
+    def _shown(self, name: str) -> object:
+        return "(set)" if name == SECRET else self.api_settings.mp.get(name)
 
     def begin(self) -> None:
         """Listen, unless a startup script said no."""
@@ -171,10 +183,11 @@ class UavApiModule(HostedModule):
             return
         before = self.api_settings.snapshot()
         try:
-            self.api_settings.set(args[0], value_of(args[1:]))
+            self.api_settings.set(args[0], value := value_of(args[1:]))
         except SettingError as error:
             print(f"uavapi: {error}")
             return
+        self.remembered.change(args[0], value)
         after = self.api_settings.snapshot()
         if after == before or not self._begun or not self._wanted:
             return

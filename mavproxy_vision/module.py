@@ -21,6 +21,7 @@ if not hasattr(getattr(cv2, "aruco", None), "ArucoDetector"):
 from mavproxy_uavapi.errors import UavApiError
 from mavproxy_uavapi.host.errands import Errands
 from mavproxy_uavapi.host.member import HostedModule, value_of
+from mavproxy_uavapi.host.remembered import Remembered
 from mavproxy_uavapi.http.requests import NED_REACH
 from mavproxy_uavapi.vehicle.jobs import Job
 from mavproxy_vision import console, files
@@ -49,7 +50,8 @@ class VisionModule(HostedModule):
     """`module load vision`."""
 
     def __init__(self, mpstate: Any, given: dict[str, Any]) -> None:
-        self.vision_settings = ModuleSettings(given)
+        self.remembered = Remembered(mpstate, NAME, given)
+        self.vision_settings = ModuleSettings(self.remembered.given)
         actions: dict[str, Callable[[list[str]], None]] = {
             "status": lambda _: self._tell(lambda: console.report(self.vision, self.flights)),
             "start": lambda _: self._start(),
@@ -72,6 +74,7 @@ class VisionModule(HostedModule):
         self._errands = Errands(self.host, NAME)
         self._pages = Pages(self.vision, self.flights)
         self._routes = {route.path: route for route in self._pages.routes()}
+        self.remembered.keep(self.vision_settings.mp.get)
 
     # -- life ------------------------------------------------------------------------------------------------
 
@@ -179,10 +182,11 @@ class VisionModule(HostedModule):
             print(f"vision: {args[0]} is not changed in flight (`vision abort` ends it)")
             return
         try:
-            self.vision_settings.set(args[0], value_of(args[1:]))
+            self.vision_settings.set(args[0], value := value_of(args[1:]))
         except BadSetting as error:
             print(f"vision: {error}")
             return
+        self.remembered.change(args[0], value)
         after = self.vision_settings.snapshot()
         if after == before or not self._begun:
             return

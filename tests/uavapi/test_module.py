@@ -365,6 +365,49 @@ def test_start_that_hangs_does_not_hold_up_the_unload(
     assert not listens(port)
 
 
+# -- reloading --------------------------------------------------------------------------------------------
+
+
+def test_settings_of_the_load_and_of_the_prompt_outlive_a_reload(
+    loader: Loader, port: int, said: Any, capsys: Any
+) -> None:
+    module = loader.load(port=1, token="secret", sysid=7)
+    module.command(["set", "port", str(port)])
+    module.command(["set", "allow_from", "127.0.0.0/8"])
+    loader.unload(module)
+    capsys.readouterr()
+    module = loader.load()
+    assert said("listening") == (
+        f"uavapi: as before: port={port}, token=(set), sysid=7, allow_from=127.0.0.0/8 "
+        "(keywords at `module load` replace all that)\n"
+        f"uavapi: listening on http://127.0.0.1:{port}\n"
+    )
+    settings = module.api_settings.snapshot()
+    assert (settings.sysid, settings.token) == (7, "secret")
+    origins = module.api_settings.origins
+    assert (origins["port"], origins["sysid"]) == ("uavapi set", "module load")
+
+
+def test_settings_that_are_only_good_together_outlive_a_reload(loader: Loader, capsys: Any) -> None:
+    module = loader.load(allow_open=True)
+    for line in ("set host 0.0.0.0", "set token secret", "set allow_open false"):
+        module.command(line.split())
+    loader.unload(module)
+    settings = loader.load().api_settings.snapshot()
+    assert (settings.host, settings.token, settings.allow_open) == ("0.0.0.0", "secret", False)
+
+
+def test_file_of_the_first_load_is_read_anew_and_yields_to_the_prompt(loader: Loader, tmp_path: Any) -> None:
+    file = tmp_path / "uavapi.ini"
+    file.write_text("[api]\nsysid = 2\nport = 8001\n")
+    module = loader.load(config=str(file))
+    module.command(["set", "port", "8002"])
+    loader.unload(module)
+    file.write_text("[api]\nsysid = 3\nport = 8003\n")
+    settings = loader.load().api_settings.snapshot()
+    assert (settings.sysid, settings.port) == (3, 8002)
+
+
 # -- unloading --------------------------------------------------------------------------------------------
 
 
