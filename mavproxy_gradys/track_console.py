@@ -27,7 +27,8 @@ HELP = """\
 gradys track                            what is recorded, and what is flown
 gradys track record FILE [SECONDS=5] [--format text|tuple|gpx] [--latest FILE] [--sysid N]
 gradys track stop                       end the recording
-gradys track fly FILE [--ground M] [--reach M] [--transit M]   take off, fly through the track, return and land"""
+gradys track fly FILE [--ground M] [--reach M] [--transit M] [--sysid N]
+                                        take off, fly through the track, return and land"""
 
 
 class Words(argparse.ArgumentParser):
@@ -65,6 +66,7 @@ def words() -> argparse.ArgumentParser:
     fly.add_argument("--ground", type=within(*GROUND))
     fly.add_argument("--reach", type=within(1.0, LARGEST_REACH), default=REACH)
     fly.add_argument("--transit", type=within(LOWEST_TRANSIT, HIGHEST_TAKEOFF), default=TRANSIT)
+    fly.add_argument("--sysid", type=int, default=0)
     verbs.add_parser("help", add_help=False)
     return made
 
@@ -119,7 +121,7 @@ class TrackConsole:
         return "nothing is recorded" if recorder is None else f"{recorder.written} readings are in {recorder.file}"
 
     async def _fly(self, given: argparse.Namespace) -> str:
-        vehicle = self._host.hangar.commandable(0)
+        vehicle = self._host.hangar.commandable(given.sysid)
         places = await asyncio.to_thread(read, given.file.expanduser(), given.ground)
         flight = flight_of(vehicle, places, given.reach, given.transit)
         request = {**{name: str(value) for name, value in vars(given).items()}, "digest": hash(tuple(places))}

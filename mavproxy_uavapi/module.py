@@ -34,7 +34,7 @@ uavapi set NAME VALUE    change one; it takes effect at once
 uavapi config            the settings in force, and where each came from
 uavapi log [N]           the last N commands: who asked, and how it ended
 uavapi vehicles          every vehicle that was heard
-uavapi fly FILE          fly a recorded track (module gradys)
+uavapi fly FILE          fly a recorded track with the API's vehicle, `sysid` (module gradys)
 uavapi help              this"""
 
 
@@ -144,12 +144,12 @@ class UavApiModule(HostedModule):
         await asyncio.to_thread(self.logs.open, *told)
 
     def _fly(self, args: list[str]) -> None:
-        """`uavapi fly FILE`: the module that knows tracks flies it."""
+        """`uavapi fly FILE`: the module that knows tracks flies it, with the API's vehicle."""
         fly = self.host.commands.get("fly")
         if fly is None:
             print("uavapi: fly needs the module that knows tracks: `module load gradys`")
         else:
-            fly(args)
+            fly(["--sysid", str(self.api_settings.snapshot().sysid), *args])
 
     def _log(self, args: list[str]) -> None:
         try:

@@ -60,8 +60,8 @@ class Errands:
         except UavApiError as error:
             self.say(str(error))
         except Exception as error:  # noqa: BLE001  whoever waits at the prompt is told of a defect too
-            self.say(f"a defect ended this: {error!r}")
             loop.call_exception_handler({"message": f"{self._name}: a defect", "exception": error})
+            self.say(f"a defect ended this: {error!r}")
         finally:
             if slow is not None:
                 slow.cancel()

@@ -365,6 +365,18 @@ def test_start_that_hangs_does_not_hold_up_the_unload(
     assert not listens(port)
 
 
+def test_track_is_flown_by_the_apis_own_vehicle(loader: Loader, capsys: Any) -> None:
+    module = loader.load(sysid=7)
+    module.command(["fly", "a.track"])
+    assert "module load gradys" in capsys.readouterr().out
+    flown: list[list[str]] = []
+    module.host.commands["fly"] = flown.append
+    module.command(["fly", "a.track", "--reach", "50"])
+    module.command(["set", "sysid", "0"])
+    module.command(["fly", "a.track"])
+    assert flown == [["--sysid", "7", "a.track", "--reach", "50"], ["--sysid", "0", "a.track"]]
+
+
 # -- reloading --------------------------------------------------------------------------------------------
 
 
