@@ -34,7 +34,7 @@ setup(
         "pymavlink>=2.4.42",
         "aiohttp>=3.10",
         "psutil>=6",
-    "pydantic>=2.7",
+        "pydantic>=2.7",
         "swagger-ui-py>=25.7.1",  # the files of Swagger UI 5 for /docs, which OpenAPI 3.1 needs
     ],
     extras_require={
