@@ -122,9 +122,7 @@ class CommandAuthority:
         self._paused_at = max(self._state.heartbeat_at, self._state.mode_since)
         self._take(job, Rank.STOP)
 
-    def accompany(
-        self, job: Job, kind: str, rank: Rank = Rank.MOVEMENT, *, stopped_too: bool = False
-    ) -> None:
+    def accompany(self, job: Job, kind: str, rank: Rank = Rank.MOVEMENT, *, stopped_too: bool = False) -> None:
         """Let `job` command beside the commander; an earlier one of its kind is superseded.
 
         Args:

@@ -8,6 +8,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import NamedTuple
 
+from mavproxy_uavapi.vehicle import endings
+from mavproxy_uavapi.vehicle.endings import Policy
+from mavproxy_uavapi.vehicle.jobs import Ending
+
 FILE = Path(__file__).parents[2] / "docs" / "faults.md"
 
 
@@ -69,13 +73,13 @@ FAULTS = {
         HEARTBEAT,
     ),
     "client gone": Fault(
-        "The client hangs up: the verb ends and is forgotten, the vehicle keeps its last setpoint. What lands, returns "
-        "or stops it goes on.",
+        "The client hangs up: the verb ends and is forgotten, the vehicle keeps its last setpoint. What lands, "
+        "returns or stops it goes on.",
         0.1,
     ),
     "another client streams": Fault(
-        "Another client sends velocities five times a second, before and after. What stops the vehicle outranks them; "
-        "of two movements the newer one counts, and a turn ends with the setpoint that it came with.",
+        "Another client sends velocities five times a second, before and after. What stops the vehicle outranks "
+        "them; of two movements the newer one counts, and a turn ends with the setpoint that it came with.",
         0.5,
     ),
     "another station flies it": Fault(
@@ -126,6 +130,21 @@ SPEED = {
     "during a take-off": "409 busy",
 }
 
+WHY = {
+    Ending.DONE: "it is done",
+    Ending.FAILED: "it failed, took too long, or the pilot has the vehicle",
+    Ending.SUPERSEDED: "a newer command took over",
+    Ending.ABORTED: "DELETE, or a stop at the prompt",
+    Ending.CLIENT_GONE: "its client hung up",
+    Ending.SCRIPT_GONE: "its script died",
+    Ending.UNLOADED: "the API stops, or the module is unloaded",
+    Ending.DEFECT: "a defect of ours",
+}
+BRAKES = (endings.Situation.MISSION, endings.Situation.LAND, endings.Situation.RTL)
+HOW = {
+    (endings.Situation.GUIDED, endings.HOLD): "zero velocity",
+    **{(situation, endings.HOLD): "BRAKE" for situation in BRAKES},
+}
 VERBS = {
     "arm": Verb("/command/arm", 5.0, ARM),
     "takeoff": Verb("/command/takeoff", 12.0, TAKEOFF),
@@ -173,7 +192,33 @@ def page() -> str:
         lines += ["| --- |" + " --- |" * len(groups)]
         for fault in FAULTS:
             lines += [f"| {fault} | " + " | ".join(VERBS[group[0]].outcomes[fault] or "–" for group in groups) + " |"]
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, *endings_page()]) + "\n"
+
+
+def endings_page() -> list[str]:
+    """How flights end: the table of `vehicle/endings.py`."""
+    columns = [policy for policy in Policy if policy is not Policy.NOTHING]
+    lines = [
+        "",
+        "## What a vehicle does when the job that flies it ends",
+        "",
+        "| it ends because | what is wanted |",
+        "| --- | --- |",
+        *(f"| {WHY[ending]} | {policy.value} |" for ending, policy in endings.FIXED.items()),
+        f"| {WHY[Ending.CLIENT_GONE]} | `on_disconnect`: nothing, or hold |",
+        f"| {WHY[Ending.SCRIPT_GONE]} | `on_script_exit`: nothing, hold, land or rtl |",
+        "",
+        "Safe means: what flies by our setpoints stops and holds, what the autopilot flies by itself goes on. It is",
+        "wanted too when a flight fails that only our setpoints keep going: vision's, a velocity with a duration.",
+        "What is wanted is done as far as telemetry allows, and sent until telemetry shows it:",
+        "",
+        "| telemetry shows | " + " | ".join(policy.value for policy in columns) + " |",
+        "| --- |" + " --- |" * len(columns),
+    ]
+    for situation, row in endings.WHAT_FOLLOWS.items():
+        cells = [HOW.get((situation, row[policy]), row[policy]) or "nothing" for policy in columns]
+        lines.append(f"| {situation.value} | " + " | ".join(cells) + " |")
+    return lines
 
 
 def _seconds(fault: Fault) -> str:

@@ -120,6 +120,8 @@ BEFORE: dict[str, Callable[[Any], None]] = {
     "busy once": be_busy_once,
     "in progress": lambda world: about_each_command(world, "in_progress", seconds=4.0),
 }
+
+
 def another_station(world: Any, _wire: Any) -> None:
     if world.copter.mode.name == "GUIDED":
         world.fault("other_station", position=ELSEWHERE)
@@ -143,9 +145,7 @@ DONE: dict[str, Callable[[Any], bool]] = {
     "stop": lambda world: world.copter.guided.paused,
 }
 ELSEWHERE = [-80.0, 40.0, -12.0]  # m NED
-CELLS = [
-    (name, fault) for name, verb in outcomes.VERBS.items() for fault in outcomes.FAULTS if verb.outcomes[fault]
-]
+CELLS = [(name, fault) for name, verb in outcomes.VERBS.items() for fault in outcomes.FAULTS if verb.outcomes[fault]]
 
 
 @pytest.mark.parametrize(("verb", "fault"), CELLS)
