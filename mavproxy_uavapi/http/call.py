@@ -9,7 +9,6 @@ from typing import Any, TypeVar, cast
 
 from aiohttp import web
 
-from mavproxy_uavapi.audit import Audit
 from mavproxy_uavapi.errors import BadRequest, Invalid, NotSupported, TooManyRequests
 from mavproxy_uavapi.host.host import Host
 from mavproxy_uavapi.host.patience import within
@@ -39,7 +38,6 @@ class Service:
     Attributes:
         host: the vehicles, and the verbs in flight.
         settings: the snapshot in force.
-        audit: the trail of commands.
         scripts: the mission scripts.
         broadcast: the telemetry, for those who listen.
         streams: how many long answers are open.
@@ -47,7 +45,6 @@ class Service:
 
     host: Host
     settings: Settings
-    audit: Audit
     scripts: Scripts = field(init=False)
     broadcast: Broadcast = field(init=False)
     streams: OpenStreams = field(default_factory=OpenStreams)

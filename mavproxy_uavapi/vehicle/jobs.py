@@ -12,6 +12,7 @@ from collections.abc import Awaitable, Callable, Mapping
 from typing import Any
 
 from mavproxy_uavapi.errors import Aborted, Superseded, TimedOut, UavApiError, without_frames
+from mavproxy_uavapi.sent import SentNames, noting_sent_if_nobody_does
 
 FINISHED_KEPT = 100
 CONSOLE = "console"  # the client of what was typed at MAVProxy's prompt
@@ -33,6 +34,7 @@ class Job:
         progress: what it last said of itself, such as distance_to_go (m) and altitude (m above home).
         result: the text of its success.
         error: why it failed.
+        sent: names of the messages sent for it; None where the HTTP call that began it notes them.
     """
 
     def __init__(
@@ -48,6 +50,7 @@ class Job:
         self.progress: dict[str, float] = {}
         self.result: str | None = None
         self.error: UavApiError | None = None
+        self.sent: SentNames | None = None
         self._loop = asyncio.get_running_loop()
         self.began_at = self._loop.time()
         self.ended_at: float | None = None
@@ -153,9 +156,14 @@ class Seat:
 
 
 class JobBook:
-    """All jobs, the running ones and the last finished ones."""
+    """All jobs, the running ones and the last finished ones.
 
-    def __init__(self) -> None:
+    Args:
+        on_ended: called with each job when it has ended.
+    """
+
+    def __init__(self, on_ended: Callable[[Job], None] = lambda _: None) -> None:
+        self._on_ended = on_ended
         self._jobs: dict[str, Job] = {}
         self._numbers = itertools.count(1)
 
@@ -177,7 +185,9 @@ class JobBook:
         job = Job(next(self._numbers), verb, request, seat, client=client, outlives_client=outlives_client)
         self._jobs[job.id] = job
         self._forget_old()
-        job.start(body, timeout)
+        job.when_ended(lambda: self._on_ended(job))
+        with noting_sent_if_nobody_does() as job.sent:
+            job.start(body, timeout)
         return job
 
     def get(self, number: str) -> Job | None:

@@ -192,7 +192,7 @@ def after_hanging_up(world: Any, expected: str, struck: float) -> None:
         world.loop.pass_time(30.0)
         assert world.host.jobs.running() == []
         assert not world.copter.armed and world.at[2] > -0.1
-    (entry,) = world.service.audit.entries  # of what went on without its client, when that had ended
+    (entry,) = world.service.host.audit.entries  # of what went on without its client, when that had ended
     assert entry.outcome == "client_gone"
     assert world.orders(since=struck) == []
 
