@@ -15,7 +15,7 @@ from mavproxy_uavapi.host.patience import within
 from mavproxy_uavapi.http.broadcast import Broadcast
 from mavproxy_uavapi.http.requests import Request, parse
 from mavproxy_uavapi.http.responses import envelope
-from mavproxy_uavapi.http.streaming import OpenStreams
+from mavproxy_uavapi.http.streaming import MOST_OPEN, Slots
 from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.settings import Settings
 from mavproxy_uavapi.vehicle.copter import Copter
@@ -40,14 +40,14 @@ class Service:
         settings: the snapshot in force.
         scripts: the mission scripts.
         broadcast: the telemetry, for those who listen.
-        streams: how many long answers are open.
+        streams: the slots of answers that go on, of all kinds.
     """
 
     host: Host
     settings: Settings
     scripts: Scripts = field(init=False)
     broadcast: Broadcast = field(init=False)
-    streams: OpenStreams = field(default_factory=OpenStreams)
+    streams: Slots = field(default_factory=lambda: Slots(MOST_OPEN, "streams are open"))
 
     def __post_init__(self) -> None:
         self.scripts = Scripts(self.host, self.settings)

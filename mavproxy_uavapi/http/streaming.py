@@ -33,21 +33,30 @@ class NotRead(ConnectionError):
     """The client read nothing for UNREAD seconds; its connection is about to be closed."""
 
 
-class OpenStreams:
-    """Counts the streams that are open."""
+class Slots:
+    """So many of a kind may be there at once.
 
-    def __init__(self) -> None:
+    Args:
+        most: how many.
+        what: they are, for the refusal: `streams are open`.
+
+    Attributes:
+        count: how many there are.
+    """
+
+    def __init__(self, most: int, what: str) -> None:
+        self._most, self._what = most, what
         self.count = 0
 
     @contextmanager
     def one_more(self) -> Iterator[None]:
-        """One more is open for as long as the context lasts.
+        """One more is there for as long as the context lasts.
 
         Raises:
-            TooManyRequests: MOST_OPEN are open already.
+            TooManyRequests: all slots are taken.
         """
-        if self.count >= MOST_OPEN:
-            raise TooManyRequests(f"{MOST_OPEN} streams are open already", retry_after=10)
+        if self.count >= self._most:
+            raise TooManyRequests(f"{self._most} {self._what} already")
         self.count += 1
         try:
             yield
