@@ -76,6 +76,7 @@ def main() -> int:
     print(f"streams: {machine()}")
     rows = []
     with rig(streamrate=10) as (made, _):
+        made.get("/telemetry/gps")  # the first one asks the vehicle for the message
         for count in options.clients:
             rows.append([f"{count} of all messages", *case(made, [ALL] * count, options.seconds)])
         different = [f"{ALL}?names={NAMES[n % 5]}&rate={n + 1}" for n in range(100)]
