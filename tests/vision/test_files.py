@@ -165,6 +165,14 @@ def test_an_image_that_only_looks_costly_is_decoded(options):
     assert decode(cv2.imencode(".jpg", colour, options)[1].tobytes()).shape == (48, 64)
 
 
+@pytest.mark.parametrize("kind", [".tiff", ".webp", ".bmp", ".pgm"])
+def test_other_kinds_are_not_decoded_whatever_their_header_says(kind, monkeypatch):
+    data = cv2.imencode(kind, picture(50))[1].tobytes()
+    monkeypatch.setattr(cv2, "imdecode", None)
+    with pytest.raises(BadImage, match="JPEG or PNG"):
+        decode(data)
+
+
 def test_what_opencv_refuses_is_no_image():
     with pytest.raises(BadImage):
         decode_any(png_header(40_000, 40_000))
