@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 LONGEST = 200  # characters of a text that the trail keeps
-MOST = 10  # items of a list, members of a mapping
+MOST = 10  # items of a list
+MOST_MEMBERS = 30  # of a mapping
 
 
 def escaped(text: str) -> str:
@@ -21,8 +22,8 @@ def cut(value: Any) -> Any:
     if isinstance(value, str) and len(value) > LONGEST:
         return f"{value[:LONGEST]}… ({len(value)} characters)"
     if isinstance(value, Mapping):
-        kept = {cut(name): cut(value[name]) for name in list(value)[:MOST]}
-        return kept if len(value) <= MOST else {**kept, "…": f"({len(value)} members)"}
+        kept = {cut(name): cut(value[name]) for name in list(value)[:MOST_MEMBERS]}
+        return kept if len(value) <= MOST_MEMBERS else {**kept, "…": f"({len(value)} members)"}
     if isinstance(value, list | tuple):
         kept_items = [cut(item) for item in value[:MOST]]
         return kept_items if len(value) <= MOST else [*kept_items, f"… ({len(value)} items)"]

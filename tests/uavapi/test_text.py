@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from mavproxy_uavapi.text import LONGEST, MOST, cut, escaped
+from mavproxy_uavapi.text import LONGEST, MOST, MOST_MEMBERS, cut, escaped
 
 
 @pytest.mark.parametrize(
@@ -33,6 +33,6 @@ def test_what_is_long_is_cut_to_any_depth() -> None:
     assert cut({"a": ["y" * 5000]}) == {"a": ["y" * LONGEST + "… (5000 characters)"]}
     assert cut(list(range(100))) == [*range(MOST), "… (100 items)"]
     many = cut({f"{n}{'k' * 1000}": n for n in range(1000)})
-    assert len(many) == MOST + 1
+    assert len(many) == MOST_MEMBERS + 1
     assert many["…"] == "(1000 members)"
     assert max(map(len, many)) < LONGEST + 30
