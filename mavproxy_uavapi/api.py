@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 
-from mavproxy_uavapi.audit import Audit
 from mavproxy_uavapi.host.host import Host
 from mavproxy_uavapi.http.app import Server
 from mavproxy_uavapi.http.call import Service
@@ -17,9 +16,8 @@ from mavproxy_uavapi.vehicle.freshness import Freshness
 class Api:
     """Everything of uavapi that lives in the asyncio thread; so do all its methods but `filenos`."""
 
-    def __init__(self, host: Host, audit: Audit) -> None:
+    def __init__(self, host: Host) -> None:
         self.host = host
-        self.audit = audit
         self._server: Server | None = None
         self._freshness: asyncio.Task[None] | None = None
         self._finding_scripts: asyncio.Task[None] | None = None
@@ -38,7 +36,7 @@ class Api:
         if self._server is not None:
             return
         self._take_up(settings)
-        server = Server(Service(self.host, settings, self.audit))
+        server = Server(Service(self.host, settings))
         try:
             await server.start()
         except BaseException:  # a cancellation too: nobody would close the port

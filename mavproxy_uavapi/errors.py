@@ -38,6 +38,7 @@ class UavApiError(Exception):
 
     status = 500
     code = "internal"
+    in_trail = False  # whether the audit trail has an entry of its own for it
 
     @property
     def detail(self) -> str | list[dict[str, Any]]:

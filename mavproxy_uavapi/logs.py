@@ -6,13 +6,16 @@ errors always show in the console.
 
 from __future__ import annotations
 
-import contextlib
 import logging
 import logging.handlers
 import queue
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
+
+from mavproxy_uavapi.rotating import RotatingFile
+from mavproxy_uavapi.text import escaped
 
 try:
     import readline
@@ -79,27 +82,14 @@ class _Console(logging.Handler):
         self._say(self.format(record))
 
 
-class _File(logging.handlers.RotatingFileHandler):
-    """The log file. A disk that takes no more is told of once, on the console, and is tried again each time."""
+class _Formatter(logging.Formatter):
+    """One line for each record, whatever a client put into it; a traceback keeps its own lines."""
 
-    def __init__(self, file: Path, say: Callable[[str], None]) -> None:
-        super().__init__(file, maxBytes=FILE_BYTES, backupCount=FILES_KEPT, encoding="utf-8")
-        self._say = say
-        self._failing = self._failed = False
+    def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802  logging's own name
+        return escaped(super().formatMessage(record))
 
-    def emit(self, record: logging.LogRecord) -> None:
-        self._failing = False
-        super().emit(record)
-        self._failed = self._failing
-
-    def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802  logging's own name
-        self._failing = True
-        if not self._failed:
-            self._say(f"API: cannot write {self.baseFilename}: {sys.exc_info()[1]}")
-
-    def close(self) -> None:
-        with contextlib.suppress(OSError):  # what the disk did not take; it was told of
-            super().close()
+    def formatException(self, ei: Any) -> str:  # noqa: N802  logging's own name
+        return "\n".join(map(escaped, super().formatException(ei).split("\n")))
 
 
 class Logs:
@@ -126,11 +116,11 @@ class Logs:
         Raises:
             OSError: the file cannot be written; what was in force stays so.
         """
-        file = _File(log_file(path, system), self._say) if path else None
+        file = self._file(path, system) if path else None
         self.close()
         shown = _Console(self._say)
         shown.addFilter(_Named(console))
-        shown.setFormatter(logging.Formatter("%(component)s: %(message)s"))
+        shown.setFormatter(_Formatter("%(component)s: %(message)s"))
         self._handlers = [shown]
         if file is not None:
             self._handlers.append(self._to_file(file))
@@ -144,11 +134,15 @@ class Logs:
             for name in names:
                 logging.getLogger(name).setLevel(logging.DEBUG if component in debug else logging.INFO)
 
+    def _file(self, path: str, system: int) -> RotatingFile:
+        return RotatingFile(log_file(path, system), FILE_BYTES, FILES_KEPT, lambda text: self._say(f"API: {text}"))
+
     def _to_file(self, writer: logging.Handler) -> logging.Handler:
         """A handler that only queues; a thread of its own writes, so that no disk holds anybody up."""
         writer.setFormatter(logging.Formatter(FORMAT))
         records: queue.SimpleQueue[logging.LogRecord] = queue.SimpleQueue()
         handler = logging.handlers.QueueHandler(records)
+        handler.setFormatter(_Formatter())
         handler.addFilter(_Named())
         self._listener = logging.handlers.QueueListener(records, writer)
         self._listener.start()

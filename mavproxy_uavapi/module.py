@@ -6,14 +6,12 @@ import asyncio
 import os
 import ssl
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 try:
     from mavproxy_uavapi.api import Api
 except ModuleNotFoundError as missing:  # MAVProxy prints the text of an ImportError as one line
     raise ImportError(f"uavapi needs {missing.name}: pip install mavproxy-uavapi") from missing
-from mavproxy_uavapi.audit import Audit
 from mavproxy_uavapi.console import address_of, report, vehicles
 from mavproxy_uavapi.host.errands import Errands
 from mavproxy_uavapi.host.member import HostedModule, value_of
@@ -58,9 +56,8 @@ class UavApiModule(HostedModule):
         }
         super().__init__(mpstate, NAME, "HTTP API to fly and watch vehicles", actions, COMPLETIONS)
         self.add_completion_function(COMPLETION, lambda _: self.api_settings.names())
-        self.audit = Audit(log_directory(mpstate))
         self.logs = Logs(lambda text: self.host.bridge.post(lambda: print_above_prompt(text, self.mpstate.rl.prompt)))
-        self.api = Api(self.host, self.audit)
+        self.api = Api(self.host)
         self._errands = Errands(self.host, NAME)
         self._changing = asyncio.Lock()  # starts, stops and settings, in the order in which they were typed
         self.host.bridge.close_in_children(self.api.filenos)
@@ -94,7 +91,6 @@ class UavApiModule(HostedModule):
             super().unload()
         finally:
             self.host.bridge.keep_in_children(self.api.filenos)
-            self.audit.close()
             self.logs.close()
 
     def _status(self, _args: list[str]) -> None:
@@ -157,10 +153,10 @@ class UavApiModule(HostedModule):
         except ValueError:
             print(f"uavapi: log takes a number, not {args[0]!r}")
             return
-        entries = list(self.audit.entries)[-max(count, 1) :]
+        entries = list(self.host.audit.entries)[-max(count, 1) :]
         print("\n".join(map(str, entries)) or "uavapi: no commands yet")
-        if self.audit.file is not None:
-            print(f"all of them: {self.audit.file}")
+        if self.host.audit.file is not None:
+            print(f"all of them: {self.host.audit.file}")
 
     def _stop(self) -> None:
         self._wanted = False
@@ -209,12 +205,6 @@ class UavApiModule(HostedModule):
             except OSError as error:
                 return f"cannot open {error.filename}: {error.strerror}; the logs stay as they were"
         return ""
-
-
-def log_directory(mpstate: Any) -> Path | None:
-    """Where MAVProxy keeps its logs; None when it keeps none (--no-state)."""
-    directory = mpstate.status.logdir
-    return None if directory is None else Path(directory)
 
 
 def init(mpstate: Any, **kwargs: Any) -> UavApiModule:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mavproxy_vision.errors import BadImage, NoCamera
-from mavproxy_vision.headers import size_of
+from mavproxy_vision.headers import size_of, why_costly
 
 Image = NDArray[np.uint8]
 
@@ -94,6 +94,9 @@ def decode(data: bytes) -> Image:
         raise BadImage("the body is not an image, JPEG or PNG")
     if size[0] * size[1] > MOST_PIXELS:
         raise BadImage(f"an image of {size[0]}x{size[1]} px; at most {MOST_PIXELS // 1_000_000} megapixels are taken")
+    costly = why_costly(data)
+    if costly is not None:
+        raise BadImage(f"{costly} is not taken")
     return decode_any(data)
 
 

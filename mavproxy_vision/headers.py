@@ -1,4 +1,4 @@
-"""The size that the header of a PNG or JPEG tells: a few kB may decode to a picture that fills the memory. Pure."""
+"""What a PNG or JPEG costs, before it is decoded: a few kB may fill the memory, or keep a core busy. Pure."""
 
 from __future__ import annotations
 
@@ -9,6 +9,9 @@ PNG, JPEG = b"\x89PNG\r\n\x1a\n", b"\xff\xd8"
 SIZE_OF_FRAME = {*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC}
 BEFORE_IT = {0xC4, 0xCC, 0xDB, 0xDD, *range(0xE0, 0xF0), 0xFE}
 FILL = 0xFF  # may come before a marker, any number of times
+SCAN = b"\xff\xda"  # begins a scan; a progressive JPEG has about 10, each of which goes over the whole picture
+MOST_SCANS = 30
+ANIMATION, PIXELS = b"acTL", b"IDAT"  # chunks of a PNG; the one of an animation comes first
 
 
 def size_of(data: bytes) -> tuple[int, int] | None:
@@ -17,6 +20,25 @@ def size_of(data: bytes) -> tuple[int, int] | None:
         width, height = struct.unpack_from(">II", data, 16)
         return width, height
     return _of_jpeg(data) if data.startswith(JPEG) else None
+
+
+def why_costly(data: bytes) -> str | None:
+    """Why decoding takes more than the size tells: an animation's canvases, too many scans; None if it does not."""
+    if data.startswith(PNG) and _is_animated(data):
+        return "an animated PNG"
+    if data.startswith(JPEG) and data.count(SCAN) > MOST_SCANS:
+        return f"a JPEG of more than {MOST_SCANS} scans"
+    return None
+
+
+def _is_animated(png: bytes) -> bool:
+    at = len(PNG)
+    while at + 8 <= len(png):
+        length, kind = struct.unpack_from(">I4s", png, at)
+        if kind in (ANIMATION, PIXELS):
+            return bool(kind == ANIMATION)
+        at += 12 + length
+    return False
 
 
 def _of_jpeg(data: bytes) -> tuple[int, int] | None:

@@ -15,18 +15,21 @@ from mavproxy_uavapi.http.call import Call, in_time
 from mavproxy_uavapi.http.requests import NED_REACH, Blocking, Empty, Number, Request, Written
 from mavproxy_uavapi.http.responses import envelope
 from mavproxy_uavapi.http.routes import EITHER, POST, Route
+from mavproxy_uavapi.http.streaming import Slots, StreamingResponse
 from mavproxy_vision.annotate import annotated, jpeg
 from mavproxy_vision.camera import Image, Posted, decode
 from mavproxy_vision.console import caption, status
 from mavproxy_vision.errors import BadImage, NoCamera
 from mavproxy_vision.flights import Flights, Sortie
 from mavproxy_vision.mission import Errand
+from mavproxy_vision.one_at_a_time import OneAtATime
 from mavproxy_vision.settings import METHODS
 from mavproxy_vision.sighting import Seen
 from mavproxy_vision.vision import FRESH, Vision, in_view
 
 BOUNDARY = "frame"
 FRAME_TIMEOUT = 5.0  # s without a frame until a stream ends
+MOST_POSTED = 32  # frames that are on their way in at once, each of up to 1 MB
 
 TagId = Annotated[int | None, Field(ge=0, le=100_000, description="of the tag; none for the main tag"), Written]
 Method = Annotated[str | None, Field(pattern=f"^({'|'.join(METHODS)})$", description="none for the setting")]
@@ -84,6 +87,9 @@ class Pages:
 
     def __init__(self, vision: Vision, flights: Flights) -> None:
         self.vision, self.flights = vision, flights
+        self._posts = Slots(MOST_POSTED, "frames are on their way in")
+        self._decoding, self._encoding = OneAtATime(), OneAtATime()
+        self._drawing: tuple[Seen, asyncio.Task[bytes]] | None = None  # the newest picture with its tags
 
     def routes(self) -> list[Route]:
         """What is served."""
@@ -124,7 +130,7 @@ class Pages:
         """The newest frame as it came, as JPEG: what take_photo answers with `command=vision`."""
         self.vision.require_camera()
         _, image = self._newest()
-        return await asyncio.get_running_loop().run_in_executor(None, jpeg, image)
+        return await self._encoding.run(lambda: jpeg(image))
 
     def _newest(self) -> tuple[Seen, Image]:
         """The newest frame, and what was seen in it.
@@ -141,21 +147,22 @@ class Pages:
         return seen, image
 
     async def _picture(self) -> bytes:
+        """The newest frame with its tags; drawn once for all who ask, and none before the last one is done."""
         seen, image = self._newest()
-        lines = caption(self.vision, self.flights)
-        loop = asyncio.get_running_loop()
-        return await loop.run_in_executor(None, lambda: jpeg(annotated(image, seen, lines)))
+        if self._drawing is None or (self._drawing[1].done() and self._drawing[0] is not seen):
+            lines = caption(self.vision, self.flights)
+            work = self._encoding.run(lambda: jpeg(annotated(image, seen, lines)))
+            self._drawing = seen, asyncio.get_running_loop().create_task(work)
+        return await asyncio.shield(self._drawing[1])
 
     async def stream(self, call: Call) -> web.StreamResponse:
         """Annotated frames as they come, as browsers show them (MJPEG)."""
         self.vision.require_camera()
         pause = 1.0 / call.params(StreamRequest).rate
-        kind = f"multipart/x-mixed-replace; boundary={BOUNDARY}"
-        response = web.StreamResponse(headers={"Content-Type": kind, "Cache-Control": "no-store"})
-        await response.prepare(call.request)
-        with contextlib.suppress(
-            ConnectionError, NoCamera, asyncio.TimeoutError
-        ):  # the client, or the camera, has gone
+        response = StreamingResponse(f"multipart/x-mixed-replace; boundary={BOUNDARY}")
+        gone = ConnectionError, NoCamera, asyncio.TimeoutError  # the client, or the camera
+        with call.service.streams.one_more(), contextlib.suppress(*gone):
+            await response.prepare(call.request)
             while True:
                 await within(FRAME_TIMEOUT, self.vision.changed.wait())
                 picture = await self._picture()
@@ -169,8 +176,9 @@ class Pages:
         worker = self.vision.worker
         if worker is None or not isinstance(worker.source, Posted):
             raise BadRequest("frames are taken with `vision set source http` only")
-        data = await in_time(call.request.read())
-        image = await asyncio.get_running_loop().run_in_executor(None, decode, data)
+        with self._posts.one_more():
+            data = await in_time(call.request.read())
+            image = await self._decoding.run(lambda: decode(data))
         latency = call.params(FrameRequest).latency
         worker.source.post(image, None if latency is None else latency / 1000)
         why_not = worker.detector.model.misfit(image.shape[1], image.shape[0])

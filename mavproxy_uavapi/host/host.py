@@ -7,8 +7,10 @@ import contextlib
 import logging
 import time
 from collections.abc import Awaitable, Callable
+from pathlib import Path
 from typing import Any
 
+from mavproxy_uavapi.audit import Audit, Entry, utc_now
 from mavproxy_uavapi.errors import LinkLost
 from mavproxy_uavapi.host.bridge import Bridge
 from mavproxy_uavapi.host.link import MavproxyLink
@@ -17,7 +19,7 @@ from mavproxy_uavapi.host.pending import Pending
 from mavproxy_uavapi.host.state import Fleet, VehicleState
 from mavproxy_uavapi.vehicle.endings import FlightEndings
 from mavproxy_uavapi.vehicle.hangar import Hangar
-from mavproxy_uavapi.vehicle.jobs import JobBook
+from mavproxy_uavapi.vehicle.jobs import Job, JobBook
 
 log = logging.getLogger("uavapi.copter")
 
@@ -30,6 +32,7 @@ class Host:
     Everything but `bridge` belongs to the asyncio thread.
 
     Attributes:
+        audit: the trail of commands.
         listeners: called with each vehicle message, after the state has taken it and the waits have seen it.
         api_address: where `uavapi` listens; None while it does not.
         extensions: HTTP routes of the other modules, by path; `uavapi` serves them while it is loaded.
@@ -51,7 +54,9 @@ class Host:
         self.link_timeout = 5.0
         self.target = 0  # the system id that MAVProxy's own commands go to; 0 before it knows one
         self.hangar = Hangar(self)
+        self.audit = Audit(log_directory(mpstate))
         self.jobs = JobBook()
+        self.jobs.on_ended.append(self._leave_trace)
         self.endings = FlightEndings(self.jobs)
         self.listeners: list[Callable[[VehicleState, Any, float], None]] = []
         self.extensions: dict[str, Any] = {}
@@ -129,6 +134,23 @@ class Host:
         for listener in list(self.listeners):
             listener(state, message, now)
 
+    def _leave_trace(self, job: Job) -> None:
+        """Leave a trace of a job that ended, unless the HTTP call that began it does."""
+        if job.sent is None or job.ended_at is None:
+            return
+        entry = Entry(
+            time=utc_now(),
+            client=job.client,
+            verb=job.verb,
+            request=job.request,
+            system=job.vehicle.state.system,
+            outcome="ok" if job.error is None else job.error.code,
+            detail=(job.result or "") if job.error is None else str(job.error),
+            seconds=round(job.ended_at - job.began_at, 3),
+            sent=job.sent.tell(),
+        )
+        self.audit.add(entry)
+
     def _watch_link(self, state: VehicleState) -> None:
         """End the waits on a vehicle when its heartbeats have been missing for the link timeout."""
         silent_for = self.clock() - state.heartbeat_at
@@ -143,6 +165,12 @@ class Host:
             delay = self.link_timeout - silent_for
         timer = self.bridge.loop.call_later(max(delay, 0.05), self._watch_link, state)
         self._link_timers[state.system] = timer
+
+
+def log_directory(mpstate: Any) -> Path | None:
+    """Where MAVProxy keeps its logs; None when it keeps none (--no-state)."""
+    directory = mpstate.status.logdir
+    return None if directory is None else Path(directory)
 
 
 def join(mpstate: Any, member: Any) -> Host:
@@ -162,3 +190,4 @@ def leave(mpstate: Any, member: Any) -> None:
     if not host.members:
         delattr(mpstate, ATTRIBUTE)
         host.end()
+        host.audit.close()

@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol
 
-from mavproxy_uavapi.audit import note_sent
 from mavproxy_uavapi.errors import LinkLost, UavApiError
 from mavproxy_uavapi.host.bridge import Bridge
+from mavproxy_uavapi.sent import note_sent
 
 
 class Address(NamedTuple):
@@ -102,6 +102,7 @@ class FakeLink:
     async def send(self, message: Any, system: int) -> None:
         """Remember `message` and tell the test."""
         require_finite(message)
+        note_sent(message.get_type())
         self.sent.append(message)
         if self.on_send is not None:
             self.on_send(message, system)

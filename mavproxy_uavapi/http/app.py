@@ -17,7 +17,7 @@ from mavproxy_uavapi.errors import NotFound
 from mavproxy_uavapi.http.call import SERVICE, Call, Service, parameters
 from mavproxy_uavapi.http.docs_page import TABLE
 from mavproxy_uavapi.http.limits import BUCKET, Bucket, at_a_bearable_rate, give_way, headers_are_here, patient
-from mavproxy_uavapi.http.responses import Handler, errors_as_answers, success
+from mavproxy_uavapi.http.responses import REFUSED, Handler, errors_as_answers, success
 from mavproxy_uavapi.http.routes import ROUTES, Route
 from mavproxy_uavapi.http.security import name_the_trusted, only_for_us
 from mavproxy_uavapi.http.trail import audited
@@ -35,6 +35,7 @@ def make_app(service: Service) -> web.Application:
     app[SERVICE] = service
     app[TABLE] = ROUTES
     app[BUCKET] = Bucket()
+    app[REFUSED] = service.host.audit.refused
     app.on_response_prepare.append(name_the_trusted)
     for route in ROUTES:
         handler = guarded(_handler(route))

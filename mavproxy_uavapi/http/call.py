@@ -9,12 +9,13 @@ from typing import Any, TypeVar, cast
 
 from aiohttp import web
 
-from mavproxy_uavapi.audit import Audit
 from mavproxy_uavapi.errors import BadRequest, Invalid, NotSupported, TooManyRequests
 from mavproxy_uavapi.host.host import Host
 from mavproxy_uavapi.host.patience import within
+from mavproxy_uavapi.http.broadcast import Broadcast
 from mavproxy_uavapi.http.requests import Request, parse
 from mavproxy_uavapi.http.responses import envelope
+from mavproxy_uavapi.http.streaming import MOST_OPEN, Slots
 from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.settings import Settings
 from mavproxy_uavapi.vehicle.copter import Copter
@@ -37,17 +38,20 @@ class Service:
     Attributes:
         host: the vehicles, and the verbs in flight.
         settings: the snapshot in force.
-        audit: the trail of commands.
         scripts: the mission scripts.
+        broadcast: the telemetry, for those who listen.
+        streams: the slots of answers that go on, of all kinds.
     """
 
     host: Host
     settings: Settings
-    audit: Audit
     scripts: Scripts = field(init=False)
+    broadcast: Broadcast = field(init=False)
+    streams: Slots = field(default_factory=lambda: Slots(MOST_OPEN, "streams are open"))
 
     def __post_init__(self) -> None:
         self.scripts = Scripts(self.host, self.settings)
+        self.broadcast = Broadcast(self.host.listeners)
 
 
 class Call:

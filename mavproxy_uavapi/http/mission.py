@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import time
 from contextlib import suppress
-from pathlib import Path
 from typing import Any
 
 from aiohttp import web
@@ -15,7 +15,9 @@ from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.forms import file_of
 from mavproxy_uavapi.http.requests import ExecuteScript, ScriptLog, ScriptName
 from mavproxy_uavapi.http.responses import dumps, envelope
+from mavproxy_uavapi.http.streaming import COMMENT, KEEP_ALIVE, EventStream
 from mavproxy_uavapi.scripts import names, runs
+from mavproxy_uavapi.scripts.follower import Follower
 from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.scripts.runs import Run
 
@@ -24,7 +26,6 @@ SAVED, LISTED, STARTED, CLEARED, RUNNING, STOPPED = 44, 42, 46, 48, 50, 52
 
 LOG_SERVED = 1024 * 1024  # bytes of a log's end
 FOLLOW_EVERY = 0.25  # s between looks at a log: a file tells nobody when it grows
-KEEP_ALIVE = 15.0  # s; a comment after such a silence, so that a dead client is noticed
 
 
 async def upload_script(call: Call) -> dict[str, Any]:
@@ -84,7 +85,8 @@ async def script_log(call: Call) -> web.StreamResponse:
     if run is None:
         raise NotFound(f"{script} never ran")
     if p.follow:
-        return await _follow(call.request, run)
+        with call.service.streams.one_more():
+            return await _follow(call, run)
     text = await asyncio.to_thread(runs.tail, run.out_log if p.stream == "out" else run.err_log, LOG_SERVED)
     return web.Response(text=text, content_type="text/plain", charset="utf-8")
 
@@ -118,56 +120,41 @@ def _report(run: Run) -> dict[str, Any]:
     return run.report(time.time())
 
 
-async def _follow(request: web.Request, run: Run) -> web.StreamResponse:
+async def _follow(call: Call, run: Run) -> web.StreamResponse:
     """Both logs from their beginning, line by line, then how the run ended."""
-    response = web.StreamResponse(headers={"Content-Type": "text/event-stream", "Cache-Control": "no-store"})
-    await response.prepare(request)
-    followers = [_Follower("out", run.out_log), _Follower("err", run.err_log)]
-    silent_since = time.monotonic()
-    with suppress(ConnectionError):  # the client has gone: that is how following ends
+    response = EventStream()
+    followers = {"out": Follower(run.out_log), "err": Follower(run.err_log)}
+    now = asyncio.get_running_loop().time
+    said_at = now()
+    with suppress(ConnectionError):  # the client has gone, or reads no more: that is how following ends
+        await response.prepare(call.request)
         while True:
-            run = await asyncio.to_thread(runs.refreshed, run)  # before the logs: then nothing of them is missed
-            for follower in followers:
-                for event in await asyncio.to_thread(follower.events, not run.running):
-                    await response.write(event)
-                    silent_since = time.monotonic()
-            if not run.running:
+            run, events = await asyncio.to_thread(_next_events, run, followers)
+            if not events and now() - said_at > KEEP_ALIVE:
+                events = COMMENT
+            if events:
+                await response.write(events)
+                said_at = now()
+            if any(follower.behind for follower in followers.values()):
+                await call.service.host.bridge.calm()
+            elif run.running:
+                await asyncio.sleep(FOLLOW_EVERY)
+            else:
                 await response.write(f"event: end\ndata: {dumps(_report(run))}\n\n".encode())
                 return response
-            if time.monotonic() - silent_since > KEEP_ALIVE:
-                await response.write(b": still here\n\n")
-                silent_since = time.monotonic()
-            await asyncio.sleep(FOLLOW_EVERY)
     return response
 
 
-class _Follower:
-    """Reads a log as it grows. Blocking: for an executor."""
+def _next_events(run: Run, followers: dict[str, Follower]) -> tuple[Run, bytes]:
+    """The run as it is now, and an event for each of the next lines. Blocking."""
+    run = runs.refreshed(run)  # before the logs: then nothing of them is missed
+    events = [_events(kind, follower.lines(not run.running)) for kind, follower in followers.items()]
+    return run, "".join(events).encode()
 
-    def __init__(self, kind: str, log: Path) -> None:
-        self._kind = kind
-        self._log = log
-        self._position = 0
-        self._rest = b""
 
-    def events(self, at_end: bool) -> list[bytes]:
-        """An event for each new line; what is no whole line yet waits for its rest, unless none comes."""
-        try:
-            with self._log.open("rb") as file:
-                file.seek(self._position)
-                data = file.read(LOG_SERVED)
-                while at_end and (more := file.read(LOG_SERVED)):
-                    data += more
-        except FileNotFoundError:
-            return []
-        self._position += len(data)
-        lines = (self._rest + data).split(b"\n")
-        self._rest = lines.pop()
-        if at_end and self._rest:
-            lines.append(self._rest)
-            self._rest = b""
-        return [self._event(line) for line in lines]
-
-    def _event(self, line: bytes) -> bytes:
-        text = line.decode(errors="replace").rstrip("\r")
-        return f"event: {self._kind}\ndata: {dumps({'line': text})}\n\n".encode()
+def _events(kind: str, lines: list[str]) -> str:
+    """An event for each line: a log may have a million, so that they are encoded all at once."""
+    if not lines:
+        return ""
+    before, after = f'event: {kind}\ndata: {{"line": ', "}\n\n"
+    return before + json.dumps(lines, separators=(after + before, ": "))[1:-1] + after

@@ -14,6 +14,8 @@ from mavproxy_uavapi.errors import BadRequest, NotFound, TooManyRequests, UavApi
 
 log = logging.getLogger("uavapi.http")
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+REFUSED: web.AppKey[Callable[[str, str], None]] = web.AppKey("refused")  # called with address and code
+REFUSALS = (401, 403, 429)  # statuses of a caller that is turned away
 
 
 def envelope(system: int, result: str, **members: Any) -> dict[str, Any]:
@@ -72,6 +74,8 @@ async def errors_as_answers(request: web.Request, handler: Handler) -> web.Strea
     try:
         return await handler(request)
     except UavApiError as error:
+        if error.status in REFUSALS and not error.in_trail:
+            request.app[REFUSED](request.remote or "unknown", error.code)
         return failure(without_frames(error))
     except web.HTTPException as error:
         return of_http_exception(error) if error.status >= 400 else error

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import asyncio
 
-from mavproxy_uavapi.audit import Entry, counted, noting_sent, utc_now
+from mavproxy_uavapi.audit import Entry, utc_now
 from mavproxy_uavapi.errors import NoVehicle, UavApiError
 from mavproxy_uavapi.http.call import Action, Answer, Call
+from mavproxy_uavapi.sent import SentNames, noting_sent
 
 GONE = "the client hung up"
 
@@ -19,6 +20,7 @@ async def audited(call: Call, action: Action) -> Answer:
             answer = await action(call)
         except UavApiError as error:
             trace.leave(error.code, str(error))
+            error.in_trail = True
             raise
         except asyncio.CancelledError:
             trace.leave_at_end("client_gone", GONE)
@@ -35,7 +37,7 @@ class Trace:
         sent: names of the messages that it sends, as they go out.
     """
 
-    def __init__(self, call: Call, sent: list[str]) -> None:
+    def __init__(self, call: Call, sent: SentNames) -> None:
         self._call = call
         self._sent = sent
         self._clock = call.service.host.clock
@@ -72,6 +74,6 @@ class Trace:
             outcome=outcome,
             detail=detail,
             seconds=round(self._clock() - self._began, 3),
-            sent=counted(self._sent),
+            sent=self._sent.tell(),
         )
-        self._call.service.audit.add(entry)
+        self._call.service.host.audit.add(entry)

@@ -13,6 +13,7 @@ from enum import Enum
 from typing import Any
 
 from mavproxy_uavapi.errors import Aborted, Superseded, TimedOut, UavApiError, without_frames
+from mavproxy_uavapi.sent import SentNames, noting_sent_if_nobody_does
 
 FINISHED_KEPT = 100
 CONSOLE = "console"  # the client of what was typed at MAVProxy's prompt
@@ -49,6 +50,7 @@ class Job:
         progress: what it last said of itself, such as distance_to_go (m) and altitude (m above home).
         result: the text of its success.
         error: why it failed.
+        sent: names of the messages sent for it; None where the HTTP call that began it notes them.
     """
 
     def __init__(
@@ -64,6 +66,7 @@ class Job:
         self.progress: dict[str, float] = {}
         self.result: str | None = None
         self.error: UavApiError | None = None
+        self.sent: SentNames | None = None
         self._loop = asyncio.get_running_loop()
         self.began_at = self._loop.time()
         self.ended_at: float | None = None
@@ -194,7 +197,8 @@ class JobBook:
         self._jobs[job.id] = job
         job.when_ended(lambda: self._ended(job))
         self._forget_old()
-        job.start(body, timeout)
+        with noting_sent_if_nobody_does() as job.sent:
+            job.start(body, timeout)
         return job
 
     def _ended(self, job: Job) -> None:

@@ -14,7 +14,6 @@ import pytest
 from mavproxy_gradys.http import Handlers
 from mavproxy_gradys.service import Gradys
 from mavproxy_gradys.track_request import Track
-from mavproxy_uavapi.audit import Audit
 from mavproxy_uavapi.errors import Invalid, TooManyRequests
 from mavproxy_uavapi.http.call import Call, Service
 from mavproxy_uavapi.http.jobs import list_jobs
@@ -37,7 +36,7 @@ def service(host: Any, teller: Any, monkeypatch: pytest.MonkeyPatch) -> Service:
     monkeypatch.setattr(asyncio, "to_thread", at_once)
     teller.tell("heartbeat", armed=True, mode="GUIDED", system_status=4)
     teller.tell("extended_sys_state", landed_state=2)
-    return Service(host, ModuleSettings(environ={}).snapshot(), Audit(None))
+    return Service(host, ModuleSettings(environ={}).snapshot())
 
 
 def call_of(service: Service, text: str = LONG, **query: str) -> Call:
@@ -54,7 +53,7 @@ def asked(service: Service, call: Call) -> Any:
 def sizes(service: Service, loop: Any) -> list[int]:
     """Bytes of what the trail and the list of jobs tell."""
     jobs = loop.run(list_jobs(Call(service, SimpleNamespace(path="/jobs"), Empty())))  # type: ignore[arg-type]
-    return [len(json.dumps(jobs)), *(len(json.dumps(entry.request)) for entry in service.audit.entries)]
+    return [len(json.dumps(jobs)), *(len(json.dumps(entry.request)) for entry in service.host.audit.entries)]
 
 
 def test_neither_job_nor_trail_keeps_the_tracks_text(loop: Any, service: Service) -> None:
@@ -86,4 +85,4 @@ def test_hanging_up_holds_where_that_is_set(loop: Any, service: Service) -> None
     waiting.cancel()
     loop.settle()
     assert [job.verb for job in service.host.jobs.all()] == ["/mission/fly-track", "hold after /mission/fly-track"]
-    assert service.audit.entries[-1].outcome == "client_gone"
+    assert service.host.audit.entries[-1].outcome == "client_gone"

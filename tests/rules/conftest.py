@@ -19,7 +19,6 @@ import pytest
 from aiohttp import web
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from mavproxy_uavapi.audit import Audit
 from mavproxy_uavapi.errors import LinkLost
 from mavproxy_uavapi.host.host import Host
 from mavproxy_uavapi.host.link import Address
@@ -159,7 +158,7 @@ class World:
         self._parser = mavlink.MAVLink(None)
         self._arriving: list[Any] = []
         host.link = self
-        self.service = Service(host, ModuleSettings(settings, environ={}).snapshot(), Audit(None))
+        self.service = Service(host, ModuleSettings(settings, environ={}).snapshot())
         self._runner = web.AppRunner(make_app(self.service), access_log=None, handler_cancellation=True)
         self._tasks: list[asyncio.Task[None]] = []
         self._streams: list[asyncio.Task[None]] = []
@@ -332,7 +331,7 @@ class World:
             task.cancel()
         self.loop.settle()
         self.loop.run(self._runner.cleanup())
-        self.service.audit.close()
+        self.service.host.audit.close()
 
 
 @pytest.fixture

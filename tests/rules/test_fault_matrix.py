@@ -238,7 +238,7 @@ def after_hanging_up(world: Any, verb: str, expected: str, struck: float) -> Non
         world.loop.pass_time(30.0)
         assert world.host.jobs.running() == []
         assert DONE[verb](world)
-    entry = world.service.audit.entries[-1]  # of what went on without its client, when that had ended
+    entry = world.service.host.audit.entries[-1]  # of what went on without its client, when that had ended
     assert entry.outcome == "client_gone"
     repeated = {m.command for m in world.orders(since=struck) if m.get_type() == "COMMAND_LONG"}
     assert len(repeated) <= 1  # a command that was not heard yet is sent again, and nothing else is

@@ -8,7 +8,6 @@ import pytest
 from aiohttp import ClientSession
 
 from mavproxy_uavapi.api import Api
-from mavproxy_uavapi.audit import Audit
 from mavproxy_uavapi.settings import ModuleSettings
 
 
@@ -22,7 +21,7 @@ def settings() -> Any:
 @pytest.fixture
 def api(loop: Any, host: Any) -> Any:
     loop.patience = 0.002
-    api = Api(host, Audit(None))
+    api = Api(host)
     yield api
     loop.run(api.stop())
 

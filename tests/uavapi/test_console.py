@@ -6,7 +6,6 @@ import pytest
 from pymavlink import mavutil
 
 from mavproxy_uavapi.api import Api
-from mavproxy_uavapi.audit import Audit
 from mavproxy_uavapi.console import report, vehicles
 from mavproxy_uavapi.settings import ModuleSettings
 from mavproxy_uavapi.vehicle.messages import NedTarget
@@ -17,7 +16,7 @@ SETTINGS = ModuleSettings().snapshot()
 
 @pytest.fixture
 def api(host: Any) -> Api:
-    return Api(host, Audit(None))
+    return Api(host)
 
 
 def test_report_before_anything_happened(api: Api) -> None:

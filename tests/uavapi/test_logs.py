@@ -111,3 +111,20 @@ def test_file_is_rotated(logs: Logs, tmp_path: Path, monkeypatch: Any) -> None:
     assert files == ["uav.log", "uav.log.1", "uav.log.2", "uav.log.3"]
     assert all(file.stat().st_size <= 1000 for file in tmp_path.iterdir())
     assert "request 199" in (tmp_path / "uav.log").read_text(encoding="utf-8")
+
+
+def test_what_a_client_wrote_is_one_line_on_the_console_and_in_the_file(
+    logs: Logs, said: list[str], tmp_path: Path
+) -> None:
+    logs.open(frozenset({"API"}), frozenset(), str(tmp_path / "uav.log"), 1)
+    logging.getLogger("uavapi.http").info("asked for %s", "\x1b[2J\nAPI ERROR forged\u202e")
+    try:
+        raise ValueError("\x1b[31m")
+    except ValueError:
+        logging.getLogger("uavapi.http").exception("a defect")
+    logs.close()
+    text = (tmp_path / "uav.log").read_text(encoding="utf-8")
+    for shown in ("\n".join(said), text):
+        assert "asked for \\x1b[2J\\nAPI ERROR forged\\u202e" in shown
+        assert "\nValueError: \\x1b[31m" in shown
+        assert "\x1b" not in shown

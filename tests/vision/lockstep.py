@@ -174,7 +174,9 @@ class Lockstep:
         if plnd:
             self.simulator.parameters.set("PLND_TYPE", 1)  # the autopilot reads it at boot
             self.simulator._boot(self.simulator.copter.mission)
-        mpstate = SimpleNamespace(select_extra={}, settings=SimpleNamespace(target_system=0))
+        mpstate = SimpleNamespace(
+            select_extra={}, settings=SimpleNamespace(target_system=0), status=SimpleNamespace(logdir=None)
+        )
         with patch("asyncio.new_event_loop", lambda: self.loop):
             self.host = Host(mpstate, clock=self.loop.time)
         self.wire = self.host.link = WireLink(self)  # type: ignore[assignment]

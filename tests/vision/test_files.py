@@ -141,6 +141,38 @@ def test_an_image_that_would_fill_the_memory_is_not_decoded(monkeypatch):
             decode(data)
 
 
+def chunk(kind: bytes, data: bytes) -> bytes:
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+
+def test_an_image_that_costs_more_than_its_size_tells_is_not_decoded(monkeypatch):
+    monkeypatch.setattr(cv2, "imdecode", None)
+    png = cv2.imencode(".png", picture(50))[1].tobytes()
+    animation = chunk(b"tEXt", b"about IDAT") + chunk(b"acTL", struct.pack(">II", 50, 0))
+    with pytest.raises(BadImage, match="an animated PNG is not taken"):
+        decode(png[:33] + animation + png[33:])
+    progressive = cv2.imencode(".jpg", picture(50), [cv2.IMWRITE_JPEG_PROGRESSIVE, 1])[1].tobytes()
+    scan = progressive[progressive.rfind(b"\xff\xda") : -2]
+    with pytest.raises(BadImage, match="more than 30 scans"):
+        decode(progressive[:-2] + scan * 1000 + progressive[-2:])
+
+
+@pytest.mark.parametrize("options", [[], [cv2.IMWRITE_JPEG_PROGRESSIVE, 1]])
+def test_an_image_that_only_looks_costly_is_decoded(options):
+    png = cv2.imencode(".png", picture(50))[1].tobytes()
+    assert decode(png[:33] + chunk(b"tEXt", b"about acTL") + png[33:]).shape == (48, 64)
+    colour = np.dstack([picture(50)] * 3)
+    assert decode(cv2.imencode(".jpg", colour, options)[1].tobytes()).shape == (48, 64)
+
+
+@pytest.mark.parametrize("kind", [".tiff", ".webp", ".bmp", ".pgm"])
+def test_other_kinds_are_not_decoded_whatever_their_header_says(kind, monkeypatch):
+    data = cv2.imencode(kind, picture(50))[1].tobytes()
+    monkeypatch.setattr(cv2, "imdecode", None)
+    with pytest.raises(BadImage, match="JPEG or PNG"):
+        decode(data)
+
+
 def test_what_opencv_refuses_is_no_image():
     with pytest.raises(BadImage):
         decode_any(png_header(40_000, 40_000))

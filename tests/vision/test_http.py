@@ -3,23 +3,36 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import time
 from types import SimpleNamespace
 
 import cv2
 import numpy as np
 import pytest
-from aiohttp import web
-from aiohttp.test_utils import TestClient, TestServer
+from aiohttp import TCPConnector, web
+from aiohttp.test_utils import TestClient, TestServer, make_mocked_request
 
-from mavproxy_uavapi.errors import BadRequest, Invalid
+from mavproxy_uavapi.errors import BadRequest, Invalid, TooManyRequests, UavApiError
 from mavproxy_uavapi.http import call as calls
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import parse
+from mavproxy_uavapi.http.streaming import Slots
+from mavproxy_vision import http
 from mavproxy_vision.annotate import jpeg
 from mavproxy_vision.camera import Folder, Posted
 from mavproxy_vision.errors import BadImage, NoCamera
-from mavproxy_vision.http import FrameRequest, LandRequest, MissionRequest, Pages, SearchRequest, StreamRequest
+from mavproxy_vision.http import (
+    MOST_POSTED,
+    FrameRequest,
+    LandRequest,
+    MissionRequest,
+    Pages,
+    SearchRequest,
+    StreamRequest,
+)
 from mavproxy_vision.model import CameraModel
+from mavproxy_vision.one_at_a_time import OneAtATime
 from mavproxy_vision.sighting import Seen
 from mavproxy_vision.vision import FRESH
 from mavproxy_vision.worker import Health
@@ -127,3 +140,125 @@ def test_a_frame_that_does_not_arrive_is_told(monkeypatch):
         await asyncio.sleep(0.5)
 
     assert "did not arrive within 0.05 s" in str(posted(pages(0.0, Posted(0.0)), slow()))
+
+
+# -- many at once -----------------------------------------------------------------------------------------
+
+
+class Counting:
+    """Work that takes a while in its thread: how often it was done, and how much of it at once."""
+
+    def __init__(self, result):
+        self.result, self.count, self.at_once, self.most = result, 0, 0, 0
+
+    def __call__(self, *_):
+        self.count += 1
+        self.at_once += 1
+        self.most = max(self.most, self.at_once)
+        time.sleep(0.01)
+        self.at_once -= 1
+        return self.result
+
+
+def post_many(over, count):
+    """The answers to so many frames that are posted at once."""
+
+    async def handle(request):
+        try:
+            await over.post_frame(Call(None, request, FrameRequest()))
+        except UavApiError as error:
+            return web.Response(status=error.status)
+        return web.Response()
+
+    async def run():
+        app = web.Application()
+        app.router.add_post("/vision/frame", handle)
+        async with TestClient(TestServer(app), connector=TCPConnector(limit=0)) as client:
+            answers = await asyncio.gather(*(client.post("/vision/frame", data=jpeg(IMAGE)) for _ in range(count)))
+            return sorted(answer.status for answer in answers)
+
+    return asyncio.run(run())
+
+
+def test_frames_are_decoded_one_at_a_time(monkeypatch):
+    decoding = Counting(IMAGE)
+    monkeypatch.setattr(http, "decode", decoding)
+    assert post_many(pages(0.0, Posted(0.0)), 24) == [200] * 24
+    assert (decoding.count, decoding.most) == (24, 1)
+
+
+def test_frames_beyond_those_on_their_way_are_429():
+    over = pages(0.0, Posted(0.0))
+    with contextlib.ExitStack() as on_their_way:
+        for _ in range(MOST_POSTED):
+            on_their_way.enter_context(over._posts.one_more())
+        assert post_many(over, 3) == [429] * 3
+    assert post_many(over, 1) == [200]
+
+
+def test_decoding_goes_on_when_its_client_has_gone(monkeypatch):
+    decoding = Counting(IMAGE)
+    turns = OneAtATime()
+
+    async def run():
+        for _ in range(5):
+            task = asyncio.create_task(turns.run(decoding))
+            await asyncio.sleep(0.001)
+            task.cancel()
+        await turns.run(decoding)
+
+    asyncio.run(run())
+    assert decoding.most == 1
+
+
+def test_a_picture_is_drawn_once_for_all_who_ask(monkeypatch):
+    drawing = Counting(b"\xff\xd8")
+    monkeypatch.setattr(http, "jpeg", drawing)
+    over = pages(0.0, Posted(0.0))
+
+    async def ask(count):
+        return await asyncio.gather(*(over.frame(None) for _ in range(count)))
+
+    async def run():
+        await ask(100)
+        await ask(100)
+        over.vision.seen = Seen(2, NOW, NOW, NOW, (64, 48), ())
+        await ask(100)
+
+    asyncio.run(run())
+    assert (drawing.count, drawing.most) == (2, 1)
+
+
+def test_a_slow_drawing_is_joined_rather_than_overtaken(monkeypatch):
+    drawing = Counting(b"\xff\xd8")
+    monkeypatch.setattr(http, "jpeg", drawing)
+    over = pages(0.0, Posted(0.0))
+
+    async def run():
+        asked = []
+        for number in range(20):
+            over.vision.seen = Seen(number, NOW, NOW, NOW, (64, 48), ())
+            asked.append(asyncio.create_task(over.frame(None)))
+            await asyncio.sleep(0)
+        await asyncio.gather(*asked)
+
+    asyncio.run(run())
+    assert drawing.count == 1
+
+
+def test_frame_streams_count_among_the_open_ones():
+    over = pages(0.0, Posted(0.0))
+    over.vision.changed = asyncio.Event()
+    service = SimpleNamespace(streams=Slots(1, "streams are open"))
+
+    async def run():
+        request = make_mocked_request("GET", "/vision/stream.mjpg")
+        first = asyncio.create_task(over.stream(Call(service, request, StreamRequest())))
+        await asyncio.sleep(0)
+        with pytest.raises(TooManyRequests, match="1 streams are open already"):
+            await over.stream(Call(service, request, StreamRequest()))
+        first.cancel()
+        await asyncio.wait({first})
+        assert service.streams.count == 0
+
+    asyncio.run(run())

@@ -1,15 +1,20 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import threading
 from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from mavproxy_uavapi.audit import FILE
 from mavproxy_uavapi.errors import LinkLost
 from mavproxy_uavapi.host import host as hosts
 from mavproxy_uavapi.host.host import Host
+from mavproxy_uavapi.sent import note_sent
 from mavproxy_uavapi.vehicle.waiting import Waiting
 
 
@@ -260,3 +265,27 @@ def test_host_is_made_anew_after_the_last_member_left(mpstate: Any, descriptors:
         hosts.leave(mpstate, "uavapi")
     assert threading.active_count() == threads
     assert descriptors() == before
+
+
+def test_trail_of_a_job_without_http_is_written_when_the_last_module_leaves(
+    mpstate: Any, main_loop: Any, tmp_path: Path
+) -> None:
+    mpstate.status.logdir = str(tmp_path)
+    host = hosts.join(mpstate, "vision")
+    host.bridge.start()
+
+    async def fly() -> None:
+        async def body(_job: Any) -> str:
+            note_sent("COMMAND_LONG")
+            return "landed"
+
+        await host.jobs.begin(
+            SimpleNamespace(state=SimpleNamespace(system=7)), "/vision/land", {"id": 3}, body
+        ).outcome()
+
+    host.bridge.run(fly())
+    hosts.leave(mpstate, "vision")
+    (line,) = (tmp_path / FILE).read_text(encoding="ascii").splitlines()
+    entry = json.loads(line)
+    assert (entry["client"], entry["verb"], entry["outcome"]) == ("console", "/vision/land", "ok")
+    assert (entry["detail"], entry["sent"], entry["system"]) == ("landed", ["COMMAND_LONG"], 7)

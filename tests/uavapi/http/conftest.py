@@ -11,7 +11,6 @@ import pytest
 from aiohttp import TCPConnector, web
 from aiohttp.test_utils import TestClient, TestServer
 
-from mavproxy_uavapi.audit import Audit
 from mavproxy_uavapi.http.app import make_app
 from mavproxy_uavapi.http.call import Service
 from mavproxy_uavapi.settings import ModuleSettings
@@ -68,7 +67,7 @@ class Api:
 @pytest.fixture
 def service(host: Any) -> Service:
     """What the handlers work with."""
-    return Service(host, ModuleSettings(environ={}).snapshot(), Audit(None))
+    return Service(host, ModuleSettings(environ={}).snapshot())
 
 
 @pytest.fixture
@@ -86,7 +85,7 @@ def api(loop: Any, service: Service) -> Iterator[Api]:
 @pytest.fixture
 def raising(loop: Any) -> Any:
     """The answer of an application that raises this."""
-    from mavproxy_uavapi.http.responses import errors_as_answers
+    from mavproxy_uavapi.http.responses import REFUSED, errors_as_answers
 
     def raising(error: BaseException) -> Any:
         async def handler(_request: web.Request) -> web.StreamResponse:
@@ -97,7 +96,9 @@ def raising(loop: Any) -> Any:
 
             from aiohttp.test_utils import make_mocked_request
 
-            response = await errors_as_answers(make_mocked_request("GET", "/x"), handler)
+            app = web.Application()
+            app[REFUSED] = lambda _client, _code: None
+            response = await errors_as_answers(make_mocked_request("GET", "/x", app=app), handler)
             return SimpleNamespace(
                 status=response.status, body=json.loads(response.text or "null"), headers=response.headers
             )

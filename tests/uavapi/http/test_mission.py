@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import io
+import json
+import tracemalloc
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -9,11 +11,11 @@ import pytest
 from aiohttp import FormData
 
 from mavproxy_uavapi.errors import BadRequest, ToolFailed
-from mavproxy_uavapi.http.mission import _Follower
 from mavproxy_uavapi.scripts import runs
 from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.settings import ModuleSettings
 
+SOCKET_PATIENCE = 0.2
 FILE_PATIENCE = 2.0  # real s that the executor gets with its files before the clock jumps
 
 
@@ -196,15 +198,37 @@ def test_log_is_text_and_following_ends_with_the_run(api: Any, loop: Any) -> Non
     assert events[3].startswith("event: end\n") and '"exit_status": 3' in events[3]
 
 
-def test_follower_waits_for_whole_lines(tmp_path: Path) -> None:
-    log = tmp_path / "log"
-    follower = _Follower("out", log)
-    assert follower.events(at_end=False) == []
-    log.write_bytes(b"a\nb")
-    assert follower.events(at_end=False) == [b'event: out\ndata: {"line": "a"}\n\n']
-    log.write_bytes(b"a\nbc\r\nd")
-    assert follower.events(at_end=False) == [b'event: out\ndata: {"line": "bc"}\n\n']
-    assert follower.events(at_end=True) == [b'event: out\ndata: {"line": "d"}\n\n']
+def test_log_of_an_ended_run_comes_in_pieces(api: Any, loop: Any, ran: runs.Run) -> None:
+    ran.out_log.write_bytes(b"x\n" * 200_000)
+    loop.patience = SOCKET_PATIENCE
+
+    async def count() -> int:
+        line_ends = 0
+        async with api.client.get("/mission/scripts/a/log?follow=1") as response:
+            async for chunk in response.content.iter_any():
+                line_ends += chunk.count(b"\n")
+        return line_ends // 3  # of each event
+
+    tracemalloc.start()
+    try:
+        events = loop.run(count())
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert events == 200_000 + 2
+    assert peak < 10e6
+
+
+def test_lines_come_as_they_are(api: Any, loop: Any, ran: runs.Run) -> None:
+    lines = ['", "', '"}', "\\", "\x1b[0m\x00", "", 'event: end\\ndata: {"line": "', "\u2028\u00e9"]
+    ran.out_log.write_text("\n".join(lines), encoding="utf-8")
+
+    async def read() -> str:
+        async with api.client.get("/mission/scripts/a/log?follow=1") as response:
+            return await response.text()
+
+    events = [event.split("\ndata: ") for event in loop.run(read()).strip().split("\n\n")]
+    assert [json.loads(data)["line"] for kind, data in events if kind == "event: out"] == lines
 
 
 PATHS = [

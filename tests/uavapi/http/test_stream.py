@@ -2,13 +2,18 @@ from __future__ import annotations
 
 import asyncio
 import json
+import socket
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from typing import Any
 
 import pytest
-from aiohttp import WSMsgType
+from aiohttp import WSCloseCode, WSMsgType
 
-from mavproxy_uavapi.http.requests import StreamFilter
-from mavproxy_uavapi.http.stream import KEEP_ALIVE, QUEUED, Subscription, subscribed
+from mavproxy_uavapi.http import broadcast
+from mavproxy_uavapi.http.broadcast import QUEUED
+from mavproxy_uavapi.http.streaming import KEEP_ALIVE, LINGER, MOST_OPEN, UNREAD
+from mavproxy_uavapi.http.telemetry_views import fields
 
 
 async def socket_events(api: Any, query: str, count: int) -> list[dict[str, Any]]:
@@ -124,46 +129,6 @@ def test_slow_reader_delays_nobody(flying: Any, api: Any, loop: Any, host: Any, 
     api.until(lambda: not host.listeners)
 
 
-# -- one subscription -------------------------------------------------------------------------------------
-
-
-def take(loop: Any, subscription: Subscription) -> dict[str, Any]:
-    return loop.run(subscription.next())
-
-
-def test_reader_that_falls_behind_loses_the_oldest_and_is_told_how_many(loop: Any, host: Any, msg: Any) -> None:
-    state = host.fleet.update(msg("heartbeat"), 0.0)
-    subscription = Subscription(frozenset(), None, None)
-    for number in range(QUEUED + 25):
-        subscription.offer(state, msg("attitude", time_boot_ms=number), 1.0)
-    assert subscription.dropped == 25
-    assert take(loop, subscription)["fields"]["time_boot_ms"] == 25
-    for _ in range(QUEUED - 1):
-        last = take(loop, subscription)
-    assert last["fields"]["time_boot_ms"] == QUEUED + 24
-    assert last["dropped"] == 25
-
-
-def test_rate_lets_the_first_through_and_counts_components_apart(loop: Any, host: Any, msg: Any) -> None:
-    state = host.fleet.update(msg("heartbeat"), 0.0)
-    subscription = Subscription(frozenset(), None, 2.0)
-    heard = []
-    for tenth in range(11):
-        for component in (1, 154):
-            message = msg("attitude", component=component)
-            before = subscription._queue.qsize()
-            subscription.offer(state, message, tenth / 10)
-            heard += [(tenth, component)] * (subscription._queue.qsize() - before)
-    assert heard == [(tenth, component) for tenth in (0, 5, 10) for component in (1, 154)]
-
-
-def test_subscription_ends_with_its_context(host: Any) -> None:
-    with pytest.raises(KeyError), subscribed(host, StreamFilter()):
-        assert len(host.listeners) == 1
-        raise KeyError
-    assert host.listeners == []
-
-
 def test_client_is_not_expected_to_say_anything(flying: Any, api: Any, loop: Any) -> None:
     async def talk() -> WSMsgType:
         async with api.client.ws_connect("/telemetry/stream?names=HEARTBEAT") as socket:
@@ -171,3 +136,201 @@ def test_client_is_not_expected_to_say_anything(flying: Any, api: Any, loop: Any
             return (await socket.receive()).type
 
     assert loop.run(talk()) is WSMsgType.TEXT
+
+
+# -- clients that do not behave ---------------------------------------------------------------------------
+
+
+@pytest.fixture
+def unread(api: Any, loop: Any) -> Iterator[Callable[..., socket.socket]]:
+    """A client that asks for a stream and reads nothing: `unread(path, header=value)`."""
+    clients: list[socket.socket] = []
+
+    def connect(path: str = "/telemetry/stream", **headers: str) -> socket.socket:
+        client = socket.socket()
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        client.connect(("127.0.0.1", api.client.port))
+        lines = [f"GET {path} HTTP/1.1", "Host: 127.0.0.1", *(f"{k}: {v}" for k, v in headers.items())]
+        client.sendall("\r\n".join([*lines, "", ""]).encode())
+        client.setblocking(False)
+        clients.append(client)
+        return client
+
+    yield connect
+    for client in clients:
+        client.close()
+
+
+UPGRADE = {
+    "Upgrade": "websocket",
+    "Connection": "Upgrade",
+    "Sec-WebSocket-Version": "13",
+    "Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA==",
+    "Sec-WebSocket-Extensions": "permessage-deflate",
+}
+
+
+async def everything(loop: Any, client: socket.socket) -> bytes:
+    """What is sent to a client until its connection is closed."""
+    data = b""
+    while chunk := await loop.sock_recv(client, 1 << 16):
+        data += chunk
+    return data
+
+
+def pour(api: Any, loop: Any, msg: Any, count: int) -> None:
+    """Let so many long messages arrive, with a breath after each hundred."""
+    for number in range(count):
+        api.service.host.bridge.feed(msg("statustext", text=f"{number:050d}"))
+        if number % 100 == 99:
+            api.service.host.bridge.turn()
+            loop.settle()
+
+
+@pytest.fixture
+def encodings(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The names of the messages that were encoded."""
+    found: list[str] = []
+
+    def counting(message: Any) -> dict[str, Any]:
+        found.append(message.get_type())
+        return fields(message)
+
+    monkeypatch.setattr(broadcast, "fields", counting)
+    return found
+
+
+def test_message_is_encoded_once_for_all_clients(
+    flying: Any, api: Any, loop: Any, unread: Any, msg: Any, encodings: list[str]
+) -> None:
+    clients = [unread("/telemetry/stream?names=STATUSTEXT") for _ in range(5)]
+    clients += [unread("/telemetry/stream?names=STATUSTEXT&rate=1000", **UPGRADE) for _ in range(5)]
+    api.until(lambda: api.service.streams.count == 10)
+    api.service.host.bridge.feed(msg("statustext", text="hello"))
+    api.service.host.bridge.turn()
+
+    async def greeted() -> bool:
+        return all([b"hello" in await until(loop, client, b"hello") for client in clients])
+
+    assert loop.run(greeted())
+    assert encodings == ["STATUSTEXT"]
+
+
+async def until(loop: Any, client: socket.socket, text: bytes) -> bytes:
+    """What is sent to a client until that comes."""
+    data = b""
+    while text not in data:
+        data += await loop.sock_recv(client, 1 << 16)
+    return data
+
+
+def test_what_nobody_reads_is_not_encoded(
+    flying: Any, api: Any, loop: Any, unread: Any, msg: Any, encodings: list[str]
+) -> None:
+    for _ in range(3):
+        unread("/telemetry/stream?names=STATUSTEXT")
+    api.until(lambda: api.service.streams.count == 3)
+    pour(api, loop, msg, 3000)  # fills what the sockets hold
+    encodings.clear()
+    pour(api, loop, msg, 500)
+    assert encodings == []
+
+
+@pytest.mark.parametrize(("headers", "says"), [({}, b"event: end"), (UPGRADE, b"\x03\xf0nothing was read")])
+def test_client_that_reads_nothing_is_dropped_and_told_why(
+    flying: Any, api: Any, loop: Any, host: Any, unread: Any, msg: Any, headers: dict[str, str], says: bytes
+) -> None:
+    client = unread("/telemetry/stream?names=STATUSTEXT", **headers)
+    api.until(lambda: host.listeners)
+    began = loop.time()
+    pour(api, loop, msg, 3000)
+    loop.pass_time(UNREAD - 2.0)
+    assert host.listeners
+    api.until(lambda: not host.listeners)
+    assert loop.time() - began == pytest.approx(UNREAD, abs=2.0)
+    data = loop.run(everything(loop, client))
+    assert says in data
+    assert b"nothing was read for 30 s" in data[-200:]
+
+
+def test_client_that_reads_slowly_is_kept(flying: Any, api: Any, loop: Any, host: Any, unread: Any, msg: Any) -> None:
+    client = unread("/telemetry/stream?names=STATUSTEXT")
+    api.until(lambda: host.listeners)
+
+    async def read_slowly() -> None:
+        for _ in range(10):
+            await asyncio.sleep(UNREAD / 2)
+            for _ in range(30):
+                with suppress(BlockingIOError):
+                    client.recv(4096)
+                await asyncio.sleep(0.001)
+
+    pour(api, loop, msg, 3000)
+    loop.run(read_slowly())
+    assert host.listeners
+
+
+def test_client_that_never_reads_holds_no_connection(
+    flying: Any, api: Any, loop: Any, host: Any, unread: Any, msg: Any
+) -> None:
+    client = unread("/telemetry/stream?names=STATUSTEXT")
+    api.until(lambda: host.listeners)
+    pour(api, loop, msg, 3000)
+    loop.pass_time(UNREAD + LINGER + 5.0)
+    assert b"event: end" not in loop.run(everything(loop, client))
+
+
+def test_streams_beyond_the_most_are_429_and_a_place_is_free_again(
+    flying: Any, api: Any, loop: Any, unread: Any
+) -> None:
+    clients = [unread("/telemetry/stream?names=HEARTBEAT") for _ in range(MOST_OPEN)]
+    api.until(lambda: api.service.streams.count == MOST_OPEN)
+    refused = api.get("/telemetry/stream")
+    assert (refused.status, refused.body["code"]) == (429, "too_many_requests")
+    assert "100 streams" in refused.body["detail"]
+    clients[0].close()
+    api.until(lambda: api.service.streams.count < MOST_OPEN)
+    assert loop.run(server_sent_events(api, "", 1))
+
+
+def test_websocket_is_not_compressed(flying: Any, loop: Any, unread: Any) -> None:
+    client = unread(**UPGRADE)
+    assert b"deflate" not in loop.run(until(loop, client, b"\r\n\r\n"))
+
+
+def test_websocket_that_says_too_much_at_once_is_closed(flying: Any, api: Any, loop: Any, host: Any) -> None:
+    async def shout() -> int | None:
+        async with api.client.ws_connect("/telemetry/stream?names=NONE") as socket:
+            await socket.send_bytes(bytes(1 << 20))
+            await socket.receive()
+            return socket.close_code
+
+    assert loop.run(shout()) == WSCloseCode.MESSAGE_TOO_BIG
+    api.until(lambda: not host.listeners)
+
+
+def test_websocket_that_talks_without_end_has_to_wait(flying: Any, api: Any, loop: Any) -> None:
+    said = 0
+
+    async def talk() -> None:
+        nonlocal said
+        async with api.client.ws_connect("/telemetry/stream?names=NONE") as socket:
+            while True:
+                await socket.send_bytes(bytes(4000))
+                said += 4000
+
+    talking = loop.create_task(talk())
+    loop.pass_time(10.0)
+    talking.cancel()
+    assert 0 < said < 20e6  # what the buffers on the way hold, rather than all that it has to say
+
+
+def test_quiet_websocket_is_pinged(flying: Any, api: Any, loop: Any) -> None:
+    async def first() -> tuple[WSMsgType, float]:
+        began = loop.time()
+        async with api.client.ws_connect("/telemetry/stream?names=NONE", autoping=False) as socket:
+            return (await socket.receive()).type, loop.time() - began
+
+    kind, took = loop.run(first())
+    assert kind is WSMsgType.PING
+    assert took == pytest.approx(KEEP_ALIVE, abs=1.0)

@@ -1,0 +1,91 @@
+"""What stream clients cost others: reads of one client, while many streams are open that nobody reads."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import contextlib
+import socket
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from rig import Client, cpu_seconds, machine, percentile, rig, table
+
+ALL = "/telemetry/stream"
+NAMES = ("ATTITUDE", "HEARTBEAT", "GLOBAL_POSITION_INT", "VFR_HUD", "SYS_STATUS")
+
+
+def unread(port: int, path: str, kernel: int = 4096) -> socket.socket:
+    """A client that asks for a stream and reads nothing of it.
+
+    Args:
+        port: the API's.
+        path: what it asks for.
+        kernel: bytes that the kernel may keep for it.
+    """
+    client = socket.socket()
+    client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, kernel)
+    client.connect(("127.0.0.1", port))
+    client.sendall(f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n".encode())
+    return client
+
+
+def resident(pid: int) -> float:
+    """Memory of a process in MB."""
+    words = Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()
+    return int(words[1]) * 4096 / 1e6
+
+
+async def reads(port: int, seconds: float) -> list[float]:
+    """Read `/telemetry/gps` ten times a second; how long (s) each took."""
+    client, times = Client(port), []
+    await client.open()
+    end = time.monotonic() + seconds
+    while (before := time.monotonic()) < end:
+        await client.ask("/telemetry/gps")
+        times.append(time.monotonic() - before)
+        await asyncio.sleep(0.1)
+    client.close()
+    return times
+
+
+def case(made: Any, paths: list[str], seconds: float) -> list[str]:
+    """The numbers of one case: reads while clients have asked for `paths` and read nothing."""
+    pid = made.mavproxy.pid
+    with contextlib.ExitStack() as open_streams:
+        for path in paths:
+            open_streams.enter_context(unread(made.port, path))
+        time.sleep(2.0)
+        cpu, began = cpu_seconds(pid), time.monotonic()
+        times = asyncio.run(reads(made.port, seconds))
+        share = (cpu_seconds(pid) - cpu) / (time.monotonic() - began)
+        memory = resident(pid)
+    time.sleep(2.0)
+    millis = [f"{percentile(times, one) * 1e3:.1f}" for one in (0.5, 0.99, 1.0)]
+    return [*millis, f"{share * 100:.0f} %", f"{memory:.0f}"]
+
+
+def main() -> int:
+    """Run and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seconds", type=float, default=10.0, help="of each case")
+    parser.add_argument("--clients", type=int, nargs="*", default=[0, 100, 300])
+    options = parser.parse_args()
+    print(f"streams: {machine()}")
+    rows = []
+    with rig(streamrate=10) as (made, _):
+        made.get("/telemetry/gps")  # the first one asks the vehicle for the message
+        for count in options.clients:
+            rows.append([f"{count} of all messages", *case(made, [ALL] * count, options.seconds)])
+        different = [f"{ALL}?names={NAMES[n % 5]}&rate={n + 1}" for n in range(100)]
+        rows.append(["100 with 100 filters", *case(made, different, options.seconds)])
+        rows.append(["100 that match nothing", *case(made, [f"{ALL}?names=NONE"] * 100, options.seconds)])
+    print(table(["unread streams", "read p50 ms", "p99 ms", "most ms", "MAVProxy's CPU", "MB"], rows))
+    print()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

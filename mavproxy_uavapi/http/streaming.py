@@ -1,0 +1,145 @@
+"""Answers that go on: how many are open at once, and the end of one whose client reads no more."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import socket
+from collections.abc import Awaitable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from aiohttp import web
+from aiohttp.abc import AbstractStreamWriter
+
+from mavproxy_uavapi.errors import TooManyRequests
+
+log = logging.getLogger("uavapi.http")
+
+MOST_OPEN = 100  # streams at once, of all kinds
+KEEP_ALIVE = 15.0  # s; a comment or ping after such a silence, so that dead connections are noticed
+UNREAD = 30.0  # s without reading after which a client is dropped
+LINGER = 30.0  # s that it then has to read why
+WHY = f"nothing was read for {UNREAD:g} s"
+SEND_BUFFER = 128 * 1024  # bytes that the kernel keeps of a stream: what it holds is old when it is read
+LOW_WATER = 16 * 1024  # bytes of asyncio's own buffer up to which no writer waits
+
+COMMENT = b": still here\n\n"
+END = f"event: end\ndata: {json.dumps({'code': 'not_read', 'detail': WHY})}\n\n".encode()
+
+
+class NotRead(ConnectionError):
+    """The client read nothing for UNREAD seconds; its connection is about to be closed."""
+
+
+class Slots:
+    """So many of a kind may be there at once.
+
+    Args:
+        most: how many.
+        what: they are, for the refusal: `streams are open`.
+
+    Attributes:
+        count: how many there are.
+    """
+
+    def __init__(self, most: int, what: str) -> None:
+        self._most, self._what = most, what
+        self.count = 0
+
+    @contextmanager
+    def one_more(self) -> Iterator[None]:
+        """One more is there for as long as the context lasts.
+
+        Raises:
+            TooManyRequests: all slots are taken.
+        """
+        if self.count >= self._most:
+            raise TooManyRequests(f"{self._most} {self._what} already")
+        self.count += 1
+        try:
+            yield
+        finally:
+            self.count -= 1
+
+
+class StreamingResponse(web.StreamResponse):
+    """An answer that goes on until its client leaves, or reads no more.
+
+    Args:
+        content_type: of what is written.
+        last_words: what a client that reads no more is sent, in case it reads on.
+    """
+
+    def __init__(self, content_type: str, last_words: bytes = b"") -> None:
+        super().__init__(headers={"Content-Type": content_type, "Cache-Control": "no-store"})
+        self._last_words = last_words
+        self._transport: Any = None
+
+    async def prepare(self, request: web.BaseRequest) -> AbstractStreamWriter | None:
+        """Send the headers."""
+        self._transport = request.transport
+        limit_kernel(self._transport)
+        return await super().prepare(request)
+
+    async def write(self, data: bytes | bytearray | memoryview) -> None:
+        """Write; waits while the client is slow.
+
+        Raises:
+            NotRead: it reads no more.
+            ConnectionError: it has gone.
+        """
+        try:
+            await while_read(self._transport, len(data), super().write(data))
+        except NotRead:
+            await super().write(self._last_words)
+            self._transport.close()  # when it has sent what it holds
+            abort_later(self._transport)
+            raise
+
+
+class EventStream(StreamingResponse):
+    """Server-Sent Events."""
+
+    def __init__(self) -> None:
+        super().__init__("text/event-stream", END)
+
+
+def limit_kernel(transport: asyncio.Transport | None) -> None:
+    """Have the kernel keep little of a stream, and notice by itself when the client's machine has gone."""
+    sock = None if transport is None else transport.get_extra_info("socket")
+    if sock is None:
+        return
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
+    if hasattr(socket, "TCP_USER_TIMEOUT"):  # Linux has it; after UNREAD, which can say why
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, int(2 * UNREAD * 1000))
+
+
+async def while_read(transport: asyncio.Transport, size: int, writing: Awaitable[None]) -> None:
+    """Await `writing` of `size` bytes, for as long as the client reads.
+
+    Raises:
+        NotRead: it read nothing for UNREAD seconds; `writing` is cancelled.
+    """
+    if transport.get_write_buffer_size() + size <= LOW_WATER:
+        await writing  # waits for nothing
+        return
+    task = asyncio.ensure_future(writing)
+    try:
+        await asyncio.sleep(0)  # it hands over all its bytes, then waits until most are sent
+        while not task.done():
+            before = transport.get_write_buffer_size()
+            await asyncio.wait({task}, timeout=UNREAD)
+            if not task.done() and transport.get_write_buffer_size() >= before:
+                raise NotRead(WHY)
+    finally:
+        task.cancel()
+    task.result()
+
+
+def abort_later(transport: asyncio.Transport) -> None:
+    """Close a connection that is not read after LINGER seconds, whatever is left to be sent."""
+    peer = transport.get_extra_info("peername")
+    log.info("a stream of %s was dropped: %s", peer[0] if peer else "a client", WHY)
+    asyncio.get_running_loop().call_later(LINGER, transport.abort)

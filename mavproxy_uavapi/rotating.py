@@ -1,0 +1,86 @@
+"""A log file that rotates, and outlives a disk that takes no more."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import logging
+import logging.handlers
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+PRIVATE, PUBLIC = 0o600, 0o666  # modes; the umask takes from them
+
+
+class RotatingFile(logging.handlers.RotatingFileHandler):
+    """The file. That it cannot be written is told once, and tried again with each line.
+
+    Args:
+        file: where.
+        size: bytes after which it is renamed, and a new one begun.
+        older: renamed ones that are kept.
+        tell: called with one line when it cannot be written.
+        private: whether its owner alone may read it.
+        delay: whether it is opened with the first line; else at once.
+
+    Raises:
+        OSError: it cannot be opened.
+    """
+
+    def __init__(
+        self,
+        file: Path,
+        size: int,
+        older: int,
+        tell: Callable[[str], None],
+        *,
+        private: bool = False,
+        delay: bool = False,
+    ) -> None:
+        self._tell, self._private = tell, private
+        self._failing = self._failed = False
+        super().__init__(file, maxBytes=size, backupCount=older, encoding="utf-8", delay=delay)
+
+    def _open(self) -> io.TextIOWrapper:
+        descriptor = os.open(
+            self.baseFilename, os.O_RDWR | os.O_APPEND | os.O_CREAT, PRIVATE if self._private else PUBLIC
+        )
+        if self._private:
+            with contextlib.suppress(OSError):  # a file system without modes, or somebody else's file
+                os.fchmod(descriptor, PRIVATE)
+        if _is_torn(descriptor):
+            os.write(descriptor, b"\n")
+        return io.TextIOWrapper(os.fdopen(descriptor, "ab"), encoding="utf-8")
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Write a line."""
+        self._failing = False
+        super().emit(record)
+        self._failed = self._failing
+
+    def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802  logging's own name
+        """Tell, once, and let go of what the disk did not take: the next line begins anew."""
+        self._failing = True
+        if not self._failed:
+            self._tell(f"cannot write {self.baseFilename}: {sys.exc_info()[1]}")
+        stream, self.stream = self.stream, None
+        _close(stream)
+
+    def close(self) -> None:
+        """Write what is left, if the disk takes it."""
+        with contextlib.suppress(OSError):  # it was told of
+            super().close()
+
+
+def _is_torn(descriptor: int) -> bool:
+    """Whether the file ends within a line: the disk was full, or its writer killed."""
+    end = os.fstat(descriptor).st_size
+    return end > 0 and os.pread(descriptor, 1, end - 1) != b"\n"
+
+
+def _close(stream: io.TextIOWrapper | None) -> None:
+    if stream is not None:
+        with contextlib.suppress(OSError):  # of the rest that it still held
+            stream.close()

@@ -1,0 +1,73 @@
+"""Which messages went out to vehicles for which command: the audit trail tells."""
+
+from __future__ import annotations
+
+import contextvars
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+MANY = 3  # of a name in a row are counted
+MOST_RUNS = 40  # of one name each, that are told of a command
+
+
+class SentNames:
+    """Names of messages, in the order in which they were sent; bounded, however long a command goes on.
+
+    Attributes:
+        told: whether the trail has them: what is sent later on belongs to no command of its own.
+    """
+
+    def __init__(self) -> None:
+        self._runs: list[tuple[str, int]] = []
+        self._more = 0
+        self.told = False
+
+    def add(self, name: str) -> None:
+        """Note one that goes out."""
+        if self._runs and self._runs[-1][0] == name and not self._more:
+            self._runs[-1] = name, self._runs[-1][1] + 1
+        elif len(self._runs) < MOST_RUNS:
+            self._runs.append((name, 1))
+        else:
+            self._more += 1
+
+    def tell(self) -> tuple[str, ...]:
+        """The names; one that comes thrice or more in a row is there once, with its number: `NAME x240`."""
+        self.told = True
+        names = [
+            text for name, count in self._runs for text in ([name] * count if count < MANY else [f"{name} x{count}"])
+        ]
+        return (*names, f"and {self._more} more") if self._more else tuple(names)
+
+
+# Of the present command; a task of it inherits the same.
+_sent: contextvars.ContextVar[SentNames | None] = contextvars.ContextVar("sent", default=None)
+
+
+def note_sent(name: str) -> None:
+    """Note that a message of that name goes to a vehicle for the present command."""
+    sent = _sent.get()
+    if sent is not None:
+        sent.add(name)
+
+
+@contextmanager
+def noting_sent() -> Iterator[SentNames]:
+    """The names of the messages that are sent within the context, and by the tasks that are begun in it."""
+    sent = SentNames()
+    token = _sent.set(sent)
+    try:
+        yield sent
+    finally:
+        _sent.reset(token)
+
+
+@contextmanager
+def noting_sent_if_nobody_does() -> Iterator[SentNames | None]:
+    """As `noting_sent`; None within an HTTP call, which notes them itself."""
+    sent = _sent.get()
+    if sent is not None and not sent.told:
+        yield None
+    else:
+        with noting_sent() as names:
+            yield names

@@ -1,0 +1,68 @@
+"""Streams that nobody reads, and the trail of flights at the prompt, in a real MAVProxy."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import socket
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+import requests
+
+OPEN = 100
+
+
+@pytest.fixture
+def unread(embedded_rig: Any) -> Iterator[list[socket.socket]]:
+    """As many streams as may be open, none of which is read."""
+    with contextlib.ExitStack() as clients:
+        opened = []
+        for _ in range(OPEN):
+            client = clients.enter_context(socket.socket())
+            client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            client.connect(("127.0.0.1", embedded_rig.port))
+            client.sendall(b"GET /telemetry/stream HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+            opened.append(client)
+        yield opened
+
+
+def test_streams_that_nobody_reads_cost_a_reader_nothing(embedded_rig, harness, unread):
+    rig = embedded_rig
+    harness.eventually(lambda: rig.get("/telemetry/stream").status_code == 429, 10, "a refusal of one more")
+    times = []
+    for _ in range(50):
+        began = time.monotonic()
+        rig.ok(rig.get("/telemetry/gps"))
+        times.append(time.monotonic() - began)
+    assert sorted(times)[25] < 0.05  # of a new connection each time; generous
+    for client in unread:
+        client.close()
+
+    def free() -> bool:
+        with requests.get(f"{rig.url}/telemetry/stream", stream=True, timeout=5) as answer:
+            return answer.status_code == 200
+
+    harness.eventually(free, 10, "a free place")
+
+
+def test_flight_that_was_begun_at_the_prompt_is_in_the_trail(embedded_rig, harness):
+    pytest.importorskip("cv2")
+    rig = embedded_rig
+    rig.mavproxy.ask("module load vision", "Loaded module vision")
+    rig.mavproxy.ask("vision search 3", "/command/arm first")
+    file = rig.directory / "uavapi-audit.jsonl"
+    (entry,) = harness.eventually(lambda: of_console(file), 10, "an entry")
+    assert (entry["verb"], entry["request"], entry["outcome"]) == ("/vision/search", {"id": 3}, "not_armed")
+    assert "console /vision/search(id=3): not_armed" in rig.mavproxy.ask("uavapi log 3", "all of them:")
+    assert file.stat().st_mode & 0o777 == 0o600
+
+
+def of_console(file: Any) -> list[dict[str, Any]]:
+    """The trail's entries of the prompt."""
+    if not file.exists():
+        return []
+    entries = [json.loads(line) for line in file.read_text(encoding="ascii").splitlines()]
+    return [entry for entry in entries if entry["client"] == "console"]
