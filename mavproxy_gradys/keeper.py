@@ -16,6 +16,7 @@ from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.outages import Drops, Outage
 from mavproxy_gradys.owed import Owed
 from mavproxy_gradys.readings import Reading, Stored
+from mavproxy_gradys.rows import is_storable
 from mavproxy_gradys.spool import Spool, uptime
 from mavproxy_gradys.tasks import begin
 from mavproxy_uavapi.host.patience import within
@@ -35,7 +36,8 @@ class Keeper:
         count: readings in the spool; None until it was opened.
         problem: why the spool takes nothing just now; empty when it does.
         set_aside: corrupt files that were replaced.
-        dropped: readings that were dropped, by cause: `size`, `age`, `disk`, `value` (none that can be told).
+        dropped: readings that were dropped, by cause: `size`, `age`, `disk`, `damage` (of the
+            file; set aside in it), `value` (none that can be told).
 
     Args:
         make: opens the spool; may raise NotStored.
@@ -88,7 +90,7 @@ class Keeper:
 
     def put(self, reading: Reading) -> None:
         """Take a sampled reading; it is on the disk within COMMIT_EVERY."""
-        if not reading.is_storable:
+        if not is_storable(reading):
             self._count_drop("value")
             return
         self._waiting.append(reading)
@@ -218,7 +220,7 @@ class Keeper:
             self._close()
             raise NotStored(f"{spool.path}: {error}") from error
         try:
-            if trim or spool.size > spool.largest:
+            if trim or spool.damaged or spool.size > spool.largest:
                 spool.trim()
             self._look(spool)
         except sqlite3.Error as error:

@@ -13,7 +13,8 @@ from mavproxy_gradys.errors import NotDelivered, NotStored
 from mavproxy_gradys.keeper import Keeper
 from mavproxy_gradys.outages import Outage
 from mavproxy_gradys.readings import Stored
-from mavproxy_gradys.settings import Settings, masked
+from mavproxy_gradys.settings import Settings
+from mavproxy_gradys.sink_address import SinkAddress
 from mavproxy_gradys.sinks import Sink, make_sink
 from mavproxy_gradys.tally import RoundTrips
 from mavproxy_uavapi.host.patience import within
@@ -26,7 +27,7 @@ class Sender:
     """Empties the spool into one sink; belongs to the asyncio thread.
 
     Attributes:
-        url: the sink's.
+        address: the sink's.
         batches: how many were sent.
         sent: readings that went out, repeats included.
         acknowledged: readings that were acknowledged.
@@ -34,16 +35,21 @@ class Sender:
         last_error: why the newest failed batch failed; empty since the last success.
 
     Args:
-        url: the sink's.
+        address: the sink's.
         keeper: the spool.
         clock: monotonic seconds.
         chance: numbers from 0 to 1.
     """
 
     def __init__(
-        self, url: str, keeper: Keeper, clock: Callable[[], float], chance: Callable[[], float] = random.random
+        self,
+        address: SinkAddress,
+        keeper: Keeper,
+        clock: Callable[[], float],
+        chance: Callable[[], float] = random.random,
     ) -> None:
-        self.url = url
+        self.address = address
+        self._name = address.name
         self.batches = self.sent = self.acknowledged = self.put_last = 0
         self.last_error = ""
         self.round_trips = RoundTrips()
@@ -52,7 +58,7 @@ class Sender:
         self._backoff = Backoff(chance, LONGEST_OF_SINKS)
         self._batch: list[Stored] = []  # on its way, or the last one
         self._size = self._largest = BATCH
-        self._outage = Outage(log, f"{masked(url)} takes no readings", f"{masked(url)} takes readings again")
+        self._outage = Outage(log, f"{address} takes no readings", f"{address} takes readings again")
         self._defects: set[str] = set()
         self._hurry = asyncio.Event()
 
@@ -63,7 +69,7 @@ class Sender:
             while True:
                 try:
                     if sink is None:
-                        sink = make_sink(self.url, settings)
+                        sink = make_sink(self.address, settings)
                     await self._turn(sink)
                     continue
                 except NotStored as error:  # the spool says so itself
@@ -85,14 +91,14 @@ class Sender:
             NotDelivered, NotStored: it came to nothing.
         """
         self._batch = []
-        self._batch = batch = await self._keeper.batch(self.url, self._size)
+        self._batch = batch = await self._keeper.batch(self._name, self._size)
         self.batches += 1
         self.sent += len(batch)
         started = self._clock()
         taken = await sink.send(batch)
         self.round_trips.add(self._clock() - started)
         self.acknowledged += len(taken)
-        await self._keeper.acknowledge(self.url, batch, taken)
+        await self._keeper.acknowledge(self._name, batch, taken)
         if not taken:
             raise NotDelivered("it acknowledges nothing", reached=True, for_content=True)
         self.last_error = ""
@@ -108,7 +114,7 @@ class Sender:
         if not error.for_content or not count:
             return
         if count == 1:
-            self._keeper.put_last(self.url, self._batch[0])
+            self._keeper.put_last(self._name, self._batch[0])
             self.put_last += 1
             return
         self._size = count // 2
@@ -120,7 +126,7 @@ class Sender:
         """Tell of a defect, of each kind once."""
         if repr(error) not in self._defects:
             self._defects = {*list(self._defects)[-9:], repr(error)}
-            context = {"message": f"gradys: a defect in the delivery to {masked(self.url)}", "exception": error}
+            context = {"message": f"gradys: a defect in the delivery to {self.address}", "exception": error}
             asyncio.get_running_loop().call_exception_handler(context)
 
     async def _pause(self) -> None:
@@ -141,7 +147,7 @@ class Sender:
         now = self._clock()
         waits = self._backoff.waits(now)
         return {
-            "sink": masked(self.url),
+            "sink": str(self.address),
             "batches": self.batches,
             "sent": self.sent,
             "acknowledged": self.acknowledged,

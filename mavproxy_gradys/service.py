@@ -92,6 +92,12 @@ class Gradys:
             await pusher.close()
         await self.sensing.stop()
 
+    async def close(self) -> None:
+        """End it for good; what the spool did not take is tried once more."""
+        async with self._changing:
+            await self._stop()
+            await self.sensing.close()
+
     def flush(self) -> None:
         """End all pauses after failures: everything is tried now."""
         for tally in self.stations.values():

@@ -308,7 +308,11 @@ def test_the_log_tells_of_a_full_disk_once_and_of_drops_once_a_minute(
 
 
 def test_the_log_names_the_file_that_was_set_aside(loop: Any, disk: Disk, caplog: Any) -> None:
-    disk.path.write_bytes(b"SQLite format 3\0" + b"\xff" * 8192)
+    with contextlib.closing(Spool(disk.path, 1e9, 1e9)) as spool:
+        spool.append([reading()] * 2000)
+    content = bytearray(disk.path.read_bytes())
+    content[8192:20480] = b"\xff" * 12288
+    disk.path.write_bytes(content)
     keeper = Keeper(disk.make, loop.time)
     begin(loop, keeper)
     assert [record.message.rpartition("/")[2] for record in caplog.records] == ["spool.db.corrupt-1"]
