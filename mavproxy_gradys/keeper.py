@@ -69,8 +69,8 @@ class Keeper:
         self.problem = "it is being opened"
         self._writer = begin(self._write(), "the spool")
 
-    async def stop(self) -> list[Reading]:
-        """Keep what still waits, and close the file; the readings that the disk did not take."""
+    async def stop(self) -> None:
+        """Keep what still waits, and close the file; what the disk does not take is `left`."""
         self._stopping.set()  # not cancelled: a transaction in flight must not be forgotten
         try:
             if self._writer is not None:
@@ -84,6 +84,10 @@ class Keeper:
         await asyncio.wrap_future(closing)
         self._thread.shutdown()  # it has nothing left to do
         self._drops.tell(self.dropped, at_once=True)
+
+    @property
+    def left(self) -> list[Reading]:
+        """The readings that the disk did not take."""
         return list(self._waiting)
 
     # -- in -----------------------------------------------------------------------------------------------

@@ -84,18 +84,22 @@ class GradysModule(HostedModule):
         if self.host.commands.get("fly") == self._fly:
             del self.host.commands["fly"]
         await self.gradys.tracks.close()
-        with contextlib.suppress(asyncio.TimeoutError):  # the spool is closed in its own thread
-            await within(LONGEST_END, self.gradys.close())
-        self._lost = self.gradys.sensing.lost
-        if self._lost:
-            log.warning("%s", self._lost)
+        try:
+            with contextlib.suppress(asyncio.TimeoutError):  # the spool is closed in its own thread
+                await within(LONGEST_END, self.gradys.close())
+        finally:
+            self._lost = self.gradys.sensing.lost
+            if self._lost:
+                log.warning("%s", self._lost)
 
     def unload(self) -> None:
         """Give back what is ours alone, then the rest; say what is lost."""
         self.mpstate.completion_functions.pop(COMPLETION, None)
-        super().unload()
-        if self._lost:
-            print(f"gradys: {self._lost}")
+        try:
+            super().unload()
+        finally:
+            if self._lost:
+                print(f"gradys: {self._lost}")
 
     def command(self, args: list[str]) -> None:
         """The module's command at the prompt; most of it needs the asyncio thread."""

@@ -66,9 +66,9 @@ class Sensing:
         self._senders.clear()
         if self._keeper is not None:
             try:
-                self._left = await self._keeper.stop()
-            finally:
-                self._why_left = self._keeper.problem
+                await self._keeper.stop()
+            finally:  # also after a defect
+                self._left, self._why_left = self._keeper.left, self._keeper.problem
                 self._keeper = None
 
     async def close(self) -> None:
@@ -82,7 +82,7 @@ class Sensing:
         """What is lost if nothing more is written: how many readings, and why; empty when none is."""
         keeper = self._keeper  # it is there when its end was not waited for
         count = len(self._left) if keeper is None else keeper.waiting
-        why = (self._why_left if keeper is None else keeper.problem) or "the disk did not answer in time"
+        why = (self._why_left if keeper is None else keeper.problem) or "they were not written in time"
         return f"{count} reading{'' if count == 1 else 's'} are lost: {why}" if count else ""
 
     def _kept(self, settings: Settings | None = None) -> Keeper:

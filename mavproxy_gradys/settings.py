@@ -175,6 +175,8 @@ def check(name: str, value: Any) -> None:
         sink_addresses(text)
     elif name == "quantities":
         parse_quantities(text)
+    elif name == "spool" and not text.isprintable():
+        raise SettingError("spool: it takes a file's name in printable letters")
     elif name == "token" and not (text.isascii() and (text.isprintable() or not text)):
         raise SettingError("token: it takes printable ASCII")
     elif name == "ca_file" and text:

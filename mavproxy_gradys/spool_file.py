@@ -67,7 +67,6 @@ def _opened(path: Path, first: int) -> sqlite3.Connection:
     db.text_factory = lambda cell: cell.decode(errors="surrogateescape")  # one bad letter is no reason to stop
     try:
         ours = is_ours(db, path)
-        tighten(path)
         db.execute("PRAGMA locking_mode=EXCLUSIVE")
         db.execute("PRAGMA synchronous=FULL")
         if not ours:
@@ -78,6 +77,7 @@ def _opened(path: Path, first: int) -> sqlite3.Connection:
         db.execute(f"PRAGMA journal_size_limit={WAL_KEPT}")
         check(db)
         migrate(db)
+        tighten(path)
     except BaseException:
         db.close()
         raise
@@ -156,7 +156,7 @@ def tighten(path: Path) -> None:
     """Keep others from reading the file, what is beside it, and corrupt ones of before: they may hold passwords."""
     files = [path, *(path.with_name(path.name + suffix) for suffix in BESIDE)]
     for file in (*files, *path.parent.glob(f"{glob.escape(path.name)}.corrupt-*")):
-        if file.exists():
+        if file.is_file() and not file.is_symlink():  # a link leads to what is somebody else's
             chmod(file, 0o600)
 
 

@@ -249,6 +249,7 @@ def test_a_defect_loses_no_reading_and_leaves_no_file_open(
         with pytest.raises(RuntimeError):
             loop.run(keeper.stop())
     assert [str(defect["exception"]) for defect in loop.defects] == ["a defect"]
+    assert len(keeper.left) == 1
     loop.defects.clear()
     Spool(disk.path, 1e9, 1e9).close()  # not locked
 
@@ -273,7 +274,8 @@ def test_what_the_disk_does_not_take_is_handed_back_at_the_end(loop: Any, disk: 
     for value in range(3):
         keeper.put(reading(f"{value}" * 3000))
     loop.pass_time(1)
-    assert [left.value[0] for left in loop.run(keeper.stop())] == ["0", "1", "2"]
+    loop.run(keeper.stop())
+    assert [left.value[0] for left in keeper.left] == ["0", "1", "2"]
     with pytest.raises(NotStored, match="stopping"):
         loop.run(keeper.keep([reading(1)]))
 

@@ -219,3 +219,18 @@ def test_a_bad_setting_is_an_import_error_of_one_line(mpstate: Any, given: dict[
         gradys.init(mpstate, **given)
     assert "\n" not in str(raised.value)
     assert mpstate.command_map == {}
+
+
+def test_after_a_defect_too_an_unload_says_what_is_lost(
+    make: Any, capsys: Any, monkeypatch: Any, main_loop: Any
+) -> None:
+    module = make()
+
+    def defect(*_: Any) -> list[int]:
+        raise RuntimeError("a defect")
+
+    monkeypatch.setattr(Spool, "append", defect)
+    put(module, 3)
+    with contextlib.suppress(RuntimeError):
+        module.unload()
+    assert "gradys: 3 readings are lost" in capsys.readouterr().out

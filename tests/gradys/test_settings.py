@@ -35,7 +35,7 @@ def test_an_ini_file_that_means_nothing_is_refused(tmp_path: Path, text: str) ->
      ("sink", "ftp://x"), ("quantities", "x"), ("ca_file", "/no/such"), ("spool_mb", -1), ("nope", 1),
      ("sink", "mqtt://broker/fleet/+/x"), ("sink", "mqtt://broker/a#b"), ("sink", "mqtts://broker/a?b"),
      ("sink", "mqtt://broker/a%23"), ("gs", "a..b:80"),
-     ("sink", "http://a/r#ack=200"), ("sink", "mqtt://broker/a#ack=status")],
+     ("spool", "a\0b"), ("sink", "http://a/r#ack=200"), ("sink", "mqtt://broker/a#ack=status")],
 )  # fmt: skip
 def test_what_cannot_work_is_refused(name: str, value: Any) -> None:
     with pytest.raises(SettingError):

@@ -133,6 +133,16 @@ os.kill(os.getpid(), signal.SIGKILL)
 """
 
 
+def test_no_file_is_tightened_through_a_link(file: Path, tmp_path: Path) -> None:
+    kept(file)
+    precious = tmp_path / "precious"
+    precious.touch()
+    precious.chmod(0o644)
+    file.with_name("spool.db.corrupt-1").symlink_to(precious)
+    kept(file)
+    assert mode(precious) == 0o644
+
+
 def test_only_a_folder_that_is_ours_is_tightened(tmp_path: Path) -> None:
     for name, left in (("shared", 0o755), ("mavproxy-uavapi", 0o700)):
         folder = tmp_path / name
