@@ -137,6 +137,8 @@ def explain(error: BaseException, timeout: float) -> str:
     """Why nobody answered, in a few words."""
     if isinstance(error, asyncio.TimeoutError):
         return f"no answer within {timeout:g} s"
+    if isinstance(error, aiohttp.InvalidURL):
+        return "there is no such address"  # it may hold a password, and the error repeats it
     if isinstance(error, aiohttp.ServerDisconnectedError):
         return "it closed the connection without an answer"
     if isinstance(error, aiohttp.ClientConnectorCertificateError):

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from mavproxy_gradys.errors import NotStored
-from mavproxy_gradys.outages import Drops, Outage
+from mavproxy_gradys.outages import Defects, Drops, Outage
 from mavproxy_gradys.owed import Owed
 from mavproxy_gradys.readings import Reading, Stored
 from mavproxy_gradys.rows import is_storable
@@ -56,6 +56,7 @@ class Keeper:
         self._stopping = asyncio.Event()
         self._closed = False
         self._outage = Outage(log, "the spool fails", "the spool works again")
+        self._defects = Defects("the spool")
         self._drops = Drops(log, clock)
         self._oldest_since: float | None = None
         self.count: int | None = None
@@ -210,6 +211,10 @@ class Keeper:
             self.problem = str(error)
             self._outage.now(self.problem)
             raise
+        except Exception as error:
+            self._defects.tell(error)
+            self.problem = f"{type(error).__name__}: {error}"
+            raise NotStored(self.problem) from error
         self._outage.now(self.problem)
         return result
 

@@ -11,7 +11,7 @@ from typing import Any
 from mavproxy_gradys.cadence import LONGEST_OF_SINKS, Backoff
 from mavproxy_gradys.errors import NotDelivered, NotStored
 from mavproxy_gradys.keeper import Keeper
-from mavproxy_gradys.outages import Outage
+from mavproxy_gradys.outages import Defects, Outage
 from mavproxy_gradys.readings import Stored
 from mavproxy_gradys.settings import Settings
 from mavproxy_gradys.sink_address import SinkAddress
@@ -59,7 +59,7 @@ class Sender:
         self._batch: list[Stored] = []  # on its way, or the last one
         self._size = self._largest = BATCH
         self._outage = Outage(log, f"{address} takes no readings", f"{address} takes readings again")
-        self._defects: set[str] = set()
+        self._defects = Defects(f"the delivery to {address}")
         self._hurry = asyncio.Event()
 
     async def run(self, settings: Settings) -> None:
@@ -77,7 +77,7 @@ class Sender:
                 except NotDelivered as error:
                     self._failed(error)
                 except Exception as error:  # noqa: BLE001  a defect must not end the delivery for ever
-                    self._report(error)
+                    self._defects.tell(error)
                     self._failed(NotDelivered(f"{type(error).__name__}: {error}", for_content=True))
                 await self._pause()
         finally:
@@ -121,13 +121,6 @@ class Sender:
         self._backoff.succeeded()  # a smaller one is another one
         if error.too_large:
             self._largest = self._size
-
-    def _report(self, error: Exception) -> None:
-        """Tell of a defect, of each kind once."""
-        if repr(error) not in self._defects:
-            self._defects = {*list(self._defects)[-9:], repr(error)}
-            context = {"message": f"gradys: a defect in the delivery to {self.address}", "exception": error}
-            asyncio.get_running_loop().call_exception_handler(context)
 
     async def _pause(self) -> None:
         self._hurry.clear()

@@ -14,7 +14,6 @@ import sqlite3
 import time
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any
 
 from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.readings import Reading, Stored
@@ -214,20 +213,26 @@ class Spool:
             sqlite3.Error: the file cannot be read.
         """
         while True:
-            rows = self._rows(sink, after, limit)
-            found = [stored_of(row) for row in rows]
-            self.damaged.update(row[0] for row, stored in zip(rows, found, strict=True) if stored is None)
-            good = [stored for stored in found if stored is not None]
-            if good or not rows:
+            good, newest = self._look_through(sink, after, limit)
+            if good or newest is None:
                 return good
-            after = rows[-1][0]
+            after = newest
 
-    def _rows(self, sink: str, after: int, limit: int) -> list[tuple[Any, ...]]:
-        return self._db.execute(
+    def _look_through(self, sink: str, after: int, limit: int) -> tuple[list[Stored], int | None]:
+        """The sound ones of so many rows, and the last row's number; None when there are no rows."""
+        good, newest = [], None
+        rows = self._db.execute(
             f"SELECT {COLUMNS} FROM readings WHERE seq > ? AND NOT EXISTS (SELECT 1 FROM acknowledged"
             " WHERE sink = ? AND acknowledged.seq = readings.seq) ORDER BY seq LIMIT ?",
             (after, sink, limit),
-        ).fetchall()
+        )
+        for row in rows:  # one at a time: a damaged one may be large
+            newest, stored = row[0], stored_of(row)
+            if stored is None:
+                self.damaged.add(newest)
+            else:
+                good.append(stored)
+        return good, newest
 
     def acknowledge(self, sink: str, numbers: Sequence[int]) -> None:
         """Note that a sink has acknowledged just these; what all sinks have is removed.

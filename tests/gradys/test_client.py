@@ -6,10 +6,11 @@ import socket
 import tracemalloc
 from typing import Any
 
+import aiohttp
 import pytest
 from aiohttp import web
 
-from mavproxy_gradys.client import FORM, LARGEST_ANSWER, Client, refusal
+from mavproxy_gradys.client import FORM, LARGEST_ANSWER, Client, explain, refusal
 from mavproxy_gradys.errors import NotDelivered
 
 
@@ -105,6 +106,10 @@ def test_an_answer_that_would_grow_large_is_no_json(loop: Any, peer: Peer) -> No
     _, most = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert most < 4 * LARGEST_ANSWER
+
+
+def test_an_address_that_cannot_be_called_is_not_repeated() -> None:
+    assert "s3cret" not in explain(aiohttp.InvalidURL("http://me:s3cret@h/"), 3.0)
 
 
 def test_what_a_redirect_says_cannot_write_to_the_terminal() -> None:

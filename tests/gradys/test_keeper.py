@@ -237,19 +237,26 @@ def test_a_value_that_cannot_be_told_is_dropped_alone_and_counted(loop: Any, kee
     assert keeper.dropped == {"value": 1}
 
 
-def test_a_defect_loses_no_reading_and_leaves_no_file_open(
+def test_a_defect_loses_no_reading_is_told_once_and_leaves_no_file_open(
     loop: Any, disk: Disk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     keeper = Keeper(disk.make, loop.time)
     begin(loop, keeper)
     with failing(monkeypatch, "append", RuntimeError("a defect")):
         keeper.put(reading(1))
-        loop.pass_time(1)
-        assert keeper.waiting == 1
-        with pytest.raises(RuntimeError):
-            loop.run(keeper.stop())
+        loop.pass_time(5)
+        assert keeper.waiting == 1 and "a defect" in keeper.problem
+        with pytest.raises(NotStored, match="a defect"):
+            loop.run(keeper.keep([reading(2)]))
     assert [str(defect["exception"]) for defect in loop.defects] == ["a defect"]
+    loop.defects.clear()
+    loop.pass_time(1)
+    assert (keeper.problem, taken(loop, keeper)) == ("", [1])
+    with failing(monkeypatch, "append", RuntimeError("another defect")):
+        keeper.put(reading(3))
+        loop.run(keeper.stop())
     assert len(keeper.left) == 1
+    assert [str(defect["exception"]) for defect in loop.defects] == ["another defect"]
     loop.defects.clear()
     Spool(disk.path, 1e9, 1e9).close()  # not locked
 

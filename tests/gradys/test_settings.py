@@ -42,6 +42,14 @@ def test_what_cannot_work_is_refused(name: str, value: Any) -> None:
         ModuleSettings({name: value})
 
 
+def test_a_sinks_option_is_no_comment_of_an_ini_file(tmp_path: Path) -> None:
+    ini = tmp_path / "uav.ini"
+    ini.write_text("[gradys]\nsink = http://h/r#ack=status, mqtt://b/t\n")
+    settings = ModuleSettings({"config": str(ini)})
+    assert [sink.status_counts for sink in settings.snapshot().sink] == [True, False]
+    assert settings.shown("sink") == "http://h/r#ack=status,mqtt://b/t"
+
+
 def test_none_unsets() -> None:
     settings = ModuleSettings({"gs": "a:1"})
     settings.set("gs", "None")

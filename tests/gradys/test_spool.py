@@ -252,6 +252,23 @@ def test_a_damaged_row_is_set_aside_and_counted_and_the_rest_goes_on(
     assert opened().dropped == {"damage": 1}
 
 
+def test_a_cell_that_is_missing_is_the_damage_of_its_row_only(opened: Any, tmp_path: Path) -> None:
+    spool = opened()
+    kept = spool.append([reading(n) for n in range(3)])
+    spool.close()
+    for change in (
+        "UPDATE sqlite_master SET sql = replace(sql, 'value TEXT NOT NULL', 'value TEXT')",
+        f"UPDATE readings SET value = NULL WHERE seq = {kept[1]}",
+        "UPDATE sqlite_master SET sql = replace(sql, 'value TEXT', 'value TEXT NOT NULL')",
+    ):
+        db = sqlite3.connect(tmp_path / "deep" / "spool.db", isolation_level=None)
+        db.execute("PRAGMA writable_schema=1")
+        db.execute(change)
+        db.close()
+    spool = opened()
+    assert spool.set_aside is None and numbers(spool) == [kept[0], kept[2]]
+
+
 def test_a_whole_batch_of_damaged_rows_does_not_hide_what_comes_after(opened: Any) -> None:
     spool = opened()
     kept = spool.append([reading(n) for n in range(10)])
