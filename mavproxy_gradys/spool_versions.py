@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import logging
 import sqlite3
 from collections.abc import Callable
@@ -53,19 +54,17 @@ def migrate(db: sqlite3.Connection) -> None:
 def name_sinks(db: sqlite3.Connection) -> None:
     """1 to 2: sinks have names instead of their URLs, which held passwords; damaged rows have a table."""
     with Transaction(db):
-        found = db.execute("SELECT sink, seq FROM acknowledged").fetchall()
-        names = {url: name_of(str(url)) for url in {url for url, _ in found}}
-        db.execute("DELETE FROM acknowledged")
-        db.executemany("INSERT OR IGNORE INTO acknowledged VALUES (?, ?)", [(names[url], seq) for url, seq in found])
+        db.create_function("name_of", 1, functools.cache(name_of))
+        db.execute("UPDATE OR REPLACE acknowledged SET sink = name_of(coalesce(CAST(sink AS BLOB), X''))")
         db.execute("DELETE FROM acknowledged WHERE sink = ''")
         db.execute(DAMAGED)
         db.execute("PRAGMA user_version=2")
 
 
-def name_of(url: str) -> str:
+def name_of(url: bytes) -> str:
     """The name of the sink that a setting of version 1 named; empty when no setting can."""
     try:
-        return sink_address(url).name
+        return sink_address(url.decode(errors="replace")).name
     except SettingError:
         return ""
 
