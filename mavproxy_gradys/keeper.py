@@ -76,8 +76,7 @@ class Keeper:
         try:
             if self._writer is not None:
                 await asyncio.gather(self._writer, return_exceptions=True)
-            with contextlib.suppress(NotStored):
-                await self._commit()
+            await self.save()
         finally:
             self._closed = True
             closing = self._thread.submit(self._close)  # also when nobody waits for it any more
@@ -130,11 +129,16 @@ class Keeper:
                     await self._do(lambda spool: None, trim=True)
             self._drops.tell(self.dropped)
 
+    async def save(self) -> None:
+        """Write what waits now, if the disk takes it."""
+        with contextlib.suppress(NotStored):  # `problem` has it
+            await self._commit()
+
     async def _commit(self) -> None:
         if not self._waiting:
             return
         readings = [self._waiting.popleft() for _ in range(len(self._waiting))]
-        self._in_hand = len(readings)
+        self._in_hand += len(readings)
         try:
             await self._do(lambda spool: spool.append(readings))
         except BaseException:
@@ -142,7 +146,7 @@ class Keeper:
             self._drop_excess()  # others may have come meanwhile
             raise
         finally:
-            self._in_hand = 0
+            self._in_hand -= len(readings)
         self._tell()
 
     def _tell(self) -> None:

@@ -61,15 +61,24 @@ class Sensing:
         """End it, and close the spool; what the disk does not take is kept in memory until the next start."""
         self._settings = None
         tasks, self._tasks = self._tasks, []
-        await end(tasks)
         self._samplers.clear()
         self._senders.clear()
-        if self._keeper is not None:
-            try:
-                await self._keeper.stop()
-            finally:  # also after a defect
-                self._left, self._why_left = self._keeper.left, self._keeper.problem
-                self._keeper = None
+        try:
+            if self._keeper is not None:
+                await self._keeper.save()  # before the sinks' goodbyes, which may take long
+            await end(tasks)
+        finally:
+            await self._end_keeper()
+
+    async def _end_keeper(self) -> None:
+        keeper = self._keeper
+        if keeper is None:
+            return
+        try:
+            await keeper.stop()
+        finally:
+            self._left, self._why_left = keeper.left, keeper.problem
+            self._keeper = None
 
     async def close(self) -> None:
         """End it for good: what an earlier stop left in memory is tried once more."""

@@ -103,9 +103,9 @@ def is_ours(db: sqlite3.Connection, path: Path) -> bool:
         if application or tables:
             raise NotStored(f"{path} is a database of another program; `gradys set spool FILE` takes another")
         return False
-    if version > VERSION:
+    if not 1 <= version <= VERSION:
         raise NotStored(
-            f"{path} is of a newer version of gradys ({version}; this one knows {VERSION});"
+            f"{path} is a spool of version {version}, which a newer gradys wrote: this one knows 1 to {VERSION};"
             " `gradys set spool FILE` takes another"
         )
     return True

@@ -234,3 +234,24 @@ def test_after_a_defect_too_an_unload_says_what_is_lost(
     with contextlib.suppress(RuntimeError):
         module.unload()
     assert "gradys: 3 readings are lost" in capsys.readouterr().out
+
+
+def test_a_sink_that_takes_long_to_say_goodbye_costs_no_reading(
+    make: Any, main_loop: Any, capsys: Any, monkeypatch: Any, tmp_path: Path
+) -> None:
+    leaving = asyncio.Event()
+
+    class Slow:
+        async def send(self, batch: Any) -> Any:
+            raise NotDelivered("nobody is there")
+
+        async def close(self) -> None:
+            await leaving.wait()
+
+    monkeypatch.setattr("mavproxy_gradys.sender.make_sink", lambda *_: Slow())
+    monkeypatch.setattr("mavproxy_gradys.module.LONGEST_END", 0.5)
+    module = make(sink="http://127.0.0.1:9/r", quantities="")
+    main_loop.until(lambda: "no ground station" in capsys.readouterr().out)
+    put(module, 5)
+    module.unload()
+    assert "lost" not in capsys.readouterr().out and kept(tmp_path / "spool.db") == 5

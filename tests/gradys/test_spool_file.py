@@ -20,6 +20,7 @@ import pytest
 from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.readings import Reading
 from mavproxy_gradys.spool import Spool
+from mavproxy_gradys.spool_versions import VERSION
 
 NOW = 1_800_000_000.0  # s since 1970
 
@@ -128,6 +129,7 @@ from pathlib import Path
 from typing import Any
 from mavproxy_gradys.readings import Reading
 from mavproxy_gradys.spool import Spool
+from mavproxy_gradys.spool_versions import VERSION
 Spool(Path(sys.argv[1]), 1e9, 1e9).append([Reading("uav-1", 1, "alt", "m", 1.0, 0.0)])
 os.kill(os.getpid(), signal.SIGKILL)
 """
@@ -236,6 +238,7 @@ from pathlib import Path
 from typing import Any
 from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.spool import Spool
+from mavproxy_gradys.spool_versions import VERSION
 try:
     Spool(Path(sys.argv[1]), 1e9, 1e9)
 except NotStored as error:
@@ -252,12 +255,13 @@ def test_who_is_refused_does_not_open_the_file_for_others(file: Path) -> None:
         assert spool.append([reading()])
 
 
-def test_a_file_of_a_newer_version_is_refused_and_left_as_it_is(file: Path) -> None:
+@pytest.mark.parametrize("version", [VERSION + 1, 99, 0, -1])
+def test_a_file_of_a_version_that_we_do_not_know_is_refused_and_left_as_it_is(file: Path, version: int) -> None:
     kept(file)
     with contextlib.closing(sqlite3.connect(file)) as db:
-        db.execute("PRAGMA user_version=99")
+        db.execute(f"PRAGMA user_version={version}")
     before = file.read_bytes()
-    with pytest.raises(NotStored, match="newer version"):
+    with pytest.raises(NotStored, match="newer gradys"):
         opened(file)
     assert file.read_bytes() == before
 
