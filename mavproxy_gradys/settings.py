@@ -72,7 +72,9 @@ def table() -> list[Any]:
         MPSetting("timeout", float, 3.0, "s for an answer", range=(0.1, 60)),
         MPSetting("token", str, "", "bearer token for stations and HTTP sinks"),
         MPSetting("ca_file", str, "", "certificates that TLS is checked by; empty: the system's"),
-        MPSetting("sink", str, "", "where readings go: http(s):// and mqtt(s):// URLs by comma"),
+        MPSetting(
+            "sink", str, "", "where readings go, by comma: http(s)://HOST/PATH[#ack=status], mqtt(s)://HOST/TOPIC"
+        ),
         MPSetting("quantities", str, "position@1", "what is sampled while there is a sink"),
         MPSetting("spool", str, default_spool(), "file that keeps readings until they are acknowledged"),
         MPSetting("spool_mb", float, 64.0, "MB of readings kept; beyond it the oldest go", range=(0.1, 100_000)),

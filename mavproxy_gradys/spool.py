@@ -4,7 +4,8 @@ Blocking; one thread uses it at a time (`keeper.py` has a thread for it). A tran
 call returns (WAL, synchronous=FULL), so that neither `kill -9` nor a flat battery loses what was kept.
 
 A sequence number is given once, even after the file was lost: a new file begins at the milliseconds since
-1970, above whatever a former one can have reached at less than a thousand readings a second.
+1970, above whatever a former one can have reached at less than a thousand readings a second, and above what a
+corrupt one is known to have given, should the clock have been set back.
 """
 
 from __future__ import annotations
