@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ipaddress
+import re
 import socket
 from dataclasses import dataclass
 from urllib.parse import SplitResult, urlsplit
@@ -57,27 +58,33 @@ def station(text: str) -> Station:
     return Station(f"{parts.scheme}://{bracketed(host)}{shown}", host, port)
 
 
+def masked(url: str) -> str:
+    """A URL as it may be shown: without its password, and without what a query may hold of the kind."""
+    return re.sub(r"\?[^#]*", "?***", re.sub(r"(://[^:/?#@]*):.*@", r"\1:***@", url))
+
+
 def split_url(text: str, schemes: tuple[str, ...]) -> tuple[SplitResult, int]:
     """An address and its port, after a look at both.
 
     Raises:
         SettingError: no such scheme, no host, or no such port.
     """
+    shown = masked(text)
     try:
         parts = urlsplit(text)
         port = parts.port
     except ValueError as error:
-        raise SettingError(f"{text!r} is not an address: {error}") from error
+        raise SettingError(f"{shown!r} is not an address") from error
     if parts.scheme not in schemes:
-        raise SettingError(f"{text!r}: it begins with one of {', '.join(f'{scheme}://' for scheme in schemes)}")
+        raise SettingError(f"{shown!r}: it begins with one of {', '.join(f'{scheme}://' for scheme in schemes)}")
     if not parts.hostname or any(letter.isspace() for letter in text):
-        raise SettingError(f"{text!r} is not an address: it names no host")
+        raise SettingError(f"{shown!r} is not an address: it names no host")
     if "%" in parts.hostname:
-        raise SettingError(f"{text!r}: a URL has no place for an address's zone (%…)")
+        raise SettingError(f"{shown!r}: a URL has no place for an address's zone (%…)")
     try:
         parts.hostname.encode("idna")
     except UnicodeError as error:
-        raise SettingError(f"{text!r} is not an address: no host has such a name ({error})") from error
+        raise SettingError(f"{shown!r} is not an address: no host has such a name ({error})") from error
     return parts, PORTS[parts.scheme] if port is None else port
 
 

@@ -15,6 +15,7 @@ from mavproxy_gradys.names import Names
 
 CONNECTIONS = 8  # to one receiver at a time
 LARGEST_ANSWER = 1024 * 1024  # bytes; a receiver that says more is not heard out
+LONGEST_TOLD = 200  # letters of what a receiver says
 FORM = "application/x-www-form-urlencoded"
 JSON = "application/json"
 # Answers about the address, the sender or the moment; all others are taken for answers about what was sent.
@@ -44,7 +45,7 @@ class Client:
     """
 
     def __init__(self, timeout: float, token: str = "", ca_file: str = "") -> None:
-        headers = {"User-Agent": "mavproxy-uavapi"}
+        headers = {"User-Agent": "mavproxy-uavapi", "Accept-Encoding": "identity"}
         if token:
             headers["Authorization"] = f"Bearer {token}"
         self._timeout = timeout
@@ -53,6 +54,7 @@ class Client:
             timeout=aiohttp.ClientTimeout(total=timeout),
             headers=headers,
             cookie_jar=aiohttp.DummyCookieJar(),
+            auto_decompress=False,  # a small answer must not grow large
             trust_env=False,
         )
 
@@ -105,11 +107,16 @@ async def read_up_to(stream: aiohttp.StreamReader, limit: int) -> bytes:
 def refusal(status: int, location: str) -> NotDelivered:
     """The error for an answer that is not a 200."""
     if 300 <= status < 400:
-        where = f" to {location}" if location else ""
+        where = f" to {printable(location)}" if location else ""
         return NotDelivered(f"it redirects{where} ({status}), which is refused: set its real address", reached=True)
     why = {401: " (does it want a token?)", 403: " (is the token the right one?)"}.get(status, "")
     for_content = status >= 400 and status not in NOT_FOR_CONTENT
     return NotDelivered(f"it answers {status}{why}", reached=True, too_large=status == 413, for_content=for_content)
+
+
+def printable(text: str) -> str:
+    """What somebody else said, fit for a terminal."""
+    return "".join(letter if letter.isprintable() else "?" for letter in text[:LONGEST_TOLD])
 
 
 def tls_context(ca_file: str) -> ssl.SSLContext | bool:
@@ -130,6 +137,8 @@ def explain(error: BaseException, timeout: float) -> str:
     """Why nobody answered, in a few words."""
     if isinstance(error, asyncio.TimeoutError):
         return f"no answer within {timeout:g} s"
+    if isinstance(error, aiohttp.InvalidURL):
+        return "there is no such address"  # it may hold a password, and the error repeats it
     if isinstance(error, aiohttp.ServerDisconnectedError):
         return "it closed the connection without an answer"
     if isinstance(error, aiohttp.ClientConnectorCertificateError):

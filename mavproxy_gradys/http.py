@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from mavproxy_gradys.readings import NAME, Reading, Value, device_of
+from mavproxy_gradys.readings import LONGEST_TEXT, NAME, Reading, Value, device_of
 from mavproxy_gradys.service import Gradys
 from mavproxy_gradys.track_flight import VERB, flight_of
 from mavproxy_gradys.track_request import Track, TrackFile
@@ -22,7 +22,6 @@ from mavproxy_uavapi.http.routes import EITHER, POST, Route
 from mavproxy_uavapi.vehicle.jobs import Job
 
 MOST_READINGS = 1000  # in one request
-LONGEST_TEXT = 4096
 LONGEST_LIST = 64
 VEHICLE = re.compile(rf"{device_of(0)[:-1]}[0-9]+")  # what vehicles are called as devices
 Name = Annotated[str, Field(pattern=rf"^{NAME}$", description="letters, digits, _ . -")]

@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import TypeVar
 
 from mavproxy_gradys.errors import NotStored
-from mavproxy_gradys.outages import Drops, Outage
+from mavproxy_gradys.outages import Defects, Drops, Outage
 from mavproxy_gradys.owed import Owed
 from mavproxy_gradys.readings import Reading, Stored
+from mavproxy_gradys.rows import is_storable
 from mavproxy_gradys.spool import Spool, uptime
 from mavproxy_gradys.tasks import begin
 from mavproxy_uavapi.host.patience import within
@@ -35,7 +36,8 @@ class Keeper:
         count: readings in the spool; None until it was opened.
         problem: why the spool takes nothing just now; empty when it does.
         set_aside: corrupt files that were replaced.
-        dropped: readings that were dropped, by cause: `size`, `age`, `disk`, `value` (none that can be told).
+        dropped: readings that were dropped, by cause: `size`, `age`, `disk`, `damage` (of the
+            file; set aside in it), `value` (none that can be told).
 
     Args:
         make: opens the spool; may raise NotStored.
@@ -54,6 +56,7 @@ class Keeper:
         self._stopping = asyncio.Event()
         self._closed = False
         self._outage = Outage(log, "the spool fails", "the spool works again")
+        self._defects = Defects("the spool")
         self._drops = Drops(log, clock)
         self._oldest_since: float | None = None
         self.count: int | None = None
@@ -67,14 +70,13 @@ class Keeper:
         self.problem = "it is being opened"
         self._writer = begin(self._write(), "the spool")
 
-    async def stop(self) -> list[Reading]:
-        """Keep what still waits, and close the file; the readings that the disk did not take."""
+    async def stop(self) -> None:
+        """Keep what still waits, and close the file; what the disk does not take is `left`."""
         self._stopping.set()  # not cancelled: a transaction in flight must not be forgotten
         try:
             if self._writer is not None:
                 await asyncio.gather(self._writer, return_exceptions=True)
-            with contextlib.suppress(NotStored):
-                await self._commit()
+            await self.save()
         finally:
             self._closed = True
             closing = self._thread.submit(self._close)  # also when nobody waits for it any more
@@ -82,13 +84,17 @@ class Keeper:
         await asyncio.wrap_future(closing)
         self._thread.shutdown()  # it has nothing left to do
         self._drops.tell(self.dropped, at_once=True)
+
+    @property
+    def left(self) -> list[Reading]:
+        """The readings that the disk did not take."""
         return list(self._waiting)
 
     # -- in -----------------------------------------------------------------------------------------------
 
     def put(self, reading: Reading) -> None:
         """Take a sampled reading; it is on the disk within COMMIT_EVERY."""
-        if not reading.is_storable:
+        if not is_storable(reading):
             self._count_drop("value")
             return
         self._waiting.append(reading)
@@ -123,11 +129,16 @@ class Keeper:
                     await self._do(lambda spool: None, trim=True)
             self._drops.tell(self.dropped)
 
+    async def save(self) -> None:
+        """Write what waits now, if the disk takes it."""
+        with contextlib.suppress(NotStored):  # `problem` has it
+            await self._commit()
+
     async def _commit(self) -> None:
         if not self._waiting:
             return
         readings = [self._waiting.popleft() for _ in range(len(self._waiting))]
-        self._in_hand = len(readings)
+        self._in_hand += len(readings)
         try:
             await self._do(lambda spool: spool.append(readings))
         except BaseException:
@@ -135,7 +146,7 @@ class Keeper:
             self._drop_excess()  # others may have come meanwhile
             raise
         finally:
-            self._in_hand = 0
+            self._in_hand -= len(readings)
         self._tell()
 
     def _tell(self) -> None:
@@ -204,6 +215,10 @@ class Keeper:
             self.problem = str(error)
             self._outage.now(self.problem)
             raise
+        except Exception as error:
+            self._defects.tell(error)
+            self.problem = f"{type(error).__name__}: {error}"
+            raise NotStored(self.problem) from error
         self._outage.now(self.problem)
         return result
 
@@ -218,7 +233,7 @@ class Keeper:
             self._close()
             raise NotStored(f"{spool.path}: {error}") from error
         try:
-            if trim or spool.size > spool.largest:
+            if trim or spool.damaged or spool.size > spool.largest:
                 spool.trim()
             self._look(spool)
         except sqlite3.Error as error:

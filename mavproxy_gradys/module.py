@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 from collections.abc import Callable
 from typing import Any
 
@@ -23,6 +24,7 @@ from mavproxy_uavapi.host.remembered import Remembered
 from mavproxy_uavapi.settings import SettingError
 
 NAME = "gradys"
+log = logging.getLogger("gradys.spool")
 LONGEST_END = 3.0  # s that MAVProxy waits for it to end
 COMPLETION = "(GRADYSSETTING)"
 COMPLETIONS = [
@@ -65,6 +67,7 @@ class GradysModule(HostedModule):
         self.add_completion_function(COMPLETION, self.gradys_settings.mp.completion)
         self.gradys = Gradys(self.host)
         self._errands = Errands(self.host, NAME)
+        self._lost = ""  # what the end found unwritten
         self._track = TrackConsole(self.host, self.gradys.tracks)
         self._routes = Handlers(self.gradys).routes()
         self.remembered.keep(self.gradys_settings.shown)
@@ -84,14 +87,23 @@ class GradysModule(HostedModule):
         if self.host.commands.get("fly") == self._fly:
             del self.host.commands["fly"]
         await self.gradys.tracks.close()
-        with contextlib.suppress(asyncio.TimeoutError):  # the spool is closed in its own thread
-            await within(LONGEST_END, self.gradys.stop())
+        try:
+            with contextlib.suppress(asyncio.TimeoutError):  # the spool is closed in its own thread
+                await within(LONGEST_END, self.gradys.close())
+        finally:
+            self._lost = self.gradys.sensing.lost
+            if self._lost:
+                log.warning("%s", self._lost)
         await self._errands.close()
 
     def unload(self) -> None:
-        """Give back what is ours alone, then the rest."""
+        """Give back what is ours alone, then the rest; say what is lost."""
         self.mpstate.completion_functions.pop(COMPLETION, None)
-        super().unload()
+        try:
+            super().unload()
+        finally:
+            if self._lost:
+                print(f"gradys: {self._lost}")
 
     def command(self, args: list[str]) -> None:
         """The module's command at the prompt; most of it needs the asyncio thread."""

@@ -1,7 +1,8 @@
-"""What the log says of failures: one line when they begin, one when they are over, never one for each. Pure."""
+"""What is said of failures: one line when they begin, one when they are over, never one for each."""
 
 from __future__ import annotations
 
+import asyncio
 import logging
 from collections.abc import Callable, Mapping
 
@@ -27,6 +28,25 @@ class Outage:
         elif self.lasts and not why:
             self._log.warning("%s", self._ended)
         self.lasts = bool(why)
+
+
+class Defects:
+    """Mistakes of ours, of which each kind is told to the loop's exception handler once.
+
+    Args:
+        where: what it is that failed.
+    """
+
+    def __init__(self, where: str) -> None:
+        self._where = where
+        self._told: list[str] = []
+
+    def tell(self, error: Exception) -> None:
+        """Take one."""
+        if repr(error) not in self._told:
+            self._told = [*self._told[-9:], repr(error)]
+            context = {"message": f"gradys: a defect in {self._where}", "exception": error}
+            asyncio.get_running_loop().call_exception_handler(context)
 
 
 class Drops:

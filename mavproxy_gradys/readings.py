@@ -11,7 +11,6 @@ out. `position@1` is built in: [degrees, degrees, m above home].
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from dataclasses import dataclass, field
@@ -24,12 +23,13 @@ POSITION = "position"
 STATUS = "status"  # the MQTT sink's word on whether a vehicle is online
 POSITION_REPRESENTATION = "degrees, degrees, m above home"
 NAME = r"[A-Za-z0-9_.-]{1,64}"  # fits into an MQTT topic
+LONGEST_TEXT = 4096  # letters of a value or a representation
 NUMBER = r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?"
 GRAMMAR = re.compile(
     rf"(?P<name>{NAME})"
     r"(?:=(?P<message>[A-Z0-9_]+)(?:\[(?P<instance>\d+)\])?\.(?P<attribute>[A-Za-z0-9_]+)(?:\[(?P<index>\d+)\])?"
     rf"(?:\*(?P<scale>{NUMBER}))?(?P<offset>[-+]{NUMBER.removeprefix('[-+]?')})?)?"
-    rf"(?:@(?P<period>{NUMBER}))?(?:\[(?P<representation>[^\[\]]*)\])?"
+    rf"(?:@(?P<period>{NUMBER}))?(?:\[(?P<representation>[^\[\]]{{0,{LONGEST_TEXT}}})\])?"
 )
 SHORTEST_PERIOD = 0.05  # s
 LONGEST_PERIOD = 86400.0  # s
@@ -77,15 +77,6 @@ class Reading:
     representation: str
     value: Value
     time: float
-
-    @property
-    def is_storable(self) -> bool:
-        """Whether it can be told as JSON."""
-        try:
-            json.dumps(self.value, allow_nan=False)
-        except ValueError:
-            return False
-        return math.isfinite(self.time)
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,10 @@ from typing import Any
 from mavproxy_gradys.cadence import LONGEST_OF_SINKS, Backoff
 from mavproxy_gradys.errors import NotDelivered, NotStored
 from mavproxy_gradys.keeper import Keeper
-from mavproxy_gradys.outages import Outage
+from mavproxy_gradys.outages import Defects, Outage
 from mavproxy_gradys.readings import Stored
-from mavproxy_gradys.settings import Settings, masked
+from mavproxy_gradys.settings import Settings
+from mavproxy_gradys.sink_address import SinkAddress
 from mavproxy_gradys.sinks import Sink, make_sink
 from mavproxy_gradys.tally import RoundTrips
 from mavproxy_uavapi.host.patience import within
@@ -26,7 +27,7 @@ class Sender:
     """Empties the spool into one sink; belongs to the asyncio thread.
 
     Attributes:
-        url: the sink's.
+        address: the sink's.
         batches: how many were sent.
         sent: readings that went out, repeats included.
         acknowledged: readings that were acknowledged.
@@ -34,16 +35,21 @@ class Sender:
         last_error: why the newest failed batch failed; empty since the last success.
 
     Args:
-        url: the sink's.
+        address: the sink's.
         keeper: the spool.
         clock: monotonic seconds.
         chance: numbers from 0 to 1.
     """
 
     def __init__(
-        self, url: str, keeper: Keeper, clock: Callable[[], float], chance: Callable[[], float] = random.random
+        self,
+        address: SinkAddress,
+        keeper: Keeper,
+        clock: Callable[[], float],
+        chance: Callable[[], float] = random.random,
     ) -> None:
-        self.url = url
+        self.address = address
+        self._name = address.name
         self.batches = self.sent = self.acknowledged = self.put_last = 0
         self.last_error = ""
         self.round_trips = RoundTrips()
@@ -52,8 +58,8 @@ class Sender:
         self._backoff = Backoff(chance, LONGEST_OF_SINKS)
         self._batch: list[Stored] = []  # on its way, or the last one
         self._size = self._largest = BATCH
-        self._outage = Outage(log, f"{masked(url)} takes no readings", f"{masked(url)} takes readings again")
-        self._defects: set[str] = set()
+        self._outage = Outage(log, f"{address} takes no readings", f"{address} takes readings again")
+        self._defects = Defects(f"the delivery to {address}")
         self._hurry = asyncio.Event()
 
     async def run(self, settings: Settings) -> None:
@@ -63,7 +69,7 @@ class Sender:
             while True:
                 try:
                     if sink is None:
-                        sink = make_sink(self.url, settings)
+                        sink = make_sink(self.address, settings)
                     await self._turn(sink)
                     continue
                 except NotStored as error:  # the spool says so itself
@@ -71,7 +77,7 @@ class Sender:
                 except NotDelivered as error:
                     self._failed(error)
                 except Exception as error:  # noqa: BLE001  a defect must not end the delivery for ever
-                    self._report(error)
+                    self._defects.tell(error)
                     self._failed(NotDelivered(f"{type(error).__name__}: {error}", for_content=True))
                 await self._pause()
         finally:
@@ -85,14 +91,14 @@ class Sender:
             NotDelivered, NotStored: it came to nothing.
         """
         self._batch = []
-        self._batch = batch = await self._keeper.batch(self.url, self._size)
+        self._batch = batch = await self._keeper.batch(self._name, self._size)
         self.batches += 1
         self.sent += len(batch)
         started = self._clock()
         taken = await sink.send(batch)
         self.round_trips.add(self._clock() - started)
         self.acknowledged += len(taken)
-        await self._keeper.acknowledge(self.url, batch, taken)
+        await self._keeper.acknowledge(self._name, batch, taken)
         if not taken:
             raise NotDelivered("it acknowledges nothing", reached=True, for_content=True)
         self.last_error = ""
@@ -108,20 +114,13 @@ class Sender:
         if not error.for_content or not count:
             return
         if count == 1:
-            self._keeper.put_last(self.url, self._batch[0])
+            self._keeper.put_last(self._name, self._batch[0])
             self.put_last += 1
             return
         self._size = count // 2
         self._backoff.succeeded()  # a smaller one is another one
         if error.too_large:
             self._largest = self._size
-
-    def _report(self, error: Exception) -> None:
-        """Tell of a defect, of each kind once."""
-        if repr(error) not in self._defects:
-            self._defects = {*list(self._defects)[-9:], repr(error)}
-            context = {"message": f"gradys: a defect in the delivery to {masked(self.url)}", "exception": error}
-            asyncio.get_running_loop().call_exception_handler(context)
 
     async def _pause(self) -> None:
         self._hurry.clear()
@@ -141,7 +140,7 @@ class Sender:
         now = self._clock()
         waits = self._backoff.waits(now)
         return {
-            "sink": masked(self.url),
+            "sink": str(self.address),
             "batches": self.batches,
             "sent": self.sent,
             "acknowledged": self.acknowledged,

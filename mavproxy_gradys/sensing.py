@@ -13,7 +13,7 @@ from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.keeper import Keeper
 from mavproxy_gradys.readings import POSITION, STATUS, Quantity, Reading, Sampler
 from mavproxy_gradys.sender import Sender
-from mavproxy_gradys.settings import Settings, masked
+from mavproxy_gradys.settings import Settings
 from mavproxy_gradys.spool import Spool
 from mavproxy_gradys.tasks import begin, end
 from mavproxy_uavapi.errors import Unavailable
@@ -36,44 +36,73 @@ class Sensing:
         self._wall = wall
         self._settings: Settings | None = None
         self._keeper: Keeper | None = None
+        self._settings_before: Settings | None = None  # of the last start
         self._left: list[Reading] = []  # what the disk did not take before the last stop
-        self._senders: dict[str, Sender] = {}
+        self._why_left = ""
+        self._senders: list[Sender] = []
         self._samplers: list[Sampler] = []
         self._tasks: list[asyncio.Task[None]] = []
 
     def start(self, settings: Settings) -> None:
         """Sample and send, if there is a sink."""
-        self._settings = settings
+        self._settings = self._settings_before = settings
         if settings.sink or self._left:
             self._kept()
-        for url in settings.sink:
-            sender = self._senders[url] = Sender(url, self._kept(), self._host.clock)
-            self._tasks.append(begin(sender.run(settings), f"the delivery to {masked(url)}"))
+        for address in settings.sink:
+            sender = Sender(address, self._kept(), self._host.clock)
+            self._senders.append(sender)
+            self._tasks.append(begin(sender.run(settings), f"the delivery to {address}"))
         for quantity in settings.quantities if settings.sink else ():
             sampler = Sampler(quantity)
             self._samplers.append(sampler)
             self._tasks.append(begin(self._sample(sampler, self._kept()), f"the sampling of {quantity.name}"))
 
     async def stop(self) -> None:
-        """End it, and close the spool."""
+        """End it, and close the spool; what the disk does not take is kept in memory until the next start."""
         self._settings = None
         tasks, self._tasks = self._tasks, []
-        await end(tasks)
         self._samplers.clear()
         self._senders.clear()
-        keeper, self._keeper = self._keeper, None
-        if keeper is not None:
-            self._left = await keeper.stop()
+        try:
+            if self._keeper is not None:
+                await self._keeper.save()  # before the sinks' goodbyes, which may take long
+            await end(tasks)
+        finally:
+            await self._end_keeper()
 
-    def _kept(self) -> Keeper:
+    async def _end_keeper(self) -> None:
+        keeper = self._keeper
+        if keeper is None:
+            return
+        try:
+            await keeper.stop()
+        finally:
+            self._left, self._why_left = keeper.left, keeper.problem
+            self._keeper = None
+
+    async def close(self) -> None:
+        """End it for good: what an earlier stop left in memory is tried once more."""
+        if self._settings is None and self._left and self._settings_before is not None:
+            self._kept(self._settings_before)
+        await self.stop()
+
+    @property
+    def lost(self) -> str:
+        """What is lost if nothing more is written: how many readings, and why; empty when none is."""
+        keeper = self._keeper  # it is there when its end was not waited for
+        count = len(self._left) if keeper is None else keeper.waiting
+        why = (self._why_left if keeper is None else keeper.problem) or "they were not written in time"
+        return f"{count} reading{'' if count == 1 else 's'} are lost: {why}" if count else ""
+
+    def _kept(self, settings: Settings | None = None) -> Keeper:
         """The spool's keeper, started if need be."""
-        settings = self._settings
+        settings = settings or self._settings
         if settings is None:
             raise NotStored("gradys is stopped: `gradys start`")
         if self._keeper is None:
-            largest, longest = settings.spool_mb * MEGABYTE, settings.spool_hours * 3600
-            self._keeper = Keeper(lambda: Spool(settings.spool, largest, longest))
-            self._keeper.start(settings.sink)
+            spool, largest, longest = settings.spool, settings.spool_mb * MEGABYTE, settings.spool_hours * 3600
+            self._keeper = Keeper(lambda: Spool(spool, largest, longest))
+            self._keeper.start([address.name for address in settings.sink])
             for reading in self._left:
                 self._keeper.put(reading)
             self._left = []
@@ -95,7 +124,7 @@ class Sensing:
 
     def flush(self) -> None:
         """Try all sinks now."""
-        for sender in self._senders.values():
+        for sender in self._senders:
             sender.flush()
         if self._keeper is not None:
             self._keeper.flush()
@@ -141,7 +170,7 @@ class Sensing:
             "spooled": len(self._left) if keeper is None else spooled(keeper),
             "oldest_unsent_s": None if oldest is None else round(oldest, 1),
             "spool": None if keeper is None else self._spool_report(keeper),
-            "sinks": [sender.report() for sender in self._senders.values()],
+            "sinks": [sender.report() for sender in self._senders],
             "quantities": [quantity_report(sampler) for sampler in self._samplers],
         }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import random
+from collections.abc import Awaitable, Callable
 from typing import Any
 
 from mavproxy_gradys.address import Station
@@ -84,13 +85,18 @@ class Gradys:
             self._start(settings)
             return True
 
-    async def _stop(self) -> None:
+    async def _stop(self, stop_sensing: Callable[[], Awaitable[None]] | None = None) -> None:
         self.settings = None
         tasks, self._tasks = self._tasks, []
         await end(tasks)
         for pusher in self._pushers:  # also those that had not begun
             await pusher.close()
-        await self.sensing.stop()
+        await (stop_sensing or self.sensing.stop)()
+
+    async def close(self) -> None:
+        """End it for good; what the spool did not take is tried once more."""
+        async with self._changing:
+            await self._stop(self.sensing.close)
 
     def flush(self) -> None:
         """End all pauses after failures: everything is tried now."""

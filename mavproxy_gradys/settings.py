@@ -9,18 +9,17 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
 
 from MAVProxy.modules.lib.mp_settings import MPSetting, MPSettings
 
-from mavproxy_gradys.address import Station, check_ip, split_url, stations
+from mavproxy_gradys.address import Station, check_ip, stations
 from mavproxy_gradys.client import tls_context
 from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.readings import Quantity, parse_quantities
+from mavproxy_gradys.sink_address import SinkAddress, sink_addresses
 from mavproxy_uavapi.settings import UNSET, SettingError
 
 SECTION = "gradys"
-SINK_SCHEMES = ("http", "https", "mqtt", "mqtts")
 SECRETS = {"token", "sink"}
 
 
@@ -36,7 +35,7 @@ class Settings:
         timeout: s for an answer.
         token: bearer token for stations and HTTP sinks; empty for none.
         ca_file: certificates that TLS is checked by; empty for the system's.
-        sink: where readings go: http(s) and mqtt(s) URLs.
+        sink: where readings go.
         quantities: what is sampled.
         spool: file in which readings are kept until they are acknowledged.
         spool_mb: its largest size (MB of readings); beyond it the oldest are dropped.
@@ -50,7 +49,7 @@ class Settings:
     timeout: float
     token: str
     ca_file: str
-    sink: tuple[str, ...]
+    sink: tuple[SinkAddress, ...]
     quantities: tuple[Quantity, ...]
     spool: Path
     spool_mb: float
@@ -73,7 +72,9 @@ def table() -> list[Any]:
         MPSetting("timeout", float, 3.0, "s for an answer", range=(0.1, 60)),
         MPSetting("token", str, "", "bearer token for stations and HTTP sinks"),
         MPSetting("ca_file", str, "", "certificates that TLS is checked by; empty: the system's"),
-        MPSetting("sink", str, "", "where readings go: http(s):// and mqtt(s):// URLs by comma"),
+        MPSetting(
+            "sink", str, "", "where readings go, by comma: http(s)://HOST/PATH[#ack=status], mqtt(s)://HOST/TOPIC"
+        ),
         MPSetting("quantities", str, "position@1", "what is sampled while there is a sink"),
         MPSetting("spool", str, default_spool(), "file that keeps readings until they are acknowledged"),
         MPSetting("spool_mb", float, 64.0, "MB of readings kept; beyond it the oldest go", range=(0.1, 100_000)),
@@ -147,7 +148,7 @@ class ModuleSettings:
         """The settings as they are now."""
         values = {name: self.mp.get(name) for name in self.mp.list()}
         values["gs"] = tuple(stations(values["gs"]))
-        values["sink"] = tuple(sinks(values["sink"]))
+        values["sink"] = tuple(sink_addresses(values["sink"]))
         values["quantities"] = tuple(parse_quantities(values["quantities"]))
         values["ca_file"] = os.path.expanduser(values["ca_file"])
         values["spool"] = Path(values["spool"] or default_spool()).expanduser()
@@ -158,7 +159,7 @@ class ModuleSettings:
         value = str(self.mp.get(name))
         if name == "token":
             return "(set)" if value else ""
-        return ",".join(map(masked, sinks(value))) if name == "sink" else value
+        return ",".join(map(str, sink_addresses(value))) if name == "sink" else value
 
 
 def check(name: str, value: Any) -> None:
@@ -173,9 +174,11 @@ def check(name: str, value: Any) -> None:
     elif name == "ip":
         check_ip(text)
     elif name == "sink":
-        sinks(text)
+        sink_addresses(text)
     elif name == "quantities":
         parse_quantities(text)
+    elif name == "spool" and not text.isprintable():
+        raise SettingError("spool: it takes a file's name in printable letters")
     elif name == "token" and not (text.isascii() and (text.isprintable() or not text)):
         raise SettingError("token: it takes printable ASCII")
     elif name == "ca_file" and text:
@@ -187,24 +190,3 @@ def check(name: str, value: Any) -> None:
         isinstance(value, float) and not math.isfinite(value)
     ):
         raise SettingError(f"{name} = {value!r}: it takes a finite number")
-
-
-def sinks(text: str) -> list[str]:
-    """The sinks of a list by comma.
-
-    Raises:
-        SettingError: one is no URL of a scheme that we know, or no topic.
-    """
-    found = [part.strip() for part in text.split(",") if part.strip()]
-    for part in found:
-        split_url(part, SINK_SCHEMES)
-        if part.startswith("mqtt") and set("+#?") & set(unquote(part.partition("://")[2].partition("/")[2])):
-            raise SettingError(f"{masked(part)}: a topic holds none of + # ?")
-    return list(dict.fromkeys(found))
-
-
-def masked(url: str) -> str:
-    """A URL without its password."""
-    scheme, separator, rest = url.partition("://")
-    user, at, host = rest.rpartition("@")
-    return f"{scheme}{separator}{user.partition(':')[0]}{':***' if ':' in user else ''}{at}{host}"

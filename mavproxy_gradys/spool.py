@@ -4,13 +4,13 @@ Blocking; one thread uses it at a time (`keeper.py` has a thread for it). A tran
 call returns (WAL, synchronous=FULL), so that neither `kill -9` nor a flat battery loses what was kept.
 
 A sequence number is given once, even after the file was lost: a new file begins at the milliseconds since
-1970, above whatever a former one can have reached at less than a thousand readings a second.
+1970, above whatever a former one can have reached at less than a thousand readings a second, and above what a
+corrupt one is known to have given, should the clock have been set back.
 """
 
 from __future__ import annotations
 
-import json
-import random
+import os
 import sqlite3
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -18,22 +18,13 @@ from pathlib import Path
 
 from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.readings import Reading, Stored
+from mavproxy_gradys.rows import COLUMNS, row_of, size_of, stored_of
+from mavproxy_gradys.spool_file import opened
+from mavproxy_gradys.transaction import Transaction
 
-APPLICATION = 0x67726164  # "grad": PRAGMA application_id of our files
-VERSION = 1
-ROW_OVERHEAD = 100  # bytes of a row beyond its texts, about
 DROPPED_AT_ONCE = 500  # rows
-CLOCK_IS_SET = 1.7e9  # s since 1970: a clock behind this (2023) was never set
-WAL_KEPT = 1024 * 1024  # bytes
-SCHEMA = """
-CREATE TABLE readings (
-    seq INTEGER PRIMARY KEY AUTOINCREMENT, device TEXT NOT NULL, system INTEGER NOT NULL, quantity TEXT NOT NULL,
-    representation TEXT NOT NULL, value TEXT NOT NULL, time REAL NOT NULL,
-    boot TEXT NOT NULL, uptime REAL NOT NULL, size INTEGER NOT NULL);
-CREATE TABLE acknowledged (sink TEXT, seq INTEGER, PRIMARY KEY (sink, seq)) WITHOUT ROWID;
-CREATE TABLE dropped (cause TEXT PRIMARY KEY, count INTEGER NOT NULL) WITHOUT ROWID;
-"""
-COLUMNS = "seq, device, system, quantity, representation, value, time"
+DAMAGED_KEPT = 1000  # rows
+CAUSES = ("size", "age", "damage")
 
 
 def uptime() -> float:
@@ -54,7 +45,8 @@ class Spool:
 
     Attributes:
         count, size: readings, and their bytes.
-        dropped: how many readings were dropped, by cause (`size`, `age`), over the file's whole life.
+        dropped: how many readings were dropped, by cause (`size`, `age`, `damage`), over the file's whole life.
+        damaged: numbers of rows that could not be read, and that `trim` is to set aside.
         set_aside: the corrupt file that this one replaced; None when there was none.
 
     Args:
@@ -79,94 +71,46 @@ class Spool:
         boot: str | None = None,
         wall: Callable[[], float] = time.time,
     ) -> None:
-        self.path = path
+        self.path = Path(os.path.realpath(path))
         self.largest = largest
         self.longest = longest
-        self.set_aside: Path | None = None
         self.sinks: list[str] = []
+        self.damaged: set[int] = set()
         self._clock = clock
-        self._wall = wall
         self._boot = boot_id() if boot is None else boot
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            self._open_or_replace()
+            self._db, self.set_aside = opened(self.path, wall())
         except (sqlite3.Error, OSError) as error:
             raise NotStored(f"{path}: {error}{_hint(error)}") from error
-
-    def _open_or_replace(self) -> None:
         try:
-            self._open()
-        except sqlite3.DatabaseError as error:
-            if isinstance(error, sqlite3.OperationalError):
-                raise  # no room, no permission, locked: the file itself may be good
-            self.set_aside = self._move_aside()
-            self._open()
-
-    def _open(self) -> None:
-        self._db = sqlite3.connect(self.path, timeout=0, isolation_level=None, check_same_thread=False)
-        try:
-            self._check_owner()
-            self._db.execute("PRAGMA locking_mode=EXCLUSIVE")
-            self._db.execute("PRAGMA journal_mode=WAL")
-            self._db.execute("PRAGMA synchronous=FULL")
-            self._db.execute(f"PRAGMA journal_size_limit={WAL_KEPT}")
-            self._check()
-            with self._transaction():
-                now = self._clock()
-                self._db.execute(
-                    "UPDATE readings SET boot = ?, uptime = ? WHERE boot != ?", (self._boot, now, self._boot)
-                )
-            self._look()
-        except BaseException:
+            self._find()
+        except BaseException as error:
             self._db.close()
+            if isinstance(error, sqlite3.Error):
+                raise NotStored(f"{path}: {error}") from error
             raise
 
-    def _check_owner(self) -> None:
-        (application,) = self._db.execute("PRAGMA application_id").fetchone()
-        (tables,) = self._db.execute("SELECT count(*) FROM sqlite_master").fetchone()
-        if tables and application != APPLICATION:
-            raise NotStored(f"{self.path} is a database of another program; `gradys set spool FILE` takes another")
-
-    def _check(self) -> None:
-        (tables,) = self._db.execute("SELECT count(*) FROM sqlite_master").fetchone()
-        if not tables:
-            self._make()
-            return
-        (found,) = self._db.execute("PRAGMA quick_check(1)").fetchone()
-        if found != "ok":
-            raise sqlite3.DatabaseError(found)
-
-    def _make(self) -> None:
-        wall = self._wall()
-        first = int(wall * 1000) if wall > CLOCK_IS_SET else random.getrandbits(40)
+    def _find(self) -> None:
         with self._transaction():
-            for statement in SCHEMA.split(";"):
-                self._db.execute(statement)
-            self._db.execute("INSERT INTO sqlite_sequence (name, seq) VALUES ('readings', ?)", (first,))
-            self._db.execute(f"PRAGMA application_id={APPLICATION}")
-            self._db.execute(f"PRAGMA user_version={VERSION}")
-
-    def _move_aside(self) -> Path:
-        """Rename the file, so that nobody's data is lost by our not understanding it."""
-        number = 1
-        while (aside := self.path.with_name(f"{self.path.name}.corrupt-{number}")).exists():
-            number += 1
-        for suffix in ("-wal", "-shm", ""):
-            part = self.path.with_name(self.path.name + suffix)
-            if part.exists():
-                part.rename(aside.with_name(aside.name + suffix))
-        return aside
+            now = self._clock()
+            self._db.execute(
+                "UPDATE readings SET boot = ?, uptime = ? WHERE boot != ?", (self._boot, now, self._boot)
+            )
+        self._look()
 
     def _look(self) -> None:
-        self.count, self.size = self._db.execute("SELECT count(*), coalesce(sum(size), 0) FROM readings").fetchone()
-        self.dropped = dict(self._db.execute("SELECT cause, count FROM dropped"))
+        self.count, self.size = self._db.execute(
+            "SELECT count(*), coalesce(sum(CAST(size AS INTEGER)), 0) FROM readings"
+        ).fetchone()
+        counts = self._db.execute("SELECT cause, CAST(count AS INTEGER) FROM dropped").fetchall()
+        self.dropped = {cause: count for cause, count in counts if cause in CAUSES}
 
     def close(self) -> None:
         """Close the file."""
         self._db.close()
 
-    def _transaction(self) -> _Transaction:
-        return _Transaction(self._db)
+    def _transaction(self) -> Transaction:
+        return Transaction(self._db)
 
     # -- in -----------------------------------------------------------------------------------------------
 
@@ -178,14 +122,12 @@ class Spool:
         """
         now, numbers, added = self._clock(), [], 0
         with self._transaction():
-            for r in readings:
-                value = json.dumps(r.value, allow_nan=False)
-                size = ROW_OVERHEAD + sum(map(len, (r.device, r.quantity, r.representation, value)))
-                row = (r.device, r.system, r.quantity, r.representation, value, r.time, self._boot, now, size)
+            for reading in readings:
+                row = row_of(reading)
+                size = size_of(row)
                 cursor = self._db.execute(
-                    "INSERT INTO readings (device, system, quantity, representation, value, time, boot, uptime, size)"
-                    " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
-                    row,
+                    f"INSERT INTO readings ({COLUMNS}, boot, uptime, size) VALUES (NULL, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                    (*row, self._boot, now, size),
                 )
                 numbers.append(int(cursor.lastrowid or 0))
                 added += size
@@ -194,18 +136,40 @@ class Spool:
         return numbers
 
     def trim(self) -> None:
-        """Drop what is too old, then the oldest of what is too much.
+        """Set aside what is damaged; drop what is too old, then the oldest of what is too much.
 
         Raises:
             sqlite3.Error: as `append`.
         """
+        if self.damaged:
+            self._set_aside_damaged()
         while self.count and self._drop("age", "uptime < ?", self._clock() - self.longest) == DROPPED_AT_ONCE:
             pass
         while self.size > self.largest and self._drop_excess():
             pass
 
+    def _set_aside_damaged(self) -> None:
+        """Move the rows that could not be read to a table of their own, of which the newest are kept."""
+        found, moved = sorted(self.damaged), 0
+        with self._transaction():
+            for seq in found:
+                moved += self._db.execute(
+                    f"INSERT OR REPLACE INTO damaged SELECT {COLUMNS} FROM readings WHERE seq = ?", (seq,)
+                ).rowcount
+                self._db.execute("DELETE FROM readings WHERE seq = ?", (seq,))
+                self._db.execute("DELETE FROM acknowledged WHERE seq = ?", (seq,))
+            self._db.execute(
+                "DELETE FROM damaged WHERE seq NOT IN (SELECT seq FROM damaged ORDER BY seq DESC LIMIT ?)",
+                (DAMAGED_KEPT,),
+            )
+            self._count_dropped("damage", moved)
+        self.damaged.clear()
+        self._look()
+
     def _drop_excess(self) -> int:
-        oldest = self._db.execute("SELECT seq, size FROM readings ORDER BY seq LIMIT ?", (DROPPED_AT_ONCE,))
+        oldest = self._db.execute(
+            "SELECT seq, CAST(size AS INTEGER) FROM readings ORDER BY seq LIMIT ?", (DROPPED_AT_ONCE,)
+        )
         excess, last = self.size - self.largest, -1
         for seq, size in oldest:
             if excess <= 0:
@@ -217,20 +181,22 @@ class Spool:
         with self._transaction():
             gone = self._db.execute(
                 "DELETE FROM readings WHERE seq IN (SELECT seq FROM readings ORDER BY seq LIMIT ?)"
-                f" AND {condition} RETURNING seq, size",
+                f" AND {condition} RETURNING seq, CAST(size AS INTEGER)",
                 (DROPPED_AT_ONCE, limit),
             ).fetchall()
             if gone:
                 self._db.execute("DELETE FROM acknowledged WHERE seq <= ?", (max(seq for seq, _ in gone),))
-                self._db.execute(
-                    "INSERT INTO dropped VALUES (?, ?)"
-                    " ON CONFLICT (cause) DO UPDATE SET count = count + excluded.count",
-                    (cause, len(gone)),
-                )
+                self._count_dropped(cause, len(gone))
         if gone:
             self._forget(size for _, size in gone)
             self.dropped[cause] = self.dropped.get(cause, 0) + len(gone)
         return len(gone)
+
+    def _count_dropped(self, cause: str, count: int) -> None:
+        self._db.execute(
+            "INSERT INTO dropped VALUES (?, ?) ON CONFLICT (cause) DO UPDATE SET count = count + excluded.count",
+            (cause, count),
+        )
 
     def _forget(self, sizes: Iterable[int]) -> None:
         gone = list(sizes)
@@ -242,18 +208,32 @@ class Spool:
     def batch(self, sink: str, after: int, limit: int) -> list[Stored]:
         """The oldest readings after number `after` that a sink has not acknowledged, in their order.
 
+        Rows that are damaged are passed over, until `trim` sets them aside.
+
         Raises:
             sqlite3.Error: the file cannot be read.
         """
+        while True:
+            good, newest = self._look_through(sink, after, limit)
+            if good or newest is None:
+                return good
+            after = newest
+
+    def _look_through(self, sink: str, after: int, limit: int) -> tuple[list[Stored], int | None]:
+        """The sound ones of so many rows, and the last row's number; None when there are no rows."""
+        good, newest = [], None
         rows = self._db.execute(
             f"SELECT {COLUMNS} FROM readings WHERE seq > ? AND NOT EXISTS (SELECT 1 FROM acknowledged"
             " WHERE sink = ? AND acknowledged.seq = readings.seq) ORDER BY seq LIMIT ?",
             (after, sink, limit),
         )
-        return [
-            Stored(seq, Reading(device, system, quantity, representation, json.loads(value), at))
-            for seq, device, system, quantity, representation, value, at in rows
-        ]
+        for row in rows:  # one at a time: a damaged one may be large
+            newest, stored = row[0], stored_of(row)
+            if stored is None:
+                self.damaged.add(newest)
+            else:
+                good.append(stored)
+        return good, newest
 
     def acknowledge(self, sink: str, numbers: Sequence[int]) -> None:
         """Note that a sink has acknowledged just these; what all sinks have is removed.
@@ -276,7 +256,12 @@ class Spool:
             return []
         if others:
             self._db.execute("DELETE FROM acknowledged WHERE seq = ?", (number,))
-        return [size for (size,) in self._db.execute("DELETE FROM readings WHERE seq = ? RETURNING size", (number,))]
+        return [
+            size
+            for (size,) in self._db.execute(
+                "DELETE FROM readings WHERE seq = ? RETURNING CAST(size AS INTEGER)", (number,)
+            )
+        ]
 
     def use_sinks(self, sinks: Sequence[str]) -> None:
         """From now on readings are owed to these; what all of them have acknowledged already is removed.
@@ -299,32 +284,8 @@ class Spool:
 
     def oldest_since(self) -> float | None:
         """The uptime (s) at which the oldest reading was kept; None when there is none."""
-        row = self._db.execute("SELECT uptime FROM readings ORDER BY seq LIMIT 1").fetchone()
+        row = self._db.execute("SELECT CAST(uptime AS REAL) FROM readings ORDER BY seq LIMIT 1").fetchone()
         return None if row is None else float(row[0])
-
-
-class _Transaction:
-    """BEGIN IMMEDIATE … COMMIT, or ROLLBACK when anything was raised."""
-
-    def __init__(self, db: sqlite3.Connection) -> None:
-        self._db = db
-
-    def __enter__(self) -> None:
-        self._db.execute("BEGIN IMMEDIATE")
-
-    def __exit__(self, kind: type[BaseException] | None, error: object, trace: object) -> None:
-        if kind is None:
-            try:
-                self._db.execute("COMMIT")
-                return
-            except sqlite3.Error:
-                self._roll_back()
-                raise
-        self._roll_back()
-
-    def _roll_back(self) -> None:
-        if self._db.in_transaction:  # SQLite itself ends it after some errors
-            self._db.execute("ROLLBACK")
 
 
 def _hint(error: BaseException) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import random
@@ -9,8 +10,10 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
@@ -134,6 +137,59 @@ def test_an_outage_costs_nothing_and_order_is_kept(loaded, receiver, harness):
     assert len(everything) == len(set(everything))
 
 
+class Portal(ThreadingHTTPServer):
+    """A captive portal: every request gets the login page, or is sent to it."""
+
+    daemon_threads = True
+
+    class Page(BaseHTTPRequestHandler):
+        def do_POST(self) -> None:
+            self.rfile.read(int(self.headers["Content-Length"]))
+            moved = self.path == "/moved"
+            self.send_response(302 if moved else 200)
+            if moved:
+                self.send_header("Location", "/login")
+            page = b"" if moved else b"<html><form>Please log in</form></html>"
+            self.send_header("Content-Length", str(len(page)))
+            self.end_headers()
+            self.wfile.write(page)
+
+        do_GET = do_POST
+
+        def log_message(self, *_: Any) -> None: ...
+
+    def __init__(self) -> None:
+        super().__init__(("127.0.0.1", 0), self.Page)
+        self.url = f"http://127.0.0.1:{self.server_port}"
+
+
+@pytest.fixture
+def portal() -> Iterator[Portal]:
+    with Portal() as made:
+        thread = threading.Thread(target=made.serve_forever)
+        thread.start()
+        yield made
+        made.shutdown()
+        thread.join()
+
+
+@pytest.mark.parametrize("path", ["/readings", "/moved", "/moved#ack=status"])
+def test_a_captive_portal_takes_nothing(rig, harness, receiver, portal, tmp_path, path):
+    sink = f"{portal.url}{path}"
+    rig.mavproxy.ask(gradys(receiver, tmp_path, sink=sink, quantities=""), "Loaded module gradys")
+    try:
+        harness.eventually(lambda: serves(rig), 5, "the route")
+        posted = [number for value in range(10) for number in post(rig, value)]
+        error = harness.eventually(lambda: report(rig)["sinks"][0]["last_error"], 10, "the error")
+        assert "names no numbers" in error or "redirects to /login" in error
+        assert report(rig)["spooled"] == 10
+        rig.mavproxy.ask(f"gradys set sink {receiver.url}/readings", "gradys: no ground station")
+        found = harness.eventually(lambda: len(receiver.readings()) == 10 and receiver.readings(), 30, "all ten")
+        assert [reading["seq"] for reading in found] == posted
+    finally:
+        rig.mavproxy.ask("module unload gradys", "Unloaded module gradys")
+
+
 def test_kill_9_loses_nothing_that_was_acknowledged(harness, tmp_path):
     """MAVProxy is killed at random moments while readings are posted; what was answered with 200 arrives."""
     rig = harness.Rig(tmp_path, harness.free_port())
@@ -201,7 +257,12 @@ def test_a_full_disk_is_said_and_nothing_else_suffers(harness, rig, tmp_path):
         refused = [answer for answer in answers if answer.status_code == 503]
         assert refused and refused[-1].json()["code"] == "not_stored"
         assert rig.get("/telemetry/gps").status_code == 200
+        with contextlib.suppress(OSError), (disk / "filler").open("wb", buffering=0) as filler:
+            while True:
+                filler.write(b"x")  # not even a sample fits any more
+        harness.eventually(lambda: report(rig)["spool"]["problem"], 10, "the problem")
         rig.mavproxy.ask("gradys status", "NOT KEPT just now")
+        assert "readings are lost" in rig.mavproxy.ask("module unload gradys", "Unloaded module gradys")
     finally:
-        rig.mavproxy.ask("module unload gradys", "Unloaded module gradys")
+        rig.mavproxy.ask("module unload gradys", "gradys")
         subprocess.run(["umount", str(disk)], check=False)

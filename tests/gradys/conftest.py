@@ -121,6 +121,11 @@ class FakePoster:
             raise answer
         return answer
 
+    @staticmethod
+    def acknowledging(body: bytes) -> dict[str, list[int]]:
+        """An `answer`: a receiver that keeps all readings."""
+        return {"acknowledged": [reading["seq"] for reading in json.loads(body)["readings"]]}
+
     async def close(self) -> None:
         self.closed = True
 

@@ -1,13 +1,16 @@
 from __future__ import annotations
 
 import asyncio
+import gzip
 import socket
+import tracemalloc
 from typing import Any
 
+import aiohttp
 import pytest
 from aiohttp import web
 
-from mavproxy_gradys.client import FORM, LARGEST_ANSWER, Client, refusal
+from mavproxy_gradys.client import FORM, LARGEST_ANSWER, Client, explain, refusal
 from mavproxy_gradys.errors import NotDelivered
 
 
@@ -93,6 +96,25 @@ def test_what_is_no_200_is_a_refusal(loop: Any, peer: Peer, answer: Any, text: s
     with pytest.raises(NotDelivered, match=text) as raised:
         asked(loop, peer)
     assert raised.value.reached and raised.value.too_large == too_large
+
+
+def test_an_answer_that_would_grow_large_is_no_json(loop: Any, peer: Peer) -> None:
+    bomb = gzip.compress(b" " * 50 * LARGEST_ANSWER)
+    peer.answer = lambda request: web.Response(body=bomb, headers={"Content-Encoding": "gzip"})
+    tracemalloc.start()
+    assert asked(loop, peer) == [None]
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 4 * LARGEST_ANSWER
+
+
+def test_an_address_that_cannot_be_called_is_not_repeated() -> None:
+    assert "s3cret" not in explain(aiohttp.InvalidURL("http://me:s3cret@h/"), 3.0)
+
+
+def test_what_a_redirect_says_cannot_write_to_the_terminal() -> None:
+    assert str(refusal(302, "http://x/\x1b[2J\r\n" + "y" * 9000)).startswith("it redirects to http://x/?[2J??yyy")
+    assert len(str(refusal(302, "y" * 9000))) < 300
 
 
 @pytest.mark.parametrize(

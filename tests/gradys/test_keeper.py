@@ -237,18 +237,26 @@ def test_a_value_that_cannot_be_told_is_dropped_alone_and_counted(loop: Any, kee
     assert keeper.dropped == {"value": 1}
 
 
-def test_a_defect_loses_no_reading_and_leaves_no_file_open(
+def test_a_defect_loses_no_reading_is_told_once_and_leaves_no_file_open(
     loop: Any, disk: Disk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     keeper = Keeper(disk.make, loop.time)
     begin(loop, keeper)
     with failing(monkeypatch, "append", RuntimeError("a defect")):
         keeper.put(reading(1))
-        loop.pass_time(1)
-        assert keeper.waiting == 1
-        with pytest.raises(RuntimeError):
-            loop.run(keeper.stop())
+        loop.pass_time(5)
+        assert keeper.waiting == 1 and "a defect" in keeper.problem
+        with pytest.raises(NotStored, match="a defect"):
+            loop.run(keeper.keep([reading(2)]))
     assert [str(defect["exception"]) for defect in loop.defects] == ["a defect"]
+    loop.defects.clear()
+    loop.pass_time(1)
+    assert (keeper.problem, taken(loop, keeper)) == ("", [1])
+    with failing(monkeypatch, "append", RuntimeError("another defect")):
+        keeper.put(reading(3))
+        loop.run(keeper.stop())
+    assert len(keeper.left) == 1
+    assert [str(defect["exception"]) for defect in loop.defects] == ["another defect"]
     loop.defects.clear()
     Spool(disk.path, 1e9, 1e9).close()  # not locked
 
@@ -273,7 +281,8 @@ def test_what_the_disk_does_not_take_is_handed_back_at_the_end(loop: Any, disk: 
     for value in range(3):
         keeper.put(reading(f"{value}" * 3000))
     loop.pass_time(1)
-    assert [left.value[0] for left in loop.run(keeper.stop())] == ["0", "1", "2"]
+    loop.run(keeper.stop())
+    assert [left.value[0] for left in keeper.left] == ["0", "1", "2"]
     with pytest.raises(NotStored, match="stopping"):
         loop.run(keeper.keep([reading(1)]))
 
@@ -308,7 +317,11 @@ def test_the_log_tells_of_a_full_disk_once_and_of_drops_once_a_minute(
 
 
 def test_the_log_names_the_file_that_was_set_aside(loop: Any, disk: Disk, caplog: Any) -> None:
-    disk.path.write_bytes(b"SQLite format 3\0" + b"\xff" * 8192)
+    with contextlib.closing(Spool(disk.path, 1e9, 1e9)) as spool:
+        spool.append([reading()] * 2000)
+    content = bytearray(disk.path.read_bytes())
+    content[8192:20480] = b"\xff" * 12288
+    disk.path.write_bytes(content)
     keeper = Keeper(disk.make, loop.time)
     begin(loop, keeper)
     assert [record.message.rpartition("/")[2] for record in caplog.records] == ["spool.db.corrupt-1"]

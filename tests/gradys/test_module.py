@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import sqlite3
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -11,6 +13,8 @@ import pytest
 import gradys
 from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.module import HELP
+from mavproxy_gradys.readings import Reading
+from mavproxy_gradys.spool import Spool
 
 
 @pytest.fixture
@@ -117,6 +121,98 @@ def test_a_stopped_module_stays_stopped_when_a_setting_changes(make: Any, capsys
     assert capsys.readouterr().out.startswith("gradys: stopped")
 
 
+class FullDisk:
+    """Every spool's `append` fails; `makes_room` ends that."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self._full = True
+        append = Spool.append
+
+        def appended(spool: Spool, readings: Any) -> list[int]:
+            if self._full:
+                raise sqlite3.OperationalError("database or disk is full")
+            return append(spool, readings)
+
+        monkeypatch.setattr(Spool, "append", appended)
+
+    def makes_room(self) -> None:
+        self._full = False
+
+
+@pytest.fixture
+def full_disk(monkeypatch: pytest.MonkeyPatch) -> FullDisk:
+    return FullDisk(monkeypatch)
+
+
+def put(module: Any, count: int) -> None:
+    """Have that many readings wait in memory."""
+
+    async def wait() -> None:
+        for number in range(count):
+            module.gradys.sensing._kept().put(Reading("uav-1", 1, "alt", "m", float(number), 0.0))
+
+    module.host.bridge.run(wait())
+
+
+def kept(file: Path) -> int:
+    with contextlib.closing(sqlite3.connect(file)) as db:
+        (count,) = db.execute("SELECT count(*) FROM readings").fetchone()
+    return int(count)
+
+
+def test_an_unload_says_how_many_readings_are_lost(
+    make: Any, capsys: Any, caplog: Any, full_disk: FullDisk, tmp_path: Path
+) -> None:
+    module = make()
+    put(module, 12)
+    module.unload()
+    assert "gradys: 12 readings are lost" in capsys.readouterr().out
+    (told,) = (record.message for record in caplog.records if "lost" in record.message)
+    assert told.startswith("12 readings are lost") and "disk is full" in told
+
+
+def test_an_unload_writes_what_it_can_and_then_says_nothing(make: Any, capsys: Any, tmp_path: Path) -> None:
+    module = make()
+    put(module, 12)
+    module.unload()
+    assert "lost" not in capsys.readouterr().out and kept(tmp_path / "spool.db") == 12
+
+
+@pytest.mark.parametrize("room", [True, False])
+def test_what_was_left_at_a_stop_is_tried_once_more_at_the_unload(
+    make: Any, main_loop: Any, capsys: Any, full_disk: FullDisk, tmp_path: Path, room: bool
+) -> None:
+    module = make()
+    put(module, 12)
+    module.command(["stop"])
+    main_loop.until(lambda: "stopped" in capsys.readouterr().out)
+    if room:
+        full_disk.makes_room()
+    module.unload()
+    assert ("12 readings are lost" in capsys.readouterr().out) == (not room)
+    assert kept(tmp_path / "spool.db") == (12 if room else 0)
+
+
+def test_a_disk_that_hangs_at_the_unload_is_not_waited_for_and_its_readings_are_told(
+    make: Any, capsys: Any, monkeypatch: Any
+) -> None:
+    module = make()
+    hung, asked = threading.Event(), threading.Event()
+
+    def hang(*_: Any) -> list[int]:
+        asked.set()
+        hung.wait(30)
+        return []
+
+    monkeypatch.setattr("mavproxy_gradys.module.LONGEST_END", 0.1)
+    monkeypatch.setattr(Spool, "append", hang)
+    put(module, 7)
+    assert asked.wait(10)
+    module.unload()
+    assert "gradys: 7 readings" in capsys.readouterr().out
+    hung.set()
+
+
 @pytest.mark.parametrize("given", [{"gs": "x:y"}, {"nope": 1}, {"config": "/no/such/file"}])
 def test_a_bad_setting_is_an_import_error_of_one_line(mpstate: Any, given: dict[str, Any]) -> None:
     with pytest.raises(ImportError) as raised:
@@ -135,5 +231,41 @@ def test_settings_outlive_a_reload_and_no_password_is_shown(mpstate: Any, tmp_pa
     assert "sink=mqtt://me:***@127.0.0.1/fleet, token=(set), gs=127.0.0.1:9" in told
     assert "secret" not in told and "hidden" not in told
     settings = again.gradys_settings.snapshot()
-    assert (settings.sink, settings.token, settings.gs[0].url) == ((sink,), "hidden", "http://127.0.0.1:9")
+    assert ([sink.url for sink in settings.sink], settings.token, settings.gs[0].url) == ([sink], "hidden", "http://127.0.0.1:9")
     again.unload()
+
+
+def test_after_a_defect_too_an_unload_says_what_is_lost(
+    make: Any, capsys: Any, monkeypatch: Any, main_loop: Any
+) -> None:
+    module = make()
+
+    def defect(*_: Any) -> list[int]:
+        raise RuntimeError("a defect")
+
+    monkeypatch.setattr(Spool, "append", defect)
+    put(module, 3)
+    with contextlib.suppress(RuntimeError):
+        module.unload()
+    assert "gradys: 3 readings are lost" in capsys.readouterr().out
+
+
+def test_a_sink_that_takes_long_to_say_goodbye_costs_no_reading(
+    make: Any, main_loop: Any, capsys: Any, monkeypatch: Any, tmp_path: Path
+) -> None:
+    leaving = asyncio.Event()
+
+    class Slow:
+        async def send(self, batch: Any) -> Any:
+            raise NotDelivered("nobody is there")
+
+        async def close(self) -> None:
+            await leaving.wait()
+
+    monkeypatch.setattr("mavproxy_gradys.sender.make_sink", lambda *_: Slow())
+    monkeypatch.setattr("mavproxy_gradys.module.LONGEST_END", 0.5)
+    module = make(sink="http://127.0.0.1:9/r", quantities="")
+    main_loop.until(lambda: "no ground station" in capsys.readouterr().out)
+    put(module, 5)
+    module.unload()
+    assert "lost" not in capsys.readouterr().out and kept(tmp_path / "spool.db") == 5

@@ -10,12 +10,13 @@ import pytest
 from mavproxy_gradys.client import refusal
 from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.keeper import Keeper
-from mavproxy_gradys.readings import Reading
+from mavproxy_gradys.readings import Reading, Stored
 from mavproxy_gradys.sender import BATCH, Sender
+from mavproxy_gradys.sink_address import sink_address
 from mavproxy_gradys.sinks import HttpSink, acknowledged
 from mavproxy_gradys.spool import Spool
 
-SINK = "http://a/readings"
+SINK = sink_address("http://a/readings")
 
 
 @pytest.fixture
@@ -23,7 +24,7 @@ def keeper(loop: Any, tmp_path: Path, at_once: None) -> Iterator[Keeper]:
     keeper = Keeper(lambda: Spool(tmp_path / "spool.db", 1e9, 1e9, clock=loop.time), loop.time)
 
     async def started() -> None:
-        keeper.start([SINK])
+        keeper.start([SINK.name])
 
     loop.run(started())
     yield keeper
@@ -33,8 +34,8 @@ def keeper(loop: Any, tmp_path: Path, at_once: None) -> Iterator[Keeper]:
 @pytest.fixture
 def sender(loop: Any, keeper: Keeper, poster: Any, settings: Any, monkeypatch: pytest.MonkeyPatch) -> Sender:
     """Sends to `poster` from now on."""
-    poster.answer = lambda body: {"acknowledged": [reading["seq"] for reading in json.loads(body)["readings"]]}
-    monkeypatch.setattr("mavproxy_gradys.sender.make_sink", lambda url, settings: HttpSink(url, poster))
+    poster.answer = poster.acknowledging
+    monkeypatch.setattr("mavproxy_gradys.sender.make_sink", lambda sink, _: HttpSink(sink, poster))
     sender = Sender(SINK, keeper, loop.time, lambda: 0.0)
     loop.create_task(sender.run(settings()))
     return sender
@@ -70,11 +71,18 @@ def test_what_is_not_acknowledged_is_sent_again(loop: Any, keeper: Any, sender: 
     assert keeper.count == 0
 
 
-def test_a_200_without_numbers_acknowledges_all(loop: Any, keeper: Any, sender: Any, poster: Any) -> None:
-    poster.answer = None
-    keep(loop, keeper, 5)
-    loop.pass_time(0.1)
-    assert keeper.count == 0
+@pytest.mark.parametrize("answer", [None, "OK", {}, {"status": "ok"}, [1, 2, 3], {"Acknowledged": [1]}])
+def test_a_200_that_names_no_numbers_acknowledges_nothing(
+    loop: Any, keeper: Any, sender: Any, poster: Any, answer: Any
+) -> None:
+    answers, poster.answer = poster.answer, answer  # None: a captive portal's login page
+    kept = keep(loop, keeper, 5)
+    loop.pass_time(100)
+    assert keeper.count == 5 and "names no numbers" in sender.last_error
+    assert {len(batch) for batch in poster.batches} == {5}  # it is nobody's fault but the answer's
+    poster.answer = answers
+    loop.pass_time(30)
+    assert keeper.count == 0 and poster.batches[-1] == kept
 
 
 def test_a_receiver_that_is_down_gets_them_in_order_when_it_is_back(
@@ -136,6 +144,7 @@ def test_batches_that_are_too_large_get_smaller_and_stay_so(loop: Any, keeper: A
 def test_one_that_is_refused_by_itself_holds_up_nobody_and_is_sent_last(
     loop: Any, keeper: Any, sender: Any, poster: Any
 ) -> None:
+    answers = poster.answer
     refusing(poster, lambda found: 150.0 in found)
     keep(loop, keeper, 300)
     loop.pass_time(20)
@@ -143,8 +152,7 @@ def test_one_that_is_refused_by_itself_holds_up_nobody_and_is_sent_last(
     keep(loop, keeper, 3)
     loop.pass_time(40)
     assert keeper.count == 1 and values(poster.posts[-1][2]) == [150.0]  # it is still tried, alone
-    refusing(poster, lambda found: False)
-    poster.answer = None
+    poster.answer = answers
     loop.pass_time(30)
     assert keeper.count == 0
 
@@ -219,3 +227,20 @@ def test_an_acknowledgement_that_is_no_list_of_numbers_acknowledges_nothing(numb
 
 def test_numbers_that_were_not_sent_are_not_acknowledged() -> None:
     assert acknowledged({"acknowledged": [1, 99]}, {1, 2}) == {1}
+
+
+def test_where_the_option_says_so_a_200_alone_acknowledges_and_numbers_still_count_if_there_are_any() -> None:
+    for answer in (None, {}, {"status": "ok"}, [7]):
+        assert acknowledged(answer, {1, 2}, status_counts=True) == {1, 2}
+    assert acknowledged({"acknowledged": [1]}, {1, 2}, status_counts=True) == {1}
+    with pytest.raises(NotDelivered, match="names no numbers"):
+        acknowledged(None, {1, 2}, status_counts=False)
+
+
+def test_the_option_of_a_sink_reaches_its_delivery(loop: Any, poster: Any) -> None:
+    batch = [Stored(1, Reading("uav-1", 1, "alt", "m", 1.0, 0.0))]
+    poster.answer = None
+    assert loop.run(HttpSink(sink_address("http://a/r#ack=status"), poster).send(batch)) == {1}
+    with pytest.raises(NotDelivered):
+        loop.run(HttpSink(sink_address("http://a/r"), poster).send(batch))
+    assert {url for _, url, _ in poster.posts} == {"http://a/r"}

@@ -2,11 +2,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from mavproxy_gradys.errors import NotStored
+from mavproxy_gradys.errors import NotDelivered, NotStored
 from mavproxy_gradys.readings import Reading
 from mavproxy_gradys.sensing import Sensing
 from mavproxy_gradys.sinks import HttpSink
@@ -16,8 +17,9 @@ from mavproxy_gradys.spool import Spool
 @pytest.fixture
 def sensing(loop: Any, host: Any, teller: Any, poster: Any, at_once: Any, monkeypatch: Any) -> Iterator[Sensing]:
     """Its only receiver is `poster`."""
-    monkeypatch.setattr("mavproxy_gradys.sender.make_sink", lambda url, settings: HttpSink(url, poster))
+    monkeypatch.setattr("mavproxy_gradys.sender.make_sink", lambda sink, _: HttpSink(sink, poster))
     monkeypatch.setattr("mavproxy_gradys.keeper.uptime", loop.time)
+    poster.answer = poster.acknowledging
     made = Sensing(host)
     yield made
     loop.run(made.stop())
@@ -100,3 +102,28 @@ def test_what_is_posted_while_it_starts_anew_is_kept_or_refused(
     with pytest.raises(NotStored, match="stopped"):
         loop.run(sensing.stop())
         loop.run(sensing.keep([reading(2)]))
+
+
+class Nobody:
+    """A broker that takes nothing."""
+
+    async def send(self, batch: Any) -> set[int]:
+        raise NotDelivered("nobody is there")
+
+    async def close(self) -> None: ...
+
+
+def test_no_password_gets_into_the_file(
+    loop: Any, sensing: Any, start: Any, poster: Any, monkeypatch: Any, tmp_path: Path
+) -> None:
+    def make_sink(sink: Any, _: Any) -> Any:
+        return Nobody() if sink.url.startswith("mqtt") else HttpSink(sink, poster)
+
+    monkeypatch.setattr("mavproxy_gradys.sender.make_sink", make_sink)
+    start(sink="http://me:s3cret@a/r?key=s3cret,mqtt://uav:s3cret@broker/x", quantities="")
+    loop.run(sensing.keep([reading(n) for n in range(100)]))
+    loop.pass_time(1)
+    assert sensing.report()["spooled"] == 100 and len(poster.posts) == 1
+    loop.run(sensing.stop())
+    content = b"".join(file.read_bytes() for file in tmp_path.iterdir())
+    assert b"acknowledged" in content and b"s3cret" not in content

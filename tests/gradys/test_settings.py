@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from mavproxy_gradys.settings import ModuleSettings, masked
+from mavproxy_gradys.settings import ModuleSettings
 from mavproxy_uavapi.settings import SettingError
 
 
@@ -34,11 +34,20 @@ def test_an_ini_file_that_means_nothing_is_refused(tmp_path: Path, text: str) ->
     [("gs", "x:y"), ("ip", "a b"), ("period", float("nan")), ("period", "inf"), ("timeout", 0), ("token", "a\nb"),
      ("sink", "ftp://x"), ("quantities", "x"), ("ca_file", "/no/such"), ("spool_mb", -1), ("nope", 1),
      ("sink", "mqtt://broker/fleet/+/x"), ("sink", "mqtt://broker/a#b"), ("sink", "mqtts://broker/a?b"),
-     ("sink", "mqtt://broker/a%23"), ("gs", "a..b:80")],
+     ("sink", "mqtt://broker/a%23"), ("gs", "a..b:80"),
+     ("spool", "a\0b"), ("sink", "http://a/r#ack=200"), ("sink", "mqtt://broker/a#ack=status")],
 )  # fmt: skip
 def test_what_cannot_work_is_refused(name: str, value: Any) -> None:
     with pytest.raises(SettingError):
         ModuleSettings({name: value})
+
+
+def test_a_sinks_option_is_no_comment_of_an_ini_file(tmp_path: Path) -> None:
+    ini = tmp_path / "uav.ini"
+    ini.write_text("[gradys]\nsink = http://h/r#ack=status, mqtt://b/t\n")
+    settings = ModuleSettings({"config": str(ini)})
+    assert [sink.status_counts for sink in settings.snapshot().sink] == [True, False]
+    assert settings.shown("sink") == "http://h/r#ack=status,mqtt://b/t"
 
 
 def test_none_unsets() -> None:
@@ -51,4 +60,3 @@ def test_passwords_are_not_shown() -> None:
     settings = ModuleSettings({"token": "s3cret", "sink": "mqtt://me:pass@broker/x"})
     assert settings.shown("token") == "(set)"
     assert settings.shown("sink") == "mqtt://me:***@broker/x"
-    assert masked("http://broker/x") == "http://broker/x"

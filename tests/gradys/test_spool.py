@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import os
 import signal
 import sqlite3
 import subprocess
@@ -13,7 +12,8 @@ import pytest
 
 from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.readings import Reading
-from mavproxy_gradys.spool import DROPPED_AT_ONCE, ROW_OVERHEAD, Spool
+from mavproxy_gradys.rows import ROW_OVERHEAD
+from mavproxy_gradys.spool import DROPPED_AT_ONCE, Spool
 
 HTTP, MQTT = "http://a/readings", "mqtt://b/fleet"
 
@@ -158,39 +158,6 @@ def test_after_a_restart_of_the_machine_ages_begin_anew(opened: Any, clock: Cloc
     assert numbers(spool) == []
 
 
-@pytest.mark.parametrize("damage", ["garbage", "middle"])
-def test_a_corrupt_file_is_set_aside_and_not_deleted(opened: Any, tmp_path: Path, damage: str) -> None:
-    spool = opened()
-    spool.append([reading(n) for n in range(2000)])
-    spool.close()
-    file = tmp_path / "deep" / "spool.db"
-    content = bytearray(file.read_bytes())
-    if damage == "garbage":
-        content[:] = b"this is no database" * 100
-    else:
-        content[8192:20480] = os.urandom(12288)
-    file.write_bytes(content)
-    spool = opened()
-    assert spool.set_aside == file.with_name("spool.db.corrupt-1")
-    assert spool.set_aside.read_bytes() == content
-    assert spool.append([reading()]) and numbers(spool)
-    spool.close()
-    file.write_bytes(b"again garbage, and longer than a header would be" * 10)
-    assert opened().set_aside == file.with_name("spool.db.corrupt-2")
-
-
-def test_the_database_of_another_program_is_left_alone(opened: Any, tmp_path: Path) -> None:
-    (tmp_path / "deep").mkdir()
-    file = tmp_path / "deep" / "spool.db"
-    other = sqlite3.connect(file)
-    other.execute("CREATE TABLE precious (x)")
-    other.close()
-    before = file.read_bytes()
-    with pytest.raises(NotStored, match="another program"):
-        opened()
-    assert file.read_bytes() == before
-
-
 def test_two_at_once_on_one_file_are_refused(opened: Any) -> None:
     opened()
     with pytest.raises(NotStored, match="another MAVProxy uses it"):
@@ -244,3 +211,66 @@ def test_what_was_kept_survives_kill_9(tmp_path: Path) -> None:
     assert set(told) <= set(found)
     assert len(found) % 10 == 0  # whole transactions
     spool.close()
+
+
+DAMAGES = {
+    "bad JSON": "UPDATE readings SET value = '{\"a' WHERE seq = ?",
+    "nested JSON": "UPDATE readings SET value = replace(hex(zeroblob(9000)), '0', '[') WHERE seq = ?",
+    "an infinite number": "UPDATE readings SET value = '1e999' WHERE seq = ?",
+    "a dictionary": "UPDATE readings SET value = '{}' WHERE seq = ?",
+    "bad UTF-8 in the value": "UPDATE readings SET value = CAST(X'22FF4122' AS TEXT) WHERE seq = ?",
+    "bad UTF-8 in the unit": "UPDATE readings SET representation = CAST(X'FF41' AS TEXT) WHERE seq = ?",
+    "a quantity of 1 MB": "UPDATE readings SET quantity = hex(zeroblob(500000)) WHERE seq = ?",
+    "a unit of 1 MB": "UPDATE readings SET representation = hex(zeroblob(500000)) WHERE seq = ?",
+    "a value of 1 MB": "UPDATE readings SET value = '\"' || hex(zeroblob(500000)) || '\"' WHERE seq = ?",
+    "a device of another alphabet": "UPDATE readings SET device = 'uav/+/#' WHERE seq = ?",
+    "a system that is a word": "UPDATE readings SET system = 'one' WHERE seq = ?",
+    "an infinite time": "UPDATE readings SET time = 9e999 WHERE seq = ?",
+    "bytes for everything": "UPDATE readings SET device = X'FF', system = X'FF', value = X'FF', time = X'FF',"
+    " boot = X'FF', uptime = X'FF', size = X'FF' WHERE seq = ?",
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_row_is_set_aside_and_counted_and_the_rest_goes_on(
+    opened: Any, tmp_path: Path, damage: str
+) -> None:
+    spool = opened()
+    kept = spool.append([reading(n) for n in range(5)])
+    spool._db.execute(DAMAGES[damage], (kept[2],))
+    spool.close()
+    spool = opened()
+    others = [*kept[:2], *kept[3:]]
+    assert numbers(spool) == others
+    spool.trim()
+    assert (numbers(spool), spool.count, spool.dropped) == (others, 4, {"damage": 1})
+    assert [seq for (seq,) in spool._db.execute("SELECT seq FROM damaged")] == [kept[2]]
+    assert spool.oldest_since() == 100.0
+    spool.acknowledge(HTTP, others)
+    assert (spool.count, spool.size) == (0, 0)
+    spool.close()
+    assert opened().dropped == {"damage": 1}
+
+
+def test_a_cell_that_is_missing_is_the_damage_of_its_row_only(opened: Any, tmp_path: Path) -> None:
+    spool = opened()
+    kept = spool.append([reading(n) for n in range(3)])
+    spool.close()
+    for change in (
+        "UPDATE sqlite_master SET sql = replace(sql, 'value TEXT NOT NULL', 'value TEXT')",
+        f"UPDATE readings SET value = NULL WHERE seq = {kept[1]}",
+        "UPDATE sqlite_master SET sql = replace(sql, 'value TEXT', 'value TEXT NOT NULL')",
+    ):
+        db = sqlite3.connect(tmp_path / "deep" / "spool.db", isolation_level=None)
+        db.execute("PRAGMA writable_schema=1")
+        db.execute(change)
+        db.close()
+    spool = opened()
+    assert spool.set_aside is None and numbers(spool) == [kept[0], kept[2]]
+
+
+def test_a_whole_batch_of_damaged_rows_does_not_hide_what_comes_after(opened: Any) -> None:
+    spool = opened()
+    kept = spool.append([reading(n) for n in range(10)])
+    spool._db.execute("UPDATE readings SET value = 'x' WHERE seq <= ?", (kept[7],))
+    assert numbers(spool, limit=3) == kept[8:9] and numbers(spool, limit=100) == kept[8:]
