@@ -14,6 +14,7 @@ IpAddress = ipaddress.IPv4Address | ipaddress.IPv6Address
 
 PREFIX = 64  # bits of an IPv6 address that say whose it is: the rest its owner chooses as he likes
 NOBODY = "unknown"
+LOOPBACK = "this machine"
 
 
 def address_of(remote: str | None) -> IpAddress | None:
@@ -27,10 +28,12 @@ def address_of(remote: str | None) -> IpAddress | None:
 
 
 def group_of(address: IpAddress | None) -> str:
-    """Who counts as one caller: an IPv4 address, or a /64 of IPv6."""
+    """Who counts as one caller: an IPv4 address, a /64 of IPv6, or this machine."""
     if address is None:
         return NOBODY
-    if isinstance(address, ipaddress.IPv6Address) and not address.is_loopback:
+    if address.is_loopback:
+        return LOOPBACK
+    if isinstance(address, ipaddress.IPv6Address):
         return str(ipaddress.ip_network((address, PREFIX), strict=False))
     return str(address)
 
