@@ -3,8 +3,8 @@
     python benchmarks/fuzz_http.py --minutes 10 [--seed N]
 
 Real processes: the embedded vehicle, a MAVProxy, and two fuzzers beside a reader of telemetry. schemathesis makes
-what is HTTP, from /openapi.json; a generator of our own breaks what is: it takes requests apart and puts them together
-wrongly, in pieces, at the wrong moment. It fails when an answer is a defect of ours, when MAVProxy's log has a
+what is HTTP, from /openapi.json; a generator of our own breaks what is: it takes requests apart, joins them wrongly,
+in pieces, at the wrong moment. It fails when an answer is a defect of ours, when MAVProxy's log has a
 traceback, when the reader waits for longer than a second, or when the port is dead at the end.
 """
 

@@ -1,6 +1,6 @@
 """Strangers at the port while an owner with the token flies: what they cost him.
 
-    python benchmarks/soak_strangers.py --minutes 10
+    python benchmarks/soak_strangers.py --minutes 10 [--first]
 
 Real processes: the embedded vehicle, a tap on its link, a MAVProxy, strangers in a process of their own. It fails
 when a stop of the owner's was refused, or was on the wire later than 50 ms after he asked (99th percentile), when a
@@ -24,7 +24,7 @@ from collections import Counter
 from collections.abc import Awaitable, Callable
 from typing import Any
 
-from rig import Client, fly, machine, message_id, percentile, rig, table
+from rig import Client, fly, machine, message_id, percentile, put_first, rig, table
 from soak import RSS_ALLOWED, Notes, Usage, look_for_bad_words
 
 TOKEN = "a-long-and-secret-word"
@@ -296,10 +296,13 @@ def main() -> int:
     """Run, print what was measured, and say whether all was well."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--minutes", type=float, default=10.0)
+    parser.add_argument("--first", action="store_true", help="run before the machine's other work (root)")
     options = parser.parse_args()
     print(f"strangers: {options.minutes:g} min; {machine()}", flush=True)
     notes = Notes()
     with rig(max_jobs=1000) as (made, tap):
+        if options.first:
+            put_first(*(process.pid for process in made.processes))
         fly(made)
         made.mavproxy.ask(f"uavapi set token {TOKEN}", "listening on")
         measure(made, tap, options.minutes * 60, notes)
