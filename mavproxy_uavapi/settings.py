@@ -292,7 +292,7 @@ class ModuleSettings:
         """A line for each setting: its value and where that came from; the token is not shown."""
         shown = {name: self.mp.get(name) for name in self.mp.list()}
         shown[SECRET] = "(set)" if self._token else ""
-        return [f"{name:18} {shown[name]!s:24} {self.origins.get(name, DEFAULT)}" for name in self.names()]
+        return [f"{name:14} {shown[name]!s:24} {self.origins.get(name, DEFAULT)}" for name in self.names()]
 
 
 def _parse(name: str, value: Any) -> Any:

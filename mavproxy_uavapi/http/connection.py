@@ -25,7 +25,7 @@ class Connection(asyncio.Protocol):
 
     Args:
         factory: makes aiohttp's protocol.
-        peer: the socket, for as long as there is no transport yet.
+        peer: the socket, which nobody reads yet; None where a transport is there at once.
         group: whose connection it is (`caller.group_of`).
         on_lost: called when it is over.
 
@@ -50,7 +50,9 @@ class Connection(asyncio.Protocol):
         self.peer = peer
         self.group = group
         self.admitted = self.refused = self.answering = self.closing = False
-        self.idle_since = asyncio.get_running_loop().time()
+        self._loop = asyncio.get_running_loop()
+        self.idle_since = self._loop.time()
+        self._silent = False
         self._factory = factory
         self._on_lost = on_lost
         self._inner: Any = None
@@ -71,17 +73,34 @@ class Connection(asyncio.Protocol):
     def ended(self) -> None:
         """The answer is ready; the connection may idle until the next request's first byte."""
         self.answering = False
-        self.idle_since = asyncio.get_running_loop().time()
+        self.idle_since = self._loop.time()
 
     def judged(self, admitted: bool) -> None:
         """The door has let the request in, or refused it."""
         self.admitted, self.refused = admitted, not admitted
+
+    def await_first_byte(self, ready: Callable[[Connection], object]) -> None:
+        """Call `ready` when the peer has sent something; until then a connection costs a socket and no more."""
+        assert self.peer is not None
+        self._silent = True
+        self._loop.add_reader(self.peer, self._first_byte, ready)
+        self._expect_headers()
+
+    def _first_byte(self, ready: Callable[[Connection], object]) -> None:
+        assert self.peer is not None
+        self._silent = False
+        self._loop.remove_reader(self.peer)
+        ready(self)
 
     def abort(self) -> None:
         """Close it, without waiting for anything."""
         self.closing = True
         if self._transport is not None:
             self._transport.abort()
+        elif self.peer is not None and self._silent:
+            self._loop.remove_reader(self.peer)
+            self.peer.close()
+            self._lost()
         elif self.peer is not None:
             with contextlib.suppress(OSError):  # the peer was quicker
                 self.peer.shutdown(socket.SHUT_RDWR)  # what waits for the handshake sees its end
@@ -93,7 +112,7 @@ class Connection(asyncio.Protocol):
 
     def _expect_headers(self) -> None:
         if self._timer is None and not self.answering:
-            self._timer = asyncio.get_running_loop().call_later(HEADER_TIMEOUT, self.abort)
+            self._timer = self._loop.call_later(HEADER_TIMEOUT, self.abort)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """See asyncio.Protocol."""
@@ -133,10 +152,18 @@ class Connection(asyncio.Protocol):
     def connection_lost(self, error: Exception | None) -> None:
         """See asyncio.Protocol."""
         self.closing = True
-        self._stop_timer()
         if self._inner is not None:
             self._of.pop(self._inner, None)
             self._inner.connection_lost(error)
+        self._lost()
+
+    def abandon(self) -> None:
+        """There was no TLS handshake: aiohttp never hears of it."""
+        self.closing = True
+        self._lost()
+
+    def _lost(self) -> None:
+        self._stop_timer()
         if self._on_lost is not None:
             self._on_lost(self)
 

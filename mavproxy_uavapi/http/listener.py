@@ -14,7 +14,7 @@ from mavproxy_uavapi.http.connection import Connection
 from mavproxy_uavapi.http.log_throttle import LogThrottle
 
 BACKLOG = 512  # connections that wait to be accepted
-AT_ONCE = 16  # are accepted before others get a turn
+AT_ONCE = 8  # are accepted before others get a turn; what they replace may close a turn later
 SHARE = 20  # connections of one caller beyond the loopback
 RESERVE = 16  # connections that only those who have passed the door can have
 HANDSHAKE_TIMEOUT = 10.0  # s, of TLS
@@ -149,7 +149,10 @@ class Listener:
         near.setblocking(False)
         connection = Connection(self._factory, near, group, self._forget)
         self._connections[connection] = near
-        handshake = self._loop.create_task(self._hand_over(connection, near))
+        connection.await_first_byte(self._begin)
+
+    def _begin(self, connection: Connection) -> None:
+        handshake = self._loop.create_task(self._hand_over(connection, self._connections[connection]))
         self._handshakes.add(handshake)
         handshake.add_done_callback(self._handshakes.discard)
 
@@ -164,7 +167,7 @@ class Listener:
                 lambda: connection, near, ssl=self._tls, ssl_handshake_timeout=timeout
             )
         except OSError:  # it speaks no TLS, hung up, or has been replaced; asyncio closes the socket
-            self._forget(connection)
+            connection.abandon()
 
     def filenos(self) -> list[int]:
         """Descriptors of the port and of every connection."""
