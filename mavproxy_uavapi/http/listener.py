@@ -79,6 +79,17 @@ def highest_descriptor() -> int:
     return limit - 1 - min(KEPT_FREE, limit // 4)
 
 
+def lowest(near: socket.socket) -> socket.socket:
+    """The same socket by the lowest free descriptor, if one is lower."""
+    try:
+        copy = near.dup()
+    except OSError:  # there is none
+        return near
+    higher, lower = sorted((near, copy), key=socket.socket.fileno, reverse=True)
+    higher.close()
+    return lower
+
+
 class Listener:
     """A listening socket whose connections become aiohttp's; all methods belong to the asyncio thread.
 
@@ -134,18 +145,20 @@ class Listener:
         address = address_of(remote)
         group, is_local = group_of(address), address is not None and address.is_loopback
         highest = highest_descriptor()
+        scarce = near.fileno() > highest - REPLACING
         try:
+            going = who_makes_room(self._connections, group, is_local, self._most(), scarce)
+            if going is not None:
+                self._throttle.tell("replaced", f"an idle connection of {going.group} was closed for one of {group}")
+                going.abort()
+            if scarce:
+                near = lowest(near)
             if near.fileno() > highest:
                 raise NoRoom("descriptors", "MAVProxy needs the descriptors that are left")
-            scarce = near.fileno() > highest - REPLACING
-            going = who_makes_room(self._connections, group, is_local, self._most(), scarce)
         except NoRoom as error:
             self._throttle.tell(error.cause, f"a connection of {group} was refused: {error}")
             near.close()
             return
-        if going is not None:
-            self._throttle.tell("replaced", f"an idle connection of {going.group} was closed for one of {group}")
-            going.abort()
         near.setblocking(False)
         connection = Connection(self._factory, near, group, self._forget)
         self._connections[connection] = near

@@ -92,6 +92,16 @@ def test_descriptors_are_left_below_the_process_limit_and_below_that_of_select(
     assert highest_descriptor() == highest
 
 
+def test_socket_moves_to_a_lower_descriptor_where_one_is_free() -> None:
+    hole, first = socket.socket(), socket.socket()
+    number = hole.fileno()
+    hole.close()
+    moved = listener.lowest(first)
+    assert moved.fileno() == min(number, first.fileno() if first.fileno() >= 0 else number)
+    assert listener.lowest(moved) is moved
+    moved.close()
+
+
 @pytest.mark.skipif(not hasattr(socket, "TCP_USER_TIMEOUT"), reason="Linux only")
 def test_kernel_gives_up_a_peer_that_reads_nothing() -> None:
     with listener.listening_socket("127.0.0.1", 0) as listening:
