@@ -31,6 +31,7 @@ class Connection(asyncio.Protocol):
 
     Attributes:
         group: as given.
+        silent: whether the peer has sent nothing yet.
         admitted: whether the last request has passed the door.
         refused: whether the last request has not; the connection is about to be closed.
         answering: whether a request is being answered.
@@ -49,10 +50,9 @@ class Connection(asyncio.Protocol):
     ) -> None:
         self.peer = peer
         self.group = group
-        self.admitted = self.refused = self.answering = self.closing = False
+        self.silent = self.admitted = self.refused = self.answering = self.closing = False
         self._loop = asyncio.get_running_loop()
         self.idle_since = self._loop.time()
-        self._silent = False
         self._factory = factory
         self._on_lost = on_lost
         self._inner: Any = None
@@ -82,13 +82,13 @@ class Connection(asyncio.Protocol):
     def await_first_byte(self, ready: Callable[[Connection], object]) -> None:
         """Call `ready` when the peer has sent something; until then a connection costs a socket and no more."""
         assert self.peer is not None
-        self._silent = True
+        self.silent = True
         self._loop.add_reader(self.peer, self._first_byte, ready)
         self._expect_headers()
 
     def _first_byte(self, ready: Callable[[Connection], object]) -> None:
         assert self.peer is not None
-        self._silent = False
+        self.silent = False
         self._loop.remove_reader(self.peer)
         ready(self)
 
@@ -97,7 +97,7 @@ class Connection(asyncio.Protocol):
         self.closing = True
         if self._transport is not None:
             self._transport.abort()
-        elif self.peer is not None and self._silent:
+        elif self.peer is not None and self.silent:
             self._loop.remove_reader(self.peer)
             self.peer.close()
             self._lost()

@@ -39,8 +39,9 @@ def who_makes_room(
 ) -> Connection | None:
     """Which connection is to be closed for a new one of `group`; None while there is room.
 
-    A connection that has not passed the door goes first: one that was refused, then the oldest. Then that which
-    has been idle longest: HTTP clients open another. One that is being answered stays.
+    A connection that has not passed the door goes first: one that has said nothing, then the oldest; whoever was
+    refused would be back at once. Then that which has been idle longest: HTTP clients open another. One that is being
+    answered stays.
 
     Args:
         connections: the open ones, oldest first.
@@ -66,7 +67,7 @@ def who_makes_room(
     unknown = [one for one in candidates if not one.admitted]
     idle = [one for one in candidates if not one.answering]
     if unknown:
-        return min(unknown, key=lambda one: not one.refused)
+        return min(unknown, key=lambda one: not one.silent)
     if idle:
         return min(idle, key=lambda one: one.idle_since)
     raise error

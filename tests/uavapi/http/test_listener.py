@@ -15,8 +15,8 @@ MOST = 200
 
 def connection(group: str = "127.0.0.1", **given: Any) -> Any:
     """A connection that has asked for nothing yet."""
-    state = {"admitted": False, "refused": False, "answering": False, "closing": False, "idle_since": 0.0}
-    return SimpleNamespace(group=group, **{**state, **given})
+    state = dict.fromkeys(("silent", "admitted", "refused", "answering", "closing"), False)
+    return SimpleNamespace(group=group, **{**state, "idle_since": 0.0, **given})
 
 
 def busy(group: str = "127.0.0.1") -> Any:
@@ -36,9 +36,9 @@ def test_reserve_is_for_those_who_have_passed_the_door() -> None:
     assert who_makes_room([*there, busy()], "127.0.0.1", True, MOST) is there[0]
 
 
-def test_connection_that_was_refused_goes_before_an_older_one() -> None:
-    there = [connection() for _ in range(MOST)]
-    there[7].refused = True
+def test_connection_that_says_nothing_goes_before_an_older_one_that_was_refused() -> None:
+    there = [connection(refused=True, answering=True) for _ in range(MOST)]
+    there[7] = connection(silent=True)
     assert who_makes_room(there, "127.0.0.1", True, MOST) is there[7]
 
 
