@@ -10,8 +10,11 @@ import logging
 import os
 import resource
 import socket
+import ssl
+import subprocess
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -218,6 +221,44 @@ def test_connection_that_sends_a_byte_every_29_s_is_closed(drone: Any, port: Por
         return loop.time() - began
 
     assert port.run(act) <= 58
+
+
+@pytest.mark.needs("openssl")
+def test_tls_handshake_that_stops_half_way_is_given_up_and_holds_up_nobody(
+    drone: Any, service: Any, loop: Any, tmp_path: Path
+) -> None:
+    key, cert = str(tmp_path / "key.pem"), str(tmp_path / "cert.pem")
+    command = ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-subj", "/CN=localhost"]
+    subprocess.run([*command, "-keyout", key, "-out", cert], check=True, capture_output=True)
+    loop.patience = 0.02
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        free = int(probe.getsockname()[1])
+    given = {"port": free, "certfile": cert, "keyfile": key}
+    service.settings = ModuleSettings(given, environ={}).snapshot()
+    server = Server(service)
+    port = Port(loop, server, free)
+
+    async def act() -> tuple[int, float, int]:
+        await server.start()
+        silent, half = await port.connect(), await port.connect()
+        half.writer.write(b"\x16\x03\x01\x02\x00\x01\x00")
+        began = loop.time()
+        trusting = ssl.create_default_context(cafile=cert)
+        trusting.check_hostname = False
+        owner = Wire(*await asyncio.open_connection("127.0.0.1", free, ssl=trusting))
+        status = (await owner.ask("GET", "/telemetry/gps")).status
+        owner.writer.transport.abort()
+        assert await half.ended() and await silent.ended()
+        seconds = loop.time() - began
+        await asyncio.sleep(1)
+        return status, seconds, len(server.filenos())
+
+    status, seconds, descriptors = port.run(act)
+    loop.run(port.close())
+    assert status == 200
+    assert 9 <= seconds <= 12
+    assert descriptors == 1
 
 
 # -- the door comes first -----------------------------------------------------------------------------------
