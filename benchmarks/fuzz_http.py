@@ -1,6 +1,6 @@
 """Broken HTTP and nonsense at the port: no 500, no traceback, no reader who has to wait.
 
-    python benchmarks/fuzz_http.py --minutes 10 [--seed N]
+    python benchmarks/fuzz_http.py --minutes 10 [--seed N] [--first]
 
 Real processes: the embedded vehicle, a MAVProxy, and two fuzzers beside a reader of telemetry. schemathesis makes
 what is HTTP, from /openapi.json; a generator of our own breaks what is: it takes requests apart, joins them wrongly,
@@ -23,7 +23,7 @@ from collections import Counter
 from typing import Any
 
 import requests
-from rig import Client, harness, machine, percentile, rig, table
+from rig import Client, harness, machine, percentile, put_first, rig, table
 from soak import Notes, look_for_bad_words
 
 FUZZERS = 12
@@ -256,11 +256,14 @@ def main() -> int:
     """Run, print what was seen, and say whether all was well."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--minutes", type=float, default=10.0)
+    parser.add_argument("--first", action="store_true", help="run before the machine's other work (root)")
     parser.add_argument("--seed", type=int, default=random.randrange(1 << 30))
     options = parser.parse_args()
     print(f"fuzz: {options.minutes:g} min, seed {options.seed}; {machine()}", flush=True)
     notes = Notes()
     with rig(max_jobs=10000, scripts_path="scripts", script_logs="script_logs") as (made, _tap):
+        if options.first:
+            put_first(*(process.pid for process in made.processes))
         fuzz(made, options.minutes * 60, options.seed, notes)
         harness.eventually(lambda: made.get("/telemetry/status", timeout=10).status_code == 200, 30, "an answer")
         look_for_bad_words(made.mavproxy.output(), notes)

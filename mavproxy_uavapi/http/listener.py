@@ -13,8 +13,8 @@ from mavproxy_uavapi.http.caller import address_of, group_of
 from mavproxy_uavapi.http.connection import Connection
 from mavproxy_uavapi.http.log_throttle import LogThrottle
 
-BACKLOG = 512  # connections that wait to be accepted
-AT_ONCE = 8  # are accepted before others get a turn; what they replace may close a turn later
+BACKLOG = 2048  # connections that wait to be accepted; who finds no place asks again a second later
+AT_ONCE = 64  # are accepted before others get a turn: some 4 ms
 SHARE = 20  # connections of one caller beyond the loopback
 RESERVE = 16  # connections that only those who have passed the door can have
 HANDSHAKE_TIMEOUT = 10.0  # s, of TLS
