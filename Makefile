@@ -32,6 +32,7 @@ $(INSTALLED): setup.py pyproject.toml
 
 soak: $(INSTALLED)
 	$(BIN)/python benchmarks/soak.py --minutes $(or $(MINUTES),10)
+	$(BIN)/python benchmarks/soak_strangers.py --minutes $(or $(MINUTES),10)
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info

@@ -32,7 +32,7 @@ setup(
     install_requires=[
         "MAVProxy>=1.8.71",
         "pymavlink>=2.4.42",
-        "aiohttp>=3.10",
+        "aiohttp>=3.14",
         "psutil>=6",
         "pydantic>=2.7",
         "swagger-ui-py>=25.7.1",  # the files of Swagger UI 5 for /docs, which OpenAPI 3.1 needs

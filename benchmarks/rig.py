@@ -221,11 +221,16 @@ class Forwarding:
 
 
 class Client:
-    """One keep-alive connection that costs as little as an HTTP client in Python can."""
+    """One keep-alive connection that costs as little as an HTTP client in Python can.
 
-    def __init__(self, port: int) -> None:
+    Args:
+        port: where to, on the loopback.
+        headers: whole lines that every request has.
+    """
+
+    def __init__(self, port: int, headers: str = "") -> None:
         self._port = port
-        self._host = f"Host: 127.0.0.1:{port}\r\n".encode()
+        self._host = f"Host: 127.0.0.1:{port}\r\n{headers}".encode()
 
     async def open(self) -> None:
         """Connect."""

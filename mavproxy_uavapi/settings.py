@@ -44,7 +44,7 @@ NOT_OURS: dict[str, dict[str, str]] = {
 }
 NEIGHBOURS = {"gradys", "vision"}  # sections of the other modules, in a file that serves all
 # What an API takes up by listening anew: its address, its vehicle, and who may call.
-ACCESS = ("token", "allow_from", "allow_open", "cors_origins")
+ACCESS = ("token", "allow_from", "allow_scripts_from", "allow_open", "cors_origins")
 LISTENING = ("host", "port", "sysid", "certfile", "keyfile", *ACCESS)
 UNSET = {"", "None", "[]"}
 PREFIX = "UAVAPI_"  # of the environment variables
@@ -69,11 +69,14 @@ class Settings:
         max_age: s after which telemetry is no longer served.
         on_disconnect: what the vehicle does when the client of a waiting verb hangs up: continue or hold.
         allow_from: networks that may call without a token.
+        allow_scripts_from: networks among these that may run scripts, too.
         allow_open: whether anybody may call without a token, from anywhere.
         cors_origins: origins of the web pages that may call.
         certfile, keyfile: PEM files for TLS; empty for none.
         max_jobs: verbs that may be in flight at once.
-        max_rate: requests per second of one client, in the long run.
+        max_connections: connections that may be open at once.
+        max_rate: requests per second of one caller, in the long run.
+        local_rate: the same on the loopback, where there is no limit (0) unless `max_rate` was set.
         scripts_path: folder of the uploaded scripts.
         script_logs: folder of their logs.
         python_path: what runs .py scripts.
@@ -93,12 +96,15 @@ class Settings:
     max_age: float
     on_disconnect: str
     allow_from: tuple[Network, ...]
+    allow_scripts_from: tuple[Network, ...]
     allow_open: bool
     cors_origins: tuple[str, ...]
     certfile: str
     keyfile: str
     max_jobs: int
+    max_connections: int
     max_rate: float
+    local_rate: float
     scripts_path: str
     script_logs: str
     python_path: str
@@ -145,12 +151,14 @@ def table() -> list[Any]:
         MPSetting("max_age", float, 5.0, "s after which telemetry is stale", range=(0.1, 3600)),
         MPSetting("on_disconnect", str, "continue", "when a client hangs up", choice=["continue", "hold"]),
         MPSetting("allow_from", str, "", "networks that may call without a token", tab="Access"),
+        MPSetting("allow_scripts_from", str, "", "networks among these that may run scripts, too"),
         MPSetting("allow_open", bool, False, "let anybody call without a token"),
         MPSetting("cors_origins", str, "", "origins of web pages that may call"),
         MPSetting("certfile", str, "", "TLS certificate (PEM)"),
         MPSetting("keyfile", str, "", "TLS key (PEM)"),
         MPSetting("max_jobs", int, 64, "verbs in flight at once", range=(1, 10000), tab="Limits"),
-        MPSetting("max_rate", float, 500.0, "requests/s of one client", range=(1, 100000)),
+        MPSetting("max_connections", int, 200, "connections open at once", range=(32, 900)),
+        MPSetting("max_rate", float, 500.0, "requests/s of one caller", range=(1, 100000)),
         MPSetting("log_console", str, "", "components that log to the console", tab="Logs"),
         MPSetting("log_path", str, "", "log file, or its folder"),
         MPSetting("debug", str, "", "components that log in detail"),
@@ -277,7 +285,8 @@ class ModuleSettings:
     def snapshot(self) -> Settings:
         """The settings as they are now."""
         values = {name: _parse(name, self.mp.get(name)) for name in self.mp.list()}
-        return Settings(**values, token=self._token)
+        is_set = self.origins.get("max_rate", DEFAULT) != DEFAULT
+        return Settings(**values, local_rate=values["max_rate"] if is_set else 0.0, token=self._token)
 
     def listing(self) -> list[str]:
         """A line for each setting: its value and where that came from; the token is not shown."""
@@ -294,8 +303,8 @@ def _parse(name: str, value: Any) -> Any:
     """
     if name == "host":
         is_loopback(str(value))
-    if name == "allow_from":
-        return tuple(_network(word) for word in _words(value))
+    if name in ("allow_from", "allow_scripts_from"):
+        return tuple(_network(name, word) for word in _words(value))
     if name in ("log_console", "debug"):
         try:
             return components(str(value))
@@ -326,11 +335,11 @@ def _words(value: Any) -> list[str]:
     return [word for word in str(value).strip("[]").replace(",", " ").split() if word not in UNSET]
 
 
-def _network(text: str) -> Network:
+def _network(name: str, text: str) -> Network:
     try:
         return ipaddress.ip_network(text, strict=False)
     except ValueError as error:
-        raise SettingError(f"allow_from: {text!r} is no network such as 192.168.1.0/24") from error
+        raise SettingError(f"{name}: {text!r} is no network such as 192.168.1.0/24") from error
 
 
 def is_loopback(host: str) -> bool:

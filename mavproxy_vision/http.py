@@ -102,7 +102,7 @@ class Pages:
             Route("/vision/land", self.land, LandRequest, POST, job=True),
             Route("/vision/search", self.search, SearchRequest, POST, job=True),
             Route("/vision/mission", self.mission, MissionRequest, POST, job=True),
-            Route("/vision/stop", self.stop, Empty, EITHER),
+            Route("/vision/stop", self.stop, Empty, EITHER, stops=True),
         ]
 
     # -- reading -------------------------------------------------------------------------------------------

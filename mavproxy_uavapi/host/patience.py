@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable
-from typing import TypeVar
+from typing import Any, TypeVar
 
 T = TypeVar("T")
 
@@ -19,6 +19,7 @@ async def within(seconds: float | None, awaited: Awaitable[T]) -> T:
         asyncio.TimeoutError: it took longer; `awaited` is cancelled.
     """
     task = asyncio.ensure_future(awaited)
+    task.add_done_callback(_heed)  # whoever is cancelled meanwhile does not ask how it ended
     try:
         done, _ = await asyncio.wait({task}, timeout=seconds)
     finally:
@@ -27,3 +28,9 @@ async def within(seconds: float | None, awaited: Awaitable[T]) -> T:
     if not done:
         raise asyncio.TimeoutError
     return task.result()
+
+
+def _heed(task: asyncio.Future[Any]) -> None:
+    """Have asyncio not complain of an error that nobody asked for."""
+    if not task.cancelled():
+        task.exception()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import functools
 import logging
 import socket
@@ -14,18 +13,21 @@ from aiohttp import web
 from aiohttp.http_exceptions import HttpProcessingError
 
 from mavproxy_uavapi.errors import NotFound
-from mavproxy_uavapi.http.call import SERVICE, Call, Service, parameters
+from mavproxy_uavapi.http.bodies import invite
+from mavproxy_uavapi.http.call import ROUTE, SERVICE, Call, Service, parameters
+from mavproxy_uavapi.http.connection import IDLE_TIMEOUT, LINGER, headers_are_here
 from mavproxy_uavapi.http.docs_page import TABLE
-from mavproxy_uavapi.http.limits import BUCKET, Bucket, at_a_bearable_rate, give_way, headers_are_here, patient
+from mavproxy_uavapi.http.limits import BUCKET, STRANGERS, Bucket, at_a_bearable_rate, give_way
+from mavproxy_uavapi.http.listener import Listener, listening_socket
+from mavproxy_uavapi.http.log_throttle import LogThrottle
 from mavproxy_uavapi.http.responses import REFUSED, Handler, errors_as_answers, success
 from mavproxy_uavapi.http.routes import ROUTES, Route
-from mavproxy_uavapi.http.security import name_the_trusted, only_for_us
+from mavproxy_uavapi.http.security import THROTTLE, door, name_the_trusted
 from mavproxy_uavapi.http.trail import audited
 
 log = logging.getLogger("uavapi.http.server")
-BACKLOG = 512  # connections that wait to be accepted
 MAX_BODY = 1024 * 1024  # bytes
-MIDDLEWARES = (headers_are_here, errors_as_answers, give_way, at_a_bearable_rate, only_for_us)
+MIDDLEWARES = (headers_are_here, errors_as_answers, door, at_a_bearable_rate, give_way)
 SHUTDOWN_TIMEOUT = 1.0  # s for answers that are being written when we stop
 
 
@@ -34,15 +36,15 @@ def make_app(service: Service) -> web.Application:
     app = web.Application(client_max_size=MAX_BODY)
     app[SERVICE] = service
     app[TABLE] = ROUTES
-    app[BUCKET] = Bucket()
+    app[BUCKET], app[STRANGERS] = Bucket(), Bucket()
+    app[THROTTLE] = LogThrottle(service.host.clock, log.warning)
     app[REFUSED] = service.host.audit.refused
     app.on_response_prepare.append(name_the_trusted)
     for route in ROUTES:
-        handler = guarded(_handler(route))
         for method in route.methods:
             for path in (route.path, route.path + "/"):
-                app.router.add_route(method, path, handler)
-    app.router.add_route("*", r"/{path:[\s\S]*}", guarded(_extension))
+                app.router.add_route(method, path, _handler(route), expect_handler=_no_answer_yet)
+    app.router.add_route("*", r"/{path:[\s\S]*}", _extension, expect_handler=_no_answer_yet)
     return app
 
 
@@ -59,23 +61,20 @@ def guarded(handler: Handler) -> Handler:
 
 def _handler(route: Route) -> Handler:
     async def handle(request: web.Request) -> web.StreamResponse:
-        return await _answer(route, request)
+        request[ROUTE] = route
+        return await _behind_the_door(request)
 
     return handle
 
 
 async def _extension(request: web.Request) -> web.StreamResponse:
     """A path that another module serves, which may be loaded and unloaded while we listen."""
-    path = request.path.rstrip("/")
-    allowed = methods_of(path)
-    if allowed:
-        raise web.HTTPMethodNotAllowed(request.method, allowed)
-    route: Route | None = request.app[SERVICE].host.extensions.get(path)
-    if route is None:
-        raise NotFound("no such path")
-    if request.method not in route.methods:
-        raise web.HTTPMethodNotAllowed(request.method, route.methods)
-    return await _answer(route, request)
+    request[ROUTE] = request.app[SERVICE].host.extensions.get(request.path.rstrip("/"))
+    return await _behind_the_door(request)
+
+
+async def _no_answer_yet(_request: web.Request) -> None:
+    """An `Expect: 100-continue` is answered behind the door (`invite`): nobody else is asked for his body."""
 
 
 def methods_of(path: str) -> set[str]:
@@ -83,11 +82,22 @@ def methods_of(path: str) -> set[str]:
     return {method for route in ROUTES if route.matches(path) for method in route.methods}
 
 
-async def _answer(route: Route, request: web.Request) -> web.StreamResponse:
+async def _answer(request: web.Request) -> web.StreamResponse:
+    path = request.path.rstrip("/")
+    route: Route | None = request[ROUTE]
+    allowed = methods_of(path) if route is None else set(route.methods)
+    if route is None and not allowed:
+        raise NotFound("no such path")
+    if route is None or request.method not in allowed:
+        raise web.HTTPMethodNotAllowed(request.method, allowed)
+    await invite(request)
     params = await parameters(request, route.model, body=request.method == "POST" and not route.raw)
     call = Call(request.app[SERVICE], request, params)
     answer = await (audited(call, route.action) if route.commands and route.trail else route.action(call))
     return answer if isinstance(answer, web.StreamResponse) else success(answer)
+
+
+_behind_the_door = guarded(_answer)
 
 
 def is_ours(record: logging.LogRecord) -> bool:
@@ -110,9 +120,12 @@ class Server:
             logger=log,
             handler_cancellation=True,
             shutdown_timeout=SHUTDOWN_TIMEOUT,
+            keepalive_timeout=IDLE_TIMEOUT,
+            lingering_time=LINGER,
+            auto_decompress=False,  # what is compressed is refused, and thrown away as it is
         )
         self._socket: socket.socket | None = None
-        self._server: asyncio.Server | None = None
+        self._listener: Listener | None = None
 
     async def start(self) -> None:
         """Listen.
@@ -125,28 +138,23 @@ class Server:
         await self._runner.setup()
         self._socket = listening_socket(settings.host, settings.port)
         factory: Any = self._runner.server
-        loop = asyncio.get_running_loop()
-        self._server = await loop.create_server(patient(factory), sock=self._socket, ssl=tls, backlog=BACKLOG)
+        throttle = self._runner.app[THROTTLE]
+        self._listener = Listener(self._socket, factory, tls, lambda: self.service.settings.max_connections, throttle)
 
     async def stop(self) -> None:
         """End the verbs in flight, answer their clients, and close the port."""
         self.service.host.jobs.abort_remote("the API is stopping")
-        if self._server is not None:
-            self._server.close()
+        if self._listener is not None:
+            self._listener.close_port()
         await self._runner.cleanup()
+        if self._listener is not None:
+            self._listener.stop()
         if self._socket is not None:
             self._socket.close()
 
     def filenos(self) -> list[int]:
         """Descriptors of the port and of every connection."""
-        found = [] if self._socket is None else [self._socket.fileno()]
-        server: Any = self._runner.server
-        for connection in [] if server is None else server.connections:
-            transport = connection.transport
-            peer = None if transport is None else transport.get_extra_info("socket")
-            if peer is not None:
-                found.append(peer.fileno())
-        return found
+        return [] if self._listener is None else self._listener.filenos()
 
 
 def tls_context(certfile: str, keyfile: str) -> ssl.SSLContext:
@@ -160,21 +168,3 @@ def tls_context(certfile: str, keyfile: str) -> ssl.SSLContext:
     context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
     context.load_cert_chain(certfile, keyfile)
     return context
-
-
-def listening_socket(host: str, port: int) -> socket.socket:
-    """A bound TCP socket that can be bound again at once after we close it.
-
-    Raises:
-        OSError: taken, or no such address.
-    """
-    family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-    listening = socket.socket(family, kind, protocol)
-    try:
-        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listening.bind(address)
-    except OSError:
-        listening.close()
-        raise
-    listening.setblocking(False)
-    return listening

@@ -192,6 +192,7 @@ class Call:
 
 BODY_TIMEOUT = 10.0  # s from the headers to the end of the body
 SERVICE = web.AppKey("service", Service)
+ROUTE: web.RequestKey[Any] = web.RequestKey("route", object)  # the Route that a request matches, or None
 
 
 async def in_time(body: Awaitable[T]) -> T:

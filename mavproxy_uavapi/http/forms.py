@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
 
-from aiohttp import BodyPartReader, web
+from aiohttp import BodyPartReader, MultipartReader, StreamReader, web
+from aiohttp.base_protocol import BaseProtocol
 
 from mavproxy_uavapi.errors import BadRequest
+from mavproxy_uavapi.http.call import in_time
 
 CHUNK = 65536  # bytes
+WRAPPING = 65536  # bytes of a form besides its file
 FIELD = "file"
 
 
@@ -26,18 +30,35 @@ async def file_of(request: web.Request, limit: int, checked: Callable[[str], str
         checked: looks at the name before anything is read; what it raises refuses the file.
 
     Raises:
-        BadRequest: there is none, or it is too large.
+        BadRequest: there is none, it is too large, or it does not arrive in time.
     """
     if request.content_type != "multipart/form-data":
         raise BadRequest(f"the file goes into field `{FIELD}` of a multipart/form-data body")
     try:
-        form = await request.multipart()
+        form = MultipartReader(request.headers, _stream_of(await _body(request, limit)))
         while (part := await form.next()) is not None:
             if isinstance(part, BodyPartReader) and part.name == FIELD and part.filename is not None:
                 return checked(part.filename), await _contents(part, limit)
     except (ValueError, LookupError, AssertionError, RuntimeError) as error:
         raise BadRequest(f"the body is no multipart form: {error}") from error
     raise BadRequest(f"the form has no file in its field `{FIELD}`")
+
+
+async def _body(request: web.Request, limit: int) -> bytes:
+    """The whole form."""
+    try:
+        return await in_time(request.clone(client_max_size=limit + WRAPPING).read())
+    except web.HTTPRequestEntityTooLarge as error:
+        raise BadRequest(f"the form is larger than {limit // 1024} kB") from error
+
+
+def _stream_of(body: bytes) -> StreamReader:
+    """What aiohttp reads forms from."""
+    loop = asyncio.get_running_loop()
+    stream = StreamReader(BaseProtocol(loop), limit=len(body) + 1, loop=loop)
+    stream.feed_data(body)
+    stream.feed_eof()
+    return stream
 
 
 async def _contents(part: BodyPartReader, limit: int) -> bytes:

@@ -1,21 +1,19 @@
-"""Limits that keep one client from holding up the others, and MAVProxy: requests per second, slow senders."""
+"""How often who may ask: those whom the door let in, and, far less often, those whom it did not."""
 
 from __future__ import annotations
 
-import asyncio
 import math
-from collections.abc import Callable
-from typing import Any, ClassVar
 
 from aiohttp import web
 
 from mavproxy_uavapi.errors import TooManyRequests
-from mavproxy_uavapi.http.call import SERVICE
+from mavproxy_uavapi.http.call import ROUTE, SERVICE
+from mavproxy_uavapi.http.caller import CALLER, Caller
 from mavproxy_uavapi.http.responses import Handler
 
 BURST = 2.0  # s of the long-run rate that a client may use up at once
 CLIENTS_KEPT = 1000
-HEADER_TIMEOUT = 10.0  # s from the first byte of a connection, or of its next request, to the end of the headers
+STRANGERS_RATE = 10.0  # requests/s of one address that the door does not let in
 
 
 class Bucket:
@@ -28,7 +26,7 @@ class Bucket:
         """Take one request of `client`; 0, or the seconds to wait when it has used up its share.
 
         Args:
-            client: its address.
+            client: who it is (`caller.group_of`).
             rate: requests per second in the long run.
             now: s.
         """
@@ -44,111 +42,34 @@ class Bucket:
         return 0.0
 
 
-BUCKET = web.AppKey("bucket", Bucket)
+BUCKET = web.AppKey("bucket", Bucket)  # of those whom the door let in
+STRANGERS = web.AppKey("strangers", Bucket)
+
+
+def stops(request: web.Request) -> bool:
+    """Whether the request stops a vehicle: it is refused for no limit, and waits for nobody."""
+    route = request.get(ROUTE)
+    return route is not None and route.stops and request.method in route.methods
 
 
 @web.middleware
 async def give_way(request: web.Request, handler: Handler) -> web.StreamResponse:
     """Let MAVProxy's main loop finish what it is at: its messages are not to wait for our answers."""
-    await request.app[SERVICE].host.bridge.calm()
+    if not stops(request):
+        await request.app[SERVICE].host.bridge.calm()
     return await handler(request)
 
 
 @web.middleware
 async def at_a_bearable_rate(request: web.Request, handler: Handler) -> web.StreamResponse:
-    """Refuse a client that asks more often than it may."""
+    """Refuse a caller who asks more often than he may."""
     service = request.app[SERVICE]
-    wait = request.app[BUCKET].take(request.remote or "", service.settings.max_rate, service.host.clock())
-    if wait:
-        raise TooManyRequests(f"more than {service.settings.max_rate:g} requests a second", math.ceil(wait))
+    caller: Caller | None = request.get(CALLER)  # None: a reader of the documentation, counted at the door
+    if caller is None or stops(request):
+        return await handler(request)
+    rate = service.settings.local_rate if caller.is_local else service.settings.max_rate
+    if rate:
+        wait = request.app[BUCKET].take(caller.group, rate, service.host.clock())
+        if wait:
+            raise TooManyRequests(f"more than {rate:g} requests a second", math.ceil(wait))
     return await handler(request)
-
-
-class Patience(asyncio.Protocol):
-    """Wraps aiohttp's protocol: closes a connection whose headers do not arrive in time.
-
-    aiohttp itself waits for the rest of a request line for ever.
-    """
-
-    _of: ClassVar[dict[Any, Patience]] = {}  # by aiohttp's protocol, while the connection lasts
-
-    def __init__(self, inner: Any) -> None:
-        self._inner = inner
-        self._transport: Any = None
-        self._timer: asyncio.TimerHandle | None = None
-        self._answering = False
-
-    @classmethod
-    def of(cls, request: web.Request) -> Patience | None:
-        """The wrapper of a request's connection."""
-        return cls._of.get(request.protocol)
-
-    def began(self) -> None:
-        """The headers are here."""
-        self._answering = True
-        self._stop()
-
-    def ended(self) -> None:
-        """The answer is out; the connection may idle until the next request's first byte."""
-        self._answering = False
-
-    def _stop(self) -> None:
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
-
-    def _give_up(self) -> None:
-        if self._transport is not None:
-            self._transport.abort()
-
-    def _expect(self) -> None:
-        if self._timer is None and not self._answering:
-            self._timer = asyncio.get_running_loop().call_later(HEADER_TIMEOUT, self._give_up)
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """See asyncio.Protocol."""
-        self._transport = transport
-        self._of[self._inner] = self
-        self._expect()
-        self._inner.connection_made(transport)
-
-    def data_received(self, data: bytes) -> None:
-        """See asyncio.Protocol."""
-        self._expect()
-        self._inner.data_received(data)
-
-    def eof_received(self) -> Any:
-        """See asyncio.Protocol."""
-        return self._inner.eof_received()
-
-    def pause_writing(self) -> None:
-        """See asyncio.Protocol."""
-        self._inner.pause_writing()
-
-    def resume_writing(self) -> None:
-        """See asyncio.Protocol."""
-        self._inner.resume_writing()
-
-    def connection_lost(self, error: Exception | None) -> None:
-        """See asyncio.Protocol."""
-        self._stop()
-        self._of.pop(self._inner, None)
-        self._inner.connection_lost(error)
-
-
-def patient(factory: Callable[[], Any]) -> Callable[[], Patience]:
-    """A protocol factory whose connections give up on slow headers."""
-    return lambda: Patience(factory())
-
-
-@web.middleware
-async def headers_are_here(request: web.Request, handler: Handler) -> web.StreamResponse:
-    """Tell the connection's patience that a request has begun, and when it is answered."""
-    patience = Patience.of(request)
-    if patience is None:
-        return await handler(request)
-    patience.began()
-    try:
-        return await handler(request)
-    finally:
-        patience.ended()

@@ -12,6 +12,7 @@ from aiohttp import web
 
 from mavproxy_uavapi.errors import Forbidden, NotFound
 from mavproxy_uavapi.http.call import Call
+from mavproxy_uavapi.http.caller import CALLER, Caller
 from mavproxy_uavapi.http.forms import file_of
 from mavproxy_uavapi.http.requests import ExecuteScript, ScriptLog, ScriptName
 from mavproxy_uavapi.http.responses import dumps, envelope
@@ -98,11 +99,11 @@ def _scripts(call: Call) -> Scripts:
     """The scripts, for whoever may have them.
 
     Raises:
-        Forbidden: others than this machine could call without a token.
+        Forbidden: the caller has no token, is no program of this machine, and his network was not named.
     """
-    settings = call.service.settings
-    if not settings.is_local and not settings.token:
-        raise Forbidden("scripts run on this machine: they need a token, or an API that listens on the loopback only")
+    caller: Caller = call.request[CALLER]
+    if not (caller.has_token or caller.is_local or caller.is_in(call.service.settings.allow_scripts_from)):
+        raise Forbidden("scripts run on this machine: call with the token, or from here, or set allow_scripts_from")
     return call.service.scripts
 
 

@@ -31,6 +31,7 @@ class Route:
     methods: tuple[str, ...] = ("GET",)
     raw: bool = False  # whether the action itself reads the body, which holds no parameters
     job: bool = False  # whether the action runs as a job, which a client need not wait for
+    stops: bool = False  # whether it stops a vehicle: no limit refuses it
     trail: bool = True  # whether a call that commands is audited; one that comes many times a second would flush it
 
     @property
@@ -49,11 +50,11 @@ POST = ("POST",)
 
 COMMAND = [
     Route("/command/arm", command.arm, requests.Blocking, EITHER, job=True),
-    Route("/command/disarm", command.disarm, requests.Disarm, EITHER, job=True),
+    Route("/command/disarm", command.disarm, requests.Disarm, EITHER, job=True, stops=True),
     Route("/command/takeoff", command.takeoff, requests.Takeoff, EITHER, job=True),
-    Route("/command/land", command.land, requests.Blocking, EITHER, job=True),
-    Route("/command/rtl", command.rtl, requests.Blocking, EITHER, job=True),
-    Route("/command/brake", command.brake, requests.Empty, EITHER, job=True),
+    Route("/command/land", command.land, requests.Blocking, EITHER, job=True, stops=True),
+    Route("/command/rtl", command.rtl, requests.Blocking, EITHER, job=True, stops=True),
+    Route("/command/brake", command.brake, requests.Empty, EITHER, job=True, stops=True),
     Route("/command/guided", command.guided, requests.Empty, EITHER, job=True),
     Route("/command/set_mode", command.set_mode, requests.ModeName, EITHER, job=True),
     Route("/command/set_air_speed", command.set_air_speed, requests.NewSpeed, EITHER, job=True),
@@ -76,7 +77,7 @@ MOVEMENT = [
     Route("/movement/travel_at_ned", movement.travel_at_ned, requests.NedVelocity, POST, job=True),
     Route("/movement/set_heading", movement.set_heading, requests.Heading, EITHER, job=True),
     Route("/movement/set_yaw_rate", movement.set_yaw_rate, requests.YawRate, EITHER, job=True),
-    Route("/movement/stop", movement.stop, requests.Empty, EITHER, job=True),
+    Route("/movement/stop", movement.stop, requests.Empty, EITHER, job=True, stops=True),
     Route("/movement/resume", movement.resume, requests.Empty, EITHER, job=True),
 ]
 
@@ -100,7 +101,7 @@ TELEMETRY = [
 JOBS = [
     Route("/jobs", jobs.list_jobs, requests.Empty),
     Route("/jobs/{id}", jobs.show_job, requests.Empty),
-    Route("/jobs/{id}", jobs.abort_job, requests.Empty, ("DELETE",)),
+    Route("/jobs/{id}", jobs.abort_job, requests.Empty, ("DELETE",), stops=True),
 ]
 
 MISSION = [

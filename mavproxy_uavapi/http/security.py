@@ -1,31 +1,45 @@
-"""Who may call: no page of another site, no name but ours, and with a token where one is asked for.
+"""The door: who may call. No page of another site, no name but ours, and with a token where one is asked for.
 
 Many commands are GETs, and any web page can make a browser issue a GET to a loopback address. A browser says
-so in Origin or Sec-Fetch-Site; Host catches a foreign name that was rebound to our address.
+so in Origin or Sec-Fetch-Site; Host catches a foreign name that was rebound to our address. Over plain HTTP to a
+LAN address a browser says neither with a GET: there it is known by what else it says (`check_page`).
 """
 
 from __future__ import annotations
 
+import asyncio
 import hmac
 import ipaddress
+import logging
+import math
 import socket
 from collections.abc import Mapping
 from urllib.parse import urlsplit
 
 from aiohttp import web
 
-from mavproxy_uavapi.errors import Forbidden, Unauthorized
-from mavproxy_uavapi.http.call import SERVICE
-from mavproxy_uavapi.http.responses import Handler
+from mavproxy_uavapi.errors import Forbidden, TooManyRequests, UavApiError, Unauthorized, without_frames
+from mavproxy_uavapi.http.call import ROUTE, SERVICE
+from mavproxy_uavapi.http.caller import CALLER, Caller, address_of, group_of
+from mavproxy_uavapi.http.connection import Connection
+from mavproxy_uavapi.http.limits import STRANGERS, STRANGERS_RATE
+from mavproxy_uavapi.http.log_throttle import LogThrottle
+from mavproxy_uavapi.http.responses import Handler, failure
 from mavproxy_uavapi.settings import Settings
 
+log = logging.getLogger("uavapi.http.door")
 OURSELVES = {"same-origin", "none"}  # Sec-Fetch-Site of our own page, and of an address typed by hand
+# What a browser accepts for a page, a picture, a style, a script, a film; programs ask for JSON or for anything.
+BROWSERS_WANT = ("text/html", "application/xhtml", "image/", "text/css", "javascript", "video/", "audio/")
+PROXIES_SAY = ("Forwarded", "X-Forwarded-For", "X-Real-IP", "Via")
+REFUSED_LATE = 1.0  # s that the answer waits when its address was refused too often
 CORS_HEADERS = {
     "Access-Control-Allow-Methods": "GET, POST, DELETE",
     "Access-Control-Allow-Headers": "Authorization, Content-Type, Prefer",
     "Access-Control-Expose-Headers": "Location",
     "Vary": "Origin",
 }
+THROTTLE = web.AppKey("throttle", LogThrottle)
 
 
 def check_origin(headers: Mapping[str, str], trusted: tuple[str, ...] = ()) -> None:
@@ -51,6 +65,41 @@ def check_origin(headers: Mapping[str, str], trusted: tuple[str, ...] = ()) -> N
         raise Forbidden(f"a page of {origin} may not call this API")
 
 
+def check_page(headers: Mapping[str, str], trusted: tuple[str, ...] = ()) -> None:
+    """Refuse a command that a browser sent without saying for which page, or for one of another site.
+
+    A page can keep its browser from sending a Referer and choose what it accepts, but not whose Referer is sent,
+    nor what the browser calls itself. With Origin or Sec-Fetch-Site `check_origin` has judged already.
+
+    Args:
+        headers: the request's.
+        trusted: origins of other sites' pages that may call.
+
+    Raises:
+        Forbidden: with the reason.
+    """
+    if "Origin" in headers or "Sec-Fetch-Site" in headers:
+        return
+    referer = headers.get("Referer")
+    if referer is not None:
+        page = "/".join(referer.split("/")[:3])
+        if page in trusted or page.partition("://")[2] == headers.get("Host"):
+            return
+        raise Forbidden(f"a page of {page} may not command the vehicle")
+    if is_browser(headers):
+        raise Forbidden(
+            "a browser that does not say for which page cannot command the vehicle; call by a program, from /docs, "
+            "with the token, or by https"
+        )
+
+
+def is_browser(headers: Mapping[str, str]) -> bool:
+    """Whether a browser sent this, by its name or by what it accepts."""
+    name = headers.get("User-Agent", "")
+    wanted = headers.get("Accept", "").lower()
+    return (name.startswith("Mozilla/") and "PowerShell" not in name) or any(kind in wanted for kind in BROWSERS_WANT)
+
+
 def is_our_name(host: str) -> bool:
     """Whether a Host header names us: by `localhost`, this machine's name, or an IP address.
 
@@ -70,43 +119,95 @@ def is_our_name(host: str) -> bool:
     return True
 
 
-def check_caller(remote: str | None, authorization: str | None, settings: Settings) -> None:
-    """Let in who has the token, or comes from a network that needs none.
+def check_caller(remote: str | None, headers: Mapping[str, str], settings: Settings) -> Caller:
+    """Let in who has the token, or comes from a network that needs none; who that is.
+
+    What a proxy passed on comes from an address that is not the caller's: the address opens nothing then.
 
     Args:
-        remote: the caller's IP address.
-        authorization: the header of that name.
+        remote: the peer's IP address.
+        headers: the request's.
         settings: what is asked for.
 
     Raises:
         Unauthorized: a token is needed, and missing or wrong.
         Forbidden: there is no token to have, and the caller's network was not named.
     """
-    address = None if remote is None else ipaddress.ip_address(remote.partition("%")[0])
-    if isinstance(address, ipaddress.IPv6Address) and address.ipv4_mapped:
-        address = address.ipv4_mapped
-    if address is not None and any(address in network for network in settings.allow_from):
-        return
+    forwarded = any(name in headers for name in PROXIES_SAY)
+    caller = Caller(address_of(remote), has_token(headers.get("Authorization"), settings.token), forwarded)
+    if caller.has_token or caller.is_in(settings.allow_from):
+        return caller
     if settings.token:
-        scheme, _, given = (authorization or "").partition(" ")
-        if scheme.lower() != "bearer" or not hmac.compare_digest(given.strip().encode(), settings.token.encode()):
-            raise Unauthorized("this API wants its token: Authorization: Bearer …")
-    elif not settings.allow_open and (address is None or not address.is_loopback):
-        raise Forbidden(f"{remote} is in none of the networks that may call")
+        raise Unauthorized("this API wants its token: Authorization: Bearer …")
+    if not settings.allow_open and not caller.is_local:
+        raise Forbidden(f"{remote}{' by a proxy' if forwarded else ''} is in none of the networks that may call")
+    return caller
+
+
+def has_token(authorization: str | None, token: str) -> bool:
+    """Whether the header of that name holds the token; it may hold any bytes."""
+    scheme, _, given = (authorization or "").partition(" ")
+    given_bytes = given.strip().encode("utf-8", "surrogateescape")
+    return bool(token) and scheme.lower() == "bearer" and hmac.compare_digest(given_bytes, token.encode())
+
+
+def admitted(request: web.Request, settings: Settings) -> Caller:
+    """Who calls, if he may, and commands for no page of another site.
+
+    Raises:
+        Unauthorized, Forbidden: nobody, and why.
+    """
+    caller = check_caller(request.remote, request.headers, settings)
+    route = request.get(ROUTE)
+    # No page of another site has the token, nor may it send that header.
+    if route is not None and route.commands and not caller.has_token:
+        check_page(request.headers, settings.cors_origins)
+    return caller
 
 
 @web.middleware
-async def only_for_us(request: web.Request, handler: Handler) -> web.StreamResponse:
-    """Both checks, for every request; and the answer to a trusted page's preflight."""
+async def door(request: web.Request, handler: Handler) -> web.StreamResponse:
+    """All checks, for every request, before anything else of it is looked at; the answer to a trusted preflight."""
     settings = request.app[SERVICE].settings
-    origin = request.headers.get("Origin", "")
-    check_origin(request.headers, settings.cors_origins)
-    if origin in settings.cors_origins and request.method == "OPTIONS":
-        return web.Response(status=204, headers={"Access-Control-Allow-Origin": origin, **CORS_HEADERS})
-    # A browser has no token before it has the page that asks for one; the page tells nothing of the vehicle.
-    if not (settings.token and is_documentation(request.path)):
-        check_caller(request.remote, request.headers.get("Authorization"), settings)
+    connection = Connection.of(request)
+    try:
+        check_origin(request.headers, settings.cors_origins)
+        origin = request.headers.get("Origin", "")
+        if origin in settings.cors_origins and request.method == "OPTIONS":
+            return web.Response(status=204, headers={"Access-Control-Allow-Origin": origin, **CORS_HEADERS})
+        caller = admitted(request, settings)
+    except Unauthorized as error:
+        # A browser has no token before it has the page that asks for one; the page tells nothing of the vehicle.
+        if not is_documentation(request.path) or _wait_of_stranger(request):
+            return await _refused(request, connection, error)
+        return await handler(request)
+    except Forbidden as error:
+        return await _refused(request, connection, error)
+    if connection is not None:
+        connection.judged(True)
+    request[CALLER] = caller
     return await handler(request)
+
+
+async def _refused(request: web.Request, connection: Connection | None, error: UavApiError) -> web.StreamResponse:
+    """The answer to whom the door does not let in; late, where that happens often. The connection ends with it."""
+    app, group = request.app, group_of(address_of(request.remote))
+    app[THROTTLE].tell(error.code, f"a request of {group} was refused: {ascii(str(error))[1:-1]}")
+    if connection is not None:
+        connection.judged(False)
+    wait = _wait_of_stranger(request)
+    if wait:
+        error = TooManyRequests(f"more than {STRANGERS_RATE:g} refused requests a second", math.ceil(wait))
+        await asyncio.sleep(REFUSED_LATE)
+    response = failure(without_frames(error))
+    response.force_close()
+    return response
+
+
+def _wait_of_stranger(request: web.Request) -> float:
+    """Count a request that the door does not let in; 0, or the seconds to wait when there were too many."""
+    group = group_of(address_of(request.remote))
+    return request.app[STRANGERS].take(group, STRANGERS_RATE, request.app[SERVICE].host.clock())
 
 
 def is_documentation(path: str) -> bool:

@@ -6,7 +6,7 @@ import asyncio
 import hashlib
 
 from mavproxy_uavapi.errors import BadRequest, Busy, Stale
-from mavproxy_uavapi.http.call import Answer, Call
+from mavproxy_uavapi.http.call import Answer, Call, in_time
 from mavproxy_uavapi.http.forms import file_of
 from mavproxy_uavapi.http.requests import MissionFile, Read, StartMission
 from mavproxy_uavapi.vehicle import mission, plans
@@ -92,7 +92,7 @@ async def _body(call: Call) -> str:
     if request.content_type == "multipart/form-data":
         _, data = await file_of(request, LARGEST)
     else:
-        data = await request.read()
+        data = await in_time(request.read())
     if not data.strip():
         raise BadRequest("the body is the mission: a QGC WPL 110 file, a .plan file, or JSON items")
     try:

@@ -18,7 +18,7 @@ import sysconfig
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 import requests
@@ -353,6 +353,46 @@ def faulty_rig(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPath
     made = embedded(directory) if request.param == "embedded" else ardupilot_with_faults(directory)
     yield made
     made.stop()
+
+
+class Lan(NamedTuple):
+    """A network namespace with an address of its own, as another computer on the LAN has one.
+
+    Attributes:
+        here: our address on it.
+        network: both addresses.
+        inside: the words before a command that is to run on the other computer.
+    """
+
+    here: str
+    network: str
+    inside: tuple[str, ...]
+
+
+@pytest.fixture
+def lan() -> Iterator[Lan]:
+    """Another computer on a LAN; only root may make one."""
+    number = os.getpid() % 250
+    name, link, net = f"uavapi-{os.getpid()}", f"uavapi{os.getpid() % 100000}", f"10.213.{number}"
+    commands = (
+        f"netns add {name}",
+        f"link add {link} type veth peer name eth0 netns {name}",
+        f"addr add {net}.1/24 dev {link}",
+        f"link set {link} up",
+        f"-n {name} addr add {net}.2/24 dev eth0",
+        f"-n {name} link set eth0 up",
+        f"-n {name} link set lo up",
+    )
+    try:
+        for command in commands:
+            done = subprocess.run(["ip", *command.split()], capture_output=True, text=True, check=False)
+            if done.returncode and not (os.environ.get("CI") and os.geteuid() == 0):
+                pytest.skip(f"no network namespace can be made here: {done.stderr.strip()}")
+            assert done.returncode == 0, done.stderr
+        yield Lan(f"{net}.1", f"{net}.0/24", ("ip", "netns", "exec", name))
+    finally:
+        subprocess.run(["ip", "link", "del", link], capture_output=True, check=False)
+        subprocess.run(["ip", "netns", "del", name], capture_output=True, check=False)
 
 
 @pytest.fixture(scope="session")

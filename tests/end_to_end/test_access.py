@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import socket
 import ssl
 import subprocess
+import sys
 import time
+from pathlib import Path
 
 import pytest
 import requests
@@ -173,6 +176,91 @@ def test_more_than_a_bearable_rate_is_429(embedded_rig):
         assert statuses[0] == 200 and 429 in statuses
     finally:
         embedded_rig.mavproxy.type("uavapi set max_rate 500")
+
+
+UPLOAD = """
+import json, socket, sys, time, urllib.request
+url = sys.argv[1]
+body = b'--b\\r\\nContent-Disposition: form-data; name="file"; filename="a.py"\\r\\n\\r\\nprint(1)\\r\\n--b--\\r\\n'
+kind = {"Content-Type": "multipart/form-data; boundary=b"}
+def status(path, body=None, headers={}):
+    try:
+        return urllib.request.urlopen(urllib.request.Request(url + path, body, headers), timeout=10).status
+    except urllib.error.HTTPError as error:
+        return error.code
+told = {"read": status("/jobs"), "upload": status("/mission/upload-script", body, kind)}
+host, port = url.removeprefix("http://").split(":")
+idle = [socket.create_connection((host, int(port))) for _ in range(60)]
+time.sleep(2)
+def ended(one):
+    one.setblocking(False)
+    try:
+        return one.recv(1) == b""
+    except BlockingIOError:
+        return False
+    except ConnectionError:
+        return True
+told["open"] = sum(not ended(one) for one in idle)
+told["read among idle ones"] = status("/jobs")
+print(json.dumps(told))
+"""
+
+
+@pytest.mark.needs("ip", "iproute2")
+def test_network_that_may_fly_has_a_share_of_the_connections_and_no_scripts(lan, harness, tmp_path):
+    folders = {"scripts_path": str(tmp_path / "scripts"), "script_logs": str(tmp_path / "logs")}
+    rig = harness.embedded(tmp_path, host="0.0.0.0", allow_from=lan.network, **folders)
+    try:
+        url = f"http://{lan.here}:{rig.port}"
+
+        def told():
+            command = [*lan.inside, sys.executable, "-c", UPLOAD, url]
+            done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
+            return json.loads(done.stdout)
+
+        assert told() == {"read": 200, "upload": 403, "open": 20, "read among idle ones": 200}
+        rig.mavproxy.ask(f"uavapi set allow_scripts_from {lan.network}", "listening on")
+        assert told()["upload"] == 200
+    finally:
+        rig.stop()
+
+
+def descriptors_of(rig) -> int:
+    return len(list(Path(f"/proc/{rig.mavproxy.pid}/fd").iterdir()))
+
+
+def test_idle_strangers_leave_mavproxy_the_descriptors_to_connect_again(harness, tmp_path):
+    """With a limit of 160 descriptors there is no room for as many connections as may be open."""
+    rig = harness.Rig(tmp_path, harness.free_port())
+    owner = {"Authorization": f"Bearer {TOKEN}"}
+    strangers = []
+    try:
+        instance = harness.start_embedded(rig)
+        mavproxy = harness.mavproxy_command(instance, harness.load(rig.port))
+        limited = ["prlimit", "--nofile=160:4096", *mavproxy]
+        rig.mavproxy = rig.start("mavproxy", limited, {"UAVAPI_TOKEN": TOKEN})
+        rig.mavproxy.says("listening on")
+        status = f"{rig.url}/telemetry/status"
+        harness.eventually(lambda: requests.get(status, headers=owner, timeout=10).status_code == 200)
+        for _ in range(400):
+            strangers.append(socket.create_connection(("127.0.0.1", rig.port)))
+        assert requests.get(status, headers=owner, timeout=10).status_code == 200
+        assert descriptors_of(rig) <= 130
+        vehicle = rig.processes[0]
+        rig.control.close()
+        vehicle.stop()  # the link blinks
+        harness.eventually(lambda: requests.get(status, headers=owner, timeout=10).status_code != 200)
+        again = [sys.executable, "-m", "mavproxy_uavapi.sim", f"--instance={instance}", "--speedup=10"]
+        rig.control = None
+        rig.start("sim-again", again)
+        harness.eventually(lambda: requests.get(status, headers=owner, timeout=10).status_code == 200, 60)
+        log = rig.mavproxy.output()
+        assert "Traceback" not in log
+        assert log.count("was closed for one of") + log.count("was refused") < 10
+    finally:
+        for one in strangers:
+            one.close()
+        rig.stop()
 
 
 def test_too_large_a_body_is_refused(embedded_rig):

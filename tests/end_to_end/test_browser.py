@@ -32,7 +32,6 @@ FLAGS = [
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",
-    f"--host-resolver-rules=MAP {EVIL} 127.0.0.1",
 ]
 
 # Each try marks its request with ?by=NAME, which the API ignores and the browser's own log of its traffic keeps.
@@ -81,11 +80,58 @@ const late = () => new Promise(done => setTimeout(() => done("no answer"), 20000
 </script>""")
 
 
+# Over plain HTTP to a LAN address a browser sends neither Origin nor Sec-Fetch-Site with most of these.
+LAN_PAGE = Template("""<!doctype html><meta charset="utf-8"><title>page</title>
+<script>
+const api = "$api/command/arm?by=";
+const element = (tag, name, more) => new Promise(done => {
+  const made = document.createElement(tag);
+  made.onload = made.onerror = () => done("answered");
+  Object.assign(made, {referrerPolicy: name.endsWith("Mute") ? "no-referrer" : "", ...more});
+  made[tag === "link" ? "href" : "src"] = api + name;
+  document.head.append(made);
+  setTimeout(() => done("late"), 4000);
+});
+const post = (name, method) => new Promise(done => {
+  const [sink, form, by] = ["iframe", "form", "input"].map(tag => document.createElement(tag));
+  sink.name = by.value = name;
+  by.name = "by";
+  Object.assign(form, {method, action: api + name, target: name});
+  form.append(by);
+  document.body.append(sink, form);
+  sink.onload = () => done("answered");
+  form.submit();
+  setTimeout(() => done("late"), 4000);
+});
+const ask = (name, more) => fetch(api + name, {mode: "no-cors", ...more});
+const mute = {referrerPolicy: "no-referrer"};
+const tries = {
+  image: () => element("img", "image"), imageMute: () => element("img", "imageMute"),
+  script: () => element("script", "script"), scriptMute: () => element("script", "scriptMute"),
+  frame: () => element("iframe", "frame"), frameMute: () => element("iframe", "frameMute"),
+  style: () => element("link", "style", {rel: "stylesheet"}), video: () => element("video", "videoMute"),
+  prefetch: () => element("link", "prefetch", {rel: "prefetch"}),
+  prefetchMute: () => element("link", "prefetchMute", {rel: "prefetch"}),
+  formGet: () => post("formGet", "get"), formPost: () => post("formPost", "post"),
+  opaque: () => ask("opaque"), opaqueMute: () => ask("opaqueMute", mute),
+  disguised: () => ask("disguised", {...mute, headers: {Accept: "application/json"}}),
+  fetch: () => fetch(api + "fetch", mute), beacon: () => navigator.sendBeacon(api + "beacon"),
+};
+addEventListener("load", async () => {
+  const results = {};
+  for (const [name, act] of Object.entries(tries))
+    results[name] = `$${await Promise.resolve().then(act).catch(error => error)}`;
+  await fetch("$report", {method: "POST", mode: "no-cors", body: JSON.stringify(results)});
+});
+</script><body></body>""")
+
+
 class Site:
     """A web server with one page, which tells it what came of the page's tries."""
 
-    def __init__(self) -> None:
+    def __init__(self, host: str = "127.0.0.1") -> None:
         site = self
+        self._host = host
 
         class Handler(http.server.BaseHTTPRequestHandler):
             def do_GET(self) -> None:
@@ -110,7 +156,7 @@ class Site:
         self.page = ""
         self.report: dict[str, str] = {}
         self.reported = threading.Event()
-        self._server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+        self._server = http.server.ThreadingHTTPServer((host, 0), Handler)
         self._thread = threading.Thread(target=self._server.serve_forever)
         self._thread.start()
 
@@ -120,7 +166,7 @@ class Site:
 
     @property
     def report_url(self) -> str:
-        return f"http://127.0.0.1:{self.port}/report"
+        return f"http://{self._host}:{self.port}/report"
 
     def close(self) -> None:
         self._server.shutdown()
@@ -194,18 +240,19 @@ def _hang_up(one: socket.socket) -> None:
 
 
 class Browser:
-    """A headless Chromium."""
+    """A headless Chromium; `inside` is a command that runs it somewhere else, and `evil` the address of that name."""
 
-    def __init__(self, harness: Any, directory: Path) -> None:
+    def __init__(self, harness: Any, directory: Path, inside: tuple[str, ...] = (), evil: str = "127.0.0.1") -> None:
         program = shutil.which("chromium")
         if program is None:
             pytest.fail("there is no chromium to test with: apt-get install chromium")
-        self._program, self._harness, self._directory = program, harness, directory
+        self._command = [*inside, program, *FLAGS, f"--host-resolver-rules=MAP {EVIL} {evil}"]
+        self._harness, self._directory = harness, directory
 
     def visit(self, url: str, site: Site) -> None:
         """Open a page and wait until it has told `site` what came of its tries."""
         self.traffic = self._directory / "traffic.json"
-        command = [self._program, *FLAGS, f"--user-data-dir={self._directory / 'profile'}"]
+        command = [*self._command, f"--user-data-dir={self._directory / 'profile'}"]
         command += [f"--log-net-log={self.traffic}", url]
         process = self._harness.Process(command, self._directory / "chromium.log", self._directory)
         try:
@@ -314,3 +361,29 @@ def test_a_name_that_was_rebound_to_us_is_refused_and_our_own_is_not(ready, brow
     assert {status == 403 for status in statuses.values()} == {refused}
     assert site.report["fetch"].startswith("403" if refused else "200")  # one origin: the page can read it
     assert bool(reached_the_vehicle(ready, since)) is not refused
+
+
+# -- a LAN address ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.needs("ip", "iproute2")
+@pytest.mark.parametrize("name", ["{here}", EVIL], ids=["another-port", "another-site"])
+def test_foreign_page_commands_nothing_over_plain_http_to_a_lan_address(lan, harness, tmp_path, name):
+    rig = harness.embedded(tmp_path, host="0.0.0.0", allow_from=lan.network)
+    site = Site(lan.here)
+    try:
+        harness.eventually(lambda: rig.status()["ready_to_arm"], 60, what="getting ready to arm")
+        since = rig.control.ask("received", since=0)["last"]
+        site.page = LAN_PAGE.substitute(api=f"http://{lan.here}:{rig.port}", report=site.report_url)
+        browser = Browser(harness, tmp_path, lan.inside, evil=lan.here)
+        browser.visit(f"http://{name.format(here=lan.here)}:{site.port}/", site)
+        statuses = browser.statuses()
+        assert {"image", "imageMute", "scriptMute", "frame", "frameMute", "formGet", "opaqueMute", "disguised"} <= {
+            *statuses
+        }
+        assert set(statuses.values()) <= {403, 429}
+        assert reached_the_vehicle(rig, since) == []
+        assert rig.status()["armed"] is False
+    finally:
+        site.close()
+        rig.stop()

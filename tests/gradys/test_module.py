@@ -231,7 +231,11 @@ def test_settings_outlive_a_reload_and_no_password_is_shown(mpstate: Any, tmp_pa
     assert "sink=mqtt://me:***@127.0.0.1/fleet, token=(set), gs=127.0.0.1:9" in told
     assert "secret" not in told and "hidden" not in told
     settings = again.gradys_settings.snapshot()
-    assert ([sink.url for sink in settings.sink], settings.token, settings.gs[0].url) == ([sink], "hidden", "http://127.0.0.1:9")
+    assert ([sink.url for sink in settings.sink], settings.token, settings.gs[0].url) == (
+        [sink],
+        "hidden",
+        "http://127.0.0.1:9",
+    )
     again.unload()
 
 

@@ -24,7 +24,7 @@ from mavproxy_uavapi.host.host import Host
 from mavproxy_uavapi.host.link import Address
 from mavproxy_uavapi.http.app import make_app
 from mavproxy_uavapi.http.call import Service
-from mavproxy_uavapi.http.limits import patient
+from mavproxy_uavapi.http.connection import Connection
 from mavproxy_uavapi.settings import ModuleSettings
 from mavproxy_uavapi.sim import Options, Simulator
 from mavproxy_uavapi.sim.control import Control
@@ -267,7 +267,7 @@ class World:
 
     async def request(self, method: str, path: str, body: Any = None, kind: str = "application/json") -> Wire:
         """As `begin`, for clients that run in the loop."""
-        wire = Wire(self.loop, patient(self._runner.server)())
+        wire = Wire(self.loop, Connection(self._runner.server))
         content = b"" if body is None else body if isinstance(body, bytes) else json.dumps(body).encode()
         head = [f"{method} {path} HTTP/1.1", "Host: localhost", "Connection: close"]
         if body is not None:

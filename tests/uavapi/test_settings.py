@@ -195,3 +195,21 @@ def test_what_is_listened_on_and_who_may_call_needs_listening_anew() -> None:
     assert settings.snapshot().listens_as(before)
     settings.set("token", "secret")
     assert not settings.snapshot().listens_as(before)
+
+
+def test_rate_that_is_set_is_for_this_machine_too() -> None:
+    settings = ModuleSettings(environ={})
+    assert (settings.snapshot().max_rate, settings.snapshot().local_rate) == (500.0, 0.0)
+    settings.set("max_rate", "10")
+    assert (settings.snapshot().max_rate, settings.snapshot().local_rate) == (10.0, 10.0)
+    with pytest.raises(SettingError):
+        settings.set("max_rate", "0")
+    assert settings.snapshot().local_rate == 10.0
+    assert ModuleSettings(environ={"UAVAPI_MAX_RATE": "500"}).snapshot().local_rate == 500.0
+
+
+def test_networks_that_may_run_scripts_are_networks() -> None:
+    snapshot = ModuleSettings({"allow_scripts_from": "10.0.0.0/8, fd00::/8"}, environ={}).snapshot()
+    assert [str(network) for network in snapshot.allow_scripts_from] == ["10.0.0.0/8", "fd00::/8"]
+    with pytest.raises(SettingError, match="allow_scripts_from: 'here' is no network"):
+        ModuleSettings({"allow_scripts_from": "here"}, environ={})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 
 import pytest
 
@@ -64,3 +65,22 @@ def test_a_cancellation_around_the_turn_in_which_it_comes_is_not_lost(turns: int
         return bool(went_on)
 
     assert not asyncio.run(race())
+
+
+def test_failure_in_the_turn_of_a_cancellation_is_no_complaint_of_asyncio() -> None:
+    complaints: list[object] = []
+
+    async def main() -> None:
+        loop = asyncio.get_running_loop()
+        loop.set_exception_handler(lambda _, context: complaints.append(context))
+        failing = loop.create_future()
+        waiting = loop.create_task(within(5, failing))
+        await asyncio.sleep(0)
+        failing.set_exception(ConnectionResetError("hung up"))
+        waiting.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await waiting
+
+    asyncio.run(main())
+    gc.collect()
+    assert complaints == []

@@ -3,6 +3,7 @@ from __future__ import annotations
 import io
 import json
 import tracemalloc
+from ipaddress import ip_address
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -10,7 +11,9 @@ from typing import Any
 import pytest
 from aiohttp import FormData
 
-from mavproxy_uavapi.errors import BadRequest, ToolFailed
+from mavproxy_uavapi.errors import BadRequest, Forbidden, ToolFailed
+from mavproxy_uavapi.http.caller import CALLER, Caller
+from mavproxy_uavapi.http.mission import _scripts
 from mavproxy_uavapi.scripts import runs
 from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.settings import ModuleSettings
@@ -243,15 +246,42 @@ PATHS = [
 
 
 @pytest.mark.parametrize(("method", "path"), PATHS)
-def test_scripts_of_an_open_api_need_a_token(api: Any, loop: Any, configured: Any, method: str, path: str) -> None:
+def test_scripts_are_for_this_machine_and_for_the_token(
+    api: Any, loop: Any, configured: Any, method: str, path: str
+) -> None:
     body = {"json": {"script_name": "a"}} if method == "POST" else {}
     configured(host="0.0.0.0", allow_open=True)
-    answer = loop.run(api.ask(method, path, **body))
+    answer = loop.run(api.ask(method, path, headers={"X-Forwarded-For": "192.0.2.1"}, **body))
     assert (answer.status, answer.body["code"]) == (403, "forbidden")
+    assert loop.run(api.ask(method, path, **body)).status not in (401, 403)
     configured(host="0.0.0.0", token="t")
     answer = loop.run(api.ask(method, path, headers={"Authorization": "Bearer t"}, **body))
     assert answer.status not in (401, 403)
     assert loop.run(api.ask(method, path, **body)).status == 401
+
+
+@pytest.mark.parametrize(
+    ("given", "caller", "may"),
+    [
+        ({"token": "t", "allow_from": "10.0.0.0/8"}, Caller(ip_address("10.0.0.5")), False),
+        ({"token": "t", "allow_from": "10.0.0.0/8"}, Caller(ip_address("10.0.0.5"), has_token=True), True),
+        ({"allow_from": "10.0.0.0/8"}, Caller(ip_address("127.0.0.1")), True),
+        ({"allow_from": "10.0.0.0/8"}, Caller(ip_address("127.0.0.1"), forwarded=True), False),
+        ({"allow_from": "10.0.0.0/8", "allow_scripts_from": "10.0.0.0/24"}, Caller(ip_address("10.0.0.5")), True),
+        ({"allow_from": "10.0.0.0/8", "allow_scripts_from": "10.0.0.0/24"}, Caller(ip_address("10.0.1.5")), False),
+    ],
+    ids=["network", "token", "here", "by a proxy", "named for scripts", "named for flying only"],
+)
+def test_network_that_may_fly_may_not_run_scripts_unless_named_for_that(
+    configured: Any, service: Any, given: dict[str, Any], caller: Caller, may: bool
+) -> None:
+    configured(host="0.0.0.0", **given)
+    call = SimpleNamespace(service=service, request={CALLER: caller})
+    if may:
+        assert _scripts(call) is service.scripts  # type: ignore[arg-type]
+    else:
+        with pytest.raises(Forbidden, match="token"):
+            _scripts(call)  # type: ignore[arg-type]
 
 
 @pytest.mark.usefixtures("scripts")

@@ -4,8 +4,9 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.errors import Forbidden
-from mavproxy_uavapi.http.security import check_origin, is_our_name
+from mavproxy_uavapi.errors import Forbidden, Unauthorized
+from mavproxy_uavapi.http.security import check_caller, check_origin, check_page, has_token, is_our_name
+from mavproxy_uavapi.settings import ModuleSettings
 
 HOST = {"Host": "127.0.0.1:8000"}
 
@@ -93,3 +94,102 @@ def test_page_of_another_site_may_not_open_a_websocket(flying: Any, api: Any, lo
     with pytest.raises(WSServerHandshakeError) as caught:
         loop.run(connect())
     assert caught.value.status == 403
+
+
+# -- a browser that names neither site nor origin: plain HTTP to a LAN address ------------------------------
+
+LAN = {"Host": "192.168.1.5:8000"}
+CHROMIUM = {"User-Agent": "Mozilla/5.0 (X11; Linux x86_64) AppleWebKit/537.36 Chrome/140.0 Safari/537.36"}
+PAGE = "text/html,application/xhtml+xml,application/xml;q=0.9,image/avif,image/webp,*/*;q=0.8"
+IMAGE = "image/avif,image/webp,image/apng,image/svg+xml,image/*,*/*;q=0.8"
+
+FOREIGN = {
+    "image": {**CHROMIUM, "Accept": IMAGE, "Referer": "http://evil.example/"},
+    "image without referer": {**CHROMIUM, "Accept": IMAGE},
+    "script without referer": {**CHROMIUM, "Accept": "*/*"},
+    "navigation": {**CHROMIUM, "Accept": PAGE, "Upgrade-Insecure-Requests": "1"},
+    "style": {**CHROMIUM, "Accept": "text/css,*/*;q=0.1"},
+    "prefetch": {**CHROMIUM, "Accept": "*/*", "Purpose": "prefetch"},
+    "nameless image": {"Accept": IMAGE},
+    "nameless navigation": {"Accept": PAGE},
+    "nameless script": {"Accept": "application/javascript, */*;q=0.8"},
+    "referer alone": {"Referer": "http://evil.example/page"},
+    "our name in a path": {"Referer": "http://evil.example/192.168.1.5:8000/"},
+    "our name in a login": {"Referer": "http://192.168.1.5:8000@evil.example/"},
+    "our address, another port": {"Referer": "http://192.168.1.5:80/"},
+    "empty referer": {"Referer": ""},
+}
+OURS = {
+    "curl": {"User-Agent": "curl/8.5.0", "Accept": "*/*"},
+    "requests": {"User-Agent": "python-requests/2.34", "Accept": "*/*", "Accept-Encoding": "gzip, deflate"},
+    "no headers": {},
+    "our own page": {**CHROMIUM, "Accept": "*/*", "Referer": "http://192.168.1.5:8000/docs"},
+    "a trusted page": {**CHROMIUM, "Accept": "*/*", "Referer": "http://gs.example:3000/map"},
+    "JSON wanted": {"User-Agent": "okhttp/4.12", "Accept": "application/json, text/plain, */*"},
+    "PowerShell": {"User-Agent": "Mozilla/5.0 (Windows NT; en-US) WindowsPowerShell/5.1"},
+    "judged by its origin": {**CHROMIUM, "Origin": "http://192.168.1.5:8000"},
+    "judged by its site": {**CHROMIUM, "Accept": PAGE, "Sec-Fetch-Site": "none"},
+}
+
+
+@pytest.mark.parametrize("headers", FOREIGN.values(), ids=FOREIGN)
+def test_command_that_a_foreign_page_can_have_sent_is_refused(headers: dict[str, str]) -> None:
+    check_origin({**LAN, **headers})
+    with pytest.raises(Forbidden):
+        check_page({**LAN, **headers}, ("http://gs.example:3000",))
+
+
+@pytest.mark.parametrize("headers", OURS.values(), ids=OURS)
+def test_programs_and_our_own_pages_command(headers: dict[str, str]) -> None:
+    check_page({**LAN, **headers}, ("http://gs.example:3000",))
+
+
+@pytest.mark.parametrize("path", ["/command/disarm?force=true", "/command/arm", "/movement/stop"])
+def test_picture_of_a_foreign_page_commands_nothing_and_may_read_what_it_cannot_see(
+    flying: Any, api: Any, path: str
+) -> None:
+    headers = {**CHROMIUM, "Accept": IMAGE}
+    assert api.get(path, headers=headers).status == 403
+    assert flying.got == []
+    assert api.get("/telemetry/gps", headers=headers).status == 200
+
+
+def test_token_or_a_referer_of_ours_lets_a_browser_command(flying: Any, api: Any, service: Any) -> None:
+    service.settings = ModuleSettings({"token": "t"}, environ={}).snapshot()
+    headers = {**CHROMIUM, "Accept": "*/*", "Authorization": "Bearer t"}
+    assert api.get("/command/brake", headers=headers).status == 200
+
+
+# -- callers ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("given", ["Bearer t", "bearer  t ", "BEARER t"])
+def test_token_is_known_however_its_scheme_is_written(given: str) -> None:
+    assert has_token(given, "t")
+
+
+@pytest.mark.parametrize("given", [None, "", "t", "Bearer", "Bearer T", "Bearer \udcff", "Basic t", "Bearer t t"])
+def test_what_is_no_token_is_none(given: str | None) -> None:
+    assert not has_token(given, "t")
+    assert not has_token(given, "")
+
+
+def settings(**given: Any) -> Any:
+    return ModuleSettings(given, environ={}).snapshot()
+
+
+def test_what_a_proxy_passes_on_needs_the_token_wherever_the_proxy_is() -> None:
+    for header in ("X-Forwarded-For", "Forwarded", "X-Real-IP", "Via"):
+        with pytest.raises(Forbidden, match="proxy"):
+            check_caller("127.0.0.1", {header: "192.0.2.1"}, settings())
+        with pytest.raises(Unauthorized):
+            check_caller("10.0.0.1", {header: "x"}, settings(token="t", allow_from="10.0.0.0/8"))
+        assert check_caller("127.0.0.1", {header: "x", "Authorization": "Bearer t"}, settings(token="t")).has_token
+
+
+def test_network_is_known_however_its_addresses_are_written() -> None:
+    check_caller("::ffff:10.0.0.5", {}, settings(token="t", allow_from="10.0.0.0/8"))
+    with pytest.raises(Unauthorized):
+        check_caller("::ffff:11.0.0.5", {}, settings(token="t", allow_from="10.0.0.0/8"))
+    with pytest.raises(Forbidden):
+        check_caller(None, {}, settings())

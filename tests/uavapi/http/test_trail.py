@@ -141,6 +141,7 @@ def test_callers_that_are_turned_away_are_counted_by_address_and_minute(service:
     service.settings = replace(service.settings, token="secret")
     for _ in range(50):
         assert api.get("/telemetry/gps", headers={"Authorization": "Bearer wrong"}).status == 401
+        loop.pass_time(0.2)  # no more than the door answers at once
     for _ in range(3):
         assert api.get("/telemetry/gps", headers={"Origin": "http://evil.example"}).status == 403
     assert not service.host.audit.entries

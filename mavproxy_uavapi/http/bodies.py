@@ -1,0 +1,33 @@
+"""Bodies, before they are read: whether they can be taken, and that they may come."""
+
+from __future__ import annotations
+
+from aiohttp import HttpVersion11, web
+
+from mavproxy_uavapi.errors import BadRequest
+
+CONTINUE = b"HTTP/1.1 100 Continue\r\n\r\n"
+
+
+async def invite(request: web.Request) -> None:
+    """Refuse a body that is compressed: a small one may hold a very large one. Send for one that waits to be asked.
+
+    Raises:
+        BadRequest: the client has gone.
+        HTTPUnsupportedMediaType: it is compressed.
+        HTTPExpectationFailed: the client expects what there is not.
+    """
+    encoding = request.headers.get("Content-Encoding", "identity").strip().lower()
+    if encoding != "identity":
+        raise web.HTTPUnsupportedMediaType(reason="compressed bodies are not taken")
+    expected = request.headers.get("Expect")
+    if expected is None:
+        return
+    if expected.strip().lower() != "100-continue":
+        raise web.HTTPExpectationFailed(reason="only 100-continue can be expected")
+    if request.version >= HttpVersion11 and request.can_read_body:
+        try:
+            await request.writer.write(CONTINUE)
+        except ConnectionError as error:
+            raise BadRequest("the client hung up before its body was asked for") from error
+        request.writer.output_size = 0  # the answer's first byte is still to come

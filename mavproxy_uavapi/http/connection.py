@@ -1,0 +1,184 @@
+"""One connection: its patience with slow headers, and what decides whether it may stay."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+from aiohttp import web
+
+from mavproxy_uavapi.http.responses import Handler
+
+HEADER_TIMEOUT = 10.0  # s from the first byte of a connection, or of its next request, to the end of the headers
+IDLE_TIMEOUT = 30.0  # s that a connection may wait for its next request
+LINGER = 1.0  # s in which the rest of a refused body is thrown away: closed at once, its sender would lose the answer
+LINGER_SIZE = 4 * 1024 * 1024  # bytes of it
+
+
+class Connection(asyncio.Protocol):
+    """Wraps aiohttp's protocol: closes a connection whose headers do not arrive in time.
+
+    aiohttp itself waits for the rest of a request line for ever.
+
+    Args:
+        factory: makes aiohttp's protocol.
+        peer: the socket, which nobody reads yet; None where a transport is there at once.
+        group: whose connection it is (`caller.group_of`).
+        on_lost: called when it is over.
+
+    Attributes:
+        group: as given.
+        silent: whether the peer has sent nothing yet.
+        admitted: whether the last request has passed the door.
+        refused: whether the last request has not; the connection is about to be closed.
+        answering: whether a request is being answered.
+        idle_since: s, of the loop's clock; when it was made, or its last answer was ready.
+        closing: whether it has been told to end.
+    """
+
+    _of: ClassVar[dict[Any, Connection]] = {}  # by aiohttp's protocol, while the connection lasts
+
+    def __init__(
+        self,
+        factory: Callable[[], Any],
+        peer: socket.socket | None = None,
+        group: str = "",
+        on_lost: Callable[[Connection], object] | None = None,
+    ) -> None:
+        self.peer = peer
+        self.group = group
+        self.silent = self.admitted = self.refused = self.answering = self.closing = False
+        self._loop = asyncio.get_running_loop()
+        self.idle_since = self._loop.time()
+        self._factory = factory
+        self._on_lost = on_lost
+        self._inner: Any = None
+        self._transport: Any = None
+        self._timer: asyncio.TimerHandle | None = None
+        self._thrown_away = 0
+
+    @classmethod
+    def of(cls, request: web.Request) -> Connection | None:
+        """The wrapper of a request's connection; None under a server that is not ours."""
+        return cls._of.get(request.protocol)
+
+    def began(self) -> None:
+        """The headers are here."""
+        self.answering = True
+        self._stop_timer()
+
+    def ended(self) -> None:
+        """The answer is ready; the connection may idle until the next request's first byte."""
+        self.answering = False
+        self.idle_since = self._loop.time()
+
+    def judged(self, admitted: bool) -> None:
+        """The door has let the request in, or refused it."""
+        self.admitted, self.refused = admitted, not admitted
+
+    def await_first_byte(self, ready: Callable[[Connection], object]) -> None:
+        """Call `ready` when the peer has sent something; until then a connection costs a socket and no more."""
+        assert self.peer is not None
+        self.silent = True
+        self._loop.add_reader(self.peer, self._first_byte, ready)
+        self._expect_headers()
+
+    def _first_byte(self, ready: Callable[[Connection], object]) -> None:
+        assert self.peer is not None
+        self.silent = False
+        self._loop.remove_reader(self.peer)
+        ready(self)
+
+    def abort(self) -> None:
+        """Close it, without waiting for anything."""
+        self.closing = True
+        if self._transport is not None:
+            self._transport.abort()
+        elif self.peer is not None and self.silent:
+            self._loop.remove_reader(self.peer)
+            self.peer.close()
+            self._lost()
+        elif self.peer is not None:
+            with contextlib.suppress(OSError):  # the peer was quicker
+                self.peer.shutdown(socket.SHUT_RDWR)  # what waits for the handshake sees its end
+
+    def _stop_timer(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def _expect_headers(self) -> None:
+        if self._timer is None and not self.answering:
+            self._timer = self._loop.call_later(HEADER_TIMEOUT, self.abort)
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """See asyncio.Protocol."""
+        self._transport = transport
+        if self.closing:  # somebody else has its place since
+            self.abort()
+            return
+        self._inner = self._factory()
+        self._of[self._inner] = self
+        self._expect_headers()
+        self._inner.connection_made(transport)
+
+    def data_received(self, data: bytes) -> None:
+        """See asyncio.Protocol."""
+        if self._inner is None:
+            return
+        if self.refused:
+            self._thrown_away += len(data)
+            if self._thrown_away > LINGER_SIZE:
+                self.abort()
+                return
+        self._expect_headers()
+        self._inner.data_received(data)
+
+    def eof_received(self) -> Any:
+        """See asyncio.Protocol."""
+        return None if self._inner is None else self._inner.eof_received()
+
+    def pause_writing(self) -> None:
+        """See asyncio.Protocol."""
+        self._inner.pause_writing()
+
+    def resume_writing(self) -> None:
+        """See asyncio.Protocol."""
+        self._inner.resume_writing()
+
+    def connection_lost(self, error: Exception | None) -> None:
+        """See asyncio.Protocol."""
+        self.closing = True
+        if self._inner is not None:
+            self._of.pop(self._inner, None)
+            self._inner.connection_lost(error)
+        self._lost()
+
+    def abandon(self) -> None:
+        """There was no TLS handshake: aiohttp never hears of it."""
+        self.closing = True
+        self._lost()
+
+    def _lost(self) -> None:
+        self._stop_timer()
+        if self._on_lost is not None:
+            self._on_lost(self)
+
+
+@web.middleware
+async def headers_are_here(request: web.Request, handler: Handler) -> web.StreamResponse:
+    """Tell the connection that a request has begun, and when it is answered; close it on a body that nobody read."""
+    connection = Connection.of(request)
+    if connection is not None:
+        connection.began()
+    try:
+        response = await handler(request)
+    finally:
+        if connection is not None:
+            connection.ended()
+    if not request.content.is_eof():
+        response.force_close()
+    return response

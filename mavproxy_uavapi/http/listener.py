@@ -1,0 +1,221 @@
+"""Accepts connections, and keeps strangers from taking all that there are."""
+
+from __future__ import annotations
+
+import asyncio
+import resource
+import socket
+import ssl
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from mavproxy_uavapi.http.caller import address_of, group_of
+from mavproxy_uavapi.http.connection import Connection
+from mavproxy_uavapi.http.log_throttle import LogThrottle
+
+BACKLOG = 2048  # connections that wait to be accepted; who finds no place asks again a second later
+AT_ONCE = 64  # are accepted before others get a turn: some 4 ms
+SHARE = 20  # connections of one caller beyond the loopback
+RESERVE = 16  # connections that only those who have passed the door can have
+HANDSHAKE_TIMEOUT = 10.0  # s, of TLS
+UNREAD_TIMEOUT = 30_000  # ms in which a peer takes nothing of what we send, and the kernel gives it up
+AFTER_FAILURE = 1.0  # s until we accept again when the system is out of descriptors or memory
+
+SELECT_LIMIT = 1024  # MAVProxy's select() takes no descriptor from here on
+KEPT_FREE = 64  # descriptors below that, and below the process's own limit, that no connection takes
+REPLACING = 32  # descriptors below these: who gets one of them replaces somebody
+
+
+class NoRoom(Exception):
+    """There is no room for another connection, and nobody who could make it; `cause` says of what kind."""
+
+    def __init__(self, cause: str, sentence: str) -> None:
+        super().__init__(sentence)
+        self.cause = cause
+
+
+def who_makes_room(
+    connections: Iterable[Connection], group: str, is_local: bool, most: int, scarce: bool = False
+) -> Connection | None:
+    """Which connection is to be closed for a new one of `group`; None while there is room.
+
+    A connection that has not passed the door goes first: one that has said nothing, then the oldest; whoever was
+    refused would be back at once. Then that which has been idle longest: HTTP clients open another. One that is being
+    answered stays.
+
+    Args:
+        connections: the open ones, oldest first.
+        group: whose the new one is.
+        is_local: whether it comes from the loopback, which has no share of its own.
+        most: connections of all.
+        scarce: whether descriptors are running out.
+
+    Raises:
+        NoRoom: nobody can go.
+    """
+    there = [one for one in connections if not one.closing]
+    of_group = [one for one in there if one.group == group]
+    strangers = sum(not one.admitted for one in there)
+    if not is_local and len(of_group) >= SHARE:
+        candidates, error = of_group, NoRoom("share", f"{group} has {SHARE} connections, all with calls in flight")
+    elif scarce:
+        candidates, error = there, NoRoom("descriptors", "MAVProxy needs the descriptors that are left")
+    elif len(there) >= most or strangers >= most - RESERVE:
+        candidates, error = there, NoRoom("full", f"all {most} connections have calls in flight (max_connections)")
+    else:
+        return None
+    unknown = [one for one in candidates if not one.admitted]
+    idle = [one for one in candidates if not one.answering]
+    if unknown:
+        return min(unknown, key=lambda one: not one.silent)
+    if idle:
+        return min(idle, key=lambda one: one.idle_since)
+    raise error
+
+
+def highest_descriptor() -> int:
+    """The highest descriptor that a connection may have, so that KEPT_FREE ones, or a quarter, are left."""
+    soft, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    limit = SELECT_LIMIT if soft == resource.RLIM_INFINITY else min(soft, SELECT_LIMIT)
+    return limit - 1 - min(KEPT_FREE, limit // 4)
+
+
+def lowest(near: socket.socket) -> socket.socket:
+    """The same socket by the lowest free descriptor, if one is lower."""
+    try:
+        copy = near.dup()
+    except OSError:  # there is none
+        return near
+    higher, lower = sorted((near, copy), key=socket.socket.fileno, reverse=True)
+    higher.close()
+    return lower
+
+
+class Listener:
+    """A listening socket whose connections become aiohttp's; all methods belong to the asyncio thread.
+
+    asyncio's own server accepts whatever comes, and writes a traceback for each that there is no descriptor for.
+
+    Args:
+        listening: bound.
+        factory: makes aiohttp's protocols.
+        tls: None for plain HTTP.
+        most: tells how many connections there may be.
+        throttle: takes what is to be told.
+    """
+
+    def __init__(
+        self,
+        listening: socket.socket,
+        factory: Callable[[], Any],
+        tls: ssl.SSLContext | None,
+        most: Callable[[], int],
+        throttle: LogThrottle,
+    ) -> None:
+        self._listening = listening
+        self._factory = factory
+        self._tls = tls
+        self._most = most
+        self._throttle = throttle
+        self._loop = asyncio.get_running_loop()
+        self._connections: dict[Connection, socket.socket] = {}  # oldest first
+        self._handshakes: set[asyncio.Task[None]] = set()
+        self._resuming: asyncio.TimerHandle | None = None
+        listening.listen(BACKLOG)
+        self._resume()
+
+    def _resume(self) -> None:
+        self._resuming = None
+        self._loop.add_reader(self._listening, self._accept)
+
+    def _accept(self) -> None:
+        for _ in range(AT_ONCE):
+            try:
+                near, peer = self._listening.accept()
+            except (BlockingIOError, InterruptedError, ConnectionAbortedError):
+                return
+            except OSError as error:
+                self._throttle.tell("accept", f"no connection can be accepted: {error.strerror}")
+                self._loop.remove_reader(self._listening)
+                self._resuming = self._loop.call_later(AFTER_FAILURE, self._resume)
+                return
+            self._take(near, peer[0])
+
+    def _take(self, near: socket.socket, remote: str) -> None:
+        """Serve a connection, or close it."""
+        address = address_of(remote)
+        group, is_local = group_of(address), address is not None and address.is_loopback
+        highest = highest_descriptor()
+        scarce = near.fileno() > highest - REPLACING
+        try:
+            going = who_makes_room(self._connections, group, is_local, self._most(), scarce)
+            if going is not None:
+                self._throttle.tell("replaced", f"an idle connection of {going.group} was closed for one of {group}")
+                going.abort()
+            if scarce:
+                near = lowest(near)
+            if near.fileno() > highest:
+                raise NoRoom("descriptors", "MAVProxy needs the descriptors that are left")
+        except NoRoom as error:
+            self._throttle.tell(error.cause, f"a connection of {group} was refused: {error}")
+            near.close()
+            return
+        near.setblocking(False)
+        connection = Connection(self._factory, near, group, self._forget)
+        self._connections[connection] = near
+        connection.await_first_byte(self._begin)
+
+    def _begin(self, connection: Connection) -> None:
+        handshake = self._loop.create_task(self._hand_over(connection, self._connections[connection]))
+        self._handshakes.add(handshake)
+        handshake.add_done_callback(self._handshakes.discard)
+
+    def _forget(self, connection: Connection) -> None:
+        self._connections.pop(connection, None)
+
+    async def _hand_over(self, connection: Connection, near: socket.socket) -> None:
+        """Do the TLS handshake, if any, and hand over to aiohttp."""
+        timeout = HANDSHAKE_TIMEOUT if self._tls else None
+        try:
+            await self._loop.connect_accepted_socket(
+                lambda: connection, near, ssl=self._tls, ssl_handshake_timeout=timeout
+            )
+        except OSError:  # it speaks no TLS, hung up, or has been replaced; asyncio closes the socket
+            connection.abandon()
+
+    def filenos(self) -> list[int]:
+        """Descriptors of the port and of every connection."""
+        return [one.fileno() for one in (self._listening, *self._connections.values())]
+
+    def close_port(self) -> None:
+        """Accept no more."""
+        if self._resuming is not None:
+            self._resuming.cancel()
+        if self._listening.fileno() >= 0:
+            self._loop.remove_reader(self._listening)
+            self._listening.close()
+
+    def stop(self) -> None:
+        """End every connection that aiohttp has not ended."""
+        for connection in list(self._connections):
+            connection.abort()
+
+
+def listening_socket(host: str, port: int) -> socket.socket:
+    """A bound TCP socket that can be bound again at once after we close it.
+
+    Raises:
+        OSError: taken, or no such address.
+    """
+    family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+    listening = socket.socket(family, kind, protocol)
+    try:
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        if hasattr(socket, "TCP_USER_TIMEOUT"):  # Linux; what is accepted inherits it
+            listening.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, UNREAD_TIMEOUT)
+        listening.bind(address)
+    except OSError:
+        listening.close()
+        raise
+    listening.setblocking(False)
+    return listening
