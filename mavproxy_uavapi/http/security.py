@@ -24,7 +24,7 @@ from mavproxy_uavapi.http.caller import CALLER, Caller, address_of, group_of
 from mavproxy_uavapi.http.connection import Connection
 from mavproxy_uavapi.http.limits import STRANGERS, STRANGERS_RATE
 from mavproxy_uavapi.http.log_throttle import LogThrottle
-from mavproxy_uavapi.http.responses import Handler, failure
+from mavproxy_uavapi.http.responses import REFUSED, Handler, failure
 from mavproxy_uavapi.settings import Settings
 
 log = logging.getLogger("uavapi.http.door")
@@ -199,6 +199,7 @@ async def _refused(request: web.Request, connection: Connection | None, error: U
     if wait:
         error = TooManyRequests(f"more than {STRANGERS_RATE:g} refused requests a second", math.ceil(wait))
         await asyncio.sleep(REFUSED_LATE)
+    app[REFUSED](request.remote or "unknown", error.code)
     response = failure(without_frames(error))
     response.force_close()
     return response
