@@ -31,7 +31,7 @@ TOKEN = "a-long-and-secret-word"
 STOP_WITHIN = 0.050  # s, at the 99th percentile
 INTERVAL = 1.0  # s between the setpoints of a movement
 LATE_ALLOWED = 0.5  # s that one of them may be late
-WARM_UP = 45.0  # s of strangers before memory counts
+WARM_UP = 90.0  # s of strangers before memory counts: the longest of what they do takes 60
 AT_REST = 35.0  # s after which every connection of theirs has been closed
 CYCLE = 1.5  # s of flight before a stop
 

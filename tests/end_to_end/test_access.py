@@ -240,20 +240,27 @@ def test_idle_strangers_leave_mavproxy_the_descriptors_to_connect_again(harness,
         limited = ["prlimit", "--nofile=160:4096", *mavproxy]
         rig.mavproxy = rig.start("mavproxy", limited, {"UAVAPI_TOKEN": TOKEN})
         rig.mavproxy.says("listening on")
-        status = f"{rig.url}/telemetry/status"
-        harness.eventually(lambda: requests.get(status, headers=owner, timeout=10).status_code == 200)
-        for _ in range(400):
-            strangers.append(socket.create_connection(("127.0.0.1", rig.port)))
-        assert requests.get(status, headers=owner, timeout=10).status_code == 200
+        gps = f"{rig.url}/telemetry/gps"
+
+        def owner_reads():
+            return requests.get(gps, headers=owner, timeout=10).status_code == 200
+
+        def strangers_come():
+            strangers.extend(socket.create_connection(("127.0.0.1", rig.port)) for _ in range(400))
+
+        harness.eventually(owner_reads)
+        strangers_come()
+        assert owner_reads()
         assert descriptors_of(rig) <= 130
-        vehicle = rig.processes[0]
         rig.control.close()
-        vehicle.stop()  # the link blinks
-        harness.eventually(lambda: requests.get(status, headers=owner, timeout=10).status_code != 200)
-        again = [sys.executable, "-m", "mavproxy_uavapi.sim", f"--instance={instance}", "--speedup=10"]
         rig.control = None
-        rig.start("sim-again", again)
-        harness.eventually(lambda: requests.get(status, headers=owner, timeout=10).status_code == 200, 60)
+        rig.processes[0].stop()  # the link blinks
+        rig.mavproxy.says("refused sleeping")
+        strangers_come()
+        rig.start(
+            "sim-again", [sys.executable, "-m", "mavproxy_uavapi.sim", f"--instance={instance}", "--speedup=10"]
+        )
+        harness.eventually(owner_reads, 60, "the return of the link")
         log = rig.mavproxy.output()
         assert "Traceback" not in log
         assert log.count("was closed for one of") + log.count("was refused") < 10
