@@ -15,6 +15,7 @@ from mavproxy_uavapi.http.responses import Handler
 
 BURST = 2.0  # s of the long-run rate that a client may use up at once
 CLIENTS_KEPT = 1000
+COMMANDS = ("/command/", "/movement/")  # paths that command by GET too
 HEADER_TIMEOUT = 10.0  # s from the first byte of a connection, or of its next request, to the end of the headers
 
 
@@ -49,8 +50,12 @@ BUCKET = web.AppKey("bucket", Bucket)
 
 @web.middleware
 async def give_way(request: web.Request, handler: Handler) -> web.StreamResponse:
-    """Let MAVProxy's main loop finish what it is at: its messages are not to wait for our answers."""
-    await request.app[SERVICE].host.bridge.calm()
+    """Let MAVProxy's main loop finish what it is at: its messages are not to wait for our answers.
+
+    What commands does not wait: it is short, and a vehicle is to hear of it at once.
+    """
+    if request.method == "GET" and not request.path.startswith(COMMANDS):
+        await request.app[SERVICE].host.bridge.calm()
     return await handler(request)
 
 
