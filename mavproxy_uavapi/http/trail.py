@@ -51,7 +51,8 @@ class Trace:
         if job is None or not job.running:
             self.leave(outcome, detail)
         else:
-            job.when_ended(lambda: self._leave_with_job(outcome, detail))
+            soon = asyncio.get_running_loop().call_soon  # what its vehicle is sent then goes out first
+            job.when_ended(lambda: soon(self._leave_with_job, outcome, detail))
 
     def _leave_with_job(self, outcome: str, detail: str) -> None:
         job = self._call.job
