@@ -66,9 +66,13 @@ class Bridge:
         self._thread.start()
 
     def feed(self, message: Any) -> None:
-        """Hand a received message over. Main loop only; never blocks, never raises."""
+        """Hand a received message over. Main loop only; never blocks, never raises.
+
+        What is to be sent does not wait for the end of a burst: it goes out between two of its messages.
+        """
         self._busy = True
         self._inbox.append(message)
+        self._outbox.drain()
 
     def feed_call(self, call: Callable[[], None]) -> None:
         """Have the asyncio side run `call` between the messages that were fed before and after. Main loop only."""

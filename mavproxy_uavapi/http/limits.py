@@ -14,6 +14,7 @@ from mavproxy_uavapi.http.responses import Handler
 BURST = 2.0  # s of the long-run rate that a client may use up at once
 CLIENTS_KEPT = 1000
 STRANGERS_RATE = 10.0  # requests/s of one address that the door does not let in
+COMMANDS = ("/command/", "/movement/")  # paths that command by GET too
 
 
 class Bucket:
@@ -54,8 +55,11 @@ def stops(request: web.Request) -> bool:
 
 @web.middleware
 async def give_way(request: web.Request, handler: Handler) -> web.StreamResponse:
-    """Let MAVProxy's main loop finish what it is at: its messages are not to wait for our answers."""
-    if not stops(request):
+    """Let MAVProxy's main loop finish what it is at: its messages are not to wait for our answers.
+
+    What commands does not wait: it is short, and a vehicle is to hear of it at once.
+    """
+    if request.method == "GET" and not request.path.startswith(COMMANDS):
         await request.app[SERVICE].host.bridge.calm()
     return await handler(request)
 

@@ -52,8 +52,13 @@ class Trace:
         job = self._call.job
         if job is None or not job.running:
             self.leave(outcome, detail)
-        else:
-            job.when_ended(lambda: self._leave_with_job(outcome, detail))
+            return
+        loop = asyncio.get_running_loop()
+
+        def leave_soon() -> None:  # what the vehicle is sent then goes out first
+            loop.call_soon(self._leave_with_job, outcome, detail)
+
+        job.when_ended(leave_soon)
 
     def _leave_with_job(self, outcome: str, detail: str) -> None:
         job = self._call.job

@@ -176,6 +176,7 @@ class JobBook:
     def __init__(self) -> None:
         self.on_ended: list[Callable[[Job], None]] = []
         self._jobs: dict[str, Job] = {}
+        self._running: dict[str, Job] = {}
         self._numbers = itertools.count(1)
 
     def begin(
@@ -194,7 +195,7 @@ class JobBook:
             if job.vehicle is vehicle and job.is_for(verb, request):
                 return job
         job = Job(next(self._numbers), verb, request, vehicle, client=client, outlives_client=outlives_client)
-        self._jobs[job.id] = job
+        self._jobs[job.id] = self._running[job.id] = job
         job.when_ended(lambda: self._ended(job))
         self._forget_old()
         with noting_sent_if_nobody_does() as job.sent:
@@ -202,6 +203,7 @@ class JobBook:
         return job
 
     def _ended(self, job: Job) -> None:
+        del self._running[job.id]
         for callback in self.on_ended:
             callback(job)
 
@@ -215,7 +217,7 @@ class JobBook:
 
     def running(self) -> list[Job]:
         """The jobs without an outcome, oldest first."""
-        return [job for job in self._jobs.values() if job.running]
+        return list(self._running.values())
 
     def abort_remote(self, reason: str) -> None:
         """End every running job that came over the network."""
@@ -224,6 +226,5 @@ class JobBook:
                 job.abort(Aborted(f"{job.verb}: {reason}"), Ending.UNLOADED)
 
     def _forget_old(self) -> None:
-        finished = [job for job in self._jobs.values() if not job.running]
-        for job in finished[: max(0, len(finished) - FINISHED_KEPT)]:
-            del self._jobs[job.id]
+        while len(self._jobs) - len(self._running) > FINISHED_KEPT:
+            del self._jobs[next(number for number in self._jobs if number not in self._running)]

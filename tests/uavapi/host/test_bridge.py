@@ -112,6 +112,14 @@ def test_messages_that_are_fed_while_others_are_delivered_come_with_the_next_tur
     assert [message for message, _ in received] == ["one", "two", "three"]
 
 
+def test_what_is_to_be_sent_goes_out_between_two_messages_of_a_burst(bridge: Bridge) -> None:
+    sent: list[str] = []
+    bridge.feed("one")
+    bridge.post(lambda: sent.append("command"))
+    bridge.feed("two")
+    assert sent == ["command"]
+
+
 def test_new_work_waits_while_the_main_loop_is_at_messages(bridge: Bridge) -> None:
     bridge.run(bridge.calm())  # it is at none
     bridge.feed("one")

@@ -220,3 +220,34 @@ def test_application_that_has_served_is_forgotten(loop: Any, service: Any) -> No
     forgotten = loop.run(served())
     gc.collect()
     assert forgotten() is None
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "gives_way"),
+    [
+        ("GET", "/telemetry/gps", True),
+        ("GET", "/jobs", True),
+        ("GET", "/command/brake", False),
+        ("GET", "/movement/stop", False),
+        ("POST", "/movement/travel_at_ned", False),
+        ("DELETE", "/jobs/1", False),
+    ],
+)
+def test_only_what_commands_does_not_wait_for_the_main_loop(
+    flying: Any,
+    api: Any,
+    loop: Any,
+    host: Any,
+    monkeypatch: pytest.MonkeyPatch,
+    method: str,
+    path: str,
+    gives_way: bool,
+) -> None:
+    waited: list[str] = []
+
+    async def calm() -> None:
+        waited.append(path)
+
+    monkeypatch.setattr(host.bridge, "calm", calm)
+    loop.run(api.ask(method, path))
+    assert bool(waited) is gives_way

@@ -6,6 +6,8 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from mavproxy_uavapi.audit import COUNTED_FOR
 from mavproxy_uavapi.http.requests import Empty
 from mavproxy_uavapi.http.routes import POST, Route
@@ -45,6 +47,17 @@ def test_job_that_is_not_waited_for_leaves_its_trace_when_it_has_ended(
     assert of_delete.verb.startswith("/jobs/")
     assert (of_job.verb, of_job.outcome) == ("/movement/go_to_ned_wait", "aborted")
     assert of_job.seconds >= 1.0
+
+
+def test_vehicle_is_told_what_follows_before_the_trace_of_its_job_is_left(
+    flying: Any, service: Any, api: Any, loop: Any, link: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    accepted = api.post("/movement/go_to_ned_wait?wait=false", FAR)
+    loop.pass_time(1.0)
+    sent, sent_before_trace = len(link.sent), []
+    monkeypatch.setattr(service.host.audit, "add", lambda _: sent_before_trace.append(len(link.sent) - sent))
+    loop.run(api.ask("DELETE", accepted.headers["Location"]))
+    assert sent_before_trace[0] > 0
 
 
 def test_job_that_succeeds_without_its_client_is_traced_with_its_result(
