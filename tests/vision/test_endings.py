@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from mavproxy_uavapi.errors import Aborted, Invalid, LinkLost, ModeChanged, NotArmed
+from mavproxy_uavapi.errors import Invalid, LinkLost, ModeChanged, NotArmed
 from mavproxy_uavapi.vehicle.messages import NedTarget, VelocityTarget
 from mavproxy_vision.errors import LandingFailed
 from mavproxy_vision.geometry import Attitude, vector
@@ -63,11 +63,12 @@ def silent(rig: Any, name: str) -> None:
     rig.host._receive = lambda message: None if message.get_type() == name else hear(message)
 
 
-def holds(rig: Any, seconds: float = 10.0) -> bool:
+def holds(rig: Any, mode: str = "GUIDED", seconds: float = 10.0) -> bool:
+    """Whether it stays where it is, armed, in that mode: what the autopilot flew by itself is left by BRAKE."""
     rig.pass_time(3.0)
     before = height(rig)
     rig.pass_time(seconds)
-    return rig.mode == "GUIDED" and rig.simulator.copter.armed and abs(height(rig) - before) < 0.5
+    return rig.mode == mode and rig.simulator.copter.armed and abs(height(rig) - before) < 0.5
 
 
 # -- stopped while the autopilot flies for us ----------------------------------------------------------------
@@ -79,9 +80,9 @@ def test_stopped_in_what_a_failed_landing_does_it_holds(flying, action):
     job = rig.land()
     until(rig, lambda: rig.mode == action.upper())
     rig.pass_time(1.0)
-    assert rig.flights.stop("stopped")
+    assert rig.stop()
     assert str(rig.outcome(job)) == "stopped; the vehicle is told to hold"
-    assert holds(rig)
+    assert holds(rig, "BRAKE")
 
 
 def test_stopped_in_land_by_landing_target_it_holds_and_plnd_is_as_before(flying):
@@ -90,9 +91,9 @@ def test_stopped_in_land_by_landing_target_it_holds_and_plnd_is_as_before(flying
     job = rig.land(method="landing_target")
     until(rig, lambda: rig.mode == "LAND")
     rig.pass_time(2.0)
-    assert rig.flights.stop("stopped")
+    assert rig.stop()
     rig.outcome(job)
-    assert holds(rig)
+    assert holds(rig, "BRAKE")
     assert plnd(rig) == before
 
 
@@ -105,7 +106,7 @@ def test_stopped_in_the_pilots_mode_nothing_is_sent_and_nothing_else_is_said(fly
     mark = len(rig.wire.sent)
     until(rig, lambda: rig.copter.mode == "LOITER" or not job.running)
     if job.running:
-        rig.flights.stop("stopped")
+        rig.stop()
     rig.outcome(job)
     rig.pass_time(2.0)
     assert rig.mode == "LOITER"
@@ -120,7 +121,7 @@ def test_a_mission_that_is_stopped_at_its_takeoff_does_not_take_off(lockstep, af
     job = rig.begin(rig.flights.errand(rig.copter, Errand(alt=5, north=8, east=-5)))
     until(rig, lambda: any(m.command == TAKEOFF for m in sent(rig, "COMMAND_LONG")))
     rig.pass_time(after)
-    rig.flights.stop("stopped")
+    rig.stop()
     rig.outcome(job)
     rig.pass_time(8.0)
     assert height(rig) < 1.5
@@ -140,9 +141,9 @@ def test_one_lost_message_does_not_keep_it_from_holding(flying):
             deliver(message)
 
     rig.wire.deliver = lossy
-    rig.flights.stop("stopped")
+    rig.stop()
     rig.outcome(job)
-    assert holds(rig)
+    assert holds(rig, "BRAKE")
     assert lost
 
 
@@ -153,33 +154,23 @@ def test_stopped_and_unloaded_in_one_breath_it_holds_and_plnd_is_as_before(flyin
     until(rig, lambda: rig.mode == "LAND")
     rig.pass_time(1.0)
 
-    async def both() -> list[Any]:
-        rig.flights.stop("stopped")
-        return rig.flights.abandon()
-
-    deliver = rig.wire.deliver
-    rig.wire.deliver = lambda _message: None  # the main loop, which waits for the unload, sends nothing more
-    last = rig.run(both())
-    for message, _system in last:
-        deliver(message)
-    rig.pass_time(12.0)
-    assert rig.mode == "GUIDED"
-    assert height(rig) > 2
+    flights, abandon = rig.flights, rig.flights.abandon
+    flights.abandon = lambda: (flights.stop("stopped"), abandon())
+    rig.unload(last=True)
+    assert holds(rig, "BRAKE")
     assert plnd(rig) == before
 
 
-def test_unloaded_in_the_autopilots_land_it_holds(flying):
+def test_unloaded_in_the_autopilots_land_it_lands(flying):
     rig = flying(alt=6.0, sim_tags="", attempts=1, leash=1.0, on_failure="land")
     job = rig.land()
     until(rig, lambda: rig.mode == "LAND")
-
-    async def abandon() -> list[Any]:
-        return rig.flights.abandon()
-
-    for message, _system in rig.run(abandon()):
-        rig.wire.deliver(message)
-    assert not job.running
-    assert holds(rig)
+    rig.unload()
+    assert "left alone: it is in LAND" in str(rig.outcome(job))
+    mark = len(rig.wire.sent)
+    until(rig, lambda: not rig.simulator.copter.armed)
+    assert rig.mode == "LAND"
+    assert not sent(rig, "SET_POSITION_TARGET_LOCAL_NED", mark)
 
 
 def test_a_mission_that_is_stopped_holds_before_it_writes_its_track(flying):
@@ -187,7 +178,7 @@ def test_a_mission_that_is_stopped_holds_before_it_writes_its_track(flying):
     rig.flights._directory = lambda: (_ for _ in ()).throw(RuntimeError("no home directory"))
     job = rig.begin(rig.flights.errand(rig.copter, Errand(alt=20, north=60, east=0)))
     rig.pass_time(4.0)
-    assert rig.flights.stop("stopped")
+    assert rig.stop()
     error = rig.outcome(job)
     assert "told to hold" in str(error)
     assert holds(rig)
@@ -295,10 +286,11 @@ def test_parameters_are_given_back_after_two_landings_in_a_row(flying, pause):
     rig.host._receive = slowly
     first = rig.land(method="landing_target")
     until(rig, lambda: rig.mode == "LAND")
-    rig.flights.stop("stopped")
+    rig.stop()
     rig.outcome(first)
     rig.pass_time(pause)
-    until(rig, lambda: rig.copter.mode == "GUIDED")
+    until(rig, lambda: rig.copter.mode == "BRAKE")
+    rig.outcome(rig.begin(lambda job: rig.copter.set_mode(job, "GUIDED"), "/command/guided"))
     during: list[dict[str, float]] = []
     rig.each_step.append(lambda: during.append(plnd(rig)) if rig.mode == "LAND" and rig.flights.running else None)
     assert rig.outcome(rig.land(method="landing_target")).startswith("Landed on tag 0")
@@ -320,10 +312,10 @@ def test_a_parting_is_not_cut_short_by_the_next_flight(flying):
         deliver(message)
 
     rig.wire.send = in_turns
-    rig.flights.stop("stopped")
+    rig.stop()
     rig.pass_time(0.05)
     job._task.cancel()
-    assert holds(rig)
+    assert holds(rig, "BRAKE")
 
 
 # -- another vehicle -----------------------------------------------------------------------------------------
@@ -488,7 +480,7 @@ def test_a_landing_that_is_stopped_before_it_took_over_leaves_the_one_under_way_
     rig.copter.parameters = slowly
     second = rig.land(method="landing_target")
     rig.pass_time(0.2)
-    second.abort(Aborted("its client hung up"))
+    rig.abort(second)
     rig.copter.parameters = ask
     assert rig.outcome(first).startswith("Landed on tag 0")
 
