@@ -24,7 +24,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.errors import Aborted
 from mavproxy_uavapi.host.host import Host
-from mavproxy_uavapi.host.link import Address
+from mavproxy_uavapi.host.link import Address, require_finite
 from mavproxy_uavapi.sim.options import Home, Options, Wind
 from mavproxy_uavapi.sim.simulator import STEP, Simulator
 from mavproxy_vision.camera import Frame
@@ -145,6 +145,7 @@ class WireLink:
         self._in = mavlink.MAVLink(None)
 
     async def send(self, message: Any, _system: int) -> None:
+        require_finite(message)
         self.deliver(message)
 
     def deliver(self, message: Any) -> None:
