@@ -34,5 +34,5 @@ class HeadedVelocity(VelocityTarget):
 
 def setpoint(velocity: Vector, heading: float | None) -> VelocityTarget:
     """A velocity (m/s NED), in BODY_NED where the heading (rad) is known."""
-    parts = tuple(float(part) for part in velocity)
-    return VelocityTarget(*parts) if heading is None else HeadedVelocity(*parts, heading)
+    x, y, z = (float(part) for part in velocity)
+    return VelocityTarget(x, y, z) if heading is None else HeadedVelocity(x, y, z, heading)
