@@ -211,9 +211,7 @@ def under_way(lockstep: Any, name: str) -> tuple[Any, Any]:
         errand = Errand(alt=10, north=60, east=0, on_tag=False)
         job = rig.begin(rig.flights.errand(rig.copter, errand), "/vision/mission")
         until(rig, lambda: any(m.command == TAKEOFF for m in sent(rig, "COMMAND_LONG")))
-        if name == "leg":
-            until(rig, lambda: rig.truth.north > 2.0)
-        rig.pass_time(0.3)
+        until(rig, lambda: rig.truth.north > 2.0 if name == "leg" else height(rig) > 0.5)
         return rig, job
     rig.start(7.0)
     rig.before = plnd(rig)
@@ -306,7 +304,8 @@ def test_what_follows_a_flight_is_what_the_table_says(lockstep, name, end):
     rig.pass_time(0.3)
     mark = len(rig.wire.sent)
     rig.pass_time(12.0)
-    assert rig.simulator.copter.armed == (end != "disarm")
+    if mode not in ("LAND", "RTL"):  # else it has landed, or not yet
+        assert rig.simulator.copter.armed == (end != "disarm")
     if mode:
         assert rig.mode == mode
     if mode in ("GUIDED", "BRAKE") and end not in REFUSED_IN_LAND and end != "silence":
@@ -360,11 +359,13 @@ def test_a_flight_that_is_ended_while_it_is_prepared_never_begins(lockstep, ende
     rig = lockstep(sim_tags=TAG, plnd=True, **SMALL)
     rig.switch_on()
     rig.open_eye()
+    hear = rig.host._receive
     silent(rig, "PARAM_VALUE")
     errand = Errand(alt=5, north=8, east=-5, method="landing_target")
     job = rig.begin(rig.flights.errand(rig.copter, errand), "/vision/mission")
     rig.pass_time(0.3)
     getattr(rig, ended)()
+    rig.host._receive = hear
     assert rig.outcome(job).code == "aborted"
     rig.pass_time(20.0)
     assert not rig.simulator.copter.armed
