@@ -108,7 +108,7 @@ class PrecisionDescent(Descent):
         touchdown = Touchdown(limits)
         vehicle.held_by("GUIDED")
         flight.autopilot = "LAND"
-        await vehicle.switch_to(flight.job, "LAND")
+        await vehicle.set_mode(flight.job, "LAND")
         late = vision.now() + SLOWER * deadlines.landing_time(limits, vehicle.height)
         while not self._stands(touchdown):
             now = vision.now()
@@ -116,7 +116,7 @@ class PrecisionDescent(Descent):
                 flight.autopilot = None  # it is almost down: nobody takes it back
                 raise TimedOut(f"vehicle {vehicle.state.system} has not landed and disarmed; it is in LAND")
             if self._must_come_back(landing, now):
-                await vehicle.switch_to(flight.job, "GUIDED")
+                await vehicle.set_mode(flight.job, "GUIDED")
                 flight.autopilot = None
                 motion = vision.history.last_motion
                 assert motion is not None

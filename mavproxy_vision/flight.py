@@ -137,11 +137,11 @@ class Flight:
             plan = plan_for(settings, tags, self._here(), descend=False, **given)
             with self._lasting(), self.vision.aimed_at(tags, self._floor) as target:
                 order = await self.fly(Landing(plan, target))
-                await self.send(REST)
                 if order.phase is Phase.FAILED:
-                    self.report.action = "hold"
+                    self.report.action = "hold"  # which the end of the job sees to
                     raise self._failed(order.reason)
                 self.report.place = self._place_of(target)
+            await self.vehicle.rest(self.job)
 
     def _place_of(self, target: Target) -> tuple[float, float, float] | None:
         """The target in m NED from the EKF origin."""
@@ -255,11 +255,14 @@ class Flight:
             self.job.progress["offset"] = round(landing.offset, 3)
 
     async def send(self, velocity: Vector) -> None:
-        """Send a velocity (m/s NED) to a vehicle that is still in GUIDED."""
-        self.vehicle.held_by("GUIDED")  # the rest is asked in `tell`
+        """Send a velocity (m/s NED) to a vehicle that is still in GUIDED.
+
+        Raises:
+            Superseded, Paused, ModeChanged, NotArmed: somebody else has it; nothing is sent.
+        """
         attitude = self.vision.history.attitude(self.vision.now())
-        yaw = None if attitude is None else attitude.yaw
-        await self.tell(setpoint(self.vehicle.address, velocity, yaw))
+        self._sent_at = self.vision.host.clock()
+        await self.vehicle.send_setpoint(self.job, setpoint(velocity, None if attitude is None else attitude.yaw))
 
     async def tell(self, message: Any) -> None:
         """Send the vehicle a message; `pause` sees to it that they do not come too often.
@@ -307,8 +310,7 @@ class Flight:
         except UavApiError as error:  # refused, or it takes very long: then it goes on
             self.autopilot, reason = None, f"{reason} ({error})"
             if self.vehicle.mode == "GUIDED":
-                self.report.action = "hold"
-                await self.send(REST)
+                self.report.action = "hold"  # which the end of the job sees to
         raise self._failed(reason)
 
 

@@ -14,7 +14,7 @@ import cv2
 from mavproxy_uavapi.errors import Aborted, NotSupported, UavApiError
 from mavproxy_uavapi.host.state import VehicleState
 from mavproxy_uavapi.vehicle.copter import Copter
-from mavproxy_uavapi.vehicle.endings import Policy
+from mavproxy_uavapi.vehicle.endings import FIXED
 from mavproxy_uavapi.vehicle.jobs import CONSOLE, Ending, Job
 from mavproxy_vision import mission
 from mavproxy_vision.descent import Descent, PrecisionDescent
@@ -50,6 +50,7 @@ class Sortie:
         self.begun = True
         flights = self._flights
         flight = Flight(flights.vision, self._copter, job, self.report, flights.succeed)
+        flights.begun(flight)
         try:
             await self._fly(flight)
         except UavApiError as error:
@@ -112,7 +113,8 @@ class Flights:
         self.report: Report | None = None
         self._directory = directory
         self._flight: Flight | None = None
-        self._unfinished: set[Flight] = set()  # that have not sent their last message
+        self._begun: set[Flight] = set()  # that are not over, those too that have no vehicle yet
+        self._unfinished: set[Flight] = set()  # of these, those that took over
         self._plnd: dict[int, PrecisionLanding] = {}
         self._tidying: set[PrecisionLanding] = set()
         self._tasks: set[asyncio.Task[None]] = set()
@@ -151,6 +153,10 @@ class Flights:
 
         return by_plnd
 
+    def begun(self, flight: Flight) -> None:
+        """It is being prepared; the vehicle is somebody else's still."""
+        self._begun.add(flight)
+
     async def succeed(self, flight: Flight) -> None:
         """Make it the flight under way, and await the end of those before."""
         before = self._unfinished - {flight}
@@ -163,6 +169,7 @@ class Flights:
 
     def over(self, flight: Flight) -> None:
         """It has sent its last message."""
+        self._begun.discard(flight)
         self._unfinished.discard(flight)
         if self._flight is flight:
             self._flight = None
@@ -243,27 +250,31 @@ class Flights:
             tell(str(error))
 
     def stop(self, reason: str) -> str | None:
-        """End the flight; a vehicle that is ours is told to hold. What was done; None without a flight."""
-        flight = self._flight
-        if flight is None or not flight.job.running:
-            return None
-        error = _ended(self.vision, flight, reason)
-        flight.job.abort(error)
-        return str(error)
+        """End all flights; a vehicle that is ours is told to hold. What was done; None without a flight."""
+        return self._end(reason, Ending.ABORTED)
 
     def abandon(self) -> None:
         """End all flights, because the module is unloaded."""
-        for flight in list(self._unfinished):
-            flight.job.abort(_ended(self.vision, flight, "vision was unloaded"), Ending.UNLOADED)
+        self._end("vision was unloaded", Ending.UNLOADED)
+
+    def _end(self, reason: str, ending: Ending) -> str | None:
+        """End those in flight and those that are being prepared; what was done with the former goes first."""
+        told = None
+        for flight in sorted(self._begun, key=lambda one: one is not self._flight):
+            if flight.job.running:
+                error = _ended(self.vision, flight, reason, ending)
+                told = told or str(error)
+                flight.job.abort(error, ending)
+        return told
 
     def last_words(self) -> list[tuple[Any, int]]:
         """The parameters that are still to be given back, as messages, and the systems that they go to."""
         return [(message, plnd.vehicle.state.system) for plnd in self._plnd.values() for message in plnd.remaining()]
 
 
-def _ended(vision: Vision, flight: Flight, reason: str) -> Aborted:
+def _ended(vision: Vision, flight: Flight, reason: str, ending: Ending) -> Aborted:
     vehicle = flight.vehicle
-    holds = flight.commands and vision.host.endings.what_follows(vehicle, Policy.HOLD) is not None
+    holds = flight.commands and vision.host.endings.what_follows(vehicle, FIXED[ending]) is not None
     left = "the vehicle is told to hold" if holds else f"the vehicle is left alone: it is in {vehicle.mode}"
     return Aborted(f"{reason}; {left}")
 

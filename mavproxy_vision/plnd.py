@@ -160,14 +160,9 @@ def landing_target(time: float, relative: Vector, attitude: Attitude) -> Any:
         time: s, for the message's time stamp.
         relative: from the vehicle to the target, m NED.
         attitude: of the vehicle when the message is sent.
-
-    Raises:
-        ValueError: a number is not finite.
     """
     x, y, z = (float(part) for part in attitude.matrix.T @ relative)
     distance = math.sqrt(x * x + y * y + z * z)
-    if not math.isfinite(distance):
-        raise ValueError(f"no place of a target: {relative}")
     return mavlink.MAVLink_landing_target_message(
         int(time * 1e6),
         0,

@@ -2,31 +2,37 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 from pymavlink import mavutil
 
 from mavproxy_uavapi.host.link import Address
-from mavproxy_vision.geometry import Vector, heading_frame
+from mavproxy_uavapi.vehicle.messages import VelocityTarget, Yaw
+from mavproxy_vision.geometry import Vector, heading_frame, vector
 
 mavlink = mavutil.mavlink
 
-VELOCITY_ONLY = 3527  # SET_POSITION_TARGET_LOCAL_NED: velocity alone, the heading as it is
 
+@dataclass(frozen=True)
+class HeadedVelocity(VelocityTarget):
+    """A velocity setpoint, m/s NED, that goes out in BODY_NED: what was seen turns with the vehicle.
 
-def setpoint(address: Address, velocity: Vector, yaw: float | None) -> Any:
-    """SET_POSITION_TARGET_LOCAL_NED with a velocity (m/s NED), in BODY_NED where the heading (rad) is known.
-
-    Raises:
-        ValueError: the velocity or the heading is not finite.
+    Attributes:
+        heading: of the vehicle, rad, by which it is turned.
     """
-    if not np.isfinite([*velocity, yaw or 0.0]).all():
-        raise ValueError(f"no velocity: {velocity}, heading {yaw}")
-    if yaw is None:
-        frame, (x, y, z) = mavlink.MAV_FRAME_LOCAL_NED, (float(part) for part in velocity)
-    else:
-        frame, (x, y, z) = mavlink.MAV_FRAME_BODY_NED, heading_frame(velocity, yaw)
-    return mavlink.MAVLink_set_position_target_local_ned_message(
-        0, *address, frame, VELOCITY_ONLY, 0.0, 0.0, 0.0, x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0
-    )
+
+    heading: float
+
+    def to(self, address: Address, yaw: Yaw) -> Any:
+        """SET_POSITION_TARGET_LOCAL_NED to `address`."""
+        message = super().to(address, yaw)
+        message.coordinate_frame = mavlink.MAV_FRAME_BODY_NED
+        message.vx, message.vy, message.vz = heading_frame(vector(self.vx, self.vy, self.vz), self.heading)
+        return message
+
+
+def setpoint(velocity: Vector, heading: float | None) -> VelocityTarget:
+    """A velocity (m/s NED), in BODY_NED where the heading (rad) is known."""
+    x, y, z = (float(part) for part in velocity)
+    return VelocityTarget(x, y, z) if heading is None else HeadedVelocity(x, y, z, heading)

@@ -170,6 +170,9 @@ class Copter(GuidedVehicle):
         if not flies_mission(self.mode):
             self.require_mode(GUIDED)
         self.authority.accompany(job, "resume", stopped_too=True)
+        one = self.authority.interrupted
+        if one is not None and one.steers and not one.running and self.mode == GUIDED:
+            await self.send_setpoint(job, VelocityTarget(0, 0, 0))  # nobody sends what it flew by any more
         await self._continue(job)
 
     async def _continue(self, job: Job) -> None:
@@ -178,9 +181,12 @@ class Copter(GuidedVehicle):
         self.authority.end_pause()
 
     async def hold(self, job: Job) -> None:
-        """Stop and stay, however it flies for us: by zero velocities in GUIDED, else by BRAKE."""
+        """Stop and stay, however it flies for us: by zero velocities in GUIDED, else by BRAKE.
+
+        A mode that is on its way to it counts: it is not in GUIDED any more when it hears us.
+        """
         self.authority.take(job, Rank.STOP)
-        if self.mode == GUIDED:
+        if self.mode == self.next_mode == GUIDED:
             await self.rest(job)
         else:
             await self.switch_to(job, "BRAKE")

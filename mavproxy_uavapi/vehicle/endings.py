@@ -75,7 +75,7 @@ FIXED: Mapping[Ending, Policy] = {
 
 def situation(vehicle: Vehicle) -> Situation:
     """What telemetry shows of it."""
-    state, mode = vehicle.state, vehicle.mode
+    state, mode = vehicle.state, vehicle.next_mode
     if not state.armed:
         return Situation.UNKNOWN if state.armed is None else Situation.DISARMED
     if mode == "GUIDED":
@@ -137,7 +137,7 @@ class FlightEndings:
             if job.running:
                 number = mode_number(job.vehicle.state.vehicle_type, "BRAKE")
                 rest = VelocityTarget(0, 0, 0).to(job.vehicle.address, NO_YAW)
-                guided = job.vehicle.mode == "GUIDED"
+                guided = job.vehicle.mode == job.vehicle.next_mode == "GUIDED"
                 message = rest if guided else set_mode(number).to(job.vehicle.address, 0)
                 found.append((message, job.vehicle.state.system))
         return found

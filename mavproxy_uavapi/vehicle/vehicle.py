@@ -56,6 +56,7 @@ class Vehicle:
         self.waypoints = Waypoints(state, link, self.waiting)
         self.parameters = Parameters(state, link, self.waiting)
         self.speeds = Speeds(state)
+        self._mode_asked: tuple[int, float] | None = None  # for which mode we asked last, and when (s)
         self._requests: dict[str, asyncio.Task[Any]] = {}  # REQUEST_MESSAGE in flight, by message name
 
     # -- what it is ---------------------------------------------------------------------------------------
@@ -74,6 +75,14 @@ class Vehicle:
     def mode(self) -> str:
         """The name of its flight mode; UNKNOWN before a heartbeat since the last boot."""
         return mode_name(self.state.vehicle_type, self.state.mode)
+
+    @property
+    def next_mode(self) -> str:
+        """The name of the mode that it was told to take, until a heartbeat shows its answer; else `mode`."""
+        number, at = self._mode_asked or (None, 0.0)
+        if number is None or self.state.mode_since >= at or self.clock() - at > HEARTBEAT_TIMEOUT:
+            return self.mode
+        return mode_name(self.state.vehicle_type, number)
 
     @property
     def is_ready_to_arm(self) -> bool:
@@ -190,18 +199,25 @@ class Vehicle:
             Rejected, TimedOut, LinkLost.
         """
         number = mode_number(self.state.vehicle_type, mode)
-        before = self.state.mode
+        before, on_its_way = self.state.mode, self.next_mode
 
         def shown() -> bool:
-            if self.state.mode not in (before, number, None):
+            if self.state.mode not in (before, number, None) and self.mode != on_its_way:
                 raise ModeChanged(f"the vehicle is in {self.mode} now: somebody else switched it meanwhile")
             return self.state.mode == number
 
         def switched_by_nobody_else() -> None:
             shown()
 
-        check = self.commanding(job, switched_by_nobody_else, *needs)
-        await self.commands.send(messages.set_mode(number), check, shown=shown)
+        def noted() -> None:
+            self._mode_asked = number, self.clock()
+
+        check = self.commanding(job, switched_by_nobody_else, *needs, noted)
+        try:
+            await self.commands.send(messages.set_mode(number), check, shown=shown)
+        except Rejected:
+            self._mode_asked = None
+            raise
         before = self.state.mode  # as it was when the vehicle answered
         await self.waiting.until(
             {"HEARTBEAT"}, lambda: shown() or None, HEARTBEAT_TIMEOUT, f"show mode {mode.upper()}"

@@ -22,8 +22,9 @@ os.environ["MAVLINK20"] = "1"  # before pymavlink is imported anywhere
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from mavproxy_uavapi.errors import Aborted
 from mavproxy_uavapi.host.host import Host
-from mavproxy_uavapi.host.link import Address
+from mavproxy_uavapi.host.link import Address, require_finite
 from mavproxy_uavapi.sim.options import Home, Options, Wind
 from mavproxy_uavapi.sim.simulator import STEP, Simulator
 from mavproxy_vision.camera import Frame
@@ -144,6 +145,7 @@ class WireLink:
         self._in = mavlink.MAVLink(None)
 
     async def send(self, message: Any, _system: int) -> None:
+        require_finite(message)
         self.deliver(message)
 
     def deliver(self, message: Any) -> None:
@@ -233,6 +235,40 @@ class Lockstep:
             return self.host.jobs.begin(self.copter, name, {"n": self.loop.time()}, body, outlives_client=True)
 
         return self.run(start())
+
+    def stop(self, reason: str = "stopped") -> Any:
+        """What `vision abort` and `/vision/stop` do."""
+
+        async def stopped() -> Any:
+            return self.flights.stop(reason)
+
+        return self.run(stopped())
+
+    def abort(self, job: Any) -> None:
+        """What DELETE of the job does."""
+
+        async def aborted() -> None:
+            job.abort(Aborted("aborted by DELETE"))
+
+        self.run(aborted())
+
+    def unload(self, *, last: bool = False) -> list[Any]:
+        """What `module unload vision` does; of the last module nobody sends any more, but for the last words."""
+
+        async def never(_message: Any, _system: int) -> None:
+            await asyncio.Event().wait()  # MAVProxy's main loop waits for the unload, and sends nothing
+
+        async def unloaded() -> list[Any]:
+            self.flights.abandon()
+            await asyncio.sleep(0)
+            return [message for words in self.host.last_words for message, _ in words()] if last else []
+
+        if last:
+            self.wire.send = never  # type: ignore[method-assign]
+        said = self.run(unloaded())
+        for message in said:
+            self.wire.deliver(message)
+        return said
 
     def outcome(self, job: Any) -> Any:
         """Its result, or the error that it ended with."""

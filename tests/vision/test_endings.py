@@ -9,13 +9,15 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from mavproxy_uavapi.errors import Aborted, Invalid, LinkLost, ModeChanged, NotArmed
+from mavproxy_uavapi.errors import Invalid, LinkLost, ModeChanged, NotArmed
+from mavproxy_uavapi.host.link import is_finite
+from mavproxy_uavapi.sim.mission import Item
 from mavproxy_uavapi.vehicle.messages import NedTarget, VelocityTarget
 from mavproxy_vision.errors import LandingFailed
 from mavproxy_vision.geometry import Attitude, vector
+from mavproxy_vision.landing import Landing, Order, Phase
 from mavproxy_vision.mission import Errand
 from mavproxy_vision.plnd import WANTED, landing_target
-from mavproxy_vision.setpoints import setpoint
 
 TAG = "0:0.30@0.8,-0.6"
 FAR_TAG = "0:0.30@1.6,-1.2"
@@ -63,11 +65,21 @@ def silent(rig: Any, name: str) -> None:
     rig.host._receive = lambda message: None if message.get_type() == name else hear(message)
 
 
-def holds(rig: Any, seconds: float = 10.0) -> bool:
+def unheard(rig: Any, mode: str) -> Any:
+    """From now on nobody hears a heartbeat of that mode; what has to be put back to hear it."""
+    hear = rig.host._receive
+    rig.host._receive = lambda message: (
+        None if message.get_type() == "HEARTBEAT" and message.custom_mode == MODES[mode] else hear(message)
+    )
+    return hear
+
+
+def holds(rig: Any, mode: str = "GUIDED", seconds: float = 10.0) -> bool:
+    """Whether it stays where it is, armed, in that mode: what the autopilot flew by itself is left by BRAKE."""
     rig.pass_time(3.0)
     before = height(rig)
     rig.pass_time(seconds)
-    return rig.mode == "GUIDED" and rig.simulator.copter.armed and abs(height(rig) - before) < 0.5
+    return rig.mode == mode and rig.simulator.copter.armed and abs(height(rig) - before) < 0.5
 
 
 # -- stopped while the autopilot flies for us ----------------------------------------------------------------
@@ -79,9 +91,9 @@ def test_stopped_in_what_a_failed_landing_does_it_holds(flying, action):
     job = rig.land()
     until(rig, lambda: rig.mode == action.upper())
     rig.pass_time(1.0)
-    assert rig.flights.stop("stopped")
+    assert rig.stop()
     assert str(rig.outcome(job)) == "stopped; the vehicle is told to hold"
-    assert holds(rig)
+    assert holds(rig, "BRAKE")
 
 
 def test_stopped_in_land_by_landing_target_it_holds_and_plnd_is_as_before(flying):
@@ -90,9 +102,9 @@ def test_stopped_in_land_by_landing_target_it_holds_and_plnd_is_as_before(flying
     job = rig.land(method="landing_target")
     until(rig, lambda: rig.mode == "LAND")
     rig.pass_time(2.0)
-    assert rig.flights.stop("stopped")
+    assert rig.stop()
     rig.outcome(job)
-    assert holds(rig)
+    assert holds(rig, "BRAKE")
     assert plnd(rig) == before
 
 
@@ -105,7 +117,7 @@ def test_stopped_in_the_pilots_mode_nothing_is_sent_and_nothing_else_is_said(fly
     mark = len(rig.wire.sent)
     until(rig, lambda: rig.copter.mode == "LOITER" or not job.running)
     if job.running:
-        rig.flights.stop("stopped")
+        rig.stop()
     rig.outcome(job)
     rig.pass_time(2.0)
     assert rig.mode == "LOITER"
@@ -120,7 +132,7 @@ def test_a_mission_that_is_stopped_at_its_takeoff_does_not_take_off(lockstep, af
     job = rig.begin(rig.flights.errand(rig.copter, Errand(alt=5, north=8, east=-5)))
     until(rig, lambda: any(m.command == TAKEOFF for m in sent(rig, "COMMAND_LONG")))
     rig.pass_time(after)
-    rig.flights.stop("stopped")
+    rig.stop()
     rig.outcome(job)
     rig.pass_time(8.0)
     assert height(rig) < 1.5
@@ -140,9 +152,9 @@ def test_one_lost_message_does_not_keep_it_from_holding(flying):
             deliver(message)
 
     rig.wire.deliver = lossy
-    rig.flights.stop("stopped")
+    rig.stop()
     rig.outcome(job)
-    assert holds(rig)
+    assert holds(rig, "BRAKE")
     assert lost
 
 
@@ -153,33 +165,23 @@ def test_stopped_and_unloaded_in_one_breath_it_holds_and_plnd_is_as_before(flyin
     until(rig, lambda: rig.mode == "LAND")
     rig.pass_time(1.0)
 
-    async def both() -> list[Any]:
-        rig.flights.stop("stopped")
-        return rig.flights.abandon()
-
-    deliver = rig.wire.deliver
-    rig.wire.deliver = lambda _message: None  # the main loop, which waits for the unload, sends nothing more
-    last = rig.run(both())
-    for message, _system in last:
-        deliver(message)
-    rig.pass_time(12.0)
-    assert rig.mode == "GUIDED"
-    assert height(rig) > 2
+    flights, abandon = rig.flights, rig.flights.abandon
+    flights.abandon = lambda: (flights.stop("stopped"), abandon())
+    rig.unload(last=True)
+    assert holds(rig, "BRAKE")
     assert plnd(rig) == before
 
 
-def test_unloaded_in_the_autopilots_land_it_holds(flying):
+def test_unloaded_in_the_autopilots_land_it_lands(flying):
     rig = flying(alt=6.0, sim_tags="", attempts=1, leash=1.0, on_failure="land")
     job = rig.land()
     until(rig, lambda: rig.mode == "LAND")
-
-    async def abandon() -> list[Any]:
-        return rig.flights.abandon()
-
-    for message, _system in rig.run(abandon()):
-        rig.wire.deliver(message)
-    assert not job.running
-    assert holds(rig)
+    rig.unload()
+    assert "left alone: it is in LAND" in str(rig.outcome(job))
+    mark = len(rig.wire.sent)
+    until(rig, lambda: not rig.simulator.copter.armed)
+    assert rig.mode == "LAND"
+    assert not sent(rig, "SET_POSITION_TARGET_LOCAL_NED", mark)
 
 
 def test_a_mission_that_is_stopped_holds_before_it_writes_its_track(flying):
@@ -187,11 +189,225 @@ def test_a_mission_that_is_stopped_holds_before_it_writes_its_track(flying):
     rig.flights._directory = lambda: (_ for _ in ()).throw(RuntimeError("no home directory"))
     job = rig.begin(rig.flights.errand(rig.copter, Errand(alt=20, north=60, east=0)))
     rig.pass_time(4.0)
-    assert rig.flights.stop("stopped")
+    assert rig.stop()
     error = rig.outcome(job)
     assert "told to hold" in str(error)
     assert holds(rig)
     assert rig.flights.report.track == "not written: no home directory"
+
+
+# -- every flight, ended in every way ------------------------------------------------------------------------
+
+FLIGHTS = ["land", "landing_target", "search", "takeoff", "leg"]
+
+
+def under_way(lockstep: Any, name: str) -> tuple[Any, Any]:
+    """A flight of that kind in its middle, and its job."""
+    precise = name == "landing_target"
+    rig = lockstep(**{**SMALL, "sim_tags": TAG if name == "land" else "", **(LARGE if precise else {})}, plnd=precise)
+    if name in ("takeoff", "leg"):
+        rig.switch_on()
+        rig.open_eye()
+        errand = Errand(alt=10, north=60, east=0, on_tag=False)
+        job = rig.begin(rig.flights.errand(rig.copter, errand), "/vision/mission")
+        until(rig, lambda: any(m.command == TAKEOFF for m in sent(rig, "COMMAND_LONG")))
+        until(rig, lambda: rig.truth.north > 2.0 if name == "leg" else height(rig) > 0.5)
+        return rig, job
+    rig.start(7.0)
+    rig.before = plnd(rig)
+    if name == "search":
+        job = rig.begin(rig.flights.searching(rig.copter, None, None), "/vision/search")
+        until(rig, lambda: "searching" in rig.flights.phase)
+        rig.pass_time(1.5)
+        return rig, job
+    job = rig.land(method="landing_target" if precise else "velocity")
+    until(rig, lambda: rig.copter.mode == "LAND" if precise else "descending" in rig.flights.phase)
+    rig.pass_time(1.0)
+    return rig, job
+
+
+def pilot(rig: Any, mode: int) -> None:
+    """The pilot switches; for AUTO there is a mission."""
+    rig.simulator.copter.sticks.move(3, 1500)
+    item = Item(mavlink.MAV_CMD_NAV_LOITER_UNLIM, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, 0, 0, 0, 0, 0, 0, 10.0)
+    rig.simulator.copter.mission.replace([item, item])
+    assert rig.simulator.copter.set_mode(mode)
+
+
+def client(rig: Any, verb: Any) -> None:
+    """Somebody else's verb."""
+    rig.begin(lambda job: verb(rig.copter, job), "/command/other")
+    rig.pass_time(0.2)
+
+
+def defect(rig: Any, _job: Any) -> None:
+    """A bug in what flies: the next thing that the flight asks fails."""
+    rig.loop.set_exception_handler(lambda _loop, _context: None)  # it is told there, too
+
+    def broken(*_: Any) -> Any:
+        raise ZeroDivisionError("a defect")
+
+    rig.copter.held_by, rig.vision.now = broken, broken
+    rig.pass_time(0.3)
+    del rig.copter.held_by, rig.vision.now
+
+
+# How it ends, the error of its client, and the mode that follows what is flown in GUIDED, and what is flown in LAND.
+ENDS: dict[str, tuple[Any, str, str, str]] = {
+    "DELETE": (lambda rig, job: rig.abort(job), "aborted", "GUIDED", "BRAKE"),
+    "vision stop": (lambda rig, _: rig.stop(), "aborted", "GUIDED", "BRAKE"),
+    "unload": (lambda rig, _: rig.unload(), "aborted", "GUIDED", "LAND"),
+    "unload of the last module": (lambda rig, _: rig.unload(last=True), "aborted", "GUIDED", "LAND"),
+    "defect": (defect, "internal", "GUIDED", "LAND"),
+    "another search": (
+        lambda rig, _: rig.begin(rig.flights.searching(rig.copter, 3, 2.0)), "superseded", "GUIDED", "",
+    ),
+    "movement": (
+        lambda rig, _: client(rig, lambda copter, job: copter.go_to(job, NedTarget(30, 0, -9))),
+        "superseded", "GUIDED", "",
+    ),
+    "rtl": (lambda rig, _: client(rig, lambda copter, job: copter.rtl(job)), "superseded", "RTL", "RTL"),
+    "land": (lambda rig, _: client(rig, lambda copter, job: copter.land(job)), "superseded", "LAND", "LAND"),
+    "brake": (
+        lambda rig, _: client(rig, lambda copter, job: copter.set_mode(job, "BRAKE")), "superseded", "BRAKE", "BRAKE",
+    ),
+    "LOITER by the pilot": (lambda rig, _: pilot(rig, 5), "mode_changed", "LOITER", "LOITER"),
+    "RTL by the pilot": (lambda rig, _: pilot(rig, 6), "mode_changed", "RTL", "RTL"),
+    "AUTO by the pilot": (lambda rig, _: pilot(rig, 3), "mode_changed", "AUTO", "AUTO"),
+    "disarm": (
+        lambda rig, _: client(rig, lambda copter, job: copter.disarm(job, force=True)), "superseded", "", "",
+    ),
+    "silence": (
+        lambda rig, _: rig.simulator.faults.silence(rig.simulator.copter.now, 8.0, sending=True, receiving=True),
+        "link_lost", "GUIDED", "LAND",
+    ),
+}  # fmt: skip
+REFUSED_IN_LAND = ("another search", "movement")
+NOT_IN_A_TAKEOFF = ("another search", "movement")  # 409 busy
+MODES = {"LAND": 9, "RTL": 6, "BRAKE": 17, "GUIDED": 4}
+
+
+@pytest.mark.parametrize("end", ENDS)
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_what_follows_a_flight_is_what_the_table_says(lockstep, name, end):
+    rig, job = under_way(lockstep, name)
+    act, code, after_guided, after_land = ENDS[end]
+    refused = end in REFUSED_IN_LAND if name == "landing_target" else name == "takeoff" and end in NOT_IN_A_TAKEOFF
+    began, mode = height(rig), after_land if name == "landing_target" else after_guided
+    act(rig, job)
+    if refused:  # the flight goes on
+        rig.pass_time(0.5)
+        assert job.running
+        return
+    error = rig.outcome(job)
+    assert error.code == code, error
+    rig.pass_time(0.3)
+    mark = len(rig.wire.sent)
+    rig.pass_time(12.0)
+    if mode not in ("LAND", "RTL"):  # else it has landed, or not yet
+        assert rig.simulator.copter.armed == (end != "disarm")
+    if mode:
+        assert rig.mode == mode
+    if mode in ("GUIDED", "BRAKE") and end not in REFUSED_IN_LAND and end != "silence":
+        assert math.hypot(*rig.simulator.copter.body.velocity[:2]) < 0.3
+        assert height(rig) < began + 1.5
+    if name == "landing_target":
+        assert plnd(rig) == rig.before
+    flown = [m for m in rig.wire.sent[mark:] if m.get_type() in ("SET_POSITION_TARGET_LOCAL_NED", "LANDING_TARGET")]
+    rest = [m for m in flown if m.get_type() == "LANDING_TARGET" or (m.vx, m.vy, m.vz) != (0, 0, 0)]
+    assert end == "another search" or not rest
+    switched = {m.param2 for m in sent(rig, "COMMAND_LONG", mark) if m.command == SWITCH_MODE}
+    assert switched <= {MODES.get(mode)}
+
+
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_stop_holds_a_flight_and_resume_does_not_take_up_what_it_flew_by(lockstep, name):
+    rig, job = under_way(lockstep, name)
+    answers = []
+
+    async def begin(verb: Any, path: str) -> Any:
+        async def body(one: Any) -> str:
+            await verb(one)
+            return "done"
+
+        return rig.host.jobs.begin(rig.copter, path, {}, body)
+
+    stop = rig.run(begin(rig.copter.stop, "/movement/stop"))
+    answers.append(rig.outcome(stop))
+    if name == "landing_target":
+        assert answers[0].code == "mode_changed"
+        assert job.running
+        return
+    assert answers == ["done"]
+    rig.pass_time(0.3)
+    if name in ("takeoff", "leg"):  # it waits, and goes on
+        assert job.running
+        rig.pass_time(2.0)
+        assert float(abs(rig.simulator.copter.body.velocity[0])) < 0.3
+    else:
+        assert rig.outcome(job).code == "paused"
+        assert rig.outcome(rig.land()).code == "paused"
+    before = rig.truth
+    rig.outcome(rig.run(begin(rig.copter.resume, "/movement/resume")))
+    rig.pass_time(3.0)
+    moved = math.dist(before, rig.truth)
+    assert moved > 1.0 if job.running else moved < 0.3
+
+
+@pytest.mark.parametrize("ended", ["stop", "unload"])
+def test_a_flight_that_is_ended_while_it_is_prepared_never_begins(lockstep, ended):
+    rig = lockstep(sim_tags=TAG, plnd=True, **SMALL)
+    rig.switch_on()
+    rig.open_eye()
+    hear = rig.host._receive
+    silent(rig, "PARAM_VALUE")
+    errand = Errand(alt=5, north=8, east=-5, method="landing_target")
+    job = rig.begin(rig.flights.errand(rig.copter, errand), "/vision/mission")
+    rig.pass_time(0.3)
+    getattr(rig, ended)()
+    rig.host._receive = hear
+    assert rig.outcome(job).code == "aborted"
+    rig.pass_time(20.0)
+    assert not rig.simulator.copter.armed
+
+
+@pytest.mark.parametrize("action", ["land", "rtl"])
+def test_what_is_ended_before_telemetry_shows_its_mode_is_held_all_the_same(flying, action):
+    rig = flying(alt=6.0, sim_tags="", attempts=1, leash=1.0, on_failure=action)
+    hear = unheard(rig, action.upper())
+    job = rig.land()
+    until(rig, lambda: rig.mode == action.upper())
+    rig.pass_time(0.2)
+    assert rig.stop() == "stopped; the vehicle is told to hold"
+    rig.pass_time(0.02)
+    rig.host._receive = hear
+    rig.outcome(job)
+    assert holds(rig, "BRAKE")
+
+
+def test_what_is_on_its_way_to_land_by_landing_target_refuses_movements(flying):
+    rig = flying(alt=6.0, plnd=True, **LARGE)
+    hear = unheard(rig, "LAND")
+    job = rig.land(method="landing_target")
+    until(rig, lambda: rig.mode == "LAND")
+    rig.pass_time(0.2)
+    other = rig.begin(lambda one: rig.copter.go_to(one, NedTarget(30, 0, -9)), "/movement/go_to_ned")
+    assert rig.outcome(other).code == "busy"
+    rig.host._receive = hear
+    assert rig.outcome(job).startswith("Landed on tag 0")
+
+
+def test_a_yaw_rate_after_a_search_turns_it_above_the_tag(flying):
+    rig = flying(alt=5.0)
+    rig.fly_to(-6.0, 0.0, -5.0)  # the target of long ago
+    rig.fly_to(0.0, 0.0, -5.0)
+    rig.outcome(rig.begin(rig.flights.searching(rig.copter, None, None), "/vision/search"))
+    rig.pass_time(5.0)  # GUID_TIMEOUT is over too
+    before, yaw = rig.truth, rig.simulator.copter.body.yaw
+    assert rig.outcome(rig.begin(lambda job: rig.copter.set_yaw_rate(job, 20.0), "/movement/set_yaw_rate")) == "done"
+    rig.pass_time(10.0)
+    assert math.dist(before, rig.truth) < 1.0
+    assert rig.simulator.copter.body.yaw != pytest.approx(yaw, abs=0.1)
 
 
 # -- newer flights -------------------------------------------------------------------------------------------
@@ -295,10 +511,11 @@ def test_parameters_are_given_back_after_two_landings_in_a_row(flying, pause):
     rig.host._receive = slowly
     first = rig.land(method="landing_target")
     until(rig, lambda: rig.mode == "LAND")
-    rig.flights.stop("stopped")
+    rig.stop()
     rig.outcome(first)
     rig.pass_time(pause)
-    until(rig, lambda: rig.copter.mode == "GUIDED")
+    until(rig, lambda: rig.copter.mode == "BRAKE")
+    rig.outcome(rig.begin(lambda job: rig.copter.set_mode(job, "GUIDED"), "/command/guided"))
     during: list[dict[str, float]] = []
     rig.each_step.append(lambda: during.append(plnd(rig)) if rig.mode == "LAND" and rig.flights.running else None)
     assert rig.outcome(rig.land(method="landing_target")).startswith("Landed on tag 0")
@@ -320,10 +537,10 @@ def test_a_parting_is_not_cut_short_by_the_next_flight(flying):
         deliver(message)
 
     rig.wire.send = in_turns
-    rig.flights.stop("stopped")
+    rig.stop()
     rig.pass_time(0.05)
     job._task.cancel()
-    assert holds(rig)
+    assert holds(rig, "BRAKE")
 
 
 # -- another vehicle -----------------------------------------------------------------------------------------
@@ -488,7 +705,7 @@ def test_a_landing_that_is_stopped_before_it_took_over_leaves_the_one_under_way_
     rig.copter.parameters = slowly
     second = rig.land(method="landing_target")
     rig.pass_time(0.2)
-    second.abort(Aborted("its client hung up"))
+    rig.abort(second)
     rig.copter.parameters = ask
     assert rig.outcome(first).startswith("Landed on tag 0")
 
@@ -605,12 +822,28 @@ def test_the_angles_of_landing_target_mean_the_same_as_its_position(forward, rig
     assert (message.x, message.y, message.z) == pytest.approx((forward, right, 4.0))
 
 
-def test_what_is_no_number_is_never_packed():
-    for velocity in (vector(math.nan, 0, 0), vector(0, math.inf, 0)):
-        with pytest.raises(ValueError, match="no velocity"):
-            setpoint((1, 1), velocity, 0.0)
-    with pytest.raises(ValueError, match="no place"):
-        landing_target(1.0, vector(math.nan, 0, 1), Attitude())
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_a_velocity_that_is_no_number_is_not_sent_and_the_vehicle_holds(flying, monkeypatch, bad):
+    rig = flying(sim_tags="")
+    job = rig.land()
+    rig.pass_time(1.0)
+    monkeypatch.setattr(Landing, "step", lambda *_: Order(Phase.LOOK, vector(0, bad, 0)))
+    assert "a number in it is not finite" in str(rig.outcome(job))
+    assert holds(rig, seconds=3.0)
+
+
+def test_a_target_that_is_no_number_is_not_told_and_the_landing_goes_on_by_itself(flying):
+    rig = flying(alt=6.0, plnd=True, **LARGE)
+    before = plnd(rig)
+    job = rig.land(method="landing_target")
+    until(rig, lambda: rig.mode == "LAND")
+    rig.pass_time(1.5)
+    rig.vision.target.place[:] = math.nan
+    assert "a number in it is not finite" in str(rig.outcome(job))
+    rig.pass_time(3.0)
+    assert rig.mode == "LAND"
+    assert plnd(rig) == before
+    assert all(map(is_finite, rig.wire.sent))
 
 
 def test_an_id_that_tags_does_not_name_has_the_size_of_the_main_tag_of_now(lockstep):

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.errors import LinkLost, ModeChanged
+from mavproxy_uavapi.vehicle.authority import Rank
 from mavproxy_vision.errors import LandingFailed
 
 TAG = "0:0.30@0.8,-0.6"  # m north and east of home, above which the vehicle takes off
@@ -317,13 +318,7 @@ def test_unloaded_in_flight_the_vehicle_holds(flying):
     job = rig.land()
     rig.pass_time(2.0)
     assert rig.simulator.copter.body.velocity_down > 0.1
-
-    async def abandon() -> list[Any]:
-        return rig.flights.abandon()
-
-    last = rig.run(abandon())
-    for message, _system in last:
-        rig.wire.deliver(message)
+    last = rig.unload(last=True)
     mark = len(rig.wire.sent)
     height = -rig.truth.down
     rig.pass_time(5.0)
@@ -340,7 +335,7 @@ def test_a_newer_command_supersedes_the_landing_and_it_sends_nothing_more(flying
     rig.pass_time(2.0)
 
     async def other(new: Any) -> None:
-        rig.copter.seat.take(new)
+        rig.copter.authority.take(new, Rank.MOVEMENT)
 
     rig.begin(other, "/movement/other")
     rig.pass_time(0.05)
@@ -355,7 +350,7 @@ def test_stopped_it_holds(flying):
     rig.land()
     rig.pass_time(2.0)
     mark = len(rig.wire.sent)
-    assert rig.flights.stop("stopped")
+    assert rig.stop()
     rig.pass_time(0.2)
     last = setpoints(rig, mark)[-1]
     assert (last.vx, last.vy, last.vz) == (0, 0, 0)
