@@ -15,7 +15,7 @@ TEST = [
     "requests>=2.31",
     "setuptools>=70.1",
 ]
-LINT = ["ruff>=0.6", "mypy>=1.11", "types-requests"]
+LINT = ["ruff>=0.6", "mypy>=1.11", "types-requests", "types-psutil"]
 
 setup(
     name="mavproxy-uavapi",
@@ -34,6 +34,7 @@ setup(
         "pymavlink>=2.4.42",
         "aiohttp>=3.10",
         "pydantic>=2.7",
+        "psutil>=6",  # which script a connection comes from
         "swagger-ui-py>=25.7.1",  # the files of Swagger UI 5 for /docs, which OpenAPI 3.1 needs
     ],
     extras_require={
