@@ -30,7 +30,7 @@ PROGRAMS = {  # program: its speed-up
     "go_to_polygon/go_to_polygon.py": SPEEDUP,
     "drive_polygon/drive_polygon.py": SPEEDUP,
     "gps_follower/gps_follower.py": SPEEDUP,
-    "delivery/delivery_simulation.py": 2,  # it sleeps for 4 s between arming and take-off, ArduPilot disarms after 10
+    "delivery/delivery_simulation.py": 1,  # it sleeps for 8 s between arming and take-off, ArduPilot disarms after 10
 }
 FOLLOWER = "gps_follower/gps_follower.py"
 FOLLOWS_FOR = 8.0  # s until Ctrl-C, which sends it home
