@@ -15,7 +15,7 @@ TEST = [
     "requests>=2.31",
     "setuptools>=70.1",
 ]
-LINT = ["ruff>=0.6", "mypy>=1.11", "types-requests", "types-psutil"]
+LINT = ["ruff>=0.6", "mypy>=1.11", "types-psutil", "types-requests"]
 
 setup(
     name="mavproxy-uavapi",
@@ -33,8 +33,8 @@ setup(
         "MAVProxy>=1.8.71",
         "pymavlink>=2.4.42",
         "aiohttp>=3.10",
+        "psutil>=6",
         "pydantic>=2.7",
-        "psutil>=6",  # which script a connection comes from
         "swagger-ui-py>=25.7.1",  # the files of Swagger UI 5 for /docs, which OpenAPI 3.1 needs
     ],
     extras_require={

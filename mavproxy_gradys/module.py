@@ -9,7 +9,6 @@ from typing import Any
 
 try:
     from mavproxy_gradys import console
-    from mavproxy_gradys.errands import Errands
     from mavproxy_gradys.http import Handlers
     from mavproxy_gradys.service import Gradys
     from mavproxy_gradys.settings import ModuleSettings, Settings
@@ -17,8 +16,10 @@ try:
     from mavproxy_gradys.track_console import TrackConsole
 except ModuleNotFoundError as missing:  # MAVProxy prints the text of an ImportError as one line
     raise ImportError(f"gradys needs {missing.name}: pip install mavproxy-uavapi") from missing
+from mavproxy_uavapi.host.errands import Errands
 from mavproxy_uavapi.host.member import HostedModule, value_of
 from mavproxy_uavapi.host.patience import within
+from mavproxy_uavapi.host.remembered import Remembered
 from mavproxy_uavapi.settings import SettingError
 
 NAME = "gradys"
@@ -48,7 +49,8 @@ class GradysModule(HostedModule):
     """`module load gradys`."""
 
     def __init__(self, mpstate: Any, given: dict[str, Any]) -> None:
-        self.gradys_settings = ModuleSettings(given)
+        self.remembered = Remembered(mpstate, NAME, given)
+        self.gradys_settings = ModuleSettings(self.remembered.given)
         actions: dict[str, Callable[[list[str]], None]] = {
             "status": lambda _: self._show(console.status),
             "stats": lambda _: self._show(console.stats),
@@ -62,9 +64,10 @@ class GradysModule(HostedModule):
         super().__init__(mpstate, NAME, "GrADyS ground station push", actions, COMPLETIONS)
         self.add_completion_function(COMPLETION, self.gradys_settings.mp.completion)
         self.gradys = Gradys(self.host)
-        self._errands = Errands(self.host)
+        self._errands = Errands(self.host, NAME)
         self._track = TrackConsole(self.host, self.gradys.tracks)
         self._routes = Handlers(self.gradys).routes()
+        self.remembered.keep(self.gradys_settings.shown)
 
     def begin(self) -> None:
         """Push and sense."""
@@ -83,6 +86,7 @@ class GradysModule(HostedModule):
         await self.gradys.tracks.close()
         with contextlib.suppress(asyncio.TimeoutError):  # the spool is closed in its own thread
             await within(LONGEST_END, self.gradys.stop())
+        await self._errands.close()
 
     def unload(self) -> None:
         """Give back what is ours alone, then the rest."""
@@ -111,14 +115,14 @@ class GradysModule(HostedModule):
             await self.gradys.start(settings)
             return told(settings)
 
-        self._errands.send(start)
+        self._errands.send(start, "starting")
 
     def _stop(self) -> None:
         async def stop() -> str:
             await self.gradys.stop()
             return "stopped"
 
-        self._errands.send(stop)
+        self._errands.send(stop, "stopping")
 
     def _flush(self) -> None:
         self.host.bridge.call_soon(self.gradys.flush)
@@ -141,17 +145,18 @@ class GradysModule(HostedModule):
             return
         before = self.gradys_settings.snapshot()
         try:
-            self.gradys_settings.set(args[0], value_of(args[1:]))
+            self.gradys_settings.set(args[0], value := value_of(args[1:]))
         except SettingError as error:
             print(f"gradys: {error}")
             return
+        self.remembered.change(args[0], value)
         settings = self.gradys_settings.snapshot()
 
         async def restart() -> str:
             return told(settings) if await self.gradys.restart(settings) else ""
 
         if settings != before and self._begun:
-            self._errands.send(restart)
+            self._errands.send(restart, "taking up the setting")
 
 
 def told(settings: Settings) -> str:

@@ -8,7 +8,6 @@ from collections.abc import Callable, Coroutine, Mapping
 from pathlib import Path
 from typing import Any, NoReturn
 
-from mavproxy_gradys.errands import Errands
 from mavproxy_gradys.track_flight import (
     HIGHEST_TAKEOFF,
     LARGEST_REACH,
@@ -21,13 +20,15 @@ from mavproxy_gradys.track_flight import (
 from mavproxy_gradys.tracking import Tracking
 from mavproxy_gradys.tracks import FORMATS, GROUND, Waypoint, places_of, style_of
 from mavproxy_uavapi.errors import BadRequest
+from mavproxy_uavapi.host.errands import Errands
 from mavproxy_uavapi.host.host import Host
 
 HELP = """\
 gradys track                            what is recorded, and what is flown
 gradys track record FILE [SECONDS=5] [--format text|tuple|gpx] [--latest FILE] [--sysid N]
 gradys track stop                       end the recording
-gradys track fly FILE [--ground M] [--reach M] [--transit M]   take off, fly through the track, return and land"""
+gradys track fly FILE [--ground M] [--reach M] [--transit M] [--sysid N]
+                                        take off, fly through the track, return and land"""
 
 
 class Words(argparse.ArgumentParser):
@@ -65,6 +66,7 @@ def words() -> argparse.ArgumentParser:
     fly.add_argument("--ground", type=within(*GROUND))
     fly.add_argument("--reach", type=within(1.0, LARGEST_REACH), default=REACH)
     fly.add_argument("--transit", type=within(LOWEST_TRANSIT, HIGHEST_TAKEOFF), default=TRANSIT)
+    fly.add_argument("--sysid", type=int, default=0)
     verbs.add_parser("help", add_help=False)
     return made
 
@@ -80,7 +82,7 @@ class TrackConsole:
     def __init__(self, host: Host, tracks: Tracking) -> None:
         self._host = host
         self._tracks = tracks
-        self._errands = Errands(host)
+        self._errands = Errands(host, "gradys")
 
     def command(self, args: list[str]) -> None:
         """What was typed. Main loop only."""
@@ -119,7 +121,7 @@ class TrackConsole:
         return "nothing is recorded" if recorder is None else f"{recorder.written} readings are in {recorder.file}"
 
     async def _fly(self, given: argparse.Namespace) -> str:
-        vehicle = self._host.hangar.commandable(0)
+        vehicle = self._host.hangar.commandable(given.sysid)
         places = await asyncio.to_thread(read, given.file.expanduser(), given.ground)
         flight = flight_of(vehicle, places, given.reach, given.transit)
         request = {**{name: str(value) for name, value in vars(given).items()}, "digest": hash(tuple(places))}

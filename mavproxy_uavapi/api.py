@@ -41,7 +41,7 @@ class Api:
         server = Server(Service(self.host, settings, self.audit))
         try:
             await server.start()
-        except OSError:
+        except BaseException:  # a cancellation too: nobody would close the port
             await server.stop()
             raise
         self._server = server

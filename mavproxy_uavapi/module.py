@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import ssl
 from collections.abc import Callable
@@ -14,9 +15,11 @@ except ModuleNotFoundError as missing:  # MAVProxy prints the text of an ImportE
     raise ImportError(f"uavapi needs {missing.name}: pip install mavproxy-uavapi") from missing
 from mavproxy_uavapi.audit import Audit
 from mavproxy_uavapi.console import address_of, report, vehicles
+from mavproxy_uavapi.host.errands import Errands
 from mavproxy_uavapi.host.member import HostedModule, value_of
+from mavproxy_uavapi.host.remembered import Remembered
 from mavproxy_uavapi.logs import Logs, print_above_prompt
-from mavproxy_uavapi.settings import ModuleSettings, SettingError, Settings
+from mavproxy_uavapi.settings import SECRET, ModuleSettings, SettingError, Settings
 
 NAME = "uavapi"
 COMPLETION = "(UAVAPISETTING)"
@@ -31,7 +34,7 @@ uavapi set NAME VALUE    change one; it takes effect at once
 uavapi config            the settings in force, and where each came from
 uavapi log [N]           the last N commands: who asked, and how it ended
 uavapi vehicles          every vehicle that was heard
-uavapi fly FILE          fly a recorded track (module gradys)
+uavapi fly FILE          fly a recorded track with the API's vehicle, `sysid` (module gradys)
 uavapi help              this"""
 
 
@@ -39,7 +42,8 @@ class UavApiModule(HostedModule):
     """`module load uavapi`."""
 
     def __init__(self, mpstate: Any, given: dict[str, Any]) -> None:
-        self.api_settings = ModuleSettings(given)
+        self.remembered = Remembered(mpstate, NAME, given)
+        self.api_settings = ModuleSettings(self._given())
         self._wanted = True  # whether it is to listen; `uavapi stop` says no
         actions: dict[str, Callable[[list[str]], None]] = {
             "status": self._status,
@@ -57,7 +61,19 @@ class UavApiModule(HostedModule):
         self.audit = Audit(log_directory(mpstate))
         self.logs = Logs(lambda text: self.host.bridge.post(lambda: print_above_prompt(text, self.mpstate.rl.prompt)))
         self.api = Api(self.host, self.audit)
+        self._errands = Errands(self.host, NAME)
+        self._changing = asyncio.Lock()  # starts, stops and settings, in the order in which they were typed
         self.host.bridge.close_in_children(self.api.filenos)
+        self.remembered.keep(self._shown)
+
+    def _given(self) -> dict[str, Any]:
+        """The keywords and what was set at the prompt, and where `uavapi config` is to say that they came from."""
+        given = self.remembered.given
+        set_here = dict.fromkeys(self.remembered.changed, "uavapi set")
+        return {**given, "origins": {**given.get("origins", {}), **set_here}}
+
+    def _shown(self, name: str) -> object:
+        return "(set)" if name == SECRET else self.api_settings.mp.get(name)
 
     def begin(self) -> None:
         """Listen, unless a startup script said no."""
@@ -67,7 +83,8 @@ class UavApiModule(HostedModule):
             self._start()
 
     async def end(self) -> None:
-        """Stop listening."""
+        """Stop listening, and trying to."""
+        await self._errands.close()
         await self.api.stop()
 
     def unload(self) -> None:
@@ -98,30 +115,41 @@ class UavApiModule(HostedModule):
             print("uavapi: it listens once MAVProxy's main loop runs")
             return
         settings = self.api_settings.snapshot()
+
+        async def start() -> str:
+            async with self._changing:
+                return await self._listen(settings)
+
+        self._errands.send(start, f"trying to listen on {address_of(settings)}")
+
+    async def _listen(self, settings: Settings) -> str:
+        """Listen; what came of it. A disk may take its time, so a thread opens the logs."""
         address = address_of(settings)
         try:
-            self.logs.open(settings.log_console, settings.debug, settings.log_path, settings.sysid)
-            self.host.bridge.run(self.api.start(settings))
+            await self._open_logs(settings)
+            await self.api.start(settings)
         except ssl.SSLError as error:
-            print(f"uavapi: cannot use {settings.certfile} with {settings.keyfile}: {error.reason}")
+            return f"cannot use {settings.certfile} with {settings.keyfile}: {error.reason}"
         except OSError as error:
             why = os.strerror(error.errno) if error.errno else str(error)
             if error.filename is not None:
-                print(f"uavapi: cannot open {error.filename}: {why}")
-                return
-            print(f"uavapi: cannot listen on {address}: {why}; `uavapi set port N` takes another port")
-        else:
-            print(f"uavapi: listening on {address}")
-            if settings.allow_open and not settings.is_local:
-                print("uavapi: WARNING: allow_open is set: anybody who reaches this port can fly the vehicle")
+                return f"cannot open {error.filename}: {why}"
+            return f"cannot listen on {address}: {why}; `uavapi set port N` takes another port"
+        if settings.allow_open and not settings.is_local:
+            self._errands.say("WARNING: allow_open is set: anybody who reaches this port can fly the vehicle")
+        return f"listening on {address}"
+
+    async def _open_logs(self, settings: Settings) -> None:
+        told = settings.log_console, settings.debug, settings.log_path, settings.sysid
+        await asyncio.to_thread(self.logs.open, *told)
 
     def _fly(self, args: list[str]) -> None:
-        """`uavapi fly FILE`: the module that knows tracks flies it."""
+        """`uavapi fly FILE`: the module that knows tracks flies it, with the API's vehicle."""
         fly = self.host.commands.get("fly")
         if fly is None:
             print("uavapi: fly needs the module that knows tracks: `module load gradys`")
         else:
-            fly(args)
+            fly(["--sysid", str(self.api_settings.snapshot().sysid), *args])
 
     def _log(self, args: list[str]) -> None:
         try:
@@ -136,9 +164,16 @@ class UavApiModule(HostedModule):
 
     def _stop(self) -> None:
         self._wanted = False
-        if self._begun:
-            self.host.bridge.run(self.api.stop())
-        print("uavapi: stopped")
+        if not self._begun:
+            print("uavapi: stopped")
+            return
+
+        async def stop() -> str:
+            async with self._changing:
+                await self.api.stop()
+            return "stopped"
+
+        self._errands.send(stop, "stopping")
 
     def _set(self, args: list[str]) -> None:
         if len(args) < 2:
@@ -148,26 +183,32 @@ class UavApiModule(HostedModule):
             return
         before = self.api_settings.snapshot()
         try:
-            self.api_settings.set(args[0], value_of(args[1:]))
+            self.api_settings.set(args[0], value := value_of(args[1:]))
         except SettingError as error:
             print(f"uavapi: {error}")
             return
+        self.remembered.change(args[0], value)
         after = self.api_settings.snapshot()
         if after == before or not self._begun or not self._wanted:
             return
-        if after.listens_as(before):
-            self._renew(after)
-            return
-        self.host.bridge.run(self.api.stop())
-        self._start()
+        take_up = self._renew if after.listens_as(before) else self._restart
+        self._errands.send(lambda: take_up(after), "taking up the setting")
 
-    def _renew(self, settings: Settings) -> None:
+    async def _restart(self, settings: Settings) -> str:
+        """Listen anew; what is in flight ends."""
+        async with self._changing:
+            await self.api.stop()
+            return await self._listen(settings)
+
+    async def _renew(self, settings: Settings) -> str:
         """Take up settings without ending what is in flight."""
-        try:
-            self.logs.open(settings.log_console, settings.debug, settings.log_path, settings.sysid)
-        except OSError as error:
-            print(f"uavapi: cannot open {error.filename}: {error.strerror}; the logs stay as they were")
-        self.host.bridge.run(self.api.renew(settings))
+        async with self._changing:
+            await self.api.renew(settings)
+            try:
+                await self._open_logs(settings)
+            except OSError as error:
+                return f"cannot open {error.filename}: {error.strerror}; the logs stay as they were"
+        return ""
 
 
 def log_directory(mpstate: Any) -> Path | None:

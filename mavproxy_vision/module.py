@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import asyncio
 import os
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,9 @@ if not hasattr(getattr(cv2, "aruco", None), "ArucoDetector"):
     )
 
 from mavproxy_uavapi.errors import UavApiError
+from mavproxy_uavapi.host.errands import Errands
 from mavproxy_uavapi.host.member import HostedModule, value_of
+from mavproxy_uavapi.host.remembered import Remembered
 from mavproxy_uavapi.http.requests import NED_REACH
 from mavproxy_uavapi.vehicle.jobs import Job
 from mavproxy_vision import console, files
@@ -27,7 +28,7 @@ from mavproxy_vision.errors import BadSetting
 from mavproxy_vision.flights import Flights, Sortie
 from mavproxy_vision.http import Pages
 from mavproxy_vision.mission import Errand
-from mavproxy_vision.settings import METHODS, ModuleSettings, Settings
+from mavproxy_vision.settings import METHODS, ModuleSettings
 from mavproxy_vision.vision import Vision
 
 NAME = "vision"
@@ -48,7 +49,8 @@ class VisionModule(HostedModule):
     """`module load vision`."""
 
     def __init__(self, mpstate: Any, given: dict[str, Any]) -> None:
-        self.vision_settings = ModuleSettings(given)
+        self.remembered = Remembered(mpstate, NAME, given)
+        self.vision_settings = ModuleSettings(self.remembered.given)
         actions: dict[str, Callable[[list[str]], None]] = {
             "status": lambda _: self._tell(lambda: console.report(self.vision, self.flights)),
             "start": lambda _: self._start(),
@@ -68,9 +70,10 @@ class VisionModule(HostedModule):
         self.add_completion_function(COMPLETION, self.vision_settings.mp.completion)
         self.vision = Vision(self.host, self.vision_settings.snapshot())
         self.flights = Flights(self.vision, self._directory)
-        self._tasks: set[asyncio.Task[None]] = set()
+        self._errands = Errands(self.host, NAME)
         self._pages = Pages(self.vision, self.flights)
         self._routes = {route.path: route for route in self._pages.routes()}
+        self.remembered.keep(self.vision_settings.mp.get)
 
     # -- life ------------------------------------------------------------------------------------------------
 
@@ -78,16 +81,14 @@ class VisionModule(HostedModule):
         """Listen, and open the camera if one is set."""
         self.host.extensions.update(self._routes)
         self.host.newest_frame = self._pages.newest_frame
-        self._run(self._listen())
+        self.host.bridge.call_soon(self.vision.listen)
         if self.vision_settings.snapshot().source:
             self._start()
-
-    async def _listen(self) -> None:
-        self.vision.listen()
 
     async def end(self) -> None:
         """Close everything."""
         await self.vision.close()
+        await self._errands.close()
 
     def unload(self) -> None:
         """Make the vehicle hold, then give everything back."""
@@ -137,33 +138,23 @@ class VisionModule(HostedModule):
         print(self._run(told()) if self._begun else tell())
 
     def _start(self) -> None:
-        if self._awake():
-            self._do(self._started(self.vision_settings.snapshot()))
+        settings = self.vision_settings.snapshot()
 
-    async def _started(self, settings: Settings) -> None:
-        try:
+        async def started() -> str:
             await self.vision.start(settings)
-        except UavApiError as error:
-            self._say(str(error))
-        else:
-            self._say(f"looking for {settings.family} through {settings.source}")
+            return f"looking for {settings.family} through {settings.source}"
+
+        if self._awake():
+            self._errands.send(started, "opening the camera")
 
     def _stop(self) -> None:
+        async def stopped() -> str:
+            await self.vision.stop()
+            return "stopped"
+
         if self._awake():
             self._abort(quiet=True)
-            self._do(self._stopped())
-
-    async def _stopped(self) -> None:
-        await self.vision.stop()
-        self._say("stopped")
-
-    def _do(self, work: Coroutine[Any, Any, None]) -> None:
-        """Have the asyncio thread do what may take long: the main loop, which flies the vehicle, does not wait."""
-        self.host.bridge.call_soon(self._begin, work)
-
-    def _begin(self, work: Coroutine[Any, Any, None]) -> None:
-        self._tasks.add(task := asyncio.get_running_loop().create_task(work))
-        task.add_done_callback(self._tasks.discard)
+            self._errands.send(stopped, "closing the camera")
 
     def _abort(self, quiet: bool = False) -> None:
         async def stopped() -> str | None:
@@ -182,10 +173,11 @@ class VisionModule(HostedModule):
             print(f"vision: {args[0]} is not changed in flight (`vision abort` ends it)")
             return
         try:
-            self.vision_settings.set(args[0], value_of(args[1:]))
+            self.vision_settings.set(args[0], value := value_of(args[1:]))
         except BadSetting as error:
             print(f"vision: {error}")
             return
+        self.remembered.change(args[0], value)
         after = self.vision_settings.snapshot()
         if after == before or not self._begun:
             return
@@ -262,7 +254,7 @@ class VisionModule(HostedModule):
 
         async def begin() -> Job:
             copter = self.flights.copter()
-            return self.flights.begin(copter, make(request), path, request, self._say)
+            return self.flights.begin(copter, make(request), path, request, self._errands.say)
 
         if not self._awake():
             return
@@ -272,10 +264,6 @@ class VisionModule(HostedModule):
             print(f"vision: {error}")
         else:
             print(f"vision: {path.rpartition('/')[2]} begins (job {job.id}); `vision abort` ends it")
-
-    def _say(self, text: str) -> None:
-        """Print from the asyncio thread."""
-        self.host.bridge.post(lambda: print(f"vision: {text}"))
 
     # -- files -----------------------------------------------------------------------------------------------
 

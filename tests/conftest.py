@@ -161,6 +161,8 @@ def mavproxy_state() -> Any:
         public_modules={},
         settings=SimpleNamespace(target_system=0, target_component=0, source_system=255, source_component=230),
         status=SimpleNamespace(logdir=None),
+        continue_mode=False,
+        mav_param_by_sysid={},
         the_master=master,
         master=lambda system=None: master,
     )

@@ -70,6 +70,10 @@ class Bridge:
         self._busy = True
         self._inbox.append(message)
 
+    def feed_call(self, call: Callable[[], None]) -> None:
+        """Have the asyncio side run `call` between the messages that were fed before and after. Main loop only."""
+        self._inbox.append(call)
+
     def _hand_over(self) -> None:
         """Wake the asyncio side for what was fed since the last turn, and for what has waited for its end."""
         self._busy = False
@@ -93,11 +97,12 @@ class Bridge:
     def _deliver(self) -> None:
         self._delivering = False  # what comes from now on needs another call
         for _ in range(len(self._inbox)):
-            message = self._inbox.popleft()
+            fed = self._inbox.popleft()
             try:
-                self._receive(message)
+                fed() if callable(fed) else self._receive(fed)
             except Exception as error:  # noqa: BLE001  one bad message must not stop the next
-                context = {"message": f"uavapi: defect on {message.get_type()}", "exception": error}
+                what = "what was fed" if callable(fed) else fed.get_type()
+                context = {"message": f"uavapi: defect on {what}", "exception": error}
                 self.loop.call_exception_handler(context)
 
     def turn(self) -> None:

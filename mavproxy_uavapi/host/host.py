@@ -12,6 +12,7 @@ from typing import Any
 from mavproxy_uavapi.errors import LinkLost
 from mavproxy_uavapi.host.bridge import Bridge
 from mavproxy_uavapi.host.link import MavproxyLink
+from mavproxy_uavapi.host.parameters import ParameterWatch
 from mavproxy_uavapi.host.pending import Pending
 from mavproxy_uavapi.host.state import Fleet, VehicleState
 from mavproxy_uavapi.vehicle.endings import FlightEndings
@@ -61,6 +62,7 @@ class Host:
         self.last_words: list[Callable[[], list[tuple[Any, int]]]] = [self.endings.last_words]
         self._mpstate = mpstate
         self._told_target = 0
+        self._parameters = ParameterWatch()
         self._lost: set[int] = set()
         self._link_timers: dict[int, asyncio.TimerHandle] = {}
 
@@ -81,6 +83,7 @@ class Host:
         if target != self._told_target:
             self._told_target = target
             self.bridge.call_soon(setattr, self, "target", target)
+        self._tell_parameters()
         self.bridge.turn()
 
     def end(self) -> None:
@@ -97,6 +100,17 @@ class Host:
                 with contextlib.suppress(LinkLost):  # nobody hears us anyhow
                     self.link.write(message, system)
         self.bridge.stop()
+
+    def _tell_parameters(self) -> None:
+        """Hand over what MAVProxy has learnt of parameters, in order with the messages: a later PARAM_VALUE wins.
+
+        With `--continue` MAVProxy's tables hold a file of an earlier session: those are not the vehicle's word.
+        """
+        if self._mpstate.continue_mode:
+            return
+        changes = self._parameters.changes(self._mpstate.mav_param_by_sysid, self.clock())
+        if changes:
+            self.bridge.feed_call(lambda: self.fleet.learn(changes))
 
     # -- the asyncio thread -----------------------------------------------------------------------------
 

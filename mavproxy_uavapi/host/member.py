@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import difflib
+import logging
 from collections.abc import Callable
 from typing import Any
 
 from MAVProxy.modules.lib import mp_module
 
 from mavproxy_uavapi.host import host as hosts
+
+log = logging.getLogger("uavapi.api")
 
 Action = Callable[[list[str]], None]
 
@@ -36,11 +39,12 @@ class HostedModule(mp_module.MPModule):  # type: ignore[misc]
         super().__init__(mpstate, name, description, multi_vehicle=True)
         self._actions = actions
         self._begun = False
+        self._told_failure = ""
         self.host = hosts.join(mpstate, self)
         self.add_command(name, self.command, description, completions)
 
     def begin(self) -> None:
-        """Called once, in the first idle task: whatever opens a socket waits until then.
+        """Called once, in the first idle task: whatever opens a socket waits until then. It must not block.
 
         MAVProxy loads the modules of its command line before it forks, and a child would keep the socket.
         """
@@ -53,11 +57,22 @@ class HostedModule(mp_module.MPModule):  # type: ignore[misc]
         self.host.feed(self, packet)
 
     def idle_task(self) -> None:
-        """MAVProxy calls this several hundred times a second."""
-        self.host.idle(self)
-        if not self._begun:
-            self._begun = True
-            self.begin()
+        """MAVProxy calls this several hundred times a second, and keeps to itself what it raises."""
+        try:
+            self.host.idle(self)
+            if not self._begun:
+                self._begun = True
+                self.begin()
+        except Exception as error:  # noqa: BLE001  nobody else would tell of it
+            self._tell_failure(error)
+
+    def _tell_failure(self, error: Exception) -> None:
+        """Say why an idle task failed: once, though it may do so several hundred times a second."""
+        failure = f"{type(error).__name__}: {error}"
+        if failure != self._told_failure:
+            self._told_failure = failure
+            print(f"{self.name}: its idle task fails, `module reload {self.name}` may help: {failure}")
+            log.debug("idle task of %s", self.name, exc_info=error)
 
     def unload(self) -> None:
         """Give back all that was taken. Runs in another thread than the main loop, which waits for it."""

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from pymavlink import mavutil
 
+from mavproxy_uavapi.host import autopilot
 from mavproxy_uavapi.host.timeratio import TimeRatio
+from mavproxy_uavapi.vehicle.modes import kind_of
 
 mavlink = mavutil.mavlink
 
@@ -20,14 +23,6 @@ RECENT = 5.0  # s before the newest heartbeat; a state that was told earlier is 
 SEQUENCE_REORDER = 128  # a step back of less than this is a message out of order, not a loss
 FAILING = {mavlink.MAV_STATE_CRITICAL, mavlink.MAV_STATE_EMERGENCY}
 ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
-NOT_VEHICLES = {
-    mavlink.MAV_TYPE_GCS,
-    mavlink.MAV_TYPE_ADSB,
-    mavlink.MAV_TYPE_GIMBAL,
-    mavlink.MAV_TYPE_ONBOARD_CONTROLLER,
-    mavlink.MAV_TYPE_CAMERA,
-    mavlink.MAV_TYPE_ODID,
-}
 # What a reboot makes worthless; the rest is overwritten soon enough.
 FORGOTTEN_AT_REBOOT = ("HOME_POSITION", "HEARTBEAT", "EXTENDED_SYS_STATE", "SYS_STATUS", "EKF_STATUS_REPORT")
 
@@ -104,7 +99,7 @@ class VehicleState:
         mode_since: arrival of the heartbeat that first showed the mode (s).
         messages: newest message by name, and by `NAME[instance]` for those that come for several devices.
         others: newest message by (component, name), of the system's other components.
-        parameters: values that PARAM_VALUE told, by name.
+        parameters: values by name, that PARAM_VALUE told or MAVProxy knew. A reboot does not change them.
     """
 
     system: int
@@ -161,17 +156,24 @@ class VehicleState:
     def landed(self) -> bool | None:
         """Whether it stands on the ground; None while unknown.
 
-        A disarmed vehicle does. Else whichever told last: EXTENDED_SYS_STATE, or the heartbeat, whose
-        system_status is STANDBY on the ground and ACTIVE in the air (ArduCopter); CRITICAL says neither.
+        A rover or boat always does: its heartbeat says ACTIVE in every mode but HOLD, and it sends no landed state
+        (ArduRover, vehicle_system_status). Any other vehicle does while it is disarmed. Else EXTENDED_SYS_STATE
+        tells, or the heartbeat: STANDBY on the ground, ACTIVE in the air, CRITICAL says neither. A copter's word
+        is the one that came last; a plane's heartbeat counts only while EXTENDED_SYS_STATE is not told.
         """
+        kind = kind_of(self.vehicle_type)
+        if kind == "rover":
+            return True
         if self.armed is None or self.system_status is None:
             return None
         if not self.armed:
             return True
         told = self.messages.get("EXTENDED_SYS_STATE")
-        in_doubt = self.system_status in FAILING
-        if told is not None and told.message.landed_state and (in_doubt or told.at >= self.heartbeat_at):
-            return bool(told.message.landed_state == mavlink.MAV_LANDED_STATE_ON_GROUND)
+        if told is not None and told.message.landed_state:
+            in_doubt = self.system_status in FAILING
+            behind = self.heartbeat_at - told.at
+            if in_doubt or behind <= (RECENT if kind == "plane" else 0.0):
+                return bool(told.message.landed_state == mavlink.MAV_LANDED_STATE_ON_GROUND)
         return bool(self.system_status not in {mavlink.MAV_STATE_ACTIVE} | FAILING)
 
     @property
@@ -201,6 +203,17 @@ class VehicleState:
             self.parameters[message.param_id] = message.param_value
         for number in [n for n, text in self._chunks.items() if now - text.heard_at > CHUNK_TIMEOUT]:
             self._say_chunked(number, now)
+
+    def become(self, component: int, vehicle_type: int, now: float) -> None:
+        """Be the state of another component from now on, which has turned out to be the autopilot.
+
+        What that one told so far counts; what the former one told moves to `others`.
+        """
+        told = {(self.component, name): received for name, received in self.messages.items() if "[" not in name}
+        others = {**self.others, **told}
+        own = {name: others.pop((c, name)) for c, name in list(others) if c == component}
+        fresh = VehicleState(self.system, component, vehicle_type, now, messages=own, others=others)
+        vars(self).update(vars(fresh))  # in place: whoever flies or watches the vehicle holds this object
 
     def _take_heartbeat(self, message: Any, now: float) -> None:
         self.heartbeat_at = now
@@ -248,28 +261,42 @@ def _keep(store: dict[Any, Received], key: Any, message: Any, now: float) -> Non
 
 
 class Fleet:
-    """Every vehicle that was ever heard on the links, by system id."""
+    """Every vehicle that was ever heard on the links, by system id.
+
+    A system's state is its autopilot's, by `autopilot.rank`; when a better candidate is heard it becomes that one's.
+    It never goes back, not even when the better one falls silent: a second autopilot's mode and arming, told
+    from one moment to the next, would be taken for the vehicle's own. The link is lost then, and that is told.
+    """
 
     def __init__(self) -> None:
         self.vehicles: dict[int, VehicleState] = {}
+        self._parameters: dict[tuple[int, int], dict[str, float]] = {}  # by system and component
+        self._ranks: dict[int, int] = {}
 
     def update(self, message: Any, now: float) -> VehicleState | None:
         """Take a message; the state of the vehicle it came from, None when it came from no vehicle."""
         system = message.get_srcSystem()
+        if message.get_type() == "HEARTBEAT":
+            self._take_candidate(message, now)
         state = self.vehicles.get(system)
-        if state is None:
-            if not is_vehicle_heartbeat(message):
-                return None
-            state = VehicleState(system, message.get_srcComponent(), message.type, now)
-            self.vehicles[system] = state
-        state.update(message, now)
+        if state is not None:
+            state.update(message, now)
         return state
 
+    def learn(self, parameters: Mapping[tuple[int, int], Mapping[str, float]]) -> None:
+        """Take parameters by system and component, of vehicles that were heard or are yet to be."""
+        for key, values in parameters.items():
+            self._parameters.setdefault(key, {}).update(values)
 
-def is_vehicle_heartbeat(message: Any) -> bool:
-    """Whether `message` is the heartbeat of an autopilot, rather than of a gimbal or a ground station."""
-    return bool(
-        message.get_type() == "HEARTBEAT"
-        and message.autopilot != mavlink.MAV_AUTOPILOT_INVALID
-        and message.type not in NOT_VEHICLES
-    )
+    def _take_candidate(self, heartbeat: Any, now: float) -> None:
+        system, rank = heartbeat.get_srcSystem(), autopilot.rank(heartbeat)
+        if rank <= self._ranks.get(system, autopilot.NONE):
+            return
+        self._ranks[system] = rank
+        component = heartbeat.get_srcComponent()
+        state = self.vehicles.get(system)
+        if state is None:
+            self.vehicles[system] = VehicleState(system, component, heartbeat.type, now)
+        elif component != state.component:
+            state.become(component, heartbeat.type, now)
+        self.vehicles[system].parameters = self._parameters.setdefault((system, component), {})

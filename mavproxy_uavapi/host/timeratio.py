@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 REBOOT_STEP_BACK = 3000  # ms; more than any reordering between two links, less than any boot takes
+WRAP = 2**32  # ms; `time_boot_ms` begins anew at 0 after 49.7 days
+WRAP_SLACK = 60_000  # ms by which the vehicle's clock may run ahead of ours over a wrap
 WINDOW = 5.0  # s of ours between two readings of the ratio
 # GLOBAL_POSITION_INT's time is that of the position fix, which may run behind the boot time of others.
 NOT_BOOT_TIME = {"GLOBAL_POSITION_INT"}
@@ -16,22 +18,37 @@ class TimeRatio:
 
     def __init__(self) -> None:
         self.ratio = 1.0
-        self._boot_ms: int | None = None
         self._from: tuple[float, int] | None = None
-        self._newest: tuple[float, int] | None = None
+        self._newest: tuple[float, int] | None = None  # arrival (s), ms since the boot, wraps counted in
 
     def update(self, boot_ms: int | None, name: str, now: float) -> bool:
         """Take a message's `time_boot_ms`, arrived at `now` (s); whether it says that the vehicle rebooted."""
         if not boot_ms or name in NOT_BOOT_TIME:
             return False
-        rebooted = self._boot_ms is not None and boot_ms + REBOOT_STEP_BACK < self._boot_ms
+        uptime = self._uptime(boot_ms, now)
+        rebooted = self._newest is not None and uptime + REBOOT_STEP_BACK < self._newest[1]
         if rebooted:
             self._from = None
-        if rebooted or self._boot_ms is None or boot_ms > self._boot_ms:
-            self._boot_ms = boot_ms
-            self._newest = now, boot_ms
-        self._measure(boot_ms, now)
+        if rebooted or self._newest is None or uptime > self._newest[1]:
+            self._newest = now, uptime
+        self._measure(uptime, now)
         return rebooted
+
+    def _uptime(self, boot_ms: int, now: float) -> int:
+        """The ms since the boot, wraps counted in.
+
+        The time that falls back has wrapped when it would have come to that value by itself meanwhile; a message
+        from before a wrap may be overtaken by one from after it.
+        """
+        if self._newest is None:
+            return boot_ms
+        at, newest = self._newest
+        ahead = (boot_ms - newest) % WRAP
+        if ahead <= (now - at) * 1000 * max(self.ratio, 1.0) + WRAP_SLACK:
+            return newest + ahead
+        if WRAP - ahead <= REBOOT_STEP_BACK and newest > WRAP:
+            return newest + ahead - WRAP
+        return boot_ms
 
     def boot_time(self, now: float) -> float:
         """The vehicle's own clock at `now` (s of ours), in s since its boot; 0 before it told.

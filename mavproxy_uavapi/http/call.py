@@ -116,6 +116,7 @@ class Call:
             asked: what tells one request from another, where the parameters do not.
         """
         params = self.remembered = asked or self.remembered
+        is_async = self.is_async
 
         async def body(job: Job) -> str:
             await verb(job)
@@ -130,13 +131,11 @@ class Call:
             params.model_dump(),
             body,
             client=self.client,
-            outlives_client=outlives_client or self.is_async,
+            outlives_client=outlives_client or is_async,
             timeout=getattr(params, "timeout", None),
         )
-        if self.is_async:
-            peer = None if self.request.transport is None else self.request.transport.get_extra_info("peername")
-            if peer is not None:
-                job.script = await self.service.scripts.session_of(peer[:2])
+        if is_async:
+            job.script = await self.service.scripts.session_of(self.peer)
             return self.accepted(job)
         return self.answer(await self.outcome(job))
 
@@ -163,6 +162,13 @@ class Call:
     def client(self) -> str:
         """The client's address."""
         return self.request.remote or "unknown"
+
+    @property
+    def peer(self) -> tuple[str, int] | None:
+        """The client's end of the connection; None when it has hung up."""
+        transport = self.request.transport
+        address = None if transport is None else transport.get_extra_info("peername")
+        return None if address is None else (address[0], address[1])
 
     @property
     def is_async(self) -> bool:

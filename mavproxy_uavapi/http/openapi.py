@@ -41,7 +41,7 @@ TAGS = {
 EVERYWHERE = (errors.Unauthorized, errors.Forbidden, errors.Invalid, errors.TooManyRequests)
 OF_A_VEHICLE = (errors.LinkLost, errors.NoVehicle)
 OF_A_COMMAND = (*OF_A_VEHICLE, errors.NotSupported, errors.Rejected, errors.TimedOut, errors.Busy)
-OF_A_FLIGHT = (*OF_A_COMMAND, errors.Superseded, errors.ModeChanged, errors.NotArmed, errors.Aborted)
+OF_A_FLIGHT = (*OF_A_COMMAND, errors.Superseded, errors.ModeChanged, errors.Paused, errors.NotArmed, errors.Aborted)
 OF_A_SCRIPT = (errors.BadRequest, errors.NotFound, errors.ToolFailed)
 BY_TAG: Mapping[str, tuple[type[UavApiError], ...]] = {
     "command": OF_A_FLIGHT,

@@ -11,6 +11,7 @@ from mavproxy_uavapi.http.forms import file_of
 from mavproxy_uavapi.http.requests import MissionFile, Read, StartMission
 from mavproxy_uavapi.vehicle import mission, plans
 from mavproxy_uavapi.vehicle.jobs import Job
+from mavproxy_uavapi.vehicle.modes import flies_mission
 from mavproxy_uavapi.vehicle.vehicle import Vehicle
 
 LARGEST = 1024 * 1024  # bytes of a mission file
@@ -29,7 +30,7 @@ async def upload(call: Call) -> Answer:
         def told(done: int, of: int) -> None:
             job.progress = {"item": done, "items": of}
 
-        await vehicle.waypoints.upload(items, told)
+        await vehicle.waypoints.upload(items, told, check=lambda: _require_no_flown_mission(vehicle))
 
     # A client that hangs up must not leave half a mission.
     result = f"Mission of {len(items)} items uploaded"
@@ -50,7 +51,7 @@ async def clear(call: Call) -> Answer:
 
     async def verb(_job: Job) -> None:
         _require_no_flown_mission(vehicle)
-        await vehicle.waypoints.clear()
+        await vehicle.waypoints.clear(check=lambda: _require_no_flown_mission(vehicle))
 
     return await call.fly(vehicle, verb, "Mission cleared", outlives_client=True)
 
@@ -77,7 +78,7 @@ async def progress(call: Call) -> Answer:
 
 def _require_no_flown_mission(vehicle: Vehicle) -> None:
     """Raises Busy while the vehicle flies the mission that is to be changed."""
-    if vehicle.state.armed and vehicle.mode == mission.AUTO:
+    if vehicle.state.armed and flies_mission(vehicle.mode):
         raise Busy("the vehicle flies its mission; /command/guided or /command/brake first")
 
 

@@ -186,10 +186,12 @@ class Scripts:
         told = await asyncio.to_thread(runs.of_script, self.logs, script)
         return told[0] if told else None
 
-    async def session_of(self, peer: tuple[str, int]) -> str | None:
+    async def session_of(self, peer: tuple[str, int] | None) -> str | None:
         """The session of the script that a request comes from, by its end of the connection; None for others."""
         running = list(self._watched.values())
-        return await asyncio.to_thread(clients.session_of, *peer, running) if running else None
+        if peer is None or not running:
+            return None
+        return await asyncio.to_thread(clients.session_of, *peer, running)
 
     # -- what a script is given ---------------------------------------------------------------------------
 

@@ -127,18 +127,18 @@ class CommandAuthority:
         self._paused_at = max(self._state.heartbeat_at, self._state.mode_since)
         self._take(job, Rank.STOP)
 
-    def accompany(self, job: Job, kind: str, *, stopped_too: bool = False) -> None:
+    def accompany(self, job: Job, kind: str, rank: Rank = Rank.MOVEMENT, *, stopped_too: bool = False) -> None:
         """Let `job` command beside the commander; an earlier one of its kind is superseded.
 
         Args:
             job: who commands.
             kind: what: YAW, a speed, resume.
-            stopped_too: as for `admit`.
+            rank, stopped_too: as for `admit`.
 
         Raises:
             Busy, Paused: as `admit`.
         """
-        self.admit(Rank.MOVEMENT, stopped_too=stopped_too)
+        self.admit(rank, stopped_too=stopped_too)
         self._supersede([self._companions.get(kind)], job)
         self._companions[kind] = job
 

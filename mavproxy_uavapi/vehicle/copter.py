@@ -8,6 +8,7 @@ from mavproxy_uavapi.vehicle.authority import Rank
 from mavproxy_uavapi.vehicle.guided import ARRIVAL_SPEED, GUIDED, GuidedVehicle
 from mavproxy_uavapi.vehicle.jobs import Job
 from mavproxy_uavapi.vehicle.messages import VelocityTarget
+from mavproxy_uavapi.vehicle.modes import MISSION_MODES, flies_mission
 from mavproxy_uavapi.vehicle.touchdown import Touchdown
 
 TAKEOFF_SHARE = 0.05  # of the altitude, between TAKEOFF_TOLERANCE's two ends
@@ -15,7 +16,7 @@ TAKEOFF_TOLERANCE = (0.3, 1.0)  # m
 LIFT_OFF_TIMEOUT = 5.0  # s in which an unacknowledged takeoff must show
 STOP_TIMEOUT = 20.0  # s from full speed to rest
 HOME_RADIUS = 10.0  # m; closer than this a vehicle on the ground is at home
-SPEED_MODES = {"GUIDED", "AUTO", "AUTO RTL", "RTL"}  # others refuse DO_CHANGE_SPEED
+SPEED_MODES = {"GUIDED", "RTL", *MISSION_MODES}  # others refuse DO_CHANGE_SPEED
 
 
 class Copter(GuidedVehicle):
@@ -150,7 +151,7 @@ class Copter(GuidedVehicle):
         """
         self.require_armed()
         mode = self.mode
-        if mode not in (GUIDED, "AUTO"):
+        if mode != GUIDED and not flies_mission(mode):
             raise ModeChanged(f"the vehicle is in {mode}, in which it cannot be paused; /command/brake stops it")
         self.authority.interrupt(job)
         try:
@@ -170,7 +171,7 @@ class Copter(GuidedVehicle):
     async def resume(self, job: Job) -> None:
         """Continue the movement that `stop` interrupted."""
         self.require_armed()
-        if self.mode not in (GUIDED, "AUTO"):
+        if not flies_mission(self.mode):
             self.require_mode(GUIDED)
         self.authority.accompany(job, "resume", stopped_too=True)
         await self._continue(job)

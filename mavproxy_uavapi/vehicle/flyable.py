@@ -43,7 +43,7 @@ def status(vehicle: Vehicle, link_alive: bool, now: float) -> dict[str, Any]:
 
 
 def landed_state(vehicle: Vehicle) -> str:
-    """`on_ground`, `in_air`, `takeoff`, `landing`, or `unknown`."""
+    """`on_ground` (a rover or boat: always), `in_air`, `takeoff`, `landing`, or `unknown`."""
     told = vehicle.state.recent_field("EXTENDED_SYS_STATE", "landed_state")
     if told:
         name: str = mavlink.enums["MAV_LANDED_STATE"][told].name

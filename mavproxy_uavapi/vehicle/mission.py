@@ -11,6 +11,7 @@ from mavproxy_uavapi.errors import Busy, ModeChanged, Stale
 from mavproxy_uavapi.vehicle import messages
 from mavproxy_uavapi.vehicle.authority import Rank
 from mavproxy_uavapi.vehicle.jobs import Job
+from mavproxy_uavapi.vehicle.modes import flies_mission
 from mavproxy_uavapi.vehicle.plans import Item
 from mavproxy_uavapi.vehicle.vehicle import Vehicle
 
@@ -57,22 +58,29 @@ async def fly(vehicle: Vehicle, job: Job, until_complete: bool = False, timeout:
     await vehicle.commands.send(messages.set_mission_current(1), vehicle.commanding(job, startable))
     if vehicle.mode != AUTO:
         await vehicle.switch_to(job, AUTO, startable)
-    await vehicle.commands.send(messages.start_mission(), vehicle.commanding(job, lambda: vehicle.held_by(AUTO)))
+    await vehicle.commands.send(messages.start_mission(), vehicle.commanding(job, lambda: _held(vehicle)))
     started = vehicle.clock()
 
     def runs() -> bool | None:
+        _held(vehicle)
         _report(vehicle, job)
         return True if _is_active(vehicle, started) else None
 
-    await vehicle.flown(AUTO, {"MISSION_CURRENT"}, runs, START_TIMEOUT, "begin its mission")
+    await vehicle.waiting.until({"HEARTBEAT", "MISSION_CURRENT"}, runs, START_TIMEOUT, "begin its mission")
     vehicle.authority.shown(job)
     if until_complete:
         await _flown_to_its_end(vehicle, job, items, timeout or LONGEST)
 
 
+def _held(vehicle: Vehicle) -> None:
+    """Raises NotArmed or ModeChanged unless it flies its mission."""
+    if not (vehicle.state.armed and flies_mission(vehicle.mode)):
+        vehicle.held_by(AUTO)
+
+
 def _require_startable(vehicle: Vehicle) -> None:
     vehicle.require_armed()
-    if vehicle.mode not in STARTING_MODES:
+    if vehicle.mode not in STARTING_MODES and not flies_mission(vehicle.mode):
         raise ModeChanged(f"the vehicle is in {vehicle.mode}; /command/guided takes it over")
 
 
@@ -98,7 +106,7 @@ async def _flown_to_its_end(vehicle: Vehicle, job: Job, items: Sequence[Item], t
             return True
         if vehicle.state.armed is False and flown in final:
             return True
-        vehicle.held_by(AUTO)
+        _held(vehicle)
         flown = progress(vehicle)["current"] or flown
         return None
 

@@ -22,6 +22,15 @@ ROVERS = {mavlink.MAV_TYPE_GROUND_ROVER, mavlink.MAV_TYPE_SURFACE_BOAT}
 VTOLS = range(19, 26)  # MAV_TYPE: pymavlink has renamed them more than once
 PLANES = {mavlink.MAV_TYPE_FIXED_WING, *VTOLS}
 
+# The modes in which ArduPilot runs its mission: AUTO, of all vehicles; a copter shows AUTO_RTL instead from the jump
+# to the mission's landing sequence on. A plane that returns along one changes to AUTO for it.
+MISSION_MODES = {"AUTO", "AUTO_RTL"}
+
+
+def flies_mission(mode: str) -> bool:
+    """Whether the autopilot flies its mission in the mode of that name, be it a copter, a plane or a rover."""
+    return mode in MISSION_MODES
+
 
 def kind_of(vehicle_type: int) -> str:
     """`copter`, `plane`, `rover` or `other`, for a MAV_TYPE."""
@@ -29,11 +38,6 @@ def kind_of(vehicle_type: int) -> str:
         if vehicle_type in types:
             return kind
     return "other"
-
-
-def flies_mission(mode: str) -> bool:
-    """Whether the autopilot flies its mission in the mode of that name."""
-    return mode in {"AUTO", "AUTO RTL", "AUTO_RTL"}
 
 
 def mode_name(vehicle_type: int, number: int | None) -> str:

@@ -286,7 +286,7 @@ class Vehicle:
 
     async def set_home(self, job: Job) -> None:
         """Make the current position home; asked again while the estimator settles."""
-        self.authority.accompany(job, "home", stopped_too=True)
+        self.authority.accompany(job, "home", Rank.ARM)
         await self.commands.send(messages.set_home_here(), self.commanding(job))
         await self.home()
 

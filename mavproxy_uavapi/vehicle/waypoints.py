@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 from pymavlink import mavutil
 
-from mavproxy_uavapi.errors import LinkLost, Rejected, TimedOut, UavApiError
+from mavproxy_uavapi.errors import Busy, LinkLost, Rejected, TimedOut, UavApiError
 from mavproxy_uavapi.host.link import Address, Link
 from mavproxy_uavapi.host.state import VehicleState
 from mavproxy_uavapi.vehicle.conversation import Conversation
@@ -32,6 +32,7 @@ ANSWERS = ("MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_ITEM", "MISSION_ACK")
 REQUESTS = ("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK")
 
 Progress = Callable[[int, int], None]
+Check = Callable[[], None]
 
 
 class Waypoints:
@@ -60,7 +61,9 @@ class Waypoints:
         async with self._lock:
             return await self._download()
 
-    async def upload(self, items: Sequence[Item], progress: Progress = lambda done, of: None) -> None:
+    async def upload(
+        self, items: Sequence[Item], progress: Progress = lambda done, of: None, check: Check = lambda: None
+    ) -> None:
         """Put `items` in place of the vehicle's mission, and read them back.
 
         A failed upload leaves the old mission: untouched where the vehicle refused at once, else put back.
@@ -69,27 +72,38 @@ class Waypoints:
         Args:
             items: from item 1 on.
             progress: told how many were asked for, of how many.
+            check: called before the first item and after each; what it raises ends the upload, as a failure does.
 
         Raises:
             Rejected: with the MAV_MISSION_RESULT as `ack`.
             TimedOut, LinkLost.
         """
+
+        def told(done: int, of: int) -> None:
+            check()
+            progress(done, of)
+
         async with self._lock:
             _, old = await self._download()
+            check()
             self.changed_at = self._waiting.clock()
             try:
-                await self._put(items, progress)
-            except (Rejected, TimedOut, LinkLost) as error:
+                await self._put(items, told)
+            except (Rejected, TimedOut, LinkLost, Busy) as error:
                 raise _with(error, await self._undo(old, error)) from error
 
-    async def clear(self) -> None:
+    async def clear(self, check: Check = lambda: None) -> None:
         """Remove the mission, and see that it is gone.
+
+        Args:
+            check: called before it is removed; what it raises ends that.
 
         Raises:
             Rejected: the vehicle flies it.
             TimedOut, LinkLost.
         """
         async with self._lock:
+            check()
             self.changed_at = self._waiting.clock()
             with self._talk(ANSWERS) as talk:
                 await self._clear(talk)
@@ -259,9 +273,11 @@ def _item_number(seq: int) -> Callable[[Any], Item | None]:
     return of
 
 
-def _with(error: Rejected | TimedOut | LinkLost, addition: str) -> UavApiError:
+def _with(error: Rejected | TimedOut | LinkLost | Busy, addition: str) -> UavApiError:
     """The same error, whose sentence goes on."""
     sentence = f"{error}{addition}"
+    if isinstance(error, Busy):
+        return Busy(sentence)
     if isinstance(error, Rejected):
         return Rejected(sentence, error.ack, error.statustext)
     if isinstance(error, TimedOut):

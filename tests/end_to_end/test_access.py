@@ -146,6 +146,7 @@ def test_tls(embedded_rig, tmp_path):
     finally:
         prompt.ask("module unload uavapi", "Unloaded")
         prompt.ask(f'module load uavapi:{{"port":{embedded_rig.port}}}', "listening on http://")
+        embedded_rig.wait_until_up()
 
 
 def test_slow_headers_are_hung_up_on_and_hold_up_nobody(embedded_rig):

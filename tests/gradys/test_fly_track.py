@@ -21,6 +21,7 @@ from mavproxy_uavapi.http.jobs import list_jobs
 from mavproxy_uavapi.http.requests import Empty
 from mavproxy_uavapi.http.trail import audited
 from mavproxy_uavapi.settings import ModuleSettings
+from mavproxy_uavapi.vehicle.endings import Policy
 
 LINE = "(1, -158400810, -479266420, 584090, 0, 65535, 0, 0, 3, 10)\n"
 LONG = LINE + "# a comment\n" * 10_000
@@ -40,7 +41,9 @@ def service(host: Any, teller: Any, monkeypatch: pytest.MonkeyPatch) -> Service:
 
 
 def call_of(service: Service, text: str = LONG, **query: str) -> Call:
-    request: Any = SimpleNamespace(path="/mission/fly-track", remote="10.0.0.9", headers={}, query=query)
+    request: Any = SimpleNamespace(
+        path="/mission/fly-track", remote="10.0.0.9", headers={}, query=query, transport=None
+    )
     return Call(service, request, Track(track=text))
 
 
@@ -58,6 +61,7 @@ def test_neither_job_nor_trail_keeps_the_tracks_text(loop: Any, service: Service
     assert loop.run(asked(service, call_of(service, wait="false"))).status == 202
     with pytest.raises(Invalid):
         loop.run(asked(service, call_of(service, LONG + "nonsense")))
+    service.host.jobs.on_ended.clear()
     service.host.jobs.abort_remote("enough")
     loop.settle()
     found = sizes(service, loop)
@@ -76,10 +80,10 @@ def test_the_limit_of_jobs_holds_for_tracks_too(loop: Any, service: Service) -> 
 
 
 def test_hanging_up_holds_where_that_is_set(loop: Any, service: Service) -> None:
-    service.settings = replace(service.settings, on_disconnect="hold")
+    service.host.endings.on_disconnect = Policy.HOLD
     waiting = loop.create_task(asked(service, call_of(service)))
     loop.settle()
     waiting.cancel()
     loop.settle()
-    assert [job.verb for job in service.host.jobs.all()] == ["/mission/fly-track", "hold"]
+    assert [job.verb for job in service.host.jobs.all()] == ["/mission/fly-track", "hold after /mission/fly-track"]
     assert service.audit.entries[-1].outcome == "client_gone"

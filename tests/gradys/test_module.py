@@ -123,3 +123,17 @@ def test_a_bad_setting_is_an_import_error_of_one_line(mpstate: Any, given: dict[
         gradys.init(mpstate, **given)
     assert "\n" not in str(raised.value)
     assert mpstate.command_map == {}
+
+
+def test_settings_outlive_a_reload_and_no_password_is_shown(mpstate: Any, tmp_path: Path, capsys: Any) -> None:
+    sink = "mqtt://me:secret@127.0.0.1/fleet"
+    module = gradys.init(mpstate, spool=str(tmp_path / "spool.db"), sink=sink, token="hidden")
+    module.command(["set", "gs", "127.0.0.1:9"])
+    module.unload()
+    again = gradys.init(mpstate)
+    told = capsys.readouterr().out
+    assert "sink=mqtt://me:***@127.0.0.1/fleet, token=(set), gs=127.0.0.1:9" in told
+    assert "secret" not in told and "hidden" not in told
+    settings = again.gradys_settings.snapshot()
+    assert (settings.sink, settings.token, settings.gs[0].url) == ((sink,), "hidden", "http://127.0.0.1:9")
+    again.unload()

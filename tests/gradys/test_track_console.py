@@ -4,7 +4,8 @@ from typing import Any
 
 import pytest
 
-from mavproxy_gradys.track_console import shown, words
+from mavproxy_gradys.track_console import TrackConsole, shown, words
+from mavproxy_gradys.tracking import Tracking
 from mavproxy_uavapi.errors import BadRequest
 
 
@@ -28,3 +29,26 @@ def test_all_flights_are_shown() -> None:
     said = shown({"recording": None, "flights": [{**flight, "vehicle": 1}, {**flight, "vehicle": 2}]})
     assert said.splitlines() == [f"track flight running, vehicle {n}: flying, leg 2 of 5" for n in (1, 2)]
     assert shown({"recording": None, "flights": []}) == "no track is recorded or flown"
+
+
+@pytest.mark.parametrize(
+    ("line", "answer"),
+    [
+        ("fly a.track", "gradys: a.track: [Errno 2] No such file or directory: 'a.track'"),  # vehicle 10 would do
+        ("fly a.track --sysid 11", "gradys: no vehicle 11 on the link yet; heard so far: 10"),
+        ("fly --sysid 11 a.track --sysid 10", "gradys: a.track: [Errno 2] No such file or directory: 'a.track'"),
+    ],
+)
+def test_track_is_flown_by_the_vehicle_that_is_named(
+    loop: Any, host: Any, teller: Any, capsys: Any, tmp_path: Any, monkeypatch: Any, line: str, answer: str
+) -> None:
+    async def at_once(call: Any, *args: Any) -> Any:
+        return call(*args)
+
+    monkeypatch.setattr("asyncio.to_thread", at_once)
+    monkeypatch.chdir(tmp_path)
+    teller.tell("heartbeat")
+    TrackConsole(host, Tracking(host)).command(line.split())
+    loop.pass_time(1.0)
+    host.bridge.turn()
+    assert capsys.readouterr().out.strip() == answer

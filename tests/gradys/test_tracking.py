@@ -51,7 +51,8 @@ def test_of_a_vehicle_the_newest_flight_is_told(loop: Any, host: Any, fleet: Any
     jobs = [begin(loop, host, tracks, 11, name) for name in "abc"]
     assert [job.running for job in jobs] == [False, False, True]
     assert [flight["job"] for flight in tracks.report()["flights"]] == [jobs[-1].id]
-    jobs[-1].abort(Aborted("enough"))
+    loop.call_soon(jobs[-1].abort, Aborted("enough"))
+    loop.settle()
     assert [flight["state"] for flight in tracks.report()["flights"]] == ["failed"]
 
 

@@ -29,6 +29,7 @@ from mavproxy_uavapi.http.limits import patient
 from mavproxy_uavapi.settings import ModuleSettings
 from mavproxy_uavapi.sim import Options, Simulator
 from mavproxy_uavapi.sim.control import Control
+from mavproxy_uavapi.sim.mission import Item
 from mavproxy_uavapi.vehicle.freshness import Freshness
 
 TICK = 0.02  # s; what is sent either way arrives with the next one
@@ -37,9 +38,19 @@ STREAMS_EVERY = 15.0  # s; MAVProxy asks for all streams so often
 STREAM_RATE = 4  # Hz, MAVProxy's default
 US = Address(255, 230)
 HOUSEKEEPING = {mavlink.MAV_CMD_SET_MESSAGE_INTERVAL}  # what is asked for whether anybody flies or not
-MODES = {"STABILIZE": 0, "ALT_HOLD": 2, "GUIDED": 4, "LOITER": 5, "RTL": 6, "LAND": 9, "BRAKE": 17}
+MODES = {"STABILIZE": 0, "ALT_HOLD": 2, "AUTO": 3, "GUIDED": 4, "LOITER": 5, "RTL": 6, "LAND": 9, "BRAKE": 17}
 # A vehicle whose landings and returns are quick; deadlines follow from the same parameters.
 PARAMETERS = {"LAND_SPEED": 100.0, "RTL_ALT": 0.0, "RTL_LOIT_TIME": 500.0}
+
+
+PLACE = (-35.363261, 149.165230)  # degrees: where the simulator stands
+LEGS = (0.002, 0.0, 0.002)  # degrees north: a mission of places that are far apart
+
+
+def item_at(lat: float, lon: float) -> Item:
+    """A waypoint 10 m above home."""
+    frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
+    return Item(mavlink.MAV_CMD_NAV_WAYPOINT, frame, 0, 0, 0, 0, round(lat * 1e7), round(lon * 1e7), 10.0)
 
 
 class Reply(NamedTuple):
@@ -151,6 +162,7 @@ class World:
         self.service = Service(host, ModuleSettings(settings, environ={}).snapshot(), Audit(None))
         self._runner = web.AppRunner(make_app(self.service), access_log=None, handler_cancellation=True)
         self._tasks: list[asyncio.Task[None]] = []
+        self._streams: list[asyncio.Task[None]] = []
 
     # -- the vehicle before anybody looks -------------------------------------------------------------------
 
@@ -178,6 +190,31 @@ class World:
         assert abs(self.at[2] + height) < 0.3
         if mode != "GUIDED":
             self.by_hand(mavlink.MAV_CMD_DO_SET_MODE, 1, MODES[mode])
+
+    def on_mission(self) -> None:
+        """Flying a mission of two places, far apart."""
+        self.flying()
+        self.copter.mission.items[:] = [item_at(*PLACE), *(item_at(PLACE[0] + north, PLACE[1]) for north in LEGS)]
+        self.by_hand(mavlink.MAV_CMD_DO_SET_MODE, 1, MODES["AUTO"])
+        self.by_hand(mavlink.MAV_CMD_MISSION_START)
+
+    def stream(self, velocity: dict[str, float], every: float) -> None:
+        """Another client, which sends velocities every so many s, whatever is answered."""
+
+        async def streaming() -> None:
+            while True:
+                wire = await self.request("POST", "/movement/travel_at_ned", velocity)
+                await wire.reply
+                await asyncio.sleep(every)
+
+        self._streams.append(self.loop.create_task(streaming()))
+        self.loop.pass_time(1.0)
+
+    def end_streams(self) -> None:
+        """The other clients fall silent."""
+        for task in self._streams:
+            task.cancel()
+        self.loop.settle()
 
     def go_live(self) -> None:
         """Connect the host, and let it get to know the vehicle."""
@@ -282,10 +319,16 @@ class World:
         """The messages of these, but for the watch over the telemetry."""
         return [m for _, m in sent if getattr(m, "command", None) not in HOUSEKEEPING]
 
+    def end_jobs(self) -> None:
+        """End the jobs in flight, and leave the vehicle as it is."""
+        callbacks, self.host.jobs.on_ended = self.host.jobs.on_ended, []
+        self.host.jobs.abort_remote("the test is over")
+        self.host.jobs.on_ended = callbacks
+
     def close(self) -> None:
         """End what is in flight."""
-        self.host.jobs.abort_remote("the test is over")
-        for task in self._tasks:
+        self.end_jobs()
+        for task in [*self._tasks, *self._streams]:
             task.cancel()
         self.loop.settle()
         self.loop.run(self._runner.cleanup())

@@ -8,6 +8,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import NamedTuple
 
+from mavproxy_uavapi.vehicle import endings
+from mavproxy_uavapi.vehicle.endings import Policy
+from mavproxy_uavapi.vehicle.jobs import Ending
+
 FILE = Path(__file__).parents[2] / "docs" / "faults.md"
 
 
@@ -56,11 +60,11 @@ FAULTS = {
     "link silence": Fault("Neither side hears the other any more; found after the link timeout of 5 s.", 5.2),
     "reboot": Fault(
         "The autopilot starts anew and is back 2 s later, disarmed, in STABILIZE. A command that waited for it in "
-        "vain reaches it then: it can set its home and arm, and refuses a speed.",
+        "vain reaches it then: it can set its home and arm; a speed is remembered for the next flight.",
         2.0 + HEARTBEAT,
     ),
     "pilot's mode": Fault(
-        "The pilot switches to another mode. A speed needs none: it is asked for again; most modes refuse it (2 s).",
+        "The pilot switches to another mode. A speed is remembered until the vehicle flies in GUIDED again.",
         HEARTBEAT,
     ),
     "disarmed": Fault(
@@ -69,14 +73,25 @@ FAULTS = {
         HEARTBEAT,
     ),
     "client gone": Fault(
-        "The client hangs up: the verb ends and is forgotten, the vehicle keeps its last setpoint. Landing and "
-        "return go on.",
+        "The client hangs up: the verb ends and is forgotten, the vehicle keeps its last setpoint. What lands, "
+        "returns or stops it goes on.",
         0.1,
     ),
+    "another client streams": Fault(
+        "Another client sends velocities five times a second, before and after. What stops the vehicle outranks "
+        "them; of two movements the newer one counts, and a turn ends with the setpoint that it came with.",
+        0.5,
+    ),
+    "another station flies it": Fault(
+        "Another ground station gives the vehicle a target of its own, elsewhere; its telemetry tells.", 4.0
+    ),
+    "during a take-off": Fault("The vehicle has been climbing for 3 s, for another client.", 0.5),
+    "in AUTO": Fault("The vehicle flies its mission.", 0.5),
 }
 
 REFUSAL = 2.0  # s; the autopilot's own word, after sending again
 ENDED, GOES_ON = "ended", "goes on"  # where nobody is left to be answered
+NONE = ""  # where it cannot happen
 
 SUCCESS = dict.fromkeys(FAULTS, "200")
 LOST = {"link silence": "503 link_lost", "client gone": ENDED}
@@ -86,21 +101,50 @@ REFUSED = {
     "busy once": "500 rejected",
 }
 FLIGHT = {"reboot": "409 not_armed", "pilot's mode": "409 mode_changed", "disarmed": "409 not_armed"}
-MOVING = {**SUCCESS, **LOST, **FLIGHT}  # by setpoints, which nobody acknowledges
+GUIDED_ONLY = {"during a take-off": "409 busy", "in AUTO": "409 mode_changed"}
+OTHERS = {"another client streams": "409 superseded", "another station flies it": "409 superseded"}
+MOVING = {**SUCCESS, **LOST, **FLIGHT, **OTHERS, **GUIDED_ONLY}  # by setpoints, which nobody acknowledges
+TRAVEL = {**MOVING, "another station flies it": "200"}  # it repeats its own
 MODE = {**SUCCESS, **LOST, **REFUSED, "reboot": "409 mode_changed", "pilot's mode": "409 mode_changed"}
 LANDING = {**SUCCESS, **LOST, **REFUSED, **FLIGHT, "client gone": GOES_ON}
-ARM = {**MODE, "busy once": "200", "reboot": "200"}
-TAKEOFF = {**SUCCESS, **LOST, **REFUSED, **FLIGHT}
+BRAKE = {**MODE, "client gone": GOES_ON}
+ARM = {**MODE, "busy once": "200", "reboot": "200", "another station flies it": NONE, "in AUTO": "409 mode_changed"}
+TAKEOFF = {**SUCCESS, **LOST, **REFUSED, **FLIGHT, **GUIDED_ONLY, "another station flies it": NONE}
+ACKED = {**SUCCESS, **LOST, **REFUSED, **FLIGHT, **GUIDED_ONLY}
+STOP = {**ACKED, "in AUTO": "200", "during a take-off": "200", "client gone": GOES_ON}
+RESUME = {
+    **ACKED,
+    "acks lost for good": "504 timeout",
+    "reboot": "409 mode_changed",
+    "disarmed": "200",
+    "in AUTO": "200",
+}
+TURN = {**ACKED, "acks lost for good": "504 timeout", "another client streams": "409 superseded"}
+TURN_RATE = {**MOVING, "another station flies it": "200"}
 HOME = {**SUCCESS, **LOST, **REFUSED, "busy once": "200", "acks lost for good": "504 timeout"}
 SPEED = {
     **SUCCESS,
     **LOST,
     **REFUSED,
     "acks lost for good": "504 timeout",
-    "reboot": "500 rejected",
-    "pilot's mode": "500 rejected",
+    "during a take-off": "409 busy",
 }
 
+WHY = {
+    Ending.DONE: "it is done",
+    Ending.FAILED: "it failed, took too long, or the pilot has the vehicle",
+    Ending.SUPERSEDED: "a newer command took over",
+    Ending.ABORTED: "DELETE, or a stop at the prompt",
+    Ending.CLIENT_GONE: "its client hung up",
+    Ending.SCRIPT_GONE: "its script died",
+    Ending.UNLOADED: "the API stops, or the module is unloaded",
+    Ending.DEFECT: "a defect of ours",
+}
+BRAKES = (endings.Situation.MISSION, endings.Situation.LAND, endings.Situation.RTL)
+HOW = {
+    (endings.Situation.GUIDED, endings.HOLD): "zero velocity",
+    **{(situation, endings.HOLD): "BRAKE" for situation in BRAKES},
+}
 VERBS = {
     "arm": Verb("/command/arm", 5.0, ARM),
     "takeoff": Verb("/command/takeoff", 12.0, TAKEOFF),
@@ -110,8 +154,12 @@ VERBS = {
     "go_to_gps_wait": Verb("/movement/go_to_gps_wait", 10.0, MOVING),
     "drive_wait": Verb("/movement/drive_wait", 10.0, MOVING),
     "drive_body_wait": Verb("/movement/drive_body_wait", 10.0, MOVING),
-    "travel, with duration": Verb("/movement/travel_at_ned", 5.0, MOVING),
-    "brake": Verb("/command/brake", HEARTBEAT, MODE),
+    "travel, with duration": Verb("/movement/travel_at_ned", 7.0, TRAVEL),
+    "set_heading": Verb("/movement/set_heading", 5.0, TURN),
+    "set_yaw_rate": Verb("/movement/set_yaw_rate", 3.0, TURN_RATE),
+    "stop": Verb("/movement/stop", 3.0, STOP),
+    "resume": Verb("/movement/resume", 0.5, RESUME),
+    "brake": Verb("/command/brake", HEARTBEAT, BRAKE),
     "guided": Verb("/command/guided", HEARTBEAT, MODE),
     "set_mode": Verb("/command/set_mode", HEARTBEAT, MODE),
     "set_home": Verb("/command/set_home", 2.0, HOME),
@@ -138,13 +186,39 @@ def page() -> str:
         "| --- | --- | --- |",
     ]
     lines += [f"| {name} | {fault.meaning} | {_seconds(fault)} |" for name, fault in FAULTS.items()]
-    for verbs in (("arm", "takeoff", "land", "rtl"), tuple(list(VERBS)[4:9]), tuple(list(VERBS)[9:])):
+    for verbs in (("arm", "takeoff", "land", "rtl"), tuple(list(VERBS)[4:13]), tuple(list(VERBS)[13:])):
         groups = _alike(verbs)
         lines += ["", "| fault | " + " | ".join(", ".join(f"`{name}`" for name in group) for group in groups) + " |"]
         lines += ["| --- |" + " --- |" * len(groups)]
         for fault in FAULTS:
-            lines += [f"| {fault} | " + " | ".join(VERBS[group[0]].outcomes[fault] for group in groups) + " |"]
-    return "\n".join(lines) + "\n"
+            lines += [f"| {fault} | " + " | ".join(VERBS[group[0]].outcomes[fault] or "–" for group in groups) + " |"]
+    return "\n".join([*lines, *endings_page()]) + "\n"
+
+
+def endings_page() -> list[str]:
+    """How flights end: the table of `vehicle/endings.py`."""
+    columns = [policy for policy in Policy if policy is not Policy.NOTHING]
+    lines = [
+        "",
+        "## What a vehicle does when the job that flies it ends",
+        "",
+        "| it ends because | what is wanted |",
+        "| --- | --- |",
+        *(f"| {WHY[ending]} | {policy.value} |" for ending, policy in endings.FIXED.items()),
+        f"| {WHY[Ending.CLIENT_GONE]} | `on_disconnect`: nothing, or hold |",
+        f"| {WHY[Ending.SCRIPT_GONE]} | `on_script_exit`: nothing, hold, land or rtl |",
+        "",
+        "Safe means: what flies by our setpoints stops and holds, what the autopilot flies by itself goes on. It is",
+        "wanted too when a flight fails that only our setpoints keep going: vision's, a velocity with a duration.",
+        "What is wanted is done as far as telemetry allows, and sent until telemetry shows it:",
+        "",
+        "| telemetry shows | " + " | ".join(policy.value for policy in columns) + " |",
+        "| --- |" + " --- |" * len(columns),
+    ]
+    for situation, row in endings.WHAT_FOLLOWS.items():
+        cells = [HOW.get((situation, row[policy]), row[policy]) or "nothing" for policy in columns]
+        lines.append(f"| {situation.value} | " + " | ".join(cells) + " |")
+    return lines
 
 
 def _seconds(fault: Fault) -> str:

@@ -46,7 +46,7 @@ def answer(world: Any, case: Any) -> requests.Response:
     body = asked.body.encode() if isinstance(asked.body, str) else asked.body
     wire = world.begin(asked.method, asked.path_url, body, asked.headers.get("Content-Type", "application/json"))
     world.loop.pass_time(BREATH)
-    world.host.jobs.abort_remote("that will do")
+    world.end_jobs()
     reply = world.answer(wire, 60.0)
     response = requests.Response()
     response.status_code, response.request = reply.status, asked

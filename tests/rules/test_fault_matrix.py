@@ -16,7 +16,15 @@ _spec.loader.exec_module(outcomes)
 
 ARM = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
 TAKEOFF = mavlink.MAV_CMD_NAV_TAKEOFF
-COMMANDS = (ARM, TAKEOFF, mavlink.MAV_CMD_DO_SET_MODE, mavlink.MAV_CMD_DO_SET_HOME, mavlink.MAV_CMD_DO_CHANGE_SPEED)
+COMMANDS = (
+    ARM,
+    TAKEOFF,
+    mavlink.MAV_CMD_DO_SET_MODE,
+    mavlink.MAV_CMD_DO_SET_HOME,
+    mavlink.MAV_CMD_DO_CHANGE_SPEED,
+    mavlink.MAV_CMD_DO_PAUSE_CONTINUE,
+    mavlink.MAV_CMD_CONDITION_YAW,
+)
 GUARD = 4.0  # s for which nothing must be sent after the answer: a resend comes after 1.5 s, a setpoint after 1
 UNDER_WAY = 3.0  # s after which something happens to a flight
 WAITING = 0.5  # s after which something happens to a command that is waiting for its ack
@@ -48,8 +56,12 @@ REQUESTS = {
     "drive_wait": Request("flying", {"x": 6, "y": 3, "z": -1}, {"x": 300, "y": 0, "z": 0}),
     "drive_body_wait": Request("flying", {"front": 6, "right": 3}, {"front": 300, "right": 0}),
     "travel, with duration": Request(
-        "flying", {"vx": 1, "vy": 0, "vz": 0, "duration": 3}, {"vx": 1, "vy": 0, "vz": 0, "duration": 60}
+        "flying", {"vx": 1, "vy": 0, "vz": 0, "duration": 5}, {"vx": 1, "vy": 0, "vz": 0, "duration": 60}
     ),
+    "set_heading": Request("flying", "?heading=90"),
+    "set_yaw_rate": Request("flying", "?yaw_rate=20"),
+    "stop": Request("flying", ""),
+    "resume": Request("stopped", ""),
     "brake": Request("flying", ""),
     "guided": Request("loitering", ""),
     "set_mode": Request("flying", "?mode=ALT_HOLD"),
@@ -63,7 +75,10 @@ STAGES: dict[str, Callable[[Any], None]] = {
     "armed": lambda world: world.armed(),
     "flying": lambda world: world.flying(),
     "loitering": lambda world: world.flying("LOITER"),
+    "stopped": lambda world: world.flying(),
 }
+# Where the vehicle is instead, because that is what goes wrong.
+INSTEAD = {"during a take-off": STAGES["armed"], "in AUTO": lambda world: world.on_mission()}
 
 
 def about_each_command(world: Any, name: str, **fields: Any) -> None:
@@ -105,6 +120,13 @@ BEFORE: dict[str, Callable[[Any], None]] = {
     "busy once": be_busy_once,
     "in progress": lambda world: about_each_command(world, "in_progress", seconds=4.0),
 }
+
+
+def another_station(world: Any, _wire: Any) -> None:
+    if world.copter.mode.name == "GUIDED":
+        world.fault("other_station", position=ELSEWHERE)
+
+
 # What happens while the verb waits.
 MEANWHILE: dict[str, Callable[[Any, Any], None]] = {
     "link silence": lambda world, wire: world.fault("silence"),
@@ -114,13 +136,23 @@ MEANWHILE: dict[str, Callable[[Any, Any], None]] = {
     ),
     "disarmed": lambda world, wire: world.fault("pilot_disarm"),
     "client gone": lambda world, wire: wire.hang_up(),
+    "another station flies it": another_station,
 }
-CELLS = [(verb, fault) for verb in outcomes.VERBS for fault in outcomes.FAULTS]
+# How a verb shows that has gone on without its client.
+DONE: dict[str, Callable[[Any], bool]] = {
+    **dict.fromkeys(("land", "rtl"), lambda world: not world.copter.armed and world.at[2] > -0.1),
+    "brake": lambda world: world.copter.mode.name == "BRAKE",
+    "stop": lambda world: world.copter.guided.paused,
+}
+ELSEWHERE = [-80.0, 40.0, -12.0]  # m NED
+CELLS = [(name, fault) for name, verb in outcomes.VERBS.items() for fault in outcomes.FAULTS if verb.outcomes[fault]]
 
 
 @pytest.mark.parametrize(("verb", "fault"), CELLS)
 def test_verb_meets_fault(make_world: Any, verb: str, fault: str) -> None:
-    world = make_world(STAGES[REQUESTS[verb].stage])
+    stage = REQUESTS[verb].stage
+    world = make_world(INSTEAD.get(fault, STAGES[stage]))
+    prepare(world, stage, fault)
     expected = outcomes.VERBS[verb].outcomes[fault]
     struck, wire = strike(world, verb, fault)
     allowed = outcomes.FAULTS[fault].within
@@ -129,22 +161,36 @@ def test_verb_meets_fault(make_world: Any, verb: str, fault: str) -> None:
     elif expected == "500 rejected":
         allowed = max(allowed, outcomes.REFUSAL)
     if expected in (outcomes.ENDED, outcomes.GOES_ON):
-        after_hanging_up(world, expected, struck)
+        after_hanging_up(world, verb, expected, struck)
         return
     reply = world.answer(wire, 200.0)
     assert reply.outcome == expected, reply.body
     assert reply.at - struck <= allowed + 1e-6
     assert says_why(reply.body, fault)
+    world.end_streams()
+    quiet_since = max(reply.at, world.loop.time())
     world.loop.pass_time(GUARD)
-    assert world.orders(since=reply.at) == []
+    assert world.orders(since=quiet_since) == []
     if (verb, fault) == ("arm", "disarmed"):
         assert not world.copter.armed
+
+
+def prepare(world: Any, stage: str, fault: str) -> None:
+    """Bring it to where the verb begins, by the API, and let others fly it."""
+    if fault == "during a take-off":
+        world.begin("GET", "/command/takeoff?alt=60")
+        world.loop.pass_time(UNDER_WAY)
+    if stage == "stopped" and fault not in INSTEAD:
+        assert world.ask("GET", "/movement/stop").outcome == "200"
+    if fault == "another client streams":
+        world.stream({"vx": 0.5, "vy": 0, "vz": 0}, every=0.2)
 
 
 def strike(world: Any, verb: str, fault: str) -> tuple[float, Any]:
     """Ask, and let it happen; when it happened, and the request in flight."""
     request = REQUESTS[verb]
     flight = request.far is not None
+    far = flight and (verb, fault) != ("travel, with duration", "another station flies it")
     BEFORE.get(fault, lambda _: None)(world)
     meanwhile = MEANWHILE.get(fault)
     delay = UNDER_WAY if flight else WAITING
@@ -156,7 +202,7 @@ def strike(world: Any, verb: str, fault: str) -> tuple[float, Any]:
         world.uplink_until, delay = 0.0, 1.3
         world.fault("lose_acks", command=ARM)
     began = world.loop.time()
-    wire = begin(world, verb, request.far if flight and meanwhile is not None else request.near)
+    wire = begin(world, verb, request.far if far and meanwhile is not None else request.near)
     if meanwhile is None:
         return began, wire
     world.loop.pass_time(delay)
@@ -180,7 +226,7 @@ def says_why(body: dict[str, Any], fault: str) -> bool:
     return True
 
 
-def after_hanging_up(world: Any, expected: str, struck: float) -> None:
+def after_hanging_up(world: Any, verb: str, expected: str, struck: float) -> None:
     """The verb has ended and nothing more is sent, or it goes on to its end by itself."""
     world.loop.settle()
     running = [job.verb for job in world.host.jobs.running()]
@@ -191,10 +237,12 @@ def after_hanging_up(world: Any, expected: str, struck: float) -> None:
         assert len(running) == 1
         world.loop.pass_time(30.0)
         assert world.host.jobs.running() == []
-        assert not world.copter.armed and world.at[2] > -0.1
-    (entry,) = world.service.audit.entries  # of what went on without its client, when that had ended
+        assert DONE[verb](world)
+    entry = world.service.audit.entries[-1]  # of what went on without its client, when that had ended
     assert entry.outcome == "client_gone"
-    assert world.orders(since=struck) == []
+    repeated = {m.command for m in world.orders(since=struck) if m.get_type() == "COMMAND_LONG"}
+    assert len(repeated) <= 1  # a command that was not heard yet is sent again, and nothing else is
+    assert expected == outcomes.GOES_ON or world.orders(since=struck) == []
 
 
 def test_command_in_progress_for_ever_is_given_up(make_world: Any) -> None:

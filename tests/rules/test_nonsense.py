@@ -267,7 +267,7 @@ class Trial:
         orders = world.orders_of(world.sent[sent:])
         if orders:
             world.loop.pass_time(0.05)
-        world.host.jobs.abort_remote("next, please")
+        world.end_jobs()
         world.loop.settle()
         trace = f"{self.name} = {value!r:.200} by {by}: {reply}"
         assert reply.status in TABLE and reply.body.get("code") != "internal", trace

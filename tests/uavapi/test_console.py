@@ -41,7 +41,7 @@ def test_report_of_a_call_in_flight_tells_its_progress(
         return "done"
 
     async def begin() -> None:
-        host.jobs.begin(copter.seat, "/movement/go_to_ned_wait", {}, body)
+        host.jobs.begin(copter, "/movement/go_to_ned_wait", {}, body)
 
     loop.run(begin())
     loop.pass_time(5.1)

@@ -36,6 +36,7 @@ def test_codes_are_the_contracts_each_with_its_status() -> None:
         "superseded": 409,
         "mode_changed": 409,
         "busy": 409,
+        "paused": 409,
         "not_armed": 409,
         "aborted": 409,
         "too_many_requests": 429,

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import asyncio
 import json
 import re
 import socket
@@ -56,11 +57,10 @@ def port() -> int:
 
 
 @pytest.fixture
-def module(loader: Loader, main_loop: Any, port: int, capsys: Any) -> Any:
+def module(loader: Loader, port: int, said: Any) -> Any:
     """The module, listening."""
     module = loader.load(port=port)
-    main_loop.turn()
-    assert capsys.readouterr().out == f"uavapi: listening on http://127.0.0.1:{port}\n"
+    assert said("listening") == f"uavapi: listening on http://127.0.0.1:{port}\n"
     return module
 
 
@@ -71,6 +71,23 @@ def ask(port: int, path: str) -> tuple[int, Any]:
     except urllib.error.HTTPError as error:
         with error:
             return error.code, json.load(error)
+
+
+@pytest.fixture
+def said(main_loop: Any, capsys: Any) -> Callable[[str], str]:
+    """Turn the main loop until those words were printed; everything that was printed since the last time."""
+
+    def said(words: str) -> str:
+        printed: list[str] = []
+
+        def found() -> bool:
+            printed.append(capsys.readouterr().out)
+            return words in "".join(printed)
+
+        main_loop.until(found)
+        return "".join(printed)
+
+    return said
 
 
 def listens(port: int) -> bool:
@@ -162,14 +179,13 @@ def test_bad_argument_is_an_import_error_of_one_line_and_leaves_nothing(
 
 
 def test_taken_port_is_one_line_and_another_port_helps(
-    loader: Loader, main_loop: Any, port: int, capsys: Any
+    loader: Loader, main_loop: Any, port: int, capsys: Any, said: Any
 ) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", port))
         taken.listen()
         module = loader.load(port=port)
-        main_loop.turn()
-        assert capsys.readouterr().out == (
+        assert said("\n") == (
             f"uavapi: cannot listen on http://127.0.0.1:{port}: Address already in use; "
             "`uavapi set port N` takes another port\n"
         )
@@ -177,16 +193,17 @@ def test_taken_port_is_one_line_and_another_port_helps(
         assert capsys.readouterr().out == ""
         other = free_port()
         module.command(["set", "port", str(other)])
+        said("listening")
         assert listens(other)
 
 
 # -- the prompt -------------------------------------------------------------------------------------------
 
 
-def test_set_port_restarts_there(module: Any, port: int, capsys: Any) -> None:
+def test_set_port_restarts_there(module: Any, port: int, said: Any) -> None:
     other = free_port()
     module.command(["set", "port", str(other)])
-    assert capsys.readouterr().out == f"uavapi: listening on http://127.0.0.1:{other}\n"
+    assert said("listening") == f"uavapi: listening on http://127.0.0.1:{other}\n"
     assert listens(other)
     assert not listens(port)
 
@@ -216,20 +233,36 @@ def test_set_shows_the_settings(module: Any, port: int, capsys: Any) -> None:
     assert capsys.readouterr().out.split() == ["max_age", "5.0", "default"]
 
 
-def test_stop_and_start(module: Any, port: int, capsys: Any) -> None:
+def test_stop_and_start(module: Any, port: int, said: Any) -> None:
     module.command(["stop"])
+    assert said("stopped") == "uavapi: stopped\n"
     assert not listens(port)
     module.command(["start"])
+    assert said("listening") == f"uavapi: listening on http://127.0.0.1:{port}\n"
     assert listens(port)
-    assert capsys.readouterr().out == f"uavapi: stopped\nuavapi: listening on http://127.0.0.1:{port}\n"
 
 
-def test_set_does_not_open_what_was_stopped(module: Any, capsys: Any) -> None:
+def test_starts_and_stops_are_done_in_the_order_in_which_they_were_typed(module: Any, port: int, said: Any) -> None:
+    other = free_port()
+    for line in ("stop", "start", f"set port {other}", "stop", f"set port {port}", "start"):
+        module.command(line.split())
+    addresses = [f"uavapi: listening on http://127.0.0.1:{number}\n" for number in (port, other, port)]
+    stopped = "uavapi: stopped\n"
+    assert (
+        said(addresses[1] + stopped + addresses[2]) == stopped + addresses[0] + addresses[1] + stopped + addresses[2]
+    )
+    assert listens(port)
+    assert not listens(other)
+
+
+def test_set_does_not_open_what_was_stopped(module: Any, said: Any) -> None:
     module.command(["stop"])
     other = free_port()
     module.command(["set", "port", str(other)])
+    said("stopped")
     assert not listens(other)
     module.command(["start"])
+    said("listening")
     assert listens(other)
 
 
@@ -247,7 +280,7 @@ def test_status_and_vehicles_and_help(module: Any, main_loop: Any, port: int, ms
 
 
 def test_commands_of_a_startup_script_come_before_the_main_loop(
-    loader: Loader, main_loop: Any, port: int, capsys: Any
+    loader: Loader, port: int, said: Any, capsys: Any
 ) -> None:
     module = loader.load(port=port)
     started = time.monotonic()
@@ -256,17 +289,135 @@ def test_commands_of_a_startup_script_come_before_the_main_loop(
         module.command(line.split())
     assert time.monotonic() - started < 1.0
     assert f"not listening; it would be http://127.0.0.1:{port}" in capsys.readouterr().out
-    main_loop.turn()
+    said("listening")
     assert listens(other)
 
 
-def test_startup_script_may_keep_it_from_listening(loader: Loader, main_loop: Any, port: int) -> None:
+def test_startup_script_may_keep_it_from_listening(loader: Loader, main_loop: Any, port: int, said: Any) -> None:
     module = loader.load(port=port)
     module.command(["stop"])
-    main_loop.turn()
+    for _ in range(20):
+        main_loop.turn(0.01)
     assert not listens(port)
     module.command(["start"])
+    said("listening")
     assert listens(port)
+
+
+# -- a start that takes long, or fails --------------------------------------------------------------------
+
+
+def test_start_that_takes_long_holds_nothing_up_and_says_so_and_what_came_of_it(
+    loader: Loader, main_loop: Any, port: int, said: Any, monkeypatch: Any
+) -> None:
+    begun, released = threading.Event(), threading.Event()
+
+    def slow(*_: Any) -> None:
+        begun.set()
+        released.wait(10)
+
+    monkeypatch.setattr("mavproxy_uavapi.host.errands.SLOW", 0.05)
+    module = loader.load(port=port)
+    module.logs.open = slow
+    started = time.monotonic()
+    main_loop.turn()
+    assert time.monotonic() - started < 0.5
+    assert begun.wait(5)
+    still = f"uavapi: still trying to listen on http://127.0.0.1:{port}; a line tells when that is done\n"
+    assert said("still") == still
+    released.set()
+    assert said("listening") == f"uavapi: listening on http://127.0.0.1:{port}\n"
+
+
+def test_start_that_fails_for_an_unforeseen_reason_says_so(
+    loader: Loader, port: int, said: Any, monkeypatch: Any
+) -> None:
+    module = loader.load(port=port)
+    defects: list[Any] = []
+    module.host.bridge.loop.set_exception_handler(lambda _, context: defects.append(context["exception"]))
+    module.api.start = lambda _: 1 / 0
+    assert said("\n") == "uavapi: a defect ended this: ZeroDivisionError('division by zero')\n"
+    assert [type(defect) for defect in defects] == [ZeroDivisionError]
+    del module.api.start
+    module.command(["start"])
+    said("listening")
+    assert listens(port)
+
+
+def test_start_that_hangs_does_not_hold_up_the_unload(
+    loader: Loader, main_loop: Any, port: int, monkeypatch: Any
+) -> None:
+    module = loader.load(port=port)
+    hanging = threading.Event()
+
+    async def hang() -> None:
+        hanging.set()
+        await asyncio.Event().wait()
+
+    monkeypatch.setattr("mavproxy_uavapi.http.app.Server.start", lambda _: hang())
+    started = time.monotonic()
+    main_loop.turn()
+    assert time.monotonic() - started < 0.5
+    assert hanging.wait(5)
+    started = time.monotonic()
+    loader.unload(module)
+    assert time.monotonic() - started < 2.0
+    assert not listens(port)
+
+
+def test_track_is_flown_by_the_apis_own_vehicle(loader: Loader, capsys: Any) -> None:
+    module = loader.load(sysid=7)
+    module.command(["fly", "a.track"])
+    assert "module load gradys" in capsys.readouterr().out
+    flown: list[list[str]] = []
+    module.host.commands["fly"] = flown.append
+    module.command(["fly", "a.track", "--reach", "50"])
+    module.command(["set", "sysid", "0"])
+    module.command(["fly", "a.track"])
+    assert flown == [["--sysid", "7", "a.track", "--reach", "50"], ["--sysid", "0", "a.track"]]
+
+
+# -- reloading --------------------------------------------------------------------------------------------
+
+
+def test_settings_of_the_load_and_of_the_prompt_outlive_a_reload(
+    loader: Loader, port: int, said: Any, capsys: Any
+) -> None:
+    module = loader.load(port=1, token="secret", sysid=7)
+    module.command(["set", "port", str(port)])
+    module.command(["set", "allow_from", "127.0.0.0/8"])
+    loader.unload(module)
+    capsys.readouterr()
+    module = loader.load()
+    assert said("listening") == (
+        f"uavapi: as before: port={port}, token=(set), sysid=7, allow_from=127.0.0.0/8 "
+        "(keywords at `module load` replace all that)\n"
+        f"uavapi: listening on http://127.0.0.1:{port}\n"
+    )
+    settings = module.api_settings.snapshot()
+    assert (settings.sysid, settings.token) == (7, "secret")
+    origins = module.api_settings.origins
+    assert (origins["port"], origins["sysid"]) == ("uavapi set", "module load")
+
+
+def test_settings_that_are_only_good_together_outlive_a_reload(loader: Loader, capsys: Any) -> None:
+    module = loader.load(allow_open=True)
+    for line in ("set host 0.0.0.0", "set token secret", "set allow_open false"):
+        module.command(line.split())
+    loader.unload(module)
+    settings = loader.load().api_settings.snapshot()
+    assert (settings.host, settings.token, settings.allow_open) == ("0.0.0.0", "secret", False)
+
+
+def test_file_of_the_first_load_is_read_anew_and_yields_to_the_prompt(loader: Loader, tmp_path: Any) -> None:
+    file = tmp_path / "uavapi.ini"
+    file.write_text("[api]\nsysid = 2\nport = 8001\n")
+    module = loader.load(config=str(file))
+    module.command(["set", "port", "8002"])
+    loader.unload(module)
+    file.write_text("[api]\nsysid = 3\nport = 8003\n")
+    settings = loader.load().api_settings.snapshot()
+    assert (settings.sysid, settings.port) == (3, 8002)
 
 
 # -- unloading --------------------------------------------------------------------------------------------
@@ -279,7 +430,7 @@ def test_unload_leaves_nothing_behind_twenty_times(
     for number in range(20):
         module = loader.load(port=port)
         if number % 5:  # and sometimes it is unloaded before it began
-            main_loop.turn()
+            main_loop.until(lambda module=module: module.api.listening)
             module.mavlink_packet(msg("heartbeat"))
             main_loop.until(lambda module=module: module.host.fleet.vehicles)
             assert ask(port, "/telemetry/status")[0] == 200
@@ -317,8 +468,7 @@ def test_unload_takes_its_descriptors_back_from_a_host_that_goes_on(
     before = len(other.host.bridge._open_sockets)
     for _ in range(3):
         module = loader.load(port=port)
-        main_loop.turn()
-        assert listens(port)
+        main_loop.until(lambda: listens(port))
         loader.unload(module)
         assert not listens(port)
     assert len(other.host.bridge._open_sockets) == before
@@ -326,7 +476,7 @@ def test_unload_takes_its_descriptors_back_from_a_host_that_goes_on(
 
 
 def test_setting_that_needs_no_other_listening_leaves_calls_in_flight_alone(
-    module: Any, main_loop: Any, port: int, msg: Any, tmp_path: Any, capsys: Any
+    module: Any, main_loop: Any, port: int, msg: Any, tmp_path: Any, said: Any
 ) -> None:
     answers: list[Any] = []
     module.mavlink_packet(msg("heartbeat"))
@@ -338,11 +488,12 @@ def test_setting_that_needs_no_other_listening_leaves_calls_in_flight_alone(
     module.command(["set", "script_grace", "3"])
     (tmp_path / "file").touch()
     module.command(["set", "log_path", str(tmp_path / "file" / "uav.log")])
-    assert "the logs stay as they were" in capsys.readouterr().out
+    said("the logs stay as they were")
     assert len(module.host.jobs.running()) == 1 and answers == []
     assert module.api._server.service.settings.script_grace == 3
     module.command(["set", "max_rate", "1"])
     assert listens(port)
     module.command(["stop"])
+    said("stopped")
     client.join(5.0)
     assert answers[0][1]["code"] == "aborted"

@@ -161,3 +161,14 @@ def test_settings_that_need_no_camera_end_no_flight(running: Any, capsys: Any, m
     time.sleep(0.1)
     assert running.vision.settings.tags == "0:0.5"
     assert said(running, capsys, "status").startswith("vision: source none")
+
+
+def test_settings_outlive_a_reload(mpstate: Any, capsys: Any) -> None:
+    first = vision.init(mpstate, fps=15, family="16h5", tags="0:0.2")
+    first.command(["set", "tags", "0:0.4", "1:0.1"])
+    first.unload()
+    again = vision.init(mpstate)
+    assert "vision: as before: fps=15.0, family=16h5, tags=0:0.4 1:0.1 (" in capsys.readouterr().out
+    settings = again.vision_settings.snapshot()
+    assert (settings.fps, settings.family, settings.tags) == (15.0, "16h5", "0:0.4 1:0.1")
+    again.unload()

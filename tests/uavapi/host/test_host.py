@@ -196,6 +196,49 @@ def test_idle_tells_the_asyncio_side_mavproxys_target(mpstate: Any) -> None:
         hosts.leave(mpstate, "uavapi")
 
 
+def parameters(host: Host, system: int = 1) -> dict[str, float]:
+    """What the asyncio side knows of a vehicle's parameters, after all that was fed."""
+
+    async def look() -> dict[str, float]:
+        await asyncio.sleep(0)
+        return dict(host.fleet.vehicles[system].parameters)
+
+    return host.bridge.run(look())
+
+
+def test_parameters_that_mavproxy_fetched_are_known_from_the_first_idle_task(mpstate: Any, msg: Any) -> None:
+    host = hosts.join(mpstate, "uavapi")
+    now = [100.0]
+    host.clock = lambda: now[0]
+    try:
+        mpstate.mav_param_by_sysid[1, 1] = {"RTL_ALT": 1500.0, "LAND_SPEED": 50.0}
+        host.idle("uavapi")
+        host.feed("uavapi", msg("heartbeat"))
+        host.idle("uavapi")
+        assert parameters(host) == {"RTL_ALT": 1500.0, "LAND_SPEED": 50.0}
+        mpstate.mav_param_by_sysid[1, 1]["RTL_ALT"] = 1800.0  # by FTP, without a PARAM_VALUE
+        now[0] += 2.0
+        host.idle("uavapi")
+        host.feed("uavapi", msg("param_value", param_id="RTL_ALT", param_value=2000.0))
+        host.idle("uavapi")
+        assert parameters(host) == {"RTL_ALT": 2000.0, "LAND_SPEED": 50.0}
+    finally:
+        hosts.leave(mpstate, "uavapi")
+
+
+def test_parameters_of_an_earlier_session_are_not_taken_for_the_vehicles(mpstate: Any, msg: Any) -> None:
+    host = hosts.join(mpstate, "uavapi")
+    try:
+        mpstate.continue_mode = True
+        mpstate.mav_param_by_sysid[1, 1] = {"RTL_ALT": 1500.0}
+        host.idle("uavapi")
+        host.feed("uavapi", msg("heartbeat"))
+        host.idle("uavapi")
+        assert parameters(host) == {}
+    finally:
+        hosts.leave(mpstate, "uavapi")
+
+
 def test_idle_sends_what_is_to_be_sent_even_when_select_does_not_wake(mpstate: Any) -> None:
     host = hosts.join(mpstate, "uavapi")
     try:

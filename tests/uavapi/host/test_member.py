@@ -122,3 +122,30 @@ def test_second_module_goes_on_when_the_first_is_unloaded(demo: Demo, mpstate: A
 )
 def test_value_is_what_was_typed_without_the_quotation_marks_around_it(words: list[str], value: str) -> None:
     assert value_of(words) == value
+
+
+def test_idle_task_never_raises_and_tells_of_each_failure_once(demo: Demo, main_loop: Any, capsys: Any) -> None:
+    def fail() -> None:
+        raise OSError("no more threads")
+
+    start, demo.host.bridge.start = demo.host.bridge.start, fail  # type: ignore[method-assign]
+    for _ in range(3):
+        main_loop.turn()
+    assert capsys.readouterr().out == (
+        "demo: its idle task fails, `module reload demo` may help: OSError: no more threads\n"
+    )
+    assert demo.done == []
+    demo.host.bridge.start = start  # type: ignore[method-assign]
+    main_loop.turn()
+    assert demo.done == [("begun", True)]
+
+
+def test_beginning_that_fails_is_told_and_the_rest_goes_on(demo: Demo, main_loop: Any, capsys: Any, msg: Any) -> None:
+    def fail() -> None:
+        raise ValueError("no")
+
+    demo.begin = fail  # type: ignore[method-assign]
+    main_loop.turn()
+    assert "ValueError: no" in capsys.readouterr().out
+    demo.mavlink_packet(msg("heartbeat", system=4))
+    main_loop.until(lambda: 4 in demo.host.fleet.vehicles)

@@ -52,6 +52,8 @@ def test_first_heartbeat_makes_a_vehicle(fleet: Fleet, hear: Any) -> None:
         (mavlink.MAV_TYPE_ADSB, mavlink.MAV_AUTOPILOT_GENERIC),
         (mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA),
         (QUADROTOR, mavlink.MAV_AUTOPILOT_INVALID),
+        (mavlink.MAV_TYPE_GENERIC, mavlink.MAV_AUTOPILOT_GENERIC),
+        *((peripheral, mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA) for peripheral in (31, 32, 33, 36, 37, 39, 40, 41, 42)),
     ],
 )
 def test_what_is_no_autopilot_never_makes_a_vehicle(
@@ -59,6 +61,89 @@ def test_what_is_no_autopilot_never_makes_a_vehicle(
 ) -> None:
     assert hear("heartbeat", system=9, type=vehicle_type, autopilot=autopilot) is None
     assert fleet.vehicles == {}
+
+
+COMPANION = {"component": 191, "type": mavlink.MAV_TYPE_GENERIC, "autopilot": mavlink.MAV_AUTOPILOT_GENERIC}
+
+
+@pytest.mark.parametrize(
+    "first",
+    [
+        COMPANION,
+        {**COMPANION, "type": QUADROTOR},
+        {"component": 191, "type": mavlink.MAV_TYPE_ONBOARD_CONTROLLER},
+        {"component": 158, "type": mavlink.MAV_TYPE_GENERIC},  # AP_Periph
+        {"component": 154, "type": mavlink.MAV_TYPE_GIMBAL},
+        {"component": 156, "type": mavlink.MAV_TYPE_ADSB},
+        {"component": 100, "type": mavlink.MAV_TYPE_CAMERA, "autopilot": mavlink.MAV_AUTOPILOT_GENERIC},
+        {"component": 190, "type": QUADROTOR, "autopilot": mavlink.MAV_AUTOPILOT_INVALID},
+        {"component": 2},
+    ],
+)
+def test_autopilot_is_found_whatever_was_heard_before_it(fleet: Fleet, hear: Any, first: dict[str, Any]) -> None:
+    hear("heartbeat", at=1.0, custom_mode=7, base_mode=128, **first)
+    hear("attitude", at=1.1, component=first["component"], yaw=3.0)
+    state = hear("heartbeat", at=2.0, mode="GUIDED")
+    hear("heartbeat", at=3.0, custom_mode=7, base_mode=128, **first)
+    assert state is fleet.vehicles[1]
+    assert (state.component, state.vehicle_type, state.armed, state.mode) == (1, QUADROTOR, False, 4)
+    assert (state.heartbeat_at, state.mode_since, state.received) == (2.0, 2.0, 1)
+    assert state.field("ATTITUDE", "yaw") is None
+
+
+def test_state_that_becomes_the_autopilots_keeps_nothing_of_the_other_as_its_own(fleet: Fleet, hear: Any) -> None:
+    state = hear("heartbeat", component=191, autopilot=mavlink.MAV_AUTOPILOT_GENERIC)
+    hear("attitude", component=191, yaw=3.0, time_boot_ms=900_000)
+    hear("battery_status", component=191, id=1, voltages=[0] * 10, voltages_ext=[0] * 4)
+    hear("param_value", component=191, param_id="RTL_ALT", param_value=1.0)
+    hear("statustext", component=191, text="companion is up")
+    hear("vfr_hud", component=1, alt=5.0)
+    hear("heartbeat", at=2.0)
+    hear("attitude", at=2.0, yaw=1.0, time_boot_ms=500)
+    assert fleet.vehicles[1] is state
+    assert sorted(state.messages) == ["ATTITUDE", "HEARTBEAT", "VFR_HUD"]
+    assert (state.field("VFR_HUD", "alt"), state.field("ATTITUDE", "yaw")) == (5.0, 1.0)
+    assert state.others[191, "ATTITUDE"].message.yaw == 3.0
+    assert (191, "BATTERY_STATUS") in state.others
+    assert (state.parameters, state.said_since(0.0), state.reboots) == ({}, [], 0)
+
+
+def test_second_autopilot_never_takes_over_from_the_first_even_when_that_is_silent(fleet: Fleet, hear: Any) -> None:
+    state = hear("heartbeat", at=1.0)
+    for second in range(2, 60):
+        hear("heartbeat", at=float(second), component=2, armed=True)
+    assert (state.component, state.armed, state.heartbeat_at) == (1, False, 1.0)
+
+
+def test_generic_autopilot_counts_when_it_is_alone_and_says_what_vehicle_it_is(fleet: Fleet, hear: Any) -> None:
+    state = hear("heartbeat", component=5, autopilot=mavlink.MAV_AUTOPILOT_GENERIC)
+    assert (state.component, state.vehicle_type) == (5, QUADROTOR)
+
+
+def test_parameters_are_known_before_and_after_their_vehicle_and_outlive_a_reboot(fleet: Fleet, hear: Any) -> None:
+    fleet.learn({(1, 1): {"RTL_ALT": 1500.0}, (1, 191): {"RTL_ALT": 1.0}})
+    state = hear("heartbeat")
+    fleet.learn({(1, 1): {"LAND_SPEED": 50.0}, (2, 1): {"LAND_SPEED": 30.0}})
+    assert state.parameters == {"RTL_ALT": 1500.0, "LAND_SPEED": 50.0}
+    hear("param_value", param_id="RTL_ALT", param_value=2000.0)
+    hear("attitude", time_boot_ms=60_000)
+    hear("attitude", time_boot_ms=400)
+    assert (state.reboots, state.parameters) == (1, {"RTL_ALT": 2000.0, "LAND_SPEED": 50.0})
+    assert hear("heartbeat", system=2).parameters == {"LAND_SPEED": 30.0}
+
+
+def test_parameters_are_those_of_the_component_that_turns_out_to_be_the_autopilot(fleet: Fleet, hear: Any) -> None:
+    fleet.learn({(1, 1): {"RTL_ALT": 1500.0}})
+    state = hear("heartbeat", component=191, autopilot=mavlink.MAV_AUTOPILOT_GENERIC)
+    assert state.parameters == {}
+    hear("heartbeat")
+    assert state.parameters == {"RTL_ALT": 1500.0}
+
+
+def test_copter_that_does_not_know_its_frame_yet_is_a_vehicle(fleet: Fleet, hear: Any) -> None:
+    state = hear("heartbeat", type=mavlink.MAV_TYPE_GENERIC)
+    hear("heartbeat")
+    assert (state.component, state.vehicle_type) == (1, QUADROTOR)
 
 
 @pytest.mark.parametrize("component", [mavlink.MAV_COMP_ID_GIMBAL, mavlink.MAV_COMP_ID_ADSB, 191])
@@ -137,6 +222,32 @@ def test_landed_is_the_heartbeats_word_without_extended_sys_state(
     hear("extended_sys_state", landed_state=mavlink.MAV_LANDED_STATE_UNDEFINED)
     hear("heartbeat", armed=armed, system_status=system_status)
     assert state.landed is landed
+
+
+@pytest.mark.parametrize("vehicle_type", [mavlink.MAV_TYPE_GROUND_ROVER, mavlink.MAV_TYPE_SURFACE_BOAT])
+@pytest.mark.parametrize("system_status", [mavlink.MAV_STATE_ACTIVE, mavlink.MAV_STATE_CRITICAL])
+def test_rover_stands_on_the_ground_whatever_its_heartbeat_says(
+    hear: Any, vehicle_type: int, system_status: int
+) -> None:
+    state = hear("heartbeat", type=vehicle_type, armed=True, mode="MANUAL", system_status=system_status)
+    assert state.landed is True
+    hear("extended_sys_state", landed_state=mavlink.MAV_LANDED_STATE_UNDEFINED)
+    assert state.landed is True
+
+
+@pytest.mark.parametrize("vehicle_type", [mavlink.MAV_TYPE_FIXED_WING, 20])
+def test_plane_is_where_extended_sys_state_says_until_that_is_old(hear: Any, vehicle_type: int) -> None:
+    flying = {"type": vehicle_type, "armed": True, "system_status": mavlink.MAV_STATE_ACTIVE}
+    state = hear("heartbeat", **flying)
+    assert state.landed is False  # nothing else tells
+    hear("extended_sys_state", at=2.0, landed_state=GROUND)
+    hear("heartbeat", at=2.5, **flying)
+    assert state.landed is True
+    hear("extended_sys_state", at=3.0, landed_state=AIR)
+    hear("heartbeat", at=3.5, **{**flying, "system_status": mavlink.MAV_STATE_STANDBY})
+    assert state.landed is False
+    hear("heartbeat", at=8.5, **{**flying, "system_status": mavlink.MAV_STATE_STANDBY})
+    assert state.landed is True
 
 
 def test_status_text_in_chunks_is_one_text(state: VehicleState, hear: Any) -> None:

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from mavproxy_uavapi.host.timeratio import WINDOW, TimeRatio
+from mavproxy_uavapi.host.timeratio import WINDOW, WRAP, TimeRatio
 
 
 def run(ratio: TimeRatio, seconds: float, speed: float, boot_ms: int = 10_000) -> None:
@@ -65,3 +65,42 @@ def test_messages_without_a_true_boot_time_do_not_count(boot_ms: int | None, nam
     ratio = TimeRatio()
     ratio.update(60_000, "ATTITUDE", 1.0)
     assert not ratio.update(boot_ms, name, 2.0)
+
+
+def test_boot_time_that_wraps_after_49_days_is_no_reboot_and_goes_on() -> None:
+    ratio = TimeRatio()
+    for tenth in range(200):
+        boot_ms = (WRAP - 10_050 + 100 * tenth) % WRAP
+        assert not ratio.update(boot_ms, "ATTITUDE", 50.0 + tenth / 10)
+    assert ratio.ratio == pytest.approx(1.0)
+    assert ratio.boot_time(69.9) == pytest.approx((WRAP - 10_050 + 19_900) / 1000)
+
+
+def test_wrap_during_a_silence_of_the_link_is_no_reboot() -> None:
+    ratio = TimeRatio()
+    ratio.update(WRAP - 1000, "ATTITUDE", 50.0)
+    assert not ratio.update(3_600_000, "ATTITUDE", 50.0 + 3_601.0)
+
+
+def test_message_from_before_a_wrap_that_was_overtaken_changes_nothing() -> None:
+    ratio = TimeRatio()
+    ratio.update(WRAP - 100, "ATTITUDE", 50.0)
+    assert not ratio.update(50, "ATTITUDE", 50.15)
+    assert not ratio.update(WRAP - 50, "ATTITUDE", 50.16)
+    assert ratio.boot_time(50.15) == pytest.approx((WRAP + 50) / 1000)
+    assert not ratio.update(150, "ATTITUDE", 50.25)
+
+
+@pytest.mark.parametrize("days", [20, 30, 49.5])
+def test_reboot_after_a_long_time_is_a_reboot_all_the_same(days: float) -> None:
+    ratio = TimeRatio()
+    ratio.update(round(days * 86_400_000), "ATTITUDE", 50.0)
+    assert ratio.update(1000, "ATTITUDE", 60.0)
+
+
+def test_reboot_after_a_wrap_is_a_reboot() -> None:
+    ratio = TimeRatio()
+    ratio.update(WRAP - 100, "ATTITUDE", 50.0)
+    ratio.update(7_200_000, "ATTITUDE", 7250.0)
+    assert ratio.update(1000, "ATTITUDE", 7260.0)
+    assert ratio.boot_time(7260.0) == pytest.approx(1.0)

@@ -78,6 +78,7 @@ def api(loop: Any, service: Service) -> Iterator[Api]:
     api = Api(loop, service)
     loop.run(api.start())
     yield api
+    service.host.jobs.on_ended.clear()
     service.host.jobs.abort_remote("the test is over")
     loop.run(api.client.close())
 

@@ -161,8 +161,8 @@ def test_takeoff_disarmed_is_409_not_armed(api: Any, loop: Any, drone: Any) -> N
     assert (answer.status, answer.body["code"]) == (409, "not_armed")
 
 
-def test_no_ack_is_504(api: Any, drone: Any) -> None:
-    drone.answers[mavlink.MAV_CMD_DO_CHANGE_SPEED] = [None]
+def test_no_ack_is_504(api: Any, flying: Any) -> None:
+    flying.answers[mavlink.MAV_CMD_DO_CHANGE_SPEED] = [None]
     answer = api.get("/command/set_ground_speed", params={"new_v": "3"})
     assert (answer.status, answer.body["code"]) == (504, "timeout")
 

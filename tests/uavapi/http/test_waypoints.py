@@ -22,11 +22,11 @@ def vehicles_mission(api: Any, loop: Any, copter: Any, monkeypatch: pytest.Monke
     loop.patience = FILE_PATIENCE
     held: list[Any] = []
 
-    async def upload(items: Any, progress: Any) -> None:
+    async def upload(items: Any, progress: Any, **_checks: Any) -> None:
         progress(1, len(items))
         held[:] = items
 
-    async def clear() -> None:
+    async def clear(**_checks: Any) -> None:
         held.clear()
 
     async def download() -> Any:
@@ -75,7 +75,7 @@ def test_mission_in_flight_is_not_changed(api: Any, loop: Any, flying: Any, vehi
 
 @pytest.mark.usefixtures("vehicles_mission")
 def test_refusal_is_told(api: Any, copter: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    async def refuse(_items: Any, _progress: Any) -> None:
+    async def refuse(_items: Any, _progress: Any, **_checks: Any) -> None:
         raise Rejected("no; its old mission is unchanged", "MAV_MISSION_NO_SPACE", ["Full"])
 
     monkeypatch.setattr(copter.waypoints, "upload", refuse)

@@ -150,10 +150,10 @@ def test_without_tmux_execute_is_a_clear_error_and_all_else_works(
 @pytest.mark.needs("tmux")
 @pytest.mark.usefixtures("own_tmux")
 def test_deaths_are_acted_upon_and_other_ends_are_not(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    acted: list[tuple[int, str, str]] = []
+    acted: list[tuple[int, str, list[str]]] = []
 
-    async def after_death(_host: Any, sysid: int, action: str, script: str) -> str:
-        acted.append((sysid, action, script))
+    async def after_death(_host: Any, sysid: int, run: Any, others: list[str]) -> str:
+        acted.append((sysid, run.script, others))
         return "done"
 
     async def story(scripts: Scripts) -> None:
@@ -170,7 +170,7 @@ def test_deaths_are_acted_upon_and_other_ends_are_not(tmp_path: Path, monkeypatc
 
     monkeypatch.setattr(manager.on_exit, "after_death", after_death)
     flown(tmp_path, story, on_script_exit="rtl")
-    assert acted == [(9, "rtl", "bad.py")]
+    assert acted == [(9, "bad.py", []), (9, "bad.py", ["stopped.py"])]
 
 
 @pytest.mark.parametrize(

@@ -1,14 +1,23 @@
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from mavproxy_uavapi.scripts.on_exit import after_death
+from mavproxy_uavapi.scripts.runs import Run
+from mavproxy_uavapi.vehicle.endings import Policy
+from mavproxy_uavapi.vehicle.messages import VelocityTarget
 
 
-def after(loop: Any, host: Any, action: str, sysid: int = 1) -> str:
-    return str(loop.run(after_death(host, sysid, action, "a.py")))
+def run_of(session: str = "UAV_API_1_a") -> Run:
+    return Run(Path("r"), "a.py", [], session, 1, 8000, 0.0, Path("o"), Path("e"), 1.0)
+
+
+def after(loop: Any, host: Any, action: str, sysid: int = 1, others: tuple[str, ...] = ()) -> str:
+    host.endings.on_script_exit = Policy(action)
+    return str(loop.run(after_death(host, sysid, run_of(), list(others))))
 
 
 def test_hold_stops_the_vehicle_and_leaves_it_in_guided(loop: Any, host: Any, flying: Any) -> None:
@@ -59,8 +68,35 @@ def test_no_vehicle_is_said(loop: Any, host: Any) -> None:
 
 
 def test_pilot_who_takes_the_vehicle_meanwhile_keeps_it(loop: Any, host: Any, flying: Any) -> None:
-    task = loop.create_task(after_death(host, 1, "land", "a.py"))
+    host.endings.on_script_exit = Policy.LAND
+    task = loop.create_task(after_death(host, 1, run_of(), []))
     loop.pass_time(2.0)
     flying.pilot("LOITER")
     assert "LOITER" in loop.run(task)
     assert flying.mode == "LOITER"
+
+
+def test_another_script_that_runs_on_keeps_the_vehicle(loop: Any, host: Any, flying: Any) -> None:
+    assert "b.py still runs" in after(loop, host, "hold", others=("b.py",))
+    assert flying.orders() == []
+
+
+@pytest.mark.parametrize("others", [(), ("b.py",)])
+def test_a_dead_scripts_own_job_ends_with_it(
+    loop: Any, host: Any, flying: Any, pilotage: Any, copter: Any, others: tuple[str, ...]
+) -> None:
+    job = pilotage.start(copter.travel, VelocityTarget(8.0, 0.0, 0.0), duration=600.0)
+    job.script = run_of().session
+    loop.pass_time(3.0)
+    assert after(loop, host, "hold", others=others) == "hold is done"
+    assert (job.running, job.ending.value) == (False, "script gone")
+    assert flying.setpoints()[-1].vx == 0.0
+
+
+def test_somebody_elses_job_does_not_end_with_a_script(
+    loop: Any, host: Any, flying: Any, pilotage: Any, copter: Any
+) -> None:
+    job = pilotage.start(copter.travel, VelocityTarget(8.0, 0.0, 0.0), duration=600.0)
+    job.script = "UAV_API_1_b"
+    assert "flies the vehicle" in after(loop, host, "hold")
+    assert job.running

@@ -4,7 +4,7 @@ import pytest
 from pymavlink import mavutil
 
 from mavproxy_uavapi.errors import Invalid
-from mavproxy_uavapi.vehicle.modes import kind_of, mode_name, mode_number
+from mavproxy_uavapi.vehicle.modes import flies_mission, kind_of, mode_name, mode_number
 
 mavlink = mavutil.mavlink
 COPTER, PLANE, ROVER = mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_TYPE_FIXED_WING, mavlink.MAV_TYPE_GROUND_ROVER
@@ -49,3 +49,10 @@ def test_plane_has_no_land_mode() -> None:
     with pytest.raises(Invalid, match="no mode 'LAND'; there are .*AUTO") as caught:
         mode_number(PLANE, "LAND")
     assert caught.value.problems[0]["loc"] == ["query", "mode"]
+
+
+@pytest.mark.parametrize(
+    ("vehicle_type", "modes"), [(COPTER, {"AUTO", "AUTO_RTL"}), (PLANE, {"AUTO"}), (ROVER, {"AUTO"})]
+)
+def test_mission_is_flown_in_auto_and_on_a_copters_way_home_by_it(vehicle_type: int, modes: set[str]) -> None:
+    assert {name for name in mavutil.mode_mapping_byname(vehicle_type) if flies_mission(name)} == modes

@@ -1,0 +1,52 @@
+"""The settings of a module that outlive it: MAVProxy reloads by unloading, then loading without a keyword."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+ATTRIBUTE = "uavapi_remembered"  # on MAVProxy's state: remembered for as long as MAVProxy runs
+UNSHOWN = {"origins"}  # keywords that are no settings
+
+
+class Remembered:
+    """What one of our modules was given: the keywords of `module load`, and what was set at the prompt since.
+
+    A load without keywords takes over what the one before it was given; a load with any begins anew. An INI file that
+    the keyword `config` names is read again.
+
+    Args:
+        mpstate: MAVProxy's state.
+        module: its name.
+        keywords: of this load.
+    """
+
+    def __init__(self, mpstate: Any, module: str, keywords: Mapping[str, Any]) -> None:
+        if not hasattr(mpstate, ATTRIBUTE):
+            setattr(mpstate, ATTRIBUTE, {})
+        self._all: dict[str, Remembered] = getattr(mpstate, ATTRIBUTE)
+        self._module = module
+        before = None if keywords else self._all.get(module)
+        self.keywords = dict(keywords) if before is None else before.keywords
+        self.changed: dict[str, Any] = {} if before is None else before.changed
+        self.taken_over = before is not None and bool(self.given)
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """Keywords and changes as one, the latter winning."""
+        return {**self.keywords, **self.changed}
+
+    def keep(self, shown: Callable[[str], object]) -> None:
+        """Remember this from now on, and print what was taken over. Not called when the module refuses it.
+
+        Args:
+            shown: gives a setting's value as the prompt may show it.
+        """
+        self._all[self._module] = self
+        if self.taken_over:
+            pairs = [f"{n}={v if n == 'config' else shown(n)}" for n, v in self.given.items() if n not in UNSHOWN]
+            print(f"{self._module}: as before: {', '.join(pairs)} (keywords at `module load` replace all that)")
+
+    def change(self, name: str, value: Any) -> None:
+        """A setting was set at the prompt."""
+        self.changed[name] = value
