@@ -51,6 +51,11 @@ class CommandAuthority:
         return self._paused_at is not None and self._state.mode_since <= self._paused_at
 
     @property
+    def on_its_way(self) -> bool:
+        """Whether the commander's verb has not shown its effect yet."""
+        return self.commander is not None and self.commander.running and not self._shown
+
+    @property
     def interrupted(self) -> Job | None:
         """The job that waits for the end of a pause."""
         return None if self._suspended is None else self._suspended[0]
@@ -88,7 +93,7 @@ class CommandAuthority:
             Paused: `stop` holds the vehicle; rank MOVEMENT only.
         """
         one = self.commander
-        if one is not None and one.running and not self._shown and rank < self._rank:
+        if one is not None and self.on_its_way and rank < self._rank:
             raise Busy(f"{one.verb} is on its way; try again when the vehicle shows it")
         if rank is Rank.MOVEMENT and self.paused and not stopped_too:
             raise Paused("the vehicle is stopped; /movement/resume or /command/guided ends that")

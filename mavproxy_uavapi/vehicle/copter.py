@@ -71,10 +71,13 @@ class Copter(GuidedVehicle):
             )
 
     async def land(self, job: Job, timeout: float | None = None) -> None:
-        """Land where it is; done when it has disarmed. On the ground and disarmed nothing is sent."""
+        """Land where it is; done when it has disarmed.
+
+        On the ground and disarmed nothing is sent, and an `arm` that waits ends.
+        """
+        self.authority.take(job, Rank.STOP)
         if self.state.armed is False:
             return
-        self.authority.take(job, Rank.STOP)
         await self.switch_to(job, "LAND")
         limits = await self.limits()
         expected = deadlines.landing_time(limits, self.height)
@@ -83,11 +86,13 @@ class Copter(GuidedVehicle):
     async def rtl(self, job: Job, timeout: float | None = None) -> None:
         """Return to launch; done when the vehicle has landed there and disarmed.
 
-        On the ground and disarmed it is not switched: at home it is done, elsewhere `NotArmed`.
+        On the ground and disarmed it is not switched, and an `arm` that waits ends: at home it is done, elsewhere
+        `NotArmed`.
 
         Raises:
             NotFound: disarmed, and it has no home yet.
         """
+        self.authority.take(job, Rank.STOP)
         distance = self.distance_home()
         if self.state.armed is False:
             if distance is None:
@@ -97,7 +102,6 @@ class Copter(GuidedVehicle):
             if distance > HOME_RADIUS:
                 raise NotArmed(f"the vehicle is disarmed, {distance:.0f} m from home")
             return
-        self.authority.take(job, Rank.STOP)
         await self.switch_to(job, "RTL")
         limits = await self.limits()
         expected = deadlines.return_time(limits, self.distance_home() or 0.0, self.height)

@@ -39,7 +39,7 @@ class Situation(Enum):
     DISARMED = "disarmed"
     IDLE = "stands on the ground"  # in a landing's mode, its motors idle
     GUIDED = "GUIDED"  # on the ground too: a climb begins there
-    PAUSED = "held still"
+    PAUSED = "held still"  # with a target yet, which `resume` would fly to
     MISSION = "AUTO"
     LAND = "LAND"
     RTL = "RTL"
@@ -54,7 +54,7 @@ WHAT_FOLLOWS: Mapping[Situation, Mapping[Policy, str | None]] = {
     Situation.IDLE: NOTHING,
     Situation.PILOTED: NOTHING,
     Situation.GUIDED: {**NOTHING, Policy.HOLD: HOLD, Policy.SAFE: HOLD, Policy.LAND: LAND, Policy.RTL: RTL},
-    Situation.PAUSED: {**NOTHING, Policy.LAND: LAND, Policy.RTL: RTL},
+    Situation.PAUSED: {**NOTHING, Policy.HOLD: HOLD, Policy.SAFE: HOLD, Policy.LAND: LAND, Policy.RTL: RTL},
     Situation.MISSION: {**NOTHING, Policy.HOLD: HOLD, Policy.LAND: LAND, Policy.RTL: RTL},
     Situation.LAND: {**NOTHING, Policy.HOLD: HOLD},
     Situation.RTL: {**NOTHING, Policy.HOLD: HOLD, Policy.LAND: LAND},
@@ -121,7 +121,7 @@ class FlightEndings:
 
     def _ended(self, job: Job) -> None:
         vehicle = job.vehicle
-        if isinstance(vehicle, Vehicle) and vehicle.authority.commander is job:
+        if isinstance(vehicle, Vehicle) and job in (vehicle.authority.commander, vehicle.authority.interrupted):
             closing = self.see_to(vehicle, self.policy(job), f"after {job.verb}", job.client)
             if closing is not None:
                 self._closing = {n: one for n, one in self._closing.items() if one.running} | {job.id: closing}

@@ -252,13 +252,17 @@ class Vehicle:
         self.authority.shown(job)
 
     async def disarm(self, job: Job, force: bool = False) -> None:
-        """Disarm and wait until a heartbeat shows it. In flight it is refused, unless `force`: then it falls."""
-        if self.state.armed is False:
-            return
-        if not force and self.state.landed is False:
+        """Disarm and wait until a heartbeat shows it. In flight it is refused, unless `force`: then it falls.
+
+        It ends an `arm` that waits; nothing is sent then, unless that may have been on its way.
+        """
+        armed = self.state.armed is not False
+        if armed and not force and self.state.landed is False:
             raise Busy("the vehicle is flying; land it first (force=true stops its motors in the air)")
+        may_be_armed = armed or self.authority.on_its_way
         self.authority.take(job, Rank.FORCE if force else Rank.STOP)
-        await arming.disarm(self, job, force)
+        if may_be_armed:
+            await arming.disarm(self, job, force)
         self.authority.shown(job)
 
     async def set_mode(self, job: Job, mode: str) -> None:

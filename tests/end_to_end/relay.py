@@ -1,8 +1,8 @@
 """A wire between MAVProxy and ArduPilot that records and misbehaves; its words are the embedded vehicle's.
 
-The faults of the link (`silence`, `lose_acks`, `delay_acks`, `foreign_ack`, `refuse`, `in_progress`) are the wire's
-own. What the pilot does (`pilot_mode`, `pilot_sticks`, `pilot_disarm`) and `reboot` go to the vehicle as another
-ground station's commands, the sticks as MAVProxy's own RC overrides.
+The faults of the link (`silence`, `lose_acks`, `delay_acks`, `foreign_ack`, `refuse`, `in_progress`, `drop`, `nan`)
+are the wire's own. What the pilot does (`pilot_mode`, `pilot_sticks`, `pilot_arm`, `pilot_disarm`), `other_station`
+and `reboot` go to the vehicle as another ground station's messages, the sticks as MAVProxy's own RC overrides.
 """
 
 from __future__ import annotations
@@ -22,7 +22,9 @@ from mavproxy_uavapi.vehicle.modes import mode_number
 mavlink = mavutil.mavlink
 
 PILOT, MAVPROXY, VEHICLE = (254, 190), (255, 230), (1, 1)
-FORCE_REBOOT, FORCE_DISARM = 20190226, 21196
+FORCE_REBOOT, FORCE_ARMING = 20190226, 21196
+CLIMBING_THROTTLE = 1700  # microseconds
+POSITION_ONLY, VELOCITY_ONLY = 0x0DF8, 0x0DC7
 STICKS_PERIOD = 0.1  # s; ArduPilot forgets overrides after 3 s of its own, faster clock
 RECONNECT = 0.2  # s between attempts to reach a vehicle that restarts
 
@@ -32,13 +34,22 @@ def encoder(source: tuple[int, int]) -> Any:
     return mavlink.MAVLink(None, *source)
 
 
+def _setpoint(position: tuple[float, ...] = (0, 0, 0), velocity: tuple[float, ...] | None = None) -> Any:
+    """A GUIDED setpoint in NED from the EKF origin."""
+    mask = POSITION_ONLY if velocity is None else VELOCITY_ONLY
+    fields = (*position, *(velocity or (0, 0, 0)), 0, 0, 0, 0, 0)
+    frame = mavlink.MAV_FRAME_LOCAL_NED
+    return mavlink.MAVLink_set_position_target_local_ned_message(0, *VEHICLE, frame, mask, *fields)
+
+
 class Relay:
     """Listens for MAVProxy on `port`, and connects it to the vehicle's TCP port."""
 
     def __init__(self, vehicle_port: int) -> None:
         self._vehicle_port = vehicle_port
         self._faults = Faults()
-        self._received: list[tuple[int, Any]] = []
+        self._spoilt: set[str] = set()  # names of messages that carry NaN
+        self._received: list[tuple[int, float, Any]] = []
         self._sticks: list[int] | None = None
         self._encoders: dict[tuple[int, int], Any] = {}
         self._mavproxy: asyncio.StreamWriter | None = None
@@ -61,14 +72,17 @@ class Relay:
         with self._lock:
             if op == "clear":
                 self._faults.clear()
+                self._spoilt.clear()
                 return {"ok": True}
             assert op == "received", f"a wire knows nothing of {op}"
-            found = [(index, message) for index, message in self._received if index > arguments.get("since", 0)]
-            told = [(message, message.to_dict()) for _, message in found if message.get_type() != "HEARTBEAT"]
+            found = [entry for entry in self._received if entry[0] > arguments.get("since", 0)]
+            told = [(wall, message) for _, wall, message in found if message.get_type() != "HEARTBEAT"]
             return {
                 "ok": True,
                 "last": found[-1][0] if found else arguments.get("since", 0),
-                "messages": [{"name": message.get_type(), "fields": fields} for message, fields in told],
+                "messages": [
+                    {"name": message.get_type(), "wall": wall, "fields": message.to_dict()} for wall, message in told
+                ],
             }
 
     def fault(self, name: str, **arguments: Any) -> None:
@@ -89,8 +103,17 @@ class Relay:
                 names = ("roll", "pitch", "throttle", "yaw")
                 self._sticks = [arguments.get(stick, 1500) for stick in names]
                 self._loop.call_soon_threadsafe(self._move_sticks)
+            elif name == "pilot_arm":
+                self._sticks = [1500, 1500, arguments.get("throttle", CLIMBING_THROTTLE), 1500]
+                self._command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1, FORCE_ARMING)
+            elif name == "other_station":
+                self._loop.call_soon_threadsafe(self._order, _setpoint(**arguments), PILOT)
+            elif name == "nan":
+                seconds = arguments.get("seconds", math.inf)
+                self._spoilt.add(arguments["message"])
+                self._faults.spoil(arguments["message"], arguments.get("fields", ()), time.monotonic(), seconds)
             elif name == "pilot_disarm":
-                self._command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, FORCE_DISARM)
+                self._command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, FORCE_ARMING)
             elif name == "reboot":
                 self._sticks = None
                 self._command(mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 1, 0, 0, 0, 0, FORCE_REBOOT)
@@ -137,7 +160,9 @@ class Relay:
     def _pass_up(self, message: Any) -> None:
         if self._vehicle is None or self._faults.deaf(time.monotonic()):
             return
-        self._received.append((len(self._received) + 1, message))
+        if self._faults.drops(message):
+            return
+        self._received.append((len(self._received) + 1, time.time(), message))
         if message.get_type() == "COMMAND_LONG":
             refused = self._faults.refusal(message.command)
             if refused is not None:
@@ -168,6 +193,9 @@ class Relay:
     def _pass_down(self, message: Any) -> None:
         now = time.monotonic()
         if self._mavproxy is None or self._faults.mute(now):
+            return
+        if message.get_type() in self._spoilt:
+            self._say(self._faults.spoilt(message, now), (message.get_srcSystem(), message.get_srcComponent()))
             return
         if message.get_type() != "COMMAND_ACK" or message.target_system != MAVPROXY[0]:
             self._mavproxy.write(message.get_msgbuf())

@@ -1,0 +1,447 @@
+"""Flights against an adversary: pilots, other stations, streams and deaths at the worst moment.
+
+On the embedded vehicle and on ArduPilot's; each was lost once.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import threading
+import time
+
+import pytest
+import requests
+
+pytestmark = pytest.mark.needs("tmux")
+
+READY_AFTER = 60  # s of the vehicle's clock from boot, as ArduPilot's estimator needs them
+TRIES = 20
+SLOW = 3  # speed-up, where the first second of a take-off is aimed at
+SCRIPT_GONE = 2.0  # s within which a dead script's job must end
+SENT_WITHIN = 0.25  # s from a request to the vehicle's socket, on a machine that does much else
+COMMANDS = {"takeoff": 22, "land": 176, "rtl": 176}
+STEERING = {"SET_POSITION_TARGET_LOCAL_NED", "SET_POSITION_TARGET_GLOBAL_INT", "COMMAND_LONG", "COMMAND_INT"}
+DEADLY = """
+import json, os, sys, threading, time, urllib.request
+
+path, body, lives, die = sys.argv[1], sys.argv[2], float(sys.argv[3]), int(sys.argv[4])
+
+def ask():
+    data = None if body == "-" else body.encode()
+    request = urllib.request.Request(os.environ["UAVAPI_URL"] + path, data, {"Content-Type": "application/json"})
+    urllib.request.urlopen(request, timeout=600)
+
+threading.Thread(target=ask, daemon=True).start()
+time.sleep(lives)
+os.kill(os.getpid(), die)
+"""
+WPL = """QGC WPL 110
+0\t1\t0\t16\t0\t0\t0\t0\t-35.363261\t149.165230\t584\t1
+1\t0\t3\t22\t0\t0\t0\t0\t0\t0\t10\t1
+2\t0\t3\t16\t0\t0\t0\t0\t-35.3600\t149.1653\t12\t1
+3\t0\t3\t16\t0\t0\t0\t0\t-35.3660\t149.1653\t12\t1
+"""
+
+
+@pytest.fixture(scope="module", params=["embedded", pytest.param("ardupilot", marks=pytest.mark.sitl)])
+def vehicle(request, harness, tmp_path_factory):
+    directory = tmp_path_factory.mktemp("hostile")
+    folders = {"scripts_path": str(directory / "scripts"), "script_logs": str(directory / "logs")}
+    if request.param == "embedded":
+        rig = harness.embedded(directory, f"--ready-after={READY_AFTER}", **folders)
+    else:
+        rig = harness.ardupilot_with_faults(directory, **folders)
+    rig.settings = folders
+    answer = requests.post(rig.url + "/mission/upload-script", files={"file": ("deadly.py", DEADLY)}, timeout=10)
+    rig.ok(answer)
+    harness.eventually(lambda: rig.status()["ready_to_arm"], 60, "getting ready to arm")
+    yield rig
+    rig.stop()
+
+
+@pytest.fixture
+def rig(vehicle):
+    """The vehicle; whatever a flight ended in, the next one begins on the ground without faults."""
+    yield vehicle
+    vehicle.control.ask("clear")
+    vehicle.get("/command/set_sim_speedup", sim_factor=10)
+    vehicle.get("/command/land", timeout=60)
+    vehicle.control.fault("pilot_sticks", throttle=1000)
+    vehicle.get("/command/disarm", force=True)
+
+
+class Background:
+    """A request that waits, in a thread of its own."""
+
+    def __init__(self, request):
+        self.answer = None
+        self._thread = threading.Thread(target=self._run, args=(request,))
+        self._thread.start()
+
+    def _run(self, request):
+        self.answer = request()
+
+    def join(self, timeout=60):
+        self._thread.join(timeout)
+        assert self.answer is not None, f"no answer within {timeout} s"
+        return self.answer
+
+
+class Streams:
+    """Clients that each ask for a velocity 20 times a second; a context."""
+
+    def __init__(self, rig, count=2, **velocity):
+        self._url = rig.url + "/movement/travel_at_ned"
+        self._velocities = [velocity or {"vx": 4 * (-1) ** n, "vy": 0, "vz": 0} for n in range(count)]
+        self._ended = threading.Event()
+        self.answers = []
+        self._threads = [threading.Thread(target=self._run, args=(one,)) for one in self._velocities]
+
+    def _run(self, velocity):
+        with requests.Session() as session:
+            while not self._ended.wait(0.05):
+                answer = session.post(self._url, json=velocity, timeout=30)
+                self.answers.append((answer.status_code, answer.json().get("code")))
+
+    def __enter__(self):
+        for thread in self._threads:
+            thread.start()
+        return self
+
+    def __exit__(self, *_):
+        self._ended.set()
+        for thread in self._threads:
+            thread.join(40)
+
+    def refusals(self, since=0):
+        return {code for status, code in self.answers[since:] if status != 200}
+
+
+def speed(rig):
+    velocity = rig.ok(rig.get("/telemetry/ned"))["info"]["velocity"]
+    return math.hypot(velocity["vx"], velocity["vy"], velocity["vz"])
+
+
+def height(rig):
+    return -rig.ned()[2]
+
+
+def mode(rig):
+    return rig.status()["mode"]
+
+
+def sent(rig, since):
+    """What the vehicle received from then on, but for what asks for telemetry."""
+    messages = rig.control.ask("received", since=since)["messages"]
+    asks = {511, 512}  # SET_MESSAGE_INTERVAL, REQUEST_MESSAGE
+    return [m for m in messages if m["name"] in STEERING and m["fields"].get("command") not in asks]
+
+
+def mark(rig):
+    return rig.control.ask("received", since=0)["last"]
+
+
+def delete(rig, location):
+    return requests.delete(rig.url + location, timeout=60)
+
+
+def job_of(rig, location):
+    return requests.get(rig.url + location, timeout=10).json()
+
+
+def armed_on_the_ground(rig):
+    rig.control.fault("pilot_sticks", throttle=1000)
+    rig.ok(rig.get("/command/arm"))
+
+
+# -- F1: a pilot who takes off while arm waits ------------------------------------------------------------
+
+
+def test_arm_that_waits_does_not_take_the_vehicle_from_the_pilot_who_arms_it(rig, harness):
+    rig.control.fault("reboot")
+    harness.eventually(lambda: not rig.status()["ekf_ok"] and mode(rig) == "STABILIZE", 30, "the reboot")
+    waiting = Background(lambda: rig.get("/command/arm"))
+    time.sleep(0.3)
+    harness.eventually(lambda: pilot_arms(rig), 5, "the pilot's arming")
+    time.sleep(0.5)
+    rig.control.fault("pilot_sticks", throttle=1500)
+    answer = waiting.join(30)
+    assert (answer.status_code, answer.json()["code"]) == (409, "mode_changed")
+    harness.eventually(lambda: rig.status()["ekf_ok"], 30, "readiness")
+    harness.eventually(lambda: rig.get("/telemetry/ned").status_code == 200 and height(rig) > 3, 30, "his flight")
+    since = mark(rig)
+    time.sleep(1.0)
+    assert sent(rig, since) == []
+    assert mode(rig) == "STABILIZE"
+    rig.control.fault("pilot_mode", mode="LAND")
+    harness.eventually(lambda: rig.status()["armed"] is False, 60, "his landing")
+
+
+def pilot_arms(rig):
+    with contextlib.suppress(AssertionError):  # it boots still
+        rig.control.fault("pilot_arm")
+    return rig.status()["armed"]
+
+
+# -- F2: what stops goes before what streams --------------------------------------------------------------
+
+
+@pytest.mark.parametrize("verb", ["land", "rtl"])
+def test_going_down_is_not_kept_from_the_vehicle_by_streams(rig, harness, verb):
+    rig.in_the_air(80)  # it sinks a little in each try
+    with Streams(rig) as streams:
+        for number in range(TRIES):
+            before = len(streams.answers)
+            answer = rig.get(f"/command/{verb}?wait=false")
+            assert answer.status_code == 202
+            harness.eventually(lambda: mode(rig) == verb.upper(), 3, f"{verb} number {number}")
+            time.sleep(0.2)
+            assert streams.refusals(before) <= {"busy", "mode_changed", "superseded"}
+            assert job_of(rig, answer.headers["Location"])["state"] == "running"
+            rig.ok(rig.get("/command/guided"))
+        rig.ok(rig.get(f"/command/{verb}"))
+        assert rig.status()["armed"] is False
+
+
+def test_brake_is_not_kept_from_the_vehicle_by_streams(rig):
+    rig.in_the_air(10)
+    with Streams(rig) as streams:
+        for _ in range(TRIES):
+            before = len(streams.answers)
+            rig.ok(rig.get("/command/brake"))
+            assert mode(rig) == "BRAKE"
+            assert streams.refusals(before) <= {"busy", "mode_changed", "superseded"}
+            rig.ok(rig.get("/command/guided"))
+
+
+def test_disarm_is_not_kept_from_the_vehicle_by_streams(rig):
+    rig.control.fault("pilot_sticks", throttle=1000)
+    with Streams(rig) as streams:
+        for _ in range(TRIES):
+            rig.ok(rig.get("/command/arm"))
+            before = len(streams.answers)
+            rig.ok(rig.get("/command/disarm"))
+            assert rig.status()["armed"] is False
+            assert streams.refusals(before) <= {"busy", "not_armed", "mode_changed"}
+
+
+# -- F3: stop is stop -------------------------------------------------------------------------------------
+
+
+def test_stop_holds_a_vehicle_still_against_a_stream_until_resume(rig, harness):
+    rig.in_the_air(10)
+    with Streams(rig, count=1) as streams:
+        harness.eventually(lambda: speed(rig) > 2, 10, "its flying")
+        rig.ok(rig.get("/movement/stop"))
+        before = len(streams.answers) + 1  # one may be on its way
+        for _ in range(10):
+            assert speed(rig) < 0.7
+            time.sleep(0.1)
+        assert set(streams.answers[before:]) == {(409, "paused")}
+        rig.ok(rig.get("/movement/resume"))
+        harness.eventually(lambda: speed(rig) > 2, 10, "its flying again")
+
+
+# -- F4: the setpoint in force is the autopilot's ---------------------------------------------------------
+
+
+def test_yaw_rate_leaves_another_stations_target_in_force(rig, harness):
+    rig.in_the_air(10)
+    x, y, z = rig.ned()
+    rig.ok(rig.post("/movement/go_to_ned_wait", x=x + 5, y=y, z=z))
+    target = (x + 5, y + (60 if y < 0 else -60), z)
+    rig.control.fault("other_station", position=target)
+    time.sleep(0.2)
+    rig.get("/movement/set_yaw_rate", yaw_rate=30)
+    harness.eventually(lambda: math.dist(rig.ned(), target) < 1.5, 20, "the other station's target")
+    rig.get("/movement/set_yaw_rate", yaw_rate=0)
+
+
+def test_yaw_rate_after_a_takeoff_does_not_fly_to_the_target_before_it(rig):
+    rig.in_the_air(10)
+    x, y, z = rig.ned()
+    rig.ok(rig.post("/movement/go_to_ned_wait", x=x + (40 if x < 0 else -40), y=y, z=z))
+    rig.ok(rig.post("/movement/go_to_ned", x=x, y=y, z=z))
+    time.sleep(0.3)
+    rig.on_the_ground()
+    rig.in_the_air(10)
+    here = rig.ned()
+    rig.get("/movement/set_yaw_rate", yaw_rate=30)
+    time.sleep(1.0)
+    assert math.dist(rig.ned(), here) < 2
+    rig.get("/movement/set_yaw_rate", yaw_rate=0)
+
+
+@pytest.mark.parametrize("after", [0.05, 0.4])
+def test_yaw_rate_in_a_takeoff_is_refused_and_the_climb_goes_on(rig, after):
+    armed_on_the_ground(rig)
+    waiting = Background(lambda: rig.get("/command/takeoff", alt=20))
+    time.sleep(after)
+    answer = rig.get("/movement/set_yaw_rate", yaw_rate=30)
+    assert (answer.status_code, answer.json()["code"]) == (409, "busy")
+    rig.ok(waiting.join())
+    assert height(rig) > 18.5
+
+
+# -- F5: a hold in the first second of a take-off ---------------------------------------------------------
+
+
+def highest(rig, seconds=4.0):
+    """The greatest height (m) of so many seconds."""
+    end, most = time.monotonic() + seconds, 0.0
+    while time.monotonic() < end:
+        most = max(most, height(rig))
+        time.sleep(0.05)
+    return most
+
+
+def assert_stays_low(rig):
+    reached = highest(rig)
+    print(f"it reached {reached:.2f} m")
+    assert reached < 6
+    assert speed(rig) < 0.7
+
+
+@pytest.mark.parametrize("after", [0.02, 0.15, 0.35])
+def test_takeoff_that_is_deleted_in_its_first_second_does_not_climb_on(rig, after):
+    armed_on_the_ground(rig)
+    rig.ok(rig.get("/command/set_sim_speedup", sim_factor=SLOW))
+    location = rig.get("/command/takeoff?alt=20&wait=false").headers["Location"]
+    time.sleep(after)
+    assert delete(rig, location).status_code == 200
+    assert_stays_low(rig)
+
+
+def test_takeoff_whose_client_hangs_up_in_its_first_second_does_not_climb_on(rig):
+    armed_on_the_ground(rig)
+    set_on_disconnect(rig, "hold")
+    try:
+        rig.ok(rig.get("/command/set_sim_speedup", sim_factor=SLOW))
+        with contextlib.suppress(requests.ReadTimeout):
+            rig.get("/command/takeoff", alt=20, timeout=0.3)
+        assert_stays_low(rig)
+    finally:
+        set_on_disconnect(rig, "continue")
+
+
+def set_on_disconnect(rig, value):
+    rig.mavproxy.type(f"uavapi set on_disconnect {value}")
+    rig.mavproxy.ask("uavapi set on_disconnect", f" {value} ")
+
+
+def test_takeoff_whose_script_dies_in_its_first_second_does_not_climb_on(rig):
+    armed_on_the_ground(rig)
+    rig.ok(rig.get("/command/set_sim_speedup", sim_factor=SLOW))
+    run_deadly(rig, "/command/takeoff?alt=20&wait=false", "-", 0.3)
+    assert_stays_low(rig)
+
+
+def run_deadly(rig, path, body, lives, die=9):
+    args = [path, body, str(lives), str(die)]
+    rig.ok(rig.post("/mission/execute-script", script_name="deadly", args=args))
+
+
+# -- F6: a dead script's job ------------------------------------------------------------------------------
+
+
+def test_dead_scripts_job_ends_with_it_and_the_vehicle_holds(rig, harness):
+    rig.in_the_air(10)
+    body = '{"vx": 8, "vy": 0, "vz": 0, "duration": 600}'
+    run_deadly(rig, "/movement/travel_at_ned?wait=false", body, 1.0)
+    job = harness.eventually(lambda: travelling(rig), 10, "its job")
+    harness.eventually(lambda: not show(rig)["running"], 10, "its death")
+    died = time.monotonic()
+    harness.eventually(lambda: job_of(rig, f"/jobs/{job}")["state"] != "running", 10, "the end of its job")
+    assert time.monotonic() - died < SCRIPT_GONE
+    harness.eventually(lambda: speed(rig) < 0.5, 10, "its holding")
+
+
+def travelling(rig):
+    jobs = rig.ok(rig.get("/jobs"))["jobs"]
+    return next((j["job"] for j in jobs if j["state"] == "running" and j["verb"].endswith("travel_at_ned")), None)
+
+
+def show(rig):
+    return rig.ok(rig.get("/mission/scripts/deadly"))["run"]
+
+
+# -- F7: DELETE of a mission ------------------------------------------------------------------------------
+
+
+def test_mission_that_is_deleted_is_left_by_brake(rig, harness):
+    rig.in_the_air(10)
+    rig.ok(
+        requests.post(rig.url + "/mission/waypoints", data=WPL, headers={"Content-Type": "text/plain"}, timeout=60)
+    )
+    answer = rig.post("/mission/start?wait=false", until_complete=True)
+    assert answer.status_code == 202
+    harness.eventually(lambda: mode(rig) == "AUTO" and speed(rig) > 2, 20, "its mission")
+    assert delete(rig, answer.headers["Location"]).status_code == 200
+    assert mode(rig) == "BRAKE"
+    harness.eventually(lambda: speed(rig) < 0.5, 10, "standing still")
+    rig.ok(rig.get("/command/guided"))
+
+
+# -- F8: what is not a number -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("message", "path", "body"),
+    [
+        ("LOCAL_POSITION_NED", "/movement/drive", {"x": 5, "y": 0, "z": 0}),
+        ("ATTITUDE", "/movement/drive_body", {"front": 5, "right": 0, "down": 0}),
+    ],
+)
+def test_telemetry_that_is_not_a_number_is_not_flown_by(rig, message, path, body):
+    rig.in_the_air(10)
+    rig.control.fault("nan", message=message)
+    time.sleep(0.5)
+    since = mark(rig)
+    answer = rig.post(path, **body)
+    assert (answer.status_code, answer.json()["code"]) == (503, "stale")
+    assert [m for m in sent(rig, since) if m["name"].startswith("SET_POSITION")] == []
+
+
+# -- F9: the first command is on the wire at once ---------------------------------------------------------
+
+
+@pytest.mark.parametrize("verb", ["takeoff", "land", "rtl"])
+def test_first_command_goes_out_before_anything_is_asked(rig, harness, verb):
+    if verb == "takeoff":
+        armed_on_the_ground(rig)
+    else:
+        rig.in_the_air(10)
+    reload(rig)
+    since, asked_at = mark(rig), time.time()
+    waiting = Background(lambda: rig.get(f"/command/{verb}"))
+    wanted = COMMANDS[verb]
+    received = harness.eventually(lambda: until_command(rig, since, wanted), 10, f"{verb} on the wire")
+    took = received[-1]["wall"] - asked_at
+    print(f"{verb} was on the wire after {1000 * took:.1f} ms")
+    assert [m["fields"]["param_id"] for m in received if m["name"] == "PARAM_REQUEST_READ"] == []
+    assert took < SENT_WITHIN
+    rig.ok(waiting.join())
+
+
+def until_command(rig, since, command):
+    """What came from then on, up to that command; None while it has not come."""
+    messages = rig.control.ask("received", since=since)["messages"]
+    for number, message in enumerate(messages, 1):
+        if message["name"] == "COMMAND_LONG" and message["fields"]["command"] == command:
+            return messages[:number]
+    return None
+
+
+def reload(rig):
+    """A fresh API, which has asked for nothing yet."""
+    rig.mavproxy.ask("module unload uavapi", "Unloaded module uavapi")
+    rig.mavproxy.ask(rig_load(rig), "uavapi: listening")
+    rig.wait_until_up()
+
+
+def rig_load(rig):
+    import json
+
+    settings = {"port": rig.port, **rig.settings}
+    return f"module load uavapi:{json.dumps(settings, separators=(',', ':'))}"
