@@ -245,11 +245,11 @@ def defect(rig: Any, _job: Any) -> None:
     rig.loop.set_exception_handler(lambda _loop, _context: None)  # it is told there, too
 
     def broken(*_: Any) -> Any:
+        del rig.copter.held_by, rig.vision.now  # once: what sees to the vehicle afterwards asks too
         raise ZeroDivisionError("a defect")
 
     rig.copter.held_by, rig.vision.now = broken, broken
     rig.pass_time(0.3)
-    del rig.copter.held_by, rig.vision.now
 
 
 # How it ends, the error of its client, and the mode that follows what is flown in GUIDED, and what is flown in LAND.
