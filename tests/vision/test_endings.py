@@ -245,11 +245,11 @@ def defect(rig: Any, _job: Any) -> None:
     rig.loop.set_exception_handler(lambda _loop, _context: None)  # it is told there, too
 
     def broken(*_: Any) -> Any:
+        del rig.copter.held_by, rig.vision.now  # once: what sees to the vehicle afterwards asks too
         raise ZeroDivisionError("a defect")
 
     rig.copter.held_by, rig.vision.now = broken, broken
     rig.pass_time(0.3)
-    del rig.copter.held_by, rig.vision.now
 
 
 # How it ends, the error of its client, and the mode that follows what is flown in GUIDED, and what is flown in LAND.
@@ -293,7 +293,7 @@ def test_what_follows_a_flight_is_what_the_table_says(lockstep, name, end):
     rig, job = under_way(lockstep, name)
     act, code, after_guided, after_land = ENDS[end]
     refused = end in REFUSED_IN_LAND if name == "landing_target" else name == "takeoff" and end in NOT_IN_A_TAKEOFF
-    began, mode = height(rig), after_land if name == "landing_target" else after_guided
+    mode = after_land if name == "landing_target" else after_guided
     act(rig, job)
     if refused:  # the flight goes on
         rig.pass_time(0.5)
@@ -301,6 +301,7 @@ def test_what_follows_a_flight_is_what_the_table_says(lockstep, name, end):
         return
     error = rig.outcome(job)
     assert error.code == code, error
+    began = height(rig)
     rig.pass_time(0.3)
     mark = len(rig.wire.sent)
     rig.pass_time(12.0)
