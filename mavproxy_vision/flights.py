@@ -274,7 +274,7 @@ class Flights:
 
 def _ended(vision: Vision, flight: Flight, reason: str, ending: Ending) -> Aborted:
     vehicle = flight.vehicle
-    holds = flight.commands and vision.host.endings.what_follows(vehicle, FIXED[ending]) is not None
+    holds = flight.commands and vision.host.endings.what_follows(vehicle, FIXED[ending], flight.job.modes)
     left = "the vehicle is told to hold" if holds else f"the vehicle is left alone: it is in {vehicle.mode}"
     return Aborted(f"{reason}; {left}")
 

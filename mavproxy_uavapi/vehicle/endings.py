@@ -7,7 +7,7 @@ is a job like any other: it commands by rank, is sent until telemetry shows it, 
 from __future__ import annotations
 
 import logging
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Collection, Mapping
 from enum import Enum
 from typing import Any
 
@@ -73,13 +73,20 @@ FIXED: Mapping[Ending, Policy] = {
 }
 
 
-def situation(vehicle: Vehicle) -> Situation:
-    """What telemetry shows of it."""
+def situation(vehicle: Vehicle, modes: Collection[str] = ()) -> Situation:
+    """What telemetry shows of it.
+
+    Args:
+        vehicle: which.
+        modes: those that the job which ended had switched to; a landing or a mission of another is its pilot's.
+    """
     state, mode = vehicle.state, vehicle.next_mode
     if not state.armed:
         return Situation.UNKNOWN if state.armed is None else Situation.DISARMED
     if mode == "GUIDED":
         return Situation.PAUSED if vehicle.authority.paused else Situation.GUIDED
+    if mode not in modes:
+        return Situation.PILOTED
     if mode == "LAND" or mode in RETURNS:
         flown = Situation.LAND if mode == "LAND" else Situation.RTL
         return Situation.IDLE if state.landed else flown
@@ -122,13 +129,13 @@ class FlightEndings:
     def _ended(self, job: Job) -> None:
         vehicle = job.vehicle
         if isinstance(vehicle, Vehicle) and job in (vehicle.authority.commander, vehicle.authority.interrupted):
-            closing = self.see_to(vehicle, self.policy(job), f"after {job.verb}", job.client)
+            closing = self.see_to(vehicle, self.policy(job), f"after {job.verb}", job.client, job.modes)
             if closing is not None:
                 self._closing = {n: one for n, one in self._closing.items() if one.running} | {job.id: closing}
 
-    def what_follows(self, vehicle: Vehicle, policy: Policy) -> str | None:
-        """What the vehicle would be told now; None for nothing."""
-        return WHAT_FOLLOWS[situation(vehicle)][policy]
+    def what_follows(self, vehicle: Vehicle, policy: Policy, modes: Collection[str] = ()) -> str | None:
+        """What the vehicle would be told now, as `see_to`; None for nothing."""
+        return WHAT_FOLLOWS[situation(vehicle, modes)][policy]
 
     def last_words(self) -> list[tuple[Any, int]]:
         """What must be sent before nobody can send any more: messages, and the systems that they go to."""
@@ -142,10 +149,20 @@ class FlightEndings:
                 found.append((message, job.vehicle.state.system))
         return found
 
-    def see_to(self, vehicle: Vehicle, policy: Policy, why: str, client: str) -> Job | None:
-        """Have the vehicle do what follows; the job that does it, None where nothing is sent."""
-        action = self.what_follows(vehicle, policy)
-        shown = situation(vehicle).value
+    def see_to(
+        self, vehicle: Vehicle, policy: Policy, why: str, client: str, modes: Collection[str] = ()
+    ) -> Job | None:
+        """Have the vehicle do what follows; the job that does it, None where nothing is sent.
+
+        Args:
+            vehicle: which.
+            policy: what is wanted.
+            why: for the log and the trail.
+            client: in whose name.
+            modes: those that the job which ended had switched to.
+        """
+        action = self.what_follows(vehicle, policy, modes)
+        shown = situation(vehicle, modes).value
         log.info("vehicle %d, %s: %s, so %s", vehicle.state.system, why, shown, action or "nothing is sent")
         if action is None:
             return None

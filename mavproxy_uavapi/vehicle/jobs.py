@@ -44,6 +44,7 @@ class Job:
         began_at, ended_at: on the loop's clock (s); ended_at is None while it runs.
         ending: why it ended; None while it runs.
         steers: whether the vehicle is flown by what the job goes on sending, so that it must not go on without it.
+        modes: names of the flight modes that it switched to: in any other the vehicle is somebody else's.
         script: the session of the script that asked for it; None where none did.
         outlives_client: whether it goes on when its client hangs up (land, rtl).
         stage: of a verb that is made of others, which one it is at: its name and numbers.
@@ -72,6 +73,7 @@ class Job:
         self.ended_at: float | None = None
         self.ending: Ending | None = None
         self.steers = False
+        self.modes: set[str] = set()
         self.script: str | None = None
         self._task: asyncio.Task[None] | None = None
         self._limit: asyncio.TimerHandle | None = None

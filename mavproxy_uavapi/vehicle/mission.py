@@ -11,7 +11,7 @@ from mavproxy_uavapi.errors import Busy, ModeChanged, Stale
 from mavproxy_uavapi.vehicle import messages
 from mavproxy_uavapi.vehicle.authority import Rank
 from mavproxy_uavapi.vehicle.jobs import Job
-from mavproxy_uavapi.vehicle.modes import flies_mission
+from mavproxy_uavapi.vehicle.modes import MISSION_MODES, flies_mission
 from mavproxy_uavapi.vehicle.plans import Item
 from mavproxy_uavapi.vehicle.vehicle import Vehicle
 
@@ -56,6 +56,7 @@ async def fly(vehicle: Vehicle, job: Job, until_complete: bool = False, timeout:
         _require_startable(vehicle)
 
     await vehicle.commands.send(messages.set_mission_current(1), vehicle.commanding(job, startable))
+    job.modes |= MISSION_MODES  # also where the vehicle is in AUTO already
     if vehicle.mode != AUTO:
         await vehicle.switch_to(job, AUTO, startable)
     await vehicle.commands.send(messages.start_mission(), vehicle.commanding(job, lambda: _held(vehicle)))

@@ -211,6 +211,7 @@ class Vehicle:
 
         def noted() -> None:
             self._mode_asked = number, self.clock()
+            job.modes.add(mode_name(self.state.vehicle_type, number))
 
         check = self.commanding(job, switched_by_nobody_else, *needs, noted)
         try:
