@@ -435,6 +435,7 @@ class Bench:
             arrived = self._vehicle.arrival(verb.key(self._number), connection.socket)
             time.sleep(SHOWN)
             self._vehicle.show("LOITER")  # the pilot's: whatever flies it ends
+            self._until_shown("LOITER", True, False)
             status, body = connection.answer()
             assert status in (200, 409, 504), body
         if arrived is None:  # a stream's setpoint came before it was sent, and supersedes it
