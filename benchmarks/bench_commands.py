@@ -43,7 +43,7 @@ PATIENCE = 10.0  # s
 SHOWN = (
     0.01  # s in which the API surely sees what the vehicle shows; else it answers 504 and nothing is lost but time
 )
-SENT_WITHIN = 2.0  # s
+ON_ITS_WAY = 1.0  # s that a message may arrive after the answer to its request
 DATAGRAM = 1 << 16
 SYSTEM = 1
 BARE = "bare aiohttp"
@@ -234,10 +234,11 @@ class Vehicle:
         """Count arrivals from here on."""
         self._ask("clear")
 
-    def arrival(self, key: Key) -> float | None:
-        """When the first message of that key has arrived, s of time.time(); None where none does."""
+    def arrival(self, key: Key, answer: socket.socket) -> float | None:
+        """When the first message of that key has arrived, s of time.time(); None where an answer came without it."""
         self._pipe.send(("await", key))
-        at: float | None = self._pipe.recv() if self._pipe.poll(SENT_WITHIN) else None
+        assert multiprocessing.connection.wait([self._pipe, answer], PATIENCE), f"nothing sent for {key}"
+        at: float | None = self._pipe.recv() if self._pipe.poll(ON_ITS_WAY) else None
         return at
 
     def _ask(self, *order: Any) -> None:
@@ -293,9 +294,9 @@ class Connection:
 
     def __init__(self, port: int) -> None:
         self._port = port
-        self._socket = socket.create_connection(("127.0.0.1", port), PATIENCE)
-        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self._file = self._socket.makefile("rb")
+        self.socket = socket.create_connection(("127.0.0.1", port), PATIENCE)
+        self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._file = self.socket.makefile("rb")
 
     def send(self, method: str, path: str, body: Any = None) -> float:
         """Write a request; when (s of time.time()), as late as is surely before its last byte is readable."""
@@ -304,7 +305,7 @@ class Connection:
         kind = "" if body is None else "Content-Type: application/json\r\n"
         request = f"{head}{kind}\r\n".encode() + content
         before = time.time()
-        self._socket.sendall(request)
+        self.socket.sendall(request)
         return before
 
     def answer(self) -> tuple[int, Any]:
@@ -325,7 +326,7 @@ class Connection:
     def close(self) -> None:
         """Hang up."""
         self._file.close()
-        self._socket.close()
+        self.socket.close()
 
 
 # -- tries ------------------------------------------------------------------------------------------------
@@ -417,7 +418,7 @@ class Bench:
         self._pause()
         with self._connection(self._bare, kind) as connection:
             sent = connection.send("GET", f"/command?number={self._number}")
-            arrived = self._vehicle.arrival((YARDSTICK, float(self._number), 0.0))
+            arrived = self._vehicle.arrival((YARDSTICK, float(self._number), 0.0), connection.socket)
             connection.answer()
         assert arrived is not None, "the yardstick sent nothing"
         return arrived - sent
@@ -431,9 +432,10 @@ class Bench:
             self._pause()
             self._vehicle.forget()
             sent = connection.send(verb.method, path, verb.body(self._number))
-            arrived = self._vehicle.arrival(verb.key(self._number))
+            arrived = self._vehicle.arrival(verb.key(self._number), connection.socket)
             time.sleep(SHOWN)
             self._vehicle.show("LOITER")  # the pilot's: whatever flies it ends
+            self._until_shown("LOITER", True, False)
             status, body = connection.answer()
             assert status in (200, 409, 504), body
         if arrived is None:  # a stream's setpoint came before it was sent, and supersedes it

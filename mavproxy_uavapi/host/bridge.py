@@ -4,7 +4,8 @@ Two queues, one each way. In: the main loop hands over what it received (`feed`)
 the asyncio side hands calls to the main loop (`on_main`), which is the only thread that sends.
 
 Python runs one thread at a time. A vehicle's messages come in bursts, each of which MAVProxy parses, logs and
-forwards: so long the asyncio side is not woken by us, and new work of its own waits (`calm`).
+forwards: so long the asyncio side is not woken by us, and reads wait (`calm`). What is to be sent does not wait: it
+goes out between two messages.
 """
 
 from __future__ import annotations

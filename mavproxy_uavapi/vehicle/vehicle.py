@@ -200,10 +200,15 @@ class Vehicle:
         """
         number = mode_number(self.state.vehicle_type, mode)
         before, on_its_way = self.state.mode, self.next_mode
+        has_shown = False
 
         def shown() -> bool:
-            if self.state.mode not in (before, number, None) and self.mode != on_its_way:
+            nonlocal has_shown
+            elsewhere = self.state.mode not in (before, number, None) and self.mode != on_its_way
+            left_again = has_shown and self.state.mode not in (number, None)
+            if elsewhere or left_again:
                 raise ModeChanged(f"the vehicle is in {self.mode} now: somebody else switched it meanwhile")
+            has_shown = has_shown or self.state.mode == number
             return self.state.mode == number
 
         def switched_by_nobody_else() -> None:
