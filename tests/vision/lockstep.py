@@ -337,10 +337,11 @@ class Lockstep:
 
     def close(self) -> None:
         self.eye.stop()
-        tasks = asyncio.all_tasks(self.loop)
-        for task in tasks:
-            task.cancel()
-        self.loop.run_until_complete(asyncio.gather(*tasks, return_exceptions=True))
+        self.host.jobs.on_ended.clear()  # nothing is to follow what ends here
+        while tasks := asyncio.all_tasks(self.loop):  # one that ends may begin another
+            for task in tasks:
+                task.cancel()
+            self.loop.run_until_complete(asyncio.gather(*tasks, return_exceptions=True))
         self.loop.run_until_complete(self.loop.shutdown_default_executor())
         self.loop.close()
         self.host.bridge._outbox.close()

@@ -311,7 +311,7 @@ def test_what_follows_a_flight_is_what_the_table_says(lockstep, name, end):
         assert rig.mode == mode
     if mode in ("GUIDED", "BRAKE") and end not in REFUSED_IN_LAND and end != "silence":
         assert math.hypot(*rig.simulator.copter.body.velocity[:2]) < 0.3
-        assert height(rig) < began + 1.5
+        assert height(rig) < began + 4.0  # a climb of 2.5 m/s ends at 1 m/s/s
     if name == "landing_target":
         assert plnd(rig) == rig.before
     flown = [m for m in rig.wire.sent[mark:] if m.get_type() in ("SET_POSITION_TARGET_LOCAL_NED", "LANDING_TARGET")]
@@ -697,17 +697,17 @@ def test_a_landing_that_is_stopped_before_it_took_over_leaves_the_one_under_way_
     rig = flying(alt=6.0, plnd=True, **LARGE)
     first = rig.land(method="landing_target")
     until(rig, lambda: rig.mode == "GUIDED" and rig.simulator.parameters["PLND_ENABLED"] == 1)
-    ask = rig.copter.parameters
+    ask = rig.copter.parameters.read
 
     async def slowly(names: Any) -> Any:
         await asyncio.sleep(5.0)
         return await ask(names)
 
-    rig.copter.parameters = slowly
+    rig.copter.parameters.read = slowly
     second = rig.land(method="landing_target")
     rig.pass_time(0.2)
     rig.abort(second)
-    rig.copter.parameters = ask
+    rig.copter.parameters.read = ask
     assert rig.outcome(first).startswith("Landed on tag 0")
 
 
