@@ -29,6 +29,7 @@ QUICK_LIMIT = 60.0  # s; what is done by an ack and a heartbeat, others' of the 
 QUICK = {"brake", "guided", "set_mode", "disarm", "stop", "resume", "set_home", "hold"}
 PILOT_NOTICED = 5.0  # s after which nothing that needs GUIDED runs on in a pilot's mode
 STILL = 0.6  # m/s
+JUST_NOW = 0.5  # s in which what somebody else did may have overtaken the answer
 STOP_SEEN = 1.5  # s after the answer
 
 
@@ -50,10 +51,10 @@ def goes_beside(flight: Any) -> bool:
 
 
 def wanted_mode(flight: Any) -> str:
-    """The mode that it switches to; "" for none."""
+    """The mode that it switches to, or needs; "" for none."""
     if flight.verb == "set_mode":
         return str(flight.job.request["mode"])
-    if flight.verb in ("arm", "guided"):
+    if flight.verb in {"arm", "guided", "set_heading", "set_yaw_rate"} | GUIDED_ONLY:
         return "GUIDED"
     return MODE_OF.get(flight.verb, "BRAKE" if flight.verb in ("hold", "stop") else "")
 
@@ -93,6 +94,7 @@ class Judge:
         ]
         world.on_send.append(self._sent)
         world.on_ended.append(self._ended)
+        world.host.listeners.append(self._heard)
 
     def look(self) -> None:
         """At any time."""
@@ -102,6 +104,11 @@ class Judge:
         elif self._piloted_since is None:
             self._piloted_since = self._world.loop.time()
         self._judge([(rule, rule()) for rule in self._at_times])
+
+    def _heard(self, state: Any, message: Any, now: float) -> None:
+        if message.get_type() == "HEARTBEAT":
+            for one in self._world.running:
+                one.shown = one.shown or (bool(one.sent) and self._shows(one))
 
     def _sent(self, sent: Any) -> None:
         self._judge([(rule, rule(sent)) for rule in self._at_send])
@@ -132,12 +139,15 @@ class Judge:
 
     def nothing_lower_goes_out_while_a_stop_is_on_its_way(self, sent: Any) -> str | None:
         for one in self._world.running:
-            if rank(one) >= STOP and one is not sent.flight and one.sent and not self._is_shown(one):
-                if sent.flight is None or rank(sent.flight) < rank(one):
-                    return f"{sent.message} by {sent.flight} while {one} is on its way"
+            on_its_way = rank(one) >= STOP and one is not sent.flight and one.sent and not self._is_shown(one)
+            if on_its_way and (sent.flight is None or rank(sent.flight) < rank(one)):
+                return f"{sent.message} by {sent.flight} while {one} is on its way"
         return None
 
     def _is_shown(self, flight: Any) -> bool:
+        return flight.shown or self._shows(flight)
+
+    def _shows(self, flight: Any) -> bool:
         if flight.verb == "hold" and flight.mode == "GUIDED":
             return True  # zero velocities: a newer movement replaces them
         wanted = wanted_mode(flight)
@@ -179,7 +189,7 @@ class Judge:
     # -- what ends ----------------------------------------------------------------------------------------------
 
     def success_is_what_the_vehicle_does(self, flight: Any) -> str | None:
-        if flight.job.error is not None:
+        if flight.job.error is not None or self._world.loop.time() - self._world.touched_at < JUST_NOW:
             return None
         state, mode = self._world.copter.state, flight.ended_in
         shown = {

@@ -91,6 +91,7 @@ class Flight:
         mode, armed: what we knew of the vehicle when it began.
         sent: what it sent but for questions.
         ended_in: the mode that we knew when it ended.
+        shown: whether a heartbeat has shown what it is to bring about.
     """
 
     job: Job
@@ -98,6 +99,7 @@ class Flight:
     armed: bool | None
     sent: list[Sent] = field(default_factory=list)
     ended_in: str = ""
+    shown: bool = False
 
     @property
     def verb(self) -> str:
@@ -135,6 +137,7 @@ class ScriptedWorld:
         self.drone = Drone(self.loop, self._receive, message_of)
         self.drone.parameters.update(PARAMETERS)
         self.drone.disarm_delay = 10.0
+        self.drone.mute = {"VFR_HUD", "GPS_RAW_INT"}  # nobody flies by them
         self.flights: dict[str, Flight] = {}
         self.on_send: list[Callable[[Sent], None]] = []
         self.on_ended: list[Callable[[Flight], None]] = []
@@ -262,6 +265,15 @@ class ScriptedWorld:
         if client in self.streams:
             self.streams.pop(client).cancel()
 
+    def unload(self) -> list[Any]:
+        """The module is unloaded; its last words."""
+
+        async def end() -> list[Any]:
+            self.host.jobs.abort_remote("the module is unloaded")
+            return [message for message, _ in self.host.endings.last_words()]
+
+        return list(self.loop.run(end()))
+
     def script_dies(self, flights: list[Flight]) -> Any:
         """The script that began those flights dies; the task that sees to the vehicle."""
         for flight in flights:
@@ -289,7 +301,6 @@ class ScriptedWorld:
         self._watch.cancel()
         for callbacks in (self.host.jobs.on_ended, self.on_ended, self.on_send):
             callbacks.clear()
-        self.host.jobs.abort_remote("the test is over")
         for job in self.host.jobs.running():
             job.abort(UavApiError("the test is over"))
         self.loop.settle()

@@ -43,10 +43,16 @@ VELOCITY = st.sampled_from([dict(zip(("vx", "vy", "vz"), v, strict=True)) for v 
 WAIT = st.sampled_from(["true", "false"])
 LATER = st.sampled_from([0.0, 0.0, 0.02, 0.1, 0.3, 1.0, 3.0])  # s to the next step
 A_WHILE = st.sampled_from([0.5, 2.0, 4.0, 8.0])  # s that a loss takes
+CLIMBS = [("arm", {}), ("takeoff", {"alt": 10}), ("takeoff", {"alt": 25}), ("disarm", {})]
+CLIMBS += [("disarm", {"force": "true"})]
+BESIDE = [("movement/resume", {}), ("command/set_home", {}), ("movement/set_heading", {"heading": 90})]
+BESIDE += [("movement/set_yaw_rate", {"yaw_rate": 20}), ("movement/resume", {})]
+BESIDE += [(f"command/set_{kind}_speed", {"new_v": speed}) for kind, speed in (("ground", 3), ("descent", 1))]
+MISFORTUNES = ["acks", "uplink", "downlink", "link", "losses", "few losses", "nan", "reboot", "quick reboot"]
+MISFORTUNES += ["not ready", "silent"]
+AGROUND = 5  # steps, after which somebody flies it up again: that is where most can go wrong
 STOPS = st.sampled_from(["command/land", "command/rtl", "command/brake", "movement/stop"])
 MOVES = st.sampled_from(["go_to_ned", "go_to_ned_wait", "drive", "drive_wait"])
-SPEEDS = st.sampled_from(["air", "ground", "climb", "descent"])
-NAN = st.sampled_from([{"LOCAL_POSITION_NED"}, {"ATTITUDE"}, {"LOCAL_POSITION_NED", "ATTITUDE"}])
 POLICY = st.sampled_from(["nothing", "hold", "land", "rtl"])
 
 
@@ -58,6 +64,7 @@ class Authority(RuleBasedStateMachine):
     def __init__(self) -> None:
         super().__init__()
         self.world: Any = None
+        self.aground = 0
 
     @initialize(
         where=st.sampled_from(["ground", "GUIDED", "GUIDED", "GUIDED", "LOITER", "AUTO", "armed"]),
@@ -83,6 +90,13 @@ class Authority(RuleBasedStateMachine):
             self.world.loop.pass_time(seconds)
             self.judge.look()
         assert not self.judge.broken, self.judge.broken[0]
+        drone = self.world.drone
+        self.aground = 0 if drone.armed and drone.mode == "GUIDED" and drone.at[2] < -1.0 else self.aground + 1
+        if self.aground > AGROUND:
+            self.world.touched()
+            self.world.all_well()
+            drone.fly("GUIDED", at=(0.0, 0.0, -10.0))
+            self.world.loop.pass_time(0.3)
 
     def ask(self, path: str, later: float, method: str = "GET", **query: Any) -> Any:
         """A client's request."""
@@ -105,17 +119,9 @@ class Authority(RuleBasedStateMachine):
         more = {} if duration is None else {"duration": duration}
         self.ask("movement/travel_at_ned", later, "POST", wait=wait, **velocity, **more)
 
-    @rule(wait=WAIT, later=LATER)
-    def ask_to_arm(self, wait: str, later: float) -> None:
-        self.ask("command/arm", later, wait=wait)
-
-    @rule(force=st.sampled_from(["false", "false", "false", "true"]), wait=WAIT, later=LATER)
-    def ask_to_disarm(self, force: str, wait: str, later: float) -> None:
-        self.ask("command/disarm", later, force=force, wait=wait)
-
-    @rule(alt=st.sampled_from([3, 10, 25]), wait=WAIT, later=LATER)
-    def ask_to_take_off(self, alt: int, wait: str, later: float) -> None:
-        self.ask("command/takeoff", later, alt=alt, wait=wait)
+    @rule(what=st.sampled_from(CLIMBS), wait=WAIT, later=LATER)
+    def ask_to_climb(self, what: tuple[str, dict[str, Any]], wait: str, later: float) -> None:
+        self.ask(f"command/{what[0]}", later, wait=wait, **what[1])
 
     @rule(mode=st.sampled_from(OUR_MODES), wait=WAIT, later=LATER)
     def ask_for_mode(self, mode: str, wait: str, later: float) -> None:
@@ -125,25 +131,9 @@ class Authority(RuleBasedStateMachine):
     def ask_for_guided(self, wait: str, later: float) -> None:
         self.ask("command/guided", later, wait=wait)
 
-    @rule(later=LATER)
-    def ask_to_resume(self, later: float) -> None:
-        self.ask("movement/resume", later)
-
-    @rule(kind=SPEEDS, speed=st.sampled_from([2, 5]), later=LATER)
-    def ask_for_speed(self, kind: str, speed: int, later: float) -> None:
-        self.ask(f"command/set_{kind}_speed", later, new_v=speed)
-
-    @rule(heading=st.sampled_from([0, 90, 359]), later=LATER)
-    def ask_for_heading(self, heading: int, later: float) -> None:
-        self.ask("movement/set_heading", later, heading=heading)
-
-    @rule(rate=st.sampled_from([0, 20, -20]), later=LATER)
-    def ask_for_yaw_rate(self, rate: int, later: float) -> None:
-        self.ask("movement/set_yaw_rate", later, yaw_rate=rate)
-
-    @rule(later=LATER)
-    def ask_to_set_home(self, later: float) -> None:
-        self.ask("command/set_home", later)
+    @rule(what=st.sampled_from(BESIDE), later=LATER)
+    def ask_beside(self, what: tuple[str, dict[str, Any]], later: float) -> None:
+        self.ask(what[0], later, **what[1])
 
     @rule(client=st.integers(0, 2), velocity=st.sampled_from(VELOCITIES), rate=st.sampled_from([2, 10]), later=LATER)
     def stream(self, client: int, velocity: tuple[int, int, int], rate: int, later: float) -> None:
@@ -196,20 +186,17 @@ class Authority(RuleBasedStateMachine):
         return [one for one in self.world.running if one.sent and not beside(one) and not one.follows]
 
     @precondition(lambda self: self.world.running)
-    @rule(share=st.sampled_from([1, 2]), later=LATER)
-    def script_dies(self, share: int, later: float) -> None:
-        flights = [one for one in self.world.running if not one.follows][::share]
-        self.world.script_dies(flights)
+    @rule(share=st.sampled_from([0, 1, 2]), later=LATER)
+    def script_dies_or_module_is_unloaded(self, share: int, later: float) -> None:
+        flights = [one for one in self.world.running if not one.follows][::share] if share else []
+        if share:
+            self.world.script_dies(flights)
+        else:
+            last_words = {message.get_type() for message in self.world.unload()}
+            assert last_words <= {"COMMAND_LONG", "SET_POSITION_TARGET_LOCAL_NED"}
         self.then(later)
         left = [one for one in flights if one.job.running and one.verb not in ("land", "rtl")]
         assert not left, f"{left[0]} outlives its script"
-
-    @rule(later=LATER)
-    def unload(self, later: float) -> None:
-        self.world.host.jobs.abort_remote("the module is unloaded")
-        for message, _ in self.world.host.endings.last_words():
-            assert message.get_type() in ("COMMAND_LONG", "SET_POSITION_TARGET_LOCAL_NED")
-        self.then(later)
 
     # -- the pilot and other stations -------------------------------------------------------------------------
 
@@ -219,25 +206,17 @@ class Authority(RuleBasedStateMachine):
         self.world.drone.pilot(mode)
         self.then(later)
 
-    @precondition(lambda self: not self.world.drone.armed)
     @rule(mode=st.sampled_from(PILOTS_MODES), up=st.booleans(), later=LATER)
-    def pilot_arms(self, mode: str, up: bool, later: float) -> None:
+    def pilot_arms_or_disarms(self, mode: str, up: bool, later: float) -> None:
         self.world.touched()
         drone = self.world.drone
-        drone.pilot(mode)
-        if up:
-            drone.fly(mode, at=(drone.at[0], drone.at[1], -5.0))
+        if drone.armed:
+            drone.armed, drone.landed, drone.at[2] = False, 1, 0.0
         else:
+            drone.pilot(mode)
             drone.armed = True
-            drone.tell("HEARTBEAT")
-        self.then(later)
-
-    @precondition(lambda self: self.world.drone.armed)
-    @rule(later=LATER)
-    def pilot_disarms(self, later: float) -> None:
-        self.world.touched()
-        drone = self.world.drone
-        drone.armed, drone.landed, drone.at[2] = False, 1, 0.0
+            if up:
+                drone.landed, drone.at[2] = 2, -5.0
         drone.tell_all()
         self.then(later)
 
@@ -253,42 +232,23 @@ class Authority(RuleBasedStateMachine):
 
     # -- misfortunes --------------------------------------------------------------------------------------------
 
-    @rule(acks=st.integers(1, 5), later=LATER)
-    def acks_are_lost(self, acks: int, later: float) -> None:
-        self.world.acks_to_lose = acks
-        self.then(later)
-
-    @rule(up=st.booleans(), down=st.booleans(), seconds=A_WHILE, later=LATER)
-    def link_is_lost(self, up: bool, down: bool, seconds: float, later: float) -> None:
-        self.world.touched()
-        now = self.world.loop.time()
-        if up:
-            self.world.uplink_until = now + seconds
-        if down:
-            self.world.downlink_until = now + seconds
-        self.then(later)
-
-    @rule(one_of=st.sampled_from([2, 3, 7]), later=LATER)
-    def messages_are_lost(self, one_of: int, later: float) -> None:
-        self.world.touched()
-        self.world.lossy = one_of
-        self.then(later)
-
-    @rule(names=NAN, later=LATER)
-    def telemetry_is_no_number(self, names: set[str], later: float) -> None:
-        self.world.nan = names
-        self.then(later)
-
-    @rule(dark=st.sampled_from([0.0, 1.0, 3.0, 7.0]), later=LATER)
-    def autopilot_reboots(self, dark: float, later: float) -> None:
-        self.world.touched()
-        self.world.drone.reboot()
-        self.world.uplink_until = self.world.downlink_until = self.world.loop.time() + dark
-        self.then(later)
-
-    @rule(ready=st.booleans(), tells_target=st.booleans(), later=LATER)
-    def autopilot_is_difficult(self, ready: bool, tells_target: bool, later: float) -> None:
-        self.world.drone.ready, self.world.drone.mute_requests = ready, not tells_target
+    @rule(what=st.sampled_from(MISFORTUNES), seconds=A_WHILE, later=LATER)
+    def misfortune(self, what: str, seconds: float, later: float) -> None:
+        world = self.world
+        until = world.loop.time() + seconds
+        if what not in ("acks", "nan", "silent", "not ready"):
+            world.touched()
+        if what in ("uplink", "link", "reboot"):
+            world.uplink_until = until
+        if what in ("downlink", "link", "reboot"):
+            world.downlink_until = until
+        if what in ("reboot", "quick reboot"):
+            world.drone.reboot()
+        world.acks_to_lose = 4 if what == "acks" else world.acks_to_lose
+        world.lossy = {"losses": 2, "few losses": 5}.get(what, world.lossy)
+        world.nan = {"LOCAL_POSITION_NED", "ATTITUDE"} if what == "nan" else world.nan
+        world.drone.ready = world.drone.ready and what != "not ready"
+        world.drone.mute_requests = world.drone.mute_requests or what == "silent"
         self.then(later)
 
     @rule(later=LATER)
@@ -296,14 +256,11 @@ class Authority(RuleBasedStateMachine):
         self.world.all_well()
         self.then(later)
 
-    @rule(seconds=st.sampled_from([1.0, 5.0, 12.0]))
+    @rule(seconds=st.sampled_from([1.0, 5.0, 12.0, 40.0]))
     def nothing_happens(self, seconds: float) -> None:
-        self.then(seconds)
-
-    @rule()
-    def nothing_happens_for_long(self) -> None:
-        for _ in range(4):
-            self.then(10.0)
+        while seconds > 0:
+            self.then(min(seconds, 10.0))
+            seconds -= 10.0
 
     def teardown(self) -> None:
         if self.world is not None:

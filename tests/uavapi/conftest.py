@@ -150,6 +150,7 @@ class Drone:
 
     def tell_all(self) -> None:
         """One round of telemetry."""
+        tables = self._telemetry()
         for name in (
             "HEARTBEAT",
             "EXTENDED_SYS_STATE",
@@ -161,21 +162,21 @@ class Drone:
             "ATTITUDE",
             "VFR_HUD",
         ):
-            self.tell(name)
+            self.tell(name, tables)
 
-    def tell(self, name: str) -> None:
+    def tell(self, name: str, tables: dict[str, dict[str, Any]] | None = None) -> None:
         """Send one telemetry message."""
         if name not in self.mute:
-            self.send(name, **self._telemetry(name))
+            self.send(name, **(tables or self._telemetry())[name])
 
-    def _telemetry(self, name: str) -> dict[str, Any]:
+    def _telemetry(self) -> dict[str, dict[str, Any]]:
         boot_ms = round((self._loop.time() - self._booted_at) * 1000)
         x, y, z = self.at
         vx, vy, vz = self.velocity
         lat, lon = self.place((x, y))
         in_air = self.landed != mavlink.MAV_LANDED_STATE_ON_GROUND
         health = ALL_GOOD if self.ready else ALL_GOOD & ~mavlink.MAV_SYS_STATUS_PREARM_CHECK
-        tables: dict[str, dict[str, Any]] = {
+        return {
             "HEARTBEAT": {
                 "mode": self.mode,
                 "armed": self.armed,
@@ -219,7 +220,6 @@ class Drone:
             },
             "VFR_HUD": {"airspeed": 1.5, "groundspeed": 2.5, "heading": 90, "throttle": 40, "alt": 604.0},
         }  # fmt: skip
-        return tables[name]
 
     async def _run(self) -> None:
         while True:
