@@ -30,6 +30,7 @@ QUICK = {"brake", "guided", "set_mode", "disarm", "stop", "resume", "set_home", 
 PILOT_NOTICED = 5.0  # s after which nothing that needs GUIDED runs on in a pilot's mode
 STILL = 0.6  # m/s
 JUST_NOW = 0.5  # s in which what somebody else did may have overtaken the answer
+SHOWN_NOTICED = 2.0  # s from the heartbeat that shows a mode, in which the ack may still come
 STOP_SEEN = 1.5  # s after the answer
 
 
@@ -83,6 +84,7 @@ class Judge:
         self._at_end: list[Callable[[Any], str | None]] = [
             self.success_is_what_the_vehicle_does,
             self.only_its_own_rank_supersedes_a_stop_on_its_way,
+            self.nothing_is_busy_with_what_has_been_shown,
             self.nothing_fails_by_a_defect,
         ]
         self._at_times: list[Callable[[], str | None]] = [
@@ -108,7 +110,8 @@ class Judge:
     def _heard(self, state: Any, message: Any, now: float) -> None:
         if message.get_type() == "HEARTBEAT":
             for one in self._world.running:
-                one.shown = one.shown or (bool(one.sent) and self._shows(one))
+                if one.shown_at is None and one.sent and self._shows(one):
+                    one.shown_at = now
 
     def _sent(self, sent: Any) -> None:
         self._judge([(rule, rule(sent)) for rule in self._at_send])
@@ -145,7 +148,7 @@ class Judge:
         return None
 
     def _is_shown(self, flight: Any) -> bool:
-        return flight.shown or self._shows(flight)
+        return flight.shown_at is not None or self._shows(flight)
 
     def _shows(self, flight: Any) -> bool:
         if flight.verb == "hold" and flight.mode == "GUIDED":
@@ -212,6 +215,15 @@ class Judge:
         if any(rank(one) >= STOP for one in named or [by]):
             return None
         return f"{flight}: {error}"
+
+    def nothing_is_busy_with_what_has_been_shown(self, flight: Any) -> str | None:
+        verb, on_its_way, _ = str(flight.job.error).partition(" is on its way")
+        since = self._world.loop.time() - SHOWN_NOTICED
+        for one in self._world.running:
+            switches = one.verb in ("land", "rtl", "brake", "guided", "set_mode")
+            if on_its_way and one.job.verb == verb and switches and one.shown_at is not None and one.shown_at < since:
+                return f"{flight}: {flight.job.error}"
+        return None
 
     def nothing_fails_by_a_defect(self, flight: Any) -> str | None:
         code = getattr(flight.job.error, "code", "")

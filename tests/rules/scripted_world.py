@@ -91,7 +91,7 @@ class Flight:
         mode, armed: what we knew of the vehicle when it began.
         sent: what it sent but for questions.
         ended_in: the mode that we knew when it ended.
-        shown: whether a heartbeat has shown what it is to bring about.
+        shown_at: when a heartbeat first showed the mode that it is to bring about (s).
     """
 
     job: Job
@@ -99,7 +99,7 @@ class Flight:
     armed: bool | None
     sent: list[Sent] = field(default_factory=list)
     ended_in: str = ""
-    shown: bool = False
+    shown_at: float | None = None
 
     @property
     def verb(self) -> str:

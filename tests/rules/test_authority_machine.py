@@ -161,22 +161,17 @@ class Authority(RuleBasedStateMachine):
         self.then(later)
 
     @precondition(lambda self: not self.world.streams and self.commanders)
-    @rule()
-    def delete_and_see_it_stand(self) -> None:
-        world = self.world
-        world.all_well()
-        world.loop.pass_time(0.1)
-        running = self.commanders
-        if not running:
-            return
+    @rule(deaf=st.sampled_from([0.0, 0.4, 2.0]))
+    def delete_and_see_it_stand(self, deaf: float = 0.0) -> None:
+        world, running = self.world, self.commanders
+        world.nan, world.downlink_until, world.uplink_until = set(), 0.0, world.loop.time() + deaf
         newest = int(max(world.flights, key=int))
         world.ask("DELETE", f"/jobs/{running[-1].job.id}")
         self.then(DELETED_STANDS)
-        # It runs down after what we have sent, and a landing that it is told goes on.
         after = [one for number, one in world.flights.items() if int(number) > newest and not one.follows]
         drone = world.drone
         stands = not drone.armed or world.speed <= rules_of_the_air.STILL or drone.mode == "BRAKE"
-        others = after or self.commanders or drone.mode in PILOTS_MODES or world.loop.time() - world.touched_at < 60.0
+        others = after or self.commanders or drone.mode in PILOTS_MODES
         assert stands or others, f"{running[-1]} was deleted, and it flies on in {drone.mode}: {world.speed:.1f} m/s"
 
     @property

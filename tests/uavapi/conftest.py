@@ -27,6 +27,7 @@ NAMES = {number: name for name, number in MODES.items()}
 ALL_GOOD = 0x7FFFFFFF
 EKF_GOOD = mavlink.EKF_ATTITUDE | mavlink.EKF_POS_HORIZ_ABS | mavlink.EKF_POS_VERT_ABS
 SPEEDS = {"horizontal": 10.0, "up": 2.5, "down": 1.5}
+BOOT_TIME = 1.0  # s from a reboot to the first word
 MISSION_SPEED = 2.0  # m/s northwards, in AUTO
 PARAMETERS = {
     "WPNAV_SPEED": 1000.0,
@@ -111,7 +112,7 @@ class Drone:
         self._switch("STABILIZE")
         self.armed, self.landed = False, mavlink.MAV_LANDED_STATE_ON_GROUND
         self.at[2], self.velocity, self.yaw_rate = 0.0, [0.0, 0.0, 0.0], 0.0
-        self._booted_at = self._loop.time()
+        self._booted_at = self._loop.time() - BOOT_TIME
 
     def say(self, text: str, **fields: Any) -> None:
         """STATUSTEXT."""
