@@ -177,10 +177,19 @@ class Copter(GuidedVehicle):
         await self.commands.send(messages.pause(False), self.commanding(job, lambda: self.require_mode(mode)))
         self.authority.end_pause()
 
-    async def hold(self, job: Job) -> None:
-        """Stop and stay, however it flies for us: by zero velocities in GUIDED, else by BRAKE."""
+    async def hold(self, job: Job, late_switch_too: bool = True) -> None:
+        """Stop and stay, however it flies for us: by zero velocities in GUIDED, else by BRAKE.
+
+        With `late_switch_too` a mode that was on its way when the flight before this one ended is left by BRAKE too.
+        """
         self.authority.take(job, Rank.STOP)
         if self.mode == GUIDED:
-            await self.rest(job)
-        else:
-            await self.switch_to(job, "BRAKE")
+            try:
+                await self.rest(job)
+            except ModeChanged:
+                if not (late_switch_too and self.switched_by_us):
+                    raise
+                self.authority.take(job, Rank.STOP)  # anew: BRAKE is not shown yet
+            else:
+                return
+        await self.switch_to(job, "BRAKE")

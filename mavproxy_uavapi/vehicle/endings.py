@@ -149,7 +149,7 @@ class FlightEndings:
         log.info("vehicle %d, %s: %s, so %s", vehicle.state.system, why, shown, action or "nothing is sent")
         if action is None:
             return None
-        verb = _verb(vehicle, action)
+        verb = _verb(vehicle, action, policy)
 
         async def body(job: Job) -> str:
             await verb(job)
@@ -160,8 +160,10 @@ class FlightEndings:
         return job
 
 
-def _verb(vehicle: Vehicle, action: str) -> Callable[[Job], Awaitable[None]]:
+def _verb(vehicle: Vehicle, action: str, policy: Policy) -> Callable[[Job], Awaitable[None]]:
     if isinstance(vehicle, Copter):
-        return {HOLD: vehicle.hold, LAND: vehicle.land, RTL: vehicle.rtl}[action]
+        if action == HOLD:
+            return lambda job: vehicle.hold(job, late_switch_too=policy is Policy.HOLD)
+        return {LAND: vehicle.land, RTL: vehicle.rtl}[action]
     mode = HOLDING_MODES.get(vehicle.kind, "RTL") if action == HOLD else "RTL"
     return lambda job: vehicle.set_mode(job, mode)

@@ -29,6 +29,7 @@ mavlink = mavutil.mavlink
 
 HEARTBEAT_TIMEOUT = 5.0  # s until a heartbeat must show what was acknowledged
 STOPPING_MODES = {"LAND", "RTL", "SMART_RTL", "BRAKE", "QLAND", "QRTL", "HOLD"}
+LATE_SWITCH = 10.0  # s after a mode was asked for in which it may still come, though whoever asked has ended
 FRESH = 3.0  # s; older positions are not flown by
 
 
@@ -56,6 +57,7 @@ class Vehicle:
         self.waypoints = Waypoints(state, link, self.waiting)
         self.parameters = Parameters(state, link, self.waiting)
         self.speeds = Speeds(state)
+        self._mode_asked = "", 0.0  # the mode that we asked for last, and when (s)
         self._requests: dict[str, asyncio.Task[Any]] = {}  # REQUEST_MESSAGE in flight, by message name
 
     # -- what it is ---------------------------------------------------------------------------------------
@@ -201,12 +203,20 @@ class Vehicle:
             shown()
 
         check = self.commanding(job, switched_by_nobody_else, *needs)
+        check()
+        self._mode_asked = mode.upper(), self.clock()
         await self.commands.send(messages.set_mode(number), check, shown=shown)
         before = self.state.mode  # as it was when the vehicle answered
         await self.waiting.until(
             {"HEARTBEAT"}, lambda: shown() or None, HEARTBEAT_TIMEOUT, f"show mode {mode.upper()}"
         )
         self.authority.shown(job)
+
+    @property
+    def switched_by_us(self) -> bool:
+        """Whether it is in a mode that we asked for a moment ago: the job that did so may have ended since."""
+        mode, at = self._mode_asked
+        return self.mode == mode and self.clock() - at <= LATE_SWITCH
 
     async def limits(self) -> deadlines.Limits:
         """Its speeds and heights, for deadlines; asked for where they are not known."""
