@@ -192,10 +192,13 @@ class Vehicle:
             Rejected, TimedOut, LinkLost.
         """
         number = mode_number(self.state.vehicle_type, mode)
-        before = self.state.mode
+        before, reached = self.state.mode, False
 
         def shown() -> bool:
-            if self.state.mode not in (before, number, None):
+            nonlocal reached
+            reached = reached or self.state.mode == number
+            expected = (number, None) if reached else (before, number, None)
+            if self.state.mode not in expected:
                 raise ModeChanged(f"the vehicle is in {self.mode} now: somebody else switched it meanwhile")
             return self.state.mode == number
 
