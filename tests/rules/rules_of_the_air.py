@@ -30,6 +30,7 @@ QUICK = {"brake", "guided", "set_mode", "disarm", "stop", "resume", "set_home", 
 PILOT_NOTICED = 5.0  # s after which nothing that needs GUIDED runs on in a pilot's mode
 STILL = 0.6  # m/s
 JUST_NOW = 0.5  # s in which what somebody else did may have overtaken the answer
+LATE_SWITCH = 10.0  # s in which a mode may still come that an ended flight asked for
 SHOWN_NOTICED = 2.0  # s from the heartbeat that shows a mode, in which the ack may still come
 STOP_SEEN = 1.5  # s after the answer
 
@@ -177,7 +178,14 @@ class Judge:
             return None if sent.mode in SPEED_MODES else f"{sent.message} in {sent.mode} by {flight}"
         if sent.mode in (flight.mode, wanted_mode(flight)) or flight.mode == "UNKNOWN":
             return None
+        if flight.verb == "hold" and sent.mode in self._modes_on_their_way(flight):
+            return None
         return f"{sent.message} by {flight}, which began in {flight.mode}, in {sent.mode}"
+
+    def _modes_on_their_way(self, flight: Any) -> set[str]:
+        """The modes that flights which have ended asked for before that one began."""
+        asked = [one for one in self._world.flights.values() if one.sent and not one.job.running]
+        return {wanted_mode(one) for one in asked if flight.job.began_at - one.sent[-1].at <= LATE_SWITCH}
 
     def arm_leaves_a_vehicle_alone_that_others_armed(self, sent: Any) -> str | None:
         if sent.flight is None or sent.flight.verb != "arm" or sent.flight.armed or not sent.armed:

@@ -168,6 +168,8 @@ class Authority(RuleBasedStateMachine):
         newest = int(max(world.flights, key=int))
         world.ask("DELETE", f"/jobs/{running[-1].job.id}")
         self.then(DELETED_STANDS)
+        if getattr(running[-1].job.error, "code", "") != "aborted":
+            return  # it had ended before
         after = [one for number, one in world.flights.items() if int(number) > newest and not one.follows]
         drone = world.drone
         stands = not drone.armed or world.speed <= rules_of_the_air.STILL or drone.mode == "BRAKE"
