@@ -24,14 +24,14 @@ SPEED_MODES = {"GUIDED", "AUTO", "RTL"}
 ENDS_STOP = {"resume", "guided", "set_mode", "land", "rtl", "brake", "takeoff"}
 AUTOPILOTS = {"GUIDED", "AUTO", "LAND", "RTL", "BRAKE", "UNKNOWN"}  # every other mode is a pilot's
 
-FLIGHT_LIMIT = 250.0  # s; landings, returns and the longest legs here, twice over and with their margin
+FLIGHT_LIMIT = 450.0  # s; landings, returns and the longest legs here, twice over and with their margin
 QUICK_LIMIT = 60.0  # s; what is done by an ack and a heartbeat, others' of the same command before it
 QUICK = {"brake", "guided", "set_mode", "disarm", "stop", "resume", "set_home", "hold"}
 PILOT_NOTICED = 5.0  # s after which nothing that needs GUIDED runs on in a pilot's mode
 STILL = 0.6  # m/s
 JUST_NOW = 0.5  # s in which what somebody else did may have overtaken the answer
 LATE_SWITCH = 10.0  # s in which a mode may still come that an ended flight asked for
-SHOWN_NOTICED = 2.0  # s from the heartbeat that shows a mode, in which the ack may still come
+SHOWN_NOTICED = 0.6  # s from the heartbeat that shows a mode, in which the next one may be lost
 STOP_SEEN = 1.5  # s after the answer
 
 
