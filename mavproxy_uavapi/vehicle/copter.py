@@ -149,6 +149,8 @@ class Copter(GuidedVehicle):
         Raises:
             ModeChanged: it is in another mode.
         """
+        if self.authority.on_its_way and not self.state.armed:
+            self.authority.take(job, Rank.STOP)  # an arm that waits ends
         self.require_armed()
         mode = self.mode
         if mode != GUIDED and not flies_mission(mode):

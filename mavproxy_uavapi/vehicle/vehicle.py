@@ -80,7 +80,7 @@ class Vehicle:
     def next_mode(self) -> str:
         """The name of the mode that it was told to take, until a heartbeat shows its answer; else `mode`."""
         number, at = self._mode_asked or (None, 0.0)
-        if number is None or self.state.mode_since >= at or self.clock() - at > HEARTBEAT_TIMEOUT:
+        if number is None or self.state.mode_since > at or self.clock() - at > HEARTBEAT_TIMEOUT:
             return self.mode
         return mode_name(self.state.vehicle_type, number)
 

@@ -15,7 +15,7 @@ from pymavlink import mavutil
 from mavproxy_uavapi.host.host import Host
 from mavproxy_uavapi.host.link import FakeLink
 from mavproxy_uavapi.vehicle.hangar import Hangar
-from mavproxy_uavapi.vehicle.messages import POSITION_IGNORED, VELOCITY_IGNORED
+from mavproxy_uavapi.vehicle.messages import FORCE_DISARM, POSITION_IGNORED, VELOCITY_IGNORED
 
 mavlink = mavutil.mavlink
 
@@ -27,6 +27,8 @@ NAMES = {number: name for name, number in MODES.items()}
 ALL_GOOD = 0x7FFFFFFF
 EKF_GOOD = mavlink.EKF_ATTITUDE | mavlink.EKF_POS_HORIZ_ABS | mavlink.EKF_POS_VERT_ABS
 SPEEDS = {"horizontal": 10.0, "up": 2.5, "down": 1.5}
+BOOT_TIME = 1.0  # s from a reboot to the first word
+MISSION_SPEED = 2.0  # m/s northwards, in AUTO
 PARAMETERS = {
     "WPNAV_SPEED": 1000.0,
     "WPNAV_SPEED_UP": 250.0,
@@ -54,6 +56,7 @@ class Drone:
         says: texts by MAV_CMD, said with the ack.
         mute: message names that it does not tell.
         stuck: whether it never gets anywhere.
+        disarm_delay: s after which it disarms by itself on the ground.
         mute_requests: whether it does not answer for its target.
     """
 
@@ -67,6 +70,7 @@ class Drone:
         self.mute: set[str] = set()
         self.parameters = dict(PARAMETERS)
         self.stuck = self.mute_requests = False
+        self.disarm_delay = math.inf
         self.mode, self.armed, self.landed = "STABILIZE", False, mavlink.MAV_LANDED_STATE_ON_GROUND
         self.ready = True
         self.at = [0.0, 0.0, 0.0]
@@ -74,8 +78,9 @@ class Drone:
         self.yaw = self.yaw_rate = 0.0  # rad, rad/s
         self.home = HOME
         self.target: list[float] | None = None
-        self.moving: list[float] | None = None  # the velocity that it was told (m/s); it only tells of it
-        self.paused = False
+        self.moving: list[float] | None = None  # the velocity that it was told (m/s)
+        self.paused = self.lifting = False
+        self._told_at = self._idle_since = self._booted_at = 0.0
         self._sequence = 0
         self._stream: asyncio.Task[None] | None = None
 
@@ -99,8 +104,15 @@ class Drone:
 
     def pilot(self, mode: str) -> None:
         """The pilot switches the mode; the heartbeat that shows it comes at once."""
-        self.mode, self.target = mode, None
+        self._switch(mode)
         self.tell("HEARTBEAT")
+
+    def reboot(self) -> None:
+        """Start anew: disarmed, in STABILIZE, on the ground below."""
+        self._switch("STABILIZE")
+        self.armed, self.landed = False, mavlink.MAV_LANDED_STATE_ON_GROUND
+        self.at[2], self.velocity, self.yaw_rate = 0.0, [0.0, 0.0, 0.0], 0.0
+        self._booted_at = self._loop.time() - BOOT_TIME
 
     def say(self, text: str, **fields: Any) -> None:
         """STATUSTEXT."""
@@ -139,6 +151,7 @@ class Drone:
 
     def tell_all(self) -> None:
         """One round of telemetry."""
+        tables = self._telemetry()
         for name in (
             "HEARTBEAT",
             "EXTENDED_SYS_STATE",
@@ -150,21 +163,21 @@ class Drone:
             "ATTITUDE",
             "VFR_HUD",
         ):
-            self.tell(name)
+            self.tell(name, tables)
 
-    def tell(self, name: str) -> None:
+    def tell(self, name: str, tables: dict[str, dict[str, Any]] | None = None) -> None:
         """Send one telemetry message."""
         if name not in self.mute:
-            self.send(name, **self._telemetry(name))
+            self.send(name, **(tables or self._telemetry())[name])
 
-    def _telemetry(self, name: str) -> dict[str, Any]:
-        boot_ms = round(self._loop.time() * 1000)
+    def _telemetry(self) -> dict[str, dict[str, Any]]:
+        boot_ms = round((self._loop.time() - self._booted_at) * 1000)
         x, y, z = self.at
         vx, vy, vz = self.velocity
         lat, lon = self.place((x, y))
         in_air = self.landed != mavlink.MAV_LANDED_STATE_ON_GROUND
         health = ALL_GOOD if self.ready else ALL_GOOD & ~mavlink.MAV_SYS_STATUS_PREARM_CHECK
-        tables: dict[str, dict[str, Any]] = {
+        return {
             "HEARTBEAT": {
                 "mode": self.mode,
                 "armed": self.armed,
@@ -208,7 +221,6 @@ class Drone:
             },
             "VFR_HUD": {"airspeed": 1.5, "groundspeed": 2.5, "heading": 90, "throttle": 40, "alt": 604.0},
         }  # fmt: skip
-        return tables[name]
 
     async def _run(self) -> None:
         while True:
@@ -223,11 +235,37 @@ class Drone:
             self._towards(goal, seconds)
             if self.at[2] > -0.01:
                 self.armed, self.landed = False, mavlink.MAV_LANDED_STATE_ON_GROUND
-        elif self.armed and self.mode == "GUIDED" and self.target is not None and not self.paused:
-            self._towards(self.target, seconds)
-            if self.at[2] < -0.2:
-                self.landed = mavlink.MAV_LANDED_STATE_IN_AIR
+        elif self.armed and not self.paused:
+            self._fly(seconds)
         self.velocity = [(now - then) / seconds for now, then in zip(self.at, before, strict=True)]
+        self._disarm_idle()
+
+    def _fly(self, seconds: float) -> None:
+        """By its target, its velocity or its mission; from the ground by a takeoff only."""
+        stands = self.landed == mavlink.MAV_LANDED_STATE_ON_GROUND and not self.lifting
+        if self.mode == "AUTO" and not stands:
+            self.at[0] += MISSION_SPEED * seconds
+        if self.mode != "GUIDED" or stands:
+            return
+        if self.target is not None:
+            self._towards(self.target, seconds)
+        elif self.moving is not None and self._loop.time() - self._told_at < self.parameters["GUID_TIMEOUT"]:
+            self.at = [here + speed * seconds for here, speed in zip(self.at, self.moving, strict=True)]
+        if self.at[2] >= 0.0 and not self.lifting:
+            self.at[2], self.landed = 0.0, mavlink.MAV_LANDED_STATE_ON_GROUND
+        elif self.lifting and self.target is not None:
+            self.lifting = self.at[2] > self.target[2] + 0.01
+            if not self.lifting:
+                self.landed = mavlink.MAV_LANDED_STATE_IN_AIR
+            elif self.at[2] < -0.2:
+                self.landed = mavlink.MAV_LANDED_STATE_TAKEOFF
+
+    def _disarm_idle(self) -> None:
+        now = self._loop.time()
+        if not self.armed or self.lifting or self.landed != mavlink.MAV_LANDED_STATE_ON_GROUND:
+            self._idle_since = now
+        elif now - self._idle_since >= self.disarm_delay:
+            self.armed = False
 
     def _towards(self, goal: list[float], seconds: float) -> None:
         if self.stuck:
@@ -268,7 +306,11 @@ class Drone:
         self.send("param_value", param_id=name, param_value=self.parameters[name])
 
     def _take_setpoint(self, message: Any) -> None:
-        self.yaw_rate = message.yaw_rate
+        if self.mode != "GUIDED" or not self.armed:
+            return
+        self.yaw_rate, self.lifting, self._told_at = message.yaw_rate, False, self._loop.time()
+        if self.landed == mavlink.MAV_LANDED_STATE_TAKEOFF:
+            self.landed = mavlink.MAV_LANDED_STATE_IN_AIR
         if message.type_mask & mavlink.POSITION_TARGET_TYPEMASK_X_IGNORE:
             self.target, self.moving = None, [message.vx, message.vy, message.vz]
         elif message.get_type() == "SET_POSITION_TARGET_LOCAL_NED":
@@ -290,29 +332,28 @@ class Drone:
                 if result is not None:
                     self.acknowledge(number, result)
             return
-        self._obey(message)
+        obeyed = self._obey(message)
         if number not in self.deaf:
-            self.acknowledge(number, mavlink.MAV_RESULT_ACCEPTED)
+            self.acknowledge(number, mavlink.MAV_RESULT_ACCEPTED if obeyed else mavlink.MAV_RESULT_FAILED)
 
     def acknowledge(self, number: int, result: int, component: int = 1, target: tuple[int, int] = (255, 230)) -> None:
         """COMMAND_ACK."""
         fields = {"target_system": target[0], "target_component": target[1]}
         self.send("command_ack", component, command=number, result=result, **fields)
 
-    def _obey(self, message: Any) -> None:
+    def _obey(self, message: Any) -> bool:
         number = message.command
+        if not self._can(message):
+            return False
         if number == mavlink.MAV_CMD_DO_SET_MODE:
-            self.mode, self.target = NAMES[int(message.param2)], None
+            self._switch(NAMES[int(message.param2)])
             self.tell("HEARTBEAT")
         elif number == mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
-            self.armed = bool(message.param1)
-            if not self.armed:
-                self.landed = mavlink.MAV_LANDED_STATE_ON_GROUND
-            self.tell("HEARTBEAT")
+            self._arm(bool(message.param1))
         elif number == mavlink.MAV_CMD_CONDITION_YAW:
             self.yaw = math.radians(message.param1)
         elif number == mavlink.MAV_CMD_NAV_TAKEOFF:
-            self.target = [self.at[0], self.at[1], -message.param7]
+            self.target, self.lifting = [self.at[0], self.at[1], -message.param7], True
         elif number == mavlink.MAV_CMD_DO_PAUSE_CONTINUE:
             self.paused = not message.param1
         elif number == mavlink.MAV_CMD_REQUEST_MESSAGE and message.param1 == mavlink.MAVLINK_MSG_ID_HOME_POSITION:
@@ -320,6 +361,32 @@ class Drone:
             self.send("home_position", latitude=lat, longitude=lon, altitude=584000)
         elif number == mavlink.MAV_CMD_REQUEST_MESSAGE:
             self._tell_target(int(message.param1))
+        return True
+
+    def _can(self, message: Any) -> bool:
+        """Whether ArduCopter would do that now."""
+        number, on_ground = message.command, self.landed == mavlink.MAV_LANDED_STATE_ON_GROUND
+        if number == mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
+            return self.ready if message.param1 else on_ground or message.param2 == FORCE_DISARM
+        if number == mavlink.MAV_CMD_NAV_TAKEOFF:
+            return self.mode == "GUIDED" and self.armed and on_ground
+        if number == mavlink.MAV_CMD_DO_PAUSE_CONTINUE:
+            return self.mode in ("GUIDED", "AUTO")
+        if number == mavlink.MAV_CMD_DO_CHANGE_SPEED:
+            return self.mode in ("GUIDED", "AUTO", "RTL")
+        return True
+
+    def _arm(self, armed: bool) -> None:
+        self.armed = armed
+        if not armed:
+            self.landed = mavlink.MAV_LANDED_STATE_ON_GROUND
+        self.tell("HEARTBEAT")
+
+    def _switch(self, mode: str) -> None:
+        if mode != self.mode:
+            self.mode, self.target, self.moving, self.paused, self.lifting = mode, None, None, False, False
+            if self.landed == mavlink.MAV_LANDED_STATE_TAKEOFF:
+                self.landed = mavlink.MAV_LANDED_STATE_IN_AIR
 
     def _tell_target(self, message_id: int) -> None:
         """What it flies: a place by POSITION_TARGET_GLOBAL_INT, a velocity by POSITION_TARGET_LOCAL_NED."""

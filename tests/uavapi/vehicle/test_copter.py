@@ -67,7 +67,7 @@ def test_takeoff_that_stays_below_is_a_timeout(
     armed: Any, loop: Any, copter: Any, pilotage: Any, alt: float, short: float
 ) -> None:
     armed.answers[TAKEOFF] = [mavlink.MAV_RESULT_ACCEPTED]
-    armed.target = [0.0, 0.0, -(alt - short)]
+    armed.target, armed.lifting = [0.0, 0.0, -(alt - short)], True
     with pytest.raises(TimedOut, match=f"did not reach {alt:g} m"):
         pilotage.do(copter.takeoff, alt)
 
@@ -77,13 +77,13 @@ def test_takeoff_tolerance_is_a_share_of_the_altitude(
     armed: Any, copter: Any, pilotage: Any, alt: float, short: float
 ) -> None:
     armed.answers[TAKEOFF] = [mavlink.MAV_RESULT_ACCEPTED]
-    armed.target = [0.0, 0.0, -(alt - short)]
+    armed.target, armed.lifting = [0.0, 0.0, -(alt - short)], True
     pilotage.do(copter.takeoff, alt)
 
 
 def test_takeoff_is_not_done_while_it_shoots_past(loop: Any, armed: Any, copter: Any, pilotage: Any) -> None:
     armed.answers[TAKEOFF] = [mavlink.MAV_RESULT_ACCEPTED]
-    armed.target = [0.0, 0.0, -60.0]
+    armed.target, armed.lifting = [0.0, 0.0, -60.0], True
     job = pilotage.start(copter.takeoff, 10.0)
     loop.pass_time(20.0)
     assert copter.height > 40

@@ -19,24 +19,22 @@ def drone(loop: Any, drone: Any) -> Any:
     """A rover, disarmed in MANUAL."""
     telemetry, obey = drone._telemetry, drone._obey
 
-    def rovers(name: str) -> Any:
-        told = telemetry(name)
-        if name == "HEARTBEAT":
-            resting = drone.mode == "HOLD"
-            told |= {
-                "type": ROVER,
-                "system_status": mavlink.MAV_STATE_STANDBY if resting else mavlink.MAV_STATE_ACTIVE,
-            }
-        elif name == "EXTENDED_SYS_STATE":
-            told["landed_state"] = mavlink.MAV_LANDED_STATE_UNDEFINED
+    def rovers() -> Any:
+        told = telemetry()
+        resting = drone.mode == "HOLD"
+        told["HEARTBEAT"] |= {
+            "type": ROVER,
+            "system_status": mavlink.MAV_STATE_STANDBY if resting else mavlink.MAV_STATE_ACTIVE,
+        }
+        told["EXTENDED_SYS_STATE"]["landed_state"] = mavlink.MAV_LANDED_STATE_UNDEFINED
         return told
 
-    def obeyed(message: Any) -> None:
-        if message.command == mavlink.MAV_CMD_DO_SET_MODE:
-            drone.mode = mode_name(ROVER, int(message.param2))
-            drone.tell("HEARTBEAT")
-        else:
-            obey(message)
+    def obeyed(message: Any) -> bool:
+        if message.command != mavlink.MAV_CMD_DO_SET_MODE:
+            return bool(obey(message))
+        drone.mode = mode_name(ROVER, int(message.param2))
+        drone.tell("HEARTBEAT")
+        return True
 
     drone._telemetry, drone._obey, drone.mode = rovers, obeyed, "MANUAL"
     drone.tell_all()

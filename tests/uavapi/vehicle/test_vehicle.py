@@ -407,3 +407,16 @@ def test_link_loss_ends_arming(loop: Any, drone: Any, copter: Any, pilotage: Any
     drone.power_off()
     with pytest.raises(LinkLost):
         pilotage.result(job)
+
+
+def test_mode_that_was_shown_and_left_at_once_is_somebody_elses_switch(
+    loop: Any, drone: Any, copter: Any, pilotage: Any
+) -> None:
+    drone.fly()
+    drone.answers[mavlink.MAV_CMD_DO_SET_MODE] = [None]
+    loop.settle()
+    job = pilotage.start(copter.set_mode, "LOITER")
+    drone.pilot("LOITER")
+    drone.pilot("GUIDED")  # in the same batch of messages
+    loop.settle()
+    assert isinstance(job.error, ModeChanged)

@@ -1,0 +1,323 @@
+"""The whole house but for MAVProxy, in virtual time, with the scripted vehicle: quick enough for long random flights.
+
+The real HTTP application, the host, the jobs and the endings; the vehicle is the `Drone` of tests/uavapi/conftest.py.
+What is asked for and what is sent is remembered, for `rules_of_the_air.py` to judge.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextvars
+import importlib.util
+import math
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+from unittest import mock
+from urllib.parse import urlencode
+
+from aiohttp import web
+
+from mavproxy_uavapi.audit import Audit
+from mavproxy_uavapi.errors import UavApiError
+from mavproxy_uavapi.host.host import Host
+from mavproxy_uavapi.host.link import Address, require_finite
+from mavproxy_uavapi.http.app import make_app
+from mavproxy_uavapi.http.call import Service
+from mavproxy_uavapi.http.connection import Connection
+from mavproxy_uavapi.scripts import on_exit
+from mavproxy_uavapi.settings import ModuleSettings
+from mavproxy_uavapi.vehicle.endings import Policy
+from mavproxy_uavapi.vehicle.freshness import Freshness
+from mavproxy_uavapi.vehicle.jobs import Job
+
+
+def load(file: str) -> Any:
+    """A Python file by its path below tests/; tests are no package."""
+    name = "helpers_" + file.replace("/", "_").removesuffix(".py")
+    if name not in sys.modules:
+        spec = importlib.util.spec_from_file_location(name, Path(__file__).parents[1] / file)
+        assert spec is not None and spec.loader is not None
+        sys.modules[name] = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(sys.modules[name])
+    return sys.modules[name]
+
+
+TimeTravellingLoop, message_of, mavproxy_state = (
+    getattr(load("conftest.py"), name) for name in ("TimeTravellingLoop", "message_of", "mavproxy_state")
+)
+Drone, mavlink = load("uavapi/conftest.py").Drone, load("uavapi/conftest.py").mavlink
+Wire = load("rules/conftest.py").Wire
+
+ASKING = {
+    mavlink.MAV_CMD_REQUEST_MESSAGE,
+    mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
+    mavlink.MAV_CMD_RUN_PREARM_CHECKS,
+}
+SETTINGS = {"max_rate": 100000.0, "max_jobs": 1000}
+# Landings and returns that are quick; deadlines follow from the same parameters.
+PARAMETERS = {"LAND_SPEED": 150.0, "RTL_ALT": 0.0, "RTL_LOIT_TIME": 0.0}
+the_job: contextvars.ContextVar[Job | None] = contextvars.ContextVar("the_job", default=None)
+
+
+class Sent(NamedTuple):
+    """A message of ours: when it was given to the link (s), and what we knew of the vehicle then."""
+
+    at: float
+    message: Any
+    flight: Flight | None
+    mode: str
+    armed: bool | None
+
+    @property
+    def asks(self) -> bool:
+        """Whether it only asks for something."""
+        return self.message.get_type() == "PARAM_REQUEST_READ" or getattr(self.message, "command", None) in ASKING
+
+    @property
+    def is_setpoint(self) -> bool:
+        """Whether it is a movement's."""
+        return bool(self.message.get_type().startswith("SET_POSITION_TARGET"))
+
+
+@dataclass
+class Flight:
+    """A job, and what was seen of it.
+
+    Attributes:
+        mode, armed: what we knew of the vehicle when it began.
+        sent: what it sent but for questions.
+        ended_in: the mode that we knew when it ended.
+        shown_at: when a heartbeat first showed the mode that it is to bring about (s).
+    """
+
+    job: Job
+    mode: str
+    armed: bool | None
+    sent: list[Sent] = field(default_factory=list)
+    ended_in: str = ""
+    shown_at: float | None = None
+
+    @property
+    def verb(self) -> str:
+        """Its path's last part; the verb of what follows a flight."""
+        return self.job.verb.split()[0].rpartition("/")[2]
+
+    @property
+    def follows(self) -> bool:
+        """Whether it sees to a vehicle after a flight."""
+        return not self.job.verb.startswith("/")
+
+    def __str__(self) -> str:
+        return f"{self.job.verb} {self.job.request} (job {self.job.id})"
+
+
+class ScriptedWorld:
+    """A vehicle, a host that flies it, and the API.
+
+    Attributes:
+        flights: the jobs so far, by number.
+        on_send, on_ended: called with each message (but questions) as it goes out, with each flight that ends.
+        uplink_until, downlink_until: s; until then nothing reaches the vehicle, or nothing comes from it.
+        lossy: one of how many messages is lost, either way; 0 for none.
+        acks_to_lose: so many of the next acks are lost.
+        nan: names of messages whose numbers are none.
+        touched_at: when somebody else last did something to the vehicle, or its link (s).
+    """
+
+    def __init__(self, on_disconnect: str = "nothing", on_script_exit: str = "hold") -> None:
+        self.loop = TimeTravellingLoop()
+        asyncio.set_event_loop(self.loop)
+        with mock.patch.object(asyncio, "new_event_loop", lambda: self.loop):
+            self.host = Host(mavproxy_state(), clock=self.loop.time)
+        self.host.link = self
+        self.drone = Drone(self.loop, self._receive, message_of)
+        self.drone.parameters.update(PARAMETERS)
+        self.drone.disarm_delay = 10.0
+        self.drone.mute = {"VFR_HUD", "GPS_RAW_INT"}  # nobody flies by them
+        self.flights: dict[str, Flight] = {}
+        self.on_send: list[Callable[[Sent], None]] = []
+        self.on_ended: list[Callable[[Flight], None]] = []
+        self.uplink_until = self.downlink_until = self.touched_at = -math.inf
+        self.lossy = self.acks_to_lose = self._count = 0
+        self.nan: set[str] = set()
+        self.wires: list[Any] = []
+        self.streams: dict[int, asyncio.Task[None]] = {}
+        self._watch_jobs()
+        self.service = Service(self.host, ModuleSettings(SETTINGS, environ={}).snapshot(), Audit(None))
+        endings = self.host.endings
+        endings.on_disconnect, endings.on_script_exit = Policy(on_disconnect), Policy(on_script_exit)
+        self._runner = web.AppRunner(make_app(self.service), access_log=None, handler_cancellation=True)
+        self.loop.run(self._runner.setup())
+        self.drone.power_on()
+        self._watch = self.loop.create_task(Freshness(self.host.hangar, 0).run())
+        self.loop.pass_time(0.6)
+
+    def _watch_jobs(self) -> None:
+        jobs, begin = self.host.jobs, self.host.jobs.begin
+
+        def watched(vehicle: Any, verb: str, request: Any, body: Any, **options: Any) -> Job:
+            async def tagged(job: Job) -> str:
+                the_job.set(job)
+                return str(await body(job))
+
+            job = begin(vehicle, verb, request, tagged, **options)
+            if job.id not in self.flights:
+                self.flights[job.id] = Flight(job, vehicle.mode, vehicle.state.armed)
+            return job
+
+        def ended(job: Job) -> None:
+            flight = self.flights[job.id]
+            flight.ended_in = job.vehicle.mode
+            for look in self.on_ended:
+                look(flight)
+
+        jobs.begin = watched  # type: ignore[method-assign]
+        jobs.on_ended.insert(0, ended)
+
+    # -- the link -------------------------------------------------------------------------------------------
+
+    source = Address(255, 230)
+
+    async def send(self, message: Any, system: int) -> None:
+        """See `host.link.Link.send`; who is cancelled before it came to it has sent nothing."""
+        require_finite(message)
+        job = the_job.get()
+        flight = None if job is None else self.flights[job.id]
+        sent = Sent(self.loop.time(), message, flight, self.copter.mode, self.copter.state.armed)
+        await asyncio.sleep(0)
+        if not sent.asks:
+            for look in self.on_send:
+                look(sent)
+            if flight is not None:
+                flight.sent.append(sent)
+        if self.loop.time() >= self.uplink_until and not self._loses():
+            self.drone.on_send(message, system)
+
+    def _loses(self) -> bool:
+        self._count += 1
+        return self.lossy > 0 and self._count % self.lossy == 0
+
+    def _receive(self, message: Any) -> None:
+        kind = message.get_type()
+        if self.loop.time() < self.downlink_until or self._loses():
+            return
+        if kind == "COMMAND_ACK" and self.acks_to_lose:
+            self.acks_to_lose -= 1
+            return
+        if kind in self.nan:
+            for name in ("x", "y", "z", "yaw", "vx"):
+                if isinstance(getattr(message, name, None), float):
+                    setattr(message, name, math.nan)
+        self.host.bridge.feed(message)
+        self.host.bridge.turn()
+
+    # -- what is known --------------------------------------------------------------------------------------
+
+    @property
+    def copter(self) -> Any:
+        """Our side of the vehicle."""
+        return self.host.hangar.find(1)
+
+    @property
+    def running(self) -> list[Flight]:
+        """The flights without an outcome, oldest first."""
+        return [self.flights[job.id] for job in self.host.jobs.running()]
+
+    @property
+    def speed(self) -> float:
+        """The vehicle's true speed, m/s."""
+        return math.hypot(*self.drone.velocity)
+
+    # -- clients --------------------------------------------------------------------------------------------
+
+    def ask(self, method: str, path: str, **query: Any) -> Any:
+        """A request in flight: its connection."""
+        wire = self.loop.run(self.request(method, path, query))
+        self.wires = [one for one in self.wires if not one.reply.done()] + [wire]
+        self.loop.settle()
+        return wire
+
+    async def request(self, method: str, path: str, query: dict[str, Any]) -> Any:
+        """As `ask`, for clients that run in the loop."""
+        wire = Wire(self.loop, Connection(self._runner.server))
+        target = path + ("?" + urlencode(query) if query else "")
+        wire.ask(f"{method} {target} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n".encode())
+        return wire
+
+    def stream(self, client: int, velocity: tuple[float, float, float], rate: float) -> None:
+        """Have a client send velocities, `rate` a second, until `end_stream`."""
+        self.end_stream(client)
+        query = dict(zip(("vx", "vy", "vz"), velocity, strict=True))
+
+        async def run() -> None:
+            while True:
+                await self.request("POST", "/movement/travel_at_ned", query)
+                await asyncio.sleep(1.0 / rate)
+
+        self.streams[client] = self.loop.create_task(run())
+
+    def end_stream(self, client: int) -> None:
+        """End what that client sends."""
+        if client in self.streams:
+            self.streams.pop(client).cancel()
+
+    def unload(self) -> list[Any]:
+        """The module is unloaded; its last words."""
+
+        async def end() -> list[Any]:
+            self.host.jobs.abort_remote("the module is unloaded")
+            return [message for message, _ in self.host.endings.last_words()]
+
+        return list(self.loop.run(end()))
+
+    def script_dies(self, flights: list[Flight]) -> Any:
+        """The script that began those flights dies; the task that sees to the vehicle."""
+        for flight in flights:
+            flight.job.script = "session"
+        run = SimpleNamespace(session="session", script="mission.py")
+        return self.loop.create_task(on_exit.after_death(self.host, 0, run, []))
+
+    # -- the vehicle ----------------------------------------------------------------------------------------
+
+    def touched(self) -> None:
+        """Somebody else did something."""
+        self.touched_at = self.loop.time()
+
+    def all_well(self) -> None:
+        """End all faults."""
+        self.uplink_until = self.downlink_until = -math.inf
+        self.lossy = self.acks_to_lose = 0
+        self.nan = set()
+        self.drone.mute_requests, self.drone.ready = False, True
+
+    def close(self) -> int:
+        """End what is in flight; how many waits are left then."""
+        for client in list(self.streams):
+            self.end_stream(client)
+        self._watch.cancel()
+        for callbacks in (self.host.jobs.on_ended, self.on_ended, self.on_send):
+            callbacks.clear()
+        for job in self.host.jobs.running():
+            job.abort(UavApiError("the test is over"))
+        self.loop.settle()
+        self.loop.settle()
+        left = len(self.host.pending)
+        self.drone.power_off()
+        self.loop.run(self._runner.cleanup())
+        self.service.audit.close()
+        for timer in self.host._link_timers.values():
+            timer.cancel()
+        tasks = asyncio.all_tasks(self.loop)
+        for task in tasks:
+            task.cancel()
+        if tasks:
+            self.loop.run(asyncio.wait(tasks))
+        self.host.bridge._outbox.close()
+        self.loop.run(self.loop.shutdown_asyncgens())
+        self.loop.close()
+        asyncio.set_event_loop(None)
+        return left

@@ -1,0 +1,303 @@
+"""Any order of verbs, streams, pilots, stations, losses and hang-ups: the rules of the air hold after every step.
+
+MACHINE_STEPS=200000 takes more steps, other ones each time. What it finds is written down below as a case.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, Phase, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
+
+
+def _beside(name: str) -> Any:
+    spec = importlib.util.spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
+    assert spec is not None and spec.loader is not None
+    module = sys.modules[name] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+scripted_world, rules_of_the_air = _beside("scripted_world"), _beside("rules_of_the_air")
+
+STEPS_OF_ONE = 50
+IN_CI = 10_000
+WANTED = int(os.environ.get("MACHINE_STEPS", IN_CI))
+WAITS_LEFT = 0  # when all is over
+DELETED_STANDS = 5.0  # s from a DELETE, or from when the vehicle hears again: BRAKE is sent anew after 1.5 s
+OUR_MODES = ("GUIDED", "LAND", "RTL", "BRAKE", "AUTO", "LOITER")
+PILOTS_MODES = ("STABILIZE", "ALT_HOLD", "LOITER")
+PLACES = [(30, 0, -10), (-20, 15, -20), (0, 0, -5), (400, -60, -30), (1, 1, -10)]
+VELOCITIES = [(4, 0, 0), (0, -6, 0), (2, 2, -1), (0, 0, 2), (0, 0, 0)]
+
+NED = st.sampled_from([dict(zip("xyz", place, strict=True)) for place in PLACES])
+VELOCITY = st.sampled_from([dict(zip(("vx", "vy", "vz"), v, strict=True)) for v in VELOCITIES])
+WAIT = st.sampled_from(["true", "false"])
+LATER = st.sampled_from([0.0, 0.0, 0.02, 0.1, 0.3, 1.0, 3.0])  # s to the next step
+A_WHILE = st.sampled_from([0.5, 2.0, 4.0, 8.0])  # s that a loss takes
+CLIMBS = [("arm", {}), ("takeoff", {"alt": 10}), ("takeoff", {"alt": 25}), ("disarm", {})]
+CLIMBS += [("disarm", {"force": "true"})]
+BESIDE = [("movement/resume", {}), ("command/set_home", {}), ("movement/set_heading", {"heading": 90})]
+BESIDE += [("movement/set_yaw_rate", {"yaw_rate": 20}), ("movement/resume", {})]
+BESIDE += [(f"command/set_{kind}_speed", {"new_v": speed}) for kind, speed in (("ground", 3), ("descent", 1))]
+MISFORTUNES = ["acks", "uplink", "downlink", "link", "losses", "few losses", "nan", "reboot", "quick reboot"]
+MISFORTUNES += ["not ready", "silent"]
+AGROUND = 10  # steps, after which somebody flies it up again: that is where most can go wrong
+STOPS = st.sampled_from(["command/land", "command/rtl", "command/brake", "movement/stop"])
+MOVES = st.sampled_from(["go_to_ned", "go_to_ned_wait", "drive", "drive_wait"])
+POLICY = st.sampled_from(["nothing", "hold", "land", "rtl"])
+
+
+class Authority(RuleBasedStateMachine):
+    """Everybody who may do something to a vehicle, in any order."""
+
+    steps = 0  # of all machines so far
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.world: Any = None
+        self.aground = 0
+
+    @initialize(
+        where=st.sampled_from(["ground", "GUIDED", "GUIDED", "GUIDED", "LOITER", "AUTO", "armed"]),
+        on_disconnect=POLICY,
+        on_script_exit=POLICY,
+    )
+    def begin(self, where: str, on_disconnect: str = "nothing", on_script_exit: str = "hold") -> None:
+        self.world = scripted_world.ScriptedWorld(on_disconnect, on_script_exit)
+        self.judge = rules_of_the_air.Judge(self.world)
+        drone = self.world.drone
+        if where == "armed":
+            drone.mode, drone.armed = "GUIDED", True
+        elif where != "ground":
+            drone.fly(where, at=(0.0, 0.0, -10.0))
+        self.then(0.6)
+
+    def then(self, seconds: float) -> None:
+        """Let time go by, and look at the rules."""
+        type(self).steps += 1
+        self.world.loop.settle()
+        self.judge.look()
+        if seconds:
+            self.world.loop.pass_time(seconds)
+            self.judge.look()
+        assert not self.judge.broken, self.judge.broken[0]
+        drone = self.world.drone
+        self.aground = 0 if drone.armed and drone.mode == "GUIDED" and drone.at[2] < -1.0 else self.aground + 1
+        if self.aground > AGROUND:
+            self.world.touched()
+            self.world.all_well()
+            drone.fly("GUIDED", at=(0.0, 0.0, -10.0))
+            self.world.loop.pass_time(0.3)
+
+    def ask(self, path: str, later: float, method: str = "GET", **query: Any) -> Any:
+        """A client's request."""
+        wire = self.world.ask(method, f"/{path}", **query)
+        self.then(later)
+        return wire
+
+    # -- clients ----------------------------------------------------------------------------------------------
+
+    @rule(path=STOPS, wait=WAIT, later=LATER)
+    def ask_to_stop(self, path: str, wait: str, later: float) -> None:
+        self.ask(path, later, wait=wait)
+
+    @rule(path=MOVES, place=NED, wait=WAIT, later=LATER)
+    def ask_to_move(self, path: str, place: dict[str, int], wait: str, later: float) -> None:
+        self.ask(f"movement/{path}", later, "POST", wait=wait, **place)
+
+    @rule(velocity=VELOCITY, duration=st.sampled_from([None, 0.5, 20.0]), wait=WAIT, later=LATER)
+    def ask_to_travel(self, velocity: dict[str, int], duration: float | None, wait: str, later: float) -> None:
+        more = {} if duration is None else {"duration": duration}
+        self.ask("movement/travel_at_ned", later, "POST", wait=wait, **velocity, **more)
+
+    @rule(what=st.sampled_from(CLIMBS), wait=WAIT, later=LATER)
+    def ask_to_climb(self, what: tuple[str, dict[str, Any]], wait: str, later: float) -> None:
+        self.ask(f"command/{what[0]}", later, wait=wait, **what[1])
+
+    @rule(mode=st.sampled_from(OUR_MODES), wait=WAIT, later=LATER)
+    def ask_for_mode(self, mode: str, wait: str, later: float) -> None:
+        self.ask("command/set_mode", later, mode=mode, wait=wait)
+
+    @rule(wait=WAIT, later=LATER)
+    def ask_for_guided(self, wait: str, later: float) -> None:
+        self.ask("command/guided", later, wait=wait)
+
+    @rule(what=st.sampled_from(BESIDE), later=LATER)
+    def ask_beside(self, what: tuple[str, dict[str, Any]], later: float) -> None:
+        self.ask(what[0], later, **what[1])
+
+    @rule(client=st.integers(0, 2), velocity=st.sampled_from(VELOCITIES), rate=st.sampled_from([2, 10]), later=LATER)
+    def stream(self, client: int, velocity: tuple[int, int, int], rate: int, later: float) -> None:
+        self.world.stream(client, velocity, rate)
+        self.then(later)
+
+    @precondition(lambda self: self.world.streams)
+    @rule(later=LATER)
+    def end_streams(self, later: float) -> None:
+        for client in list(self.world.streams):
+            self.world.end_stream(client)
+        self.then(later)
+
+    @precondition(lambda self: self.world.wires)
+    @rule(which=st.integers(0, 3), later=LATER)
+    def hang_up(self, which: int, later: float) -> None:
+        self.world.wires[which % len(self.world.wires)].hang_up()
+        self.then(later)
+
+    @precondition(lambda self: self.world.running)
+    @rule(which=st.integers(0, 3), later=LATER)
+    def delete(self, which: int, later: float) -> None:
+        running = self.world.running
+        self.world.ask("DELETE", f"/jobs/{running[which % len(running)].job.id}")
+        self.then(later)
+
+    @precondition(lambda self: not self.world.streams and self.commanders)
+    @rule(deaf=st.sampled_from([0.0, 0.4, 2.0]))
+    def delete_and_see_it_stand(self, deaf: float = 0.0) -> None:
+        world, running = self.world, self.commanders
+        was_piloted = world.copter.mode not in rules_of_the_air.AUTOPILOTS  # then nothing is sent: it is the pilot's
+        world.all_well()
+        world.uplink_until = world.loop.time() + deaf
+        newest = int(max(world.flights, key=int))
+        world.ask("DELETE", f"/jobs/{running[-1].job.id}")
+        self.then(deaf + DELETED_STANDS)
+        if getattr(running[-1].job.error, "code", "") != "aborted":
+            return  # it had ended before
+        after = [one for number, one in world.flights.items() if int(number) > newest and not one.follows]
+        drone = world.drone
+        stands = not drone.armed or world.speed <= rules_of_the_air.STILL or drone.mode == "BRAKE"
+        others = after or self.commanders or drone.mode in PILOTS_MODES or was_piloted
+        assert stands or others, f"{running[-1]} was deleted, and it flies on in {drone.mode}: {world.speed:.1f} m/s"
+
+    @property
+    def commanders(self) -> list[Any]:
+        """The flights under way that command."""
+        beside = rules_of_the_air.goes_beside
+        return [one for one in self.world.running if one.sent and not beside(one) and not one.follows]
+
+    @precondition(lambda self: self.world.running)
+    @rule(share=st.sampled_from([0, 1, 2]), later=LATER)
+    def script_dies_or_module_is_unloaded(self, share: int, later: float) -> None:
+        flights = [one for one in self.world.running if not one.follows][::share] if share else []
+        if share:
+            self.world.script_dies(flights)
+        else:
+            last_words = {message.get_type() for message in self.world.unload()}
+            assert last_words <= {"COMMAND_LONG", "SET_POSITION_TARGET_LOCAL_NED"}
+        self.then(later)
+        left = [one for one in flights if one.job.running and one.verb not in ("land", "rtl")]
+        assert not left, f"{left[0]} outlives its script"
+
+    # -- the pilot and other stations -------------------------------------------------------------------------
+
+    @rule(mode=st.sampled_from([*PILOTS_MODES, "GUIDED", "LAND", "RTL"]), later=LATER)
+    def pilot_switches(self, mode: str, later: float) -> None:
+        self.world.touched()
+        self.world.drone.pilot(mode)
+        self.then(later)
+
+    @rule(mode=st.sampled_from(PILOTS_MODES), up=st.booleans(), later=LATER)
+    def pilot_arms_or_disarms(self, mode: str, up: bool, later: float) -> None:
+        self.world.touched()
+        drone = self.world.drone
+        if drone.armed:
+            drone.armed, drone.landed, drone.at[2] = False, 1, 0.0
+        else:
+            drone.pilot(mode)
+            drone.armed = True
+            if up:
+                drone.landed, drone.at[2] = 2, -5.0
+        drone.tell_all()
+        self.then(later)
+
+    @rule(velocity=st.sampled_from(VELOCITIES), later=LATER)
+    def other_station_flies(self, velocity: tuple[int, int, int], later: float) -> None:
+        self.world.touched()
+        drone = self.world.drone
+        if drone.mode == "GUIDED" and drone.armed:
+            drone.target, drone.moving, drone.lifting = [40.0, 40.0, -15.0], None, False
+            if velocity != (0, 0, 0):
+                drone.target, drone.moving, drone._told_at = None, list(velocity), self.world.loop.time()
+        self.then(later)
+
+    # -- misfortunes --------------------------------------------------------------------------------------------
+
+    @rule(what=st.sampled_from(MISFORTUNES), seconds=A_WHILE, later=LATER)
+    def misfortune(self, what: str, seconds: float, later: float) -> None:
+        world = self.world
+        until = world.loop.time() + seconds
+        if what not in ("acks", "nan", "silent", "not ready"):
+            world.touched()
+        if what in ("uplink", "link", "reboot"):
+            world.uplink_until = until
+        if what in ("downlink", "link", "reboot"):
+            world.downlink_until = until
+        if what in ("reboot", "quick reboot"):
+            world.drone.reboot()
+        world.acks_to_lose = 8 if what == "acks" else world.acks_to_lose
+        world.lossy = {"losses": 2, "few losses": 5}.get(what, world.lossy)
+        world.nan = {"LOCAL_POSITION_NED", "ATTITUDE"} if what == "nan" else world.nan
+        world.drone.ready = world.drone.ready and what != "not ready"
+        world.drone.mute_requests = world.drone.mute_requests or what == "silent"
+        self.then(later)
+
+    @rule(later=LATER)
+    def all_is_well(self, later: float) -> None:
+        self.world.all_well()
+        self.then(later)
+
+    @rule(seconds=st.sampled_from([1.0, 5.0, 12.0, 40.0]))
+    def nothing_happens(self, seconds: float) -> None:
+        while seconds > 0:
+            self.then(min(seconds, 10.0))
+            seconds -= 10.0
+
+    def teardown(self) -> None:
+        if self.world is not None:
+            left = self.world.close()
+            assert left <= WAITS_LEFT, f"{left} waits are left"
+            assert not self.judge.broken, self.judge.broken[0]
+
+
+def test_any_order_of_events_keeps_the_rules_of_the_air() -> None:
+    phases = [Phase.explicit, Phase.generate] + ([Phase.shrink] if WANTED != IN_CI else [])
+    run_state_machine_as_test(
+        Authority,
+        settings=settings(
+            max_examples=max(1, WANTED // STEPS_OF_ONE),
+            stateful_step_count=STEPS_OF_ONE,
+            derandomize=WANTED == IN_CI,  # the same steps in each run
+            database=None,
+            deadline=None,
+            phases=phases,
+            suppress_health_check=list(HealthCheck),
+        ),
+    )
+
+
+# -- what it found, each in as few steps as it needs -----------------------------------------------------------
+
+
+@pytest.fixture
+def state() -> Iterator[Authority]:
+    """A machine to be driven by hand."""
+    machine = Authority()
+    yield machine
+    machine.teardown()
+
+
+@pytest.mark.parametrize("mode", ["AUTO", "RTL", "LAND"])
+def test_mode_that_arrives_after_its_flight_was_deleted_is_left_by_brake(state: Authority, mode: str) -> None:
+    state.begin(where="GUIDED")
+    state.ask_for_mode(later=0.0, mode=mode, wait="true")
+    state.delete_and_see_it_stand(deaf=0.0)
+    assert state.world.drone.mode == "BRAKE"
