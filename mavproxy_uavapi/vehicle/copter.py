@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
+
 from mavproxy_uavapi.errors import Busy, ModeChanged, NotArmed, Rejected, TimedOut
 from mavproxy_uavapi.vehicle import deadlines, messages
 from mavproxy_uavapi.vehicle.authority import Rank
@@ -14,6 +17,7 @@ from mavproxy_uavapi.vehicle.touchdown import Touchdown
 TAKEOFF_SHARE = 0.05  # of the altitude, between TAKEOFF_TOLERANCE's two ends
 TAKEOFF_TOLERANCE = (0.3, 1.0)  # m
 LIFT_OFF_TIMEOUT = 5.0  # s in which an unacknowledged takeoff must show
+SLOWED_DOWN = 0.3  # s in which a pause on the ground takes the motors from full throttle
 STOP_TIMEOUT = 20.0  # s from full speed to rest
 HOME_RADIUS = 10.0  # m; closer than this a vehicle on the ground is at home
 SPEED_MODES = {"GUIDED", "RTL", *MISSION_MODES}  # others refuse DO_CHANGE_SPEED
@@ -184,7 +188,21 @@ class Copter(GuidedVehicle):
     async def hold(self, job: Job) -> None:
         """Stop and stay, however it flies for us: by zero velocities in GUIDED, else by BRAKE."""
         self.authority.take(job, Rank.STOP)
-        if self.mode == GUIDED:
-            await self.rest(job)
-        else:
+        if self.mode != GUIDED:
             await self.switch_to(job, "BRAKE")
+        elif self.state.landed and not self.authority.paused:
+            await self._hold_down(job)
+        else:
+            await self.rest(job)
+
+    async def _hold_down(self, job: Job) -> None:
+        """Break off a take-off before it lifts off: a pause first, in which the motors slow down.
+
+        ArduCopter takes a setpoint between full throttle and lift-off for a defect of its own ("Internal Errors",
+        flow_of_ctrl), and does not arm any more until it reboots.
+        """
+        with contextlib.suppress(TimedOut):  # the setpoints are sent all the same
+            await self.commands.send(messages.pause(True), self.commanding(job, self.flying))
+            await asyncio.sleep(SLOWED_DOWN)
+        await self.rest(job)
+        await self._continue(job)
