@@ -50,8 +50,8 @@ class Launched(rig.harness.Rig):  # type: ignore[misc]
         self.launcher = self.start("launcher", command)
 
     def stop(self) -> None:
-        """Ctrl-C, as a user ends it: it ends what it has started."""
-        self.launcher.popen.send_signal(signal.SIGINT)
+        """SIGTERM, upon which it ends what it has started."""
+        self.launcher.popen.terminate()
         with contextlib.suppress(subprocess.TimeoutExpired):
             self.launcher.popen.wait(40)
         super().stop()
@@ -144,7 +144,9 @@ def main() -> int:
         outcomes = runs(arguments.examples, name, arguments.runs, arguments.ardupilot)
         reasons = [why for why in outcomes if why]
         failed += len(reasons)
-        rows.append([Path(name).stem, f"{speedup}", f"{len(outcomes)}", f"{len(reasons)}", "; ".join(reasons)])
+        rows.append(
+            [Path(name).stem, f"{speedup}", f"{len(outcomes)}", f"{len(reasons)}", "; ".join(dict.fromkeys(reasons))]
+        )
     print(rig.machine())
     print(rig.table(["program", "speed-up", "runs", "failed", "why"], rows))
     return 1 if failed else 0

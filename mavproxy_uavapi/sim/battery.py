@@ -1,4 +1,8 @@
-"""A lithium pack like SITL's: 12.6 V full, sagging under load, counted in mAh against BATT_CAPACITY."""
+"""A lithium pack like SITL's: 12.6 V full, sagging under load, counted in mAh against BATT_CAPACITY.
+
+As in SITL its voltage falls with the charge only where SIM_BATT_CAP_AH says how much it holds; by default it never
+becomes empty.
+"""
 
 from __future__ import annotations
 
@@ -35,8 +39,8 @@ class Battery:
         """Draw the current of this throttle (1 hovers) for dt seconds."""
         self.current = AVIONICS_CURRENT + HOVER_CURRENT * throttle_share**1.5
         self.consumed += self.current * dt / 3.6
-        capacity = max(self._parameters["BATT_CAPACITY"], 1.0)
-        charge = max(0.0, 1 - self.consumed / capacity)
+        holds = 1000.0 * self._parameters["SIM_BATT_CAP_AH"]
+        charge = max(0.0, 1 - self.consumed / holds) if holds > 0 else 1.0
         rest = EMPTY_VOLTAGE + (FULL_VOLTAGE - EMPTY_VOLTAGE) * charge**0.6
         if self.forced_voltage is not None:
             rest = self.forced_voltage

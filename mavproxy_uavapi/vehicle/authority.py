@@ -124,7 +124,7 @@ class CommandAuthority:
             self._suspended = before, self._rank, self._shown
         else:
             self._supersede([before], job)
-        self._paused_at = max(self._state.heartbeat_at, self._state.mode_since)
+        self.begin_pause()
         self._take(job, Rank.STOP)
 
     def accompany(self, job: Job, kind: str, rank: Rank = Rank.MOVEMENT, *, stopped_too: bool = False) -> None:
@@ -146,6 +146,10 @@ class CommandAuthority:
         """Telemetry shows the effect of the commander's verb: from now on any rank supersedes it."""
         if job is self.commander:
             self._shown = True
+
+    def begin_pause(self) -> None:
+        """The vehicle is held still, or about to be."""
+        self._paused_at = max(self._state.heartbeat_at, self._state.mode_since)
 
     def end_pause(self) -> None:
         """The vehicle is held still no more; a movement that waited for that goes on."""

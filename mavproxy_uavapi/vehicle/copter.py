@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
+
 from mavproxy_uavapi.errors import Busy, ModeChanged, NotArmed, Rejected, TimedOut
 from mavproxy_uavapi.vehicle import deadlines, messages
 from mavproxy_uavapi.vehicle.authority import Rank
@@ -14,6 +17,7 @@ from mavproxy_uavapi.vehicle.touchdown import Touchdown
 TAKEOFF_SHARE = 0.05  # of the altitude, between TAKEOFF_TOLERANCE's two ends
 TAKEOFF_TOLERANCE = (0.3, 1.0)  # m
 LIFT_OFF_TIMEOUT = 5.0  # s in which an unacknowledged takeoff must show
+SLOWED_DOWN = 0.3  # s in which a pause on the ground takes the motors from full throttle
 STOP_TIMEOUT = 20.0  # s from full speed to rest
 HOME_RADIUS = 10.0  # m; closer than this a vehicle on the ground is at home
 SPEED_MODES = {"GUIDED", "RTL", *MISSION_MODES}  # others refuse DO_CHANGE_SPEED
@@ -97,6 +101,8 @@ class Copter(GuidedVehicle):
         if self.state.armed is False:
             if distance is None:
                 await self.home()
+                if self.state.armed is not False:
+                    raise ModeChanged(f"the vehicle was armed meanwhile, in {self.mode}: whoever armed it has it")
                 self.fresh("GLOBAL_POSITION_INT")
                 distance = self.distance_home() or 0.0
             if distance > HOME_RADIUS:
@@ -192,7 +198,22 @@ class Copter(GuidedVehicle):
         A mode that is on its way to it counts: it is not in GUIDED any more when it hears us.
         """
         self.authority.take(job, Rank.STOP)
-        if self.mode == self.next_mode == GUIDED:
-            await self.rest(job)
-        else:
+        if not self.mode == self.next_mode == GUIDED:
             await self.switch_to(job, "BRAKE")
+        elif self.state.landed and not self.authority.paused:
+            await self._hold_down(job)
+        else:
+            await self.rest(job)
+
+    async def _hold_down(self, job: Job) -> None:
+        """Break off a take-off before it lifts off: a pause first, in which the motors slow down.
+
+        ArduCopter takes a setpoint between full throttle and lift-off for a defect of its own ("Internal Errors",
+        flow_of_ctrl), and does not arm any more until it reboots.
+        """
+        with contextlib.suppress(TimedOut):  # the setpoints are sent all the same
+            self.authority.begin_pause()  # who takes over meanwhile has to end it
+            await self.commands.send(messages.pause(True), self.commanding(job, self.flying))
+            await asyncio.sleep(SLOWED_DOWN)
+        await self.rest(job)
+        await self._continue(job)

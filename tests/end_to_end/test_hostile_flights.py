@@ -55,6 +55,7 @@ def vehicle(request, harness, tmp_path_factory):
     rig.settings = folders
     answer = requests.post(rig.url + "/mission/upload-script", files={"file": ("deadly.py", DEADLY)}, timeout=10)
     rig.ok(answer)
+    rig.mavproxy.type("param set BATT_CAPACITY 1000000")  # mAh: for flights of an hour
     harness.eventually(lambda: rig.status()["ready_to_arm"], 60, "getting ready to arm")
     yield rig
     rig.stop()
@@ -167,7 +168,7 @@ def test_arm_that_waits_does_not_take_the_vehicle_from_the_pilot_who_arms_it(rig
     time.sleep(0.5)
     rig.control.fault("pilot_sticks", throttle=1500)
     answer = waiting.join(30)
-    assert (answer.status_code, answer.json()["code"]) == (409, "mode_changed")
+    assert (answer.status_code, answer.json().get("code")) == (409, "mode_changed")
     harness.eventually(lambda: rig.status()["ekf_ok"], 30, "readiness")
     harness.eventually(lambda: rig.get("/telemetry/ned").status_code == 200 and height(rig) > 3, 30, "his flight")
     since = mark(rig)
@@ -189,7 +190,8 @@ def pilot_arms(rig):
 
 @pytest.mark.parametrize("verb", ["land", "rtl"])
 def test_going_down_is_not_kept_from_the_vehicle_by_streams(rig, harness, verb):
-    rig.in_the_air(80)  # it sinks a little in each try
+    rig.in_the_air(50)
+    rig.ok(rig.get("/command/set_sim_speedup", sim_factor=1))  # it sinks a little in each try
     with Streams(rig) as streams:
         for number in range(TRIES):
             before = len(streams.answers)
@@ -200,6 +202,7 @@ def test_going_down_is_not_kept_from_the_vehicle_by_streams(rig, harness, verb):
             assert streams.refusals(before) <= {"busy", "mode_changed", "superseded"}
             assert job_of(rig, answer.headers["Location"])["state"] == "running"
             rig.ok(rig.get("/command/guided"))
+        rig.ok(rig.get("/command/set_sim_speedup", sim_factor=10))
         rig.ok(rig.get(f"/command/{verb}"))
         assert rig.status()["armed"] is False
 
@@ -279,7 +282,7 @@ def test_yaw_rate_in_a_takeoff_is_refused_and_the_climb_goes_on(rig, after):
     waiting = Background(lambda: rig.get("/command/takeoff", alt=20))
     time.sleep(after)
     answer = rig.get("/movement/set_yaw_rate", yaw_rate=30)
-    assert (answer.status_code, answer.json()["code"]) == (409, "busy")
+    assert (answer.status_code, answer.json().get("code")) == (409, "busy")
     rig.ok(waiting.join())
     assert height(rig) > 18.5
 
@@ -301,9 +304,10 @@ def assert_stays_low(rig):
     print(f"it reached {reached:.2f} m")
     assert reached < 6
     assert speed(rig) < 0.7
+    assert "Internal Error" not in rig.mavproxy.output()
 
 
-@pytest.mark.parametrize("after", [0.02, 0.15, 0.35])
+@pytest.mark.parametrize("after", [0.02, 0.15, 0.25, 0.35, 0.45, 0.6])
 def test_takeoff_that_is_deleted_in_its_first_second_does_not_climb_on(rig, after):
     armed_on_the_ground(rig)
     rig.ok(rig.get("/command/set_sim_speedup", sim_factor=SLOW))
@@ -393,14 +397,18 @@ def test_mission_that_is_deleted_is_left_by_brake(rig, harness):
         ("ATTITUDE", "/movement/drive_body", {"front": 5, "right": 0, "down": 0}),
     ],
 )
-def test_telemetry_that_is_not_a_number_is_not_flown_by(rig, message, path, body):
+def test_telemetry_that_is_not_a_number_is_not_flown_by(rig, harness, message, path, body):
     rig.in_the_air(10)
     rig.control.fault("nan", message=message)
-    time.sleep(0.5)
+    harness.eventually(lambda: None in told(rig, message), 10, "its arrival")
     since = mark(rig)
     answer = rig.post(path, **body)
-    assert (answer.status_code, answer.json()["code"]) == (503, "stale")
+    assert (answer.status_code, answer.json().get("code")) == (503, "stale"), answer.text
     assert [m for m in sent(rig, since) if m["name"].startswith("SET_POSITION")] == []
+
+
+def told(rig, message):
+    return rig.ok(rig.get(f"/telemetry/message/{message}"))["info"].values()
 
 
 # -- F9: the first command is on the wire at once ---------------------------------------------------------

@@ -21,7 +21,6 @@ from urllib.parse import urlencode
 
 from aiohttp import web
 
-from mavproxy_uavapi.audit import Audit
 from mavproxy_uavapi.errors import UavApiError
 from mavproxy_uavapi.host.host import Host
 from mavproxy_uavapi.host.link import Address, require_finite
@@ -147,7 +146,7 @@ class ScriptedWorld:
         self.wires: list[Any] = []
         self.streams: dict[int, asyncio.Task[None]] = {}
         self._watch_jobs()
-        self.service = Service(self.host, ModuleSettings(SETTINGS, environ={}).snapshot(), Audit(None))
+        self.service = Service(self.host, ModuleSettings(SETTINGS, environ={}).snapshot())
         endings = self.host.endings
         endings.on_disconnect, endings.on_script_exit = Policy(on_disconnect), Policy(on_script_exit)
         self._runner = web.AppRunner(make_app(self.service), access_log=None, handler_cancellation=True)
@@ -308,7 +307,7 @@ class ScriptedWorld:
         left = len(self.host.pending)
         self.drone.power_off()
         self.loop.run(self._runner.cleanup())
-        self.service.audit.close()
+        self.host.audit.close()
         for timer in self.host._link_timers.values():
             timer.cancel()
         tasks = asyncio.all_tasks(self.loop)

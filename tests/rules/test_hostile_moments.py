@@ -259,6 +259,18 @@ def test_takeoff_that_is_deleted_stays_below_two_metres(on_ground: Any, after: f
     assert speed(on_ground) < 0.3
 
 
+def test_takeoff_that_is_deleted_before_it_lifts_off_is_paused_first_and_the_pause_ends(on_ground: Any) -> None:
+    asked = on_ground.ask("GET", "/command/takeoff?alt=20&wait=false")
+    on_ground.loop.pass_time(0.5)
+    since = on_ground.loop.time()
+    on_ground.ask("DELETE", asked.headers["location"])
+    orders = on_ground.orders(since - 0.001)
+    pauses = [m.param1 for m in orders if m.get_type() == "COMMAND_LONG" and m.command == PAUSE]
+    assert orders[0].get_type() == "COMMAND_LONG"
+    assert pauses == [0, 1]
+    assert on_ground.ask("GET", "/command/takeoff?alt=5").outcome == "200"
+
+
 def test_takeoff_that_is_deleted_with_its_first_hold_lost_holds_all_the_same(on_ground: Any) -> None:
     asked = on_ground.ask("GET", "/command/takeoff?alt=20&wait=false")
     on_ground.loop.pass_time(0.5)

@@ -84,8 +84,15 @@ def test_the_battery_drains_in_flight(flying):
     flying.run(60.0)
     after = asked(flying, "BATTERY_STATUS")
     assert after.current_consumed > before.current_consumed + 200
-    assert after.voltages[0] < before.voltages[0]
     assert asked(flying, "SYS_STATUS").battery_remaining < 95
+
+
+def test_the_voltage_falls_only_where_the_pack_has_a_capacity(flying):
+    flying.run(900)
+    assert asked(flying, "SYS_STATUS").voltage_battery > 12_000
+    flying.send(mavlink.MAVLink_param_set_message(1, 1, b"SIM_BATT_CAP_AH", 3.3, 9))
+    flying.run(1)
+    assert asked(flying, "SYS_STATUS").voltage_battery < 11_000
 
 
 def test_timesync_is_answered_in_vehicle_time(ground):
