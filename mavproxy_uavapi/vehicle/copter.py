@@ -87,11 +87,14 @@ class Copter(GuidedVehicle):
 
         Raises:
             NotFound: disarmed, and it has no home yet.
+            ModeChanged: somebody armed it while its home was asked for.
         """
         distance = self.distance_home()
         if self.state.armed is False:
             if distance is None:
                 await self.home()
+                if self.state.armed:
+                    raise ModeChanged(f"the vehicle was armed meanwhile, in {self.mode}: whoever armed it has it")
                 self.fresh("GLOBAL_POSITION_INT")
                 distance = self.distance_home() or 0.0
             if distance > HOME_RADIUS:
