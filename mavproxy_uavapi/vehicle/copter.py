@@ -95,6 +95,7 @@ class Copter(GuidedVehicle):
 
         Raises:
             NotFound: disarmed, and it has no home yet.
+            ModeChanged: somebody armed it while its home was asked for.
         """
         self.authority.take(job, Rank.STOP)
         distance = self.distance_home()

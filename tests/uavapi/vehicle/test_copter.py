@@ -198,6 +198,18 @@ def test_rtl_on_the_ground_away_from_home_is_not_armed(loop: Any, drone: Any, co
     nothing_more(loop, drone)
 
 
+def test_rtl_of_a_vehicle_that_is_armed_while_its_home_is_asked_for_is_not_done(
+    loop: Any, drone: Any, copter: Any, pilotage: Any
+) -> None:
+    drone.answers[mavlink.MAV_CMD_REQUEST_MESSAGE] = [None]
+    job = pilotage.start(copter.rtl)
+    drone.fly("STABILIZE")
+    loop.settle()
+    drone.answers.clear()
+    loop.pass_time(10.0)
+    assert isinstance(job.error, ModeChanged) and drone.mode == "STABILIZE"
+
+
 def test_rtl_on_the_ground_away_from_a_home_that_was_not_told_yet_is_not_done(
     loop: Any, drone: Any, copter: Any, pilotage: Any
 ) -> None:
