@@ -57,7 +57,7 @@ class Vehicle:
         self.waypoints = Waypoints(state, link, self.waiting)
         self.parameters = Parameters(state, link, self.waiting)
         self.speeds = Speeds(state)
-        self._mode_asked = "", 0.0  # the mode that we asked for last, and when (s)
+        self._modes_asked: dict[str, float] = {}  # when we asked for each mode last (s)
         self._requests: dict[str, asyncio.Task[Any]] = {}  # REQUEST_MESSAGE in flight, by message name
 
     # -- what it is ---------------------------------------------------------------------------------------
@@ -207,7 +207,7 @@ class Vehicle:
 
         check = self.commanding(job, switched_by_nobody_else, *needs)
         check()
-        self._mode_asked = mode.upper(), self.clock()
+        self._modes_asked[mode.upper()] = self.clock()
         await self.commands.send(messages.set_mode(number), check, shown=shown)
         before = self.state.mode  # as it was when the vehicle answered
         await self.waiting.until(
@@ -218,8 +218,8 @@ class Vehicle:
     @property
     def switched_by_us(self) -> bool:
         """Whether it is in a mode that we asked for a moment ago: the job that did so may have ended since."""
-        mode, at = self._mode_asked
-        return self.mode == mode and self.clock() - at <= LATE_SWITCH
+        asked = self._modes_asked.get(self.mode)
+        return asked is not None and self.clock() - asked <= LATE_SWITCH
 
     async def limits(self) -> deadlines.Limits:
         """Its speeds and heights, for deadlines; asked for where they are not known."""
