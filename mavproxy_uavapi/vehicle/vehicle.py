@@ -56,7 +56,7 @@ class Vehicle:
         self.waypoints = Waypoints(state, link, self.waiting)
         self.parameters = Parameters(state, link, self.waiting)
         self.speeds = Speeds(state)
-        self._mode_asked: tuple[int, float] | None = None  # for which mode we asked last, and when (s)
+        self._modes_asked: dict[int, float] = {}  # modes that we asked for, the last one last, and when (s)
         self._requests: dict[str, asyncio.Task[Any]] = {}  # REQUEST_MESSAGE in flight, by message name
 
     # -- what it is ---------------------------------------------------------------------------------------
@@ -79,10 +79,17 @@ class Vehicle:
     @property
     def next_mode(self) -> str:
         """The name of the mode that it was told to take, until a heartbeat shows its answer; else `mode`."""
-        number, at = self._mode_asked or (None, 0.0)
-        if number is None or self.state.mode_since > at or self.clock() - at > HEARTBEAT_TIMEOUT:
-            return self.mode
-        return mode_name(self.state.vehicle_type, number)
+        coming = self._on_its_way()
+        return mode_name(self.state.vehicle_type, coming[-1]) if coming else self.mode
+
+    def _on_its_way(self) -> list[int]:
+        """The modes that we asked for of late and that it has not shown since, the last one last."""
+        now, since = self.clock(), self.state.mode_since
+        asked = {mode: at for mode, at in self._modes_asked.items() if now - at <= HEARTBEAT_TIMEOUT}
+        shown_at = asked.get(-1 if self.state.mode is None else self.state.mode)
+        # What was asked for before the mode that it shows has been answered; another's switch answers all before it.
+        after = since if shown_at is None else shown_at
+        return [mode for mode, at in asked.items() if at >= after and mode != self.state.mode]
 
     @property
     def is_ready_to_arm(self) -> bool:
@@ -199,12 +206,12 @@ class Vehicle:
             Rejected, TimedOut, LinkLost.
         """
         number = mode_number(self.state.vehicle_type, mode)
-        before, on_its_way = self.state.mode, self.next_mode
+        before, on_its_way = self.state.mode, self._on_its_way()
         has_shown = False
 
         def shown() -> bool:
             nonlocal has_shown
-            elsewhere = self.state.mode not in (before, number, None) and self.mode != on_its_way
+            elsewhere = self.state.mode not in (before, number, None, *on_its_way)
             left_again = has_shown and self.state.mode not in (number, None)
             if elsewhere or left_again:
                 raise ModeChanged(f"the vehicle is in {self.mode} now: somebody else switched it meanwhile")
@@ -215,14 +222,15 @@ class Vehicle:
             shown()
 
         def noted() -> None:
-            self._mode_asked = number, self.clock()
+            self._modes_asked.pop(number, None)
+            self._modes_asked[number] = self.clock()
             job.modes.add(mode_name(self.state.vehicle_type, number))
 
         check = self.commanding(job, switched_by_nobody_else, *needs, noted)
         try:
             await self.commands.send(messages.set_mode(number), check, shown=shown)
         except Rejected:
-            self._mode_asked = None
+            self._modes_asked.pop(number, None)
             raise
         before = self.state.mode  # as it was when the vehicle answered
         await self.waiting.until(

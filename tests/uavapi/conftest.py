@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections import defaultdict
+from collections import defaultdict, deque
 from collections.abc import Callable, Iterator
 from types import SimpleNamespace
 from typing import Any
@@ -82,6 +82,7 @@ class Drone:
         self.paused = self.lifting = False
         self._told_at = self._idle_since = self._booted_at = 0.0
         self._sequence = 0
+        self._arriving: deque[Any] = deque()
         self._stream: asyncio.Task[None] | None = None
 
     # -- what a test does with it -----------------------------------------------------------------------
@@ -288,7 +289,12 @@ class Drone:
             return
         assert message.target_system == self.system
         self.got.append(message)
-        self._loop.call_later(LATENCY, self._take, message)
+        self._arriving.append(message)
+        self._loop.call_later(LATENCY, self._take_next)
+
+    def _take_next(self) -> None:
+        """The messages arrive in their order, also those of one moment: a timer's is not."""
+        self._take(self._arriving.popleft())
 
     def _take(self, message: Any) -> None:
         kind = message.get_type()

@@ -281,3 +281,15 @@ def test_landing_on_its_way_goes_on_when_the_module_is_unloaded(
     end(loop, pilotage.start(copter.set_mode, "LAND"), Ending.UNLOADED)
     loop.pass_time(5.0)
     assert flying.mode == "LAND"
+
+
+def test_deleted_switch_is_followed_by_brake_though_an_older_one_arrives_too(
+    loop: Any, host: Any, flying: Any, copter: Any, pilotage: Any
+) -> None:
+    pilotage.start(copter.land)
+    loop.pass_time(0.005)
+    job = pilotage.start(copter.set_mode, "RTL")
+    loop.pass_time(0.005)
+    end(loop, job)
+    loop.pass_time(5.0)
+    assert flying.mode == "BRAKE"
