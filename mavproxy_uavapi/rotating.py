@@ -44,13 +44,12 @@ class RotatingFile(logging.handlers.RotatingFileHandler):
         super().__init__(file, maxBytes=size, backupCount=older, encoding="utf-8", delay=delay)
 
     def _open(self) -> io.TextIOWrapper:
-        descriptor = os.open(
-            self.baseFilename, os.O_RDWR | os.O_APPEND | os.O_CREAT, PRIVATE if self._private else PUBLIC
-        )
+        mode = PRIVATE if self._private else PUBLIC
+        descriptor = os.open(self.baseFilename, os.O_WRONLY | os.O_APPEND | os.O_CREAT, mode)
         if self._private:
             with contextlib.suppress(OSError):  # a file system without modes, or somebody else's file
                 os.fchmod(descriptor, PRIVATE)
-        if _is_torn(descriptor):
+        if _is_torn(Path(self.baseFilename)):
             os.write(descriptor, b"\n")
         return io.TextIOWrapper(os.fdopen(descriptor, "ab"), encoding="utf-8")
 
@@ -74,10 +73,13 @@ class RotatingFile(logging.handlers.RotatingFileHandler):
             super().close()
 
 
-def _is_torn(descriptor: int) -> bool:
+def _is_torn(file: Path) -> bool:
     """Whether the file ends within a line: the disk was full, or its writer killed."""
-    end = os.fstat(descriptor).st_size
-    return end > 0 and os.pread(descriptor, 1, end - 1) != b"\n"
+    if not file.is_file() or not file.stat().st_size:
+        return False
+    with file.open("rb") as stream:
+        stream.seek(-1, os.SEEK_END)
+        return stream.read(1) != b"\n"
 
 
 def _close(stream: io.TextIOWrapper | None) -> None:

@@ -7,11 +7,11 @@ import time
 
 import aiohttp
 
-WAITING = 200
+WAITING = 180  # max_connections is 200, and a few are kept for callers who have passed the door
 READS = 50
 
 
-def test_two_hundred_waiting_calls_do_not_hold_up_a_read(embedded_rig):
+def test_almost_two_hundred_waiting_calls_do_not_hold_up_a_read(embedded_rig):
     rig = embedded_rig
     rig.in_the_air(10)
     x, y, z = rig.ned()

@@ -172,7 +172,7 @@ def test_pilots_mode_is_left_alone_when_the_script_dies(rig, harness):
     rig.mavproxy.type("mode LOITER")
     harness.eventually(lambda: rig.status()["mode"] == "LOITER")
     since = rig.control.ask("received", since=0)["last"] if rig.control is not None else 0
-    rig.mavproxy.says("the vehicle is in LOITER, which is left alone", mark)
+    rig.mavproxy.says("left alone: the vehicle is in LOITER", mark)
     assert show(rig, "dies")["exit_status"] == 1
     time.sleep(1)  # what is not to come would come at once
     status = rig.status()

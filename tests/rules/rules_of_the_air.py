@@ -158,7 +158,7 @@ class Judge:
         return flight.verb != "stop" and wanted != "" and self._world.copter.mode == wanted
 
     def a_stopped_vehicle_gets_no_setpoint(self, sent: Any) -> str | None:
-        if not self.stopped or not sent.is_setpoint or sent.flight.verb in ("guided", "set_mode"):
+        if not self.stopped or not sent.is_setpoint or sent.flight.verb in ("guided", "set_mode", "hold", "resume"):
             return None
         return f"{sent.message} by {sent.flight}"
 
