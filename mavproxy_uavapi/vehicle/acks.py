@@ -32,6 +32,7 @@ SENDINGS = 4  # the first one and three more
 IN_PROGRESS_TIMEOUT = 10.0  # s that each IN_PROGRESS buys
 IN_PROGRESS_LIMIT = 60.0  # s until a command that is still in progress is given up
 PATIENCE_PAUSE = 1.0  # s before a patient command is asked again
+SHOWN_WITHIN = (2.0, 1.5, 1.5)  # s after each acknowledgement in which a heartbeat must show what was done
 LATE_ACK = 10.0  # s after a sending in which its ack may still come
 LAST_WORDS = 0.5  # s that a refusal's STATUSTEXT may come after its ack
 WORTH_ASKING_AGAIN = {mavlink.MAV_RESULT_TEMPORARILY_REJECTED, mavlink.MAV_RESULT_FAILED}
@@ -90,6 +91,28 @@ class Commands:
                 await asyncio.sleep(PATIENCE_PAUSE)
                 if shown():
                     return
+
+    async def send_until_shown(
+        self, command: Command, check: Callable[[], None], shown: Callable[[], bool], what: str
+    ) -> None:
+        """Send `command` until a heartbeat shows that it was done.
+
+        The ack alone does not do: MAVLink does not number commands, so it may be an earlier one's, and this one lost.
+
+        Args:
+            command: what to send.
+            check, shown: as for `send`.
+            what: ends the sentence "vehicle 1 did not …".
+
+        Raises:
+            Rejected, TimedOut, LinkLost: as `send`; and whatever `check` and `shown` raise.
+        """
+        for seconds in SHOWN_WITHIN:
+            await self.send(command, check, shown=shown)
+            with contextlib.suppress(TimedOut):
+                await self._waiting.until({"HEARTBEAT"}, lambda: shown() or None, seconds, what)
+                return
+        raise TimedOut(f"vehicle {self._state.system} did not {what} within {sum(SHOWN_WITHIN):.1f} s")
 
     def _outstanding(self, number: int) -> deque[Sending]:
         """The sendings of that command whose ack may still come, oldest first."""

@@ -48,15 +48,20 @@ async def arm(vehicle: Vehicle, job: Job, timeout: float | None) -> None:
 
     if not vehicle.state.armed:
         await vehicle.commands.send(messages.arm(), vehicle.commanding(job, still_guided), shown=shown)
-    await _until_armed(vehicle, True)
+    # Not sent again: a pilot may have disarmed it meanwhile.
+    await vehicle.waiting.until(
+        {"HEARTBEAT"}, lambda: vehicle.state.armed or None, SHOWN_WITHIN, "show that it is armed"
+    )
 
 
 async def disarm(vehicle: Vehicle, job: Job, force: bool) -> None:
     """See `Vehicle.disarm`."""
-    await vehicle.commands.send(
-        messages.disarm(force), vehicle.commanding(job), shown=lambda: vehicle.state.armed is False
+    await vehicle.commands.send_until_shown(
+        messages.disarm(force),
+        vehicle.commanding(job),
+        lambda: vehicle.state.armed is False,
+        "show that it is disarmed",
     )
-    await _until_armed(vehicle, False)
 
 
 def _requires_guided(vehicle: Vehicle) -> Callable[[], None]:
@@ -91,12 +96,3 @@ async def _why_not_ready(vehicle: Vehicle, waited: float) -> Rejected:
     said = vehicle.state.said_since(asked)
     because = "; ".join(said) or "it does not say why"
     return Rejected(f"not ready to arm after {waited:.0f} s: {because}", statustext=said)
-
-
-async def _until_armed(vehicle: Vehicle, armed: bool) -> None:
-    await vehicle.waiting.until(
-        {"HEARTBEAT"},
-        lambda: True if vehicle.state.armed is armed else None,
-        SHOWN_WITHIN,
-        "show that it is armed" if armed else "show that it is disarmed",
-    )

@@ -27,7 +27,7 @@ from mavproxy_uavapi.vehicle.waypoints import Waypoints
 T = TypeVar("T")
 mavlink = mavutil.mavlink
 
-HEARTBEAT_TIMEOUT = 5.0  # s until a heartbeat must show what was acknowledged
+HEARTBEAT_TIMEOUT = 5.0  # s until a message must show what was acknowledged
 STOPPING_MODES = {"LAND", "RTL", "SMART_RTL", "BRAKE", "QLAND", "QRTL", "HOLD"}
 FRESH = 3.0  # s; older positions are not flown by
 
@@ -228,14 +228,10 @@ class Vehicle:
 
         check = self.commanding(job, switched_by_nobody_else, *needs, noted)
         try:
-            await self.commands.send(messages.set_mode(number), check, shown=shown)
+            await self.commands.send_until_shown(messages.set_mode(number), check, shown, f"show mode {mode.upper()}")
         except Rejected:
             self._modes_asked.pop(number, None)
             raise
-        before = self.state.mode  # as it was when the vehicle answered
-        await self.waiting.until(
-            {"HEARTBEAT"}, lambda: shown() or None, HEARTBEAT_TIMEOUT, f"show mode {mode.upper()}"
-        )
         self.authority.shown(job)
 
     async def limits(self) -> deadlines.Limits:

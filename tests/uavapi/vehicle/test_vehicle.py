@@ -221,6 +221,16 @@ def test_mode_request_whose_ack_was_lost_is_done_when_the_heartbeat_shows_it(
     assert copter.mode == "BRAKE"
 
 
+def test_mode_whose_ack_was_an_earlier_ones_is_sent_again(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+    flying.answers[MODE] = [(0,), (0,), None]  # acknowledged, and not obeyed: the command itself was lost
+    job = pilotage.start(copter.land)
+    loop.pass_time(3.0)
+    assert len(flying.commands(MODE)) == 2 and job.running
+    del flying.answers[MODE]
+    loop.pass_time(3.0)
+    assert flying.mode == "LAND"
+
+
 @pytest.mark.parametrize(("kind", "number"), [("air", 0), ("ground", 1), ("climb", 2), ("descent", 3)])
 def test_speed_is_set_by_its_type(flying: Any, copter: Any, kind: str, number: int, pilotage: Any) -> None:
     pilotage.do(copter.set_speed, kind, 3.5)
