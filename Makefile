@@ -10,7 +10,7 @@ demo: $(INSTALLED)
 	$(BIN)/mavproxy-uavapi --simulated --module 'vision:{"source":"sim"}' $(ARGS)
 
 test: $(INSTALLED)
-	$(BIN)/python -m pytest -m "not sitl" -n 3 --dist loadfile --reruns 2 -rR $(ARGS)
+	$(BIN)/python -m pytest -m "not sitl" -n 4 --dist loadfile --reruns 2 -rR $(ARGS)
 
 # Against ArduPilot's own simulation: make test-sitl ARDUPILOT_HOME=…
 test-sitl: $(INSTALLED)

@@ -190,6 +190,7 @@ def status(path, body=None, headers={}):
         return error.code
 told = {"read": status("/jobs"), "upload": status("/mission/upload-script", body, kind)}
 host, port = url.removeprefix("http://").split(":")
+time.sleep(2)  # until the connections of those calls have ended
 idle = [socket.create_connection((host, int(port))) for _ in range(60)]
 time.sleep(2)
 def ended(one):
