@@ -16,6 +16,7 @@ from mavproxy_uavapi.vehicle.touchdown import Touchdown
 
 TAKEOFF_SHARE = 0.05  # of the altitude, between TAKEOFF_TOLERANCE's two ends
 TAKEOFF_TOLERANCE = (0.3, 1.0)  # m
+OVER_WITHIN = 3.0  # s at its altitude in which the autopilot should call a takeoff over
 LIFT_OFF_TIMEOUT = 5.0  # s in which an unacknowledged takeoff must show
 SLOWED_DOWN = 0.3  # s in which a pause on the ground takes the motors from full throttle
 STOP_TIMEOUT = 20.0  # s from full speed to rest
@@ -51,14 +52,24 @@ class Copter(GuidedVehicle):
         low, high = TAKEOFF_TOLERANCE
         tolerance = min(max(TAKEOFF_SHARE * alt, low), high)
 
+        near_since: float | None = None
+
         def reached() -> bool | None:
+            nonlocal near_since
             self._report_leg(job, abs(alt - self.height))
             climb = self.state.field("GLOBAL_POSITION_INT", "vz") or 0
             slow = abs(climb) / 100.0 <= 2 * ARRIVAL_SPEED
-            return True if abs(alt - self.height) <= tolerance and slow else None
+            if not (abs(alt - self.height) <= tolerance and slow):
+                near_since = None
+                return None
+            near_since = self.clock() if near_since is None else near_since
+            # Movements are refused until the autopilot calls it over, which it does a moment later.
+            over = not self.is_taking_off or self.clock() - near_since >= OVER_WITHIN
+            return True if over else None
 
         allowed = self.allowed(deadlines.leg_time(limits, 0.0, alt), timeout)
-        await self.flown(GUIDED, {"GLOBAL_POSITION_INT"}, reached, allowed, f"reach {alt:g} m")
+        names = {"GLOBAL_POSITION_INT", "EXTENDED_SYS_STATE"}
+        await self.flown(GUIDED, names, reached, allowed, f"reach {alt:g} m")
         self.authority.shown(job)
 
     async def _lift_off(self, job: Job, alt: float) -> None:

@@ -50,9 +50,14 @@ class GuidedVehicle(Vehicle):
         if self.state.landed:
             raise Busy("the vehicle is on the ground; /command/takeoff first")
 
+    @property
+    def is_taking_off(self) -> bool:
+        """Whether the autopilot says that it climbs from the ground, whoever told it to."""
+        return bool(self.state.recent_field("EXTENDED_SYS_STATE", "landed_state") == TAKING_OFF)
+
     def require_no_takeoff(self) -> None:
-        """Raises Busy while it climbs from the ground, whoever told it to."""
-        if self.state.recent_field("EXTENDED_SYS_STATE", "landed_state") == TAKING_OFF:
+        """Raises Busy while it climbs from the ground."""
+        if self.is_taking_off:
             raise Busy("the vehicle is taking off")
 
     def flying(self) -> None:

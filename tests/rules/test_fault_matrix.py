@@ -288,5 +288,11 @@ def test_vehicle_that_rebooted_can_be_flown_again(make_world: Any) -> None:
     assert world.ask("GET", "/command/takeoff?alt=3").outcome == "200"
 
 
+def test_a_turn_right_after_a_takeoff_is_flown(make_world: Any) -> None:
+    world = make_world(STAGES["armed"])
+    assert world.ask("GET", "/command/takeoff?alt=10").outcome == "200"
+    assert world.ask("GET", "/movement/set_yaw_rate?yaw_rate=20").outcome == "200"
+
+
 def test_page_about_faults_is_up_to_date() -> None:
     assert outcomes.FILE.read_text(encoding="utf-8") == outcomes.page(), "python tests/rules/outcomes.py"
