@@ -161,7 +161,8 @@ class GuidedVehicle(Vehicle):
         """
         self.commanding(job, self.flying)()
         await self.link.send(target.to(self.address, yaw), self.state.system)
-        self._sent, self._sent_at, self._shown = target, self.clock(), None
+        self._sent, self._sent_at = target, self.clock()
+        self._shown = target if isinstance(target, GlobalTarget) else None  # another frame: as it is told first
 
     async def _take_up(self, job: Job, target: Target, yaw: Yaw) -> None:
         """Begin a movement. ArduCopter takes up its own speeds again whenever the kind of setpoint changes."""

@@ -19,6 +19,8 @@ import pytest
 from aiohttp import web
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from mavproxy_gradys.http import Handlers
+from mavproxy_gradys.service import Gradys
 from mavproxy_uavapi.errors import LinkLost
 from mavproxy_uavapi.host.host import Host
 from mavproxy_uavapi.host.link import Address
@@ -159,6 +161,8 @@ class World:
         self._arriving: list[Any] = []
         host.link = self
         self.service = Service(host, ModuleSettings(settings, environ={}).snapshot())
+        for route in Handlers(Gradys(host)).routes():
+            host.extensions[route.path] = route
         self._runner = web.AppRunner(make_app(self.service), access_log=None, handler_cancellation=True)
         self._tasks: list[asyncio.Task[None]] = []
         self._streams: list[asyncio.Task[None]] = []

@@ -104,6 +104,7 @@ FLIGHT = {"reboot": "409 not_armed", "pilot's mode": "409 mode_changed", "disarm
 GUIDED_ONLY = {"during a take-off": "409 busy", "in AUTO": "409 mode_changed"}
 OTHERS = {"another client streams": "409 superseded", "another station flies it": "409 superseded"}
 MOVING = {**SUCCESS, **LOST, **FLIGHT, **OTHERS, **GUIDED_ONLY}  # by setpoints, which nobody acknowledges
+TRACK = {**MOVING, **REFUSED}  # of the gradys module: movements, and a return
 TRAVEL = {**MOVING, "another station flies it": "200"}  # it repeats its own
 MODE = {**SUCCESS, **LOST, **REFUSED, "reboot": "409 mode_changed", "pilot's mode": "409 mode_changed"}
 LANDING = {**SUCCESS, **LOST, **REFUSED, **FLIGHT, "client gone": GOES_ON}
@@ -155,6 +156,7 @@ VERBS = {
     "drive_wait": Verb("/movement/drive_wait", 10.0, MOVING),
     "drive_body_wait": Verb("/movement/drive_body_wait", 10.0, MOVING),
     "travel, with duration": Verb("/movement/travel_at_ned", 7.0, TRAVEL),
+    "fly-track": Verb("/mission/fly-track", 60.0, TRACK),
     "set_heading": Verb("/movement/set_heading", 5.0, TURN),
     "set_yaw_rate": Verb("/movement/set_yaw_rate", 3.0, TURN_RATE),
     "stop": Verb("/movement/stop", 3.0, STOP),
@@ -186,7 +188,7 @@ def page() -> str:
         "| --- | --- | --- |",
     ]
     lines += [f"| {name} | {fault.meaning} | {_seconds(fault)} |" for name, fault in FAULTS.items()]
-    for verbs in (("arm", "takeoff", "land", "rtl"), tuple(list(VERBS)[4:13]), tuple(list(VERBS)[13:])):
+    for verbs in (("arm", "takeoff", "land", "rtl"), tuple(list(VERBS)[4:14]), tuple(list(VERBS)[14:])):
         groups = _alike(verbs)
         lines += ["", "| fault | " + " | ".join(", ".join(f"`{name}`" for name in group) for group in groups) + " |"]
         lines += ["| --- |" + " --- |" * len(groups)]
