@@ -17,6 +17,7 @@ mavlink = mavutil.mavlink
 
 RATE_SMOOTHING = 0.2  # weight of the newest interval in the smoothed rate
 STATUSTEXTS_KEPT = 200
+MODE_CHANGES_KEPT = 16
 CHUNK = 50  # characters of a full chunk of a STATUSTEXT
 CHUNK_TIMEOUT = 2.0  # s after which the chunks of a text that are missing are taken as lost
 RECENT = 5.0  # s before the newest heartbeat; a state that was told earlier is the present one no more
@@ -97,6 +98,7 @@ class VehicleState:
         system_status: MAV_STATE of the heartbeat; None likewise.
         heartbeat_at: arrival of the newest heartbeat (s).
         mode_since: arrival of the heartbeat that first showed the mode (s).
+        mode_changes: the newest of those: arrival and mode, oldest first.
         messages: newest message by name, and by `NAME[instance]` for those that come for several devices.
         others: newest message by (component, name), of the system's other components.
         parameters: values by name, that PARAM_VALUE told or MAVProxy knew. A reboot does not change them.
@@ -110,6 +112,7 @@ class VehicleState:
     mode: int | None = None
     system_status: int | None = None
     mode_since: float = 0.0
+    mode_changes: deque[tuple[float, int]] = field(default_factory=lambda: deque(maxlen=MODE_CHANGES_KEPT))
     messages: dict[str, Received] = field(default_factory=dict)
     others: dict[tuple[int, str], Received] = field(default_factory=dict)
     parameters: dict[str, float] = field(default_factory=dict)
@@ -220,6 +223,7 @@ class VehicleState:
         self.vehicle_type = message.type
         if message.custom_mode != self.mode:
             self.mode, self.mode_since = message.custom_mode, now
+            self.mode_changes.append((now, self.mode))
         self.armed = bool(message.base_mode & ARMED)
         self.system_status = message.system_status
 

@@ -84,12 +84,15 @@ class Vehicle:
 
     def _on_its_way(self) -> list[int]:
         """The modes that we asked for of late and that it has not shown since, the last one last."""
-        now, since = self.clock(), self.state.mode_since
-        asked = {mode: at for mode, at in self._modes_asked.items() if now - at <= HEARTBEAT_TIMEOUT}
-        shown_at = asked.get(-1 if self.state.mode is None else self.state.mode)
-        # What was asked for before the mode that it shows has been answered; another's switch answers all before it.
-        after = since if shown_at is None else shown_at
-        return [mode for mode, at in asked.items() if at >= after and mode != self.state.mode]
+        now = self.clock()
+        asked = [(mode, at) for mode, at in self._modes_asked.items() if now - at <= HEARTBEAT_TIMEOUT]
+        for changed_at, mode in self.state.mode_changes:
+            answered = [at for wanted, at in asked if wanted == mode and at <= changed_at]
+            if answered:
+                asked = [(wanted, at) for wanted, at in asked if at > answered[-1]]
+            else:  # somebody else's switch: what we asked for before it has come to nothing
+                asked = [(wanted, at) for wanted, at in asked if at >= changed_at]
+        return [mode for mode, _ in asked]
 
     @property
     def is_ready_to_arm(self) -> bool:

@@ -221,6 +221,20 @@ def test_mode_request_whose_ack_was_lost_is_done_when_the_heartbeat_shows_it(
     assert copter.mode == "BRAKE"
 
 
+def test_mode_that_somebody_elses_switch_came_before_is_not_on_its_way(
+    loop: Any, flying: Any, copter: Any, pilotage: Any
+) -> None:
+    pilotage.do(copter.set_mode, "GUIDED")
+    flying.answers[MODE] = [None]
+    pilotage.start(copter.land)
+    assert copter.next_mode == "LAND"
+    for mode in ("LOITER", "GUIDED"):
+        loop.pass_time(0.3)
+        flying.pilot(mode)
+    loop.settle()
+    assert copter.next_mode == "GUIDED"
+
+
 def test_mode_whose_ack_was_an_earlier_ones_is_sent_again(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
     flying.answers[MODE] = [(0,), (0,), None]  # acknowledged, and not obeyed: the command itself was lost
     job = pilotage.start(copter.land)
