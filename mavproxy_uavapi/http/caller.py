@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import ipaddress
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -17,6 +18,7 @@ NOBODY = "unknown"
 LOOPBACK = "this machine"
 
 
+@functools.lru_cache(maxsize=1024)
 def address_of(remote: str | None) -> IpAddress | None:
     """A peer's address without its zone; an IPv4 address that is written as IPv6 is IPv4. None where it is none."""
     try:
@@ -27,6 +29,7 @@ def address_of(remote: str | None) -> IpAddress | None:
     return mapped or address
 
 
+@functools.lru_cache(maxsize=1024)
 def group_of(address: IpAddress | None) -> str:
     """Who counts as one caller: an IPv4 address, a /64 of IPv6, or this machine."""
     if address is None:

@@ -8,6 +8,7 @@ LAN address a browser says neither with a GET: there it is known by what else it
 from __future__ import annotations
 
 import asyncio
+import functools
 import hmac
 import ipaddress
 import logging
@@ -105,11 +106,15 @@ def is_our_name(host: str) -> bool:
 
     No foreign name server can make any of these point here.
     """
+    return _names_us(host, socket.gethostname().lower())
+
+
+@functools.lru_cache(maxsize=256)  # each request has one, and mostly the same
+def _names_us(host: str, own: str) -> bool:
     try:
         name = (urlsplit(f"//{host}").hostname or "").lower()
     except ValueError:  # such as a bracket that is not closed
         return False
-    own = socket.gethostname().lower()
     if name in ("localhost", own, f"{own}.local"):
         return True
     try:
