@@ -3,6 +3,7 @@
 The faults of the link (`silence`, `lose_acks`, `delay_acks`, `foreign_ack`, `refuse`, `in_progress`, `drop`, `nan`)
 are the wire's own. What the pilot does (`pilot_mode`, `pilot_sticks`, `pilot_arm`, `pilot_disarm`), `other_station`
 and `reboot` go to the vehicle as another ground station's messages, the sticks as MAVProxy's own RC overrides.
+`ekf_bad` takes the simulated GPS away until `clear`.
 """
 
 from __future__ import annotations
@@ -73,6 +74,7 @@ class Relay:
             if op == "clear":
                 self._faults.clear()
                 self._spoilt.clear()
+                self._enable_gps(True)
                 return {"ok": True}
             assert op == "received", f"a wire knows nothing of {op}"
             found = [entry for entry in self._received if entry[0] > arguments.get("since", 0)]
@@ -114,6 +116,8 @@ class Relay:
                 self._faults.spoil(arguments["message"], arguments.get("fields", ()), time.monotonic(), seconds)
             elif name == "pilot_disarm":
                 self._command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, FORCE_ARMING)
+            elif name == "ekf_bad":
+                self._enable_gps(False)
             elif name == "reboot":
                 self._sticks = None
                 self._command(mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 1, 0, 0, 0, 0, FORCE_REBOOT)
@@ -217,6 +221,11 @@ class Relay:
         params = (*params, *(0.0,) * (7 - len(params)))
         order = mavlink.MAVLink_command_long_message(*VEHICLE, number, 0, *params)
         self._loop.call_soon_threadsafe(self._order, order, PILOT)
+
+    def _enable_gps(self, enabled: bool) -> None:
+        kind = mavlink.MAV_PARAM_TYPE_INT8
+        parameter = mavlink.MAVLink_param_set_message(*VEHICLE, b"SIM_GPS1_ENABLE", enabled, kind)
+        self._loop.call_soon_threadsafe(self._order, parameter, PILOT)
 
     def _order(self, message: Any, source: tuple[int, int]) -> None:
         if self._vehicle is not None:
