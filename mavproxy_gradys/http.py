@@ -16,9 +16,7 @@ from mavproxy_gradys.track_flight import VERB, flight_of
 from mavproxy_gradys.track_request import Track, TrackFile
 from mavproxy_gradys.tracks import places_of
 from mavproxy_uavapi.errors import Invalid, NoVehicle
-from mavproxy_uavapi.http.call import Answer, Call
-from mavproxy_uavapi.http.requests import Empty, Request
-from mavproxy_uavapi.http.routes import EITHER, POST, Route
+from mavproxy_uavapi.http.extension import EITHER, POST, Answer, Call, Empty, Request, Route
 from mavproxy_uavapi.vehicle.jobs import Job
 
 MOST_READINGS = 1000  # in one request

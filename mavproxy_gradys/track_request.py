@@ -9,7 +9,7 @@ from pydantic import Field
 
 from mavproxy_gradys.track_flight import HIGHEST_TAKEOFF, LARGEST_REACH, LOWEST_TRANSIT, REACH, TRANSIT
 from mavproxy_gradys.tracks import GROUND
-from mavproxy_uavapi.http.requests import Request
+from mavproxy_uavapi.http.extension import Request
 
 
 class Limits(Request):

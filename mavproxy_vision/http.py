@@ -11,11 +11,22 @@ from pydantic import Field, model_validator
 
 from mavproxy_uavapi.errors import BadRequest
 from mavproxy_uavapi.host.patience import within
-from mavproxy_uavapi.http.call import Call, in_time
-from mavproxy_uavapi.http.requests import NED_REACH, Blocking, Empty, Number, Request, Written
-from mavproxy_uavapi.http.responses import envelope
-from mavproxy_uavapi.http.routes import EITHER, POST, Route
-from mavproxy_uavapi.http.streaming import Slots, StreamingResponse
+from mavproxy_uavapi.http.extension import (
+    EITHER,
+    NED_REACH,
+    POST,
+    Blocking,
+    Call,
+    Empty,
+    Number,
+    Request,
+    Route,
+    Slots,
+    StreamingResponse,
+    Written,
+    envelope,
+    in_time,
+)
 from mavproxy_vision.annotate import annotated, jpeg
 from mavproxy_vision.camera import Image, Posted, decode
 from mavproxy_vision.console import caption, status

@@ -21,7 +21,7 @@ from mavproxy_uavapi.errors import UavApiError
 from mavproxy_uavapi.host.errands import Errands
 from mavproxy_uavapi.host.member import HostedModule, value_of
 from mavproxy_uavapi.host.remembered import Remembered
-from mavproxy_uavapi.http.requests import NED_REACH
+from mavproxy_uavapi.http.extension import NED_REACH
 from mavproxy_uavapi.vehicle.jobs import Job
 from mavproxy_vision import console, files
 from mavproxy_vision.errors import BadSetting

@@ -21,7 +21,8 @@ from mavproxy_uavapi.http.limits import BUCKET, STRANGERS, Bucket, at_a_bearable
 from mavproxy_uavapi.http.listener import Listener, listening_socket
 from mavproxy_uavapi.http.log_throttle import LogThrottle
 from mavproxy_uavapi.http.responses import REFUSED, Handler, errors_as_answers, success
-from mavproxy_uavapi.http.routes import ROUTES, Route
+from mavproxy_uavapi.http.route import Route
+from mavproxy_uavapi.http.routes import ROUTES
 from mavproxy_uavapi.http.security import THROTTLE, door, name_the_trusted
 from mavproxy_uavapi.http.trail import audited
 

@@ -12,7 +12,9 @@ from aiohttp import web
 from mavproxy_uavapi.errors import NotFound
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.openapi import document
+from mavproxy_uavapi.http.route import Route
 
+TABLE: web.AppKey[list[Route]] = web.AppKey("table", list)
 PACKAGE = "swagger_ui"
 ASSETS = {
     "swagger-ui.css": "text/css",
@@ -95,6 +97,3 @@ def _folder() -> Path | None:
     if found is None or found.origin is None:
         return None
     return Path(found.origin).parent / "static"
-
-
-TABLE: web.AppKey[list[Any]] = web.AppKey("table", list)

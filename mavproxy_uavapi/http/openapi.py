@@ -10,16 +10,14 @@ import inspect
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pydantic.json_schema import models_json_schema
 
 from mavproxy_uavapi import errors
 from mavproxy_uavapi.errors import UavApiError
 from mavproxy_uavapi.http import examples, requests
-
-if TYPE_CHECKING:
-    from mavproxy_uavapi.http.routes import Route
+from mavproxy_uavapi.http.route import Route
 
 ABOUT = """\
 Arm, fly, watch and script an ArduPilot vehicle through MAVProxy. Units: metres, m/s, degrees, seconds, unless a \

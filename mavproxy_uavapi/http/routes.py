@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import re
-from dataclasses import dataclass
-
 from mavproxy_uavapi.http import (
     command,
     docs_page,
@@ -18,35 +15,7 @@ from mavproxy_uavapi.http import (
     telemetry,
     waypoints,
 )
-from mavproxy_uavapi.http.call import Action
-
-
-@dataclass(frozen=True)
-class Route:
-    """A path: who may ask how, what is validated, and who answers. The action's docstring is its summary."""
-
-    path: str
-    action: Action
-    model: type[requests.Request]
-    methods: tuple[str, ...] = ("GET",)
-    raw: bool = False  # whether the action itself reads the body, which holds no parameters
-    job: bool = False  # whether the action runs as a job, which a client need not wait for
-    stops: bool = False  # whether it stops a vehicle: no limit refuses it
-    trail: bool = True  # whether a call that commands is audited; one that comes many times a second would flush it
-
-    @property
-    def commands(self) -> bool:
-        """Whether it does something; what can only be read with GET does not."""
-        return self.methods != ("GET",)
-
-    def matches(self, path: str) -> bool:
-        """Whether `path` is this one, with something in the place of each `{name}`."""
-        pattern = re.sub(r"\\{\w+\\}", "[^/]+", re.escape(self.path))
-        return re.fullmatch(pattern, path) is not None
-
-
-EITHER = ("GET", "POST")
-POST = ("POST",)
+from mavproxy_uavapi.http.route import EITHER, POST, Route
 
 COMMAND = [
     Route("/command/arm", command.arm, requests.Blocking, EITHER, job=True),

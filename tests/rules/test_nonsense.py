@@ -14,7 +14,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from mavproxy_uavapi.http.routes import ROUTES, Route
+from mavproxy_uavapi.http.route import Route
+from mavproxy_uavapi.http.routes import ROUTES
 
 quick = settings(
     derandomize=True,  # the same values in each run

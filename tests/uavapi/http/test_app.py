@@ -14,7 +14,7 @@ from aiohttp.test_utils import TestClient, TestServer
 
 from mavproxy_uavapi.http.app import MAX_BODY, Server, listening_socket, make_app
 from mavproxy_uavapi.http.requests import Servo
-from mavproxy_uavapi.http.routes import Route
+from mavproxy_uavapi.http.route import Route
 from mavproxy_uavapi.settings import ModuleSettings
 
 

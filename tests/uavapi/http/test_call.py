@@ -7,7 +7,7 @@ import pytest
 
 from mavproxy_uavapi.http.call import BODY_TIMEOUT, Call, in_time
 from mavproxy_uavapi.http.requests import Blocking, Empty, Servo
-from mavproxy_uavapi.http.routes import POST, Route
+from mavproxy_uavapi.http.route import POST, Route
 from mavproxy_uavapi.settings import ModuleSettings
 
 

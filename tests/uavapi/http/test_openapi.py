@@ -11,7 +11,8 @@ from mavproxy_uavapi import errors
 from mavproxy_uavapi.errors import UavApiError
 from mavproxy_uavapi.http import examples, requests
 from mavproxy_uavapi.http.openapi import BY_PATH, KINDS, RAW_BODIES, TAGS, document, example_of, simplified
-from mavproxy_uavapi.http.routes import ROUTES, Route
+from mavproxy_uavapi.http.route import Route
+from mavproxy_uavapi.http.routes import ROUTES
 
 DOCUMENT = document(ROUTES)
 OPERATIONS = [(route, method) for route in ROUTES for method in route.methods]

@@ -4,7 +4,8 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.http.routes import ROUTES, Route
+from mavproxy_uavapi.http.route import Route
+from mavproxy_uavapi.http.routes import ROUTES
 
 CONTRACT = {
     "/command": "arm disarm takeoff land rtl brake guided set_mode set_air_speed set_ground_speed set_climb_speed "

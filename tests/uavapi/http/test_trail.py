@@ -10,7 +10,7 @@ import pytest
 
 from mavproxy_uavapi.audit import COUNTED_FOR
 from mavproxy_uavapi.http.requests import Empty
-from mavproxy_uavapi.http.routes import POST, Route
+from mavproxy_uavapi.http.route import POST, Route
 from mavproxy_uavapi.scripts.on_exit import after_death
 from mavproxy_uavapi.scripts.runs import Run
 from mavproxy_uavapi.text import LONGEST

@@ -1,0 +1,30 @@
+"""What other modules use to add paths to the API: they import nothing else of `mavproxy_uavapi.http`.
+
+A module puts its routes into `Host.extensions`, by path; the API serves them while it is loaded:
+
+    host.extensions["/vision/land"] = Route("/vision/land", land, LandRequest, EITHER, job=True)
+"""
+
+from mavproxy_uavapi.http.call import Answer, Call, in_time
+from mavproxy_uavapi.http.requests import NED_REACH, Blocking, Empty, Number, Request, Written
+from mavproxy_uavapi.http.responses import envelope
+from mavproxy_uavapi.http.route import EITHER, POST, Route
+from mavproxy_uavapi.http.streaming import Slots, StreamingResponse
+
+__all__ = [
+    "EITHER",
+    "NED_REACH",
+    "POST",
+    "Answer",
+    "Blocking",
+    "Call",
+    "Empty",
+    "Number",
+    "Request",
+    "Route",
+    "Slots",
+    "StreamingResponse",
+    "Written",
+    "envelope",
+    "in_time",
+]
