@@ -96,7 +96,7 @@ class Pusher:
                 state,
                 self._host.clock(),
                 max_age=self._settings.max_age,
-                link_timeout=self._host.link_timeout,
+                link_timeout=self._host.link_watch.timeout,
                 has_position=self._host.hangar.find(state.system).has_position,
             )
         except Unavailable as nothing:

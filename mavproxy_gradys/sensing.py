@@ -151,7 +151,7 @@ class Sensing:
                 state,
                 now,
                 max_age=max_age,
-                link_timeout=self._host.link_timeout,
+                link_timeout=self._host.link_watch.timeout,
                 has_position=self._host.hangar.find(state.system).has_position,
             )
         except Unavailable as nothing:

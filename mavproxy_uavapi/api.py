@@ -57,7 +57,7 @@ class Api:
         service.scripts.renew(settings)
 
     def _take_up(self, settings: Settings) -> None:
-        self.host.link_timeout = settings.link_timeout
+        self.host.link_watch.timeout = settings.link_timeout
         self.host.endings.on_disconnect = Policy.HOLD if settings.on_disconnect == "hold" else Policy.NOTHING
         self.host.endings.on_script_exit = Policy(settings.on_script_exit)
 

@@ -40,7 +40,7 @@ def vehicles(api: Api) -> str:
 def describe(api: Api, state: VehicleState) -> str:
     """One vehicle in a line."""
     armed = {True: "armed", False: "disarmed", None: "armed or not: unknown"}[state.armed]
-    link = "link ok" if api.host.is_alive(state) else "LINK LOST"
+    link = "link ok" if api.host.link_watch.is_alive(state) else "LINK LOST"
     age = api.host.clock() - state.heartbeat_at
     kind = kind_of(state.vehicle_type)
     mode = mode_name(state.vehicle_type, state.mode)

@@ -241,7 +241,7 @@ class Flight:
         with contextlib.suppress(asyncio.TimeoutError):
             await within(seconds, self.vision.changed.wait())
         await asyncio.sleep(max(self._sent_at + SHORTEST - clock(), 0.0))
-        if not self.vision.host.is_alive(self.vehicle.state):
+        if not self.vision.host.link_watch.is_alive(self.vehicle.state):
             raise LinkLost.since(self.vehicle.state.system, clock() - self.vehicle.state.heartbeat_at)
 
     def note(self, landing: Landing, motion: Motion) -> None:

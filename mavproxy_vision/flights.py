@@ -217,7 +217,7 @@ class Flights:
         self._tidying.add(plnd)
         tries = 0
         while plnd.before and tries < TIDY_TRIES:
-            if not plnd.in_use and self.vision.host.is_alive(plnd.vehicle.state):
+            if not plnd.in_use and self.vision.host.link_watch.is_alive(plnd.vehicle.state):
                 try:
                     await plnd.give_back()
                 except UavApiError as error:

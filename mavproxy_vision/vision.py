@@ -201,7 +201,7 @@ class Vision:
     @property
     def system(self) -> int:
         """The system id of the vehicle that carries the camera; 0 while there is none."""
-        return self._carrier or self.host.target or next(iter(self.host.fleet.vehicles), 0)
+        return self.host.hangar.resolve(self._carrier)
 
     @contextlib.contextmanager
     def carried_by(self, system: int) -> Iterator[None]:

@@ -34,10 +34,14 @@ class Bridge:
     Args:
         select_extra: MAVProxy's table of further descriptors for its select().
         receive: called in the asyncio thread with each message that was fed.
+        loop: as for `LoopThread`.
     """
 
     def __init__(
-        self, select_extra: dict[int, tuple[Callable[..., None], Any]], receive: Callable[[Any], None]
+        self,
+        select_extra: dict[int, tuple[Callable[..., None], Any]],
+        receive: Callable[[Any], None],
+        loop: asyncio.AbstractEventLoop | None = None,
     ) -> None:
         self._select_extra = select_extra
         self._receive = receive
@@ -47,7 +51,7 @@ class Bridge:
         self._waited_for = False
         self._calm = asyncio.Event()
         self._outbox = Outbox()
-        self._thread = LoopThread("uavapi-loop")
+        self._thread = LoopThread("uavapi-loop", loop)
         self._open_sockets: list[Callable[[], list[int]]] = [self._outbox.filenos]
         _bridges.add(self)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import logging
 import time
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -13,15 +12,14 @@ from typing import Any
 from mavproxy_uavapi.audit import Audit, Entry, utc_now
 from mavproxy_uavapi.errors import LinkLost
 from mavproxy_uavapi.host.bridge import Bridge
-from mavproxy_uavapi.host.link import MavproxyLink
+from mavproxy_uavapi.host.link import Link, MavproxyLink
+from mavproxy_uavapi.host.link_watch import LinkWatch
 from mavproxy_uavapi.host.parameters import ParameterWatch
 from mavproxy_uavapi.host.pending import Pending
 from mavproxy_uavapi.host.state import Fleet, VehicleState
 from mavproxy_uavapi.vehicle.endings import FlightEndings
 from mavproxy_uavapi.vehicle.hangar import Hangar
 from mavproxy_uavapi.vehicle.jobs import Job, JobBook
-
-log = logging.getLogger("uavapi.copter")
 
 ATTRIBUTE = "uavapi_host"  # on MAVProxy's state, so that a module loaded anew finds it
 
@@ -43,17 +41,25 @@ class Host:
     Args:
         mpstate: MAVProxy's state.
         clock: monotonic seconds.
+        link: the way out, in place of MAVProxy's own.
+        loop: an asyncio loop that somebody else runs, in place of the host's own thread.
     """
 
-    def __init__(self, mpstate: Any, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self,
+        mpstate: Any,
+        clock: Callable[[], float] = time.monotonic,
+        link: Link | None = None,
+        loop: asyncio.AbstractEventLoop | None = None,
+    ) -> None:
         self.clock = clock
         self.fleet = Fleet()
         self.pending = Pending()
-        self.bridge = Bridge(mpstate.select_extra, self._receive)
-        self.link = MavproxyLink(self.bridge, mpstate)
-        self.link_timeout = 5.0
-        self.target = 0  # the system id that MAVProxy's own commands go to; 0 before it knows one
-        self.hangar = Hangar(self)
+        self.bridge = Bridge(mpstate.select_extra, self._receive, loop)
+        self._mavproxy_link = MavproxyLink(self.bridge, mpstate)
+        self.link = link or self._mavproxy_link
+        self.link_watch = LinkWatch(self.pending, clock, self.bridge.loop)
+        self.hangar = Hangar(self.fleet, self.link, self.link_watch, self.pending, clock)
         self.audit = Audit(log_directory(mpstate))
         self.jobs = JobBook()
         self.jobs.on_ended.append(self._leave_trace)
@@ -68,8 +74,6 @@ class Host:
         self._mpstate = mpstate
         self._told_target = 0
         self._parameters = ParameterWatch()
-        self._lost: set[int] = set()
-        self._link_timers: dict[int, asyncio.TimerHandle] = {}
 
     # -- MAVProxy's main loop ---------------------------------------------------------------------------
 
@@ -87,7 +91,7 @@ class Host:
         target = self._mpstate.settings.target_system
         if target != self._told_target:
             self._told_target = target
-            self.bridge.call_soon(setattr, self, "target", target)
+            self.bridge.call_soon(setattr, self.hangar, "current", target)
         self._tell_parameters()
         self.bridge.turn()
 
@@ -103,7 +107,7 @@ class Host:
         if self.bridge.running:
             for message, system in self.bridge.run(said()):
                 with contextlib.suppress(LinkLost):  # nobody hears us anyhow
-                    self.link.write(message, system)
+                    self._mavproxy_link.write(message, system)
         self.bridge.stop()
 
     def _tell_parameters(self) -> None:
@@ -119,18 +123,13 @@ class Host:
 
     # -- the asyncio thread -----------------------------------------------------------------------------
 
-    def is_alive(self, state: VehicleState) -> bool:
-        """Whether a heartbeat came within the link timeout."""
-        return self.clock() - state.heartbeat_at < self.link_timeout
-
     def _receive(self, message: Any) -> None:
         now = self.clock()
         state = self.fleet.update(message, now)
         if state is None:
             return
         self.pending.feed(state.system, message.get_type(), message)
-        if state.system not in self._link_timers:
-            self._watch_link(state)
+        self.link_watch.watch(state)
         for listener in list(self.listeners):
             listener(state, message, now)
 
@@ -150,21 +149,6 @@ class Host:
             sent=job.sent.tell(),
         )
         self.audit.add(entry)
-
-    def _watch_link(self, state: VehicleState) -> None:
-        """End the waits on a vehicle when its heartbeats have been missing for the link timeout."""
-        silent_for = self.clock() - state.heartbeat_at
-        lost = silent_for >= self.link_timeout
-        if lost != (state.system in self._lost):
-            self._lost ^= {state.system}
-            log.warning("vehicle %d: %s", state.system, "link lost" if lost else "link is back")
-        if lost:
-            self.pending.fail(state.system, lambda: LinkLost.since(state.system, silent_for))
-            delay = self.link_timeout / 5
-        else:
-            delay = self.link_timeout - silent_for
-        timer = self.bridge.loop.call_later(max(delay, 0.05), self._watch_link, state)
-        self._link_timers[state.system] = timer
 
 
 def log_directory(mpstate: Any) -> Path | None:

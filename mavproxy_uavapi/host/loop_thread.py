@@ -12,10 +12,15 @@ T = TypeVar("T")
 
 
 class LoopThread:
-    """Runs an asyncio loop in a daemon thread from `start` to `stop`; both are called from other threads."""
+    """Runs an asyncio loop in a daemon thread from `start` to `stop`; both are called from other threads.
 
-    def __init__(self, name: str) -> None:
-        self.loop = asyncio.new_event_loop()
+    Args:
+        name: of the thread.
+        loop: a loop that somebody else runs, in place of the thread's own.
+    """
+
+    def __init__(self, name: str, loop: asyncio.AbstractEventLoop | None = None) -> None:
+        self.loop = loop or asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
 
     def start(self) -> None:

@@ -130,7 +130,7 @@ async def status(call: Call) -> dict[str, Any]:
     """Whether the vehicle is flyable, and why not."""
     vehicle, host = call.seen, call.service.host
     now = host.clock()
-    info = status_of(vehicle, host.is_alive(vehicle.state), now)
+    info = status_of(vehicle, host.link_watch.is_alive(vehicle.state), now)
     return call.answer("Success", info=info, age_s=round(max(now - vehicle.state.heartbeat_at, 0.0), 3))
 
 

@@ -2,42 +2,65 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
-from mavproxy_uavapi.errors import LinkLost, NoVehicle
+from mavproxy_uavapi.errors import NoVehicle
+from mavproxy_uavapi.host.link import Link
+from mavproxy_uavapi.host.link_watch import LinkWatch
+from mavproxy_uavapi.host.pending import Pending
+from mavproxy_uavapi.host.state import Fleet
 from mavproxy_uavapi.vehicle.copter import Copter
 from mavproxy_uavapi.vehicle.modes import kind_of
 from mavproxy_uavapi.vehicle.vehicle import Vehicle
-
-if TYPE_CHECKING:
-    from mavproxy_uavapi.host.host import Host
 
 CLASSES: dict[str, type[Vehicle]] = {"copter": Copter}
 
 
 class Hangar:
-    """Vehicles by system id, over the host's fleet."""
+    """Vehicles by system id.
 
-    def __init__(self, host: Host) -> None:
-        self.host = host
+    Attributes:
+        current: the system id that MAVProxy's own commands go to; 0 before it knows one.
+
+    Args:
+        fleet: what was heard of each.
+        link: the way out.
+        link_watch: whether they hear us.
+        pending: the waits on them.
+        clock: monotonic seconds, the clock of arrivals.
+    """
+
+    def __init__(
+        self, fleet: Fleet, link: Link, link_watch: LinkWatch, pending: Pending, clock: Callable[[], float]
+    ) -> None:
+        self.current = 0
+        self._fleet = fleet
+        self._link = link
+        self._link_watch = link_watch
+        self._pending = pending
+        self._clock = clock
         self._vehicles: dict[int, Vehicle] = {}
 
+    def resolve(self, system: int = 0) -> int:
+        """That system id; for 0 MAVProxy's current one, or else the first that was heard, or 0."""
+        return system or self.current or next(iter(self._fleet.vehicles), 0)
+
     def find(self, system: int = 0) -> Vehicle:
-        """The vehicle with that system id; 0 is MAVProxy's current one, or else the first that was heard.
+        """The vehicle with that system id; 0 as for `resolve`.
 
         Raises:
             NoVehicle: none such was heard yet.
         """
-        fleet = self.host.fleet.vehicles
-        wanted = system or self.host.target or next(iter(fleet), 0)
-        if wanted not in fleet:
-            heard = f"; heard so far: {', '.join(map(str, fleet))}" if fleet else ""
-            raise NoVehicle(f"no vehicle {wanted or ''} on the link yet".replace("  ", " ") + heard)
-        state = fleet[wanted]
+        heard = self._fleet.vehicles
+        wanted = self.resolve(system)
+        if wanted not in heard:
+            others = f"; heard so far: {', '.join(map(str, heard))}" if heard else ""
+            raise NoVehicle(f"no vehicle {wanted or ''} on the link yet".replace("  ", " ") + others)
+        state = heard[wanted]
         make = CLASSES.get(kind_of(state.vehicle_type), Vehicle)
         vehicle = self._vehicles.get(wanted)
         if type(vehicle) is not make:  # the first time, or the autopilot came back with other firmware
-            vehicle = self._vehicles[wanted] = make(state, self.host.link, self.host.pending, self.host.clock)
+            vehicle = self._vehicles[wanted] = make(state, self._link, self._pending, self._clock)
         return vehicle
 
     def commandable(self, system: int = 0) -> Vehicle:
@@ -47,6 +70,5 @@ class Hangar:
             NoVehicle, LinkLost.
         """
         vehicle = self.find(system)
-        if not self.host.is_alive(vehicle.state):
-            raise LinkLost.since(vehicle.state.system, self.host.clock() - vehicle.state.heartbeat_at)
+        self._link_watch.require_alive(vehicle.state)
         return vehicle

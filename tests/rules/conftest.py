@@ -146,8 +146,9 @@ class World:
         uplink_until, cut_until: s; until then nothing reaches the vehicle, or nothing goes either way.
     """
 
-    def __init__(self, loop: Any, host: Host, settings: dict[str, Any]) -> None:
-        self.loop, self.host = loop, host
+    def __init__(self, loop: Any, mpstate: Any, settings: dict[str, Any]) -> None:
+        self.loop = loop
+        self.host = host = Host(mpstate, clock=loop.time, link=self, loop=loop)
         self.simulator = Simulator(Options(seed=1, ready_after=1.0))
         for name, value in PARAMETERS.items():
             self.simulator.parameters.set(name, value)
@@ -159,7 +160,6 @@ class World:
         self._encoder = mavlink.MAVLink(None, *US)
         self._parser = mavlink.MAVLink(None)
         self._arriving: list[Any] = []
-        host.link = self
         self.service = Service(host, ModuleSettings(settings, environ={}).snapshot())
         for route in Handlers(Gradys(host)).routes():
             host.extensions[route.path] = route
@@ -339,15 +339,12 @@ class World:
 
 
 @pytest.fixture
-def make_world(loop: Any, mpstate: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., World]]:
+def make_world(loop: Any, mpstate: Any) -> Iterator[Callable[..., World]]:
     """Makes a world of which nobody knows yet; `stage` brings its vehicle to where a test begins."""
     worlds: list[World] = []
 
     def make(stage: Callable[[World], None] = World.flying, **settings: Any) -> World:
-        with monkeypatch.context() as patch:
-            patch.setattr(asyncio, "new_event_loop", lambda: loop)
-            host = Host(mpstate, clock=loop.time)
-        world = World(loop, host, settings)
+        world = World(loop, mpstate, settings)
         worlds.append(world)
         stage(world)
         world.go_live()

@@ -16,7 +16,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, NamedTuple
-from unittest import mock
 from urllib.parse import urlencode
 
 from aiohttp import web
@@ -131,9 +130,7 @@ class ScriptedWorld:
     def __init__(self, on_disconnect: str = "nothing", on_script_exit: str = "hold") -> None:
         self.loop = TimeTravellingLoop()
         asyncio.set_event_loop(self.loop)
-        with mock.patch.object(asyncio, "new_event_loop", lambda: self.loop):
-            self.host = Host(mavproxy_state(), clock=self.loop.time)
-        self.host.link = self
+        self.host = Host(mavproxy_state(), clock=self.loop.time, link=self, loop=self.loop)
         self.drone = Drone(self.loop, self._receive, message_of)
         self.drone.parameters.update(PARAMETERS)
         self.drone.disarm_delay = 10.0

@@ -415,12 +415,9 @@ class Drone:
 
 
 @pytest.fixture
-def host(loop: Any, mpstate: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Host]:
+def host(loop: Any, mpstate: Any) -> Iterator[Host]:
     """A host whose asyncio side runs in the test's loop and clock."""
-    with monkeypatch.context() as patch:
-        patch.setattr(asyncio, "new_event_loop", lambda: loop)
-        host = Host(mpstate, clock=loop.time)
-    host.link = FakeLink()
+    host = Host(mpstate, clock=loop.time, link=FakeLink(), loop=loop)
     yield host
     host.bridge._outbox.close()
 

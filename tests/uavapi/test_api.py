@@ -36,7 +36,7 @@ def test_start_listens_and_takes_the_settings(loop: Any, api: Api, host: Any, se
     assert not api.listening
     loop.run(api.start(settings))
     assert api.listening
-    assert host.link_timeout == 9.0
+    assert host.link_watch.timeout == 9.0
     assert loop.run(status_of(settings)) == 200
 
 

@@ -16,7 +16,6 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
-from unittest.mock import patch
 
 os.environ["MAVLINK20"] = "1"  # before pymavlink is imported anywhere
 
@@ -179,9 +178,8 @@ class Lockstep:
         mpstate = SimpleNamespace(
             select_extra={}, settings=SimpleNamespace(target_system=0), status=SimpleNamespace(logdir=None)
         )
-        with patch("asyncio.new_event_loop", lambda: self.loop):
-            self.host = Host(mpstate, clock=self.loop.time)
-        self.wire = self.host.link = WireLink(self)  # type: ignore[assignment]
+        self.wire = WireLink(self)
+        self.host = Host(mpstate, clock=self.loop.time, link=self.wire, loop=self.loop)
         self.link = self.simulator.open_link()
         self._parser = mavlink.MAVLink(None)
         self._truth = contextlib.ExitStack()

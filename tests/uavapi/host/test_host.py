@@ -66,7 +66,7 @@ def test_wait_ends_when_the_heartbeats_stop(loop: Any, host: Host, hear: Any, wa
     started = loop.time()
     with pytest.raises(LinkLost, match=r"no heartbeat from vehicle 1 for 5\.0 s"):
         loop.run(task)
-    assert loop.time() - started == pytest.approx(host.link_timeout, abs=0.1)
+    assert loop.time() - started == pytest.approx(host.link_watch.timeout, abs=0.1)
 
 
 def test_other_messages_do_not_keep_a_link_alive(loop: Any, host: Host, hear: Any, wait_for: Any) -> None:
@@ -76,7 +76,7 @@ def test_other_messages_do_not_keep_a_link_alive(loop: Any, host: Host, hear: An
         loop.pass_time(0.5)
         hear("attitude")
     assert isinstance(task.exception(), LinkLost)
-    assert not host.is_alive(host.fleet.vehicles[1])
+    assert not host.link_watch.is_alive(host.fleet.vehicles[1])
 
 
 def test_wait_that_begins_on_a_lost_link_fails_soon(loop: Any, hear: Any, wait_for: Any) -> None:
@@ -92,9 +92,9 @@ def test_wait_that_begins_on_a_lost_link_fails_soon(loop: Any, hear: Any, wait_f
 def test_link_recovers(loop: Any, host: Host, hear: Any, wait_for: Any) -> None:
     hear("heartbeat")
     loop.pass_time(20.0)
-    assert not host.is_alive(host.fleet.vehicles[1])
+    assert not host.link_watch.is_alive(host.fleet.vehicles[1])
     hear("heartbeat")
-    assert host.is_alive(host.fleet.vehicles[1])
+    assert host.link_watch.is_alive(host.fleet.vehicles[1])
     task = wait_for("ATTITUDE")
     loop.pass_time(3.0)
     hear("attitude", yaw=2.0)
@@ -122,7 +122,7 @@ def test_loss_of_one_vehicle_leaves_the_waits_on_another(loop: Any, hear: Any, w
 
 
 def test_link_timeout_can_be_set(loop: Any, host: Host, hear: Any, wait_for: Any) -> None:
-    host.link_timeout = 2.0
+    host.link_watch.timeout = 2.0
     hear("heartbeat")
     task = wait_for("ATTITUDE")
     started = loop.time()
@@ -196,7 +196,7 @@ def test_idle_tells_the_asyncio_side_mavproxys_target(mpstate: Any) -> None:
         mpstate.settings.target_system = 3
         host.idle("uavapi")
         received(host)
-        assert host.target == 3
+        assert host.hangar.current == 3
     finally:
         hosts.leave(mpstate, "uavapi")
 

@@ -737,7 +737,7 @@ def test_link_loss_ends_every_wait(waiting: Any, loop: Any, host: Any, drone: An
     started = loop.time()
     with pytest.raises(LinkLost):
         pilotage.result(waiting)
-    assert loop.time() - started <= host.link_timeout + 0.1
+    assert loop.time() - started <= host.link_watch.timeout + 0.1
     assert len(host.pending) == 0
     nothing_more(loop, drone)
 

@@ -41,7 +41,7 @@ def test_vehicle_is_the_named_one_or_mavproxys_or_the_first(hangar: Hangar, host
     hear(system=5)
     hear(system=2)
     assert hangar.find().state.system == 5
-    host.target = 2
+    host.hangar.current = 2
     assert hangar.find().state.system == 2
     assert hangar.find(5).state.system == 5
 
