@@ -20,7 +20,7 @@ REACH = 10_000.0  # m from here within which a track must lie
 LARGEST_REACH = 100_000.0  # m
 TRANSIT = 10.0  # m above home, at least, on the way to a first place that is not near
 LOWEST_TRANSIT = 2.0  # m
-HIGHEST_TAKEOFF = 500.0  # m above home, as /command/takeoff
+HIGHEST_TAKEOFF = 500.0  # m above home, as for `takeoff`
 NEAR = 5.0  # m
 
 

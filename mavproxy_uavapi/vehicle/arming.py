@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from mavproxy_uavapi.errors import ModeChanged, Rejected, TimedOut
 from mavproxy_uavapi.vehicle import messages
+from mavproxy_uavapi.vehicle.base import BaseVehicle
 from mavproxy_uavapi.vehicle.jobs import Job
-
-if TYPE_CHECKING:
-    from mavproxy_uavapi.vehicle.vehicle import Vehicle
 
 TIMEOUT = 90.0  # s until an estimator that does not settle is reported
 REASON_TIME = 2.0  # s of a client's timeout that asking why it is not ready may need
@@ -19,7 +16,7 @@ SHOWN_WITHIN = 5.0  # s until a heartbeat must show what was acknowledged
 GUIDED = "GUIDED"
 
 
-async def arm(vehicle: Vehicle, job: Job, timeout: float | None) -> None:
+async def arm(vehicle: BaseVehicle, job: Job, timeout: float | None) -> None:
     """See `Vehicle.arm`."""
     before = vehicle.state.armed, vehicle.state.mode
 
@@ -54,7 +51,7 @@ async def arm(vehicle: Vehicle, job: Job, timeout: float | None) -> None:
     )
 
 
-async def disarm(vehicle: Vehicle, job: Job, force: bool) -> None:
+async def disarm(vehicle: BaseVehicle, job: Job, force: bool) -> None:
     """See `Vehicle.disarm`."""
     await vehicle.commands.send_until_shown(
         messages.disarm(force),
@@ -64,7 +61,7 @@ async def disarm(vehicle: Vehicle, job: Job, force: bool) -> None:
     )
 
 
-def _requires_guided(vehicle: Vehicle) -> Callable[[], None]:
+def _requires_guided(vehicle: BaseVehicle) -> Callable[[], None]:
     def check() -> None:
         if vehicle.state.mode is not None:  # it has just rebooted; the next heartbeat tells
             vehicle.require_mode(GUIDED)
@@ -73,7 +70,7 @@ def _requires_guided(vehicle: Vehicle) -> Callable[[], None]:
 
 
 async def _get_ready(
-    vehicle: Vehicle, is_ready: Callable[[], bool], check: Callable[[], None], deadline: float
+    vehicle: BaseVehicle, is_ready: Callable[[], bool], check: Callable[[], None], deadline: float
 ) -> None:
     def ready() -> bool | None:
         check()
@@ -87,7 +84,7 @@ async def _get_ready(
         raise await _why_not_ready(vehicle, remaining) from None
 
 
-async def _why_not_ready(vehicle: Vehicle, waited: float) -> Rejected:
+async def _why_not_ready(vehicle: BaseVehicle, waited: float) -> Rejected:
     asked = vehicle.clock()
     with contextlib.suppress(Rejected, TimedOut):  # the texts that it makes the autopilot say are what counts
         await vehicle.commands.send(messages.check_prearm())

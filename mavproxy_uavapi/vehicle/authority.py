@@ -96,7 +96,7 @@ class CommandAuthority:
         if one is not None and self.on_its_way and rank < self._rank:
             raise Busy(f"{one.verb} is on its way; try again when the vehicle shows it")
         if rank is Rank.MOVEMENT and self.paused and not stopped_too:
-            raise Paused("the vehicle is stopped; /movement/resume or /command/guided ends that")
+            raise Paused("the vehicle is stopped; `resume` or `guided` ends that")
 
     # -- commanding ---------------------------------------------------------------------------------------
 

@@ -172,7 +172,7 @@ class Copter(GuidedVehicle):
         self.require_armed()
         mode = self.mode
         if mode != GUIDED and not flies_mission(mode):
-            raise ModeChanged(f"the vehicle is in {mode}, in which it cannot be paused; /command/brake stops it")
+            raise ModeChanged(f"the vehicle is in {mode}, which cannot be paused; `brake` stops it")
         self.authority.interrupt(job)
         try:
             await self.commands.send(messages.pause(True), self.commanding(job, lambda: self.held_by(mode)))

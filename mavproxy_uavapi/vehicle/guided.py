@@ -48,7 +48,7 @@ class GuidedVehicle(Vehicle):
         self.require_armed()
         self.require_mode(GUIDED)
         if self.state.landed:
-            raise Busy("the vehicle is on the ground; /command/takeoff first")
+            raise Busy("the vehicle is on the ground; `takeoff` first")
 
     @property
     def is_taking_off(self) -> bool:

@@ -19,7 +19,7 @@ mavlink = mavutil.mavlink
 
 AUTO = "AUTO"
 LANDINGS = {mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH, mavlink.MAV_CMD_NAV_VTOL_LAND}
-STARTING_MODES = (AUTO, "GUIDED")  # any other is the pilot's; /command/guided takes it from there
+STARTING_MODES = (AUTO, "GUIDED")  # any other is the pilot's; `guided` takes it from there
 START_TIMEOUT = 10.0  # s until the vehicle must show that the mission runs
 LONGEST = 4 * 3600.0  # s for a mission whose client gave no timeout: longer than any copter flies
 UNKNOWN_TOTAL = 65535
@@ -82,7 +82,7 @@ def _held(vehicle: Vehicle) -> None:
 def _require_startable(vehicle: Vehicle) -> None:
     vehicle.require_armed()
     if vehicle.mode not in STARTING_MODES and not flies_mission(vehicle.mode):
-        raise ModeChanged(f"the vehicle is in {vehicle.mode}; /command/guided takes it over")
+        raise ModeChanged(f"the vehicle is in {vehicle.mode}; `guided` takes it over")
 
 
 def _is_active(vehicle: Vehicle, since: float) -> bool:
