@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import Awaitable, Callable, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from mavproxy_uavapi.errors import Conflict, LinkLost, Rejected, Stale, UavApiError
 from mavproxy_uavapi.host.patience import within
@@ -25,9 +25,6 @@ from mavproxy_vision.tags import Tag
 from mavproxy_vision.target import Target
 from mavproxy_vision.vision import Vision
 
-if TYPE_CHECKING:
-    from mavproxy_vision.descent import Descent
-
 PERIOD = 0.05  # s of the vehicle's clock between two setpoints
 SHORTEST = 0.03  # s of ours, whatever the camera's rate and the vehicle's clock
 STALE = 0.5  # s of the vehicle's clock without telemetry until it rests
@@ -36,6 +33,20 @@ BLIND = 5.0  # s without a frame until a landing is given up
 FIRST = 3.0  # s of ours for the first telemetry
 SEARCHES = 1000  # attempts of a search, which its leash and its time limit end
 DID = {"rtl": "returned to launch", "land": "landed in place", "hold": "the vehicle holds"}
+
+
+class DescentMethod(Protocol):
+    """A way down onto the target: `descent.py` has them."""
+
+    @property
+    def by_velocity(self) -> bool:
+        """Whether the landing's own velocities descend."""
+
+    async def prepare(self) -> None:
+        """See whether it can be done, before the vehicle is taken over."""
+
+    async def __call__(self, landing: Landing) -> None:
+        """Land. Raises LandingFailed where it was given up."""
 
 
 class Flight:
@@ -94,7 +105,7 @@ class Flight:
 
     # -- verbs ---------------------------------------------------------------------------------------------
 
-    async def land(self, number: int | None, method: str, way_down: Callable[[Flight], Descent]) -> None:
+    async def land(self, number: int | None, method: str, way_down: Callable[[Flight], DescentMethod]) -> None:
         """Land on the tag from wherever the vehicle is; done when it stands on it, disarmed.
 
         A camera that gives no frames is a refusal at first, and a failure like that of a lost tag later.

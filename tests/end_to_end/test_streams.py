@@ -52,7 +52,7 @@ def test_flight_that_was_begun_at_the_prompt_is_in_the_trail(embedded_rig, harne
     pytest.importorskip("cv2")
     rig = embedded_rig
     rig.mavproxy.ask("module load vision", "Loaded module vision")
-    rig.mavproxy.ask("vision search 3", "/command/arm first")
+    rig.mavproxy.ask("vision search 3", "`arm` it first")
     file = rig.directory / "uavapi-audit.jsonl"
     (entry,) = harness.eventually(lambda: of_console(file), 10, "an entry")
     assert (entry["verb"], entry["request"], entry["outcome"]) == ("/vision/search", {"id": 3}, "not_armed")
