@@ -31,7 +31,7 @@ from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rig import SO_TIMESTAMPNS, Client, harness, machine, percentile, put_first, table
 
-from mavproxy_uavapi.vehicle import deadlines
+from mavproxy_uavapi.core.vehicle import time_limits
 
 MEDIAN_GOAL, WORST_GOAL = 1.0, 10.0  # ms, the latter at the 99th percentile
 MODES = {name: number for number, name in mavutil.mode_mapping_acm.items()}
@@ -84,8 +84,8 @@ class Peer:
         self._began = time.monotonic()
         self._arrived: dict[Key, float] = {}
         self._awaited: Key | None = None
-        known = {names[0]: 100 * names[2] for names in deadlines.NAMES.values()}
-        self._parameters = list({**known, **deadlines.TIMES}.items())
+        known = {names[0]: 100 * names[2] for names in time_limits.NAMES.values()}
+        self._parameters = list({**known, **time_limits.TIMES}.items())
 
     def run(self) -> None:
         """Serve until the pipe says None."""

@@ -23,7 +23,7 @@ from mavproxy_gradys.client import Client
 from mavproxy_gradys.pusher import Pusher
 from mavproxy_gradys.settings import ModuleSettings
 from mavproxy_gradys.tally import StationTally
-from mavproxy_uavapi.host.host import Host
+from mavproxy_uavapi.core.host import Host
 
 mavlink = mavutil.mavlink
 SECONDS = 20.0

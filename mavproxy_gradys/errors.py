@@ -1,4 +1,4 @@
-"""The errors of this module, branches of the one tree in `mavproxy_uavapi.errors`.
+"""The errors of this module, branches of the one tree in `mavproxy_uavapi.core.errors`.
 
 Unavailable                503
 |- NoFix                   503 no_fix        the vehicle does not know where it is
@@ -8,7 +8,7 @@ Unavailable                503
 
 from __future__ import annotations
 
-from mavproxy_uavapi.errors import Unavailable
+from mavproxy_uavapi.core.errors import Unavailable
 
 
 class NoFix(Unavailable):

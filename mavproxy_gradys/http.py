@@ -15,9 +15,9 @@ from mavproxy_gradys.service import Gradys
 from mavproxy_gradys.track_flight import VERB, flight_of
 from mavproxy_gradys.track_request import Track, TrackFile
 from mavproxy_gradys.tracks import places_of
-from mavproxy_uavapi.errors import Invalid, NoVehicle
+from mavproxy_uavapi.core.errors import Invalid, NoVehicle
+from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.http.extension import EITHER, POST, Answer, Call, Empty, Request, Route
-from mavproxy_uavapi.vehicle.jobs import Job
 
 MOST_READINGS = 1000  # in one request
 LONGEST_LIST = 64

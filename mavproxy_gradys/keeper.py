@@ -19,7 +19,7 @@ from mavproxy_gradys.readings import Reading, Stored
 from mavproxy_gradys.rows import is_storable
 from mavproxy_gradys.spool import Spool, uptime
 from mavproxy_gradys.tasks import begin
-from mavproxy_uavapi.host.patience import within
+from mavproxy_uavapi.core.timeout import within
 
 T = TypeVar("T")
 log = logging.getLogger("gradys.spool")

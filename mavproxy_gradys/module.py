@@ -17,10 +17,10 @@ try:
     from mavproxy_gradys.track_console import TrackConsole
 except ModuleNotFoundError as missing:  # MAVProxy prints the text of an ImportError as one line
     raise ImportError(f"gradys needs {missing.name}: pip install mavproxy-uavapi") from missing
-from mavproxy_uavapi.host.errands import Errands
-from mavproxy_uavapi.host.member import HostedModule, value_of
-from mavproxy_uavapi.host.patience import within
-from mavproxy_uavapi.host.remembered import Remembered
+from mavproxy_uavapi.core.background import Errands
+from mavproxy_uavapi.core.module import HostedModule, value_of
+from mavproxy_uavapi.core.remembered_settings import Remembered
+from mavproxy_uavapi.core.timeout import within
 from mavproxy_uavapi.settings import SettingError
 
 NAME = "gradys"

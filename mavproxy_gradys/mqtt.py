@@ -25,7 +25,7 @@ from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.names import Names
 from mavproxy_gradys.readings import POSITION, STATUS, Reading, Stored, device_of
 from mavproxy_gradys.tasks import begin
-from mavproxy_uavapi.host.patience import within
+from mavproxy_uavapi.core.timeout import within
 
 KEEP_ALIVE = 15  # s; the broker gives a silent connection up after one and a half of it
 WINDOW = 20  # readings on their way at once, on one connection

@@ -15,8 +15,8 @@ from urllib.parse import urlencode
 from pymavlink import mavutil
 
 from mavproxy_gradys.errors import NoFix
-from mavproxy_uavapi.errors import LinkLost, Stale
-from mavproxy_uavapi.host.state import VehicleState
+from mavproxy_uavapi.core.errors import LinkLost, Stale
+from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 
 mavlink = mavutil.mavlink
 

@@ -15,10 +15,10 @@ from mavproxy_gradys.names import Names
 from mavproxy_gradys.outages import Outage
 from mavproxy_gradys.settings import Settings
 from mavproxy_gradys.tally import StationTally, VehicleTally
-from mavproxy_uavapi.errors import Unavailable
-from mavproxy_uavapi.host.host import Host
-from mavproxy_uavapi.host.patience import within
-from mavproxy_uavapi.host.state import VehicleState
+from mavproxy_uavapi.core.errors import Unavailable
+from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
+from mavproxy_uavapi.core.timeout import within
 
 DROPPED = 101  # the station's `type` when it received an update but no browser took it; 103 when one did
 log = logging.getLogger("gradys.push")

@@ -16,7 +16,7 @@ import re
 from dataclasses import dataclass, field
 from typing import Any
 
-from mavproxy_uavapi.host.state import Received, VehicleState
+from mavproxy_uavapi.core.mavlink.vehicle_state import Received, VehicleState
 from mavproxy_uavapi.settings import SettingError
 
 POSITION = "position"

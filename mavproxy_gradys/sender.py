@@ -17,7 +17,7 @@ from mavproxy_gradys.settings import Settings
 from mavproxy_gradys.sink_address import SinkAddress
 from mavproxy_gradys.sinks import Sink, make_sink
 from mavproxy_gradys.tally import RoundTrips
-from mavproxy_uavapi.host.patience import within
+from mavproxy_uavapi.core.timeout import within
 
 BATCH = 200  # readings
 log = logging.getLogger("gradys.delivery")

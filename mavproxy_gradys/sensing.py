@@ -16,9 +16,9 @@ from mavproxy_gradys.sender import Sender
 from mavproxy_gradys.settings import Settings
 from mavproxy_gradys.spool import Spool
 from mavproxy_gradys.tasks import begin, end
-from mavproxy_uavapi.errors import Unavailable
-from mavproxy_uavapi.host.host import Host
-from mavproxy_uavapi.host.state import VehicleState
+from mavproxy_uavapi.core.errors import Unavailable
+from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 
 MEGABYTE = 1e6
 

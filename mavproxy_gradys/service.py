@@ -15,7 +15,7 @@ from mavproxy_gradys.settings import Settings
 from mavproxy_gradys.tally import StationTally
 from mavproxy_gradys.tasks import begin, end
 from mavproxy_gradys.tracking import Tracking
-from mavproxy_uavapi.host.host import Host
+from mavproxy_uavapi.core.host import Host
 
 
 class Gradys:

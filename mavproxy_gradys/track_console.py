@@ -19,9 +19,9 @@ from mavproxy_gradys.track_flight import (
 )
 from mavproxy_gradys.tracking import Tracking
 from mavproxy_gradys.tracks import FORMATS, GROUND, Waypoint, places_of, style_of
-from mavproxy_uavapi.errors import BadRequest
-from mavproxy_uavapi.host.errands import Errands
-from mavproxy_uavapi.host.host import Host
+from mavproxy_uavapi.core.background import Errands
+from mavproxy_uavapi.core.errors import BadRequest
+from mavproxy_uavapi.core.host import Host
 
 HELP = """\
 gradys track                            what is recorded, and what is flown

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from typing import Any
 
 from mavproxy_gradys.tracks import Waypoint
-from mavproxy_uavapi.errors import Invalid, NotSupported
-from mavproxy_uavapi.vehicle.copter import Copter
-from mavproxy_uavapi.vehicle.geodesy import offset
-from mavproxy_uavapi.vehicle.jobs import Job
-from mavproxy_uavapi.vehicle.messages import GlobalTarget
-from mavproxy_uavapi.vehicle.vehicle import Vehicle
+from mavproxy_uavapi.core.errors import Invalid, NotSupported
+from mavproxy_uavapi.core.vehicle.copter import Copter
+from mavproxy_uavapi.core.vehicle.geodesy import offset
+from mavproxy_uavapi.core.vehicle.jobs import Job
+from mavproxy_uavapi.core.vehicle.messages import GlobalTarget
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 VERB = "/mission/fly-track"
 TOLERANCE = 1.0  # m

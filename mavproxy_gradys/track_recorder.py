@@ -13,8 +13,8 @@ from mavproxy_gradys.cadence import Cadence
 from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.tasks import begin, end
 from mavproxy_gradys.tracks import GPX, GPX_HEAD, GPX_TAIL, Reading
-from mavproxy_uavapi.host.host import Host
-from mavproxy_uavapi.host.state import VehicleState
+from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 
 MAX_AGE = 5.0  # s after which a reading is not recorded as new
 

@@ -7,9 +7,9 @@ from typing import Any
 
 from mavproxy_gradys.track_flight import VERB, Flight
 from mavproxy_gradys.track_recorder import Recorder
-from mavproxy_uavapi.errors import Aborted, Busy
-from mavproxy_uavapi.host.host import Host
-from mavproxy_uavapi.vehicle.jobs import Ending, Job
+from mavproxy_uavapi.core.errors import Aborted, Busy
+from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.vehicle.jobs import Ending, Job
 
 
 class Tracking:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import asyncio
 import contextlib
 
-from mavproxy_uavapi.host.host import Host
+from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.vehicle.endings import Policy
+from mavproxy_uavapi.core.vehicle.stream_requester import Freshness
 from mavproxy_uavapi.http.app import Server
 from mavproxy_uavapi.http.call import Service
 from mavproxy_uavapi.settings import Settings
-from mavproxy_uavapi.vehicle.endings import Policy
-from mavproxy_uavapi.vehicle.freshness import Freshness
 
 
 class Api:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from mavproxy_uavapi.errors import BadRequest, ToolFailed
+from mavproxy_uavapi.core.errors import BadRequest, ToolFailed
 from mavproxy_uavapi.tools import run_tool
 
 TIME_LIMIT = 30.0  # s

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from mavproxy_uavapi.api import Api
-from mavproxy_uavapi.errors import UavApiError
-from mavproxy_uavapi.host.state import VehicleState
+from mavproxy_uavapi.core.errors import UavApiError
+from mavproxy_uavapi.core.mavlink.flight_modes import kind_of, mode_name
+from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.settings import Settings
-from mavproxy_uavapi.vehicle.modes import kind_of, mode_name
 
 
 def report(api: Api, settings: Settings) -> str:

@@ -13,10 +13,10 @@ try:
 except ModuleNotFoundError as missing:  # MAVProxy prints the text of an ImportError as one line
     raise ImportError(f"uavapi needs {missing.name}: pip install mavproxy-uavapi") from missing
 from mavproxy_uavapi.console import address_of, report, vehicles
-from mavproxy_uavapi.host.errands import Errands
-from mavproxy_uavapi.host.member import HostedModule, value_of
-from mavproxy_uavapi.host.remembered import Remembered
-from mavproxy_uavapi.logs import Logs, print_above_prompt
+from mavproxy_uavapi.core.background import Errands
+from mavproxy_uavapi.core.logs import Logs, print_above_prompt
+from mavproxy_uavapi.core.module import HostedModule, value_of
+from mavproxy_uavapi.core.remembered_settings import Remembered
 from mavproxy_uavapi.settings import SECRET, ModuleSettings, SettingError, Settings
 
 NAME = "uavapi"

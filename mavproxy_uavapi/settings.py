@@ -17,7 +17,7 @@ from typing import Any
 
 from MAVProxy.modules.lib.mp_settings import MPSetting, MPSettings
 
-from mavproxy_uavapi.logs import components
+from mavproxy_uavapi.core.logs import components
 
 Network = ipaddress.IPv4Network | ipaddress.IPv6Network
 

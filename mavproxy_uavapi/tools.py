@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mavproxy_uavapi.errors import TimedOut, ToolFailed
-from mavproxy_uavapi.host.patience import within
+from mavproxy_uavapi.core.errors import TimedOut, ToolFailed
+from mavproxy_uavapi.core.timeout import within
 
 
 @dataclass(frozen=True)

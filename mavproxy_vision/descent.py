@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import contextlib
 
-from mavproxy_uavapi.errors import NotArmed, TimedOut, UavApiError
-from mavproxy_uavapi.vehicle import deadlines
-from mavproxy_uavapi.vehicle.touchdown import Touchdown
+from mavproxy_uavapi.core.errors import NotArmed, TimedOut, UavApiError
+from mavproxy_uavapi.core.vehicle import time_limits
+from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
 from mavproxy_vision.flight import Flight
 from mavproxy_vision.landing import BLIND_BELOW, COAST, REST, Landing, Phase
 from mavproxy_vision.plnd import PrecisionLanding, landing_target
@@ -109,7 +109,7 @@ class PrecisionDescent(Descent):
         vehicle.held_by("GUIDED")
         flight.autopilot = "LAND"
         await vehicle.set_mode(flight.job, "LAND")
-        late = vision.now() + SLOWER * deadlines.landing_time(limits, vehicle.height)
+        late = vision.now() + SLOWER * time_limits.landing_time(limits, vehicle.height)
         while not self._stands(touchdown):
             now = vision.now()
             if now > late and not self._is_high(landing):

@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from mavproxy_uavapi.errors import Aborted, BadRequest, Invalid, Unavailable
+from mavproxy_uavapi.core.errors import Aborted, BadRequest, Invalid, Unavailable
 
 
 class LandingFailed(Aborted):

@@ -7,11 +7,11 @@ import contextlib
 from collections.abc import Awaitable, Callable, Iterator
 from typing import Any, Protocol
 
-from mavproxy_uavapi.errors import Conflict, LinkLost, Rejected, Stale, UavApiError
-from mavproxy_uavapi.host.patience import within
-from mavproxy_uavapi.vehicle.authority import Rank
-from mavproxy_uavapi.vehicle.copter import Copter
-from mavproxy_uavapi.vehicle.jobs import Job
+from mavproxy_uavapi.core.errors import Conflict, LinkLost, Rejected, Stale, UavApiError
+from mavproxy_uavapi.core.timeout import within
+from mavproxy_uavapi.core.vehicle.authority import Rank
+from mavproxy_uavapi.core.vehicle.copter import Copter
+from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_vision.errors import LandingFailed
 from mavproxy_vision.geometry import Vector
 from mavproxy_vision.history import Motion

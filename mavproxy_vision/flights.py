@@ -11,11 +11,11 @@ from typing import Any
 
 import cv2
 
-from mavproxy_uavapi.errors import Aborted, NotSupported, UavApiError
-from mavproxy_uavapi.host.state import VehicleState
-from mavproxy_uavapi.vehicle.copter import Copter
-from mavproxy_uavapi.vehicle.endings import FIXED
-from mavproxy_uavapi.vehicle.jobs import CONSOLE, Ending, Job
+from mavproxy_uavapi.core.errors import Aborted, NotSupported, UavApiError
+from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
+from mavproxy_uavapi.core.vehicle.copter import Copter
+from mavproxy_uavapi.core.vehicle.endings import FIXED
+from mavproxy_uavapi.core.vehicle.jobs import CONSOLE, Ending, Job
 from mavproxy_vision import mission
 from mavproxy_vision.descent import Descent, PrecisionDescent
 from mavproxy_vision.flight import Flight

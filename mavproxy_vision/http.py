@@ -9,8 +9,8 @@ from typing import Annotated, Any
 from aiohttp import web
 from pydantic import Field, model_validator
 
-from mavproxy_uavapi.errors import BadRequest
-from mavproxy_uavapi.host.patience import within
+from mavproxy_uavapi.core.errors import BadRequest
+from mavproxy_uavapi.core.timeout import within
 from mavproxy_uavapi.http.extension import (
     EITHER,
     NED_REACH,

@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from mavproxy_uavapi.errors import Invalid
-from mavproxy_uavapi.vehicle.geodesy import METRES_PER_DEGREE
-from mavproxy_uavapi.vehicle.messages import GlobalTarget
+from mavproxy_uavapi.core.errors import Invalid
+from mavproxy_uavapi.core.vehicle.geodesy import METRES_PER_DEGREE
+from mavproxy_uavapi.core.vehicle.messages import GlobalTarget
 from mavproxy_vision.descent import Descent
 from mavproxy_vision.flight import Flight
 from mavproxy_vision.planning import landable

@@ -17,12 +17,12 @@ if not hasattr(getattr(cv2, "aruco", None), "ArucoDetector"):
         f"vision needs OpenCV 4.10 or newer, this is {cv2.__version__}: pip install -U 'mavproxy-uavapi[vision]'"
     )
 
-from mavproxy_uavapi.errors import UavApiError
-from mavproxy_uavapi.host.errands import Errands
-from mavproxy_uavapi.host.member import HostedModule, value_of
-from mavproxy_uavapi.host.remembered import Remembered
+from mavproxy_uavapi.core.background import Errands
+from mavproxy_uavapi.core.errors import UavApiError
+from mavproxy_uavapi.core.module import HostedModule, value_of
+from mavproxy_uavapi.core.remembered_settings import Remembered
+from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.http.extension import NED_REACH
-from mavproxy_uavapi.vehicle.jobs import Job
 from mavproxy_vision import console, files
 from mavproxy_vision.errors import BadSetting
 from mavproxy_vision.flights import Flights, Sortie

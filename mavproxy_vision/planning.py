@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from mavproxy_uavapi.errors import Invalid
+from mavproxy_uavapi.core.errors import Invalid
 from mavproxy_vision.landing import Plan
 from mavproxy_vision.search import step_for
 from mavproxy_vision.settings import Settings

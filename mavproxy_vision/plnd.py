@@ -9,9 +9,9 @@ from typing import Any
 
 from pymavlink import mavutil
 
-from mavproxy_uavapi.errors import NotSupported, Rejected, TimedOut
-from mavproxy_uavapi.vehicle.messages import read_parameter, set_parameter
-from mavproxy_uavapi.vehicle.vehicle import Vehicle
+from mavproxy_uavapi.core.errors import NotSupported, Rejected, TimedOut
+from mavproxy_uavapi.core.vehicle.messages import read_parameter, set_parameter
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_vision.geometry import Attitude, Vector
 
 mavlink = mavutil.mavlink

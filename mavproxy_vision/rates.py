@@ -13,9 +13,9 @@ from typing import Any
 
 from pymavlink import mavutil
 
-from mavproxy_uavapi.errors import UavApiError
-from mavproxy_uavapi.vehicle.messages import MESSAGE_IDS, Command, set_interval
-from mavproxy_uavapi.vehicle.vehicle import Vehicle
+from mavproxy_uavapi.core.errors import UavApiError
+from mavproxy_uavapi.core.vehicle.messages import MESSAGE_IDS, Command, set_interval
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 mavlink = mavutil.mavlink
 

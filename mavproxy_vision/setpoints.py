@@ -7,8 +7,8 @@ from typing import Any
 
 from pymavlink import mavutil
 
-from mavproxy_uavapi.host.link import Address
-from mavproxy_uavapi.vehicle.messages import VelocityTarget, Yaw
+from mavproxy_uavapi.core.mavlink.link import Address
+from mavproxy_uavapi.core.vehicle.messages import VelocityTarget, Yaw
 from mavproxy_vision.geometry import Vector, heading_frame, vector
 
 mavlink = mavutil.mavlink

@@ -13,9 +13,9 @@ from typing import Any
 
 import cv2
 
-from mavproxy_uavapi.host.host import Host
-from mavproxy_uavapi.host.state import VehicleState
-from mavproxy_uavapi.vehicle.vehicle import Vehicle
+from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_vision.camera import Folder, Image, Posted, Source
 from mavproxy_vision.capture import Capture
 from mavproxy_vision.detector import Detector, Options

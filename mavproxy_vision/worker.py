@@ -11,7 +11,7 @@ import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from mavproxy_uavapi.errors import UavApiError
+from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_vision.camera import Frame, Image, Source
 from mavproxy_vision.detector import Detector
 from mavproxy_vision.sighting import Seen

@@ -1,11 +1,10 @@
-"""What all tests share: a time-travelling asyncio loop, messages as they come off the wire, MAVProxy's state."""
+"""What all tests share: the loop, MAVProxy's state, a host, and a small scripted copter at its other end."""
 
 from __future__ import annotations
 
 import asyncio
 import importlib.util
 import os
-import selectors
 import shutil
 import signal
 import sys
@@ -17,64 +16,14 @@ from typing import Any
 os.environ["MAVLINK20"] = "1"  # before pymavlink is imported anywhere
 
 import pytest
-from pymavlink import mavutil
 
-mavlink = mavutil.mavlink
-
-NOTHING_HAPPENS = 5.0  # real s after which a loop that waits for nothing but other threads is called stuck
-
-
-class TimeTravellingLoop(asyncio.SelectorEventLoop):
-    """An asyncio loop that never waits: when nothing is ready, its clock jumps to the next timer.
-
-    Attributes:
-        patience: real s that sockets get to become ready before the clock jumps; 0 without sockets.
-        defects: what reached the loop's exception handler; a test that expects some clears them.
-    """
-
-    def __init__(self) -> None:
-        self.now = 1000.0
-        self.patience = 0.0
-        self.defects: list[dict[str, Any]] = []
-        super().__init__(_JumpingSelector(self))
-        self.set_exception_handler(lambda _, context: self.defects.append(context))
-
-    def time(self) -> float:
-        return self.now
-
-    def run(self, coroutine: Any) -> Any:
-        """The coroutine's result."""
-        return self.run_until_complete(coroutine)
-
-    def pass_time(self, seconds: float) -> None:
-        """Let that much time go by."""
-        self.run_until_complete(asyncio.sleep(seconds))
-
-    def settle(self) -> None:
-        """Run what is ready, without any time going by."""
-
-        async def a_few_rounds() -> None:
-            for _ in range(20):
-                await asyncio.sleep(0)
-
-        self.run_until_complete(a_few_rounds())
-
-
-class _JumpingSelector(selectors.DefaultSelector):
-    def __init__(self, loop: TimeTravellingLoop) -> None:
-        super().__init__()
-        self._loop = loop
-
-    def select(self, timeout: float | None = None) -> Any:
-        if timeout is None:
-            ready = super().select(NOTHING_HAPPENS)
-            if not ready:
-                raise RuntimeError("nothing will ever happen: no timer, no socket")
-            return ready
-        ready = super().select(min(timeout, self._loop.patience))
-        if not ready:
-            self._loop.now += max(timeout, 0.0)
-        return ready
+from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.vehicle.registry import Hangar
+from tests.support.drone import Drone
+from tests.support.fake_link import FakeLink
+from tests.support.mavproxy import MainLoop, mavproxy_state
+from tests.support.messages import message_of
+from tests.support.virtual_time import TimeTravellingLoop
 
 
 @pytest.fixture
@@ -96,76 +45,10 @@ def loop() -> Iterator[TimeTravellingLoop]:
     assert loop.defects == []
 
 
-DEFAULTS: dict[str, dict[str, Any]] = {
-    "heartbeat": {
-        "type": mavlink.MAV_TYPE_QUADROTOR,
-        "autopilot": mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA,
-        "base_mode": mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED,
-        "custom_mode": 0,
-        "system_status": mavlink.MAV_STATE_STANDBY,
-        "mavlink_version": 3,
-    },
-    "statustext": {"severity": mavlink.MAV_SEVERITY_CRITICAL},
-    "command_ack": {"result": mavlink.MAV_RESULT_ACCEPTED},
-    "param_value": {"param_type": mavlink.MAV_PARAM_TYPE_REAL32, "param_count": 1, "param_index": 0},
-    "home_position": {"x": 0.0, "y": 0.0, "z": 0.0, "q": [1.0, 0.0, 0.0, 0.0]}
-    | dict.fromkeys(("approach_x", "approach_y", "approach_z"), 0.0),
-    "extended_sys_state": {"vtol_state": 0},
-}
-
-
-def message_of(name: str, system: int = 1, component: int = 1, sequence: int = 0, **fields: Any) -> Any:
-    """A message as pymavlink hands it over after parsing; fields that are not given are 0.
-
-    `armed` and `mode` spell a heartbeat's bits; texts may be given as str.
-    """
-    cls = getattr(mavlink, f"MAVLink_{name.lower()}_message")
-    given = {**DEFAULTS.get(name.lower(), {}), **fields}
-    if given.pop("armed", False):
-        given["base_mode"] |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED
-    if "mode" in given and name.lower() == "heartbeat":
-        given["custom_mode"] = mavutil.mode_mapping_byname(given["type"])[given.pop("mode")]
-    for field in cls.fieldnames:
-        given.setdefault(field, 0)
-        if isinstance(given[field], str):
-            given[field] = given[field].encode()
-    message = cls(**given)
-    message._header = mavlink.MAVLink_header(cls.id, srcSystem=system, srcComponent=component, seq=sequence % 256)
-    return message
-
-
 @pytest.fixture
 def msg() -> Callable[..., Any]:
     """`message_of`."""
     return message_of
-
-
-class FakeMaster:
-    """One of MAVProxy's links: remembers what is written to it."""
-
-    def __init__(self) -> None:
-        self.written: list[Any] = []
-        self.mav = SimpleNamespace(send=self.written.append)
-
-
-def mavproxy_state() -> Any:
-    """What our modules touch of MAVProxy's `mpstate`."""
-    master = FakeMaster()
-    return SimpleNamespace(
-        select_extra={},
-        command_map={},
-        completions={},
-        completion_functions={"(OTHER)": len},
-        multi_instance={},
-        instance_count={},
-        public_modules={},
-        settings=SimpleNamespace(target_system=0, target_component=0, source_system=255, source_component=230),
-        status=SimpleNamespace(logdir=None),
-        continue_mode=False,
-        mav_param_by_sysid={},
-        the_master=master,
-        master=lambda system=None: master,
-    )
 
 
 @pytest.fixture
@@ -174,38 +57,101 @@ def mpstate() -> Any:
     return mavproxy_state()
 
 
-class MainLoop:
-    """MAVProxy's main loop, turned by hand: `select()` over select_extra, then the modules' idle tasks."""
-
-    def __init__(self, mpstate: Any) -> None:
-        self._mpstate = mpstate
-        self.modules: list[Any] = []
-
-    def turn(self, wait: float = 0.0) -> None:
-        """One turn; wakes early when one of our descriptors does."""
-        with selectors.DefaultSelector() as selector:
-            for fd in self._mpstate.select_extra:
-                selector.register(fd, selectors.EVENT_READ)
-            ready = [key.fd for key, _ in selector.select(wait)] if selector.get_map() else []
-        for fd in ready:
-            function, argument = self._mpstate.select_extra[fd]
-            function(argument)
-        for module in self.modules:
-            module.idle_task()
-
-    def until(self, condition: Callable[[], Any], turns: int = 500) -> None:
-        """Turn until that holds."""
-        for _ in range(turns):
-            if condition():
-                return
-            self.turn(0.01)
-        raise AssertionError("it did not happen")
-
-
 @pytest.fixture
 def main_loop(mpstate: Any) -> MainLoop:
     """MAVProxy's main loop over `mpstate`."""
     return MainLoop(mpstate)
+
+
+@pytest.fixture
+def host(loop: Any, mpstate: Any) -> Iterator[Host]:
+    """A host whose asyncio side runs in the test's loop and clock."""
+    host = Host(mpstate, clock=loop.time, link=FakeLink(), loop=loop)
+    yield host
+    host.bridge._outbox.close()
+
+
+@pytest.fixture
+def link(host: Host) -> FakeLink:
+    """The host's way out: remembers what was sent."""
+    return host.link
+
+
+@pytest.fixture
+def hangar(host: Host) -> Hangar:
+    """The vehicles."""
+    return host.hangar
+
+
+@pytest.fixture
+def make_drone(loop: Any, host: Host, msg: Callable[..., Any]) -> Callable[..., Drone]:
+    """Puts a drone on the link: `make_drone(system=2)`. Several share the link."""
+    drones: list[Drone] = []
+
+    def on_send(message: Any, system: int) -> None:
+        for drone in drones:
+            drone.on_send(message, system)
+
+    def receive(message: Any) -> None:
+        host.bridge.feed(message)
+        host.bridge.turn()
+
+    def make(system: int = 1) -> Drone:
+        drone = Drone(loop, receive, msg, system)
+        drones.append(drone)
+        host.link.on_send = on_send
+        drone.power_on()
+        loop.settle()
+        return drone
+
+    return make
+
+
+@pytest.fixture
+def drone(make_drone: Callable[..., Drone]) -> Drone:
+    """The vehicle at the other end, with system id 1: on the ground in STABILIZE, ready to arm."""
+    return make_drone()
+
+
+@pytest.fixture
+def flying(loop: Any, drone: Drone) -> Drone:
+    """The drone, 20 m above home in GUIDED."""
+    drone.fly()
+    loop.settle()
+    return drone
+
+
+@pytest.fixture
+def copter(drone: Drone, hangar: Hangar) -> Any:
+    """Our side of the drone."""
+    return hangar.find(1)
+
+
+@pytest.fixture
+def pilotage(loop: Any, host: Host, copter: Any) -> Iterator[Any]:
+    """Verbs as jobs: `start(verb, …)` begins one, `result(job)` awaits it, `do(verb, …)` is both."""
+    book = host.jobs
+    numbers = iter(range(10_000))
+
+    def start(verb: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
+        async def body(job: Any) -> str:
+            await verb(job, *args, **kwargs)
+            return "done"
+
+        async def begin() -> Any:
+            return book.begin(copter, f"{verb.__name__}{next(numbers)}", {}, body)
+
+        job = loop.run(begin())
+        loop.settle()
+        return job
+
+    def result(job: Any) -> str:
+        return loop.run(job.outcome())
+
+    yield SimpleNamespace(
+        book=book, start=start, result=result, do=lambda *args, **kwargs: result(start(*args, **kwargs))
+    )
+    book.on_ended.clear()  # what is in flight yet ends with the loop: nothing must follow it
 
 
 def open_descriptors() -> int:

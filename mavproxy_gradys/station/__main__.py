@@ -14,7 +14,7 @@ from aiohttp import web
 
 from mavproxy_gradys.station.app import Station
 from mavproxy_gradys.station.store import Store
-from mavproxy_uavapi.host.patience import within
+from mavproxy_uavapi.core.timeout import within
 
 
 def main(arguments: list[str] | None = None) -> int:

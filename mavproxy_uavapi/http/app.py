@@ -12,7 +12,7 @@ from typing import Any
 from aiohttp import web
 from aiohttp.http_exceptions import HttpProcessingError
 
-from mavproxy_uavapi.errors import NotFound
+from mavproxy_uavapi.core.errors import NotFound
 from mavproxy_uavapi.http.bodies import invite
 from mavproxy_uavapi.http.call import ROUTE, SERVICE, Call, Service, parameters
 from mavproxy_uavapi.http.connection import IDLE_TIMEOUT, LINGER, headers_are_here

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from aiohttp import HttpVersion11, web
 
-from mavproxy_uavapi.errors import BadRequest
+from mavproxy_uavapi.core.errors import BadRequest
 
 CONTINUE = b"HTTP/1.1 100 Continue\r\n\r\n"
 

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from functools import cached_property
 from typing import Any
 
-from mavproxy_uavapi.host.state import VehicleState
+from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.http.responses import dumps
 from mavproxy_uavapi.http.telemetry_views import fields
 

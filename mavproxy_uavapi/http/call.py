@@ -9,18 +9,18 @@ from typing import Any, TypeVar, cast
 
 from aiohttp import web
 
-from mavproxy_uavapi.errors import BadRequest, Invalid, NotSupported, TooManyRequests
-from mavproxy_uavapi.host.host import Host
-from mavproxy_uavapi.host.patience import within
+from mavproxy_uavapi.core.errors import BadRequest, Invalid, NotSupported, TooManyRequests
+from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.timeout import within
+from mavproxy_uavapi.core.vehicle.copter import Copter
+from mavproxy_uavapi.core.vehicle.jobs import Job
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.http.broadcast import Broadcast
 from mavproxy_uavapi.http.requests import Request, parse
 from mavproxy_uavapi.http.responses import envelope
 from mavproxy_uavapi.http.streaming import MOST_OPEN, Slots
 from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.settings import Settings
-from mavproxy_uavapi.vehicle.copter import Copter
-from mavproxy_uavapi.vehicle.jobs import Job
-from mavproxy_uavapi.vehicle.vehicle import Vehicle
 
 R = TypeVar("R", bound=Request)
 T = TypeVar("T")

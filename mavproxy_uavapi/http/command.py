@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.http.call import Answer, Call
 from mavproxy_uavapi.http.requests import Blocking, Disarm, ModeName, NewSpeed, SimFactor, Takeoff
-from mavproxy_uavapi.vehicle.jobs import Job
 
 
 async def arm(call: Call) -> Answer:

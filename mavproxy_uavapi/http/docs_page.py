@@ -9,7 +9,7 @@ from typing import Any
 
 from aiohttp import web
 
-from mavproxy_uavapi.errors import NotFound
+from mavproxy_uavapi.core.errors import NotFound
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.openapi import document
 from mavproxy_uavapi.http.route import Route

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from aiohttp import BodyPartReader, MultipartReader, StreamReader, web
 from aiohttp.base_protocol import BaseProtocol
 
-from mavproxy_uavapi.errors import BadRequest
+from mavproxy_uavapi.core.errors import BadRequest
 from mavproxy_uavapi.http.call import in_time
 
 CHUNK = 65536  # bytes

@@ -5,9 +5,9 @@ from __future__ import annotations
 import contextlib
 from typing import Any
 
-from mavproxy_uavapi.errors import Aborted, Busy, NotFound, UavApiError
+from mavproxy_uavapi.core.errors import Aborted, Busy, NotFound, UavApiError
+from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.http.call import Call
-from mavproxy_uavapi.vehicle.jobs import Job
 
 
 def describe(job: Job, now: float) -> dict[str, Any]:

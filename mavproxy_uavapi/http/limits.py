@@ -6,7 +6,7 @@ import math
 
 from aiohttp import web
 
-from mavproxy_uavapi.errors import TooManyRequests
+from mavproxy_uavapi.core.errors import TooManyRequests
 from mavproxy_uavapi.http.call import ROUTE, SERVICE
 from mavproxy_uavapi.http.caller import CALLER, Caller
 from mavproxy_uavapi.http.responses import Handler

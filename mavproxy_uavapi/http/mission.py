@@ -10,7 +10,7 @@ from typing import Any
 
 from aiohttp import web
 
-from mavproxy_uavapi.errors import Forbidden, NotFound
+from mavproxy_uavapi.core.errors import Forbidden, NotFound
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.caller import CALLER, Caller
 from mavproxy_uavapi.http.forms import file_of

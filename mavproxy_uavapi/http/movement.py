@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
 
+from mavproxy_uavapi.core.vehicle.copter import Copter
+from mavproxy_uavapi.core.vehicle.jobs import Job
+from mavproxy_uavapi.core.vehicle.messages import GlobalTarget, NedTarget, VelocityTarget
 from mavproxy_uavapi.http.call import Answer, Call
 from mavproxy_uavapi.http.requests import BodyOffset, GpsTarget, Heading, NedPlace, NedVelocity, YawRate
-from mavproxy_uavapi.vehicle.copter import Copter
-from mavproxy_uavapi.vehicle.jobs import Job
-from mavproxy_uavapi.vehicle.messages import GlobalTarget, NedTarget, VelocityTarget
 
 
 async def go_to_gps(call: Call) -> Answer:

@@ -14,8 +14,8 @@ from typing import Any
 
 from pydantic.json_schema import models_json_schema
 
-from mavproxy_uavapi import errors
-from mavproxy_uavapi.errors import UavApiError
+from mavproxy_uavapi.core import errors
+from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.http import examples, requests
 from mavproxy_uavapi.http.route import Route
 

@@ -6,7 +6,7 @@ from aiohttp import web
 
 from mavproxy_uavapi import camera_tools
 from mavproxy_uavapi.camera_tools import TOOLS, Shot
-from mavproxy_uavapi.errors import BadRequest
+from mavproxy_uavapi.core.errors import BadRequest
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import Photo
 

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
-from mavproxy_uavapi.errors import Invalid
+from mavproxy_uavapi.core.errors import Invalid
 
 SMALLEST = 1e-30  # more than single precision's least number
 NED_REACH = 100_000.0  # m; farther than that NED is no flat patch any more

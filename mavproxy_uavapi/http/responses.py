@@ -10,7 +10,14 @@ from typing import Any
 
 from aiohttp import web
 
-from mavproxy_uavapi.errors import BadRequest, NotFound, TooManyRequests, UavApiError, Unauthorized, without_frames
+from mavproxy_uavapi.core.errors import (
+    BadRequest,
+    NotFound,
+    TooManyRequests,
+    UavApiError,
+    Unauthorized,
+    without_frames,
+)
 
 log = logging.getLogger("uavapi.http")
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]

@@ -19,7 +19,7 @@ from urllib.parse import urlsplit
 
 from aiohttp import web
 
-from mavproxy_uavapi.errors import Forbidden, TooManyRequests, UavApiError, Unauthorized, without_frames
+from mavproxy_uavapi.core.errors import Forbidden, TooManyRequests, UavApiError, Unauthorized, without_frames
 from mavproxy_uavapi.http.call import ROUTE, SERVICE
 from mavproxy_uavapi.http.caller import CALLER, Caller, address_of, group_of
 from mavproxy_uavapi.http.connection import Connection

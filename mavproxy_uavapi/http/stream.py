@@ -7,7 +7,7 @@ from contextlib import suppress
 
 from aiohttp import WSCloseCode, WSMsgType, web
 
-from mavproxy_uavapi.host.patience import within
+from mavproxy_uavapi.core.timeout import within
 from mavproxy_uavapi.http.broadcast import Subscription
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import StreamFilter

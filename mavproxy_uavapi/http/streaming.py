@@ -13,7 +13,7 @@ from typing import Any
 from aiohttp import web
 from aiohttp.abc import AbstractStreamWriter
 
-from mavproxy_uavapi.errors import TooManyRequests
+from mavproxy_uavapi.core.errors import TooManyRequests
 
 log = logging.getLogger("uavapi.http")
 

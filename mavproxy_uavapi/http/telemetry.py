@@ -6,14 +6,14 @@ import asyncio
 from collections.abc import Callable
 from typing import Any
 
-from mavproxy_uavapi.errors import NotFound, Rejected, Stale, TimedOut
-from mavproxy_uavapi.host.patience import within
-from mavproxy_uavapi.host.state import Received
+from mavproxy_uavapi.core.errors import NotFound, Rejected, Stale, TimedOut
+from mavproxy_uavapi.core.mavlink.vehicle_state import Received
+from mavproxy_uavapi.core.timeout import within
+from mavproxy_uavapi.core.vehicle.messages import MESSAGE_IDS
+from mavproxy_uavapi.core.vehicle.readiness import status as status_of
 from mavproxy_uavapi.http import telemetry_views as views
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import Read
-from mavproxy_uavapi.vehicle.flyable import status as status_of
-from mavproxy_uavapi.vehicle.messages import MESSAGE_IDS
 
 FIRST_TIMEOUT = 2.0  # s for a message that was never told and is asked for
 HOME_AGE = 1.0  # s for which a home position that was asked for serves further readers

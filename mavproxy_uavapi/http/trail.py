@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import asyncio
 
-from mavproxy_uavapi.audit import Entry, utc_now
-from mavproxy_uavapi.errors import NoVehicle, UavApiError
+from mavproxy_uavapi.core.audit import Entry, utc_now
+from mavproxy_uavapi.core.errors import NoVehicle, UavApiError
+from mavproxy_uavapi.core.sent_messages import SentNames, noting_sent
 from mavproxy_uavapi.http.call import Action, Answer, Call
-from mavproxy_uavapi.sent import SentNames, noting_sent
 
 GONE = "the client hung up"
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import asyncio
 import hashlib
 
-from mavproxy_uavapi.errors import BadRequest, Busy, Stale
+from mavproxy_uavapi.core.errors import BadRequest, Busy, Stale
+from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission
+from mavproxy_uavapi.core.vehicle import mission_files, mission_flight
+from mavproxy_uavapi.core.vehicle.jobs import Job
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.http.call import Answer, Call, in_time
 from mavproxy_uavapi.http.forms import file_of
 from mavproxy_uavapi.http.requests import MissionFile, Read, StartMission
-from mavproxy_uavapi.vehicle import mission, plans
-from mavproxy_uavapi.vehicle.jobs import Job
-from mavproxy_uavapi.vehicle.modes import flies_mission
-from mavproxy_uavapi.vehicle.vehicle import Vehicle
 
 LARGEST = 1024 * 1024  # bytes of a mission file
 
@@ -21,7 +21,7 @@ async def upload(call: Call) -> Answer:
     """Replace the vehicle's mission and read it back; one that fails leaves the old mission, or says why not."""
     vehicle = call.vehicle
     body = await _body(call)
-    items = await asyncio.to_thread(plans.read, body)
+    items = await asyncio.to_thread(mission_files.read, body)
     asked = MissionFile(digest=hashlib.sha256(body.encode()).hexdigest(), items=len(items))
 
     async def verb(job: Job) -> None:
@@ -60,13 +60,13 @@ async def start(call: Call) -> Answer:
     """Fly the mission from its first item, in AUTO; needs an armed vehicle in GUIDED or AUTO."""
     vehicle, p = call.vehicle, call.params(StartMission)
     result = "Mission complete" if p.until_complete else "Mission started"
-    return await call.fly(vehicle, lambda job: mission.fly(vehicle, job, p.until_complete, p.timeout), result)
+    return await call.fly(vehicle, lambda job: mission_flight.fly(vehicle, job, p.until_complete, p.timeout), result)
 
 
 async def progress(call: Call) -> Answer:
     """Which item is flown, of how many, which was reached last, and how far (m) it is."""
     vehicle = call.seen
-    told = mission.progress(vehicle)
+    told = mission_flight.progress(vehicle)
     age = vehicle.state.newest("MISSION_CURRENT")
     assert age is not None
     seconds = max(vehicle.clock() - age.at, 0.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from urllib.parse import urlsplit
 
-from mavproxy_uavapi.host.patience import within
+from mavproxy_uavapi.core.timeout import within
 from mavproxy_uavapi.launcher.commands import api_url
 from mavproxy_uavapi.launcher.options import Options
 

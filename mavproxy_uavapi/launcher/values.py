@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Callable
 
-from mavproxy_uavapi import logs
+from mavproxy_uavapi.core import logs
 
 TRUE = frozenset({"true", "yes", "on", "1"})
 FALSE = frozenset({"false", "no", "off", "0"})

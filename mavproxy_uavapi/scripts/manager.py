@@ -12,8 +12,8 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from mavproxy_uavapi.errors import BadRequest, NoVehicle, ToolFailed
-from mavproxy_uavapi.host.host import Host
+from mavproxy_uavapi.core.errors import BadRequest, NoVehicle, ToolFailed
+from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.scripts import clients, names, on_exit, runner, runs, tmux
 from mavproxy_uavapi.scripts.runs import Run
 from mavproxy_uavapi.scripts.store import Store

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import PurePath
 
-from mavproxy_uavapi.errors import BadRequest
+from mavproxy_uavapi.core.errors import BadRequest
 
 SUFFIXES = (".py", ".sh")
 LONGEST = 100  # characters; with a timestamp behind it a log's name must still fit into 255 bytes

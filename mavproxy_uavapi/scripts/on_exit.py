@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from mavproxy_uavapi.errors import Aborted, UavApiError
-from mavproxy_uavapi.host.host import Host
+from mavproxy_uavapi.core.errors import Aborted, UavApiError
+from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.vehicle.jobs import Ending, Job
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.scripts.runs import Run
-from mavproxy_uavapi.vehicle.jobs import Ending, Job
-from mavproxy_uavapi.vehicle.vehicle import Vehicle
 
 FLOWN_BY_SCRIPTS = "GUIDED"  # in any other mode the vehicle is its pilot's, or on its way down already
 GOES_ON = {"/command/land", "/command/rtl"}  # a dead script's landing or return is what is best for the vehicle

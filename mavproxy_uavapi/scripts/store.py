@@ -7,7 +7,7 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from mavproxy_uavapi.errors import BadRequest, NotFound
+from mavproxy_uavapi.core.errors import BadRequest, NotFound
 from mavproxy_uavapi.scripts import names
 
 MODE = 0o755

@@ -6,7 +6,7 @@ import contextlib
 from collections.abc import Sequence
 from pathlib import Path
 
-from mavproxy_uavapi.errors import ToolFailed
+from mavproxy_uavapi.core.errors import ToolFailed
 from mavproxy_uavapi.tools import Outcome, run_tool
 
 TIMEOUT = 10.0  # s for one call

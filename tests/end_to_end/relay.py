@@ -17,8 +17,8 @@ from typing import Any
 
 from pymavlink import mavutil
 
+from mavproxy_uavapi.core.mavlink.flight_modes import mode_number
 from mavproxy_uavapi.sim.faults import Faults
-from mavproxy_uavapi.vehicle.modes import mode_number
 
 mavlink = mavutil.mavlink
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Executor, Future
 from pathlib import Path
 from typing import Any
@@ -15,18 +15,9 @@ from pymavlink import mavutil
 
 from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.settings import ModuleSettings, Settings
-from mavproxy_uavapi.host.host import Host
-from mavproxy_uavapi.host.link import FakeLink
+from mavproxy_uavapi.core.host import Host
 
 mavlink = mavutil.mavlink
-
-
-@pytest.fixture
-def host(loop: Any, mpstate: Any) -> Iterator[Host]:
-    """A host whose asyncio side runs in the test's loop and clock."""
-    host = Host(mpstate, clock=loop.time, link=FakeLink(), loop=loop)
-    yield host
-    host.bridge._outbox.close()
 
 
 class AtOnce(Executor):

@@ -14,13 +14,13 @@ import pytest
 from mavproxy_gradys.http import Handlers
 from mavproxy_gradys.service import Gradys
 from mavproxy_gradys.track_request import Track
-from mavproxy_uavapi.errors import Invalid, TooManyRequests
+from mavproxy_uavapi.core.errors import Invalid, TooManyRequests
+from mavproxy_uavapi.core.vehicle.endings import Policy
 from mavproxy_uavapi.http.call import Call, Service
 from mavproxy_uavapi.http.jobs import list_jobs
 from mavproxy_uavapi.http.requests import Empty
 from mavproxy_uavapi.http.trail import audited
 from mavproxy_uavapi.settings import ModuleSettings
-from mavproxy_uavapi.vehicle.endings import Policy
 
 LINE = "(1, -158400810, -479266420, 584090, 0, 65535, 0, 0, 3, 10)\n"
 LONG = LINE + "# a comment\n" * 10_000

@@ -7,7 +7,7 @@ import pytest
 
 from mavproxy_gradys import payload
 from mavproxy_gradys.errors import NoFix
-from mavproxy_uavapi.errors import LinkLost, Stale
+from mavproxy_uavapi.core.errors import LinkLost, Stale
 
 CAPTURED = (
     b"id=10&lat=-15.840081&lng=-47.926642&alt=20.123&ground_speed=1.25&air_speed=1.5&heading=270"

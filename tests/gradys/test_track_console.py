@@ -6,7 +6,7 @@ import pytest
 
 from mavproxy_gradys.track_console import TrackConsole, shown, words
 from mavproxy_gradys.tracking import Tracking
-from mavproxy_uavapi.errors import BadRequest
+from mavproxy_uavapi.core.errors import BadRequest
 
 
 @pytest.mark.parametrize(

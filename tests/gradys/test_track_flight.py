@@ -9,7 +9,7 @@ import pytest
 
 from mavproxy_gradys.track_flight import Flight, flight_of
 from mavproxy_gradys.tracks import Waypoint
-from mavproxy_uavapi.errors import Invalid, NotSupported
+from mavproxy_uavapi.core.errors import Invalid, NotSupported
 
 METRES_PER_DEGREE = 111318.845
 HERE = SimpleNamespace(lat=-158400810, lon=-479266420)

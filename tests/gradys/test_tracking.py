@@ -9,8 +9,8 @@ import pytest
 from mavproxy_gradys.track_flight import flight_of
 from mavproxy_gradys.tracking import Tracking
 from mavproxy_gradys.tracks import Waypoint
-from mavproxy_uavapi.errors import Aborted
-from mavproxy_uavapi.vehicle.jobs import Job
+from mavproxy_uavapi.core.errors import Aborted
+from mavproxy_uavapi.core.vehicle.jobs import Job
 
 PLACES = [Waypoint(-15.84, -47.9266, 20.0)]
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from mavproxy_gradys.tracks import GPX_HEAD, GPX_TAIL, Reading, parse, style_of, waypoints
-from mavproxy_uavapi.errors import Invalid
+from mavproxy_uavapi.core.errors import Invalid
 
 TEXT = (
     "GPS_RAW_INT {time_usec : 251908000, fix_type : 3, lat : 357713121, lon : -786743912, alt : 584090,"

@@ -21,9 +21,10 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_gradys.http import Handlers
 from mavproxy_gradys.service import Gradys
-from mavproxy_uavapi.errors import LinkLost
-from mavproxy_uavapi.host.host import Host
-from mavproxy_uavapi.host.link import Address
+from mavproxy_uavapi.core.errors import LinkLost
+from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.mavlink.link import Address
+from mavproxy_uavapi.core.vehicle.stream_requester import Freshness
 from mavproxy_uavapi.http.app import make_app
 from mavproxy_uavapi.http.call import Service
 from mavproxy_uavapi.http.connection import Connection
@@ -31,7 +32,6 @@ from mavproxy_uavapi.settings import ModuleSettings
 from mavproxy_uavapi.sim import Options, Simulator
 from mavproxy_uavapi.sim.control import Control
 from mavproxy_uavapi.sim.mission import Item
-from mavproxy_uavapi.vehicle.freshness import Freshness
 
 TICK = 0.02  # s; what is sent either way arrives with the next one
 STEPS = 2  # of the simulator, in each tick

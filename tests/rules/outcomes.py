@@ -8,9 +8,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import NamedTuple
 
-from mavproxy_uavapi.vehicle import endings
-from mavproxy_uavapi.vehicle.endings import Policy
-from mavproxy_uavapi.vehicle.jobs import Ending
+from mavproxy_uavapi.core.vehicle import endings
+from mavproxy_uavapi.core.vehicle.endings import Policy
+from mavproxy_uavapi.core.vehicle.jobs import Ending
 
 FILE = Path(__file__).parents[2] / "docs" / "faults.md"
 

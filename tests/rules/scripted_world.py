@@ -1,6 +1,6 @@
 """The whole house but for MAVProxy, in virtual time, with the scripted vehicle: quick enough for long random flights.
 
-The real HTTP application, the host, the jobs and the endings; the vehicle is the `Drone` of tests/uavapi/conftest.py.
+The real HTTP application, the host, the jobs and the endings; the vehicle is the `Drone` of tests/support.
 What is asked for and what is sent is remembered, for `rules_of_the_air.py` to judge.
 """
 
@@ -8,47 +8,31 @@ from __future__ import annotations
 
 import asyncio
 import contextvars
-import importlib.util
 import math
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 from urllib.parse import urlencode
 
 from aiohttp import web
 
-from mavproxy_uavapi.errors import UavApiError
-from mavproxy_uavapi.host.host import Host
-from mavproxy_uavapi.host.link import Address, require_finite
+from mavproxy_uavapi.core.errors import UavApiError
+from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.mavlink.link import Address, require_finite
+from mavproxy_uavapi.core.vehicle.endings import Policy
+from mavproxy_uavapi.core.vehicle.jobs import Job
+from mavproxy_uavapi.core.vehicle.stream_requester import Freshness
 from mavproxy_uavapi.http.app import make_app
 from mavproxy_uavapi.http.call import Service
 from mavproxy_uavapi.http.connection import Connection
 from mavproxy_uavapi.scripts import on_exit
 from mavproxy_uavapi.settings import ModuleSettings
-from mavproxy_uavapi.vehicle.endings import Policy
-from mavproxy_uavapi.vehicle.freshness import Freshness
-from mavproxy_uavapi.vehicle.jobs import Job
-
-
-def load(file: str) -> Any:
-    """A Python file by its path below tests/; tests are no package."""
-    name = "helpers_" + file.replace("/", "_").removesuffix(".py")
-    if name not in sys.modules:
-        spec = importlib.util.spec_from_file_location(name, Path(__file__).parents[1] / file)
-        assert spec is not None and spec.loader is not None
-        sys.modules[name] = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(sys.modules[name])
-    return sys.modules[name]
-
-
-TimeTravellingLoop, message_of, mavproxy_state = (
-    getattr(load("conftest.py"), name) for name in ("TimeTravellingLoop", "message_of", "mavproxy_state")
-)
-Drone, mavlink = load("uavapi/conftest.py").Drone, load("uavapi/conftest.py").mavlink
-Wire = load("rules/conftest.py").Wire
+from tests.rules.conftest import Wire
+from tests.support.drone import Drone, mavlink
+from tests.support.mavproxy import mavproxy_state
+from tests.support.messages import message_of
+from tests.support.virtual_time import TimeTravellingLoop
 
 ASKING = {
     mavlink.MAV_CMD_REQUEST_MESSAGE,

@@ -12,7 +12,7 @@ import pytest
 
 from mavproxy_uavapi import camera_tools
 from mavproxy_uavapi.camera_tools import TOOLS, Shot, size_of, take
-from mavproxy_uavapi.errors import BadRequest, TimedOut, ToolFailed
+from mavproxy_uavapi.core.errors import BadRequest, TimedOut, ToolFailed
 
 SHOT = Shot(1280, 720, 150)
 WRITES = 'for last; do :; done\nprintf "\\377\\330\\377 picture" > "$last"\n'

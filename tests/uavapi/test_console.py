@@ -7,8 +7,8 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.api import Api
 from mavproxy_uavapi.console import report, vehicles
+from mavproxy_uavapi.core.vehicle.messages import NedTarget
 from mavproxy_uavapi.settings import ModuleSettings
-from mavproxy_uavapi.vehicle.messages import NedTarget
 
 mavlink = mavutil.mavlink
 SETTINGS = ModuleSettings().snapshot()

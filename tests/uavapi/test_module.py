@@ -316,7 +316,7 @@ def test_start_that_takes_long_holds_nothing_up_and_says_so_and_what_came_of_it(
         begun.set()
         released.wait(10)
 
-    monkeypatch.setattr("mavproxy_uavapi.host.errands.SLOW", 0.05)
+    monkeypatch.setattr("mavproxy_uavapi.core.background.SLOW", 0.05)
     module = loader.load(port=port)
     module.logs.open = slow
     started = time.monotonic()

@@ -21,9 +21,9 @@ os.environ["MAVLINK20"] = "1"  # before pymavlink is imported anywhere
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from mavproxy_uavapi.errors import Aborted
-from mavproxy_uavapi.host.host import Host
-from mavproxy_uavapi.host.link import Address, require_finite
+from mavproxy_uavapi.core.errors import Aborted
+from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.mavlink.link import Address, require_finite
 from mavproxy_uavapi.sim.options import Home, Options, Wind
 from mavproxy_uavapi.sim.simulator import STEP, Simulator
 from mavproxy_vision.camera import Frame
@@ -321,7 +321,7 @@ class Lockstep:
 
     def fly_to(self, north: float, east: float, down: float) -> None:
         """By the vehicle's own truth: it simply is there."""
-        from mavproxy_uavapi.vehicle.messages import NedTarget  # noqa: PLC0415
+        from mavproxy_uavapi.core.vehicle.messages import NedTarget  # noqa: PLC0415
 
         async def go(job: Any) -> None:
             await self.copter.go_to(job, NedTarget(north, east, down), wait=True)

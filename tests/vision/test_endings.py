@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from mavproxy_uavapi.errors import Invalid, LinkLost, ModeChanged, NotArmed
-from mavproxy_uavapi.host.link import is_finite
+from mavproxy_uavapi.core.errors import Invalid, LinkLost, ModeChanged, NotArmed
+from mavproxy_uavapi.core.mavlink.link import is_finite
+from mavproxy_uavapi.core.vehicle.messages import NedTarget, VelocityTarget
 from mavproxy_uavapi.sim.mission import Item
-from mavproxy_uavapi.vehicle.messages import NedTarget, VelocityTarget
 from mavproxy_vision.errors import LandingFailed
 from mavproxy_vision.geometry import Attitude, vector
 from mavproxy_vision.landing import Landing, Order, Phase

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.errors import LinkLost, ModeChanged
-from mavproxy_uavapi.vehicle.authority import Rank
+from mavproxy_uavapi.core.errors import LinkLost, ModeChanged
+from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_vision.errors import LandingFailed
 
 TAG = "0:0.30@0.8,-0.6"  # m north and east of home, above which the vehicle takes off

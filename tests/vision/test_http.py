@@ -13,7 +13,7 @@ import pytest
 from aiohttp import TCPConnector, web
 from aiohttp.test_utils import TestClient, TestServer, make_mocked_request
 
-from mavproxy_uavapi.errors import BadRequest, Invalid, TooManyRequests, UavApiError
+from mavproxy_uavapi.core.errors import BadRequest, Invalid, TooManyRequests, UavApiError
 from mavproxy_uavapi.http import call as calls
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import parse

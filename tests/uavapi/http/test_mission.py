@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from aiohttp import FormData
 
-from mavproxy_uavapi.errors import BadRequest, Forbidden, ToolFailed
+from mavproxy_uavapi.core.errors import BadRequest, Forbidden, ToolFailed
 from mavproxy_uavapi.http.caller import CALLER, Caller
 from mavproxy_uavapi.http.mission import _scripts
 from mavproxy_uavapi.scripts import runs

@@ -7,8 +7,8 @@ from typing import Annotated, Any
 import pytest
 from pydantic import Field
 
-from mavproxy_uavapi import errors
-from mavproxy_uavapi.errors import UavApiError
+from mavproxy_uavapi.core import errors
+from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.http import examples, requests
 from mavproxy_uavapi.http.openapi import BY_PATH, KINDS, RAW_BODIES, TAGS, document, example_of, simplified
 from mavproxy_uavapi.http.route import Route
@@ -33,7 +33,7 @@ def leaves(base: type[UavApiError] = UavApiError) -> list[type[UavApiError]]:
     return found + [error for child in base.__subclasses__() for error in leaves(child)]
 
 
-OURS = [error for error in leaves() if error.__module__ == "mavproxy_uavapi.errors"]
+OURS = [error for error in leaves() if error.__module__ == "mavproxy_uavapi.core.errors"]
 
 
 @pytest.mark.parametrize("operation", OPERATIONS, ids=named)

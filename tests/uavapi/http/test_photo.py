@@ -6,7 +6,7 @@ import pytest
 
 from mavproxy_uavapi import camera_tools
 from mavproxy_uavapi.camera_tools import Shot
-from mavproxy_uavapi.errors import TimedOut, ToolFailed
+from mavproxy_uavapi.core.errors import TimedOut, ToolFailed
 
 
 @pytest.fixture

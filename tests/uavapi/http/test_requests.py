@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.errors import Invalid
+from mavproxy_uavapi.core.errors import Invalid
 from mavproxy_uavapi.http import requests
 from mavproxy_uavapi.http.requests import parse
 

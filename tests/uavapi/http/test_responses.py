@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from aiohttp import web
 
-from mavproxy_uavapi import errors
+from mavproxy_uavapi.core import errors
 from mavproxy_uavapi.http.responses import dumps, envelope
 
 TREE = [

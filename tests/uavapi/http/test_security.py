@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.errors import Forbidden, Unauthorized
+from mavproxy_uavapi.core.errors import Forbidden, Unauthorized
 from mavproxy_uavapi.http.security import check_caller, check_origin, check_page, has_token, is_our_name
 from mavproxy_uavapi.settings import ModuleSettings
 

@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.audit import COUNTED_FOR
+from mavproxy_uavapi.core.audit import COUNTED_FOR
+from mavproxy_uavapi.core.text import LONGEST
 from mavproxy_uavapi.http.requests import Empty
 from mavproxy_uavapi.http.route import POST, Route
 from mavproxy_uavapi.scripts.on_exit import after_death
 from mavproxy_uavapi.scripts.runs import Run
-from mavproxy_uavapi.text import LONGEST
 
 
 def run_of(script: str) -> Run:

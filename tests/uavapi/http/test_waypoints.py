@@ -8,9 +8,9 @@ import pytest
 from aiohttp import FormData
 from pymavlink import mavutil
 
-from mavproxy_uavapi.errors import Rejected
+from mavproxy_uavapi.core.errors import Rejected
+from mavproxy_uavapi.core.vehicle.mission_files import HOME, read
 from mavproxy_uavapi.http.examples import WPL
-from mavproxy_uavapi.vehicle.plans import HOME, read
 
 FILE_PATIENCE = 2.0  # real s that the executor gets before the clock jumps
 ITEMS = {"items": [{"command": "NAV_TAKEOFF", "alt": 10}]}

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.errors import BadRequest, NotFound, NoVehicle, ToolFailed
+from mavproxy_uavapi.core.errors import BadRequest, NotFound, NoVehicle, ToolFailed
 from mavproxy_uavapi.scripts import manager
 from mavproxy_uavapi.scripts.manager import Scripts, address
 from mavproxy_uavapi.settings import ModuleSettings

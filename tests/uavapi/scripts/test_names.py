@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from mavproxy_uavapi.errors import BadRequest
+from mavproxy_uavapi.core.errors import BadRequest
 from mavproxy_uavapi.scripts import names
 
 BAD = [

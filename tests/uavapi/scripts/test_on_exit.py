@@ -5,10 +5,10 @@ from typing import Any
 
 import pytest
 
+from mavproxy_uavapi.core.vehicle.endings import Policy
+from mavproxy_uavapi.core.vehicle.messages import VelocityTarget
 from mavproxy_uavapi.scripts.on_exit import after_death
 from mavproxy_uavapi.scripts.runs import Run
-from mavproxy_uavapi.vehicle.endings import Policy
-from mavproxy_uavapi.vehicle.messages import VelocityTarget
 
 
 def run_of(session: str = "UAV_API_1_a") -> Run:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from mavproxy_uavapi.errors import BadRequest, NotFound
+from mavproxy_uavapi.core.errors import BadRequest, NotFound
 from mavproxy_uavapi.scripts.store import Store
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.errors import ToolFailed
+from mavproxy_uavapi.core.errors import ToolFailed
 from mavproxy_uavapi.scripts import runner, runs, tmux
 
 

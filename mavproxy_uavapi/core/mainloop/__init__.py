@@ -1,0 +1,1 @@
+"""Between MAVProxy's main loop, which alone sends, and one asyncio loop in a thread of its own."""

@@ -1,0 +1,192 @@
+"""MAVProxy's select loop <-> one asyncio loop in one thread.
+
+Two queues, one each way. In: the main loop hands over what it received (`feed`), all of one turn at a time; out:
+the asyncio side hands calls to the main loop (`on_main`), which is the only thread that sends.
+
+Python runs one thread at a time. A vehicle's messages come in bursts, each of which MAVProxy parses, logs and
+forwards: so long the asyncio side is not woken by us, and reads wait (`calm`). What is to be sent does not wait: it
+goes out between two messages.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import weakref
+from collections import deque
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from mavproxy_uavapi.core.mainloop.call_queue import Outbox
+from mavproxy_uavapi.core.mainloop.event_loop_thread import LoopThread
+from mavproxy_uavapi.core.timeout import within
+
+T = TypeVar("T")
+GIVE_WAY = 0.05  # s that new work waits for the main loop at most
+
+_bridges: weakref.WeakSet[Bridge] = weakref.WeakSet()
+
+
+class Bridge:
+    """The only place where MAVProxy's main loop and our asyncio thread meet.
+
+    Args:
+        select_extra: MAVProxy's table of further descriptors for its select().
+        receive: called in the asyncio thread with each message that was fed.
+        loop: as for `LoopThread`.
+    """
+
+    def __init__(
+        self,
+        select_extra: dict[int, tuple[Callable[..., None], Any]],
+        receive: Callable[[Any], None],
+        loop: asyncio.AbstractEventLoop | None = None,
+    ) -> None:
+        self._select_extra = select_extra
+        self._receive = receive
+        self._inbox: deque[Any] = deque()
+        self._delivering = False  # whether `_deliver` is on its way
+        self._busy = False  # whether the main loop is at messages
+        self._waited_for = False
+        self._calm = asyncio.Event()
+        self._outbox = Outbox()
+        self._thread = LoopThread("uavapi-loop", loop)
+        self._open_sockets: list[Callable[[], list[int]]] = [self._outbox.filenos]
+        _bridges.add(self)
+
+    @property
+    def loop(self) -> asyncio.AbstractEventLoop:
+        """The asyncio loop of the one thread."""
+        return self._thread.loop
+
+    @property
+    def running(self) -> bool:
+        """Whether the asyncio thread is alive."""
+        return self._thread.running
+
+    def start(self) -> None:
+        """Start the asyncio thread and be woken by MAVProxy's select(). Main loop only."""
+        self._select_extra[self._outbox.fileno()] = (self._outbox.on_readable, None)
+        self._thread.start()
+
+    def feed(self, message: Any) -> None:
+        """Hand a received message over. Main loop only; never blocks, never raises.
+
+        What is to be sent does not wait for the end of a burst: it goes out between two of its messages.
+        """
+        self._busy = True
+        self._inbox.append(message)
+        self._outbox.drain()
+
+    def feed_call(self, call: Callable[[], None]) -> None:
+        """Have the asyncio side run `call` between the messages that were fed before and after. Main loop only."""
+        self._inbox.append(call)
+
+    def _hand_over(self) -> None:
+        """Wake the asyncio side for what was fed since the last turn, and for what has waited for its end."""
+        self._busy = False
+        if self._inbox and not self._delivering:
+            self._delivering = True  # first: the other thread may be there before `call_soon` returns
+            if not self._thread.call_soon(self._deliver):
+                self._inbox.clear()  # the loop has ended: nobody will read
+        if self._waited_for:
+            self._waited_for = False
+            self._thread.call_soon(self._calm.set)
+
+    async def calm(self) -> None:
+        """Await the end of the main loop's turn, if it is at messages just now; GIVE_WAY s at most."""
+        if not self._busy:
+            return
+        self._calm.clear()
+        self._waited_for = True
+        with contextlib.suppress(asyncio.TimeoutError):
+            await within(GIVE_WAY, self._calm.wait())
+
+    def _deliver(self) -> None:
+        self._delivering = False  # what comes from now on needs another call
+        for _ in range(len(self._inbox)):
+            fed = self._inbox.popleft()
+            try:
+                fed() if callable(fed) else self._receive(fed)
+            except Exception as error:  # noqa: BLE001  one bad message must not stop the next
+                what = "what was fed" if callable(fed) else fed.get_type()
+                context = {"message": f"uavapi: defect on {what}", "exception": error}
+                self.loop.call_exception_handler(context)
+
+    def turn(self) -> None:
+        """Between two turns of the main loop: hand over what was fed, run what the asyncio side asked for."""
+        self._hand_over()
+        self._outbox.drain()
+
+    def post(self, call: Callable[[], None]) -> None:
+        """Have the main loop run `call`, which must not raise, and do not wait for it. Any thread."""
+        self._outbox.put(call)
+
+    async def on_main(self, call: Callable[[], T]) -> T:
+        """Have the main loop run `call`; its result, or what it raised.
+
+        Cancelled before the main loop came to it, it is never run.
+        """
+        future: asyncio.Future[T] = self.loop.create_future()
+
+        def settle(result: T | None, error: Exception | None) -> None:
+            if future.done():
+                return
+            if error is not None:
+                future.set_exception(error)
+            else:
+                future.set_result(result)  # type: ignore[arg-type]
+
+        def run() -> None:
+            if future.cancelled():
+                return
+            try:
+                outcome = call(), None
+            except Exception as error:  # noqa: BLE001  it belongs to whoever awaits, not to MAVProxy
+                self._thread.call_soon(settle, None, error)
+            else:
+                self._thread.call_soon(settle, *outcome)
+
+        self._outbox.put(run)
+        return await future
+
+    def run(self, coroutine: Any, timeout: float = 4.0) -> Any:
+        """Run a coroutine in the asyncio loop and wait for it. Any thread but the loop's own."""
+        return self._thread.run(coroutine, timeout)
+
+    def call_soon(self, call: Callable[..., object], *args: Any) -> bool:
+        """Run `call` in the asyncio loop, without waiting; False when that has ended. Any thread."""
+        return self._thread.call_soon(call, *args)
+
+    def close_in_children(self, filenos: Callable[[], list[int]]) -> None:
+        """Name descriptors that a forked child must close, so that it does not keep our port."""
+        self._open_sockets.append(filenos)
+
+    def keep_in_children(self, filenos: Callable[[], list[int]]) -> None:
+        """Take back what `close_in_children` named: whoever had those descriptors has closed them."""
+        self._open_sockets.remove(filenos)
+
+    def close_inherited(self) -> None:
+        """In a forked child: close our sockets, touching neither the loop nor its epoll (both are shared)."""
+        for filenos in self._open_sockets:
+            for fd in filenos():
+                if fd >= 0:
+                    os.close(fd)
+
+    def stop(self) -> None:
+        """End the thread and take our descriptor out of MAVProxy's select(). Any thread but the loop's."""
+        self._select_extra.pop(self._outbox.fileno(), None)
+        self._thread.stop()
+        self._outbox.close()
+        _bridges.discard(self)
+
+
+def _close_inherited_sockets() -> None:
+    for bridge in list(_bridges):
+        bridge.close_inherited()
+
+
+# MAVProxy forks children (map, console) that would keep our port open after an unload; close-on-exec does
+# not help a fork. Registered once per process: Python has no way to take such a hook back.
+os.register_at_fork(after_in_child=_close_inherited_sockets)

@@ -1,0 +1,1 @@
+"""The link, and what its messages tell of each vehicle."""

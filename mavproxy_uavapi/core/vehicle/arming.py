@@ -1,0 +1,95 @@
+"""Arming and disarming, by the rule that a pilot is asked first: whoever arms the vehicle meanwhile has it."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable
+
+from mavproxy_uavapi.core.errors import ModeChanged, Rejected, TimedOut
+from mavproxy_uavapi.core.vehicle import messages
+from mavproxy_uavapi.core.vehicle.base import BaseVehicle
+from mavproxy_uavapi.core.vehicle.jobs import Job
+
+TIMEOUT = 90.0  # s until an estimator that does not settle is reported
+REASON_TIME = 2.0  # s of a client's timeout that asking why it is not ready may need
+SHOWN_WITHIN = 5.0  # s until a heartbeat must show what was acknowledged
+GUIDED = "GUIDED"
+
+
+async def arm(vehicle: BaseVehicle, job: Job, timeout: float | None) -> None:
+    """See `Vehicle.arm`."""
+    before = vehicle.state.armed, vehicle.state.mode
+
+    def is_nobodys() -> None:
+        """Raises when somebody else armed it or switched its mode, so that it is his."""
+        armed = vehicle.state.armed
+        flies = armed and not vehicle.state.landed
+        if vehicle.mode == GUIDED or ((armed, vehicle.state.mode) == before and not flies):
+            return
+        if armed:
+            raise ModeChanged(f"the vehicle is armed in {vehicle.mode} now: whoever armed it has it")
+        if vehicle.state.mode not in (before[1], None):
+            raise ModeChanged(f"the vehicle is in {vehicle.mode} now: somebody else switched it meanwhile")
+
+    deadline = vehicle.clock() + (max(timeout - REASON_TIME, timeout / 2) if timeout else TIMEOUT)
+    await _get_ready(vehicle, lambda: vehicle.has_position, is_nobodys, deadline)
+    if vehicle.mode != GUIDED:
+        await vehicle.switch_to(job, GUIDED, is_nobodys)
+    still_guided = _requires_guided(vehicle)
+    await _get_ready(vehicle, lambda: vehicle.is_ready_to_arm, still_guided, deadline)
+    still_guided()
+
+    def shown() -> bool:
+        still_guided()
+        return bool(vehicle.state.armed)
+
+    if not vehicle.state.armed:
+        await vehicle.commands.send(messages.arm(), vehicle.commanding(job, still_guided), shown=shown)
+    # Not sent again: a pilot may have disarmed it meanwhile.
+    await vehicle.waiting.until(
+        {"HEARTBEAT"}, lambda: vehicle.state.armed or None, SHOWN_WITHIN, "show that it is armed"
+    )
+
+
+async def disarm(vehicle: BaseVehicle, job: Job, force: bool) -> None:
+    """See `Vehicle.disarm`."""
+    await vehicle.commands.send_until_shown(
+        messages.disarm(force),
+        vehicle.commanding(job),
+        lambda: vehicle.state.armed is False,
+        "show that it is disarmed",
+    )
+
+
+def _requires_guided(vehicle: BaseVehicle) -> Callable[[], None]:
+    def check() -> None:
+        if vehicle.state.mode is not None:  # it has just rebooted; the next heartbeat tells
+            vehicle.require_mode(GUIDED)
+
+    return check
+
+
+async def _get_ready(
+    vehicle: BaseVehicle, is_ready: Callable[[], bool], check: Callable[[], None], deadline: float
+) -> None:
+    def ready() -> bool | None:
+        check()
+        return True if is_ready() or vehicle.state.armed else None
+
+    remaining = max(deadline - vehicle.clock(), 0.1)
+    names = {"SYS_STATUS", "EKF_STATUS_REPORT", "HEARTBEAT"}
+    try:
+        await vehicle.waiting.until(names, ready, remaining, "get ready")
+    except TimedOut:
+        raise await _why_not_ready(vehicle, remaining) from None
+
+
+async def _why_not_ready(vehicle: BaseVehicle, waited: float) -> Rejected:
+    asked = vehicle.clock()
+    with contextlib.suppress(Rejected, TimedOut):  # the texts that it makes the autopilot say are what counts
+        await vehicle.commands.send(messages.check_prearm())
+    with contextlib.suppress(TimedOut):
+        await vehicle.waiting.message({"STATUSTEXT"}, lambda _: None, 1.0, "fall silent")  # it has several reasons
+    said = vehicle.state.said_since(asked)
+    because = "; ".join(said) or "it does not say why"
+    return Rejected(f"not ready to arm after {waited:.0f} s: {because}", statustext=said)

@@ -1,0 +1,170 @@
+"""Who may command a vehicle: one commander at a time, by rank. Pure.
+
+Every verb asks here before anything goes out, and each message of it asks again. Until telemetry shows that a verb
+has taken effect, only its own rank or a higher one supersedes it; a lower one is refused.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+from mavproxy_uavapi.core.errors import Busy, Paused, Superseded
+from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
+from mavproxy_uavapi.core.vehicle.jobs import Job
+
+YAW = "yaw"
+
+
+class Rank(IntEnum):
+    """What goes before what."""
+
+    MOVEMENT = 1  # movements, yaw, speeds
+    ARM = 2  # arm, takeoff, a mode asked for on purpose, the start of a mission
+    STOP = 3  # land, rtl, brake, stop, hold, disarm
+    FORCE = 4  # disarm in flight
+
+
+class CommandAuthority:
+    """Says who commands one vehicle.
+
+    Attributes:
+        commander: the job that has the vehicle, or had it last.
+
+    Args:
+        state: what is known of the vehicle: a pause ends when it leaves its mode.
+    """
+
+    def __init__(self, state: VehicleState) -> None:
+        self.commander: Job | None = None
+        self._state = state
+        self._rank = Rank.MOVEMENT
+        self._shown = True
+        self._suspended: tuple[Job, Rank, bool] | None = None  # the commander that a pause interrupted
+        self._companions: dict[str, Job] = {}  # what goes beside a movement, by kind: yaw, a speed, resume
+        self._paused_at: float | None = None
+
+    # -- asking -------------------------------------------------------------------------------------------
+
+    @property
+    def paused(self) -> bool:
+        """Whether `stop` holds the vehicle still."""
+        return self._paused_at is not None and self._state.mode_since <= self._paused_at
+
+    @property
+    def on_its_way(self) -> bool:
+        """Whether the commander's verb has not shown its effect yet."""
+        return self.commander is not None and self.commander.running and not self._shown
+
+    @property
+    def interrupted(self) -> Job | None:
+        """The job that waits for the end of a pause."""
+        return None if self._suspended is None else self._suspended[0]
+
+    @property
+    def flies(self) -> Job | None:
+        """The job that flies the vehicle now, paused or not; None when none does."""
+        for job in (self.commander, self.interrupted):
+            if job is not None and job.running:
+                return job
+        return None
+
+    def require(self, job: Job) -> None:
+        """Raises unless `job` still commands: to be called before each message of it.
+
+        Raises:
+            Paused: `stop` interrupts it.
+            Superseded: another job commands.
+        """
+        if job is self.commander or job in self._companions.values():
+            return
+        if job is self.interrupted:
+            raise Paused(f"{job.verb} ended: the vehicle is stopped")
+        raise Superseded(f"{job.verb} was superseded")
+
+    def admit(self, rank: Rank, *, stopped_too: bool = False) -> None:
+        """Raises unless a verb of that rank may command now.
+
+        Args:
+            rank: the verb's.
+            stopped_too: whether it may be said to a vehicle that `stop` holds, though it is of rank MOVEMENT.
+
+        Raises:
+            Busy: a verb of a higher rank has not shown its effect yet.
+            Paused: `stop` holds the vehicle; rank MOVEMENT only.
+        """
+        one = self.commander
+        if one is not None and self.on_its_way and rank < self._rank:
+            raise Busy(f"{one.verb} is on its way; try again when the vehicle shows it")
+        if rank is Rank.MOVEMENT and self.paused and not stopped_too:
+            raise Paused("the vehicle is stopped; `resume` or `guided` ends that")
+
+    # -- commanding ---------------------------------------------------------------------------------------
+
+    def take(self, job: Job, rank: Rank) -> None:
+        """Make `job` the commander; whoever was it is superseded.
+
+        Raises:
+            Busy, Paused: as `admit`; then nothing has changed.
+        """
+        if job is not self.commander:
+            self.admit(rank)
+            self._supersede([self.commander, self.interrupted], job)
+            self._suspended = None
+        self._take(job, rank)
+
+    def interrupt(self, job: Job) -> None:
+        """Make `job`, which stops the vehicle, the commander; a movement under way waits until it is resumed.
+
+        Raises:
+            Busy: as `admit`.
+        """
+        self.admit(Rank.STOP)
+        before = self.commander
+        if before is not None and before.running and self._rank < Rank.STOP:
+            self._suspended = before, self._rank, self._shown
+        else:
+            self._supersede([before], job)
+        self.begin_pause()
+        self._take(job, Rank.STOP)
+
+    def accompany(self, job: Job, kind: str, rank: Rank = Rank.MOVEMENT, *, stopped_too: bool = False) -> None:
+        """Let `job` command beside the commander; an earlier one of its kind is superseded.
+
+        Args:
+            job: who commands.
+            kind: what: YAW, a speed, resume.
+            rank, stopped_too: as for `admit`.
+
+        Raises:
+            Busy, Paused: as `admit`.
+        """
+        self.admit(rank, stopped_too=stopped_too)
+        self._supersede([self._companions.get(kind)], job)
+        self._companions[kind] = job
+
+    def shown(self, job: Job) -> None:
+        """Telemetry shows the effect of the commander's verb: from now on any rank supersedes it."""
+        if job is self.commander:
+            self._shown = True
+
+    def begin_pause(self) -> None:
+        """The vehicle is held still, or about to be."""
+        self._paused_at = max(self._state.heartbeat_at, self._state.mode_since)
+
+    def end_pause(self) -> None:
+        """The vehicle is held still no more; a movement that waited for that goes on."""
+        self._paused_at = None
+        if self._suspended is not None:
+            self.commander, self._rank, self._shown = self._suspended
+            self._suspended = None
+
+    def _take(self, job: Job, rank: Rank) -> None:
+        self.commander, self._rank, self._shown = job, rank, False
+        kinds = [kind for kind in self._companions if rank > Rank.MOVEMENT or kind == YAW]
+        self._supersede([self._companions.pop(kind) for kind in kinds], job)
+
+    @staticmethod
+    def _supersede(jobs: list[Job | None], by: Job) -> None:
+        for job in jobs:
+            if job is not None and job is not by and job.running:
+                job.abort(Superseded(f"{job.verb} was superseded by {by.verb}"))

@@ -1,0 +1,272 @@
+"""What the verbs of every type of vehicle are made of: its state, guards, waits, a mode's switch, requests."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Callable, Iterable
+from typing import Any, TypeVar
+
+from pymavlink import mavutil
+
+from mavproxy_uavapi.core.errors import ModeChanged, NotArmed, Rejected, Stale
+from mavproxy_uavapi.core.mavlink.flight_modes import kind_of, mode_name, mode_number
+from mavproxy_uavapi.core.mavlink.link import Address, Link, is_finite
+from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
+from mavproxy_uavapi.core.mavlink.waiters import Pending
+from mavproxy_uavapi.core.vehicle import messages, time_limits
+from mavproxy_uavapi.core.vehicle.authority import CommandAuthority
+from mavproxy_uavapi.core.vehicle.command_sender import Commands
+from mavproxy_uavapi.core.vehicle.geodesy import offset
+from mavproxy_uavapi.core.vehicle.jobs import Job
+from mavproxy_uavapi.core.vehicle.message_waiter import Waiting
+from mavproxy_uavapi.core.vehicle.mission_protocol import Waypoints
+from mavproxy_uavapi.core.vehicle.parameters import Parameters
+from mavproxy_uavapi.core.vehicle.speeds import Speeds
+
+T = TypeVar("T")
+mavlink = mavutil.mavlink
+
+HEARTBEAT_TIMEOUT = 5.0  # s until a message must show what was acknowledged
+FRESH = 3.0  # s; older positions are not flown by
+
+
+class BaseVehicle:
+    """One vehicle, and what its verbs are made of.
+
+    Verbs raise errors of `errors.py`: `Rejected` when the autopilot refuses, `TimedOut`, `LinkLost`,
+    `ModeChanged` when the pilot or a failsafe takes the vehicle, `Busy` and `NotArmed` when its state
+    stands against it; then nothing has been sent.
+
+    Args:
+        state: what is known of it; kept up to date by the host.
+        link: the way out.
+        pending: the host's waits.
+        clock: monotonic seconds, the clock of arrivals.
+    """
+
+    def __init__(self, state: VehicleState, link: Link, pending: Pending, clock: Callable[[], float]) -> None:
+        self.state = state
+        self.link = link
+        self.clock = clock
+        self.authority = CommandAuthority(state)
+        self.waiting = Waiting(state, pending, clock)
+        self.commands = Commands(state, link, self.waiting)
+        self.waypoints = Waypoints(state, link, self.waiting)
+        self.parameters = Parameters(state, link, self.waiting)
+        self.speeds = Speeds(state)
+        self._modes_asked: dict[int, float] = {}  # modes that we asked for, the last one last, and when (s)
+        self._requests: dict[str, asyncio.Task[Any]] = {}  # REQUEST_MESSAGE in flight, by message name
+
+    # -- what it is ---------------------------------------------------------------------------------------
+
+    @property
+    def address(self) -> Address:
+        """Its autopilot's MAVLink address."""
+        return Address(self.state.system, self.state.component)
+
+    @property
+    def kind(self) -> str:
+        """`copter`, `plane`, `rover` or `other`, by its own heartbeat."""
+        return kind_of(self.state.vehicle_type)
+
+    @property
+    def mode(self) -> str:
+        """The name of its flight mode; UNKNOWN before a heartbeat since the last boot."""
+        return mode_name(self.state.vehicle_type, self.state.mode)
+
+    @property
+    def next_mode(self) -> str:
+        """The name of the mode that it was told to take, until a heartbeat shows its answer; else `mode`."""
+        coming = self._on_its_way()
+        return mode_name(self.state.vehicle_type, coming[-1]) if coming else self.mode
+
+    def _on_its_way(self) -> list[int]:
+        """The modes that we asked for of late and that it has not shown since, the last one last."""
+        now = self.clock()
+        asked = [(mode, at) for mode, at in self._modes_asked.items() if now - at <= HEARTBEAT_TIMEOUT]
+        for changed_at, mode in self.state.mode_changes:
+            answered = [at for wanted, at in asked if wanted == mode and at <= changed_at]
+            if answered:
+                asked = [(wanted, at) for wanted, at in asked if at > answered[-1]]
+            else:  # somebody else's switch: what we asked for before it has come to nothing
+                asked = [(wanted, at) for wanted, at in asked if at >= changed_at]
+        return [mode for mode, _ in asked]
+
+    @property
+    def is_ready_to_arm(self) -> bool:
+        """Whether its pre-arm checks pass, by SYS_STATUS; an autopilot that does not report them may try."""
+        present = self.state.recent_field("SYS_STATUS", "onboard_control_sensors_present")
+        health = self.state.recent_field("SYS_STATUS", "onboard_control_sensors_health")
+        if present is None:
+            return False
+        return not present & mavlink.MAV_SYS_STATUS_PREARM_CHECK or bool(health & mavlink.MAV_SYS_STATUS_PREARM_CHECK)
+
+    @property
+    def has_position(self) -> bool:
+        """Whether its estimator has an absolute horizontal position, by EKF_STATUS_REPORT.
+
+        An autopilot that sends no such report is taken at its pre-arm word. The pre-arm bit alone is not
+        enough: in STABILIZE ArduCopter sets it 20 s before its position is good for GUIDED.
+        """
+        flags = self.state.recent_field("EKF_STATUS_REPORT", "flags")
+        if flags is None:
+            return self.is_ready_to_arm
+        return bool(flags & mavlink.EKF_POS_HORIZ_ABS) and not flags & mavlink.EKF_CONST_POS_MODE
+
+    @property
+    def height(self) -> float:
+        """Metres above home; 0 before it said so."""
+        relative_alt = self.state.field("GLOBAL_POSITION_INT", "relative_alt")
+        return 0.0 if relative_alt is None else relative_alt / 1000.0
+
+    def distance_home(self) -> float | None:
+        """Horizontal metres to home; None while either place is unknown."""
+        home = self.state.messages.get("HOME_POSITION")
+        here = self.state.messages.get("GLOBAL_POSITION_INT")
+        if home is None or here is None:
+            return None
+        h, p = home.message, here.message
+        return math.hypot(*offset(p.lat / 1e7, p.lon / 1e7, h.latitude / 1e7, h.longitude / 1e7))
+
+    # -- what verbs are made of ---------------------------------------------------------------------------
+
+    def fresh(self, name: str) -> Any:
+        """The newest message of that name, to fly by.
+
+        Raises:
+            Stale: there is none, it is older than FRESH, or a number in it is not finite.
+        """
+        age = self.state.age(name, self.clock())
+        if age is None or age > FRESH:
+            told = "never told" if age is None else f"told {age:.1f} s ago"
+            raise Stale(f"vehicle {self.state.system} does not tell where it is ({name}: {told})")
+        message = self.state.messages[name].message
+        if not is_finite(message):
+            raise Stale(f"vehicle {self.state.system} does not tell where it is ({name}: not a number)")
+        return message
+
+    def require_armed(self) -> None:
+        """Raises NotArmed unless it is armed."""
+        if not self.state.armed:
+            raise NotArmed("the vehicle is not armed; `arm` it first")
+
+    def require_mode(self, mode: str) -> None:
+        """Raises ModeChanged unless it is in that mode."""
+        if self.mode != mode:
+            raise ModeChanged(f"the vehicle is in {self.mode}, not in {mode}; `{mode.lower()}` gets it there")
+
+    def held_by(self, mode: str) -> None:
+        """A guard for waits: raises when the vehicle was disarmed, or somebody else took it out of `mode`."""
+        if self.state.armed is None:
+            raise NotArmed("the autopilot rebooted meanwhile")
+        if not self.state.armed:  # the mode comes second: a reboot changes both
+            raise NotArmed("the vehicle was disarmed meanwhile" + ("" if self.mode == mode else f", in {self.mode}"))
+        if self.mode != mode:
+            raise ModeChanged(f"the vehicle left {mode}: it is in {self.mode} now, and whoever switched it has it")
+
+    async def flown(
+        self, mode: str, names: Iterable[str], done: Callable[[], T | None], timeout: float, what: str
+    ) -> T:
+        """Wait until `done` holds while the vehicle stays armed and in `mode`.
+
+        Args:
+            mode: the mode that the verb needs.
+            names: messages after which `done` is looked at; heartbeats always are.
+            done: looks at the state.
+            timeout: in s.
+            what: ends the sentence "vehicle 1 did not …".
+        """
+
+        def guarded() -> T | None:
+            self.held_by(mode)
+            return done()
+
+        return await self.waiting.until({"HEARTBEAT", *names}, guarded, timeout, what)
+
+    def commanding(self, job: Job, *needs: Callable[[], None]) -> Callable[[], None]:
+        """What is asked before each message of `job`: whether it still commands, and what else it needs."""
+
+        def check() -> None:
+            self.authority.require(job)
+            for need in needs:
+                need()
+
+        return check
+
+    async def switch_to(self, job: Job, mode: str, *needs: Callable[[], None]) -> None:
+        """Switch the flight mode for `job` and wait until a heartbeat shows it.
+
+        Args:
+            job: who commands.
+            mode: the mode's name.
+            needs: what must hold each time before it is sent; they raise where it does not.
+
+        Raises:
+            Invalid: no such mode.
+            ModeChanged: somebody else switched it meanwhile.
+            Rejected, TimedOut, LinkLost.
+        """
+        number = mode_number(self.state.vehicle_type, mode)
+        before, on_its_way = self.state.mode, self._on_its_way()
+        has_shown = False
+
+        def shown() -> bool:
+            nonlocal has_shown
+            elsewhere = self.state.mode not in (before, number, None, *on_its_way)
+            left_again = has_shown and self.state.mode not in (number, None)
+            if elsewhere or left_again:
+                raise ModeChanged(f"the vehicle is in {self.mode} now: somebody else switched it meanwhile")
+            has_shown = has_shown or self.state.mode == number
+            return self.state.mode == number
+
+        def switched_by_nobody_else() -> None:
+            shown()
+
+        def noted() -> None:
+            self._modes_asked.pop(number, None)
+            self._modes_asked[number] = self.clock()
+            job.modes.add(mode_name(self.state.vehicle_type, number))
+
+        check = self.commanding(job, switched_by_nobody_else, *needs, noted)
+        try:
+            await self.commands.send_until_shown(messages.set_mode(number), check, shown, f"show mode {mode.upper()}")
+        except Rejected:
+            self._modes_asked.pop(number, None)
+            raise
+        self.authority.shown(job)
+
+    async def limits(self) -> time_limits.Limits:
+        """Its speeds and heights, for deadlines; asked for where they are not known."""
+        return time_limits.limits(await self.parameters.read(time_limits.WANTED), self.speeds.in_force)
+
+    def allowed(self, expected: float, timeout: float | None) -> float:
+        """Seconds that a verb may take: the client's `timeout`, or what the flight should need."""
+        return timeout or time_limits.allowed(expected, self.state.time_ratio.ratio)
+
+    async def request(self, name: str) -> Any:
+        """Ask for a message of that name; the autopilot's answer. Several who ask at a time share one request.
+
+        Raises:
+            Rejected: it has no such message.
+            TimedOut, LinkLost.
+        """
+        asking = self._requests.get(name)
+        if asking is None:
+            asking = asyncio.get_running_loop().create_task(self._request(name))
+            self._requests[name] = asking
+            asking.add_done_callback(lambda task: self._requested(name, task))
+        return await asyncio.shield(asking)
+
+    def _requested(self, name: str, asking: asyncio.Task[Any]) -> None:
+        del self._requests[name]
+        if not asking.cancelled():
+            asking.exception()  # whoever asked may have gone, and asyncio would call it unheeded
+
+    async def _request(self, name: str) -> Any:
+        def from_autopilot(message: Any) -> Any:
+            return message if message.get_srcComponent() == self.state.component else None
+
+        with self.waiting.expecting({name}, from_autopilot) as told:
+            await self.commands.send(messages.request_message(messages.MESSAGE_IDS[name]))
+            return await told.within(HEARTBEAT_TIMEOUT, f"tell {name}")

@@ -1,0 +1,175 @@
+"""A command and its acknowledgement.
+
+An ack counts only from the vehicle and component that was asked, for the command that was asked, to us,
+after we asked. Silence means sending again, for commands that may be repeated.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import itertools
+import logging
+from collections import defaultdict, deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from pymavlink import mavutil
+
+from mavproxy_uavapi.core.errors import Rejected, TimedOut
+from mavproxy_uavapi.core.mavlink.link import Address, Link
+from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
+from mavproxy_uavapi.core.vehicle.message_waiter import Waiting
+from mavproxy_uavapi.core.vehicle.messages import Command
+
+mavlink = mavutil.mavlink
+
+log = logging.getLogger("uavapi.copter")
+
+ACK_TIMEOUT = 1.5  # s until a command is sent again
+SENDINGS = 4  # the first one and three more
+IN_PROGRESS_TIMEOUT = 10.0  # s that each IN_PROGRESS buys
+IN_PROGRESS_LIMIT = 60.0  # s until a command that is still in progress is given up
+PATIENCE_PAUSE = 1.0  # s before a patient command is asked again
+SHOWN_WITHIN = (2.0, 1.5, 1.5)  # s after each acknowledgement in which a heartbeat must show what was done
+LATE_ACK = 10.0  # s after a sending in which its ack may still come
+LAST_WORDS = 0.5  # s that a refusal's STATUSTEXT may come after its ack
+WORTH_ASKING_AGAIN = {mavlink.MAV_RESULT_TEMPORARILY_REJECTED, mavlink.MAV_RESULT_FAILED}
+
+
+@dataclass(frozen=True)
+class Sending:
+    """A command that was sent and not answered yet: its parameters, and when (s)."""
+
+    params: tuple[float, ...]
+    at: float
+
+
+class Commands:
+    """Sends commands to one vehicle and waits for their acks; identical ones go one after the other."""
+
+    def __init__(self, state: VehicleState, link: Link, waiting: Waiting) -> None:
+        self._state = state
+        self._link = link
+        self._waiting = waiting
+        self._locks: defaultdict[int, asyncio.Lock] = defaultdict(asyncio.Lock)
+        self._unanswered: defaultdict[int, deque[Sending]] = defaultdict(deque)  # oldest first
+
+    async def send(
+        self,
+        command: Command,
+        check: Callable[[], None] = lambda: None,
+        *,
+        patience: float = 20.0,
+        shown: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """Send `command`; returns when the vehicle has accepted it.
+
+        Args:
+            command: what to send.
+            check: called before each sending: what it raises ends the command, and nothing more is sent.
+            patience: how long (s) a patient command is asked again while it is refused.
+            shown: looked at after each heartbeat: whether the vehicle shows that it was heard although its ack was
+                lost; what it raises ends the command.
+
+        Raises:
+            Rejected: refused, with MAV_RESULT and the STATUSTEXTs since it was asked.
+            TimedOut: no ack, also after sending again.
+            LinkLost: no heartbeat meanwhile, or nothing to send through.
+        """
+        async with self._locks[command.number]:
+            started = self._waiting.clock()
+            while True:
+                result = await self._ask(command, check, shown)
+                log.debug("%s%s: %s", command.name, command.params, result_name(result))
+                if result == mavlink.MAV_RESULT_ACCEPTED:
+                    return
+                again = result in (WORTH_ASKING_AGAIN if command.patient else command.again_after)
+                if not again or self._waiting.clock() + PATIENCE_PAUSE > started + patience:
+                    raise await self._refusal(command, result, started)
+                await asyncio.sleep(PATIENCE_PAUSE)
+                if shown():
+                    return
+
+    async def send_until_shown(
+        self, command: Command, check: Callable[[], None], shown: Callable[[], bool], what: str
+    ) -> None:
+        """Send `command` until a heartbeat shows that it was done.
+
+        The ack alone does not do: MAVLink does not number commands, so it may be an earlier one's, and this one lost.
+
+        Args:
+            command: what to send.
+            check, shown: as for `send`.
+            what: ends the sentence "vehicle 1 did not …".
+
+        Raises:
+            Rejected, TimedOut, LinkLost: as `send`; and whatever `check` and `shown` raise.
+        """
+        for seconds in SHOWN_WITHIN:
+            await self.send(command, check, shown=shown)
+            with contextlib.suppress(TimedOut):
+                await self._waiting.until({"HEARTBEAT"}, lambda: shown() or None, seconds, what)
+                return
+        raise TimedOut(f"vehicle {self._state.system} did not {what} within {sum(SHOWN_WITHIN):.1f} s")
+
+    def _outstanding(self, number: int) -> deque[Sending]:
+        """The sendings of that command whose ack may still come, oldest first."""
+        unanswered = self._unanswered[number]
+        while unanswered and unanswered[0].at < self._waiting.clock() - LATE_ACK:
+            unanswered.popleft()
+        return unanswered
+
+    async def _ask(self, command: Command, check: Callable[[], None], shown: Callable[[], bool]) -> int:
+        """One exchange: the MAV_RESULT that ends it.
+
+        MAVLink does not number commands. Where the ack is the only proof, as many acks do not count as may
+        still come for earlier commands; each one that comes is followed by one more sending.
+        """
+        unanswered = self._outstanding(command.number)
+        others = sum(sending.params != command.params for sending in unanswered)
+        late = others if command.proven_by_ack else 0
+        address = Address(self._state.system, self._state.component)
+        sendings = SENDINGS if command.repeatable else 1
+        give_up_at = self._waiting.clock() + IN_PROGRESS_LIMIT
+        silences = 0
+        for confirmation in itertools.count():
+            check()
+            with self._waiting.acks(command.number, self._link.source, shown) as acks:
+                await self._link.send(command.to(address, confirmation), self._state.system)
+                unanswered.append(Sending(command.params, self._waiting.clock()))
+                result = await acks.next(ACK_TIMEOUT)
+                while result == mavlink.MAV_RESULT_IN_PROGRESS:
+                    if self._waiting.clock() >= give_up_at:
+                        waited = f"{IN_PROGRESS_LIMIT:g} s"
+                        raise TimedOut(f"vehicle {self._state.system} was not done with {command.name} in {waited}")
+                    result = await acks.next(IN_PROGRESS_TIMEOUT)
+            if result is None:
+                silences += 1
+                if silences == sendings:
+                    break
+                continue
+            if unanswered:
+                unanswered.popleft()
+            if not late:
+                return result
+            late -= 1
+        times = "" if sendings == 1 else f", sent {sendings} times"
+        raise TimedOut(f"vehicle {self._state.system} did not acknowledge {command.name}{times}")
+
+    async def _refusal(self, command: Command, result: int, started: float) -> Rejected:
+        with contextlib.suppress(TimedOut):  # ArduPilot queues its texts, so that they may come after the ack
+            await self._waiting.until(
+                {"STATUSTEXT"}, lambda: self._state.said_since(started) or None, LAST_WORDS, "say why"
+            )
+        said = self._state.said_since(started)
+        ack = result_name(result)
+        because = f": {'; '.join(said)}" if said else ""
+        return Rejected(f"the vehicle refused {command.name} ({ack}){because}", ack, said)
+
+
+def result_name(result: int) -> str:
+    """MAV_RESULT's name, such as `MAV_RESULT_FAILED`."""
+    entry: Any = mavlink.enums["MAV_RESULT"].get(result)
+    return entry.name if entry else f"MAV_RESULT_{result}"

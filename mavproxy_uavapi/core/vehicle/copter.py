@@ -1,0 +1,231 @@
+"""The verbs of a copter."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+
+from mavproxy_uavapi.core.errors import Busy, ModeChanged, NotArmed, Rejected, TimedOut
+from mavproxy_uavapi.core.mavlink.flight_modes import MISSION_MODES, flies_mission
+from mavproxy_uavapi.core.vehicle import messages, time_limits
+from mavproxy_uavapi.core.vehicle.authority import Rank
+from mavproxy_uavapi.core.vehicle.guided import ARRIVAL_SPEED, GUIDED, GuidedVehicle
+from mavproxy_uavapi.core.vehicle.jobs import Job
+from mavproxy_uavapi.core.vehicle.messages import VelocityTarget
+from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
+
+TAKEOFF_SHARE = 0.05  # of the altitude, between TAKEOFF_TOLERANCE's two ends
+TAKEOFF_TOLERANCE = (0.3, 1.0)  # m
+OVER_WITHIN = 3.0  # s at its altitude in which the autopilot should call a takeoff over
+LIFT_OFF_TIMEOUT = 5.0  # s in which an unacknowledged takeoff must show
+SLOWED_DOWN = 0.3  # s in which a pause on the ground takes the motors from full throttle
+STOP_TIMEOUT = 20.0  # s from full speed to rest
+HOME_RADIUS = 10.0  # m; closer than this a vehicle on the ground is at home
+SPEED_MODES = {"GUIDED", "RTL", *MISSION_MODES}  # others refuse DO_CHANGE_SPEED
+
+
+class Copter(GuidedVehicle):
+    """A multicopter or helicopter."""
+
+    @property
+    def takes_speeds(self) -> bool:
+        """Whether its autopilot takes a speed in the mode that it is in."""
+        return self.mode in SPEED_MODES
+
+    # -- up and down --------------------------------------------------------------------------------------
+
+    async def takeoff(self, job: Job, alt: float, timeout: float | None = None) -> None:
+        """Climb to `alt` m above home from the ground, armed and in GUIDED; done within tolerance of it.
+
+        The tolerance is 5 % of `alt`, at least 0.3 m and at most 1 m.
+        """
+        self.require_armed()
+        self.require_mode(GUIDED)
+        if self.state.landed is False:
+            raise Busy("the vehicle is flying already")
+        was_paused = self.authority.paused
+        self.authority.take(job, Rank.ARM)
+        await self._lift_off(job, alt)
+        if was_paused:  # a pause outlives a takeoff in the autopilot
+            await self._continue(job)
+        limits = await self.limits()
+        low, high = TAKEOFF_TOLERANCE
+        tolerance = min(max(TAKEOFF_SHARE * alt, low), high)
+
+        near_since: float | None = None
+
+        def reached() -> bool | None:
+            nonlocal near_since
+            self._report_leg(job, abs(alt - self.height))
+            climb = self.state.field("GLOBAL_POSITION_INT", "vz") or 0
+            slow = abs(climb) / 100.0 <= 2 * ARRIVAL_SPEED
+            if not (abs(alt - self.height) <= tolerance and slow):
+                near_since = None
+                return None
+            near_since = self.clock() if near_since is None else near_since
+            # Movements are refused until the autopilot calls it over, which it does a moment later.
+            over = not self.is_taking_off or self.clock() - near_since >= OVER_WITHIN
+            return True if over else None
+
+        allowed = self.allowed(time_limits.leg_time(limits, 0.0, alt), timeout)
+        names = {"GLOBAL_POSITION_INT", "EXTENDED_SYS_STATE"}
+        await self.flown(GUIDED, names, reached, allowed, f"reach {alt:g} m")
+        self.authority.shown(job)
+
+    async def _lift_off(self, job: Job, alt: float) -> None:
+        try:
+            await self.commands.send(messages.takeoff(alt), self.commanding(job, self.flying))
+        except TimedOut:  # the ack may be lost; then the vehicle itself shows that it was heard
+            ratio = max(self.state.time_ratio.ratio, 0.1)
+            await self.flown(
+                GUIDED,
+                {"EXTENDED_SYS_STATE"},
+                lambda: True if self.state.landed is False else None,
+                max(LIFT_OFF_TIMEOUT, LIFT_OFF_TIMEOUT / ratio),
+                "acknowledge the takeoff, nor lift off",
+            )
+
+    async def land(self, job: Job, timeout: float | None = None) -> None:
+        """Land where it is; done when it has disarmed.
+
+        On the ground and disarmed nothing is sent, and an `arm` that waits ends.
+        """
+        self.authority.take(job, Rank.STOP)
+        if self.state.armed is False:
+            return
+        await self.switch_to(job, "LAND")
+        limits = await self.limits()
+        expected = time_limits.landing_time(limits, self.height)
+        await self._flown_home(job, "LAND", limits, self.allowed(expected, timeout))
+
+    async def rtl(self, job: Job, timeout: float | None = None) -> None:
+        """Return to launch; done when the vehicle has landed there and disarmed.
+
+        On the ground and disarmed it is not switched, and an `arm` that waits ends: at home it is done, elsewhere
+        `NotArmed`.
+
+        Raises:
+            NotFound: disarmed, and it has no home yet.
+            ModeChanged: somebody armed it while its home was asked for.
+        """
+        self.authority.take(job, Rank.STOP)
+        distance = self.distance_home()
+        if self.state.armed is False:
+            if distance is None:
+                await self.home()
+                if self.state.armed is not False:
+                    raise ModeChanged(f"the vehicle was armed meanwhile, in {self.mode}: whoever armed it has it")
+                self.fresh("GLOBAL_POSITION_INT")
+                distance = self.distance_home() or 0.0
+            if distance > HOME_RADIUS:
+                raise NotArmed(f"the vehicle is disarmed, {distance:.0f} m from home")
+            return
+        await self.switch_to(job, "RTL")
+        limits = await self.limits()
+        expected = time_limits.return_time(limits, self.distance_home() or 0.0, self.height)
+        await self._flown_home(job, "RTL", limits, self.allowed(expected, timeout))
+
+    async def _flown_home(self, job: Job, mode: str, limits: time_limits.Limits, timeout: float) -> None:
+        """Wait until it has landed and disarmed in that mode; motors that stop in flight are no landing."""
+        landing = Touchdown(limits)
+
+        def landed() -> bool | None:
+            self._report(job)
+            landing.sinks_at((self.state.field("GLOBAL_POSITION_INT", "vz") or 0) / 100.0)
+            if self.state.armed is not False or self.mode != mode:
+                self.held_by(mode)
+                return None
+            if landing.fell:
+                raise NotArmed("the vehicle was disarmed in flight, and fell")
+            return landing.is_over(self.clock(), self.state.age("GLOBAL_POSITION_INT", self.clock()))
+
+        names = {"HEARTBEAT", "GLOBAL_POSITION_INT"}
+        await self.waiting.until(names, landed, timeout, f"land and disarm in {mode}")
+
+    def _report(self, job: Job) -> None:
+        job.progress = {"altitude": self.height}
+        distance = self.distance_home()
+        if distance is not None:
+            job.progress["distance_to_go"] = distance
+
+    # -- stopping -----------------------------------------------------------------------------------------
+
+    async def set_mode(self, job: Job, mode: str) -> None:
+        """Switch to any mode. GUIDED ends a `stop` too: the vehicle stays where it is, and takes movements again."""
+        was_paused = self.authority.paused
+        await super().set_mode(job, mode)
+        if was_paused and mode.upper() == GUIDED and self.authority.paused:
+            if self.state.armed:
+                await self.send_setpoint(job, VelocityTarget(0, 0, 0))  # it must not take up the old movement
+            await self._continue(job)
+
+    async def stop(self, job: Job) -> None:
+        """Hold the vehicle still, in GUIDED or in its mission, until `resume`; done when telemetry shows it.
+
+        A movement under way waits; no other begins. A mission that cannot be paused just now is left for BRAKE.
+
+        Raises:
+            ModeChanged: it is in another mode.
+        """
+        if self.authority.on_its_way and not self.state.armed:
+            self.authority.take(job, Rank.STOP)  # an arm that waits ends
+        self.require_armed()
+        mode = self.mode
+        if mode != GUIDED and not flies_mission(mode):
+            raise ModeChanged(f"the vehicle is in {mode}, which cannot be paused; `brake` stops it")
+        self.authority.interrupt(job)
+        try:
+            await self.commands.send(messages.pause(True), self.commanding(job, lambda: self.held_by(mode)))
+        except TimedOut:
+            pass  # the acks may be lost; whether it stands still is what counts
+        except Rejected:
+            if mode == GUIDED:
+                self.authority.end_pause()
+                raise
+            await self.switch_to(job, "BRAKE")
+            mode = "BRAKE"
+        names = {"LOCAL_POSITION_NED"}
+        await self.flown(mode, names, lambda: self.stands_still or None, STOP_TIMEOUT, "stop")
+        self.authority.shown(job)
+
+    async def resume(self, job: Job) -> None:
+        """Continue the movement that `stop` interrupted."""
+        self.require_armed()
+        if not flies_mission(self.mode):
+            self.require_mode(GUIDED)
+        self.authority.accompany(job, "resume", stopped_too=True)
+        one = self.authority.interrupted
+        if one is not None and one.steers and not one.running and self.mode == GUIDED:
+            await self.send_setpoint(job, VelocityTarget(0, 0, 0))  # nobody sends what it flew by any more
+        await self._continue(job)
+
+    async def _continue(self, job: Job) -> None:
+        mode = self.mode
+        await self.commands.send(messages.pause(False), self.commanding(job, lambda: self.require_mode(mode)))
+        self.authority.end_pause()
+
+    async def hold(self, job: Job) -> None:
+        """Stop and stay, however it flies for us: by zero velocities in GUIDED, else by BRAKE.
+
+        A mode that is on its way to it counts: it is not in GUIDED any more when it hears us.
+        """
+        self.authority.take(job, Rank.STOP)
+        if not self.mode == self.next_mode == GUIDED:
+            await self.switch_to(job, "BRAKE")
+        elif self.state.landed and not self.authority.paused:
+            await self._hold_down(job)
+        else:
+            await self.rest(job)
+
+    async def _hold_down(self, job: Job) -> None:
+        """Break off a take-off before it lifts off: a pause first, in which the motors slow down.
+
+        ArduCopter takes a setpoint between full throttle and lift-off for a defect of its own ("Internal Errors",
+        flow_of_ctrl), and does not arm any more until it reboots.
+        """
+        with contextlib.suppress(TimedOut):  # the setpoints are sent all the same
+            self.authority.begin_pause()  # who takes over meanwhile has to end it
+            await self.commands.send(messages.pause(True), self.commanding(job, self.flying))
+            await asyncio.sleep(SLOWED_DOWN)
+        await self.rest(job)
+        await self._continue(job)

@@ -1,0 +1,184 @@
+"""What a vehicle does when the job that flies it ends: the one place that decides, by telemetry, and sees to it.
+
+Whoever superseded a job, and the pilot, have the vehicle: nothing is sent then. Else the table says what follows. It
+is a job like any other: it commands by rank, is sent until telemetry shows it, and ends when somebody else commands.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Awaitable, Callable, Collection, Mapping
+from enum import Enum
+from typing import Any
+
+from mavproxy_uavapi.core.errors import LinkLost, ModeChanged, NotArmed, Paused
+from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission, mode_number
+from mavproxy_uavapi.core.vehicle.authority import Rank
+from mavproxy_uavapi.core.vehicle.copter import Copter
+from mavproxy_uavapi.core.vehicle.jobs import Ending, Job, JobBook
+from mavproxy_uavapi.core.vehicle.messages import NO_YAW, VelocityTarget, set_mode
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+
+log = logging.getLogger("uavapi.copter")
+
+
+class Policy(Enum):
+    """What is wanted of a vehicle that nobody flies any more."""
+
+    NOTHING = "nothing"  # it goes on with what it was told last
+    HOLD = "hold"  # it stops and stays, a landing too
+    SAFE = "safe"  # it stops and stays, but what the autopilot flies by itself goes on
+    LAND = "land"
+    RTL = "rtl"
+
+
+class Situation(Enum):
+    """What telemetry shows."""
+
+    UNKNOWN = "not known"  # no heartbeat, or none since it booted
+    DISARMED = "disarmed"
+    IDLE = "stands on the ground"  # in a landing's mode, its motors idle
+    GUIDED = "GUIDED"  # on the ground too: a climb begins there
+    PAUSED = "held still"  # with a target yet, which `resume` would fly to
+    MISSION = "AUTO"
+    LAND = "LAND"
+    RTL = "RTL"
+    PILOTED = "its pilot's mode"
+
+
+NOTHING = dict.fromkeys(Policy)
+HOLD, LAND, RTL = "hold", "land", "rtl"
+WHAT_FOLLOWS: Mapping[Situation, Mapping[Policy, str | None]] = {
+    Situation.UNKNOWN: NOTHING,
+    Situation.DISARMED: NOTHING,
+    Situation.IDLE: NOTHING,
+    Situation.PILOTED: NOTHING,
+    Situation.GUIDED: {**NOTHING, Policy.HOLD: HOLD, Policy.SAFE: HOLD, Policy.LAND: LAND, Policy.RTL: RTL},
+    Situation.PAUSED: {**NOTHING, Policy.HOLD: HOLD, Policy.SAFE: HOLD, Policy.LAND: LAND, Policy.RTL: RTL},
+    Situation.MISSION: {**NOTHING, Policy.HOLD: HOLD, Policy.LAND: LAND, Policy.RTL: RTL},
+    Situation.LAND: {**NOTHING, Policy.HOLD: HOLD},
+    Situation.RTL: {**NOTHING, Policy.HOLD: HOLD, Policy.LAND: LAND},
+}
+HOLDING_MODES = {"plane": "LOITER", "rover": "HOLD"}  # of what does not hover
+RETURNS = {"RTL", "SMART_RTL"}
+# A pilot has it, whoever stopped it, or the autopilot's own failsafe.
+HAS_ANOTHER_MASTER = (ModeChanged, NotArmed, Paused, LinkLost)
+FIXED: Mapping[Ending, Policy] = {
+    Ending.DONE: Policy.NOTHING,
+    Ending.FAILED: Policy.NOTHING,  # its pilot has it, or it goes on to the target that it has
+    Ending.SUPERSEDED: Policy.NOTHING,
+    Ending.ABORTED: Policy.HOLD,
+    Ending.UNLOADED: Policy.SAFE,
+    Ending.DEFECT: Policy.SAFE,
+}
+
+
+def situation(vehicle: Vehicle, modes: Collection[str] = ()) -> Situation:
+    """What telemetry shows of it.
+
+    Args:
+        vehicle: which.
+        modes: those that the job which ended had switched to; a landing or a mission of another is its pilot's.
+    """
+    state, mode = vehicle.state, vehicle.next_mode
+    if not state.armed:
+        return Situation.UNKNOWN if state.armed is None else Situation.DISARMED
+    if mode == "GUIDED":
+        return Situation.PAUSED if vehicle.authority.paused else Situation.GUIDED
+    if mode not in modes:
+        return Situation.PILOTED
+    if mode == "LAND" or mode in RETURNS:
+        flown = Situation.LAND if mode == "LAND" else Situation.RTL
+        return Situation.IDLE if state.landed else flown
+    return Situation.MISSION if flies_mission(mode) else Situation.PILOTED
+
+
+class FlightEndings:
+    """Sees to the vehicles of jobs that end.
+
+    Attributes:
+        on_disconnect: what a vehicle does whose client hung up.
+        on_script_exit: what a vehicle does whose script died.
+
+    Args:
+        jobs: all jobs.
+    """
+
+    def __init__(self, jobs: JobBook) -> None:
+        self.on_disconnect = Policy.NOTHING
+        self.on_script_exit = Policy.HOLD
+        self._jobs = jobs
+        self._closing: dict[str, Job] = {}  # by the number of the job that it follows
+        jobs.on_ended.append(self._ended)
+
+    def policy(self, job: Job) -> Policy:
+        """What is wanted of the vehicle of a job that has ended."""
+        assert job.ending is not None
+        if job.ending is Ending.CLIENT_GONE:
+            return self.on_disconnect
+        if job.ending is Ending.SCRIPT_GONE:
+            return self.on_script_exit
+        if job.ending is Ending.FAILED and job.steers and not isinstance(job.error, HAS_ANOTHER_MASTER):
+            return Policy.SAFE
+        return FIXED[job.ending]
+
+    def closing(self, job: Job) -> Job | None:
+        """The job that sees to the vehicle after `job`; None when nothing is sent."""
+        return self._closing.get(job.id)
+
+    def _ended(self, job: Job) -> None:
+        vehicle = job.vehicle
+        if isinstance(vehicle, Vehicle) and job in (vehicle.authority.commander, vehicle.authority.interrupted):
+            closing = self.see_to(vehicle, self.policy(job), f"after {job.verb}", job.client, job.modes)
+            if closing is not None:
+                self._closing = {n: one for n, one in self._closing.items() if one.running} | {job.id: closing}
+
+    def what_follows(self, vehicle: Vehicle, policy: Policy, modes: Collection[str] = ()) -> str | None:
+        """What the vehicle would be told now, as `see_to`; None for nothing."""
+        return WHAT_FOLLOWS[situation(vehicle, modes)][policy]
+
+    def last_words(self) -> list[tuple[Any, int]]:
+        """What must be sent before nobody can send any more: messages, and the systems that they go to."""
+        found = []
+        for job in self._closing.values():
+            if job.running:
+                number = mode_number(job.vehicle.state.vehicle_type, "BRAKE")
+                rest = VelocityTarget(0, 0, 0).to(job.vehicle.address, NO_YAW)
+                guided = job.vehicle.mode == job.vehicle.next_mode == "GUIDED"
+                message = rest if guided else set_mode(number).to(job.vehicle.address, 0)
+                found.append((message, job.vehicle.state.system))
+        return found
+
+    def see_to(
+        self, vehicle: Vehicle, policy: Policy, why: str, client: str, modes: Collection[str] = ()
+    ) -> Job | None:
+        """Have the vehicle do what follows; the job that does it, None where nothing is sent.
+
+        Args:
+            vehicle: which.
+            policy: what is wanted.
+            why: for the log and the trail.
+            client: in whose name.
+            modes: those that the job which ended had switched to.
+        """
+        action = self.what_follows(vehicle, policy, modes)
+        shown = situation(vehicle, modes).value
+        log.info("vehicle %d, %s: %s, so %s", vehicle.state.system, why, shown, action or "nothing is sent")
+        if action is None:
+            return None
+        verb = _verb(vehicle, action)
+
+        async def body(job: Job) -> str:
+            await verb(job)
+            return f"{action} is done"
+
+        job = self._jobs.begin(vehicle, f"{action} {why}", {}, body, client=client, outlives_client=True)
+        vehicle.authority.take(job, Rank.STOP)  # at once: what comes now is newer
+        return job
+
+
+def _verb(vehicle: Vehicle, action: str) -> Callable[[Job], Awaitable[None]]:
+    if isinstance(vehicle, Copter):
+        return {HOLD: vehicle.hold, LAND: vehicle.land, RTL: vehicle.rtl}[action]
+    mode = HOLDING_MODES.get(vehicle.kind, "RTL") if action == HOLD else "RTL"
+    return lambda job: vehicle.set_mode(job, mode)

@@ -1,0 +1,232 @@
+"""Verbs in flight: every blocking call is a job that somebody awaits.
+
+Which of them commands a vehicle is the vehicle's CommandAuthority's to say. An identical request joins the job that
+is in flight.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+from collections.abc import Awaitable, Callable, Mapping
+from enum import Enum
+from typing import Any
+
+from mavproxy_uavapi.core.errors import Aborted, Superseded, TimedOut, UavApiError, without_frames
+from mavproxy_uavapi.core.sent_messages import SentNames, noting_sent_if_nobody_does
+
+FINISHED_KEPT = 100
+CONSOLE = "console"  # the client of what was typed at MAVProxy's prompt
+
+
+class Ending(Enum):
+    """Why a job ended; `endings.py` says what its vehicle does then."""
+
+    DONE = "done"
+    FAILED = "failed"  # the vehicle or its pilot stood against it, or it took too long
+    SUPERSEDED = "superseded"
+    ABORTED = "aborted"  # by DELETE, or at the prompt
+    CLIENT_GONE = "client gone"
+    SCRIPT_GONE = "script gone"
+    UNLOADED = "unloaded"  # the API stops, or a module is unloaded
+    DEFECT = "defect"  # of ours
+
+
+class Job:
+    """One verb in flight.
+
+    Attributes:
+        id: its number, as text.
+        verb: the path that was called, `/movement/go_to_ned_wait`.
+        request: the validated parameters.
+        vehicle: what it commands; two jobs of one vehicle have the same object here.
+        client: who asked for it: an address, or CONSOLE.
+        began_at, ended_at: on the loop's clock (s); ended_at is None while it runs.
+        ending: why it ended; None while it runs.
+        steers: whether the vehicle is flown by what the job goes on sending, so that it must not go on without it.
+        modes: names of the flight modes that it switched to: in any other the vehicle is somebody else's.
+        script: the session of the script that asked for it; None where none did.
+        outlives_client: whether it goes on when its client hangs up (land, rtl).
+        stage: of a verb that is made of others, which one it is at: its name and numbers.
+        progress: what it last said of itself, such as distance_to_go (m) and altitude (m above home).
+        result: the text of its success.
+        error: why it failed.
+        sent: names of the messages sent for it; None where the HTTP call that began it notes them.
+    """
+
+    def __init__(
+        self, number: int, verb: str, request: Mapping[str, Any], vehicle: Any, *, client: str, outlives_client: bool
+    ) -> None:
+        self.id = str(number)
+        self.client = client
+        self.verb = verb
+        self.request = dict(request)
+        self.vehicle = vehicle
+        self.outlives_client = outlives_client
+        self.stage: dict[str, str | int] = {}
+        self.progress: dict[str, float] = {}
+        self.result: str | None = None
+        self.error: UavApiError | None = None
+        self.sent: SentNames | None = None
+        self._loop = asyncio.get_running_loop()
+        self.began_at = self._loop.time()
+        self.ended_at: float | None = None
+        self.ending: Ending | None = None
+        self.steers = False
+        self.modes: set[str] = set()
+        self.script: str | None = None
+        self._task: asyncio.Task[None] | None = None
+        self._limit: asyncio.TimerHandle | None = None
+        self._finished = asyncio.Event()
+        self._clients = 0
+        self._when_ended: list[Callable[[], None]] = []
+
+    @property
+    def running(self) -> bool:
+        """Whether it has no outcome yet."""
+        return not self._finished.is_set()
+
+    def is_for(self, verb: str, request: Mapping[str, Any]) -> bool:
+        """Whether it does just what another request asks for."""
+        return self.verb == verb and self.request == dict(request)
+
+    @property
+    def outcome_name(self) -> str:
+        """`running`, `succeeded` or `failed`."""
+        if self.running:
+            return "running"
+        return "succeeded" if self.error is None else "failed"
+
+    def start(self, body: Callable[[Job], Awaitable[str]], timeout: float | None = None) -> None:
+        """Run `body`, whose text is the result; it never outlives `timeout` (s)."""
+        self._task = self._loop.create_task(self._run(body))
+        if timeout is not None:
+            self._limit = self._loop.call_later(timeout, self._overdue, timeout)
+
+    def _overdue(self, timeout: float) -> None:
+        left = self.progress.get("distance_to_go")
+        to_go = "" if left is None else f": {left:.1f} m to go"
+        self.abort(TimedOut(f"{self.verb} was not done within {timeout:g} s{to_go}"), Ending.FAILED)
+
+    async def _run(self, body: Callable[[Job], Awaitable[str]]) -> None:
+        try:
+            result = await body(self)
+        except UavApiError as error:
+            self._finish(Ending.SUPERSEDED if isinstance(error, Superseded) else Ending.FAILED, error=error)
+        except asyncio.CancelledError:
+            self._finish(Ending.UNLOADED, error=Aborted(f"{self.verb} was aborted"))
+            raise
+        except Exception as error:  # a defect of ours: its client learns of it, and the log has the trace
+            sentence = f"{self.verb} failed by a defect of this program: {error!r}"
+            self._finish(Ending.DEFECT, error=UavApiError(sentence))
+            raise
+        else:
+            self._finish(Ending.DONE, result)
+
+    def abort(self, error: UavApiError, ending: Ending | None = None) -> None:
+        """End it now with that error: its clients know at once, and it sends nothing more.
+
+        Args:
+            error: what its clients are told.
+            ending: why; ABORTED, or SUPERSEDED for that error, where it is not said.
+        """
+        self._finish(ending or (Ending.SUPERSEDED if isinstance(error, Superseded) else Ending.ABORTED), error=error)
+        if self._task is not None:
+            self._task.cancel()
+
+    def _finish(self, ending: Ending, result: str | None = None, error: UavApiError | None = None) -> None:
+        if self.running:
+            self.ending = ending
+            self.result, self.error = result, None if error is None else without_frames(error)
+            self.ended_at = self._loop.time()
+            if self._limit is not None:
+                self._limit.cancel()
+            self._finished.set()
+            for callback in self._when_ended:
+                callback()
+
+    def when_ended(self, callback: Callable[[], None]) -> None:
+        """Have `callback` called when the outcome of a running job is known."""
+        self._when_ended.append(callback)
+
+    async def outcome(self) -> str:
+        """Await its result for a client; when the last client hangs up, the job ends too.
+
+        Raises:
+            UavApiError: what the job failed with.
+        """
+        self._clients += 1
+        try:
+            await self._finished.wait()
+        finally:
+            self._clients -= 1
+            if self.running and not self._clients and not self.outlives_client:
+                self.abort(Aborted(f"{self.verb}: its client hung up"), Ending.CLIENT_GONE)
+        if self.error is not None:
+            raise self.error
+        assert self.result is not None
+        return self.result
+
+
+class JobBook:
+    """All jobs, the running ones and the last finished ones.
+
+    Attributes:
+        on_ended: called with each job when its outcome is known.
+    """
+
+    def __init__(self) -> None:
+        self.on_ended: list[Callable[[Job], None]] = []
+        self._jobs: dict[str, Job] = {}
+        self._running: dict[str, Job] = {}
+        self._numbers = itertools.count(1)
+
+    def begin(
+        self,
+        vehicle: Any,
+        verb: str,
+        request: Mapping[str, Any],
+        body: Callable[[Job], Awaitable[str]],
+        *,
+        client: str = CONSOLE,
+        outlives_client: bool = False,
+        timeout: float | None = None,
+    ) -> Job:
+        """Start a job for `vehicle`, or join the one that does just the same."""
+        for job in self.running():
+            if job.vehicle is vehicle and job.is_for(verb, request):
+                return job
+        job = Job(next(self._numbers), verb, request, vehicle, client=client, outlives_client=outlives_client)
+        self._jobs[job.id] = self._running[job.id] = job
+        job.when_ended(lambda: self._ended(job))
+        self._forget_old()
+        with noting_sent_if_nobody_does() as job.sent:
+            job.start(body, timeout)
+        return job
+
+    def _ended(self, job: Job) -> None:
+        del self._running[job.id]
+        for callback in self.on_ended:
+            callback(job)
+
+    def get(self, number: str) -> Job | None:
+        """The job of that number; None when there is none, or it is forgotten."""
+        return self._jobs.get(number)
+
+    def all(self) -> list[Job]:
+        """The running jobs and the last ones that ended, oldest first."""
+        return list(self._jobs.values())
+
+    def running(self) -> list[Job]:
+        """The jobs without an outcome, oldest first."""
+        return list(self._running.values())
+
+    def abort_remote(self, reason: str) -> None:
+        """End every running job that came over the network."""
+        for job in self.running():
+            if job.client != CONSOLE:
+                job.abort(Aborted(f"{job.verb}: {reason}"), Ending.UNLOADED)
+
+    def _forget_old(self) -> None:
+        while len(self._jobs) - len(self._running) > FINISHED_KEPT:
+            del self._jobs[next(number for number in self._jobs if number not in self._running)]

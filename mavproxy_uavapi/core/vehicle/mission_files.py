@@ -1,0 +1,286 @@
+"""Mission files -> mission items: QGC WPL 110, QGroundControl's .plan, and our own JSON. pymavlink parses.
+
+Item 0 of an ArduPilot mission is home, which is no item here: a list begins with item 1.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from pymavlink import mavutil, mavwp
+
+from mavproxy_uavapi.core.errors import BadRequest, Invalid
+from mavproxy_uavapi.core.mavlink.link import Address
+
+mavlink = mavutil.mavlink
+
+FRAMES = {
+    "amsl": mavlink.MAV_FRAME_GLOBAL,
+    "relative": mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+    "terrain": mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT,
+    "mission": mavlink.MAV_FRAME_MISSION,
+}
+SAME_FRAMES = {
+    mavlink.MAV_FRAME_GLOBAL_INT: mavlink.MAV_FRAME_GLOBAL,
+    mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+    mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT: mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT,
+}
+WPL_110 = "QGC WPL 110"
+LOWEST, HIGHEST = -1000.0, 10_000.0  # m, in whichever frame
+MOST_ITEMS = 5000  # more than any ArduPilot vehicle stores
+ALTITUDE_TOLERANCE = 0.02  # m; ArduPilot stores whole centimetres
+PLACE_TOLERANCE = 10  # 1e-7 degrees, about 0.1 m; an autopilot that answers in floats has no more
+DEGREES = 1e7
+
+
+@dataclass(frozen=True)
+class Item:
+    """One mission item.
+
+    Attributes:
+        command: MAV_CMD.
+        frame: MAV_FRAME.
+        params: param1 to param4.
+        x, y: 1e-7 degrees where the command has a location, else param5 and param6 as they are.
+        z: m in its frame where the command has a location, else param7.
+        autocontinue: whether the mission goes on by itself.
+    """
+
+    command: int
+    frame: int
+    params: tuple[float, float, float, float]
+    x: int
+    y: int
+    z: float
+    autocontinue: bool = True
+
+    @property
+    def name(self) -> str:
+        """MAV_CMD's name without its prefix."""
+        entry = mavlink.enums["MAV_CMD"].get(self.command)
+        return entry.name.removeprefix("MAV_CMD_") if entry else str(self.command)
+
+    @property
+    def has_location(self) -> bool:
+        """Whether x, y and z are a place."""
+        return has_location(self.command)
+
+    def to(self, address: Address, seq: int) -> Any:
+        """MISSION_ITEM_INT number `seq` to `address`."""
+        head = (*address, seq, self.frame, self.command, 0, int(self.autocontinue))
+        return mavlink.MAVLink_mission_item_int_message(*head, *self.params, self.x, self.y, self.z)
+
+    def report(self, seq: int) -> dict[str, Any]:
+        """What clients see, and may post again."""
+        told: dict[str, Any] = {"seq": seq, "command": self.name, "frame": _frame_name(self.frame)}
+        told |= {f"param{number}": value for number, value in enumerate(self.params, 1)}
+        if self.has_location:
+            told |= {"lat": self.x / DEGREES, "long": self.y / DEGREES, "alt": self.z}
+        else:
+            told |= {"param5": self.x, "param6": self.y, "param7": self.z}
+        return {**told, "autocontinue": self.autocontinue}
+
+
+HOME = Item(mavlink.MAV_CMD_NAV_WAYPOINT, mavlink.MAV_FRAME_GLOBAL, (0.0, 0.0, 0.0, 0.0), 0, 0, 0.0)
+
+
+def has_location(command: int) -> bool:
+    """Whether param5 to param7 of a MAV_CMD are latitude, longitude and altitude."""
+    entry = mavlink.enums["MAV_CMD"].get(command)
+    return bool(entry is not None and entry.has_location)
+
+
+def read(text: str) -> list[Item]:
+    """The items of a mission in any of the three formats.
+
+    Raises:
+        BadRequest: it is none of them.
+        Invalid: an item of it is of no use.
+    """
+    if text.lstrip("\ufeff").startswith("QGC WPL"):
+        return checked(_from_wpl(text.lstrip("\ufeff")))
+    try:
+        given = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise BadRequest(f"a mission is a QGC WPL 110 file, a .plan file, or JSON: {error}") from error
+    if isinstance(given, dict) and isinstance(given.get("mission"), dict):
+        given = _flattened(given["mission"].get("items"))
+        return checked(_loaded(given, _from_plan_item))
+    if isinstance(given, dict):
+        given = given.get("items")
+    if not isinstance(given, list):
+        raise BadRequest('JSON of a mission is {"items": [...]}, or a .plan file')
+    return checked(_loaded(given, _from_json_item))
+
+
+def from_message(message: Any) -> Item:
+    """The item of a MISSION_ITEM_INT or MISSION_ITEM."""
+    as_int = message.get_type() == "MISSION_ITEM_INT"
+    scale = DEGREES if has_location(message.command) and not as_int else 1.0
+    x, y = (_whole(value * scale) for value in (message.x, message.y))
+    params = (message.param1, message.param2, message.param3, message.param4)
+    return Item(message.command, message.frame, params, x, y, message.z, bool(message.autocontinue))
+
+
+def difference(wanted: Sequence[Item], found: Sequence[Item]) -> str | None:
+    """How a mission that was read back differs from what was sent, in words; None where it does not.
+
+    Command, place and altitude are looked at: of the parameters each autopilot keeps what it needs.
+    """
+    if len(wanted) != len(found):
+        return f"it has {len(found)} items, not {len(wanted)}"
+    for seq, (one, other) in enumerate(zip(wanted, found, strict=True), 1):
+        if one.command != other.command:
+            return f"item {seq} is {other.name}, not {one.name}"
+        if one.has_location and not _same_place(one, other):
+            return f"item {seq} ({one.name}) is at another place"
+    return None
+
+
+def _same_place(one: Item, other: Item) -> bool:
+    return (
+        SAME_FRAMES.get(one.frame, one.frame) == SAME_FRAMES.get(other.frame, other.frame)
+        and abs(one.x - other.x) <= PLACE_TOLERANCE
+        and abs(one.y - other.y) <= PLACE_TOLERANCE
+        and abs(one.z - other.z) <= ALTITUDE_TOLERANCE
+    )
+
+
+def checked(messages: Sequence[Any]) -> list[Item]:
+    """The items of MISSION_ITEMs whose values can be flown.
+
+    Raises:
+        Invalid: with one entry for each problem.
+    """
+    if not 0 < len(messages) <= MOST_ITEMS:
+        raise Invalid(f"a mission has 1 to {MOST_ITEMS} items besides home, not {len(messages)}", "body", "items")
+    found = [(seq, _problem(message)) for seq, message in enumerate(messages, 1)]
+    problems = [
+        {"loc": ["body", "items", seq], "msg": problem, "type": "value_error"} for seq, problem in found if problem
+    ]
+    if problems:
+        raise Invalid(problems)
+    return [from_message(message) for message in messages]
+
+
+def _problem(message: Any) -> str | None:
+    """What is wrong with a MISSION_ITEM; None where nothing is."""
+    numbers = [getattr(message, f"param{number}") for number in range(1, 5)] + [message.x, message.y, message.z]
+    if not all(math.isfinite(number) and abs(number) < 1e30 for number in numbers):
+        return "a number is not finite, or is too large"
+    if not 0 <= message.command <= 65535:
+        return f"there is no command {message.command}"
+    if message.frame not in (*FRAMES.values(), *SAME_FRAMES):
+        return f"frame {message.frame} is none of a mission's"
+    if not has_location(message.command):
+        return None if max(abs(message.x), abs(message.y)) < 2**31 else "param5 or param6 is too large"
+    return _misplaced(message.x, message.y, message.z)
+
+
+def _misplaced(lat: float, lon: float, alt: float) -> str | None:
+    if not abs(lat) <= 90:
+        return f"latitude {lat:g} is not between -90 and 90 degrees"
+    if not abs(lon) <= 180:
+        return f"longitude {lon:g} is not between -180 and 180 degrees"
+    return None if LOWEST <= alt <= HIGHEST else f"altitude {alt:g} m is not between {LOWEST:g} and {HIGHEST:g}"
+
+
+def _from_wpl(text: str) -> list[Any]:
+    loader = mavwp.MAVWPLoader()
+    header, _, rows = text.partition("\n")
+    if header.strip() != WPL_110:
+        raise BadRequest(f"this is no {WPL_110} file: it begins with {header.strip()!r}")
+    try:
+        # What load() calls once it has opened a file, which it leaves open when a row is wrong.
+        loader._read_waypoints_v110(io.StringIO(rows))
+    except (mavwp.MAVWPError, ValueError) as error:
+        raise BadRequest(f"this is no {WPL_110} file: {error}") from error
+    if loader.count() and loader.item(0).command != mavlink.MAV_CMD_NAV_WAYPOINT:
+        raise BadRequest("the first row of a QGC WPL file is home, a waypoint (16); this one is another command")
+    return list(loader.wpoints[1:])
+
+
+def _loaded(items: Iterable[Any], convert: Any) -> list[Any]:
+    """MISSION_ITEMs of JSON items."""
+    loader = mavwp.MAVWPLoader()
+    for seq, item in enumerate(items, 1):
+        try:
+            if not isinstance(item, dict):
+                raise ValueError("an item is a JSON object")
+            command, frame, autocontinue, numbers = convert(item)
+            loader.add(mavlink.MAVLink_mission_item_message(0, 0, seq, frame, command, 0, autocontinue, *numbers))
+        except (TypeError, ValueError, KeyError, OverflowError) as error:
+            raise Invalid(f"{type(error).__name__}: {error}", "body", "items", str(seq)) from error
+    return list(loader.wpoints)
+
+
+def _flattened(items: Any) -> list[Any]:
+    """The simple items of a .plan file, those of its surveys and corridors included.
+
+    Raises:
+        BadRequest: there are none, or some that only QGroundControl can turn into simple ones.
+    """
+    if not isinstance(items, list):
+        raise BadRequest("the .plan file has no mission items")
+    found: list[Any] = []
+    for item in items:
+        if not isinstance(item, dict) or item.get("type") != "ComplexItem":
+            found.append(item)
+            continue
+        transects = item.get("TransectStyleComplexItem")
+        if not isinstance(transects, dict) or not isinstance(transects.get("Items"), list):
+            raise BadRequest(f"the .plan file has a {item.get('complexItemType')}, which this API cannot fly")
+        found += _flattened(transects["Items"])
+    return found
+
+
+def _from_plan_item(item: Mapping[str, Any]) -> tuple[int, int, int, list[float]]:
+    numbers = [0.0 if number is None else _float(number) for number in item["params"]]
+    if len(numbers) != 7:
+        raise ValueError("params has 7 numbers")
+    return _int(item["command"]), _int(item["frame"]), int(bool(item.get("autoContinue", True))), numbers
+
+
+def _from_json_item(item: Mapping[str, Any]) -> tuple[int, int, int, list[float]]:
+    place = [item.get(place, item.get(f"param{number}", 0)) for number, place in enumerate(("lat", "long", "alt"), 5)]
+    numbers = [_float(item.get(f"param{number}", 0)) for number in range(1, 5)] + [_float(number) for number in place]
+    frame = item.get("frame", "relative")
+    if isinstance(frame, str):
+        frame = FRAMES[frame.lower()]
+    return _command(item["command"]), _int(frame), int(bool(item.get("autocontinue", True))), numbers
+
+
+def _command(given: Any) -> int:
+    """A MAV_CMD by its number or its name, with or without the prefix."""
+    if not isinstance(given, str):
+        return _int(given)
+    number = getattr(mavlink, f"MAV_CMD_{given.upper().removeprefix('MAV_CMD_')}", None)
+    if number is None:
+        raise ValueError(f"there is no command {given!r}")
+    return int(number)
+
+
+def _int(given: Any) -> int:
+    if isinstance(given, bool) or not isinstance(given, int):
+        raise ValueError(f"{given!r} is no whole number")
+    return given
+
+
+def _float(given: Any) -> float:
+    if isinstance(given, bool) or not isinstance(given, int | float):
+        raise ValueError(f"{given!r} is no number")
+    return float(given)
+
+
+def _whole(value: float) -> int:
+    return value if isinstance(value, int) else round(value)
+
+
+def _frame_name(frame: int) -> str | int:
+    plain = SAME_FRAMES.get(frame, frame)
+    return next((name for name, number in FRAMES.items() if number == plain), frame)

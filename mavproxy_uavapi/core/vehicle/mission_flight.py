@@ -1,0 +1,161 @@
+"""Flying the mission that a vehicle holds: AUTO from its first item, and how far it has come."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from pymavlink import mavutil
+
+from mavproxy_uavapi.core.errors import Busy, ModeChanged, Stale
+from mavproxy_uavapi.core.mavlink.flight_modes import MISSION_MODES, flies_mission
+from mavproxy_uavapi.core.vehicle import messages
+from mavproxy_uavapi.core.vehicle.authority import Rank
+from mavproxy_uavapi.core.vehicle.jobs import Job
+from mavproxy_uavapi.core.vehicle.mission_files import Item
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+
+mavlink = mavutil.mavlink
+
+AUTO = "AUTO"
+LANDINGS = {mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH, mavlink.MAV_CMD_NAV_VTOL_LAND}
+STARTING_MODES = (AUTO, "GUIDED")  # any other is the pilot's; `guided` takes it from there
+START_TIMEOUT = 10.0  # s until the vehicle must show that the mission runs
+LONGEST = 4 * 3600.0  # s for a mission whose client gave no timeout: longer than any copter flies
+UNKNOWN_TOTAL = 65535
+STATES = {
+    mavlink.MISSION_STATE_UNKNOWN: "unknown",
+    mavlink.MISSION_STATE_NO_MISSION: "no_mission",
+    mavlink.MISSION_STATE_NOT_STARTED: "not_started",
+    mavlink.MISSION_STATE_ACTIVE: "active",
+    mavlink.MISSION_STATE_PAUSED: "paused",
+    mavlink.MISSION_STATE_COMPLETE: "complete",
+}
+
+
+async def fly(vehicle: Vehicle, job: Job, until_complete: bool = False, timeout: float | None = None) -> None:
+    """Fly the mission from its first item, in AUTO; done when it runs, or with `until_complete` at its end.
+
+    On the ground the mission's first item must be a takeoff; the autopilot says so.
+
+    Raises:
+        NotArmed: arm it first.
+        ModeChanged: it is in a pilot's mode, or left AUTO meanwhile.
+        Busy: it has no mission.
+        Rejected, TimedOut, LinkLost.
+    """
+    _require_startable(vehicle)
+    _, items = await vehicle.waypoints.download()
+    if not items:
+        raise Busy("the vehicle has no mission; POST one to /mission/waypoints")
+    _require_startable(vehicle)  # the pilot may have switched it meanwhile
+    vehicle.authority.take(job, Rank.ARM)
+    vehicle.waypoints.changed_at = vehicle.clock()
+
+    def startable() -> None:
+        _require_startable(vehicle)
+
+    await vehicle.commands.send(messages.set_mission_current(1), vehicle.commanding(job, startable))
+    job.modes |= MISSION_MODES  # also where the vehicle is in AUTO already
+    if vehicle.mode != AUTO:
+        await vehicle.switch_to(job, AUTO, startable)
+    await vehicle.commands.send(messages.start_mission(), vehicle.commanding(job, lambda: _held(vehicle)))
+    started = vehicle.clock()
+
+    def runs() -> bool | None:
+        _held(vehicle)
+        _report(vehicle, job)
+        return True if _is_active(vehicle, started) else None
+
+    await vehicle.waiting.until({"HEARTBEAT", "MISSION_CURRENT"}, runs, START_TIMEOUT, "begin its mission")
+    vehicle.authority.shown(job)
+    if until_complete:
+        await _flown_to_its_end(vehicle, job, items, timeout or LONGEST)
+
+
+def _held(vehicle: Vehicle) -> None:
+    """Raises NotArmed or ModeChanged unless it flies its mission."""
+    if not (vehicle.state.armed and flies_mission(vehicle.mode)):
+        vehicle.held_by(AUTO)
+
+
+def _require_startable(vehicle: Vehicle) -> None:
+    vehicle.require_armed()
+    if vehicle.mode not in STARTING_MODES and not flies_mission(vehicle.mode):
+        raise ModeChanged(f"the vehicle is in {vehicle.mode}; `guided` takes it over")
+
+
+def _is_active(vehicle: Vehicle, since: float) -> bool:
+    """Whether a MISSION_CURRENT of after `since` (s) shows a mission that runs, or has ended already."""
+    received = vehicle.state.newest("MISSION_CURRENT")
+    if received is None or received.at < since:
+        return False
+    flown = (mavlink.MISSION_STATE_ACTIVE, mavlink.MISSION_STATE_COMPLETE)
+    if received.message.mission_state == mavlink.MISSION_STATE_UNKNOWN:  # an older autopilot
+        return bool(received.message.seq >= 1)
+    return received.message.mission_state in flown
+
+
+async def _flown_to_its_end(vehicle: Vehicle, job: Job, items: Sequence[Item], timeout: float) -> None:
+    final = {seq for seq, item in enumerate(items, 1) if item.command in LANDINGS} | {len(items)}
+    flown = 0  # the item flown last: a vehicle that has disarmed is back at the mission's beginning
+
+    def complete() -> bool | None:
+        nonlocal flown
+        _report(vehicle, job)
+        if _is_complete(vehicle):
+            return True
+        if vehicle.state.armed is False and flown in final:
+            return True
+        _held(vehicle)
+        flown = progress(vehicle)["current"] or flown
+        return None
+
+    names = {"HEARTBEAT", "MISSION_CURRENT", "MISSION_ITEM_REACHED"}
+    await vehicle.waiting.until(names, complete, timeout, "complete its mission")
+
+
+def _is_complete(vehicle: Vehicle) -> bool:
+    """By MISSION_CURRENT's state; an older autopilot tells none, and has then reached the last item."""
+    told = progress(vehicle)
+    if told["state"] == "unknown":
+        return bool(told["total"] and told["last_reached"] == told["total"])
+    return bool(told["state"] == "complete")
+
+
+def _report(vehicle: Vehicle, job: Job) -> None:
+    try:
+        told = progress(vehicle)
+    except Stale:  # nothing to report yet
+        return
+    numbers = {"item": told["current"], "items": told["total"], "distance_to_go": told["distance_m"]}
+    job.progress = {name: value for name, value in numbers.items() if value is not None}
+
+
+def progress(vehicle: Vehicle) -> dict[str, Any]:
+    """How far the mission has come.
+
+    Returns:
+        current, last_reached: item numbers, from 1; 0 and None before any.
+        total: items besides home; None where the autopilot does not tell.
+        state: of STATES.
+        distance_m: horizontally to the current item, in AUTO; None elsewhere.
+
+    Raises:
+        Stale: it was not told yet.
+    """
+    received = vehicle.state.newest("MISSION_CURRENT")
+    if received is None:
+        raise Stale(f"vehicle {vehicle.state.system} has not told MISSION_CURRENT yet")
+    current = received.message
+    reached = vehicle.state.newest("MISSION_ITEM_REACHED")
+    since_the_start = reached is not None and reached.at >= vehicle.waypoints.changed_at
+    in_auto = vehicle.mode == AUTO
+    return {
+        "current": current.seq,
+        "total": None if current.total == UNKNOWN_TOTAL else current.total,
+        "last_reached": reached.message.seq if reached is not None and since_the_start else None,
+        "state": STATES.get(current.mission_state, "unknown"),
+        "mode": vehicle.mode,
+        "distance_m": vehicle.state.field("NAV_CONTROLLER_OUTPUT", "wp_dist") if in_auto else None,
+    }

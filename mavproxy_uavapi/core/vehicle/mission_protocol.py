@@ -1,0 +1,285 @@
+"""MAVLink's mission protocol: upload with read-back, download, clear.
+
+What counts comes from the autopilot that we asked, to us, about the mission (not the fence or the rally
+points). Silence means asking again. MAVProxy's own `wp` module hears the same messages; it answers nothing
+that it did not begin.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
+
+from pymavlink import mavutil
+
+from mavproxy_uavapi.core.errors import Busy, LinkLost, Rejected, TimedOut, UavApiError
+from mavproxy_uavapi.core.mavlink.link import Address, Link
+from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
+from mavproxy_uavapi.core.vehicle.message_exchange import Conversation
+from mavproxy_uavapi.core.vehicle.message_waiter import Waiting
+from mavproxy_uavapi.core.vehicle.mission_files import HOME, Item, difference, from_message
+
+T = TypeVar("T")
+mavlink = mavutil.mavlink
+
+ANSWER_TIMEOUT = 1.5  # s until we ask again
+SENDINGS = 4  # the first one and three more
+ASKING_TIMEOUT = 9.0  # s; an ArduPilot asks again for an item after 1 s, and gives an upload up after 8 s
+CANCELLED = "MAV_MISSION_OPERATION_CANCELLED"  # the vehicle waited too long for an item
+MISSION = mavlink.MAV_MISSION_TYPE_MISSION
+ANSWERS = ("MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_ITEM", "MISSION_ACK")
+REQUESTS = ("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK")
+
+Progress = Callable[[int, int], None]
+Check = Callable[[], None]
+
+
+class Waypoints:
+    """The mission that one vehicle holds.
+
+    Attributes:
+        changed_at: when we last changed or started it, on the clock of arrivals (s).
+    """
+
+    def __init__(self, state: VehicleState, link: Link, waiting: Waiting) -> None:
+        self._state = state
+        self._link = link
+        self._waiting = waiting
+        self._lock = asyncio.Lock()  # the protocol knows one transfer at a time
+        self.changed_at = 0.0
+
+    # -- verbs --------------------------------------------------------------------------------------------
+
+    async def download(self) -> tuple[Item | None, list[Item]]:
+        """Home (None where the vehicle has no item 0 yet), and the items from 1 on.
+
+        Raises:
+            Rejected: another ground station transfers a mission just now.
+            TimedOut, LinkLost.
+        """
+        async with self._lock:
+            return await self._download()
+
+    async def upload(
+        self, items: Sequence[Item], progress: Progress = lambda done, of: None, check: Check = lambda: None
+    ) -> None:
+        """Put `items` in place of the vehicle's mission, and read them back.
+
+        A failed upload leaves the old mission: untouched where the vehicle refused at once, else put back.
+        The error says which, and where that was not possible.
+
+        Args:
+            items: from item 1 on.
+            progress: told how many were asked for, of how many.
+            check: called before the first item and after each; what it raises ends the upload, as a failure does.
+
+        Raises:
+            Rejected: with the MAV_MISSION_RESULT as `ack`.
+            TimedOut, LinkLost.
+        """
+
+        def told(done: int, of: int) -> None:
+            check()
+            progress(done, of)
+
+        async with self._lock:
+            _, old = await self._download()
+            check()
+            self.changed_at = self._waiting.clock()
+            try:
+                await self._put(items, told)
+            except (Rejected, TimedOut, LinkLost, Busy) as error:
+                raise _with(error, await self._undo(old, error)) from error
+
+    async def clear(self, check: Check = lambda: None) -> None:
+        """Remove the mission, and see that it is gone.
+
+        Args:
+            check: called before it is removed; what it raises ends that.
+
+        Raises:
+            Rejected: the vehicle flies it.
+            TimedOut, LinkLost.
+        """
+        async with self._lock:
+            check()
+            self.changed_at = self._waiting.clock()
+            with self._talk(ANSWERS) as talk:
+                await self._clear(talk)
+                left = await self._ask_count(talk) - 1
+            if left > 0:
+                raise Rejected(f"the vehicle accepted the clearing, but its mission has {left} items still")
+
+    # -- the protocol -------------------------------------------------------------------------------------
+
+    @property
+    def _address(self) -> Address:
+        return Address(self._state.system, self._state.component)
+
+    def _talk(self, names: Sequence[str]) -> Conversation:
+        return self._waiting.conversation(names, self._link.source)
+
+    async def _send(self, message: Any) -> None:
+        await self._link.send(message, self._state.system)
+
+    async def _asked(self, talk: Conversation, question: Any, test: Callable[[Any], T | None], what: str) -> T:
+        """Ask until `test` of an answer is not None.
+
+        Raises:
+            Rejected: the vehicle answered with errors only. One alone may belong to an upload that just ended.
+        """
+        refusal = None
+        for _ in range(SENDINGS):
+            await self._send(question)
+            deadline = self._waiting.clock() + ANSWER_TIMEOUT
+            while (message := await talk.next(max(deadline - self._waiting.clock(), 0.0))) is not None:
+                if message.mission_type != MISSION:
+                    continue
+                value = test(message)
+                if value is not None:
+                    return value
+                if message.get_type() == "MISSION_ACK" and message.type != mavlink.MAV_MISSION_ACCEPTED:
+                    refusal = self._refusal(message, what)
+        raise refusal or TimedOut(f"vehicle {self._state.system} did not {what}, asked {SENDINGS} times")
+
+    async def _ask_count(self, talk: Conversation) -> int:
+        question = mavlink.MAVLink_mission_request_list_message(*self._address, MISSION)
+        return await self._asked(talk, question, _count_of, "tell how many mission items it has")
+
+    async def _download(self) -> tuple[Item | None, list[Item]]:
+        with self._talk(ANSWERS) as talk:
+            found = []
+            for seq in range(await self._ask_count(talk)):
+                question = mavlink.MAVLink_mission_request_int_message(*self._address, seq, MISSION)
+                found.append(await self._asked(talk, question, _item_number(seq), f"tell mission item {seq}"))
+            await self._send(
+                mavlink.MAVLink_mission_ack_message(*self._address, mavlink.MAV_MISSION_ACCEPTED, MISSION)
+            )
+        return (found[0], found[1:]) if found else (None, [])
+
+    async def _clear(self, talk: Conversation) -> None:
+        question = mavlink.MAVLink_mission_clear_all_message(*self._address, MISSION)
+
+        def accepted(message: Any) -> bool | None:
+            if message.get_type() != "MISSION_ACK":
+                return None
+            if message.type != mavlink.MAV_MISSION_ACCEPTED:
+                raise self._refusal(message, "clear its mission")
+            return True
+
+        await self._asked(talk, question, accepted, "clear its mission")
+
+    async def _put(self, items: Sequence[Item], progress: Progress) -> None:
+        """Upload and read back; once more where the transfer itself failed.
+
+        Raises:
+            Rejected: refused, or read back otherwise.
+        """
+        try:
+            await self._hand_over([HOME, *items], progress)
+        except (TimedOut, Rejected) as error:
+            if isinstance(error, Rejected) and error.ack != CANCELLED:
+                raise
+            await self._hand_over([HOME, *items], progress)
+        _, found = await self._download()
+        differs = difference(items, found)
+        if differs is not None:
+            raise Rejected(f"the mission was read back otherwise than it was sent: {differs}")
+
+    async def _hand_over(self, items: Sequence[Item], progress: Progress) -> None:
+        with self._talk(REQUESTS) as talk:
+            await self._answer_requests(talk, items, progress)
+
+    async def _answer_requests(self, talk: Conversation, items: Sequence[Item], progress: Progress) -> None:
+        """Offer the items and give each as often as the vehicle asks for it, which knows what it lacks.
+
+        Nothing is sent unasked but the offer: an item that comes twice is an error to an ArduPilot. When the
+        acknowledgement of the last one is lost, the read-back tells.
+        """
+        given: set[int] = set()
+        offers = 0
+        while True:
+            if not given:
+                if offers == SENDINGS:
+                    raise TimedOut(f"vehicle {self._state.system} did not take the mission up, {offers} offers")
+                await self._send(mavlink.MAVLink_mission_count_message(*self._address, len(items), MISSION))
+                offers += 1
+            message = await self._next_request(talk, ASKING_TIMEOUT if given else ANSWER_TIMEOUT)
+            all_given = len(given) == len(items)
+            if message is None and all_given:
+                return
+            if message is None and given:
+                raise TimedOut(f"vehicle {self._state.system} asked for {len(given)} of {len(items)} items only")
+            if message is None:
+                continue
+            if message.get_type() == "MISSION_ACK":
+                if all_given and message.type == mavlink.MAV_MISSION_ACCEPTED:
+                    return
+            elif message.seq < len(items):
+                await self._send(items[message.seq].to(self._address, message.seq))
+                given.add(message.seq)
+                progress(len(given), len(items))
+
+    async def _next_request(self, talk: Conversation, timeout: float) -> Any | None:
+        """The next message of an upload.
+
+        Raises:
+            Rejected: it says that the vehicle does not want the mission.
+        """
+        deadline = self._waiting.clock() + timeout
+        while (message := await talk.next(max(deadline - self._waiting.clock(), 0.0))) is not None:
+            if message.mission_type != MISSION:
+                continue
+            harmless = (mavlink.MAV_MISSION_ACCEPTED, mavlink.MAV_MISSION_INVALID_SEQUENCE)
+            if message.get_type() == "MISSION_ACK" and message.type not in harmless:
+                raise self._refusal(message, "take the mission")
+            return message
+        return None
+
+    async def _undo(self, old: Sequence[Item], error: UavApiError) -> str:
+        """After a failed upload: have the old mission there, and say whether that is so."""
+        if isinstance(error, LinkLost):
+            return "; its mission may be incomplete now, because the link is lost"
+        try:
+            _, found = await self._download()
+            if found == list(old):
+                return "; its old mission is unchanged"
+            if old:
+                await self._put(old, lambda done, of: None)
+            else:
+                with self._talk(ANSWERS) as talk:
+                    await self._clear(talk)
+        except (Rejected, TimedOut, LinkLost) as again:
+            return f"; its mission is incomplete now, and the old one could not be put back: {again}"
+        return f"; its old mission ({len(old)} items) was put back" if old else "; it has no mission, as before"
+
+    def _refusal(self, message: Any, what: str) -> Rejected:
+        entry = mavlink.enums["MAV_MISSION_RESULT"].get(message.type)
+        name = entry.name if entry else f"MAV_MISSION_RESULT_{message.type}"
+        said = self._state.said_since(self.changed_at) if self.changed_at else []
+        return Rejected(f"vehicle {self._state.system} refused to {what} ({name})", name, said)
+
+
+def _count_of(message: Any) -> int | None:
+    return int(message.count) if message.get_type() == "MISSION_COUNT" else None
+
+
+def _item_number(seq: int) -> Callable[[Any], Item | None]:
+    def of(message: Any) -> Item | None:
+        is_item = message.get_type().startswith("MISSION_ITEM") and message.seq == seq
+        return from_message(message) if is_item else None
+
+    return of
+
+
+def _with(error: Rejected | TimedOut | LinkLost | Busy, addition: str) -> UavApiError:
+    """The same error, whose sentence goes on."""
+    sentence = f"{error}{addition}"
+    if isinstance(error, Busy):
+        return Busy(sentence)
+    if isinstance(error, Rejected):
+        return Rejected(sentence, error.ack, error.statustext)
+    if isinstance(error, TimedOut):
+        return TimedOut(sentence, error.statustext)
+    return LinkLost(sentence)

@@ -1,0 +1,74 @@
+"""The vehicles that can be flown, each made when it is first asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from mavproxy_uavapi.core.errors import NoVehicle
+from mavproxy_uavapi.core.mavlink.flight_modes import kind_of
+from mavproxy_uavapi.core.mavlink.link import Link
+from mavproxy_uavapi.core.mavlink.link_watch import LinkWatch
+from mavproxy_uavapi.core.mavlink.vehicle_state import Fleet
+from mavproxy_uavapi.core.mavlink.waiters import Pending
+from mavproxy_uavapi.core.vehicle.copter import Copter
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+
+CLASSES: dict[str, type[Vehicle]] = {"copter": Copter}
+
+
+class Hangar:
+    """Vehicles by system id.
+
+    Attributes:
+        current: the system id that MAVProxy's own commands go to; 0 before it knows one.
+
+    Args:
+        fleet: what was heard of each.
+        link: the way out.
+        link_watch: whether they hear us.
+        pending: the waits on them.
+        clock: monotonic seconds, the clock of arrivals.
+    """
+
+    def __init__(
+        self, fleet: Fleet, link: Link, link_watch: LinkWatch, pending: Pending, clock: Callable[[], float]
+    ) -> None:
+        self.current = 0
+        self._fleet = fleet
+        self._link = link
+        self._link_watch = link_watch
+        self._pending = pending
+        self._clock = clock
+        self._vehicles: dict[int, Vehicle] = {}
+
+    def resolve(self, system: int = 0) -> int:
+        """That system id; for 0 MAVProxy's current one, or else the first that was heard, or 0."""
+        return system or self.current or next(iter(self._fleet.vehicles), 0)
+
+    def find(self, system: int = 0) -> Vehicle:
+        """The vehicle with that system id; 0 as for `resolve`.
+
+        Raises:
+            NoVehicle: none such was heard yet.
+        """
+        heard = self._fleet.vehicles
+        wanted = self.resolve(system)
+        if wanted not in heard:
+            others = f"; heard so far: {', '.join(map(str, heard))}" if heard else ""
+            raise NoVehicle(f"no vehicle {wanted or ''} on the link yet".replace("  ", " ") + others)
+        state = heard[wanted]
+        make = CLASSES.get(kind_of(state.vehicle_type), Vehicle)
+        vehicle = self._vehicles.get(wanted)
+        if type(vehicle) is not make:  # the first time, or the autopilot came back with other firmware
+            vehicle = self._vehicles[wanted] = make(state, self._link, self._pending, self._clock)
+        return vehicle
+
+    def commandable(self, system: int = 0) -> Vehicle:
+        """As `find`, and its link is alive.
+
+        Raises:
+            NoVehicle, LinkLost.
+        """
+        vehicle = self.find(system)
+        self._link_watch.require_alive(vehicle.state)
+        return vehicle

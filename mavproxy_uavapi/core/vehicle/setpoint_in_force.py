@@ -1,0 +1,81 @@
+"""The setpoint that an autopilot flies in GUIDED, by its own telling: others may have sent it a newer one than ours.
+
+A position is told by POSITION_TARGET_GLOBAL_INT, which ArduCopter sends only while it flies to one, and a velocity by
+POSITION_TARGET_LOCAL_NED. The latter's position is no use: during a take-off, and until the first setpoint after it,
+it is one of long ago.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from typing import Any
+
+from pymavlink import mavutil
+
+from mavproxy_uavapi.core.errors import TimedOut
+from mavproxy_uavapi.core.mavlink.link import Address, Link, is_finite
+from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
+from mavproxy_uavapi.core.vehicle.message_waiter import Waiting
+from mavproxy_uavapi.core.vehicle.messages import (
+    MESSAGE_IDS,
+    POSITION_IGNORED,
+    VELOCITY_IGNORED,
+    GlobalTarget,
+    VelocityTarget,
+    request_message,
+)
+
+mavlink = mavutil.mavlink
+
+PLACE, MOTION = "POSITION_TARGET_GLOBAL_INT", "POSITION_TARGET_LOCAL_NED"
+TIMEOUT = 1.0  # s for the first of the two
+LATER = 0.5  # s for the second
+
+
+async def ask(state: VehicleState, waiting: Waiting, link: Link) -> GlobalTarget | VelocityTarget | None:
+    """What it flies to; None where it does not say, or flies neither to a place nor at a velocity.
+
+    Raises:
+        LinkLost: its heartbeats stopped.
+    """
+
+    def from_autopilot(message: Any) -> Any:
+        return message if message.get_srcComponent() == state.component else None
+
+    address = Address(state.system, state.component)
+    with waiting.expecting({MOTION}, from_autopilot) as motion, waiting.expecting({PLACE}, from_autopilot) as place:
+        for name in (PLACE, MOTION):
+            await link.send(request_message(MESSAGE_IDS[name]).to(address, 0), state.system)
+        with contextlib.suppress(TimedOut):
+            velocity = velocity_of(await motion.within(TIMEOUT, f"tell {MOTION}"))
+            return velocity or place_of(await place.within(LATER, f"tell {PLACE}"), state)
+    return None
+
+
+def velocity_of(message: Any) -> VelocityTarget | None:
+    """The velocity of a POSITION_TARGET_LOCAL_NED that has nothing else."""
+    mask = message.type_mask & (POSITION_IGNORED | VELOCITY_IGNORED)
+    if mask != POSITION_IGNORED or message.coordinate_frame != mavlink.MAV_FRAME_LOCAL_NED or not is_finite(message):
+        return None
+    return VelocityTarget(message.vx, message.vy, message.vz)
+
+
+def place_of(message: Any, state: VehicleState) -> GlobalTarget | None:
+    """The place of a POSITION_TARGET_GLOBAL_INT, above home; None where home's altitude is not known."""
+    here = state.messages.get("GLOBAL_POSITION_INT")
+    if here is None or message.coordinate_frame != mavlink.MAV_FRAME_GLOBAL or not is_finite(message):
+        return None
+    home_alt = (here.message.alt - here.message.relative_alt) / 1000.0
+    return GlobalTarget(message.lat_int / 1e7, message.lon_int / 1e7, message.alt - home_alt)
+
+
+def shown(state: VehicleState, since: float) -> GlobalTarget | VelocityTarget | None:
+    """What it has told since then (s) without being asked."""
+    place, motion = state.messages.get(PLACE), state.messages.get(MOTION)
+    if place is not None and place.at >= since and (motion is None or place.at >= motion.at or not _moves(motion)):
+        return place_of(place.message, state)
+    return velocity_of(motion.message) if motion is not None and motion.at >= since else None
+
+
+def _moves(motion: Any) -> bool:
+    return velocity_of(motion.message) is not None

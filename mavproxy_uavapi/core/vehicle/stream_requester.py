@@ -1,0 +1,84 @@
+"""Messages that a vehicle should send but that do not arrive are asked for.
+
+MAVProxy asks every vehicle for all streams at its `streamrate`; that is respected. What still does not come
+(EXTENDED_SYS_STATE is in no stream; a stream rate may be 0) is asked for with SET_MESSAGE_INTERVAL, and
+asked for again when something made it stop.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections import defaultdict
+
+from mavproxy_uavapi.core.errors import UavApiError
+from mavproxy_uavapi.core.vehicle.messages import MESSAGE_IDS, set_interval
+from mavproxy_uavapi.core.vehicle.registry import Hangar
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+
+LOOK_EVERY = 2.0  # s
+PATIENCE = 3.0  # s without a message before it is asked for
+ASK_AGAIN = 30.0  # s, after the first few askings have not helped
+FIRST_ASKINGS = 3
+
+# Hz: enough to fly by (positions) or to know by (the rest), little enough for a telemetry radio.
+WANTED = {
+    "GLOBAL_POSITION_INT": 4,
+    "LOCAL_POSITION_NED": 4,
+    "ATTITUDE": 4,
+    "EXTENDED_SYS_STATE": 2,
+    "SYS_STATUS": 2,
+    "EKF_STATUS_REPORT": 2,
+    "GPS_RAW_INT": 2,
+    "VFR_HUD": 2,
+    "POSITION_TARGET_LOCAL_NED": 2,
+    "POSITION_TARGET_GLOBAL_INT": 2,
+}
+IN_GUIDED = {"POSITION_TARGET_LOCAL_NED", "POSITION_TARGET_GLOBAL_INT"}  # elsewhere they say nothing
+
+
+class Freshness:
+    """Watches what arrives from the vehicle that the API flies.
+
+    Args:
+        hangar: the vehicles.
+        system: the system id to watch; 0 is MAVProxy's current one.
+    """
+
+    def __init__(self, hangar: Hangar, system: int) -> None:
+        self._hangar = hangar
+        self._system = system
+        self._asked: defaultdict[tuple[int, int, str], list[float]] = defaultdict(list)
+
+    async def run(self) -> None:
+        """Look every few seconds, until cancelled."""
+        while True:
+            with contextlib.suppress(UavApiError):  # no vehicle, or its link is lost: nobody to ask just now
+                await self.look(self._hangar.commandable(self._system))
+            await asyncio.sleep(LOOK_EVERY)
+
+    async def look(self, vehicle: Vehicle) -> None:
+        """Ask for what is missing now.
+
+        Raises:
+            LinkLost: it went away meanwhile.
+        """
+        for name in self.missing(vehicle):
+            key = (vehicle.state.system, vehicle.state.reboots, name)
+            self._asked[key].append(vehicle.clock())
+            await vehicle.commands.send(set_interval(MESSAGE_IDS[name], WANTED[name]))
+
+    def missing(self, vehicle: Vehicle) -> list[str]:
+        """The wanted messages that do not come and that it is time to ask for."""
+        now = vehicle.clock()
+        found = []
+        guided = vehicle.state.armed and vehicle.mode == "GUIDED"
+        for name in [name for name in WANTED if guided or name not in IN_GUIDED]:
+            age = vehicle.state.age(name, now)
+            if age is not None and age < PATIENCE:
+                continue
+            asked = self._asked[(vehicle.state.system, vehicle.state.reboots, name)]
+            pause = LOOK_EVERY if len(asked) < FIRST_ASKINGS else ASK_AGAIN
+            if not asked or now - asked[-1] >= pause:
+                found.append(name)
+        return found

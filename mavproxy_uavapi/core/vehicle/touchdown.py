@@ -1,0 +1,37 @@
+"""Was that a landing? Pure: the clock is an argument."""
+
+from __future__ import annotations
+
+from mavproxy_uavapi.core.vehicle.time_limits import Limits
+
+STANDING = 1.0  # m/s; what sinks faster than this after its disarming does not stand
+PATIENCE = 2.0  # s in which a position must come after the disarming, if positions come at all
+
+
+class Touchdown:
+    """Tells a landing from a fall: after a landing's disarming the vehicle stands."""
+
+    def __init__(self, limits: Limits) -> None:
+        self._fall = 2 * max(limits.down, limits.land, limits.land_high) + STANDING  # m/s; no descent is as fast
+        self._sinking = 0.0
+        self._disarmed_at: float | None = None
+        self.fell = False
+
+    def sinks_at(self, speed: float) -> None:
+        """Take the newest speed downwards (m/s)."""
+        self._sinking = speed
+        self.fell = self.fell or speed > self._fall
+
+    def is_over(self, now: float, age: float | None) -> bool | None:
+        """Whether a disarmed vehicle stands, by a position told since it is known to be disarmed.
+
+        Args:
+            now: s.
+            age: of the newest position, s; where none comes any more, the disarming alone has to do.
+        """
+        if self._disarmed_at is None:
+            self._disarmed_at = now
+        told_since = age is not None and now - age > self._disarmed_at
+        if told_since:
+            return True if abs(self._sinking) <= STANDING else None
+        return True if now - self._disarmed_at >= PATIENCE else None

@@ -1,0 +1,130 @@
+"""The verbs that every type of vehicle has, as far as ArduPilot has them in common."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from mavproxy_uavapi.core.errors import Busy, ModeChanged, NotFound, NotSupported, Rejected
+from mavproxy_uavapi.core.mavlink.flight_modes import mode_number
+from mavproxy_uavapi.core.vehicle import arming, messages
+from mavproxy_uavapi.core.vehicle.authority import Rank
+from mavproxy_uavapi.core.vehicle.base import HEARTBEAT_TIMEOUT, BaseVehicle
+from mavproxy_uavapi.core.vehicle.jobs import Job
+
+STOPPING_MODES = {"LAND", "RTL", "SMART_RTL", "BRAKE", "QLAND", "QRTL", "HOLD"}
+
+
+class Vehicle(BaseVehicle):
+    """One vehicle, and the verbs that all types have.
+
+    Verbs raise errors of `errors.py`: `Rejected` when the autopilot refuses, `TimedOut`, `LinkLost`,
+    `ModeChanged` when the pilot or a failsafe takes the vehicle, `Busy` and `NotArmed` when its state
+    stands against it; then nothing has been sent.
+    """
+
+    async def arm(self, job: Job, timeout: float | None = None) -> None:
+        """Wait until it is ready, switch to GUIDED, arm, and wait until it is armed.
+
+        A vehicle that flies in another mode than GUIDED belongs to its pilot: `ModeChanged`. So does one that
+        somebody arms meanwhile.
+
+        Raises:
+            Rejected: it did not get ready, or refused; with the reasons that it gave.
+        """
+        if self.state.armed and self.mode == "GUIDED":
+            return
+        if self.state.armed and not self.state.landed:
+            raise ModeChanged(f"the vehicle is flying in {self.mode}; `guided` takes it over")
+        self.authority.take(job, Rank.ARM)
+        await arming.arm(self, job, timeout)
+        self.authority.shown(job)
+
+    async def disarm(self, job: Job, force: bool = False) -> None:
+        """Disarm and wait until a heartbeat shows it. In flight it is refused, unless `force`: then it falls.
+
+        It ends an `arm` that waits; nothing is sent then, unless that may have been on its way.
+        """
+        armed = self.state.armed is not False
+        if armed and not force and self.state.landed is False:
+            raise Busy("the vehicle is flying; land it first (force=true stops its motors in the air)")
+        may_be_armed = armed or self.authority.on_its_way
+        self.authority.take(job, Rank.FORCE if force else Rank.STOP)
+        if may_be_armed:
+            await arming.disarm(self, job, force)
+        self.authority.shown(job)
+
+    async def set_mode(self, job: Job, mode: str) -> None:
+        """Switch to any mode of the vehicle's type. What stops it goes before what does not."""
+        mode_number(self.state.vehicle_type, mode)
+        self.authority.take(job, Rank.STOP if mode.upper() in STOPPING_MODES else Rank.ARM)
+        await self.switch_to(job, mode)
+
+    async def set_speed(self, job: Job, kind: str, speed: float) -> bool:
+        """Set the `kind` of speed (air, ground, climb, descent) to `speed` m/s; the ack is the proof.
+
+        Returns:
+            Whether it is in force now; else it is remembered until the vehicle flies in GUIDED.
+        """
+        self.authority.accompany(job, f"{kind} speed", stopped_too=True)
+        if not self.takes_speeds:
+            self.speeds.remember(kind, speed)
+            return False
+        try:
+            await self.commands.send(messages.change_speed(kind, speed), self.commanding(job, self._require_speeds))
+        except (ModeChanged, Rejected):
+            if self.takes_speeds:
+                raise
+            self.speeds.remember(kind, speed)
+            return False
+        self.speeds.take(kind, speed)
+        return True
+
+    @property
+    def takes_speeds(self) -> bool:
+        """Whether its autopilot takes a speed in the mode that it is in."""
+        return True
+
+    def _require_speeds(self) -> None:
+        if not self.takes_speeds:
+            raise ModeChanged(f"the vehicle is in {self.mode} now, which takes no speed")
+
+    async def set_home(self, job: Job) -> None:
+        """Make the current position home; asked again while the estimator settles."""
+        self.authority.accompany(job, "home", Rank.ARM)
+        await self.commands.send(messages.set_home_here(), self.commanding(job))
+        await self.home()
+
+    async def home(self) -> Any:
+        """HOME_POSITION, asked for.
+
+        Raises:
+            NotFound: the vehicle has no home yet.
+        """
+
+        try:
+            return await self.request("HOME_POSITION")
+        except Rejected as error:
+            raise NotFound(f"the vehicle has no home position yet ({error.ack})") from error
+
+    async def set_servo(self, channel: int, pwm: int) -> None:
+        """Set servo output `channel` (from 1) to `pwm` microseconds."""
+        await self.commands.send(messages.set_servo(channel, pwm))
+
+    async def set_sim_speedup(self, factor: float) -> None:
+        """Set SIM_SPEEDUP and read it back.
+
+        Raises:
+            NotSupported: the vehicle has no such parameter: it is no simulation.
+        """
+        name = "SIM_SPEEDUP"
+        if not await self.parameters.read([(name,)]):
+            raise NotSupported("the vehicle is not a simulation: it has no parameter SIM_SPEEDUP")
+
+        def read_back(message: Any) -> float | None:
+            told = message.param_id == name and math.isclose(message.param_value, factor, rel_tol=1e-5)
+            return factor if told else None
+
+        with self.waiting.expecting({"PARAM_VALUE"}, read_back) as told:
+            await self.link.send(messages.set_parameter(self.address, name, factor), self.state.system)
+            await told.within(HEARTBEAT_TIMEOUT, f"take {name} = {factor:g}")

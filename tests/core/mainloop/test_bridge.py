@@ -1,0 +1,257 @@
+from __future__ import annotations
+
+import asyncio
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from mavproxy_uavapi.core.mainloop.bridge import GIVE_WAY, Bridge
+
+
+class Received(list[Any]):
+    """What the asyncio side received; messages that are exceptions are raised."""
+
+    def take(self, message: Any) -> None:
+        if isinstance(message, Exception):
+            raise message
+        self.append((message, threading.current_thread().name))
+
+
+class BadMessage(Exception):
+    def get_type(self) -> str:
+        return "BAD"
+
+
+@pytest.fixture
+def received() -> Received:
+    return Received()
+
+
+@pytest.fixture
+def bridge(mpstate: Any, received: Received) -> Iterator[Bridge]:
+    bridge = Bridge(mpstate.select_extra, received.take)
+    bridge.start()
+    yield bridge
+    bridge.stop()
+
+
+def in_loop(bridge: Bridge) -> None:
+    """Wait until the loop has done what was queued before."""
+
+    async def nothing() -> None:
+        await asyncio.sleep(0)
+
+    bridge.run(nothing())
+
+
+def test_fed_messages_arrive_in_order_in_the_asyncio_thread(bridge: Bridge, received: Received) -> None:
+    for number in range(100):
+        bridge.feed(number)
+    bridge.turn()
+    in_loop(bridge)
+    assert received == [(number, "uavapi-loop") for number in range(100)]
+
+
+def test_bad_message_does_not_stop_the_next(bridge: Bridge, received: Received) -> None:
+    defects: list[str] = []
+    bridge.loop.set_exception_handler(lambda _, context: defects.append(context["message"]))
+    for message in ("one", BadMessage(), "two"):
+        bridge.feed(message)
+    bridge.turn()
+    in_loop(bridge)
+    assert [message for message, _ in received] == ["one", "two"]
+    assert defects == ["uavapi: defect on BAD"]
+
+
+def test_nothing_is_handed_over_before_the_main_loops_turn_is_over(bridge: Bridge, received: Received) -> None:
+    bridge.feed("one")
+    bridge.feed("two")
+    in_loop(bridge)
+    assert received == []
+    bridge.turn()
+    in_loop(bridge)
+    assert [message for message, _ in received] == ["one", "two"]
+
+
+def test_feed_never_goes_deaf_when_the_loop_is_faster_than_the_main_loop(
+    bridge: Bridge, received: Received, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    call_soon = bridge._thread.call_soon
+
+    def overtaken(call: Any, *args: Any) -> bool:
+        done = call_soon(call, *args)
+        in_loop(bridge)  # the call is over before the main loop hears that it was taken
+        return done
+
+    monkeypatch.setattr(bridge._thread, "call_soon", overtaken)
+    for message in ("one", "two", "three"):
+        bridge.feed(message)
+        bridge.turn()
+    assert [message for message, _ in received] == ["one", "two", "three"]
+
+
+def test_messages_that_are_fed_while_others_are_delivered_come_with_the_next_turn(
+    bridge: Bridge, received: Received
+) -> None:
+    hold = threading.Event()
+    bridge.call_soon(hold.wait, 2.0)
+    for message in ("one", "two"):  # both turns are over before the asyncio side comes to the first
+        bridge.feed(message)
+        bridge.turn()
+    hold.set()
+    in_loop(bridge)
+    bridge.feed("three")
+    bridge.turn()
+    in_loop(bridge)
+    assert [message for message, _ in received] == ["one", "two", "three"]
+
+
+def test_what_is_to_be_sent_goes_out_between_two_messages_of_a_burst(bridge: Bridge) -> None:
+    sent: list[str] = []
+    bridge.feed("one")
+    bridge.post(lambda: sent.append("command"))
+    bridge.feed("two")
+    assert sent == ["command"]
+
+
+def test_new_work_waits_while_the_main_loop_is_at_messages(bridge: Bridge) -> None:
+    bridge.run(bridge.calm())  # it is at none
+    bridge.feed("one")
+    waiting = asyncio.run_coroutine_threadsafe(bridge.calm(), bridge.loop)
+    in_loop(bridge)
+    assert not waiting.done()
+    bridge.turn()
+    waiting.result(2.0)
+
+
+def test_new_work_does_not_wait_for_ever(bridge: Bridge) -> None:
+    bridge.feed("one")
+    began = time.monotonic()
+    bridge.run(bridge.calm())
+    assert time.monotonic() - began >= GIVE_WAY
+
+
+def test_feed_after_the_end_is_dropped(mpstate: Any, received: Received) -> None:
+    bridge = Bridge(mpstate.select_extra, received.take)
+    bridge.start()
+    bridge.stop()
+    for number in range(3):
+        bridge.feed(number)
+    bridge.turn()
+    assert received == []
+    assert len(bridge._inbox) == 0
+
+
+def test_on_main_runs_in_the_main_loop_and_gives_its_result(bridge: Bridge, main_loop: Any) -> None:
+    future = asyncio.run_coroutine_threadsafe(bridge.on_main(threading.get_ident), bridge.loop)
+    main_loop.until(future.done)
+    assert future.result() == threading.get_ident()
+
+
+def test_on_main_raises_what_the_call_raised(bridge: Bridge, main_loop: Any) -> None:
+    future = asyncio.run_coroutine_threadsafe(bridge.on_main(lambda: 1 / 0), bridge.loop)
+    main_loop.until(future.done)
+    with pytest.raises(ZeroDivisionError):
+        future.result()
+
+
+def test_on_main_that_was_cancelled_before_it_ran_is_never_run(bridge: Bridge, main_loop: Any) -> None:
+    ran: list[int] = []
+
+    async def cancel_at_once() -> None:
+        task = asyncio.create_task(bridge.on_main(lambda: ran.append(1)))
+        await asyncio.sleep(0)
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+
+    bridge.run(cancel_at_once())
+    main_loop.turn()
+    bridge.turn()
+    assert ran == []
+
+
+def test_select_wakes_for_a_call_without_any_idle_task(bridge: Bridge, main_loop: Any) -> None:
+    ran: list[int] = []
+    bridge.post(lambda: ran.append(1))
+    main_loop.turn(wait=2.0)
+    assert ran == [1]
+
+
+def test_stop_takes_its_descriptor_out_of_select(mpstate: Any) -> None:
+    bridge = Bridge(mpstate.select_extra, lambda message: None)
+    bridge.start()
+    assert len(mpstate.select_extra) == 1
+    bridge.stop()
+    assert mpstate.select_extra == {}
+    assert not bridge.running
+
+
+def test_fifty_starts_and_stops_leave_no_thread_and_no_descriptor(mpstate: Any, descriptors: Any) -> None:
+    threads, before = threading.active_count(), descriptors()
+    for number in range(50):
+        bridge = Bridge(mpstate.select_extra, lambda message: None)
+        if number % 2:
+            bridge.start()
+            bridge.feed("hello")
+            bridge.turn()
+        bridge.stop()
+    assert threading.active_count() == threads
+    assert descriptors() == before
+
+
+FORK = """
+import os, socket, warnings
+warnings.simplefilter("ignore")
+from mavproxy_uavapi.core.mainloop.bridge import GIVE_WAY, Bridge
+
+def is_open(fd):
+    try:
+        os.fstat(fd)
+    except OSError:
+        return False
+    return True
+
+select_extra = {}
+bridge = Bridge(select_extra, print)
+bridge.start()
+port, kept = socket.socket(), socket.socket()
+taken_back = socket.socket()
+closed = [port.fileno(), *bridge._outbox.filenos()]
+bridge.close_in_children(lambda: [port.fileno(), -1])
+fileno = taken_back.fileno
+bridge.close_in_children(ours := (lambda: [fileno()]))
+bridge.keep_in_children(ours)
+stopped = Bridge({}, print)
+stopped.start()
+stopped.stop()
+child = os.fork()
+if not child:
+    wrong = any(is_open(fd) for fd in closed) or not is_open(kept.fileno()) or not is_open(fileno())
+    os._exit(3 if wrong else 0)
+status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+done = []
+bridge.call_soon(done.append, 1)  # the parent's loop and socket are as they were
+port.listen()
+
+async def look():
+    return done
+
+assert bridge.run(look()) == [1]
+bridge.stop()
+raise SystemExit(status)
+"""
+
+
+def test_forked_child_closes_our_sockets_and_no_other() -> None:
+    environment = {**os.environ, "MAVLINK20": "1"}
+    ended = subprocess.run(
+        [sys.executable, "-c", FORK], env=environment, capture_output=True, text=True, timeout=20, check=False
+    )
+    assert (ended.returncode, ended.stderr) == (0, "")

@@ -1,0 +1,87 @@
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+from mavproxy_uavapi.core.mainloop.event_loop_thread import LoopThread
+
+
+@pytest.fixture
+def thread() -> Iterator[LoopThread]:
+    thread = LoopThread("test-loop")
+    thread.start()
+    yield thread
+    assert thread.stop()
+
+
+async def name_of_thread() -> str:
+    return threading.current_thread().name
+
+
+def test_coroutines_run_in_the_thread(thread: LoopThread) -> None:
+    assert thread.running
+    assert thread.run(name_of_thread(), 1.0) == "test-loop"
+
+
+def test_run_hands_over_what_is_raised(thread: LoopThread) -> None:
+    async def fail() -> None:
+        raise KeyError("k")
+
+    with pytest.raises(KeyError):
+        thread.run(fail(), 1.0)
+
+
+def test_run_gives_up_in_time_and_cancels(thread: LoopThread) -> None:
+    cancelled = threading.Event()
+
+    async def for_ever() -> None:
+        try:
+            await asyncio.Event().wait()
+        except asyncio.CancelledError:
+            cancelled.set()
+            raise
+
+    with pytest.raises(TimeoutError, match=r"no answer from the loop within 0\.01 s"):
+        thread.run(for_ever(), 0.01)
+    assert cancelled.wait(1.0)
+
+
+def test_stop_cancels_what_runs_and_ends_the_thread() -> None:
+    thread = LoopThread("test-loop")
+    thread.start()
+    ended: list[str] = []
+
+    async def for_ever() -> None:
+        try:
+            await asyncio.Event().wait()
+        finally:
+            await asyncio.sleep(0)
+            ended.append("cleaned up")
+
+    async def begin() -> asyncio.Task[None]:
+        task = asyncio.create_task(for_ever())
+        await asyncio.sleep(0)
+        return task
+
+    thread.run(begin(), 1.0)
+    assert thread.stop()
+    assert ended == ["cleaned up"]
+    assert not thread.running
+    assert thread.loop.is_closed()
+
+
+def test_call_soon_after_the_end_says_so() -> None:
+    thread = LoopThread("test-loop")
+    thread.start()
+    assert thread.call_soon(lambda: None)
+    thread.stop()
+    assert not thread.call_soon(lambda: None)
+
+
+def test_thread_that_was_never_started_is_stopped_too() -> None:
+    thread = LoopThread("test-loop")
+    assert thread.stop()
+    assert thread.loop.is_closed()

@@ -1,0 +1,122 @@
+"""The audit trail's file and its memory."""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mavproxy_uavapi.core import audit as audits
+from mavproxy_uavapi.core.audit import FILE, KEPT, MOST_ADDRESSES, OTHERS, WAITING, Audit, Entry, Refusals, utc_now
+
+
+def entry(verb: str = "/command/arm", **changes: Any) -> Entry:
+    given: dict[str, Any] = {"client": "127.0.0.1", "request": {}, "detail": "Armed vehicle", **changes}
+    return Entry(time=utc_now(), verb=verb, system=1, outcome="ok", seconds=1.0, sent=(), **given)
+
+
+@pytest.fixture
+def audit(tmp_path: Path) -> Iterator[Audit]:
+    made = Audit(tmp_path)
+    yield made
+    made.close()
+
+
+def lines(folder: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in (folder / FILE).read_text(encoding="ascii").splitlines()]
+
+
+def test_trail_rotates_and_keeps_five_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(audits, "FILE_BYTES", 2000)
+    audit = Audit(tmp_path)
+    for number in range(100):
+        audit.add(entry(f"/command/{number}"))
+    audit.close()
+    files = sorted(path.name for path in tmp_path.iterdir())
+    assert files == [FILE, *(f"{FILE}.{number}" for number in range(1, 5))]
+    assert sum(path.stat().st_size for path in tmp_path.iterdir()) < 5 * 2000 + 1
+    assert lines(tmp_path)[-1]["verb"] == "/command/99"
+
+
+def test_trail_is_its_owners_alone(audit: Audit, tmp_path: Path) -> None:
+    audit.add(entry())
+    audit.close()
+    assert (tmp_path / FILE).stat().st_mode & 0o777 == 0o600
+
+
+def test_file_holds_lines_of_ascii_whatever_a_client_sends(audit: Audit, tmp_path: Path) -> None:
+    mode = '\x1b[2J\n{"forged": 1}\u2028\ud800'
+    audit.add(entry(request={"mode": mode}, client="::1\n", detail="x" * 100_000))
+    audit.close()
+    (line,) = lines(tmp_path)
+    assert line["request"]["mode"] == mode
+    assert (tmp_path / FILE).stat().st_size < 1000
+
+
+def test_memory_is_bounded(audit: Audit) -> None:
+    for number in range(2 * KEPT):
+        audit.add(entry(str(number)))
+    assert len(audit.entries) == KEPT
+    assert audit.entries[-1].verb == str(2 * KEPT - 1)
+
+
+def test_stalled_disk_holds_nobody_up_and_what_it_lost_is_told(
+    audit: Audit, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    goes_on = threading.Event()
+    lines_file = audit._lines
+    assert lines_file is not None
+    emit = lines_file.emit
+
+    def stalled(record: Any) -> None:
+        goes_on.wait()
+        emit(record)
+
+    monkeypatch.setattr(lines_file, "emit", stalled)
+    for number in range(WAITING + 20):
+        audit.add(entry(str(number)))
+    goes_on.set()
+    audit._writer.submit(lambda: None).result()
+    audit.add(entry("last"))
+    audit.close()
+    found = lines(tmp_path)
+    assert [line.get("verb") for line in found[-2:]] == [None, "last"]
+    assert found[-2]["lost"] == 20
+    assert len(found) == WAITING + 2
+
+
+def test_trail_in_no_folder_keeps_its_memory_and_says_so_once(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    audit = Audit(tmp_path / "not" / "there")
+    for number in range(3):
+        audit.add(entry(str(number)))
+    audit.close()
+    assert len(audit.entries) == 3
+    assert sum("cannot write" in record.getMessage() for record in caplog.records) == 1
+
+
+def test_refusals_are_told_at_the_end_too(loop: Any, tmp_path: Path) -> None:
+    audit = Audit(tmp_path)
+
+    async def refuse() -> None:
+        audit.refused("10.0.0.9", "unauthorized")
+        audit.refused("10.0.0.9", "unauthorized")
+
+    loop.run(refuse())
+    audit.close()
+    assert [line["request"] for line in lines(tmp_path)] == [{"unauthorized": 2}]
+
+
+def test_addresses_beyond_the_most_are_counted_together() -> None:
+    refusals = Refusals()
+    for number in range(10_000):
+        refusals.add(f"2001:db8::{number:x}", "unauthorized")
+    counts = refusals.take()
+    assert len(counts) == MOST_ADDRESSES + 1
+    assert counts[OTHERS] == {"unauthorized": 10_000 - MOST_ADDRESSES}
+    assert refusals.take() == {}

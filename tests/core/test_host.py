@@ -1,0 +1,291 @@
+from __future__ import annotations
+
+import asyncio
+import json
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from mavproxy_uavapi.core import host as hosts
+from mavproxy_uavapi.core.audit import FILE
+from mavproxy_uavapi.core.errors import LinkLost
+from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.sent_messages import note_sent
+from mavproxy_uavapi.core.vehicle.message_waiter import Waiting
+
+
+@pytest.fixture
+def hear(loop: Any, host: Host, msg: Callable[..., Any]) -> Callable[..., None]:
+    """Feed one message and let it be received."""
+
+    def hear(name: str, **fields: Any) -> None:
+        host.bridge.feed(msg(name, **fields))
+        host.bridge.turn()
+        loop.settle()
+
+    return hear
+
+
+@pytest.fixture
+def wait_for(loop: Any, host: Host) -> Callable[..., Any]:
+    """A task that waits for a message of a vehicle."""
+
+    def wait_for(name: str, system: int = 1, timeout: float = 60.0) -> Any:
+        waiting = Waiting(host.fleet.vehicles[system], host.pending, host.clock)
+        task = loop.create_task(waiting.message({name}, lambda message: message, timeout, f"send {name}"))
+        loop.settle()
+        return task
+
+    return wait_for
+
+
+def test_message_is_known_before_its_waiters_wake(loop: Any, host: Host, hear: Any, wait_for: Any) -> None:
+    hear("heartbeat")
+    task = wait_for("ATTITUDE")
+    hear("attitude", yaw=1.5)
+    assert loop.run(task).yaw == 1.5
+    assert host.fleet.vehicles[1].field("ATTITUDE", "yaw") == 1.5
+
+
+def test_listeners_hear_of_vehicles_only(host: Host, hear: Any) -> None:
+    heard: list[Any] = []
+    host.listeners.append(lambda state, message, now: heard.append((state.system, message.get_type(), now)))
+    hear("attitude", system=5)
+    hear("heartbeat")
+    hear("attitude")
+    assert heard == [(1, "HEARTBEAT", 1000.0), (1, "ATTITUDE", 1000.0)]
+
+
+def test_wait_ends_when_the_heartbeats_stop(loop: Any, host: Host, hear: Any, wait_for: Any) -> None:
+    hear("heartbeat")
+    task = wait_for("ATTITUDE")
+    started = loop.time()
+    with pytest.raises(LinkLost, match=r"no heartbeat from vehicle 1 for 5\.0 s"):
+        loop.run(task)
+    assert loop.time() - started == pytest.approx(host.link_watch.timeout, abs=0.1)
+
+
+def test_other_messages_do_not_keep_a_link_alive(loop: Any, host: Host, hear: Any, wait_for: Any) -> None:
+    hear("heartbeat")
+    task = wait_for("VFR_HUD")
+    for _ in range(12):
+        loop.pass_time(0.5)
+        hear("attitude")
+    assert isinstance(task.exception(), LinkLost)
+    assert not host.link_watch.is_alive(host.fleet.vehicles[1])
+
+
+def test_wait_that_begins_on_a_lost_link_fails_soon(loop: Any, hear: Any, wait_for: Any) -> None:
+    hear("heartbeat")
+    loop.pass_time(20.0)
+    task = wait_for("ATTITUDE")
+    started = loop.time()
+    with pytest.raises(LinkLost):
+        loop.run(task)
+    assert loop.time() - started <= 1.0
+
+
+def test_link_recovers(loop: Any, host: Host, hear: Any, wait_for: Any) -> None:
+    hear("heartbeat")
+    loop.pass_time(20.0)
+    assert not host.link_watch.is_alive(host.fleet.vehicles[1])
+    hear("heartbeat")
+    assert host.link_watch.is_alive(host.fleet.vehicles[1])
+    task = wait_for("ATTITUDE")
+    loop.pass_time(3.0)
+    hear("attitude", yaw=2.0)
+    assert loop.run(task).yaw == 2.0
+
+
+def test_heartbeats_keep_a_wait_going(loop: Any, hear: Any, wait_for: Any) -> None:
+    hear("heartbeat")
+    task = wait_for("ATTITUDE")
+    for _ in range(30):
+        loop.pass_time(1.0)
+        hear("heartbeat")
+    assert not task.done()
+
+
+def test_loss_of_one_vehicle_leaves_the_waits_on_another(loop: Any, hear: Any, wait_for: Any) -> None:
+    hear("heartbeat", system=1)
+    hear("heartbeat", system=2)
+    lost, kept = wait_for("ATTITUDE", 1), wait_for("ATTITUDE", 2)
+    for _ in range(8):
+        loop.pass_time(1.0)
+        hear("heartbeat", system=2)
+    assert isinstance(lost.exception(), LinkLost)
+    assert not kept.done()
+
+
+def test_link_timeout_can_be_set(loop: Any, host: Host, hear: Any, wait_for: Any) -> None:
+    host.link_watch.timeout = 2.0
+    hear("heartbeat")
+    task = wait_for("ATTITUDE")
+    started = loop.time()
+    with pytest.raises(LinkLost):
+        loop.run(task)
+    assert loop.time() - started == pytest.approx(2.0, abs=0.1)
+
+
+# -- membership -------------------------------------------------------------------------------------------
+
+
+def received(host: Host) -> list[int]:
+    """The yaws that the host has received so far, after all that was fed."""
+
+    async def look() -> list[int]:
+        await asyncio.sleep(0)
+        state = host.fleet.vehicles.get(1)
+        return [] if state is None else [state.received]
+
+    return host.bridge.run(look())
+
+
+def test_first_member_makes_the_host_and_the_last_ends_it(mpstate: Any) -> None:
+    host = hosts.join(mpstate, "uavapi")
+    assert hosts.join(mpstate, "vision") is host
+    host.idle("uavapi")
+    hosts.leave(mpstate, "uavapi")
+    assert host.bridge.running
+    assert getattr(mpstate, hosts.ATTRIBUTE) is host
+    hosts.leave(mpstate, "vision")
+    assert not host.bridge.running
+    assert not hasattr(mpstate, hosts.ATTRIBUTE)
+    assert mpstate.select_extra == {}
+
+
+def test_only_the_first_members_feed_counts_and_it_moves_on_when_that_leaves(mpstate: Any, msg: Any) -> None:
+    host = hosts.join(mpstate, "uavapi")
+    hosts.join(mpstate, "vision")
+    try:
+        host.idle("uavapi")
+        heartbeat = msg("heartbeat")
+        host.feed("uavapi", heartbeat)
+        host.feed("vision", heartbeat)
+        host.feed("uavapi", msg("attitude", sequence=1))
+        host.feed("vision", msg("attitude", sequence=2))
+        host.idle("uavapi")
+        assert received(host) == [2]
+        hosts.leave(mpstate, "uavapi")
+        host.feed("vision", msg("attitude", sequence=2))
+        host.idle("vision")
+        assert received(host) == [3]
+    finally:
+        hosts.leave(mpstate, "vision")
+
+
+def test_nothing_is_opened_for_select_before_the_first_idle_task(mpstate: Any) -> None:
+    host = hosts.join(mpstate, "uavapi")
+    try:
+        assert mpstate.select_extra == {}
+        assert not host.bridge.running
+        host.idle("vision")
+        assert not host.bridge.running
+    finally:
+        hosts.leave(mpstate, "uavapi")
+
+
+def test_idle_tells_the_asyncio_side_mavproxys_target(mpstate: Any) -> None:
+    host = hosts.join(mpstate, "uavapi")
+    try:
+        host.idle("uavapi")
+        mpstate.settings.target_system = 3
+        host.idle("uavapi")
+        received(host)
+        assert host.hangar.current == 3
+    finally:
+        hosts.leave(mpstate, "uavapi")
+
+
+def parameters(host: Host, system: int = 1) -> dict[str, float]:
+    """What the asyncio side knows of a vehicle's parameters, after all that was fed."""
+
+    async def look() -> dict[str, float]:
+        await asyncio.sleep(0)
+        return dict(host.fleet.vehicles[system].parameters)
+
+    return host.bridge.run(look())
+
+
+def test_parameters_that_mavproxy_fetched_are_known_from_the_first_idle_task(mpstate: Any, msg: Any) -> None:
+    host = hosts.join(mpstate, "uavapi")
+    now = [100.0]
+    host.clock = lambda: now[0]
+    try:
+        mpstate.mav_param_by_sysid[1, 1] = {"RTL_ALT": 1500.0, "LAND_SPEED": 50.0}
+        host.idle("uavapi")
+        host.feed("uavapi", msg("heartbeat"))
+        host.idle("uavapi")
+        assert parameters(host) == {"RTL_ALT": 1500.0, "LAND_SPEED": 50.0}
+        mpstate.mav_param_by_sysid[1, 1]["RTL_ALT"] = 1800.0  # by FTP, without a PARAM_VALUE
+        now[0] += 2.0
+        host.idle("uavapi")
+        host.feed("uavapi", msg("param_value", param_id="RTL_ALT", param_value=2000.0))
+        host.idle("uavapi")
+        assert parameters(host) == {"RTL_ALT": 2000.0, "LAND_SPEED": 50.0}
+    finally:
+        hosts.leave(mpstate, "uavapi")
+
+
+def test_parameters_of_an_earlier_session_are_not_taken_for_the_vehicles(mpstate: Any, msg: Any) -> None:
+    host = hosts.join(mpstate, "uavapi")
+    try:
+        mpstate.continue_mode = True
+        mpstate.mav_param_by_sysid[1, 1] = {"RTL_ALT": 1500.0}
+        host.idle("uavapi")
+        host.feed("uavapi", msg("heartbeat"))
+        host.idle("uavapi")
+        assert parameters(host) == {}
+    finally:
+        hosts.leave(mpstate, "uavapi")
+
+
+def test_idle_sends_what_is_to_be_sent_even_when_select_does_not_wake(mpstate: Any) -> None:
+    host = hosts.join(mpstate, "uavapi")
+    try:
+        host.idle("uavapi")
+        ran: list[int] = []
+        host.bridge.post(lambda: ran.append(1))
+        host.idle("uavapi")
+        assert ran == [1]
+    finally:
+        hosts.leave(mpstate, "uavapi")
+
+
+def test_host_is_made_anew_after_the_last_member_left(mpstate: Any, descriptors: Callable[[], int]) -> None:
+    threads, before, seen = threading.active_count(), descriptors(), set()
+    for _ in range(50):
+        host = hosts.join(mpstate, "uavapi")
+        host.idle("uavapi")
+        seen.add(id(host.bridge.loop))
+        hosts.leave(mpstate, "uavapi")
+    assert threading.active_count() == threads
+    assert descriptors() == before
+
+
+def test_trail_of_a_job_without_http_is_written_when_the_last_module_leaves(
+    mpstate: Any, main_loop: Any, tmp_path: Path
+) -> None:
+    mpstate.status.logdir = str(tmp_path)
+    host = hosts.join(mpstate, "vision")
+    host.bridge.start()
+
+    async def fly() -> None:
+        async def body(_job: Any) -> str:
+            note_sent("COMMAND_LONG")
+            return "landed"
+
+        await host.jobs.begin(
+            SimpleNamespace(state=SimpleNamespace(system=7)), "/vision/land", {"id": 3}, body
+        ).outcome()
+
+    host.bridge.run(fly())
+    hosts.leave(mpstate, "vision")
+    (line,) = (tmp_path / FILE).read_text(encoding="ascii").splitlines()
+    entry = json.loads(line)
+    assert (entry["client"], entry["verb"], entry["outcome"]) == ("console", "/vision/land", "ok")
+    assert (entry["detail"], entry["sent"], entry["system"]) == ("landed", ["COMMAND_LONG"], 7)

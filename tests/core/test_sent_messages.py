@@ -1,0 +1,51 @@
+"""Which messages were sent for which command."""
+
+from __future__ import annotations
+
+from mavproxy_uavapi.core.sent_messages import (
+    MOST_RUNS,
+    SentNames,
+    note_sent,
+    noting_sent,
+    noting_sent_if_nobody_does,
+)
+
+
+def told(names: list[str]) -> tuple[str, ...]:
+    sent = SentNames()
+    for name in names:
+        sent.add(name)
+    return sent.tell()
+
+
+def test_setpoints_are_counted_rather_than_listed() -> None:
+    names = ["COMMAND_LONG", "COMMAND_LONG", *["SET_POSITION_TARGET_LOCAL_NED"] * 240, "COMMAND_LONG"]
+    assert told(names) == ("COMMAND_LONG", "COMMAND_LONG", "SET_POSITION_TARGET_LOCAL_NED x240", "COMMAND_LONG")
+    assert told([]) == ()
+
+
+def test_names_that_alternate_without_end_are_bounded() -> None:
+    found = told(["LANDING_TARGET", "SET_POSITION_TARGET_LOCAL_NED"] * 10_000)
+    assert len(found) == MOST_RUNS + 1
+    assert found[-1] == f"and {20_000 - MOST_RUNS} more"
+
+
+def test_names_are_noted_within_a_context_only() -> None:
+    note_sent("HEARTBEAT")
+    with noting_sent() as sent:
+        note_sent("COMMAND_LONG")
+    note_sent("HEARTBEAT")
+    assert sent.tell() == ("COMMAND_LONG",)
+
+
+def test_within_a_call_nothing_else_notes_until_the_call_was_told_of() -> None:
+    with noting_sent() as of_call:
+        with noting_sent_if_nobody_does() as nobody:
+            note_sent("COMMAND_LONG")
+        assert nobody is None
+        assert of_call.tell() == ("COMMAND_LONG",)
+        with noting_sent_if_nobody_does() as own:
+            note_sent("COMMAND_INT")
+    assert own is not None
+    assert own.tell() == ("COMMAND_INT",)
+    assert of_call.tell() == ("COMMAND_LONG",)

@@ -1,0 +1,86 @@
+"""A cancellation is never lost, whatever comes in the same turn of the loop."""
+
+from __future__ import annotations
+
+import asyncio
+import gc
+
+import pytest
+
+from mavproxy_uavapi.core.timeout import within
+
+
+def test_what_comes_in_time_is_given_and_what_fails_fails() -> None:
+    async def give() -> int:
+        await asyncio.sleep(0)
+        return 7
+
+    async def fail() -> None:
+        raise ValueError("no")
+
+    assert asyncio.run(within(5, give())) == 7
+    assert asyncio.run(within(None, give())) == 7
+    with pytest.raises(ValueError, match="no"):
+        asyncio.run(within(5, fail()))
+
+
+def test_what_takes_longer_is_cancelled() -> None:
+    ended: list[str] = []
+
+    async def long() -> None:
+        try:
+            await asyncio.sleep(60)
+        finally:
+            ended.append("cancelled")
+
+    async def wait() -> None:
+        with pytest.raises(asyncio.TimeoutError):
+            await within(0.01, long())
+        await asyncio.sleep(0)
+
+    asyncio.run(wait())
+    assert ended == ["cancelled"]
+
+
+@pytest.mark.parametrize("turns", range(6))
+@pytest.mark.parametrize("first", ["event", "cancel"])
+def test_a_cancellation_around_the_turn_in_which_it_comes_is_not_lost(turns: int, first: str) -> None:
+    async def race() -> bool:
+        event, went_on = asyncio.Event(), []
+
+        async def fly() -> None:
+            await within(5, event.wait())
+            await asyncio.sleep(0.01)
+            went_on.append(True)
+
+        task = asyncio.get_running_loop().create_task(fly())
+        await asyncio.sleep(0.01)
+        steps = [event.set, task.cancel]
+        for step in steps if first == "event" else reversed(steps):
+            step()
+            for _ in range(turns):
+                await asyncio.sleep(0)
+        await asyncio.sleep(0.03)
+        assert task.cancelled()
+        return bool(went_on)
+
+    assert not asyncio.run(race())
+
+
+def test_failure_in_the_turn_of_a_cancellation_is_no_complaint_of_asyncio() -> None:
+    complaints: list[object] = []
+
+    async def main() -> None:
+        loop = asyncio.get_running_loop()
+        loop.set_exception_handler(lambda _, context: complaints.append(context))
+        failing = loop.create_future()
+        waiting = loop.create_task(within(5, failing))
+        await asyncio.sleep(0)
+        failing.set_exception(ConnectionResetError("hung up"))
+        waiting.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await waiting
+
+    asyncio.run(main())
+    gc.collect()
+    assert complaints == []

@@ -1,0 +1,71 @@
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from mavproxy_uavapi.core.errors import LinkLost, ModeChanged, TimedOut
+
+
+def test_message_gives_what_the_test_makes_of_it(loop: Any, drone: Any, copter: Any) -> None:
+    drone.mute.add("VFR_HUD")
+    loop.call_later(2.0, lambda: drone.send("vfr_hud", heading=12))
+    heading = loop.run(copter.waiting.message({"VFR_HUD"}, lambda m: m.heading, 5.0, "tell its heading"))
+    assert heading == 12
+    assert loop.time() == pytest.approx(1002.0)
+
+
+def test_timeout_says_what_did_not_happen_and_forgets_the_wait(loop: Any, host: Any, drone: Any, copter: Any) -> None:
+    started = loop.time()
+    with pytest.raises(TimedOut, match=r"^vehicle 1 did not sing within 2\.5 s$"):
+        loop.run(copter.waiting.message({"ATTITUDE"}, lambda m: None, 2.5, "sing"))
+    assert loop.time() - started == pytest.approx(2.5)
+    assert len(host.pending) == 0
+
+
+def test_cancelled_wait_is_forgotten(loop: Any, host: Any, drone: Any, copter: Any) -> None:
+    task = loop.create_task(copter.waiting.message({"NAMED"}, lambda m: m, 60.0, "sing"))
+    loop.settle()
+    assert len(host.pending) == 1
+    task.cancel()
+    loop.settle()
+    assert len(host.pending) == 0
+
+
+def test_until_looks_at_once(loop: Any, copter: Any) -> None:
+    started = loop.time()
+    assert loop.run(copter.waiting.until({"HEARTBEAT"}, lambda: "now", 5.0, "sing")) == "now"
+    assert loop.time() == started
+
+
+def test_until_looks_after_each_message_of_those_names(loop: Any, drone: Any, copter: Any) -> None:
+    loop.call_later(1.6, lambda: setattr(drone, "armed", True))
+    loop.run(copter.waiting.until({"HEARTBEAT"}, lambda: copter.state.armed or None, 5.0, "arm"))
+    assert loop.time() == pytest.approx(1001.75)
+
+
+def test_what_a_condition_raises_ends_the_wait(loop: Any, drone: Any, copter: Any) -> None:
+    def condition() -> None:
+        if copter.mode != "STABILIZE":
+            raise ModeChanged("the pilot")
+
+    loop.call_later(1.0, drone.pilot, "LOITER")
+    with pytest.raises(ModeChanged):
+        loop.run(copter.waiting.until({"HEARTBEAT"}, condition, 5.0, "sing"))
+
+
+def test_link_loss_ends_a_wait(loop: Any, drone: Any, copter: Any) -> None:
+    drone.power_off()
+    with pytest.raises(LinkLost):
+        loop.run(copter.waiting.message({"ATTITUDE"}, lambda m: None, 60.0, "sing"))
+
+
+def test_expecting_catches_what_comes_before_it_is_awaited(loop: Any, drone: Any, copter: Any) -> None:
+    async def send_first() -> Any:
+        with copter.waiting.expecting({"VFR_HUD"}, lambda m: m.heading) as told:
+            drone.send("vfr_hud", heading=7)
+            await copter.waiting.message({"VFR_HUD"}, lambda m: m, 1.0, "come")
+            return await told.within(1.0, "tell")
+
+    drone.mute.add("VFR_HUD")
+    assert loop.run(send_first()) == 7

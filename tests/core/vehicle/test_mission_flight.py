@@ -1,0 +1,153 @@
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from pymavlink import mavutil
+
+from mavproxy_uavapi.core.errors import Busy, ModeChanged, NotArmed, Stale
+from mavproxy_uavapi.core.vehicle import mission_flight
+from mavproxy_uavapi.core.vehicle.mission_files import Item
+
+mavlink = mavutil.mavlink
+
+ITEMS = [Item(number, 3, (0.0, 0.0, 0.0, 0.0), 0, 0, 10.0) for number in (22, 16, 20)]
+
+
+class Flight:
+    """A mission on the scripted drone: what it holds, and what it tells of it."""
+
+    def __init__(self, loop: Any, drone: Any, copter: Any, pilotage: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+        self._loop, self._drone, self._pilotage, self._copter = loop, drone, pilotage, copter
+        self.items = ITEMS
+        monkeypatch.setattr(copter.waypoints, "download", self._download)
+
+    async def _download(self) -> Any:
+        return None, self.items
+
+    def tell(self, seq: int, state: int = mavlink.MISSION_STATE_ACTIVE, total: int = 3) -> None:
+        self._drone.send("mission_current", seq=seq, total=total, mission_state=state)
+        self._loop.settle()
+
+    def start(self, **kwargs: Any) -> Any:
+        async def fly(job: Any) -> None:
+            await mission_flight.fly(self._copter, job, **kwargs)
+
+        return self._pilotage.start(fly)
+
+
+@pytest.fixture
+def flight(loop: Any, drone: Any, copter: Any, pilotage: Any, monkeypatch: pytest.MonkeyPatch) -> Flight:
+    return Flight(loop, drone, copter, pilotage, monkeypatch)
+
+
+def orders(drone: Any) -> list[int]:
+    return [message.command for message in drone.orders() if message.get_type() == "COMMAND_LONG"]
+
+
+def test_start_is_from_the_first_item_in_auto(loop: Any, flying: Any, flight: Flight, pilotage: Any) -> None:
+    job = flight.start()
+    loop.pass_time(1.0)
+    wanted = [mavlink.MAV_CMD_DO_SET_MISSION_CURRENT, mavlink.MAV_CMD_DO_SET_MODE, mavlink.MAV_CMD_MISSION_START]
+    assert orders(flying) == wanted
+    assert flying.commands(wanted[0])[0].param1 == 1
+    assert flying.mode == "AUTO"
+    flight.tell(1)
+    assert pilotage.result(job) == "done"
+
+
+def test_start_needs_an_armed_vehicle_a_mission_and_no_pilot(
+    loop: Any, drone: Any, flight: Flight, pilotage: Any
+) -> None:
+    with pytest.raises(NotArmed):
+        pilotage.result(flight.start())
+    drone.fly()
+    loop.settle()
+    flight.items = []
+    with pytest.raises(Busy, match="no mission"):
+        pilotage.result(flight.start())
+    flight.items = ITEMS
+    drone.pilot("LOITER")
+    loop.settle()
+    with pytest.raises(ModeChanged, match="LOITER"):
+        pilotage.result(flight.start())
+    assert drone.orders() == []
+
+
+def test_wait_ends_when_the_mission_is_complete(loop: Any, flying: Any, flight: Flight, pilotage: Any) -> None:
+    job = flight.start(until_complete=True)
+    loop.pass_time(1.0)
+    for seq in (1, 2, 3):
+        flight.tell(seq)
+    assert job.running
+    assert job.progress["item"] == 3
+    flight.tell(3, mavlink.MISSION_STATE_COMPLETE)
+    assert pilotage.result(job) == "done"
+
+
+def landed(flying: Any, loop: Any) -> None:
+    flying.armed = False
+    flying.tell("HEARTBEAT")
+    loop.settle()
+
+
+def test_disarming_in_the_landing_item_is_the_end(loop: Any, flying: Any, flight: Flight, pilotage: Any) -> None:
+    job = flight.start(until_complete=True)
+    loop.pass_time(1.0)
+    flight.tell(3)
+    landed(flying, loop)
+    flight.tell(0, mavlink.MISSION_STATE_NOT_STARTED)
+    assert pilotage.result(job) == "done"
+
+
+def test_disarming_before_it_is_a_failure(loop: Any, flying: Any, flight: Flight, pilotage: Any) -> None:
+    job = flight.start(until_complete=True)
+    loop.pass_time(1.0)
+    flight.tell(2)
+    landed(flying, loop)
+    with pytest.raises(NotArmed):
+        pilotage.result(job)
+
+
+def test_pilot_who_leaves_auto_ends_the_wait(loop: Any, flying: Any, flight: Flight, pilotage: Any) -> None:
+    job = flight.start(until_complete=True)
+    loop.pass_time(1.0)
+    flight.tell(1)
+    sent = len(flying.orders())
+    flying.pilot("LOITER")
+    with pytest.raises(ModeChanged, match="LOITER"):
+        pilotage.result(job)
+    loop.pass_time(5.0)
+    assert len(flying.orders()) == sent
+
+
+def test_older_autopilot_without_a_state_is_understood(loop: Any, flying: Any, flight: Flight, pilotage: Any) -> None:
+    job = flight.start(until_complete=True)
+    loop.pass_time(1.0)
+    flight.tell(3, mavlink.MISSION_STATE_UNKNOWN)
+    assert job.running
+    flying.send("mission_item_reached", seq=3)
+    assert pilotage.result(job) == "done"
+
+
+def test_progress_is_told_and_a_mission_before_this_one_is_not(loop: Any, flying: Any, copter: Any) -> None:
+    with pytest.raises(Stale):
+        mission_flight.progress(copter)
+    flying.send("mission_item_reached", seq=9)
+    flying.send("mission_current", seq=2, total=65535, mission_state=mavlink.MISSION_STATE_PAUSED)
+    loop.pass_time(0.5)
+    copter.waypoints.changed_at = loop.time()
+    told = mission_flight.progress(copter)
+    assert told == {
+        "current": 2,
+        "total": None,
+        "last_reached": None,
+        "state": "paused",
+        "mode": "GUIDED",
+        "distance_m": None,
+    }
+    flying.send("mission_item_reached", seq=1)
+    flying.send("nav_controller_output", wp_dist=14)
+    flying.pilot("AUTO")
+    loop.settle()
+    assert (mission_flight.progress(copter)["last_reached"], mission_flight.progress(copter)["distance_m"]) == (1, 14)

@@ -1,0 +1,233 @@
+"""The mission protocol against a scripted store that loses, refuses and truncates."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from pymavlink import mavutil
+
+from mavproxy_uavapi.core.errors import LinkLost, Rejected, TimedOut
+from mavproxy_uavapi.core.vehicle.mission_files import HOME, Item, from_message
+
+mavlink = mavutil.mavlink
+
+PLACE = (0.0, 0.0, 0.0, 0.0)
+OLD = [Item(22, 3, PLACE, 0, 0, 10.0), Item(16, 3, PLACE, 10, 20, 15.0)]
+NEW = [Item(22, 3, PLACE, 0, 0, 5.0), Item(16, 3, PLACE, 30, 40, 7.0), Item(20, 3, PLACE, 0, 0, 0.0)]
+
+
+class Store:
+    """The vehicle's end of the protocol, as ArduPilot has it: an upload overwrites as it goes.
+
+    Attributes:
+        items: with home first.
+        lost: how many messages to it are lost, by name; negative loses all.
+        mute: names of its own messages that are lost, and how many.
+        refuse: item number -> MAV_MISSION_RESULT.
+    """
+
+    def __init__(self, loop: Any, drone: Any) -> None:
+        self._loop, self._drone = loop, drone
+        self.items = [HOME, *OLD]
+        self.lost: dict[str, int] = {}
+        self.mute: dict[str, int] = {}
+        self.refuse: dict[int, int] = {}
+        self.counts = 0
+        self._expected: list[Any] | None = None
+        self.got: list[str] = []
+        self.spoil = False
+
+    def take(self, message: Any) -> None:
+        name = message.get_type()
+        if not name.startswith("MISSION"):
+            return
+        self.got.append(name)
+        if self.lost.get(name):
+            self.lost[name] -= 1
+            return
+        handler = getattr(self, name.lower(), None)
+        if handler is not None:
+            self._loop.call_later(0.01, handler, message)
+
+    def say(self, name: str, component: int = 1, target: tuple[int, int] = (255, 230), **fields: Any) -> None:
+        if self.mute.get(name):
+            self.mute[name] -= 1
+            return
+        self._drone.send(name, component, target_system=target[0], target_component=target[1], **fields)
+
+    def ack(self, result: int) -> None:
+        self.say("mission_ack", type=result)
+
+    def mission_request_list(self, _message: Any) -> None:
+        self.say("mission_count", count=len(self.items))
+
+    def mission_request_int(self, message: Any) -> None:
+        sent = self.items[message.seq].to((255, 230), message.seq)
+        fields = {name: getattr(sent, name) for name in sent.fieldnames if not name.startswith("target")}
+        self.say("mission_item_int", **fields)
+
+    def mission_clear_all(self, _message: Any) -> None:
+        self.items = self.items[:1]
+        self.ack(mavlink.MAV_MISSION_ACCEPTED)
+
+    def mission_count(self, message: Any) -> None:
+        self.counts += 1
+        self._expected = list(range(message.count))
+        self.items = self.items[: message.count]
+        self._ask()
+
+    def _ask(self) -> None:
+        assert self._expected is not None
+        self.say("mission_request", seq=self._expected[0])
+
+    def mission_item_int(self, message: Any) -> None:
+        if self._expected is None or message.seq != self._expected[0]:
+            self.ack(mavlink.MAV_MISSION_INVALID_SEQUENCE)
+            return
+        if message.seq in self.refuse:
+            self._expected = None
+            self.ack(self.refuse.pop(message.seq))
+            return
+        item = from_message(message)
+        self.items[message.seq : message.seq + 1] = [replace(item, z=item.z + 3) if self.spoil else item]
+        self._expected = self._expected[1:] or None
+        if self._expected is None:
+            self.ack(mavlink.MAV_MISSION_ACCEPTED)
+        else:
+            self._ask()
+
+
+@pytest.fixture
+def store(loop: Any, drone: Any, link: Any) -> Store:
+    store = Store(loop, drone)
+    before = link.on_send
+
+    def on_send(message: Any, system: int) -> None:
+        before(message, system)
+        store.take(message)
+
+    link.on_send = on_send
+    return store
+
+
+def test_download_has_home_and_the_items(loop: Any, copter: Any, store: Store) -> None:
+    assert loop.run(copter.waypoints.download()) == (HOME, OLD)
+    assert store.got[-1] == "MISSION_ACK"
+    store.items = []
+    assert loop.run(copter.waypoints.download()) == (None, [])
+
+
+@pytest.mark.parametrize("name", ["MISSION_REQUEST_LIST", "MISSION_REQUEST_INT"])
+def test_lost_questions_are_asked_again(loop: Any, copter: Any, store: Store, name: str) -> None:
+    store.lost[name] = 3
+    assert loop.run(copter.waypoints.download()) == (HOME, OLD)
+    store.lost[name] = -1
+    with pytest.raises(TimedOut, match="asked 4 times"):
+        loop.run(copter.waypoints.download())
+
+
+def test_upload_replaces_the_mission_and_tells_its_progress(loop: Any, copter: Any, store: Store) -> None:
+    told: list[tuple[int, int]] = []
+    loop.run(copter.waypoints.upload(NEW, lambda done, of: told.append((done, of))))
+    assert store.items[1:] == NEW
+    assert told == [(1, 4), (2, 4), (3, 4), (4, 4)]
+
+
+def test_shorter_and_empty_missions_are_replaced_too(loop: Any, copter: Any, store: Store) -> None:
+    store.items = [HOME, *NEW]
+    loop.run(copter.waypoints.upload(OLD))
+    assert store.items[1:] == OLD
+    store.items = []
+    loop.run(copter.waypoints.upload(NEW))
+    assert store.items[1:] == NEW
+
+
+def test_lost_offer_is_made_again_and_a_lost_ack_is_found_by_reading_back(
+    loop: Any, copter: Any, store: Store
+) -> None:
+    store.lost["MISSION_COUNT"] = 2
+    store.mute["mission_ack"] = 1
+    loop.run(copter.waypoints.upload(NEW))
+    assert store.items[1:] == NEW
+
+
+def test_refused_item_puts_the_old_mission_back_and_says_so(loop: Any, copter: Any, store: Store) -> None:
+    store.refuse[2] = mavlink.MAV_MISSION_UNSUPPORTED
+    with pytest.raises(Rejected, match="its old mission .2 items. was put back") as caught:
+        loop.run(copter.waypoints.upload(NEW))
+    assert caught.value.ack == "MAV_MISSION_UNSUPPORTED"
+    assert store.items[1:] == OLD
+
+
+def test_refused_upload_to_an_empty_vehicle_leaves_it_empty(loop: Any, copter: Any, store: Store) -> None:
+    store.items = [HOME]
+    store.refuse[2] = mavlink.MAV_MISSION_INVALID_PARAM7
+    with pytest.raises(Rejected, match="no mission, as before"):
+        loop.run(copter.waypoints.upload(NEW))
+    assert store.items == [HOME]
+
+
+def test_mission_that_is_read_back_otherwise_is_an_error(loop: Any, copter: Any, store: Store) -> None:
+    store.spoil = True
+    with pytest.raises(Rejected, match=r"otherwise than it was sent: item 1 .* could not be put back"):
+        loop.run(copter.waypoints.upload(NEW))
+
+
+def test_upload_that_nobody_takes_up_leaves_the_old_mission(loop: Any, copter: Any, store: Store) -> None:
+    store.lost["MISSION_COUNT"] = -1
+    with pytest.raises(TimedOut, match="its old mission is unchanged"):
+        loop.run(copter.waypoints.upload(NEW))
+    assert store.items[1:] == OLD
+
+
+def test_transfer_that_was_cancelled_is_tried_once_more(loop: Any, copter: Any, store: Store) -> None:
+    store.refuse[1] = mavlink.MAV_MISSION_OPERATION_CANCELLED
+    loop.run(copter.waypoints.upload(NEW))
+    assert store.items[1:] == NEW
+    assert store.counts == 2
+
+
+def test_lost_link_is_said_at_once_and_nothing_more_is_sent(
+    loop: Any, copter: Any, store: Store, host: Any, drone: Any
+) -> None:
+    store.lost["MISSION_ITEM_INT"] = -1
+    task = loop.create_task(copter.waypoints.upload(NEW))
+    loop.pass_time(1.0)
+    drone.power_off()
+    with pytest.raises(LinkLost, match="may be incomplete"):
+        loop.run(task)
+
+
+def test_clear_is_seen_to_be_done(loop: Any, copter: Any, store: Store) -> None:
+    store.lost["MISSION_CLEAR_ALL"] = 1
+    loop.run(copter.waypoints.clear())
+    assert store.items == [HOME]
+
+
+def test_refused_clearing_is_told(loop: Any, copter: Any, store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(store, "mission_clear_all", lambda _: store.ack(mavlink.MAV_MISSION_ERROR))
+    with pytest.raises(Rejected) as caught:
+        loop.run(copter.waypoints.clear())
+    assert caught.value.ack == "MAV_MISSION_ERROR"
+
+
+def test_messages_of_others_to_others_and_about_the_fence_do_not_count(loop: Any, copter: Any, store: Store) -> None:
+    store.lost["MISSION_REQUEST_LIST"] = 1
+    task = loop.create_task(copter.waypoints.download())
+    loop.pass_time(0.1)
+    store.say("mission_count", component=190, count=9)
+    store.say("mission_count", target=(1, 9), count=9)
+    store.say("mission_count", count=9, mission_type=mavlink.MAV_MISSION_TYPE_FENCE)
+    assert loop.run(task) == (HOME, OLD)
+
+
+def test_one_transfer_at_a_time(loop: Any, copter: Any, store: Store) -> None:
+    async def both() -> Any:
+        return await asyncio.gather(copter.waypoints.upload(NEW), copter.waypoints.download())
+
+    _, found = loop.run(both())
+    assert found == (HOME, NEW)
+    assert store.counts == 1

@@ -1,0 +1,102 @@
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from pymavlink import mavutil
+
+from mavproxy_uavapi.core.vehicle.readiness import landed_state, status, why_not
+
+mavlink = mavutil.mavlink
+
+
+def test_status_of_a_vehicle_that_is_ready(loop: Any, drone: Any, copter: Any) -> None:
+    assert status(copter, True, loop.time() + 0.5) == {
+        "vehicle_type": "copter",
+        "mode": "STABILIZE",
+        "armed": False,
+        "landed_state": "on_ground",
+        "link": {"alive": True, "heartbeat_age_s": 0.5, "packet_loss": 0.0},
+        "ekf_ok": True,
+        "gps_fix": 6,
+        "battery_remaining": 87,
+        "ready_to_arm": True,
+        "why_not": [],
+    }
+
+
+def test_status_of_a_vehicle_in_the_air(loop: Any, flying: Any, copter: Any) -> None:
+    told = status(copter, True, loop.time())
+    assert (told["mode"], told["armed"], told["landed_state"]) == ("GUIDED", True, "in_air")
+
+
+def test_reasons_are_what_it_said_about_arming_of_late(loop: Any, drone: Any, copter: Any) -> None:
+    drone.ready = False
+    drone.say("PreArm: long ago")
+    loop.pass_time(70.0)
+    for text in ("PreArm: compass not healthy", "Arm: throttle too high", "PreArm: compass not healthy", "hello"):
+        drone.say(text)
+    loop.pass_time(1.0)
+    assert why_not(copter, True, loop.time()) == [
+        "no position estimate yet",
+        "PreArm: compass not healthy",
+        "Arm: throttle too high",
+    ]
+    assert status(copter, True, loop.time())["ready_to_arm"] is False
+
+
+def test_reason_without_words_is_told_in_ours(loop: Any, drone: Any, copter: Any) -> None:
+    drone.ready = False
+    loop.pass_time(1.0)
+    assert "pre-arm checks do not pass" in why_not(copter, True, loop.time())
+
+
+def test_missing_fix_is_a_reason(loop: Any, drone: Any, copter: Any) -> None:
+    drone.mute.add("GPS_RAW_INT")
+    drone.send("gps_raw_int", fix_type=2)
+    loop.settle()
+    assert why_not(copter, True, loop.time()) == ["no 3D GPS fix"]
+
+
+def test_lost_link_is_the_only_reason(loop: Any, drone: Any, copter: Any) -> None:
+    drone.ready = False
+    drone.power_off()
+    assert why_not(copter, False, copter.state.heartbeat_at + 7.25) == ["no heartbeat for 7.2 s"]
+
+
+def test_armed_vehicle_needs_no_reasons(loop: Any, drone: Any, copter: Any) -> None:
+    drone.ready, drone.armed = False, True
+    loop.pass_time(1.0)
+    assert why_not(copter, True, loop.time()) == []
+
+
+@pytest.mark.parametrize(
+    ("told", "name"),
+    [
+        (mavlink.MAV_LANDED_STATE_ON_GROUND, "on_ground"),
+        (mavlink.MAV_LANDED_STATE_IN_AIR, "in_air"),
+        (mavlink.MAV_LANDED_STATE_TAKEOFF, "takeoff"),
+        (mavlink.MAV_LANDED_STATE_LANDING, "landing"),
+    ],
+)
+def test_landed_state_is_what_it_tells(loop: Any, drone: Any, copter: Any, told: int, name: str) -> None:
+    drone.landed = told
+    loop.pass_time(0.5)
+    assert landed_state(copter) == name
+
+
+def test_landed_state_without_its_message_is_the_heartbeats(loop: Any, drone: Any, copter: Any) -> None:
+    drone.mute.add("EXTENDED_SYS_STATE")
+    drone.send("extended_sys_state", landed_state=0)
+    drone.fly()
+    loop.settle()
+    assert landed_state(copter) == "in_air"
+    copter.state.system_status = None
+    assert landed_state(copter) == "unknown"
+
+
+def test_unknown_charge_is_none(loop: Any, drone: Any, copter: Any) -> None:
+    drone.mute.add("SYS_STATUS")
+    drone.send("sys_status", battery_remaining=-1)
+    loop.settle()
+    assert status(copter, True, loop.time())["battery_remaining"] is None

@@ -1,0 +1,65 @@
+"""A rover's heartbeat says ACTIVE in every mode but HOLD, be it at rest or not; it sends no landed state."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from pymavlink import mavutil
+
+from mavproxy_uavapi.core.mavlink.flight_modes import mode_name
+from mavproxy_uavapi.core.vehicle.readiness import landed_state
+
+mavlink = mavutil.mavlink
+ROVER = mavlink.MAV_TYPE_GROUND_ROVER
+
+
+@pytest.fixture
+def drone(loop: Any, drone: Any) -> Any:
+    """A rover, disarmed in MANUAL."""
+    telemetry, obey = drone._telemetry, drone._obey
+
+    def rovers() -> Any:
+        told = telemetry()
+        resting = drone.mode == "HOLD"
+        told["HEARTBEAT"] |= {
+            "type": ROVER,
+            "system_status": mavlink.MAV_STATE_STANDBY if resting else mavlink.MAV_STATE_ACTIVE,
+        }
+        told["EXTENDED_SYS_STATE"]["landed_state"] = mavlink.MAV_LANDED_STATE_UNDEFINED
+        return told
+
+    def obeyed(message: Any) -> bool:
+        if message.command != mavlink.MAV_CMD_DO_SET_MODE:
+            return bool(obey(message))
+        drone.mode = mode_name(ROVER, int(message.param2))
+        drone.tell("HEARTBEAT")
+        return True
+
+    drone._telemetry, drone._obey, drone.mode = rovers, obeyed, "MANUAL"
+    drone.tell_all()
+    loop.settle()
+    return drone
+
+
+@pytest.fixture
+def standing(loop: Any, drone: Any) -> Any:
+    """The rover, armed in MANUAL."""
+    drone.armed = True
+    drone.tell_all()
+    loop.settle()
+    return drone
+
+
+def test_rover_that_stands_armed_in_manual_is_on_the_ground(standing: Any, copter: Any) -> None:
+    assert (copter.mode, copter.state.armed, landed_state(copter)) == ("MANUAL", True, "on_ground")
+
+
+def test_rover_that_stands_armed_in_manual_can_be_disarmed(standing: Any, copter: Any, pilotage: Any) -> None:
+    pilotage.do(copter.disarm)
+    assert standing.armed is False
+
+
+def test_rover_that_stands_armed_in_manual_can_be_armed_for_guided(standing: Any, copter: Any, pilotage: Any) -> None:
+    pilotage.do(copter.arm)
+    assert (standing.armed, standing.mode) == (True, "GUIDED")

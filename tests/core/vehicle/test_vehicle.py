@@ -1,0 +1,446 @@
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from pymavlink import mavutil
+
+from mavproxy_uavapi.core.errors import (
+    Busy,
+    Invalid,
+    LinkLost,
+    ModeChanged,
+    NotArmed,
+    NotFound,
+    NotSupported,
+    Rejected,
+    Stale,
+    TimedOut,
+)
+from mavproxy_uavapi.core.vehicle.messages import NedTarget
+
+mavlink = mavutil.mavlink
+ARM = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
+MODE = mavlink.MAV_CMD_DO_SET_MODE
+SPEED = mavlink.MAV_CMD_DO_CHANGE_SPEED
+PREARM = mavlink.MAV_CMD_RUN_PREARM_CHECKS
+DENIED, FAILED = mavlink.MAV_RESULT_DENIED, mavlink.MAV_RESULT_FAILED
+
+
+def numbers(drone: Any) -> list[int]:
+    return [message.command for message in drone.orders()]
+
+
+# -- arm --------------------------------------------------------------------------------------------------
+
+
+def test_arm_switches_to_guided_then_arms(drone: Any, copter: Any, pilotage: Any) -> None:
+    pilotage.do(copter.arm)
+    assert numbers(drone) == [MODE, ARM]
+    assert (drone.mode, drone.armed) == ("GUIDED", True)
+    assert copter.state.armed is True
+
+
+def test_arm_in_guided_only_arms(loop: Any, drone: Any, copter: Any, pilotage: Any) -> None:
+    drone.pilot("GUIDED")
+    loop.settle()
+    pilotage.do(copter.arm)
+    assert numbers(drone) == [ARM]
+
+
+def test_arm_waits_until_the_vehicle_is_ready(loop: Any, drone: Any, copter: Any, pilotage: Any) -> None:
+    drone.ready = False
+    loop.pass_time(1.0)
+    job = pilotage.start(copter.arm)
+    loop.pass_time(10.0)
+    assert drone.orders() == []
+    drone.ready = True
+    pilotage.result(job)
+    assert numbers(drone) == [MODE, ARM]
+
+
+def test_arm_of_a_vehicle_that_does_not_get_ready_is_rejected_with_its_reasons(
+    loop: Any, drone: Any, copter: Any, pilotage: Any
+) -> None:
+    drone.ready = False
+    drone.says[PREARM] = ["PreArm: compass not healthy"]
+    loop.pass_time(1.0)
+    started = loop.time()
+    job = pilotage.start(copter.arm, timeout=10.0)
+    loop.call_later(8.3, drone.say, "PreArm: GPS: no fix")
+    loop.call_later(8.5, drone.say, "PreArm: battery low")
+    with pytest.raises(
+        Rejected, match=r"not ready to arm after 8 s: PreArm: compass not healthy; PreArm: GPS: n"
+    ) as e:
+        pilotage.result(job)
+    assert e.value.statustext == ["PreArm: compass not healthy", "PreArm: GPS: no fix", "PreArm: battery low"]
+    assert loop.time() - started < 13.0
+    assert numbers(drone) == [PREARM]
+
+
+def test_arm_tells_what_the_autopilot_said_when_it_refuses(drone: Any, copter: Any, pilotage: Any) -> None:
+    drone.answers[ARM] = [FAILED]
+    drone.says[ARM] = ["Arm: throttle too high"]
+    with pytest.raises(Rejected) as caught:
+        pilotage.do(copter.arm)
+    assert (caught.value.ack, caught.value.statustext) == ("MAV_RESULT_FAILED", ["Arm: throttle too high"])
+
+
+def test_arm_without_guided_is_rejected_and_does_not_arm(drone: Any, copter: Any, pilotage: Any) -> None:
+    drone.answers[MODE] = [FAILED]
+    with pytest.raises(Rejected, match="refused DO_SET_MODE"):
+        pilotage.do(copter.arm)
+    assert numbers(drone) == [MODE]
+
+
+def test_arm_of_an_armed_vehicle_in_guided_sends_nothing(flying: Any, copter: Any, pilotage: Any) -> None:
+    pilotage.do(copter.arm)
+    assert flying.orders() == []
+
+
+def test_arm_of_a_vehicle_that_its_pilot_flies_sends_nothing(
+    loop: Any, drone: Any, copter: Any, pilotage: Any
+) -> None:
+    drone.fly("LOITER")
+    loop.settle()
+    with pytest.raises(ModeChanged, match="flying in LOITER"):
+        pilotage.do(copter.arm)
+    loop.pass_time(10.0)
+    assert drone.orders() == []
+
+
+def test_arm_without_an_ack_is_done_when_a_heartbeat_shows_it(drone: Any, copter: Any, pilotage: Any) -> None:
+    drone.answers[ARM] = [mavlink.MAV_RESULT_ACCEPTED]  # says yes, does not do it
+    with pytest.raises(TimedOut, match="did not show that it is armed"):
+        pilotage.do(copter.arm)
+
+
+def test_pilot_mode_change_ends_the_wait_for_readiness_and_sends_nothing(
+    loop: Any, drone: Any, copter: Any, pilotage: Any
+) -> None:
+    drone.ready = False
+    loop.pass_time(1.0)
+    job = pilotage.start(copter.arm)
+    loop.pass_time(3.0)
+    drone.pilot("LOITER")
+    started = loop.time()
+    with pytest.raises(ModeChanged):
+        pilotage.result(job)
+    assert loop.time() - started < 0.1
+    drone.ready = True
+    loop.pass_time(20.0)
+    assert drone.orders() == []
+
+
+def test_pilot_who_leaves_guided_is_not_armed_under_his_hands(
+    loop: Any, drone: Any, copter: Any, pilotage: Any
+) -> None:
+    drone.answers[ARM] = [None]
+    job = pilotage.start(copter.arm)
+    loop.pass_time(0.5)
+    assert numbers(drone) == [MODE, ARM]
+    drone.pilot("STABILIZE")
+    with pytest.raises(ModeChanged):
+        pilotage.result(job)
+    loop.pass_time(10.0)
+    assert numbers(drone) == [MODE, ARM]
+
+
+# -- disarm -----------------------------------------------------------------------------------------------
+
+
+def test_disarm_on_the_ground(loop: Any, drone: Any, copter: Any, pilotage: Any) -> None:
+    drone.armed = True
+    loop.pass_time(0.5)
+    pilotage.do(copter.disarm)
+    assert [(message.command, message.param1, message.param2) for message in drone.orders()] == [(ARM, 0, 0)]
+    assert copter.state.armed is False
+
+
+def test_disarm_of_a_disarmed_vehicle_is_done_at_once(loop: Any, drone: Any, copter: Any, pilotage: Any) -> None:
+    started = loop.time()
+    pilotage.do(copter.disarm)
+    assert (drone.orders(), loop.time()) == ([], started)
+
+
+def test_disarm_in_the_air_is_refused_and_sends_nothing(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+    with pytest.raises(Busy, match="flying; land it first"):
+        pilotage.do(copter.disarm)
+    loop.pass_time(5.0)
+    assert flying.orders() == []
+
+
+def test_forced_disarm_in_the_air_carries_the_magic_number(flying: Any, copter: Any, pilotage: Any) -> None:
+    pilotage.do(copter.disarm, force=True)
+    assert [(message.param1, message.param2) for message in flying.orders()] == [(0, 21196)]
+
+
+# -- modes and speeds -------------------------------------------------------------------------------------
+
+
+def test_set_mode_is_done_when_a_heartbeat_shows_it(drone: Any, copter: Any, pilotage: Any) -> None:
+    pilotage.do(copter.set_mode, "loiter")
+    assert drone.mode == "LOITER"
+    assert copter.mode == "LOITER"
+
+
+def test_set_mode_that_no_heartbeat_shows_is_a_timeout(drone: Any, copter: Any, pilotage: Any) -> None:
+    drone.answers[MODE] = [mavlink.MAV_RESULT_ACCEPTED]
+    with pytest.raises(TimedOut, match="did not show mode LOITER"):
+        pilotage.do(copter.set_mode, "LOITER")
+
+
+def test_unknown_mode_is_invalid_and_takes_no_command(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+    busy = pilotage.start(copter.land)
+    loop.pass_time(1.0)
+    with pytest.raises(Invalid):
+        pilotage.do(copter.set_mode, "HOVERING")
+    assert busy.running
+    assert len(flying.commands(MODE)) == 1
+
+
+def test_mode_request_is_not_repeated_once_the_pilot_has_switched(
+    loop: Any, flying: Any, copter: Any, pilotage: Any
+) -> None:
+    flying.answers[MODE] = [None]
+    job = pilotage.start(copter.set_mode, "BRAKE")
+    loop.pass_time(0.5)
+    flying.pilot("LOITER")
+    with pytest.raises(ModeChanged):
+        pilotage.result(job)
+    loop.pass_time(10.0)
+    assert len(flying.commands(MODE)) == 1
+    assert flying.mode == "LOITER"
+
+
+def test_mode_request_whose_ack_was_lost_is_done_when_the_heartbeat_shows_it(
+    flying: Any, copter: Any, pilotage: Any
+) -> None:
+    flying.deaf.add(MODE)
+    pilotage.do(copter.set_mode, "BRAKE")
+    assert copter.mode == "BRAKE"
+
+
+def test_mode_that_somebody_elses_switch_came_before_is_not_on_its_way(
+    loop: Any, flying: Any, copter: Any, pilotage: Any
+) -> None:
+    pilotage.do(copter.set_mode, "GUIDED")
+    flying.answers[MODE] = [None]
+    pilotage.start(copter.land)
+    assert copter.next_mode == "LAND"
+    for mode in ("LOITER", "GUIDED"):
+        loop.pass_time(0.3)
+        flying.pilot(mode)
+    loop.settle()
+    assert copter.next_mode == "GUIDED"
+
+
+def test_mode_whose_ack_was_an_earlier_ones_is_sent_again(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+    flying.answers[MODE] = [(0,), (0,), None]  # acknowledged, and not obeyed: the command itself was lost
+    job = pilotage.start(copter.land)
+    loop.pass_time(3.0)
+    assert len(flying.commands(MODE)) == 2 and job.running
+    del flying.answers[MODE]
+    loop.pass_time(3.0)
+    assert flying.mode == "LAND"
+
+
+@pytest.mark.parametrize(("kind", "number"), [("air", 0), ("ground", 1), ("climb", 2), ("descent", 3)])
+def test_speed_is_set_by_its_type(flying: Any, copter: Any, kind: str, number: int, pilotage: Any) -> None:
+    pilotage.do(copter.set_speed, kind, 3.5)
+    command = flying.commands(SPEED)[0]
+    assert (command.param1, command.param2, command.param3) == (number, 3.5, -1)
+    assert copter.speeds.in_force == {kind: 3.5}
+
+
+def test_speed_that_is_asked_for_before_guided_is_sent_once_it_flies(
+    loop: Any, drone: Any, copter: Any, pilotage: Any
+) -> None:
+    pilotage.do(copter.set_speed, "ground", 3.5)
+    assert drone.commands(SPEED) == [] and copter.speeds.in_force == {}
+    drone.fly()
+    loop.settle()
+    pilotage.do(copter.go_to, NedTarget(10.0, 0.0, -20.0))
+    assert [(m.param1, m.param2) for m in drone.commands(SPEED)] == [(1, 3.5)]
+    pilotage.do(copter.go_to, NedTarget(20.0, 0.0, -20.0))
+    assert len(drone.commands(SPEED)) == 1
+    assert copter.speeds.in_force == {"ground": 3.5}
+
+
+def test_speed_that_a_pilots_mode_refuses_is_remembered(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+    flying.answers[SPEED] = [None]
+    job = pilotage.start(copter.set_speed, "ground", 3.5)
+    loop.pass_time(0.5)
+    flying.pilot("LOITER")
+    assert pilotage.result(job) == "done"
+    assert len(flying.commands(SPEED)) == 1
+
+
+def test_remembered_speed_is_forgotten_by_a_reboot(loop: Any, drone: Any, copter: Any, pilotage: Any) -> None:
+    pilotage.do(copter.set_speed, "ground", 3.5)
+    copter.state.reboots += 1
+    assert copter.speeds.to_send(new_kind=True) == {}
+
+
+def test_refused_speed_is_not_remembered(flying: Any, copter: Any, pilotage: Any) -> None:
+    flying.answers[SPEED] = [DENIED]
+    with pytest.raises(Rejected):
+        pilotage.do(copter.set_speed, "ground", 3.5)
+    assert copter.speeds.to_send(new_kind=True) == {}
+
+
+# -- home, servo, parameters ------------------------------------------------------------------------------
+
+
+def test_set_home_is_retried_while_the_estimator_settles_and_then_read_back(
+    drone: Any, copter: Any, pilotage: Any
+) -> None:
+    drone.answers[mavlink.MAV_CMD_DO_SET_HOME] = [FAILED, mavlink.MAV_RESULT_TEMPORARILY_REJECTED, 0]
+    pilotage.do(copter.set_home)
+    assert [command.param1 for command in drone.commands(mavlink.MAV_CMD_DO_SET_HOME)] == [1, 1, 1]
+    assert copter.state.messages["HOME_POSITION"].message.altitude == 584000
+
+
+def test_home_is_asked_for(loop: Any, drone: Any, copter: Any) -> None:
+    assert loop.run(copter.home()).latitude == -350000000
+
+
+def test_home_that_is_not_set_is_not_found(loop: Any, drone: Any, copter: Any) -> None:
+    drone.answers[mavlink.MAV_CMD_REQUEST_MESSAGE] = [FAILED]
+    with pytest.raises(NotFound, match="no home position yet"):
+        loop.run(copter.home())
+
+
+def test_home_that_does_not_come_is_a_timeout(loop: Any, drone: Any, copter: Any) -> None:
+    drone.answers[mavlink.MAV_CMD_REQUEST_MESSAGE] = [mavlink.MAV_RESULT_ACCEPTED]
+    with pytest.raises(TimedOut, match="did not tell HOME_POSITION"):
+        loop.run(copter.home())
+
+
+def test_servo(loop: Any, drone: Any, copter: Any) -> None:
+    loop.run(copter.set_servo(9, 1700))
+    assert [(c.command, c.param1, c.param2) for c in drone.commands()] == [(mavlink.MAV_CMD_DO_SET_SERVO, 9, 1700)]
+
+
+def test_sim_speedup_is_set_and_read_back(loop: Any, drone: Any, copter: Any) -> None:
+    loop.run(copter.set_sim_speedup(5))
+    assert drone.parameters["SIM_SPEEDUP"] == 5
+    assert copter.state.parameters["SIM_SPEEDUP"] == 5
+
+
+def test_sim_speedup_that_is_not_taken_is_a_timeout(loop: Any, drone: Any, copter: Any) -> None:
+    loop.run(copter.parameters.read([("SIM_SPEEDUP",)]))
+    del drone.parameters["SIM_SPEEDUP"]
+    with pytest.raises(TimedOut, match="did not take SIM_SPEEDUP = 5"):
+        loop.run(copter.set_sim_speedup(5))
+
+
+def test_sim_speedup_of_a_real_vehicle_is_not_supported(loop: Any, drone: Any, copter: Any) -> None:
+    del drone.parameters["SIM_SPEEDUP"]
+    with pytest.raises(NotSupported, match="not a simulation"):
+        loop.run(copter.set_sim_speedup(5))
+    assert [message.get_type() for message in drone.got] == ["PARAM_REQUEST_READ"]
+
+
+def test_parameters_are_asked_for_once_and_missing_ones_left_out(loop: Any, drone: Any, copter: Any) -> None:
+    assert loop.run(copter.parameters.read([("RTL_ALT",), ("NO_SUCH",)])) == {"RTL_ALT": 1500.0}
+    drone.got.clear()
+    assert loop.run(copter.parameters.read([("RTL_ALT",)])) == {"RTL_ALT": 1500.0}
+    assert drone.got == []
+
+
+def test_one_of_a_quantitys_names_is_enough(loop: Any, drone: Any, copter: Any) -> None:
+    started = loop.time()
+    assert loop.run(copter.parameters.read([("RTL_ALT", "RTL_ALT_M")])) == {"RTL_ALT": 1500.0}
+    assert loop.time() - started < 0.1
+
+
+def test_limits_are_the_vehicles_own(loop: Any, drone: Any, copter: Any) -> None:
+    drone.parameters["WPNAV_SPEED"] = 300.0
+    assert loop.run(copter.limits()).horizontal == 3.0
+
+
+def test_deadline_is_the_clients_or_what_the_flight_needs(copter: Any) -> None:
+    assert copter.allowed(100.0, 7.0) == 7.0
+    assert copter.allowed(100.0, None) == 230.0
+
+
+# -- what it is -------------------------------------------------------------------------------------------
+
+
+def test_position_is_good_when_the_estimator_says_so(loop: Any, drone: Any, copter: Any) -> None:
+    assert copter.has_position
+    drone.mute.add("EKF_STATUS_REPORT")
+    good = mavlink.EKF_POS_HORIZ_ABS
+    for flags, expected in ((good | mavlink.EKF_CONST_POS_MODE, False), (0, False), (good, True)):
+        drone.send("ekf_status_report", flags=flags)
+        loop.settle()
+        assert copter.has_position is expected
+
+
+def test_without_an_estimator_report_the_prearm_bit_counts(copter: Any) -> None:
+    del copter.state.messages["EKF_STATUS_REPORT"]
+    assert copter.has_position
+    copter.state.messages["SYS_STATUS"].message.onboard_control_sensors_health = 0
+    assert not copter.has_position
+
+
+def test_autopilot_that_does_not_report_prearm_checks_may_try(copter: Any) -> None:
+    told = copter.state.messages["SYS_STATUS"].message
+    told.onboard_control_sensors_present = told.onboard_control_sensors_health = 0
+    assert copter.is_ready_to_arm
+    del copter.state.messages["SYS_STATUS"]
+    assert not copter.is_ready_to_arm
+
+
+def test_distance_home_needs_both_places(loop: Any, drone: Any, copter: Any) -> None:
+    drone.at = [30.0, 40.0, 0.0]
+    loop.pass_time(0.5)
+    assert copter.distance_home() is None
+    loop.run(copter.home())
+    assert copter.distance_home() == pytest.approx(50.0, abs=0.1)
+
+
+def test_old_position_is_not_flown_by(loop: Any, drone: Any, copter: Any) -> None:
+    drone.mute.add("LOCAL_POSITION_NED")
+    loop.pass_time(3.5)
+    with pytest.raises(Stale, match=r"LOCAL_POSITION_NED: told 3\.5 s ago"):
+        copter.fresh("LOCAL_POSITION_NED")
+    with pytest.raises(Stale, match="never told"):
+        copter.fresh("HOME_POSITION")
+
+
+def test_guard_tells_pilot_disarming_and_reboot_apart(copter: Any) -> None:
+    state = copter.state
+    state.armed = True
+    copter.held_by("STABILIZE")
+    with pytest.raises(ModeChanged, match="left GUIDED: it is in STABILIZE now"):
+        copter.held_by("GUIDED")
+    state.armed = False
+    with pytest.raises(NotArmed, match="was disarmed"):
+        copter.held_by("STABILIZE")
+    state.armed = state.mode = None
+    with pytest.raises(NotArmed, match="rebooted"):
+        copter.held_by("STABILIZE")
+
+
+def test_link_loss_ends_arming(loop: Any, drone: Any, copter: Any, pilotage: Any) -> None:
+    drone.answers[ARM] = [None]
+    job = pilotage.start(copter.arm)
+    loop.pass_time(0.2)
+    drone.power_off()
+    with pytest.raises(LinkLost):
+        pilotage.result(job)
+
+
+def test_mode_that_was_shown_and_left_at_once_is_somebody_elses_switch(
+    loop: Any, drone: Any, copter: Any, pilotage: Any
+) -> None:
+    drone.fly()
+    drone.answers[mavlink.MAV_CMD_DO_SET_MODE] = [None]
+    loop.settle()
+    job = pilotage.start(copter.set_mode, "LOITER")
+    drone.pilot("LOITER")
+    drone.pilot("GUIDED")  # in the same batch of messages
+    loop.settle()
+    assert isinstance(job.error, ModeChanged)

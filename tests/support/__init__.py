@@ -1,0 +1,1 @@
+"""What tests of several packages use: clocks, vehicles, links, MAVProxy's state."""

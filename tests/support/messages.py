@@ -1,0 +1,49 @@
+"""Messages as they come off the wire."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+os.environ["MAVLINK20"] = "1"  # before pymavlink is imported anywhere
+
+from pymavlink import mavutil
+
+mavlink = mavutil.mavlink
+
+DEFAULTS: dict[str, dict[str, Any]] = {
+    "heartbeat": {
+        "type": mavlink.MAV_TYPE_QUADROTOR,
+        "autopilot": mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA,
+        "base_mode": mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED,
+        "custom_mode": 0,
+        "system_status": mavlink.MAV_STATE_STANDBY,
+        "mavlink_version": 3,
+    },
+    "statustext": {"severity": mavlink.MAV_SEVERITY_CRITICAL},
+    "command_ack": {"result": mavlink.MAV_RESULT_ACCEPTED},
+    "param_value": {"param_type": mavlink.MAV_PARAM_TYPE_REAL32, "param_count": 1, "param_index": 0},
+    "home_position": {"x": 0.0, "y": 0.0, "z": 0.0, "q": [1.0, 0.0, 0.0, 0.0]}
+    | dict.fromkeys(("approach_x", "approach_y", "approach_z"), 0.0),
+    "extended_sys_state": {"vtol_state": 0},
+}
+
+
+def message_of(name: str, system: int = 1, component: int = 1, sequence: int = 0, **fields: Any) -> Any:
+    """A message as pymavlink hands it over after parsing; fields that are not given are 0.
+
+    `armed` and `mode` spell a heartbeat's bits; texts may be given as str.
+    """
+    cls = getattr(mavlink, f"MAVLink_{name.lower()}_message")
+    given = {**DEFAULTS.get(name.lower(), {}), **fields}
+    if given.pop("armed", False):
+        given["base_mode"] |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+    if "mode" in given and name.lower() == "heartbeat":
+        given["custom_mode"] = mavutil.mode_mapping_byname(given["type"])[given.pop("mode")]
+    for field in cls.fieldnames:
+        given.setdefault(field, 0)
+        if isinstance(given[field], str):
+            given[field] = given[field].encode()
+    message = cls(**given)
+    message._header = mavlink.MAVLink_header(cls.id, srcSystem=system, srcComponent=component, seq=sequence % 256)
+    return message

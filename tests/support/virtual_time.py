@@ -1,0 +1,62 @@
+"""An asyncio loop that never waits."""
+
+from __future__ import annotations
+
+import asyncio
+import selectors
+from typing import Any
+
+NOTHING_HAPPENS = 5.0  # real s after which a loop that waits for nothing but other threads is called stuck
+
+
+class TimeTravellingLoop(asyncio.SelectorEventLoop):
+    """An asyncio loop that never waits: when nothing is ready, its clock jumps to the next timer.
+
+    Attributes:
+        patience: real s that sockets get to become ready before the clock jumps; 0 without sockets.
+        defects: what reached the loop's exception handler; a test that expects some clears them.
+    """
+
+    def __init__(self) -> None:
+        self.now = 1000.0
+        self.patience = 0.0
+        self.defects: list[dict[str, Any]] = []
+        super().__init__(_JumpingSelector(self))
+        self.set_exception_handler(lambda _, context: self.defects.append(context))
+
+    def time(self) -> float:
+        return self.now
+
+    def run(self, coroutine: Any) -> Any:
+        """The coroutine's result."""
+        return self.run_until_complete(coroutine)
+
+    def pass_time(self, seconds: float) -> None:
+        """Let that much time go by."""
+        self.run_until_complete(asyncio.sleep(seconds))
+
+    def settle(self) -> None:
+        """Run what is ready, without any time going by."""
+
+        async def a_few_rounds() -> None:
+            for _ in range(20):
+                await asyncio.sleep(0)
+
+        self.run_until_complete(a_few_rounds())
+
+
+class _JumpingSelector(selectors.DefaultSelector):
+    def __init__(self, loop: TimeTravellingLoop) -> None:
+        super().__init__()
+        self._loop = loop
+
+    def select(self, timeout: float | None = None) -> Any:
+        if timeout is None:
+            ready = super().select(NOTHING_HAPPENS)
+            if not ready:
+                raise RuntimeError("nothing will ever happen: no timer, no socket")
+            return ready
+        ready = super().select(min(timeout, self._loop.patience))
+        if not ready:
+            self._loop.now += max(timeout, 0.0)
+        return ready
