@@ -19,7 +19,7 @@ from mavproxy_gradys.readings import Reading, Stored
 from mavproxy_gradys.rows import is_storable
 from mavproxy_gradys.spool import Spool, uptime
 from mavproxy_gradys.tasks import begin
-from mavproxy_uavapi.core.timeout import within
+from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 T = TypeVar("T")
 log = logging.getLogger("gradys.spool")
@@ -121,7 +121,7 @@ class Keeper:
         trimmed = self._clock()
         while not self._stopping.is_set():
             with contextlib.suppress(asyncio.TimeoutError):
-                await within(COMMIT_EVERY, self._stopping.wait())
+                await wait_with_timeout(COMMIT_EVERY, self._stopping.wait())
             with contextlib.suppress(NotStored):
                 await self._commit()
                 if self._clock() - trimmed >= TRIM_EVERY:
@@ -168,7 +168,7 @@ class Keeper:
             if found:
                 return found
             with contextlib.suppress(asyncio.TimeoutError):
-                await within(TRIM_EVERY, owed.news.wait())
+                await wait_with_timeout(TRIM_EVERY, owed.news.wait())
 
     async def _batch(self, sink: str, owed: Owed, limit: int) -> list[Stored]:
         if owed.unnoted:

@@ -17,10 +17,10 @@ try:
     from mavproxy_gradys.track_console import TrackConsole
 except ModuleNotFoundError as missing:  # MAVProxy prints the text of an ImportError as one line
     raise ImportError(f"gradys needs {missing.name}: pip install mavproxy-uavapi") from missing
-from mavproxy_uavapi.core.background import Errands
-from mavproxy_uavapi.core.module import HostedModule, value_of
-from mavproxy_uavapi.core.remembered_settings import Remembered
-from mavproxy_uavapi.core.timeout import within
+from mavproxy_uavapi.core.background import BackgroundCommands
+from mavproxy_uavapi.core.module import SharedModule, value_of
+from mavproxy_uavapi.core.remembered_settings import RememberedSettings
+from mavproxy_uavapi.core.timeout import wait_with_timeout
 from mavproxy_uavapi.settings import SettingError
 
 NAME = "gradys"
@@ -47,11 +47,11 @@ gradys set sink URL      where readings go: http(s)://HOST/PATH or mqtt(s)://HOS
 gradys help              this"""
 
 
-class GradysModule(HostedModule):
+class GradysModule(SharedModule):
     """`module load gradys`."""
 
     def __init__(self, mpstate: Any, given: dict[str, Any]) -> None:
-        self.remembered = Remembered(mpstate, NAME, given)
+        self.remembered = RememberedSettings(mpstate, NAME, given)
         self.gradys_settings = ModuleSettings(self.remembered.given)
         actions: dict[str, Callable[[list[str]], None]] = {
             "status": lambda _: self._show(console.status),
@@ -66,7 +66,7 @@ class GradysModule(HostedModule):
         super().__init__(mpstate, NAME, "GrADyS ground station push", actions, COMPLETIONS)
         self.add_completion_function(COMPLETION, self.gradys_settings.mp.completion)
         self.gradys = Gradys(self.host)
-        self._errands = Errands(self.host, NAME)
+        self._background = BackgroundCommands(self.host, NAME)
         self._lost = ""  # what the end found unwritten
         self._track = TrackConsole(self.host, self.gradys.tracks)
         self._routes = Handlers(self.gradys).routes()
@@ -89,12 +89,12 @@ class GradysModule(HostedModule):
         await self.gradys.tracks.close()
         try:
             with contextlib.suppress(asyncio.TimeoutError):  # the spool is closed in its own thread
-                await within(LONGEST_END, self.gradys.close())
+                await wait_with_timeout(LONGEST_END, self.gradys.close())
         finally:
             self._lost = self.gradys.sensing.lost
             if self._lost:
                 log.warning("%s", self._lost)
-        await self._errands.close()
+        await self._background.close()
 
     def unload(self) -> None:
         """Give back what is ours alone, then the rest; say what is lost."""
@@ -127,14 +127,14 @@ class GradysModule(HostedModule):
             await self.gradys.start(settings)
             return told(settings)
 
-        self._errands.send(start, "starting")
+        self._background.send(start, "starting")
 
     def _stop(self) -> None:
         async def stop() -> str:
             await self.gradys.stop()
             return "stopped"
 
-        self._errands.send(stop, "stopping")
+        self._background.send(stop, "stopping")
 
     def _flush(self) -> None:
         self.host.bridge.call_soon(self.gradys.flush)
@@ -168,7 +168,7 @@ class GradysModule(HostedModule):
             return told(settings) if await self.gradys.restart(settings) else ""
 
         if settings != before and self._begun:
-            self._errands.send(restart, "taking up the setting")
+            self._background.send(restart, "taking up the setting")
 
 
 def told(settings: Settings) -> str:

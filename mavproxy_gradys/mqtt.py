@@ -25,7 +25,7 @@ from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.names import Names
 from mavproxy_gradys.readings import POSITION, STATUS, Reading, Stored, device_of
 from mavproxy_gradys.tasks import begin
-from mavproxy_uavapi.core.timeout import within
+from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 KEEP_ALIVE = 15  # s; the broker gives a silent connection up after one and a half of it
 WINDOW = 20  # readings on their way at once, on one connection
@@ -143,7 +143,7 @@ class MqttSink:
             aiomqtt.MqttError: it took longer, or failed.
         """
         try:
-            await within(self._timeout, answer)
+            await wait_with_timeout(self._timeout, answer)
         except (asyncio.TimeoutError, OSError) as error:
             raise aiomqtt.MqttError(str(error) or f"no answer within {self._timeout:g} s") from error
 
@@ -180,7 +180,7 @@ class MqttSink:
 
         async def say(status: str, client: aiomqtt.Client) -> None:
             with contextlib.suppress(aiomqtt.MqttError, asyncio.TimeoutError):
-                await within(GOODBYE, client.publish(status, OFFLINE, qos=1, retain=True))
+                await wait_with_timeout(GOODBYE, client.publish(status, OFFLINE, qos=1, retain=True))
             await self._drop(status)
 
         if self._leaving:
@@ -197,7 +197,7 @@ async def leave(client: aiomqtt.Client, connecting: asyncio.Future[aiomqtt.Clien
 async def disconnect(client: aiomqtt.Client) -> None:
     """Take leave; a broker that does not answer finds the connection closed."""
     with contextlib.suppress(aiomqtt.MqttError, asyncio.TimeoutError):
-        await within(GOODBYE, client.__aexit__(None, None, None))
+        await wait_with_timeout(GOODBYE, client.__aexit__(None, None, None))
     left = client._client.socket()  # aiomqtt itself leaves it open when the broker was too slow
     if isinstance(left, socket.socket):
         with contextlib.suppress(OSError):

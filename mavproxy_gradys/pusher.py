@@ -18,7 +18,7 @@ from mavproxy_gradys.tally import StationTally, VehicleTally
 from mavproxy_uavapi.core.errors import Unavailable
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
-from mavproxy_uavapi.core.timeout import within
+from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 DROPPED = 101  # the station's `type` when it received an update but no browser took it; 103 when one did
 log = logging.getLogger("gradys.push")
@@ -97,7 +97,7 @@ class Pusher:
                 self._host.clock(),
                 max_age=self._settings.max_age,
                 link_timeout=self._host.link_watch.timeout,
-                has_position=self._host.hangar.find(state.system).has_position,
+                has_position=self._host.registry.find(state.system).has_position,
             )
         except Unavailable as nothing:
             vehicle.withhold(str(nothing))
@@ -152,7 +152,7 @@ class Pusher:
             self._host.clock(),
             seq=vehicle.seq,
             ip=self.tally.ip,
-            ready=self._host.hangar.find(state.system).is_ready_to_arm,
+            ready=self._host.registry.find(state.system).is_ready_to_arm,
             max_age=self._settings.max_age,
         )
 
@@ -170,7 +170,7 @@ class Pusher:
         if now - self._own_at >= ADDRESS_KEPT:
             look_up = own_address(self._names, self.station.host, self.station.port)
             try:
-                self._own = await within(self._settings.timeout, look_up)
+                self._own = await wait_with_timeout(self._settings.timeout, look_up)
             except asyncio.TimeoutError as error:
                 raise NotDelivered(f"no answer about the name {self.station.host}") from error
             except OSError as error:

@@ -17,7 +17,7 @@ from mavproxy_gradys.settings import Settings
 from mavproxy_gradys.sink_address import SinkAddress
 from mavproxy_gradys.sinks import Sink, make_sink
 from mavproxy_gradys.tally import RoundTrips
-from mavproxy_uavapi.core.timeout import within
+from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 BATCH = 200  # readings
 log = logging.getLogger("gradys.delivery")
@@ -126,7 +126,7 @@ class Sender:
         self._hurry.clear()
         pause = self._backoff.failed(self._clock())
         try:
-            await within(pause, self._hurry.wait())
+            await wait_with_timeout(pause, self._hurry.wait())
         except asyncio.TimeoutError:
             return
 

@@ -152,7 +152,7 @@ class Sensing:
                 now,
                 max_age=max_age,
                 link_timeout=self._host.link_watch.timeout,
-                has_position=self._host.hangar.find(state.system).has_position,
+                has_position=self._host.registry.find(state.system).has_position,
             )
         except Unavailable as nothing:
             sampler.skip(state.system, str(nothing))

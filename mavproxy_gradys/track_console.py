@@ -19,7 +19,7 @@ from mavproxy_gradys.track_flight import (
 )
 from mavproxy_gradys.tracking import Tracking
 from mavproxy_gradys.tracks import FORMATS, GROUND, Waypoint, places_of, style_of
-from mavproxy_uavapi.core.background import Errands
+from mavproxy_uavapi.core.background import BackgroundCommands
 from mavproxy_uavapi.core.errors import BadRequest
 from mavproxy_uavapi.core.host import Host
 
@@ -39,7 +39,7 @@ class Words(argparse.ArgumentParser):
         raise BadRequest(f"{message}\n{HELP}")
 
 
-def within(low: float, high: float) -> Callable[[str], float]:
+def between(low: float, high: float) -> Callable[[str], float]:
     """What reads an option's number, which must lie between both."""
 
     def number(text: str) -> float:
@@ -63,9 +63,9 @@ def words() -> argparse.ArgumentParser:
     verbs.add_parser("stop", add_help=False)
     fly = verbs.add_parser("fly", add_help=False)
     fly.add_argument("file", type=Path)
-    fly.add_argument("--ground", type=within(*GROUND))
-    fly.add_argument("--reach", type=within(1.0, LARGEST_REACH), default=REACH)
-    fly.add_argument("--transit", type=within(LOWEST_TRANSIT, HIGHEST_TAKEOFF), default=TRANSIT)
+    fly.add_argument("--ground", type=between(*GROUND))
+    fly.add_argument("--reach", type=between(1.0, LARGEST_REACH), default=REACH)
+    fly.add_argument("--transit", type=between(LOWEST_TRANSIT, HIGHEST_TAKEOFF), default=TRANSIT)
     fly.add_argument("--sysid", type=int, default=0)
     verbs.add_parser("help", add_help=False)
     return made
@@ -82,7 +82,7 @@ class TrackConsole:
     def __init__(self, host: Host, tracks: Tracking) -> None:
         self._host = host
         self._tracks = tracks
-        self._errands = Errands(host, "gradys")
+        self._background = BackgroundCommands(host, "gradys")
 
     def command(self, args: list[str]) -> None:
         """What was typed. Main loop only."""
@@ -102,7 +102,7 @@ class TrackConsole:
             "stop": self._stop,
             "fly": self._fly,
         }
-        self._errands.send(lambda: verbs[given.verb](given))
+        self._background.send(lambda: verbs[given.verb](given))
 
     async def _show(self, _given: argparse.Namespace) -> str:
         return shown(self._tracks.report())
@@ -121,12 +121,12 @@ class TrackConsole:
         return "nothing is recorded" if recorder is None else f"{recorder.written} readings are in {recorder.file}"
 
     async def _fly(self, given: argparse.Namespace) -> str:
-        vehicle = self._host.hangar.commandable(given.sysid)
+        vehicle = self._host.registry.commandable(given.sysid)
         places = await asyncio.to_thread(read, given.file.expanduser(), given.ground)
         flight = flight_of(vehicle, places, given.reach, given.transit)
         request = {**{name: str(value) for name, value in vars(given).items()}, "digest": hash(tuple(places))}
         job = self._host.jobs.begin(vehicle, VERB, request, lambda job: self._tracks.fly(flight, job))
-        self._errands.say(
+        self._background.say(
             f"flying {len(places)} legs with vehicle {vehicle.state.system}; `gradys track` tells how far it is"
         )
         return await job.outcome()

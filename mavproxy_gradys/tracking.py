@@ -32,7 +32,7 @@ class Tracking:
         """
         if self._recorder is not None:
             raise Busy(f"{self._recorder.file} is being recorded; `gradys track stop` ends that")
-        number = self._host.hangar.find(system).state.system
+        number = self._host.registry.find(system).state.system
         recorder = Recorder(self._host, number, file, style=style, period=period, latest=latest)
         self._recorder = recorder  # before the disk answers: another one is refused from now on
         try:

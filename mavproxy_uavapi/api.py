@@ -7,7 +7,7 @@ import contextlib
 
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.vehicle.endings import Policy
-from mavproxy_uavapi.core.vehicle.stream_requester import Freshness
+from mavproxy_uavapi.core.vehicle.stream_requester import StreamRequester
 from mavproxy_uavapi.http.app import Server
 from mavproxy_uavapi.http.call import Service
 from mavproxy_uavapi.settings import Settings
@@ -44,7 +44,7 @@ class Api:
             raise
         self._server = server
         self.host.api_address = settings.host, settings.port
-        self._freshness = asyncio.create_task(Freshness(self.host.hangar, settings.sysid).run())
+        self._freshness = asyncio.create_task(StreamRequester(self.host.registry, settings.sysid).run())
         self._finding_scripts = asyncio.create_task(server.service.scripts.start())
 
     async def renew(self, settings: Settings) -> None:

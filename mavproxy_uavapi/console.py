@@ -14,7 +14,7 @@ def report(api: Api, settings: Settings) -> str:
     address = address_of(settings)
     lines = [f"uavapi: {'listening on' if api.listening else 'not listening; it would be'} {address}"]
     try:
-        lines.append(describe(api, api.host.hangar.find(settings.sysid).state))
+        lines.append(describe(api, api.host.registry.find(settings.sysid).state))
     except UavApiError as error:
         lines.append(str(error))
     running = api.host.jobs.running()

@@ -13,10 +13,10 @@ try:
 except ModuleNotFoundError as missing:  # MAVProxy prints the text of an ImportError as one line
     raise ImportError(f"uavapi needs {missing.name}: pip install mavproxy-uavapi") from missing
 from mavproxy_uavapi.console import address_of, report, vehicles
-from mavproxy_uavapi.core.background import Errands
+from mavproxy_uavapi.core.background import BackgroundCommands
 from mavproxy_uavapi.core.logs import Logs, print_above_prompt
-from mavproxy_uavapi.core.module import HostedModule, value_of
-from mavproxy_uavapi.core.remembered_settings import Remembered
+from mavproxy_uavapi.core.module import SharedModule, value_of
+from mavproxy_uavapi.core.remembered_settings import RememberedSettings
 from mavproxy_uavapi.settings import SECRET, ModuleSettings, SettingError, Settings
 
 NAME = "uavapi"
@@ -36,11 +36,11 @@ uavapi fly FILE          fly a recorded track with the API's vehicle, `sysid` (m
 uavapi help              this"""
 
 
-class UavApiModule(HostedModule):
+class UavApiModule(SharedModule):
     """`module load uavapi`."""
 
     def __init__(self, mpstate: Any, given: dict[str, Any]) -> None:
-        self.remembered = Remembered(mpstate, NAME, given)
+        self.remembered = RememberedSettings(mpstate, NAME, given)
         self.api_settings = ModuleSettings(self._given())
         self._wanted = True  # whether it is to listen; `uavapi stop` says no
         actions: dict[str, Callable[[list[str]], None]] = {
@@ -58,7 +58,7 @@ class UavApiModule(HostedModule):
         self.add_completion_function(COMPLETION, lambda _: self.api_settings.names())
         self.logs = Logs(lambda text: self.host.bridge.post(lambda: print_above_prompt(text, self.mpstate.rl.prompt)))
         self.api = Api(self.host)
-        self._errands = Errands(self.host, NAME)
+        self._background = BackgroundCommands(self.host, NAME)
         self._changing = asyncio.Lock()  # starts, stops and settings, in the order in which they were typed
         self.host.bridge.close_in_children(self.api.filenos)
         self.remembered.keep(self._shown)
@@ -81,7 +81,7 @@ class UavApiModule(HostedModule):
 
     async def end(self) -> None:
         """Stop listening, and trying to."""
-        await self._errands.close()
+        await self._background.close()
         await self.api.stop()
 
     def unload(self) -> None:
@@ -116,7 +116,7 @@ class UavApiModule(HostedModule):
             async with self._changing:
                 return await self._listen(settings)
 
-        self._errands.send(start, f"trying to listen on {address_of(settings)}")
+        self._background.send(start, f"trying to listen on {address_of(settings)}")
 
     async def _listen(self, settings: Settings) -> str:
         """Listen; what came of it. A disk may take its time, so a thread opens the logs."""
@@ -132,7 +132,7 @@ class UavApiModule(HostedModule):
                 return f"cannot open {error.filename}: {why}"
             return f"cannot listen on {address}: {why}; `uavapi set port N` takes another port"
         if settings.allow_open and not settings.is_local:
-            self._errands.say("WARNING: allow_open is set: anybody who reaches this port can fly the vehicle")
+            self._background.say("WARNING: allow_open is set: anybody who reaches this port can fly the vehicle")
         return f"listening on {address}"
 
     async def _open_logs(self, settings: Settings) -> None:
@@ -169,7 +169,7 @@ class UavApiModule(HostedModule):
                 await self.api.stop()
             return "stopped"
 
-        self._errands.send(stop, "stopping")
+        self._background.send(stop, "stopping")
 
     def _set(self, args: list[str]) -> None:
         if len(args) < 2:
@@ -188,7 +188,7 @@ class UavApiModule(HostedModule):
         if after == before or not self._begun or not self._wanted:
             return
         take_up = self._renew if after.listens_as(before) else self._restart
-        self._errands.send(lambda: take_up(after), "taking up the setting")
+        self._background.send(lambda: take_up(after), "taking up the setting")
 
     async def _restart(self, settings: Settings) -> str:
         """Listen anew; what is in flight ends."""

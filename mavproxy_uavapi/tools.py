@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mavproxy_uavapi.core.errors import TimedOut, ToolFailed
-from mavproxy_uavapi.core.timeout import within
+from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ async def run_tool(command: Sequence[str], timeout: float, cwd: Path | None = No
     except OSError as error:
         raise ToolFailed(f"cannot run {name}: {error.strerror}") from error
     try:
-        out, err = await within(timeout, process.communicate())
+        out, err = await wait_with_timeout(timeout, process.communicate())
     except asyncio.TimeoutError:
         raise TimedOut(f"{name} did not end within {timeout:g} s") from None
     finally:

@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable, Iterator
 from typing import Any, Protocol
 
 from mavproxy_uavapi.core.errors import Conflict, LinkLost, Rejected, Stale, UavApiError
-from mavproxy_uavapi.core.timeout import within
+from mavproxy_uavapi.core.timeout import wait_with_timeout
 from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_uavapi.core.vehicle.copter import Copter
 from mavproxy_uavapi.core.vehicle.jobs import Job
@@ -250,7 +250,7 @@ class Flight:
         clock = self.vision.host.clock
         seconds = max(PERIOD / max(self.vehicle.state.time_ratio.ratio, 0.1), SHORTEST)
         with contextlib.suppress(asyncio.TimeoutError):
-            await within(seconds, self.vision.changed.wait())
+            await wait_with_timeout(seconds, self.vision.changed.wait())
         await asyncio.sleep(max(self._sent_at + SHORTEST - clock(), 0.0))
         if not self.vision.host.link_watch.is_alive(self.vehicle.state):
             raise LinkLost.since(self.vehicle.state.system, clock() - self.vehicle.state.heartbeat_at)

@@ -122,7 +122,7 @@ class Flights:
 
     def copter(self) -> Copter:
         """MAVProxy's current vehicle. Raises NoVehicle, LinkLost, NotSupported."""
-        return copter_of(self.vision.host.hangar.commandable())
+        return copter_of(self.vision.host.registry.commandable())
 
     # -- flights, to be run as jobs --------------------------------------------------------------------------
 

@@ -10,7 +10,7 @@ from aiohttp import web
 from pydantic import Field, model_validator
 
 from mavproxy_uavapi.core.errors import BadRequest
-from mavproxy_uavapi.core.timeout import within
+from mavproxy_uavapi.core.timeout import wait_with_timeout
 from mavproxy_uavapi.http.extension import (
     EITHER,
     NED_REACH,
@@ -175,7 +175,7 @@ class Pages:
         with call.service.streams.one_more(), contextlib.suppress(*gone):
             await response.prepare(call.request)
             while True:
-                await within(FRAME_TIMEOUT, self.vision.changed.wait())
+                await wait_with_timeout(FRAME_TIMEOUT, self.vision.changed.wait())
                 picture = await self._picture()
                 head = f"--{BOUNDARY}\r\nContent-Type: image/jpeg\r\nContent-Length: {len(picture)}\r\n\r\n"
                 await response.write(head.encode() + picture + b"\r\n")

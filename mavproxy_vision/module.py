@@ -17,10 +17,10 @@ if not hasattr(getattr(cv2, "aruco", None), "ArucoDetector"):
         f"vision needs OpenCV 4.10 or newer, this is {cv2.__version__}: pip install -U 'mavproxy-uavapi[vision]'"
     )
 
-from mavproxy_uavapi.core.background import Errands
+from mavproxy_uavapi.core.background import BackgroundCommands
 from mavproxy_uavapi.core.errors import UavApiError
-from mavproxy_uavapi.core.module import HostedModule, value_of
-from mavproxy_uavapi.core.remembered_settings import Remembered
+from mavproxy_uavapi.core.module import SharedModule, value_of
+from mavproxy_uavapi.core.remembered_settings import RememberedSettings
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.http.extension import NED_REACH
 from mavproxy_vision import console, files
@@ -45,11 +45,11 @@ RESTARTS = {  # settings that the camera must be opened anew for
 }  # fmt: skip
 
 
-class VisionModule(HostedModule):
+class VisionModule(SharedModule):
     """`module load vision`."""
 
     def __init__(self, mpstate: Any, given: dict[str, Any]) -> None:
-        self.remembered = Remembered(mpstate, NAME, given)
+        self.remembered = RememberedSettings(mpstate, NAME, given)
         self.vision_settings = ModuleSettings(self.remembered.given)
         actions: dict[str, Callable[[list[str]], None]] = {
             "status": lambda _: self._tell(lambda: console.report(self.vision, self.flights)),
@@ -70,7 +70,7 @@ class VisionModule(HostedModule):
         self.add_completion_function(COMPLETION, self.vision_settings.mp.completion)
         self.vision = Vision(self.host, self.vision_settings.snapshot())
         self.flights = Flights(self.vision, self._directory)
-        self._errands = Errands(self.host, NAME)
+        self._background = BackgroundCommands(self.host, NAME)
         self._pages = Pages(self.vision, self.flights)
         self._routes = {route.path: route for route in self._pages.routes()}
         self.remembered.keep(self.vision_settings.mp.get)
@@ -88,7 +88,7 @@ class VisionModule(HostedModule):
     async def end(self) -> None:
         """Close everything."""
         await self.vision.close()
-        await self._errands.close()
+        await self._background.close()
 
     def unload(self) -> None:
         """Make the vehicle hold, then give everything back."""
@@ -145,7 +145,7 @@ class VisionModule(HostedModule):
             return f"looking for {settings.family} through {settings.source}"
 
         if self._awake():
-            self._errands.send(started, "opening the camera")
+            self._background.send(started, "opening the camera")
 
     def _stop(self) -> None:
         async def stopped() -> str:
@@ -154,7 +154,7 @@ class VisionModule(HostedModule):
 
         if self._awake():
             self._abort(quiet=True)
-            self._errands.send(stopped, "closing the camera")
+            self._background.send(stopped, "closing the camera")
 
     def _abort(self, quiet: bool = False) -> None:
         async def stopped() -> str | None:
@@ -254,7 +254,7 @@ class VisionModule(HostedModule):
 
         async def begin() -> Job:
             copter = self.flights.copter()
-            return self.flights.begin(copter, make(request), path, request, self._errands.say)
+            return self.flights.begin(copter, make(request), path, request, self._background.say)
 
         if not self._awake():
             return

@@ -201,7 +201,7 @@ class Vision:
     @property
     def system(self) -> int:
         """The system id of the vehicle that carries the camera; 0 while there is none."""
-        return self.host.hangar.resolve(self._carrier)
+        return self.host.registry.resolve(self._carrier)
 
     @contextlib.contextmanager
     def carried_by(self, system: int) -> Iterator[None]:
@@ -247,7 +247,7 @@ class Vision:
 
     def vehicle(self) -> Vehicle:
         """The vehicle that carries the camera, with a link that is alive."""
-        return self.host.hangar.commandable(self._carrier)
+        return self.host.registry.commandable(self._carrier)
 
     @property
     def health(self) -> Health:

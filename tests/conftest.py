@@ -18,7 +18,7 @@ os.environ["MAVLINK20"] = "1"  # before pymavlink is imported anywhere
 import pytest
 
 from mavproxy_uavapi.core.host import Host
-from mavproxy_uavapi.core.vehicle.registry import Hangar
+from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
 from tests.support.drone import Drone
 from tests.support.fake_link import FakeLink
 from tests.support.mavproxy import MainLoop, mavproxy_state
@@ -68,7 +68,7 @@ def host(loop: Any, mpstate: Any) -> Iterator[Host]:
     """A host whose asyncio side runs in the test's loop and clock."""
     host = Host(mpstate, clock=loop.time, link=FakeLink(), loop=loop)
     yield host
-    host.bridge._outbox.close()
+    host.bridge._calls.close()
 
 
 @pytest.fixture
@@ -78,9 +78,9 @@ def link(host: Host) -> FakeLink:
 
 
 @pytest.fixture
-def hangar(host: Host) -> Hangar:
+def registry(host: Host) -> VehicleRegistry:
     """The vehicles."""
-    return host.hangar
+    return host.registry
 
 
 @pytest.fixture
@@ -122,9 +122,9 @@ def flying(loop: Any, drone: Drone) -> Drone:
 
 
 @pytest.fixture
-def copter(drone: Drone, hangar: Hangar) -> Any:
+def copter(drone: Drone, registry: VehicleRegistry) -> Any:
     """Our side of the drone."""
-    return hangar.find(1)
+    return registry.find(1)
 
 
 @pytest.fixture

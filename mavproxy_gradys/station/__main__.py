@@ -14,7 +14,7 @@ from aiohttp import web
 
 from mavproxy_gradys.station.app import Station
 from mavproxy_gradys.station.store import Store
-from mavproxy_uavapi.core.timeout import within
+from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -67,7 +67,7 @@ async def serve(chosen: argparse.Namespace, store: Store) -> None:
         await over.wait()
     finally:
         with contextlib.suppress(asyncio.TimeoutError):
-            await within(5.0, runner.cleanup())
+            await wait_with_timeout(5.0, runner.cleanup())
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ Errand = Callable[[], Coroutine[Any, Any, str]]
 SLOW = 2.0  # s after which a line says that it still goes on
 
 
-class Errands:
+class BackgroundCommands:
     """Runs them side by side.
 
     Args:

@@ -15,11 +15,11 @@ from mavproxy_uavapi.core.mainloop.bridge import Bridge
 from mavproxy_uavapi.core.mavlink.link import Link, MavproxyLink
 from mavproxy_uavapi.core.mavlink.link_watch import LinkWatch
 from mavproxy_uavapi.core.mavlink.parameter_watch import ParameterWatch
+from mavproxy_uavapi.core.mavlink.pending_waits import PendingWaits
 from mavproxy_uavapi.core.mavlink.vehicle_state import Fleet, VehicleState
-from mavproxy_uavapi.core.mavlink.waiters import Pending
 from mavproxy_uavapi.core.vehicle.endings import FlightEndings
 from mavproxy_uavapi.core.vehicle.jobs import Job, JobBook
-from mavproxy_uavapi.core.vehicle.registry import Hangar
+from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
 
 ATTRIBUTE = "uavapi_host"  # on MAVProxy's state, so that a module loaded anew finds it
 
@@ -54,12 +54,12 @@ class Host:
     ) -> None:
         self.clock = clock
         self.fleet = Fleet()
-        self.pending = Pending()
+        self.pending = PendingWaits()
         self.bridge = Bridge(mpstate.select_extra, self._receive, loop)
         self._mavproxy_link = MavproxyLink(self.bridge, mpstate)
         self.link = link or self._mavproxy_link
         self.link_watch = LinkWatch(self.pending, clock, self.bridge.loop)
-        self.hangar = Hangar(self.fleet, self.link, self.link_watch, self.pending, clock)
+        self.registry = VehicleRegistry(self.fleet, self.link, self.link_watch, self.pending, clock)
         self.audit = Audit(log_directory(mpstate))
         self.jobs = JobBook()
         self.jobs.on_ended.append(self._leave_trace)
@@ -91,7 +91,7 @@ class Host:
         target = self._mpstate.settings.target_system
         if target != self._told_target:
             self._told_target = target
-            self.bridge.call_soon(setattr, self.hangar, "current", target)
+            self.bridge.call_soon(setattr, self.registry, "current", target)
         self._tell_parameters()
         self.bridge.turn()
 

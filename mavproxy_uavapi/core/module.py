@@ -22,7 +22,7 @@ def value_of(words: list[str]) -> str:
     return text[1:-1] if len(text) > 1 and text[0] == text[-1] and text[0] in "'\"" else text
 
 
-class HostedModule(mp_module.MPModule):  # type: ignore[misc]
+class SharedModule(mp_module.MPModule):  # type: ignore[misc]
     """A MAVProxy module that shares the host.
 
     Args:

@@ -9,7 +9,7 @@ ATTRIBUTE = "uavapi_remembered"  # on MAVProxy's state: remembered for as long a
 UNSHOWN = {"origins"}  # keywords that are no settings
 
 
-class Remembered:
+class RememberedSettings:
     """What one of our modules was given: the keywords of `module load`, and what was set at the prompt since.
 
     A load without keywords takes over what the one before it was given; a load with any begins anew. An INI file that
@@ -24,7 +24,7 @@ class Remembered:
     def __init__(self, mpstate: Any, module: str, keywords: Mapping[str, Any]) -> None:
         if not hasattr(mpstate, ATTRIBUTE):
             setattr(mpstate, ATTRIBUTE, {})
-        self._all: dict[str, Remembered] = getattr(mpstate, ATTRIBUTE)
+        self._all: dict[str, RememberedSettings] = getattr(mpstate, ATTRIBUTE)
         self._module = module
         before = None if keywords else self._all.get(module)
         self.keywords = dict(keywords) if before is None else before.keywords

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 T = TypeVar("T")
 
 
-async def within(seconds: float | None, awaited: Awaitable[T]) -> T:
+async def wait_with_timeout(seconds: float | None, awaited: Awaitable[T]) -> T:
     """What `awaited` gives, in at most so many seconds; for ever with None.
 
     Not `asyncio.wait_for`: up to Python 3.11 that swallows a cancellation which comes in the turn of the loop in

@@ -17,7 +17,7 @@ from mavproxy_uavapi.http.bodies import invite
 from mavproxy_uavapi.http.call import ROUTE, SERVICE, Call, Service, parameters
 from mavproxy_uavapi.http.connection import IDLE_TIMEOUT, LINGER, headers_are_here
 from mavproxy_uavapi.http.docs_page import TABLE
-from mavproxy_uavapi.http.limits import BUCKET, STRANGERS, Bucket, at_a_bearable_rate, give_way
+from mavproxy_uavapi.http.limits import BUCKET, STRANGERS, Bucket, at_a_bearable_rate, yield_to_main_loop
 from mavproxy_uavapi.http.listener import Listener, listening_socket
 from mavproxy_uavapi.http.log_throttle import LogThrottle
 from mavproxy_uavapi.http.responses import REFUSED, Handler, errors_as_answers, success
@@ -28,7 +28,7 @@ from mavproxy_uavapi.http.trail import audited
 
 log = logging.getLogger("uavapi.http.server")
 MAX_BODY = 1024 * 1024  # bytes
-MIDDLEWARES = (headers_are_here, errors_as_answers, door, at_a_bearable_rate, give_way)
+MIDDLEWARES = (headers_are_here, errors_as_answers, door, at_a_bearable_rate, yield_to_main_loop)
 SHUTDOWN_TIMEOUT = 1.0  # s for answers that are being written when we stop
 
 

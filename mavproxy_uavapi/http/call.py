@@ -11,7 +11,7 @@ from aiohttp import web
 
 from mavproxy_uavapi.core.errors import BadRequest, Invalid, NotSupported, TooManyRequests
 from mavproxy_uavapi.core.host import Host
-from mavproxy_uavapi.core.timeout import within
+from mavproxy_uavapi.core.timeout import wait_with_timeout
 from mavproxy_uavapi.core.vehicle.copter import Copter
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
@@ -76,12 +76,12 @@ class Call:
     @property
     def seen(self) -> Vehicle:
         """The vehicle, whether its link is alive or not."""
-        return self.service.host.hangar.find(self.service.settings.sysid)
+        return self.service.host.registry.find(self.service.settings.sysid)
 
     @property
     def vehicle(self) -> Vehicle:
         """The vehicle, with a link that is alive: it can be commanded."""
-        return self.service.host.hangar.commandable(self.service.settings.sysid)
+        return self.service.host.registry.commandable(self.service.settings.sysid)
 
     @property
     def copter(self) -> Copter:
@@ -202,7 +202,7 @@ async def in_time(body: Awaitable[T]) -> T:
         BadRequest: it has not, within BODY_TIMEOUT, or the client hung up.
     """
     try:
-        return await within(BODY_TIMEOUT, body)
+        return await wait_with_timeout(BODY_TIMEOUT, body)
     except asyncio.TimeoutError as error:
         raise BadRequest(f"the body did not arrive within {BODY_TIMEOUT:g} s") from error
     except ConnectionError as error:

@@ -54,13 +54,13 @@ def stops(request: web.Request) -> bool:
 
 
 @web.middleware
-async def give_way(request: web.Request, handler: Handler) -> web.StreamResponse:
+async def yield_to_main_loop(request: web.Request, handler: Handler) -> web.StreamResponse:
     """Let MAVProxy's main loop finish what it is at: its messages are not to wait for our answers.
 
     What commands does not wait: it is short, and a vehicle is to hear of it at once.
     """
     if request.method == "GET" and not request.path.startswith(COMMANDS):
-        await request.app[SERVICE].host.bridge.calm()
+        await request.app[SERVICE].host.bridge.wait_for_main_loop()
     return await handler(request)
 
 

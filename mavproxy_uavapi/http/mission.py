@@ -137,7 +137,7 @@ async def _follow(call: Call, run: Run) -> web.StreamResponse:
                 await response.write(events)
                 said_at = now()
             if any(follower.behind for follower in followers.values()):
-                await call.service.host.bridge.calm()
+                await call.service.host.bridge.wait_for_main_loop()
             elif run.running:
                 await asyncio.sleep(FOLLOW_EVERY)
             else:

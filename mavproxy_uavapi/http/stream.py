@@ -7,7 +7,7 @@ from contextlib import suppress
 
 from aiohttp import WSCloseCode, WSMsgType, web
 
-from mavproxy_uavapi.core.timeout import within
+from mavproxy_uavapi.core.timeout import wait_with_timeout
 from mavproxy_uavapi.http.broadcast import Subscription
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import StreamFilter
@@ -63,7 +63,7 @@ async def _send_all(socket: web.WebSocketResponse, request: web.Request, subscri
     try:
         while transport is not None and not socket.closed:
             try:
-                events = await within(KEEP_ALIVE, subscription.next())
+                events = await wait_with_timeout(KEEP_ALIVE, subscription.next())
             except asyncio.TimeoutError:
                 await while_read(transport, 0, socket.ping())
                 continue
@@ -82,7 +82,7 @@ async def _events(request: web.Request, subscription: Subscription) -> web.Strea
         await response.prepare(request)
         while True:
             try:
-                events = await within(KEEP_ALIVE, subscription.next())
+                events = await wait_with_timeout(KEEP_ALIVE, subscription.next())
             except asyncio.TimeoutError:
                 await response.write(COMMENT)
             else:

@@ -8,7 +8,7 @@ from typing import Any
 
 from mavproxy_uavapi.core.errors import NotFound, Rejected, Stale, TimedOut
 from mavproxy_uavapi.core.mavlink.vehicle_state import Received
-from mavproxy_uavapi.core.timeout import within
+from mavproxy_uavapi.core.timeout import wait_with_timeout
 from mavproxy_uavapi.core.vehicle.messages import MESSAGE_IDS
 from mavproxy_uavapi.core.vehicle.readiness import status as status_of
 from mavproxy_uavapi.http import telemetry_views as views
@@ -42,7 +42,7 @@ async def _newest(call: Call, name: str) -> Received:
 async def _ask_for(call: Call, name: str) -> None:
     vehicle = call.vehicle
     try:
-        await within(FIRST_TIMEOUT, vehicle.request(name))
+        await wait_with_timeout(FIRST_TIMEOUT, vehicle.request(name))
     except (Rejected, TimedOut, asyncio.TimeoutError) as error:
         raise Stale(f"vehicle {vehicle.state.system} has not told {name} yet") from error
 

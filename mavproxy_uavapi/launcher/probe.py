@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from urllib.parse import urlsplit
 
-from mavproxy_uavapi.core.timeout import within
+from mavproxy_uavapi.core.timeout import wait_with_timeout
 from mavproxy_uavapi.launcher.commands import api_url
 from mavproxy_uavapi.launcher.options import Options
 
@@ -17,7 +17,7 @@ async def answers(options: Options) -> int | None:
     sent, for it is not certain who listens on the port.
     """
     try:
-        return await within(TIMEOUT_S, _status(api_url(options)))
+        return await wait_with_timeout(TIMEOUT_S, _status(api_url(options)))
     except (OSError, asyncio.TimeoutError, EOFError, ValueError):
         return None
 

@@ -199,7 +199,7 @@ class Scripts:
     def sysid(self) -> int:
         """The vehicle's system id; 0 while none was heard and none is set."""
         try:
-            return self._host.hangar.find(self._settings.sysid).state.system
+            return self._host.registry.find(self._settings.sysid).state.system
         except NoVehicle:
             return self._settings.sysid
 

@@ -31,7 +31,7 @@ async def after_death(host: Host, sysid: int, run: Run, others: list[str]) -> st
             closing = host.endings.closing(job) or closing
     if closing is None:
         try:
-            vehicle = host.hangar.commandable(sysid)
+            vehicle = host.registry.commandable(sysid)
         except UavApiError as error:
             return f"nothing can be done: {error}"
         why_not = f"{others[0]} still runs" if others else _in_other_hands(vehicle)

@@ -15,7 +15,7 @@ from mavproxy_uavapi.core.audit import FILE
 from mavproxy_uavapi.core.errors import LinkLost
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.sent_messages import note_sent
-from mavproxy_uavapi.core.vehicle.message_waiter import Waiting
+from mavproxy_uavapi.core.vehicle.message_waiter import MessageWaiter
 
 
 @pytest.fixture
@@ -35,7 +35,7 @@ def wait_for(loop: Any, host: Host) -> Callable[..., Any]:
     """A task that waits for a message of a vehicle."""
 
     def wait_for(name: str, system: int = 1, timeout: float = 60.0) -> Any:
-        waiting = Waiting(host.fleet.vehicles[system], host.pending, host.clock)
+        waiting = MessageWaiter(host.fleet.vehicles[system], host.pending, host.clock)
         task = loop.create_task(waiting.message({name}, lambda message: message, timeout, f"send {name}"))
         loop.settle()
         return task
@@ -196,7 +196,7 @@ def test_idle_tells_the_asyncio_side_mavproxys_target(mpstate: Any) -> None:
         mpstate.settings.target_system = 3
         host.idle("uavapi")
         received(host)
-        assert host.hangar.current == 3
+        assert host.registry.current == 3
     finally:
         hosts.leave(mpstate, "uavapi")
 

@@ -6,10 +6,10 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.core import host as hosts
-from mavproxy_uavapi.core.module import HostedModule, value_of
+from mavproxy_uavapi.core.module import SharedModule, value_of
 
 
-class Demo(HostedModule):
+class Demo(SharedModule):
     def __init__(self, mpstate: Any, name: str = "demo") -> None:
         self.done: list[Any] = []
         actions = {

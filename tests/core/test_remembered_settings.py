@@ -2,12 +2,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from mavproxy_uavapi.core.remembered_settings import Remembered
+from mavproxy_uavapi.core.remembered_settings import RememberedSettings
 
 
-def loaded(mpstate: Any, name: str = "demo", **keywords: Any) -> Remembered:
+def loaded(mpstate: Any, name: str = "demo", **keywords: Any) -> RememberedSettings:
     """What a module does that takes everything."""
-    remembered = Remembered(mpstate, name, keywords)
+    remembered = RememberedSettings(mpstate, name, keywords)
     remembered.keep(lambda setting: f"<{remembered.given[setting]}>")
     return remembered
 
@@ -34,7 +34,7 @@ def test_load_with_keywords_begins_anew(mpstate: Any, capsys: Any) -> None:
 
 def test_keywords_that_the_module_refuses_are_not_remembered(mpstate: Any) -> None:
     loaded(mpstate, port=1)
-    Remembered(mpstate, "demo", {"prot": 2})
+    RememberedSettings(mpstate, "demo", {"prot": 2})
     assert loaded(mpstate).given == {"port": 1}
 
 

@@ -7,7 +7,7 @@ import gc
 
 import pytest
 
-from mavproxy_uavapi.core.timeout import within
+from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 
 def test_what_comes_in_time_is_given_and_what_fails_fails() -> None:
@@ -18,10 +18,10 @@ def test_what_comes_in_time_is_given_and_what_fails_fails() -> None:
     async def fail() -> None:
         raise ValueError("no")
 
-    assert asyncio.run(within(5, give())) == 7
-    assert asyncio.run(within(None, give())) == 7
+    assert asyncio.run(wait_with_timeout(5, give())) == 7
+    assert asyncio.run(wait_with_timeout(None, give())) == 7
     with pytest.raises(ValueError, match="no"):
-        asyncio.run(within(5, fail()))
+        asyncio.run(wait_with_timeout(5, fail()))
 
 
 def test_what_takes_longer_is_cancelled() -> None:
@@ -35,7 +35,7 @@ def test_what_takes_longer_is_cancelled() -> None:
 
     async def wait() -> None:
         with pytest.raises(asyncio.TimeoutError):
-            await within(0.01, long())
+            await wait_with_timeout(0.01, long())
         await asyncio.sleep(0)
 
     asyncio.run(wait())
@@ -49,7 +49,7 @@ def test_a_cancellation_around_the_turn_in_which_it_comes_is_not_lost(turns: int
         event, went_on = asyncio.Event(), []
 
         async def fly() -> None:
-            await within(5, event.wait())
+            await wait_with_timeout(5, event.wait())
             await asyncio.sleep(0.01)
             went_on.append(True)
 
@@ -74,7 +74,7 @@ def test_failure_in_the_turn_of_a_cancellation_is_no_complaint_of_asyncio() -> N
         loop = asyncio.get_running_loop()
         loop.set_exception_handler(lambda _, context: complaints.append(context))
         failing = loop.create_future()
-        waiting = loop.create_task(within(5, failing))
+        waiting = loop.create_task(wait_with_timeout(5, failing))
         await asyncio.sleep(0)
         failing.set_exception(ConnectionResetError("hung up"))
         waiting.cancel()

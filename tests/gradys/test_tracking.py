@@ -27,7 +27,7 @@ def fleet(host: Any, msg: Any, teller: Any) -> list[Any]:
 
 
 def begin(loop: Any, host: Any, tracks: Tracking, system: int, name: str = "a") -> Job:
-    flight = flight_of(host.hangar.find(system), PLACES, 1000.0)
+    flight = flight_of(host.registry.find(system), PLACES, 1000.0)
 
     async def begun() -> Any:
         return host.jobs.begin(flight.copter, "fly", {"name": name}, lambda job: tracks.fly(flight, job))

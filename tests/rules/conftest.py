@@ -24,7 +24,7 @@ from mavproxy_gradys.service import Gradys
 from mavproxy_uavapi.core.errors import LinkLost
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.mavlink.link import Address
-from mavproxy_uavapi.core.vehicle.stream_requester import Freshness
+from mavproxy_uavapi.core.vehicle.stream_requester import StreamRequester
 from mavproxy_uavapi.http.app import make_app
 from mavproxy_uavapi.http.call import Service
 from mavproxy_uavapi.http.connection import Connection
@@ -224,7 +224,7 @@ class World:
         self.simulator.received.clear()
         self._cable.messages()
         self.loop.run(self._runner.setup())
-        watch = Freshness(self.host.hangar, 0)
+        watch = StreamRequester(self.host.registry, 0)
         self._tasks = [self.loop.create_task(self._run()), self.loop.create_task(watch.run())]
         self.loop.pass_time(1.5)
 
@@ -256,7 +256,7 @@ class World:
         return mavlink.MAVLink(None).parse_buffer(message.pack(self._encoder))[0]
 
     async def send(self, message: Any, system: int) -> None:
-        """See `host.link.Link.send`; who is cancelled before it came to it has sent nothing."""
+        """See `core.mavlink.link.Link.send`; who is cancelled before it came to it has sent nothing."""
         await asyncio.sleep(0)
         if system != self.simulator.options.sysid:
             raise LinkLost(f"there is no vehicle {system}")
@@ -354,7 +354,7 @@ def make_world(loop: Any, mpstate: Any) -> Iterator[Callable[..., World]]:
     yield make
     for world in worlds:
         world.close()
-        world.host.bridge._outbox.close()
+        world.host.bridge._calls.close()
 
 
 def load(file: str) -> Any:

@@ -198,7 +198,7 @@ def page() -> str:
 
 
 def endings_page() -> list[str]:
-    """How flights end: the table of `vehicle/endings.py`."""
+    """How flights end: the table of `core/vehicle/endings.py`."""
     columns = [policy for policy in Policy if policy is not Policy.NOTHING]
     lines = [
         "",

@@ -22,7 +22,7 @@ from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.mavlink.link import Address, require_finite
 from mavproxy_uavapi.core.vehicle.endings import Policy
 from mavproxy_uavapi.core.vehicle.jobs import Job
-from mavproxy_uavapi.core.vehicle.stream_requester import Freshness
+from mavproxy_uavapi.core.vehicle.stream_requester import StreamRequester
 from mavproxy_uavapi.http.app import make_app
 from mavproxy_uavapi.http.call import Service
 from mavproxy_uavapi.http.connection import Connection
@@ -134,7 +134,7 @@ class ScriptedWorld:
         self._runner = web.AppRunner(make_app(self.service), access_log=None, handler_cancellation=True)
         self.loop.run(self._runner.setup())
         self.drone.power_on()
-        self._watch = self.loop.create_task(Freshness(self.host.hangar, 0).run())
+        self._watch = self.loop.create_task(StreamRequester(self.host.registry, 0).run())
         self.loop.pass_time(0.6)
 
     def _watch_jobs(self) -> None:
@@ -164,7 +164,7 @@ class ScriptedWorld:
     source = Address(255, 230)
 
     async def send(self, message: Any, system: int) -> None:
-        """See `host.link.Link.send`; who is cancelled before it came to it has sent nothing."""
+        """See `core.mavlink.link.Link.send`; who is cancelled before it came to it has sent nothing."""
         require_finite(message)
         job = the_job.get()
         flight = None if job is None else self.flights[job.id]
@@ -201,7 +201,7 @@ class ScriptedWorld:
     @property
     def copter(self) -> Any:
         """Our side of the vehicle."""
-        return self.host.hangar.find(1)
+        return self.host.registry.find(1)
 
     @property
     def running(self) -> list[Flight]:
@@ -299,7 +299,7 @@ class ScriptedWorld:
             task.cancel()
         if tasks:
             self.loop.run(asyncio.wait(tasks))
-        self.host.bridge._outbox.close()
+        self.host.bridge._calls.close()
         self.loop.run(self.loop.shutdown_asyncgens())
         self.loop.close()
         asyncio.set_event_loop(None)

@@ -342,5 +342,5 @@ class Lockstep:
             self.loop.run_until_complete(asyncio.gather(*tasks, return_exceptions=True))
         self.loop.run_until_complete(self.loop.shutdown_default_executor())
         self.loop.close()
-        self.host.bridge._outbox.close()
+        self.host.bridge._calls.close()
         asyncio.set_event_loop(None)

@@ -574,7 +574,7 @@ def test_a_change_of_mavproxys_vehicle_does_not_change_who_lands(flying):
     other_vehicle(rig)
     job = rig.land()
     rig.pass_time(1.5)
-    rig.host.hangar.current = 2
+    rig.host.registry.current = 2
     result = rig.outcome(job)
     assert str(result).startswith("Landed on tag 0"), result
     assert math.hypot(rig.truth.north - 1.6, rig.truth.east + 1.2) < 0.2

@@ -4,8 +4,8 @@ Two queues, one each way. In: the main loop hands over what it received (`feed`)
 the asyncio side hands calls to the main loop (`on_main`), which is the only thread that sends.
 
 Python runs one thread at a time. A vehicle's messages come in bursts, each of which MAVProxy parses, logs and
-forwards: so long the asyncio side is not woken by us, and reads wait (`calm`). What is to be sent does not wait: it
-goes out between two messages.
+forwards. Meanwhile we do not wake the asyncio loop, and new requests wait (`wait_for_main_loop`). What is to be sent
+does not wait: it goes out between two messages.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from mavproxy_uavapi.core.mainloop.call_queue import Outbox
-from mavproxy_uavapi.core.mainloop.event_loop_thread import LoopThread
-from mavproxy_uavapi.core.timeout import within
+from mavproxy_uavapi.core.mainloop.event_loop_thread import EventLoopThread
+from mavproxy_uavapi.core.mainloop.main_loop_queue import MainLoopQueue
+from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 T = TypeVar("T")
-GIVE_WAY = 0.05  # s that new work waits for the main loop at most
+LONGEST_WAIT = 0.05  # s that new work waits for the main loop at most
 
 _bridges: weakref.WeakSet[Bridge] = weakref.WeakSet()
 
@@ -34,7 +34,7 @@ class Bridge:
     Args:
         select_extra: MAVProxy's table of further descriptors for its select().
         receive: called in the asyncio thread with each message that was fed.
-        loop: as for `LoopThread`.
+        loop: as for `EventLoopThread`.
     """
 
     def __init__(
@@ -49,10 +49,10 @@ class Bridge:
         self._delivering = False  # whether `_deliver` is on its way
         self._busy = False  # whether the main loop is at messages
         self._waited_for = False
-        self._calm = asyncio.Event()
-        self._outbox = Outbox()
-        self._thread = LoopThread("uavapi-loop", loop)
-        self._open_sockets: list[Callable[[], list[int]]] = [self._outbox.filenos]
+        self._turn_ended = asyncio.Event()
+        self._calls = MainLoopQueue()
+        self._thread = EventLoopThread("uavapi-loop", loop)
+        self._open_sockets: list[Callable[[], list[int]]] = [self._calls.filenos]
         _bridges.add(self)
 
     @property
@@ -67,7 +67,7 @@ class Bridge:
 
     def start(self) -> None:
         """Start the asyncio thread and be woken by MAVProxy's select(). Main loop only."""
-        self._select_extra[self._outbox.fileno()] = (self._outbox.on_readable, None)
+        self._select_extra[self._calls.fileno()] = (self._calls.on_readable, None)
         self._thread.start()
 
     def feed(self, message: Any) -> None:
@@ -77,7 +77,7 @@ class Bridge:
         """
         self._busy = True
         self._inbox.append(message)
-        self._outbox.drain()
+        self._calls.drain()
 
     def feed_call(self, call: Callable[[], None]) -> None:
         """Have the asyncio side run `call` between the messages that were fed before and after. Main loop only."""
@@ -92,16 +92,16 @@ class Bridge:
                 self._inbox.clear()  # the loop has ended: nobody will read
         if self._waited_for:
             self._waited_for = False
-            self._thread.call_soon(self._calm.set)
+            self._thread.call_soon(self._turn_ended.set)
 
-    async def calm(self) -> None:
-        """Await the end of the main loop's turn, if it is at messages just now; GIVE_WAY s at most."""
+    async def wait_for_main_loop(self) -> None:
+        """Await the end of the main loop's turn, if it is at messages just now; LONGEST_WAIT s at most."""
         if not self._busy:
             return
-        self._calm.clear()
+        self._turn_ended.clear()
         self._waited_for = True
         with contextlib.suppress(asyncio.TimeoutError):
-            await within(GIVE_WAY, self._calm.wait())
+            await wait_with_timeout(LONGEST_WAIT, self._turn_ended.wait())
 
     def _deliver(self) -> None:
         self._delivering = False  # what comes from now on needs another call
@@ -117,11 +117,11 @@ class Bridge:
     def turn(self) -> None:
         """Between two turns of the main loop: hand over what was fed, run what the asyncio side asked for."""
         self._hand_over()
-        self._outbox.drain()
+        self._calls.drain()
 
     def post(self, call: Callable[[], None]) -> None:
         """Have the main loop run `call`, which must not raise, and do not wait for it. Any thread."""
-        self._outbox.put(call)
+        self._calls.put(call)
 
     async def on_main(self, call: Callable[[], T]) -> T:
         """Have the main loop run `call`; its result, or what it raised.
@@ -148,7 +148,7 @@ class Bridge:
             else:
                 self._thread.call_soon(settle, *outcome)
 
-        self._outbox.put(run)
+        self._calls.put(run)
         return await future
 
     def run(self, coroutine: Any, timeout: float = 4.0) -> Any:
@@ -176,9 +176,9 @@ class Bridge:
 
     def stop(self) -> None:
         """End the thread and take our descriptor out of MAVProxy's select(). Any thread but the loop's."""
-        self._select_extra.pop(self._outbox.fileno(), None)
+        self._select_extra.pop(self._calls.fileno(), None)
         self._thread.stop()
-        self._outbox.close()
+        self._calls.close()
         _bridges.discard(self)
 
 

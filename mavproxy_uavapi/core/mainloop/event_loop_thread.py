@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 T = TypeVar("T")
 
 
-class LoopThread:
+class EventLoopThread:
     """Runs an asyncio loop in a daemon thread from `start` to `stop`; both are called from other threads.
 
     Args:

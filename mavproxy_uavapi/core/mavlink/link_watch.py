@@ -7,8 +7,8 @@ import logging
 from collections.abc import Callable
 
 from mavproxy_uavapi.core.errors import LinkLost
+from mavproxy_uavapi.core.mavlink.pending_waits import PendingWaits
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
-from mavproxy_uavapi.core.mavlink.waiters import Pending
 
 log = logging.getLogger("uavapi.copter")
 
@@ -28,7 +28,7 @@ class LinkWatch:
         loop: where the timers run.
     """
 
-    def __init__(self, pending: Pending, clock: Callable[[], float], loop: asyncio.AbstractEventLoop) -> None:
+    def __init__(self, pending: PendingWaits, clock: Callable[[], float], loop: asyncio.AbstractEventLoop) -> None:
         self.timeout = 5.0
         self._pending = pending
         self._clock = clock

@@ -12,14 +12,14 @@ from pymavlink import mavutil
 from mavproxy_uavapi.core.errors import ModeChanged, NotArmed, Rejected, Stale
 from mavproxy_uavapi.core.mavlink.flight_modes import kind_of, mode_name, mode_number
 from mavproxy_uavapi.core.mavlink.link import Address, Link, is_finite
+from mavproxy_uavapi.core.mavlink.pending_waits import PendingWaits
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
-from mavproxy_uavapi.core.mavlink.waiters import Pending
 from mavproxy_uavapi.core.vehicle import messages, time_limits
 from mavproxy_uavapi.core.vehicle.authority import CommandAuthority
-from mavproxy_uavapi.core.vehicle.command_sender import Commands
+from mavproxy_uavapi.core.vehicle.command_sender import CommandSender
 from mavproxy_uavapi.core.vehicle.geodesy import offset
 from mavproxy_uavapi.core.vehicle.jobs import Job
-from mavproxy_uavapi.core.vehicle.message_waiter import Waiting
+from mavproxy_uavapi.core.vehicle.message_waiter import MessageWaiter
 from mavproxy_uavapi.core.vehicle.mission_protocol import Waypoints
 from mavproxy_uavapi.core.vehicle.parameters import Parameters
 from mavproxy_uavapi.core.vehicle.speeds import Speeds
@@ -45,13 +45,13 @@ class BaseVehicle:
         clock: monotonic seconds, the clock of arrivals.
     """
 
-    def __init__(self, state: VehicleState, link: Link, pending: Pending, clock: Callable[[], float]) -> None:
+    def __init__(self, state: VehicleState, link: Link, pending: PendingWaits, clock: Callable[[], float]) -> None:
         self.state = state
         self.link = link
         self.clock = clock
         self.authority = CommandAuthority(state)
-        self.waiting = Waiting(state, pending, clock)
-        self.commands = Commands(state, link, self.waiting)
+        self.waiting = MessageWaiter(state, pending, clock)
+        self.commands = CommandSender(state, link, self.waiting)
         self.waypoints = Waypoints(state, link, self.waiting)
         self.parameters = Parameters(state, link, self.waiting)
         self.speeds = Speeds(state)

@@ -20,7 +20,7 @@ from pymavlink import mavutil
 from mavproxy_uavapi.core.errors import Rejected, TimedOut
 from mavproxy_uavapi.core.mavlink.link import Address, Link
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
-from mavproxy_uavapi.core.vehicle.message_waiter import Waiting
+from mavproxy_uavapi.core.vehicle.message_waiter import MessageWaiter
 from mavproxy_uavapi.core.vehicle.messages import Command
 
 mavlink = mavutil.mavlink
@@ -31,7 +31,7 @@ ACK_TIMEOUT = 1.5  # s until a command is sent again
 SENDINGS = 4  # the first one and three more
 IN_PROGRESS_TIMEOUT = 10.0  # s that each IN_PROGRESS buys
 IN_PROGRESS_LIMIT = 60.0  # s until a command that is still in progress is given up
-PATIENCE_PAUSE = 1.0  # s before a patient command is asked again
+RETRY_PAUSE = 1.0  # s before a patient command is asked again
 SHOWN_WITHIN = (2.0, 1.5, 1.5)  # s after each acknowledgement in which a heartbeat must show what was done
 LATE_ACK = 10.0  # s after a sending in which its ack may still come
 LAST_WORDS = 0.5  # s that a refusal's STATUSTEXT may come after its ack
@@ -46,10 +46,10 @@ class Sending:
     at: float
 
 
-class Commands:
+class CommandSender:
     """Sends commands to one vehicle and waits for their acks; identical ones go one after the other."""
 
-    def __init__(self, state: VehicleState, link: Link, waiting: Waiting) -> None:
+    def __init__(self, state: VehicleState, link: Link, waiting: MessageWaiter) -> None:
         self._state = state
         self._link = link
         self._waiting = waiting
@@ -61,7 +61,7 @@ class Commands:
         command: Command,
         check: Callable[[], None] = lambda: None,
         *,
-        patience: float = 20.0,
+        retry_for: float = 20.0,
         shown: Callable[[], bool] = lambda: False,
     ) -> None:
         """Send `command`; returns when the vehicle has accepted it.
@@ -69,7 +69,7 @@ class Commands:
         Args:
             command: what to send.
             check: called before each sending: what it raises ends the command, and nothing more is sent.
-            patience: how long (s) a patient command is asked again while it is refused.
+            retry_for: how long (s) a patient command is asked again while it is refused.
             shown: looked at after each heartbeat: whether the vehicle shows that it was heard although its ack was
                 lost; what it raises ends the command.
 
@@ -86,9 +86,9 @@ class Commands:
                 if result == mavlink.MAV_RESULT_ACCEPTED:
                     return
                 again = result in (WORTH_ASKING_AGAIN if command.patient else command.again_after)
-                if not again or self._waiting.clock() + PATIENCE_PAUSE > started + patience:
+                if not again or self._waiting.clock() + RETRY_PAUSE > started + retry_for:
                     raise await self._refusal(command, result, started)
-                await asyncio.sleep(PATIENCE_PAUSE)
+                await asyncio.sleep(RETRY_PAUSE)
                 if shown():
                     return
 

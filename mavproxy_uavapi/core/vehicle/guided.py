@@ -9,8 +9,8 @@ from collections.abc import Callable
 
 from mavproxy_uavapi.core.errors import Busy, Invalid, Stale, Superseded, TimedOut
 from mavproxy_uavapi.core.mavlink.link import Link
+from mavproxy_uavapi.core.mavlink.pending_waits import PendingWaits
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
-from mavproxy_uavapi.core.mavlink.waiters import Pending
 from mavproxy_uavapi.core.vehicle import messages, setpoint_in_force, time_limits
 from mavproxy_uavapi.core.vehicle.authority import YAW, Rank
 from mavproxy_uavapi.core.vehicle.geodesy import offset, rotate
@@ -37,7 +37,7 @@ TAKING_OFF = messages.mavlink.MAV_LANDED_STATE_TAKEOFF
 class GuidedVehicle(Vehicle):
     """A vehicle that hovers, and takes setpoints in GUIDED."""
 
-    def __init__(self, state: VehicleState, link: Link, pending: Pending, clock: Callable[[], float]) -> None:
+    def __init__(self, state: VehicleState, link: Link, pending: PendingWaits, clock: Callable[[], float]) -> None:
         super().__init__(state, link, pending, clock)
         self._sent: Target | None = None  # our newest setpoint, until telemetry tells the one in force
         self._sent_at = 0.0

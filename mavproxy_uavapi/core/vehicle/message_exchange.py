@@ -9,12 +9,12 @@ from typing import Any
 
 from mavproxy_uavapi.core.errors import LinkLost
 from mavproxy_uavapi.core.mavlink.link import Address
+from mavproxy_uavapi.core.mavlink.pending_waits import PendingWaits, Wait
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
-from mavproxy_uavapi.core.mavlink.waiters import Pending, Wait
-from mavproxy_uavapi.core.timeout import within
+from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 
-class Conversation:
+class MessageExchange:
     """What a vehicle's autopilot says to us, caught from entering to leaving the context.
 
     Args:
@@ -24,7 +24,7 @@ class Conversation:
         names: message names that belong to the exchange; each has a target.
     """
 
-    def __init__(self, state: VehicleState, asker: Address, pending: Pending, names: Collection[str]) -> None:
+    def __init__(self, state: VehicleState, asker: Address, pending: PendingWaits, names: Collection[str]) -> None:
         self._state = state
         self._asker = asker
         self._pending = pending
@@ -32,7 +32,7 @@ class Conversation:
         self._wait: Wait[Any] = Wait(state.system, names, self._catch)
         self._wait.on_settled = lambda: self._said.put_nowait(None)
 
-    def __enter__(self) -> Conversation:
+    def __enter__(self) -> MessageExchange:
         self._pending.add(self._wait)
         return self
 
@@ -54,7 +54,7 @@ class Conversation:
             LinkLost: the vehicle's heartbeats stopped.
         """
         try:
-            message = await within(timeout, self._said.get())
+            message = await wait_with_timeout(timeout, self._said.get())
         except asyncio.TimeoutError:
             return None
         if message is None:

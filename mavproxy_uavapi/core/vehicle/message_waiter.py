@@ -11,16 +11,16 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import LinkLost, TimedOut
 from mavproxy_uavapi.core.mavlink.link import Address
+from mavproxy_uavapi.core.mavlink.pending_waits import PendingWaits, Wait
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
-from mavproxy_uavapi.core.mavlink.waiters import Pending, Wait
-from mavproxy_uavapi.core.timeout import within
-from mavproxy_uavapi.core.vehicle.message_exchange import Conversation
+from mavproxy_uavapi.core.timeout import wait_with_timeout
+from mavproxy_uavapi.core.vehicle.message_exchange import MessageExchange
 
 T = TypeVar("T")
 mavlink = mavutil.mavlink
 
 
-class Waiting:
+class MessageWaiter:
     """Waits on one vehicle.
 
     Args:
@@ -29,7 +29,7 @@ class Waiting:
         clock: monotonic seconds, the clock of arrivals.
     """
 
-    def __init__(self, state: VehicleState, pending: Pending, clock: Callable[[], float]) -> None:
+    def __init__(self, state: VehicleState, pending: PendingWaits, clock: Callable[[], float]) -> None:
         self.state = state
         self.clock = clock
         self._pending = pending
@@ -61,9 +61,9 @@ class Waiting:
             return value
         return await self.message(names, lambda _: condition(), timeout, what)
 
-    def expecting(self, names: Collection[str], test: Callable[[Any], T | None]) -> Expected[T]:
+    def expecting(self, names: Collection[str], test: Callable[[Any], T | None]) -> ExpectedMessage[T]:
         """A context that waits from its entering on: enter it, send, then await `within`."""
-        return Expected(Wait(self.state.system, names, test), self._pending)
+        return ExpectedMessage(Wait(self.state.system, names, test), self._pending)
 
     def acks(self, command: int, asker: Address, shown: Callable[[], bool] = lambda: False) -> Acks:
         """A context that catches the acks of `command` to `asker`; enter it before sending.
@@ -72,21 +72,21 @@ class Waiting:
         """
         return Acks(command, self.state, asker, self._pending, shown)
 
-    def conversation(self, names: Collection[str], asker: Address) -> Conversation:
+    def conversation(self, names: Collection[str], asker: Address) -> MessageExchange:
         """A context that catches messages of these names to `asker`; enter it before sending."""
-        return Conversation(self.state, asker, self._pending, names)
+        return MessageExchange(self.state, asker, self._pending, names)
 
 
-class Expected(Generic[T]):
+class ExpectedMessage(Generic[T]):
     """A registered wait, forgotten when its context is left."""
 
-    def __init__(self, wait: Wait[T], pending: Pending) -> None:
+    def __init__(self, wait: Wait[T], pending: PendingWaits) -> None:
         self._wait = wait
         self._pending = pending
         self._done = asyncio.Event()
         wait.on_settled = self._done.set
 
-    def __enter__(self) -> Expected[T]:
+    def __enter__(self) -> ExpectedMessage[T]:
         self._pending.add(self._wait)
         return self
 
@@ -103,10 +103,10 @@ class Expected(Generic[T]):
             what: ends the sentence "vehicle 1 did not …".
 
         Raises:
-            TimedOut, LinkLost: as `Waiting.message`; and whatever the test raises.
+            TimedOut, LinkLost: as `MessageWaiter.message`; and whatever the test raises.
         """
         try:
-            await within(timeout, self._done.wait())
+            await wait_with_timeout(timeout, self._done.wait())
         except asyncio.TimeoutError:
             sentence = f"vehicle {self._wait.system} did not {what} within {timeout:.1f} s"
             raise TimedOut(sentence) from None
@@ -122,7 +122,7 @@ class Acks:
     """
 
     def __init__(
-        self, command: int, state: VehicleState, asker: Address, pending: Pending, shown: Callable[[], bool]
+        self, command: int, state: VehicleState, asker: Address, pending: PendingWaits, shown: Callable[[], bool]
     ) -> None:
         self._command = command
         self._shown = shown
@@ -163,7 +163,7 @@ class Acks:
             LinkLost: the vehicle's heartbeats stopped.
         """
         try:
-            result = await within(timeout, self._results.get())
+            result = await wait_with_timeout(timeout, self._results.get())
         except asyncio.TimeoutError:
             return None
         if result is None:

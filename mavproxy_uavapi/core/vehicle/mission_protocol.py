@@ -16,8 +16,8 @@ from pymavlink import mavutil
 from mavproxy_uavapi.core.errors import Busy, LinkLost, Rejected, TimedOut, UavApiError
 from mavproxy_uavapi.core.mavlink.link import Address, Link
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
-from mavproxy_uavapi.core.vehicle.message_exchange import Conversation
-from mavproxy_uavapi.core.vehicle.message_waiter import Waiting
+from mavproxy_uavapi.core.vehicle.message_exchange import MessageExchange
+from mavproxy_uavapi.core.vehicle.message_waiter import MessageWaiter
 from mavproxy_uavapi.core.vehicle.mission_files import HOME, Item, difference, from_message
 
 T = TypeVar("T")
@@ -42,7 +42,7 @@ class Waypoints:
         changed_at: when we last changed or started it, on the clock of arrivals (s).
     """
 
-    def __init__(self, state: VehicleState, link: Link, waiting: Waiting) -> None:
+    def __init__(self, state: VehicleState, link: Link, waiting: MessageWaiter) -> None:
         self._state = state
         self._link = link
         self._waiting = waiting
@@ -117,13 +117,13 @@ class Waypoints:
     def _address(self) -> Address:
         return Address(self._state.system, self._state.component)
 
-    def _talk(self, names: Sequence[str]) -> Conversation:
+    def _talk(self, names: Sequence[str]) -> MessageExchange:
         return self._waiting.conversation(names, self._link.source)
 
     async def _send(self, message: Any) -> None:
         await self._link.send(message, self._state.system)
 
-    async def _asked(self, talk: Conversation, question: Any, test: Callable[[Any], T | None], what: str) -> T:
+    async def _asked(self, talk: MessageExchange, question: Any, test: Callable[[Any], T | None], what: str) -> T:
         """Ask until `test` of an answer is not None.
 
         Raises:
@@ -143,7 +143,7 @@ class Waypoints:
                     refusal = self._refusal(message, what)
         raise refusal or TimedOut(f"vehicle {self._state.system} did not {what}, asked {SENDINGS} times")
 
-    async def _ask_count(self, talk: Conversation) -> int:
+    async def _ask_count(self, talk: MessageExchange) -> int:
         question = mavlink.MAVLink_mission_request_list_message(*self._address, MISSION)
         return await self._asked(talk, question, _count_of, "tell how many mission items it has")
 
@@ -158,7 +158,7 @@ class Waypoints:
             )
         return (found[0], found[1:]) if found else (None, [])
 
-    async def _clear(self, talk: Conversation) -> None:
+    async def _clear(self, talk: MessageExchange) -> None:
         question = mavlink.MAVLink_mission_clear_all_message(*self._address, MISSION)
 
         def accepted(message: Any) -> bool | None:
@@ -191,7 +191,7 @@ class Waypoints:
         with self._talk(REQUESTS) as talk:
             await self._answer_requests(talk, items, progress)
 
-    async def _answer_requests(self, talk: Conversation, items: Sequence[Item], progress: Progress) -> None:
+    async def _answer_requests(self, talk: MessageExchange, items: Sequence[Item], progress: Progress) -> None:
         """Offer the items and give each as often as the vehicle asks for it, which knows what it lacks.
 
         Nothing is sent unasked but the offer: an item that comes twice is an error to an ArduPilot. When the
@@ -221,7 +221,7 @@ class Waypoints:
                 given.add(message.seq)
                 progress(len(given), len(items))
 
-    async def _next_request(self, talk: Conversation, timeout: float) -> Any | None:
+    async def _next_request(self, talk: MessageExchange, timeout: float) -> Any | None:
         """The next message of an upload.
 
         Raises:

@@ -9,7 +9,7 @@ from mavproxy_uavapi.core.errors import TimedOut
 from mavproxy_uavapi.core.mavlink.link import Address, Link
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle import messages
-from mavproxy_uavapi.core.vehicle.message_waiter import Waiting
+from mavproxy_uavapi.core.vehicle.message_waiter import MessageWaiter
 
 ASKINGS = 2  # of a name in one boot
 TIMEOUT = 1.0  # s; ArduPilot answers a known name at once and an unknown one not at all
@@ -20,7 +20,7 @@ Names = tuple[str, ...]  # of one quantity: a firmware has one of them
 class Parameters:
     """Reads parameters; each is asked for once and then remembered."""
 
-    def __init__(self, state: VehicleState, link: Link, waiting: Waiting) -> None:
+    def __init__(self, state: VehicleState, link: Link, waiting: MessageWaiter) -> None:
         self._state = state
         self._link = link
         self._waiting = waiting

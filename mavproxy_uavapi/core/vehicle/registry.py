@@ -8,15 +8,15 @@ from mavproxy_uavapi.core.errors import NoVehicle
 from mavproxy_uavapi.core.mavlink.flight_modes import kind_of
 from mavproxy_uavapi.core.mavlink.link import Link
 from mavproxy_uavapi.core.mavlink.link_watch import LinkWatch
+from mavproxy_uavapi.core.mavlink.pending_waits import PendingWaits
 from mavproxy_uavapi.core.mavlink.vehicle_state import Fleet
-from mavproxy_uavapi.core.mavlink.waiters import Pending
 from mavproxy_uavapi.core.vehicle.copter import Copter
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 CLASSES: dict[str, type[Vehicle]] = {"copter": Copter}
 
 
-class Hangar:
+class VehicleRegistry:
     """Vehicles by system id.
 
     Attributes:
@@ -31,7 +31,7 @@ class Hangar:
     """
 
     def __init__(
-        self, fleet: Fleet, link: Link, link_watch: LinkWatch, pending: Pending, clock: Callable[[], float]
+        self, fleet: Fleet, link: Link, link_watch: LinkWatch, pending: PendingWaits, clock: Callable[[], float]
     ) -> None:
         self.current = 0
         self._fleet = fleet

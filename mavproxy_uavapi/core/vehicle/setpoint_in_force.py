@@ -15,7 +15,7 @@ from pymavlink import mavutil
 from mavproxy_uavapi.core.errors import TimedOut
 from mavproxy_uavapi.core.mavlink.link import Address, Link, is_finite
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
-from mavproxy_uavapi.core.vehicle.message_waiter import Waiting
+from mavproxy_uavapi.core.vehicle.message_waiter import MessageWaiter
 from mavproxy_uavapi.core.vehicle.messages import (
     MESSAGE_IDS,
     POSITION_IGNORED,
@@ -32,7 +32,7 @@ TIMEOUT = 1.0  # s for the first of the two
 LATER = 0.5  # s for the second
 
 
-async def ask(state: VehicleState, waiting: Waiting, link: Link) -> GlobalTarget | VelocityTarget | None:
+async def ask(state: VehicleState, waiting: MessageWaiter, link: Link) -> GlobalTarget | VelocityTarget | None:
     """What it flies to; None where it does not say, or flies neither to a place nor at a velocity.
 
     Raises:

@@ -13,7 +13,7 @@ from collections import defaultdict
 
 from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.vehicle.messages import MESSAGE_IDS, set_interval
-from mavproxy_uavapi.core.vehicle.registry import Hangar
+from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 LOOK_EVERY = 2.0  # s
@@ -37,16 +37,16 @@ WANTED = {
 IN_GUIDED = {"POSITION_TARGET_LOCAL_NED", "POSITION_TARGET_GLOBAL_INT"}  # elsewhere they say nothing
 
 
-class Freshness:
+class StreamRequester:
     """Watches what arrives from the vehicle that the API flies.
 
     Args:
-        hangar: the vehicles.
+        registry: the vehicles.
         system: the system id to watch; 0 is MAVProxy's current one.
     """
 
-    def __init__(self, hangar: Hangar, system: int) -> None:
-        self._hangar = hangar
+    def __init__(self, registry: VehicleRegistry, system: int) -> None:
+        self._hangar = registry
         self._system = system
         self._asked: defaultdict[tuple[int, int, str], list[float]] = defaultdict(list)
 

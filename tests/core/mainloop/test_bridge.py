@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.core.mainloop.bridge import GIVE_WAY, Bridge
+from mavproxy_uavapi.core.mainloop.bridge import LONGEST_WAIT, Bridge
 
 
 class Received(list[Any]):
@@ -121,9 +121,9 @@ def test_what_is_to_be_sent_goes_out_between_two_messages_of_a_burst(bridge: Bri
 
 
 def test_new_work_waits_while_the_main_loop_is_at_messages(bridge: Bridge) -> None:
-    bridge.run(bridge.calm())  # it is at none
+    bridge.run(bridge.wait_for_main_loop())  # it is at none
     bridge.feed("one")
-    waiting = asyncio.run_coroutine_threadsafe(bridge.calm(), bridge.loop)
+    waiting = asyncio.run_coroutine_threadsafe(bridge.wait_for_main_loop(), bridge.loop)
     in_loop(bridge)
     assert not waiting.done()
     bridge.turn()
@@ -133,8 +133,8 @@ def test_new_work_waits_while_the_main_loop_is_at_messages(bridge: Bridge) -> No
 def test_new_work_does_not_wait_for_ever(bridge: Bridge) -> None:
     bridge.feed("one")
     began = time.monotonic()
-    bridge.run(bridge.calm())
-    assert time.monotonic() - began >= GIVE_WAY
+    bridge.run(bridge.wait_for_main_loop())
+    assert time.monotonic() - began >= LONGEST_WAIT
 
 
 def test_feed_after_the_end_is_dropped(mpstate: Any, received: Received) -> None:
@@ -209,7 +209,7 @@ def test_fifty_starts_and_stops_leave_no_thread_and_no_descriptor(mpstate: Any, 
 FORK = """
 import os, socket, warnings
 warnings.simplefilter("ignore")
-from mavproxy_uavapi.core.mainloop.bridge import GIVE_WAY, Bridge
+from mavproxy_uavapi.core.mainloop.bridge import LONGEST_WAIT, Bridge
 
 def is_open(fd):
     try:
@@ -223,7 +223,7 @@ bridge = Bridge(select_extra, print)
 bridge.start()
 port, kept = socket.socket(), socket.socket()
 taken_back = socket.socket()
-closed = [port.fileno(), *bridge._outbox.filenos()]
+closed = [port.fileno(), *bridge._calls.filenos()]
 bridge.close_in_children(lambda: [port.fileno(), -1])
 fileno = taken_back.fileno
 bridge.close_in_children(ours := (lambda: [fileno()]))

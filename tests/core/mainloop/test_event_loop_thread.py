@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 import pytest
 
-from mavproxy_uavapi.core.mainloop.event_loop_thread import LoopThread
+from mavproxy_uavapi.core.mainloop.event_loop_thread import EventLoopThread
 
 
 @pytest.fixture
-def thread() -> Iterator[LoopThread]:
-    thread = LoopThread("test-loop")
+def thread() -> Iterator[EventLoopThread]:
+    thread = EventLoopThread("test-loop")
     thread.start()
     yield thread
     assert thread.stop()
@@ -21,12 +21,12 @@ async def name_of_thread() -> str:
     return threading.current_thread().name
 
 
-def test_coroutines_run_in_the_thread(thread: LoopThread) -> None:
+def test_coroutines_run_in_the_thread(thread: EventLoopThread) -> None:
     assert thread.running
     assert thread.run(name_of_thread(), 1.0) == "test-loop"
 
 
-def test_run_hands_over_what_is_raised(thread: LoopThread) -> None:
+def test_run_hands_over_what_is_raised(thread: EventLoopThread) -> None:
     async def fail() -> None:
         raise KeyError("k")
 
@@ -34,7 +34,7 @@ def test_run_hands_over_what_is_raised(thread: LoopThread) -> None:
         thread.run(fail(), 1.0)
 
 
-def test_run_gives_up_in_time_and_cancels(thread: LoopThread) -> None:
+def test_run_gives_up_in_time_and_cancels(thread: EventLoopThread) -> None:
     cancelled = threading.Event()
 
     async def for_ever() -> None:
@@ -50,7 +50,7 @@ def test_run_gives_up_in_time_and_cancels(thread: LoopThread) -> None:
 
 
 def test_stop_cancels_what_runs_and_ends_the_thread() -> None:
-    thread = LoopThread("test-loop")
+    thread = EventLoopThread("test-loop")
     thread.start()
     ended: list[str] = []
 
@@ -74,7 +74,7 @@ def test_stop_cancels_what_runs_and_ends_the_thread() -> None:
 
 
 def test_call_soon_after_the_end_says_so() -> None:
-    thread = LoopThread("test-loop")
+    thread = EventLoopThread("test-loop")
     thread.start()
     assert thread.call_soon(lambda: None)
     thread.stop()
@@ -82,6 +82,6 @@ def test_call_soon_after_the_end_says_so() -> None:
 
 
 def test_thread_that_was_never_started_is_stopped_too() -> None:
-    thread = LoopThread("test-loop")
+    thread = EventLoopThread("test-loop")
     assert thread.stop()
     assert thread.loop.is_closed()

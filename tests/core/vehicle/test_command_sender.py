@@ -233,7 +233,7 @@ def test_patience_ends(loop: Any, drone: Any, send: Any) -> None:
     drone.answers[HOME] = [BUSY]
     started = loop.time()
     with pytest.raises(Rejected, match="TEMPORARILY_REJECTED"):
-        send(messages.set_home_here(), patience=5.0)
+        send(messages.set_home_here(), retry_for=5.0)
     assert loop.time() - started == pytest.approx(5.0, abs=1.1)
 
 

@@ -764,7 +764,7 @@ def test_newer_target_takes_over_while_the_older_client_is_told(
     assert flying.at == pytest.approx([0.0, 30.0, -20.0], abs=1.0)
 
 
-def test_two_vehicles_are_flown_by_themselves(loop: Any, make_drone: Any, hangar: Any) -> None:
+def test_two_vehicles_are_flown_by_themselves(loop: Any, make_drone: Any, registry: Any) -> None:
     from mavproxy_uavapi.core.vehicle.jobs import JobBook
 
     drones = [make_drone(1), make_drone(2)]
@@ -776,7 +776,7 @@ def test_two_vehicles_are_flown_by_themselves(loop: Any, make_drone: Any, hangar
     async def both() -> None:
         jobs = []
         for system, target in ((1, NedTarget(30.0, 0.0, -20.0)), (2, NedTarget(0.0, 30.0, -20.0))):
-            copter = hangar.find(system)
+            copter = registry.find(system)
 
             async def body(job: Any, copter: Any = copter, target: Any = target) -> str:
                 await copter.go_to(job, target, wait=True)

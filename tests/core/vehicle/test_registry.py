@@ -7,7 +7,7 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import LinkLost, NoVehicle
 from mavproxy_uavapi.core.vehicle.copter import Copter
-from mavproxy_uavapi.core.vehicle.registry import Hangar
+from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 mavlink = mavutil.mavlink
@@ -23,50 +23,52 @@ def hear(loop: Any, host: Any, msg: Any) -> Any:
     return hear
 
 
-def test_no_vehicle_before_the_first_heartbeat(hangar: Hangar) -> None:
+def test_no_vehicle_before_the_first_heartbeat(registry: VehicleRegistry) -> None:
     with pytest.raises(NoVehicle, match="^no vehicle on the link yet$"):
-        hangar.find()
+        registry.find()
     with pytest.raises(NoVehicle, match="^no vehicle 7 on the link yet$"):
-        hangar.find(7)
+        registry.find(7)
 
 
-def test_unknown_vehicle_is_answered_with_those_that_were_heard(hangar: Hangar, hear: Any) -> None:
+def test_unknown_vehicle_is_answered_with_those_that_were_heard(registry: VehicleRegistry, hear: Any) -> None:
     hear(system=1)
     hear(system=3)
     with pytest.raises(NoVehicle, match="no vehicle 7 on the link yet; heard so far: 1, 3"):
-        hangar.find(7)
+        registry.find(7)
 
 
-def test_vehicle_is_the_named_one_or_mavproxys_or_the_first(hangar: Hangar, host: Any, hear: Any) -> None:
+def test_vehicle_is_the_named_one_or_mavproxys_or_the_first(registry: VehicleRegistry, host: Any, hear: Any) -> None:
     hear(system=5)
     hear(system=2)
-    assert hangar.find().state.system == 5
-    host.hangar.current = 2
-    assert hangar.find().state.system == 2
-    assert hangar.find(5).state.system == 5
+    assert registry.find().state.system == 5
+    host.registry.current = 2
+    assert registry.find().state.system == 2
+    assert registry.find(5).state.system == 5
 
 
-def test_vehicle_is_the_same_each_time(hangar: Hangar, hear: Any) -> None:
+def test_vehicle_is_the_same_each_time(registry: VehicleRegistry, hear: Any) -> None:
     hear()
-    assert hangar.find(1) is hangar.find(1)
+    assert registry.find(1) is registry.find(1)
 
 
-def test_type_comes_from_the_heartbeat_and_may_change(hangar: Hangar, hear: Any) -> None:
+def test_type_comes_from_the_heartbeat_and_may_change(registry: VehicleRegistry, hear: Any) -> None:
     hear()
-    assert isinstance(hangar.find(), Copter)
+    assert isinstance(registry.find(), Copter)
     hear(type=mavlink.MAV_TYPE_FIXED_WING)
-    assert not isinstance(hangar.find(), Copter)
-    assert isinstance(hangar.find(), Vehicle)
-    assert hangar.find().kind == "plane"
+    assert not isinstance(registry.find(), Copter)
+    assert isinstance(registry.find(), Vehicle)
+    assert registry.find().kind == "plane"
 
 
-def test_vehicle_without_heartbeats_cannot_be_commanded_but_seen(loop: Any, hangar: Hangar, hear: Any) -> None:
+def test_vehicle_without_heartbeats_cannot_be_commanded_but_seen(
+    loop: Any, registry: VehicleRegistry, hear: Any
+) -> None:
     hear()
     loop.pass_time(4.9)
-    assert hangar.commandable() is hangar.find()
+    assert registry.commandable() is registry.find()
     loop.pass_time(1.1)
-    assert hangar.find().state.system == 1
+    assert registry.find().state.system == 1
     with pytest.raises(LinkLost, match=r"no heartbeat from vehicle 1 for 6\.0 s"):
-        hangar.commandable()
+        registry.commandable()
     hear()
-    assert hangar.commandable() is hangar.find()
+    assert registry.commandable() is registry.find()

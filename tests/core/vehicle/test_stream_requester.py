@@ -6,20 +6,26 @@ import pytest
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.vehicle.messages import MESSAGE_IDS
-from mavproxy_uavapi.core.vehicle.stream_requester import ASK_AGAIN, FIRST_ASKINGS, LOOK_EVERY, WANTED, Freshness
+from mavproxy_uavapi.core.vehicle.stream_requester import (
+    ASK_AGAIN,
+    FIRST_ASKINGS,
+    LOOK_EVERY,
+    WANTED,
+    StreamRequester,
+)
 
 mavlink = mavutil.mavlink
 INTERVAL = mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
 
 
 @pytest.fixture
-def watch(loop: Any, hangar: Any) -> Any:
+def watch(loop: Any, registry: Any) -> Any:
     """Watch for so many seconds; more each time it is called."""
     tasks: list[Any] = []
 
     def watch(seconds: float) -> None:
         if not tasks:
-            tasks.append(loop.create_task(Freshness(hangar, 0).run()))
+            tasks.append(loop.create_task(StreamRequester(registry, 0).run()))
         loop.pass_time(seconds)
         assert not tasks[0].done()
 

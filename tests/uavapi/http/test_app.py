@@ -245,9 +245,9 @@ def test_only_what_commands_does_not_wait_for_the_main_loop(
 ) -> None:
     waited: list[str] = []
 
-    async def calm() -> None:
+    async def wait_for_main_loop() -> None:
         waited.append(path)
 
-    monkeypatch.setattr(host.bridge, "calm", calm)
+    monkeypatch.setattr(host.bridge, "wait_for_main_loop", wait_for_main_loop)
     loop.run(api.ask(method, path))
     assert bool(waited) is gives_way

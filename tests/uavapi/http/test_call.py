@@ -31,7 +31,7 @@ def test_command_and_telemetry_follow_mavproxys_current_vehicle(
     make_drone: Any, host: Any, api: Any, loop: Any
 ) -> None:
     first, second = make_drone(1), make_drone(2)
-    host.hangar.current = 2
+    host.registry.current = 2
     assert api.get("/command/guided").body["id"] == "2"
     assert api.get("/telemetry/gps").body["id"] == "2"
     assert first.orders() == []

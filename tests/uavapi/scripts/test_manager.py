@@ -20,7 +20,7 @@ PRINTS = b"import os, sys\nprint(os.environ['UAVAPI_URL'], os.environ['UAVAPI_TO
 SLEEPS = b"import time\nprint('up')\ntime.sleep(60)\n"
 
 
-class NoHangar:
+class NoRegistry:
     def find(self, _system: int) -> Any:
         raise NoVehicle("none")
 
@@ -31,7 +31,7 @@ def settings(folder: Path, **given: Any) -> Any:
 
 
 def scripts_in(folder: Path, **given: Any) -> Scripts:
-    return Scripts(SimpleNamespace(hangar=NoHangar()), settings(folder, **given))  # type: ignore[arg-type]
+    return Scripts(SimpleNamespace(registry=NoRegistry()), settings(folder, **given))  # type: ignore[arg-type]
 
 
 def flown(folder: Path, story: Callable[[Scripts], Awaitable[Any]], **given: Any) -> Any:

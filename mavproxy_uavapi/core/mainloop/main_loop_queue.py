@@ -9,7 +9,7 @@ from collections.abc import Callable
 WAKE = b"\0"
 
 
-class Outbox:
+class MainLoopQueue:
     """A queue of calls: anybody puts, only MAVProxy's main loop drains.
 
     Thread safe: `put` may be called from any thread; deque's append and popleft are atomic.

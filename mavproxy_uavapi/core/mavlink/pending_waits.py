@@ -1,7 +1,7 @@
 """Acks and telemetry conditions that somebody awaits. Pure: no thread, no timer, no clock.
 
 Register before sending, and the message itself wakes the waiter: there is no polling anywhere.
-Deadlines are the waiter's own (`vehicle/waiting.py`), which then discards its wait.
+Deadlines are the waiter's own (`core/vehicle/message_waiter.py`), which then discards its wait.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class Wait(Generic[T]):
                 self.settle(value)
 
 
-class Pending:
+class PendingWaits:
     """All waits in flight."""
 
     def __init__(self) -> None:

@@ -6,23 +6,23 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from mavproxy_uavapi.core.mainloop.call_queue import Outbox
+from mavproxy_uavapi.core.mainloop.main_loop_queue import MainLoopQueue
 
 
 @pytest.fixture
-def outbox() -> Iterator[Outbox]:
-    outbox = Outbox()
+def outbox() -> Iterator[MainLoopQueue]:
+    outbox = MainLoopQueue()
     yield outbox
     outbox.close()
 
 
-def readable(outbox: Outbox) -> bool:
+def readable(outbox: MainLoopQueue) -> bool:
     with selectors.DefaultSelector() as selector:
         selector.register(outbox.fileno(), selectors.EVENT_READ)
         return bool(selector.select(0))
 
 
-def test_calls_run_in_the_order_in_which_they_were_put(outbox: Outbox) -> None:
+def test_calls_run_in_the_order_in_which_they_were_put(outbox: MainLoopQueue) -> None:
     ran: list[int] = []
     for number in range(5):
         outbox.put(lambda number=number: ran.append(number))
@@ -31,7 +31,7 @@ def test_calls_run_in_the_order_in_which_they_were_put(outbox: Outbox) -> None:
     assert ran == [0, 1, 2, 3, 4]
 
 
-def test_put_wakes_select_until_it_was_read(outbox: Outbox) -> None:
+def test_put_wakes_select_until_it_was_read(outbox: MainLoopQueue) -> None:
     assert not readable(outbox)
     ran: list[int] = []
     outbox.put(lambda: ran.append(1))
@@ -41,12 +41,12 @@ def test_put_wakes_select_until_it_was_read(outbox: Outbox) -> None:
     assert not readable(outbox)
 
 
-def test_spurious_wake_up_is_harmless(outbox: Outbox) -> None:
+def test_spurious_wake_up_is_harmless(outbox: MainLoopQueue) -> None:
     outbox.on_readable(None)
     outbox.drain()
 
 
-def test_what_a_call_queues_waits_for_the_next_time(outbox: Outbox) -> None:
+def test_what_a_call_queues_waits_for_the_next_time(outbox: MainLoopQueue) -> None:
     ran: list[str] = []
 
     def again() -> None:
@@ -60,7 +60,7 @@ def test_what_a_call_queues_waits_for_the_next_time(outbox: Outbox) -> None:
     assert ran == ["again"] * 2
 
 
-def test_full_pipe_loses_no_call(outbox: Outbox) -> None:
+def test_full_pipe_loses_no_call(outbox: MainLoopQueue) -> None:
     ran: list[int] = []
     for number in range(5000):
         outbox.put(lambda number=number: ran.append(number))
@@ -69,7 +69,7 @@ def test_full_pipe_loses_no_call(outbox: Outbox) -> None:
     assert ran == list(range(5000))
 
 
-def test_any_thread_may_put(outbox: Outbox) -> None:
+def test_any_thread_may_put(outbox: MainLoopQueue) -> None:
     ran: list[int] = []
     puts: list[Callable[[], None]] = [lambda: ran.append(threading.get_ident())] * 100
     threads = [threading.Thread(target=lambda: [outbox.put(put) for put in puts]) for _ in range(4)]
@@ -82,7 +82,7 @@ def test_any_thread_may_put(outbox: Outbox) -> None:
 
 
 def test_after_close_nothing_is_kept_and_nothing_raised() -> None:
-    outbox = Outbox()
+    outbox = MainLoopQueue()
     outbox.put(lambda: pytest.fail("ran after close"))
     outbox.close()
     outbox.put(lambda: pytest.fail("ran after close"))
