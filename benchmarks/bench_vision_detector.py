@@ -21,10 +21,10 @@ from typing import Any
 import cv2
 import numpy as np
 
-from mavproxy_vision.detector import Detector, Options
-from mavproxy_vision.geometry import Attitude, Mount, vector
-from mavproxy_vision.model import CameraModel
-from mavproxy_vision.rendering import Look, PlacedTag, Renderer
+from mavproxy_vision.apriltag.detector import Detector, Options
+from mavproxy_vision.camera.renderer import Look, PlacedTag, Renderer
+from mavproxy_vision.geometry.camera_model import CameraModel
+from mavproxy_vision.geometry.frames import Attitude, Mount, vector
 
 MODEL, SIZE, MOUNT = CameraModel(), 0.166, Mount()
 DISTANCES = (4, 5, 6, 7, 8, 9)

@@ -21,10 +21,10 @@ from typing import Any
 import cv2
 from rig import Forwarding, cpu_seconds, fly, jitter, machine, percentile, put_first, rig, table
 
-from mavproxy_vision.detector import Detector, Options
-from mavproxy_vision.geometry import Attitude, Mount, vector
-from mavproxy_vision.model import CameraModel
-from mavproxy_vision.rendering import Look, PlacedTag, Renderer
+from mavproxy_vision.apriltag.detector import Detector, Options
+from mavproxy_vision.camera.renderer import Look, PlacedTag, Renderer
+from mavproxy_vision.geometry.camera_model import CameraModel
+from mavproxy_vision.geometry.frames import Attitude, Mount, vector
 
 BUDGET = 10.0  # ms at the 99th percentile
 NONE, LOOKING, ELSEWHERE = "no camera", "detector flat out", "detector elsewhere"

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from mavproxy_vision.flights import Flights
-from mavproxy_vision.vision import Vision, in_view
+from mavproxy_vision.landing.flight_jobs import Flights
+from mavproxy_vision.tracking.tracker import Vision, in_view
 
 HELP = """\
 vision status                      the camera, the tags in view, what is in flight

@@ -27,16 +27,16 @@ from mavproxy_uavapi.http.extension import (
     envelope,
     in_time,
 )
-from mavproxy_vision.annotate import annotated, jpeg
-from mavproxy_vision.camera import Image, Posted, decode
+from mavproxy_vision.apriltag.detection import Seen
+from mavproxy_vision.apriltag.overlay import annotated, jpeg
+from mavproxy_vision.camera.one_at_a_time import OneAtATime
+from mavproxy_vision.camera.source import Image, Posted, decode
 from mavproxy_vision.console import caption, status
 from mavproxy_vision.errors import BadImage, NoCamera
-from mavproxy_vision.flights import Flights, Sortie
-from mavproxy_vision.mission import Errand
-from mavproxy_vision.one_at_a_time import OneAtATime
+from mavproxy_vision.landing.flight_jobs import Flights, Sortie
+from mavproxy_vision.landing.mission import Errand
 from mavproxy_vision.settings import METHODS
-from mavproxy_vision.sighting import Seen
-from mavproxy_vision.vision import FRESH, Vision, in_view
+from mavproxy_vision.tracking.tracker import FRESH, Vision, in_view
 
 BOUNDARY = "frame"
 FRAME_TIMEOUT = 5.0  # s without a frame until a stream ends

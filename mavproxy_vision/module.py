@@ -23,13 +23,13 @@ from mavproxy_uavapi.core.module import SharedModule, value_of
 from mavproxy_uavapi.core.remembered_settings import RememberedSettings
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.http.extension import NED_REACH
-from mavproxy_vision import console, files
+from mavproxy_vision import console, file_commands
 from mavproxy_vision.errors import BadSetting
-from mavproxy_vision.flights import Flights, Sortie
 from mavproxy_vision.http import Pages
-from mavproxy_vision.mission import Errand
+from mavproxy_vision.landing.flight_jobs import Flights, Sortie
+from mavproxy_vision.landing.mission import Errand
 from mavproxy_vision.settings import METHODS, ModuleSettings
-from mavproxy_vision.vision import Vision
+from mavproxy_vision.tracking.tracker import Vision
 
 NAME = "vision"
 COMPLETION = "(VISIONSETTING)"
@@ -268,14 +268,14 @@ class VisionModule(SharedModule):
     # -- files -----------------------------------------------------------------------------------------------
 
     def _calibrate(self, args: list[str]) -> None:
-        self._in_background(lambda: files.calibrated(args))
+        self._in_background(lambda: file_commands.calibrated(args))
 
     def _snapshot(self, args: list[str]) -> None:
-        self._in_background(lambda: files.snapshot(args, self.vision.seen, self.vision.image))
+        self._in_background(lambda: file_commands.snapshot(args, self.vision.seen, self.vision.image))
 
     def _tag(self, args: list[str]) -> None:
         settings = self.vision_settings.snapshot()
-        self._in_background(lambda: files.tag(args, settings.families[0], settings.tag_list[0]))
+        self._in_background(lambda: file_commands.tag(args, settings.families[0], settings.tag_list[0]))
 
     def _in_background(self, work: Callable[[], str]) -> None:
         """Run what takes long, or touches a disk, and print what it says."""

@@ -11,14 +11,14 @@ from typing import Any
 
 from MAVProxy.modules.lib.mp_settings import MPSetting, MPSettings
 
-from mavproxy_vision.calibration import load
+from mavproxy_vision.apriltag.tag_layout import FAMILIES, NUMBER, Tag, parse_families, parse_tags
+from mavproxy_vision.camera.calibration import load
+from mavproxy_vision.camera.renderer import Look
+from mavproxy_vision.camera.simulated import Timing, parse_placed
 from mavproxy_vision.errors import BadSetting
-from mavproxy_vision.geometry import Mount
-from mavproxy_vision.model import CameraModel
+from mavproxy_vision.geometry.camera_model import CameraModel
+from mavproxy_vision.geometry.frames import Mount
 from mavproxy_vision.paths import path_of
-from mavproxy_vision.rendering import Look
-from mavproxy_vision.simulated import Timing, parse_placed
-from mavproxy_vision.tags import FAMILIES, NUMBER, Tag, parse_families, parse_tags
 
 METHODS = ("velocity", "landing_target")
 ON_FAILURE = ("rtl", "land", "hold")

@@ -17,9 +17,9 @@ from typing import Any
 import cv2
 import requests
 
-from mavproxy_vision.geometry import Attitude, Mount, vector
-from mavproxy_vision.model import CameraModel
-from mavproxy_vision.rendering import Look, PlacedTag, Renderer
+from mavproxy_vision.camera.renderer import Look, PlacedTag, Renderer
+from mavproxy_vision.geometry.camera_model import CameraModel
+from mavproxy_vision.geometry.frames import Attitude, Mount, vector
 
 PERIOD = 0.06  # s between two frames
 FORESEEN = 0.5  # s of the vehicle's clock that it is taken to move on as it did

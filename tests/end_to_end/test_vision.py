@@ -99,7 +99,7 @@ def test_the_prompt_tells_the_same(looking: Any) -> None:
 
 
 def test_a_camera_is_calibrated_at_the_prompt_and_looked_through(looking: Any, boards: Any, tmp_path: Path) -> None:
-    from mavproxy_vision.model import CameraModel  # noqa: PLC0415
+    from mavproxy_vision.geometry.camera_model import CameraModel  # noqa: PLC0415
 
     looking.mavproxy.ask(f"vision calibrate {tmp_path} {boards.KIND}", "0 images in")
     boards.draw(tmp_path, CameraModel(480, 360, 450.0, 450.0, 240.0, 180.0, (-0.1, 0.02, 0.0, 0.0, 0.0)))
@@ -172,7 +172,7 @@ def test_the_pilots_hand_ends_a_landing(seeing: Any, harness: Any) -> None:
 
 @pytest.mark.needs("gst-launch-1.0", "gstreamer1.0-tools")
 def test_a_film_a_folder_and_a_pipeline_are_sources(seeing: Any, harness: Any, tmp_path: Path) -> None:
-    from mavproxy_vision.dictionaries import marker_image  # noqa: PLC0415
+    from mavproxy_vision.apriltag.families import marker_image  # noqa: PLC0415
 
     picture = marker_image("36h11", 0, 16)
     film = cv2.VideoWriter(str(tmp_path / "film.avi"), cv2.VideoWriter_fourcc(*"MJPG"), 20, (480, 360))

@@ -7,8 +7,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from mavproxy_vision.model import CameraModel
-from mavproxy_vision.rendering import distortion_maps
+from mavproxy_vision.camera.renderer import distortion_maps
+from mavproxy_vision.geometry.camera_model import CameraModel
 
 KIND = "chessboard:10x7:0.03"
 PIXELS = 40  # of the flat picture for a square of 0.03 m

@@ -26,14 +26,14 @@ from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.mavlink.link import Address, require_finite
 from mavproxy_uavapi.sim.options import Home, Options, Wind
 from mavproxy_uavapi.sim.simulator import STEP, Simulator
-from mavproxy_vision.camera import Frame
-from mavproxy_vision.detector import Detector
-from mavproxy_vision.flights import Flights
-from mavproxy_vision.rates import TRUTH
+from mavproxy_vision.apriltag.detection import Seen
+from mavproxy_vision.apriltag.detector import Detector
+from mavproxy_vision.camera.source import Frame
+from mavproxy_vision.landing.flight_jobs import Flights
 from mavproxy_vision.settings import ModuleSettings
-from mavproxy_vision.sighting import Seen
-from mavproxy_vision.vision import Vision, make_source
-from mavproxy_vision.worker import Health, Watch
+from mavproxy_vision.tracking.capture_worker import Health, Watch
+from mavproxy_vision.tracking.stream_rates import TRUTH
+from mavproxy_vision.tracking.tracker import Vision, make_source
 
 DETECTOR_TIME = 0.015  # s from a frame's arrival to its outcome
 STREAMS_EVERY = 15.0  # s: as often does MAVProxy ask for all streams at its rate

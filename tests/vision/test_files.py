@@ -14,21 +14,21 @@ import cv2
 import numpy as np
 import pytest
 
-from mavproxy_vision import files
-from mavproxy_vision.annotate import annotated, jpeg
-from mavproxy_vision.calibration import Board, calibrate, load, save
-from mavproxy_vision.camera import Folder, Frame, Posted, decode, decode_any, grey
-from mavproxy_vision.capture import Capture
+from mavproxy_vision import file_commands
+from mavproxy_vision.apriltag.detection import Seen
+from mavproxy_vision.apriltag.overlay import annotated, jpeg
+from mavproxy_vision.apriltag.tag_layout import Tag
+from mavproxy_vision.apriltag.tag_pdf import POINTS_PER_METRE, tag_pdf
+from mavproxy_vision.camera.calibration import Board, calibrate, load, save
+from mavproxy_vision.camera.image_size import size_of
+from mavproxy_vision.camera.opencv_capture import Capture
+from mavproxy_vision.camera.source import Folder, Frame, Posted, decode, decode_any, grey
 from mavproxy_vision.errors import BadImage, BadSetting, NoCamera
-from mavproxy_vision.headers import size_of
-from mavproxy_vision.model import CameraModel
-from mavproxy_vision.printing import POINTS_PER_METRE, tag_pdf
+from mavproxy_vision.geometry.camera_model import CameraModel
+from mavproxy_vision.landing.flight_log import SIDE, Track
 from mavproxy_vision.settings import ModuleSettings
-from mavproxy_vision.sighting import Seen
-from mavproxy_vision.tags import Tag
-from mavproxy_vision.track import SIDE, Track
-from mavproxy_vision.vision import Vision
-from mavproxy_vision.worker import Watch, Worker
+from mavproxy_vision.tracking.capture_worker import Watch, Worker
+from mavproxy_vision.tracking.tracker import Vision
 
 
 def picture(value: int = 0) -> np.ndarray:
@@ -434,7 +434,7 @@ def test_what_is_no_file_is_no_calibration(tmp_path):
 )
 def test_a_board_that_cannot_be_is_refused(tmp_path, board, why):
     with pytest.raises(BadSetting, match=why):
-        files.calibrated([str(tmp_path), board])
+        file_commands.calibrated([str(tmp_path), board])
 
 
 @pytest.mark.parametrize(
@@ -517,27 +517,27 @@ def test_tags_that_cannot_be_printed():
 
 def test_the_prompts_file_commands(tmp_path):
     seen = Seen(1, 0.0, 0.0, 0.0, (64, 48), ())
-    assert files.snapshot([str(tmp_path / "a.png")], seen, picture(9)).startswith("wrote ")
-    assert files.tag([str(tmp_path / "t.pdf"), "--family", "16h5", "--id", "2"], "36h11", Tag(0, 0.1)).startswith(
-        "wrote"
-    )
+    assert file_commands.snapshot([str(tmp_path / "a.png")], seen, picture(9)).startswith("wrote ")
+    assert file_commands.tag(
+        [str(tmp_path / "t.pdf"), "--family", "16h5", "--id", "2"], "36h11", Tag(0, 0.1)
+    ).startswith("wrote")
     assert (tmp_path / "t.pdf").read_bytes().startswith(b"%PDF")
-    assert files.snapshot(["a.png"], None, None) == "there is no frame yet"
+    assert file_commands.snapshot(["a.png"], None, None) == "there is no frame yet"
     for call in (
-        lambda: files.snapshot([], seen, picture()),
-        lambda: files.tag([], "36h11", Tag(0, 0.1)),
-        lambda: files.tag(["a.pdf", "--size", "x"], "36h11", Tag(0, 0.1)),
-        lambda: files.tag([str(tmp_path / "a.pdf"), "--size", "1e-300"], "36h11", Tag(0, 0.1)),
-        lambda: files.tag([str(tmp_path / "a.pdf"), "--size", "nan"], "36h11", Tag(0, 0.1)),
-        lambda: files.tag([str(tmp_path / "a.pdf"), "--id", "587"], "36h11", Tag(0, 0.1)),
-        lambda: files.tag(["~nobody_xyz/a.pdf"], "36h11", Tag(0, 0.1)),
-        lambda: files.tag(["-h"], "36h11", Tag(0, 0.1)),
-        lambda: files.snapshot(["~nobody_xyz/a.png"], seen, picture()),
-        lambda: files.snapshot([str(tmp_path / "a.xyz")], seen, picture()),
-        lambda: files.snapshot(["a\0.png"], seen, picture()),
-        lambda: files.calibrated(["a"]),
-        lambda: files.calibrated(["~nobody_xyz", "charuco:7x5:0.03"]),
-        lambda: files.calibrated([str(tmp_path), "charuco:7x5:0.03", "~nobody_xyz/camera.json"]),
+        lambda: file_commands.snapshot([], seen, picture()),
+        lambda: file_commands.tag([], "36h11", Tag(0, 0.1)),
+        lambda: file_commands.tag(["a.pdf", "--size", "x"], "36h11", Tag(0, 0.1)),
+        lambda: file_commands.tag([str(tmp_path / "a.pdf"), "--size", "1e-300"], "36h11", Tag(0, 0.1)),
+        lambda: file_commands.tag([str(tmp_path / "a.pdf"), "--size", "nan"], "36h11", Tag(0, 0.1)),
+        lambda: file_commands.tag([str(tmp_path / "a.pdf"), "--id", "587"], "36h11", Tag(0, 0.1)),
+        lambda: file_commands.tag(["~nobody_xyz/a.pdf"], "36h11", Tag(0, 0.1)),
+        lambda: file_commands.tag(["-h"], "36h11", Tag(0, 0.1)),
+        lambda: file_commands.snapshot(["~nobody_xyz/a.png"], seen, picture()),
+        lambda: file_commands.snapshot([str(tmp_path / "a.xyz")], seen, picture()),
+        lambda: file_commands.snapshot(["a\0.png"], seen, picture()),
+        lambda: file_commands.calibrated(["a"]),
+        lambda: file_commands.calibrated(["~nobody_xyz", "charuco:7x5:0.03"]),
+        lambda: file_commands.calibrated([str(tmp_path), "charuco:7x5:0.03", "~nobody_xyz/camera.json"]),
     ):
         with pytest.raises(BadSetting) as refusal:
             call()

@@ -19,9 +19,12 @@ from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import parse
 from mavproxy_uavapi.http.streaming import Slots
 from mavproxy_vision import http
-from mavproxy_vision.annotate import jpeg
-from mavproxy_vision.camera import Folder, Posted
+from mavproxy_vision.apriltag.detection import Seen
+from mavproxy_vision.apriltag.overlay import jpeg
+from mavproxy_vision.camera.one_at_a_time import OneAtATime
+from mavproxy_vision.camera.source import Folder, Posted
 from mavproxy_vision.errors import BadImage, NoCamera
+from mavproxy_vision.geometry.camera_model import CameraModel
 from mavproxy_vision.http import (
     MOST_POSTED,
     FrameRequest,
@@ -31,11 +34,8 @@ from mavproxy_vision.http import (
     SearchRequest,
     StreamRequest,
 )
-from mavproxy_vision.model import CameraModel
-from mavproxy_vision.one_at_a_time import OneAtATime
-from mavproxy_vision.sighting import Seen
-from mavproxy_vision.vision import FRESH
-from mavproxy_vision.worker import Health
+from mavproxy_vision.tracking.capture_worker import Health
+from mavproxy_vision.tracking.tracker import FRESH
 
 IMAGE = np.full((48, 64), 50, np.uint8)
 NOW = 100.0

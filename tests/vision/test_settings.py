@@ -6,10 +6,10 @@ import json
 
 import pytest
 
+from mavproxy_vision.apriltag.tag_layout import FAMILIES, Tag, parse_tags
+from mavproxy_vision.camera.simulated import parse_placed
 from mavproxy_vision.errors import BadSetting
 from mavproxy_vision.settings import ModuleSettings, table
-from mavproxy_vision.simulated import parse_placed
-from mavproxy_vision.tags import FAMILIES, Tag, parse_tags
 
 FLOATS = [setting.name for setting in table() if setting.type is float]
 INTS = [setting.name for setting in table() if setting.type is int]

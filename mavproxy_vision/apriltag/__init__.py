@@ -1,0 +1,1 @@
+"""AprilTags: which are looked for, how they are found in a frame, and how they are drawn."""

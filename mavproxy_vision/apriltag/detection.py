@@ -1,0 +1,74 @@
+"""What the camera saw. Pure data."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mavproxy_vision.geometry.frames import Matrix, Vector
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """One tag in one frame.
+
+    Attributes:
+        family, id: what it is.
+        hamming: bits of its payload that were read wrong.
+        corners: (4, 2) px: top left, top right, bottom right, bottom left of the tag itself.
+        size: side of its black square (m) as the settings have it; 0 when they do not say.
+        position: its centre in the camera's frame (m); None without a size.
+        rotation: the tag's frame (right, up, out of its face) in the camera's, (3, 3). Near-parallel views have
+            two solutions and this may be the other one: nothing is flown by it.
+        error: root mean square of the reprojection error, px.
+    """
+
+    family: str
+    id: int
+    hamming: int
+    corners: Any
+    size: float = 0.0
+    position: Vector | None = None
+    rotation: Matrix | None = None
+    error: float = math.nan
+
+    @property
+    def distance(self) -> float | None:
+        """Metres from the lens; None without a size."""
+        return None if self.position is None else float(np.linalg.norm(self.position))
+
+    @property
+    def centre(self) -> tuple[float, float]:
+        """Where its diagonals meet, px."""
+        a, b, c, d = (np.append(corner, 1.0) for corner in np.asarray(self.corners, float))
+        x, y, w = np.cross(np.cross(a, c), np.cross(b, d))
+        return float(x / w), float(y / w)
+
+
+@dataclass(frozen=True)
+class Seen:
+    """The outcome of one frame.
+
+    Attributes:
+        number: of the frame, counted by the source.
+        captured_at: when its light fell (s, the host's clock), as far as the camera's latency is known.
+        received_at: when we had it (s).
+        done_at: when the detector was done (s).
+        size: width and height, px.
+        sightings: the tags in it.
+    """
+
+    number: int
+    captured_at: float
+    received_at: float
+    done_at: float
+    size: tuple[int, int]
+    sightings: tuple[Sighting, ...]
+
+    @property
+    def latency(self) -> float:
+        """Seconds from light to result."""
+        return self.done_at - self.captured_at

@@ -1,0 +1,232 @@
+"""Calibration files, and their making from images of a ChArUco board or a chessboard."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from mavproxy_vision.apriltag.tag_layout import NUMBER
+from mavproxy_vision.camera.source import IMAGES, Image, decode_any
+from mavproxy_vision.errors import BadImage, BadSetting
+from mavproxy_vision.geometry.camera_model import CameraModel
+
+FEWEST_VIEWS = 5
+FEWEST_CORNERS = 8
+BOARD = re.compile(rf"(charuco|chessboard):([0-9]{{1,3}})x([0-9]{{1,3}}):({NUMBER})(?::({NUMBER}))?")
+MARKERS = 250  # that the dictionary of ChArUco boards has
+FEWEST_SQUARES = {"charuco": 3, "chessboard": 4}  # of a board, each way
+MOST_SQUARES = 50
+SQUARES = (0.001, 2.0)  # m, a square's side
+SIZES = (16, 16384)  # px, of a frame
+FOCAL_LENGTHS = (0.03, 30.0)  # of the frame's width: fields of view from 2 to 173 degrees
+DISTORTIONS = (0, 4, 5, 8, 12, 14)  # coefficients that OpenCV takes
+LARGEST = 1e6  # number in a calibration
+
+
+@dataclass(frozen=True)
+class Board:
+    """A board: `charuco` or `chessboard`, squares across and down, side of a square and of a marker (m).
+
+    ChArUco boards are those of OpenCV with DICT_5X5_250, the white squares of which hold the markers.
+    """
+
+    kind: str
+    columns: int
+    rows: int
+    square: float
+    marker: float
+
+    @classmethod
+    def parse(cls, text: str) -> Board:
+        """Read `charuco:COLUMNSxROWS:SQUARE[:MARKER]` or `chessboard:COLUMNSxROWS:SQUARE`.
+
+        Raises:
+            BadSetting: it is neither, or there can be no such board.
+        """
+        match = BOARD.fullmatch(text)
+        if match is None:
+            raise BadSetting(f"board {text!r} is not charuco:7x5:0.03:0.022 or chessboard:9x6:0.025", "board")
+        square = float(match[4])
+        marker = float(match[5] or 0.75 * square)
+        board = cls(match[1], int(match[2]), int(match[3]), square, marker)
+        board.check()
+        return board
+
+    def check(self) -> None:
+        """Raises BadSetting unless there can be such a board."""
+        fewest = FEWEST_SQUARES[self.kind]
+        if not fewest <= min(self.columns, self.rows) <= max(self.columns, self.rows) <= MOST_SQUARES:
+            raise BadSetting(f"a {self.kind} has {fewest} to {MOST_SQUARES} squares each way", "board")
+        if not (SQUARES[0] <= self.square <= SQUARES[1] and 0 < self.marker < self.square):
+            raise BadSetting(
+                f"a board's squares have {SQUARES[0]:g} to {SQUARES[1]:g} m, and its markers less than that", "board"
+            )
+        if self.kind == "charuco" and self.columns * self.rows // 2 > MARKERS:
+            raise BadSetting(f"a ChArUco board has at most {2 * MARKERS} squares", "board")
+
+    @property
+    def charuco(self) -> Any:
+        """OpenCV's board."""
+        words = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_250)
+        return cv2.aruco.CharucoBoard((self.columns, self.rows), self.square, self.marker, words)
+
+    def points(self, image: Any) -> tuple[Any, Any] | None:
+        """Corners on the board (n, 3) in m and in the image (n, 2) in px; None when it is not to be seen."""
+        if self.kind == "charuco":
+            board = self.charuco
+            corners, ids, _, _ = cv2.aruco.CharucoDetector(board).detectBoard(image)
+            if ids is None or len(ids) < FEWEST_CORNERS:
+                return None
+            on_board, in_image = board.matchImagePoints(corners, ids)
+            return on_board.reshape(-1, 3).astype(np.float32), in_image.reshape(-1, 2).astype(np.float32)
+        size = (self.columns - 1, self.rows - 1)
+        found, corners = cv2.findChessboardCornersSB(image, size)
+        if not found:
+            return None
+        grid = np.mgrid[0 : size[0], 0 : size[1]].T.reshape(-1, 2) * self.square
+        on_board = np.column_stack([grid, np.zeros(len(grid))]).astype(np.float32)
+        return on_board, corners.reshape(-1, 2).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A camera model, the images it was made of, and its error (px, rms)."""
+
+    model: CameraModel
+    views: int
+    error: float
+
+
+def calibrate(folder: Path, board: Board) -> Calibration:
+    """Make a camera model of the images of a folder.
+
+    Raises:
+        BadSetting: no such folder, or too few of its images show the board, or they make no camera.
+        OSError: the folder cannot be read.
+    """
+    if not folder.is_dir():
+        raise BadSetting(f"{folder} is not a folder", "folder")
+    on_boards, in_images, size = [], [], None
+    for file in sorted(folder.iterdir()):
+        image = _image(file) if file.suffix.lower() in IMAGES else None
+        points = None if image is None else board.points(image)
+        if image is None or points is None:
+            continue
+        if size not in (None, image.shape[::-1]):
+            raise BadSetting(f"{file.name} has another size than the images before", "folder")
+        size = image.shape[::-1]
+        on_boards.append(points[0])
+        in_images.append(points[1])
+    if size is None or len(on_boards) < FEWEST_VIEWS:
+        raise BadSetting(f"{len(on_boards)} images in {folder} show the board; {FEWEST_VIEWS} are needed", "folder")
+    return _fitted(on_boards, in_images, (int(size[0]), int(size[1])))
+
+
+def _image(file: Path) -> Image | None:
+    """What the file shows, in grey; None when it is no image."""
+    try:
+        return decode_any(file.read_bytes())
+    except BadImage:
+        return None
+
+
+def _fitted(on_boards: list[Any], in_images: list[Any], size: tuple[int, int]) -> Calibration:
+    try:
+        error, matrix, coefficients, _, _ = cv2.calibrateCamera(on_boards, in_images, size, None, None)
+    except cv2.error as failed:
+        raise BadSetting(f"the images make no camera: {failed.err}", "folder") from failed
+    model = CameraModel(
+        *size,
+        float(matrix[0, 0]),
+        float(matrix[1, 1]),
+        float(matrix[0, 2]),
+        float(matrix[1, 2]),
+        tuple(float(value) for value in np.ravel(coefficients)[:5]),
+    )
+    why_not = nonsense(model)
+    if why_not:
+        raise BadSetting(
+            f"the images make no camera: {why_not}; they should show the board from many sides", "folder"
+        )
+    return Calibration(model, len(on_boards), float(error))
+
+
+def save(model: CameraModel, file: Path) -> None:
+    """Write a model as JSON.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    file.write_text(json.dumps(asdict(model), indent=2) + "\n", encoding="utf-8")
+
+
+def load(file: Path) -> CameraModel:
+    """Read a model.
+
+    Raises:
+        BadSetting: there is none, or it makes no sense.
+    """
+    try:
+        if file.exists() and not file.is_file():
+            raise BadSetting(f"{file} is not a file", "calibration")
+        model = _model(json.loads(file.read_text(encoding="utf-8")))
+    except OSError as error:
+        raise BadSetting(f"{file}: {error.strerror}", "calibration") from error
+    except (ValueError, RecursionError) as error:
+        raise BadSetting(f"{file} is no calibration: {error}", "calibration") from error
+    why_not = nonsense(model)
+    if why_not:
+        raise BadSetting(f"{file} is no calibration: {why_not}", "calibration")
+    return model
+
+
+def _model(values: Any) -> CameraModel:
+    """Raises ValueError: it is not one number for each of a model's, and a list of them for the distortion."""
+    if not isinstance(values, dict):
+        raise ValueError("it holds no JSON object")
+    names = [field.name for field in fields(CameraModel) if field.name != "distortion"]
+    missing, unknown = [name for name in names if name not in values], values.keys() - {*names, "distortion"}
+    if missing or unknown:
+        raise ValueError(f"missing are {missing}" if missing else f"nobody knows {sorted(unknown)}")
+    distortion = values.get("distortion", [])
+    if not isinstance(distortion, list):
+        raise ValueError(f"distortion: {distortion!r} is not a list")
+    given = {name: _number(name, values[name]) for name in names}
+    for name in ("width", "height"):
+        if not given[name].is_integer():
+            raise ValueError(f"{name}: {values[name]!r} is not a whole number")
+    return CameraModel(
+        int(given.pop("width")),
+        int(given.pop("height")),
+        **given,
+        distortion=tuple(_number("distortion", value) for value in distortion),
+    )
+
+
+def _number(name: str, value: Any) -> float:
+    """Raises ValueError unless it is a number of bearable size."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= LARGEST:
+        raise ValueError(f"{name}: {value!r} is not a number up to {LARGEST:g}")
+    return float(value)
+
+
+def nonsense(model: CameraModel) -> str:
+    """What there cannot be about a camera; empty for one that there can be."""
+    if not SIZES[0] <= min(model.width, model.height) <= max(model.width, model.height) <= SIZES[1]:
+        return f"a size of {model.width}x{model.height} px; there are {SIZES[0]} to {SIZES[1]}"
+    least, most = (share * model.width for share in FOCAL_LENGTHS)
+    if not (least <= model.fx <= most and least <= model.fy <= most):
+        return f"focal lengths of {model.fx:g} and {model.fy:g} px; with that width there are {least:g} to {most:g}"
+    if not (0 <= model.cx <= model.width and 0 <= model.cy <= model.height):
+        return f"the optical axis at {model.cx:g}, {model.cy:g} px is outside the frame"
+    if len(model.distortion) not in DISTORTIONS:
+        return f"{len(model.distortion)} coefficients of distortion; OpenCV takes {', '.join(map(str, DISTORTIONS))}"
+    if not all(abs(value) <= LARGEST for value in model.distortion):  # of NaN that is false
+        return f"coefficients of distortion beyond {LARGEST:g}"
+    return ""

@@ -1,0 +1,166 @@
+"""Cameras, streams and video files, by OpenCV."""
+
+from __future__ import annotations
+
+import os
+import re
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+# The state of a camera is told by `vision status`; FFmpeg and OpenCV would write into the pilot's prompt.
+os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+os.environ.setdefault("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT", "1")  # s that a read of a silent camera blocks, not 10
+
+import cv2  # noqa: E402
+
+from mavproxy_vision.camera.source import Frame, grey  # noqa: E402
+from mavproxy_vision.errors import NoCamera  # noqa: E402
+
+BEHIND = 1.0  # s; a driver's time stamp that is farther from now is on another clock
+STAMPED = ("rtsp", "rtp", "udp", "srt")  # protocols whose frames have times; of HTTP's MJPEG they are made up
+COMPARED = 100  # frames of a stream, the most punctual of which tells how its clock and ours agree
+JUMP = 5.0  # s between two frames of a stream that are not a pause but another clock
+OPENING, SILENCE = 5000, 3000  # ms that a stream has to open, and to give the next frame
+BACKLOG = 2.0  # s in which a stream that was just opened may give what it had kept
+
+
+def be_silent() -> None:
+    """Have OpenCV write no log; its versions differ in where that is set."""
+    set_level = getattr(cv2, "setLogLevel", None) or cv2.utils.logging.setLogLevel
+    set_level(0)
+
+
+class StreamClock:
+    """When a stream's frames were sent, by their own times: what the network kept comes all at once. Pure."""
+
+    def __init__(self) -> None:
+        self._late: deque[float] = deque(maxlen=COMPARED)  # s by which a frame came later than its own time
+        self._last = 0.0
+
+    def sent(self, arrival: float, stamp: float) -> float:
+        """Host time (s) for a frame stamped `stamp` (s of the stream) that arrived at `arrival` (s)."""
+        if not 0.0 < stamp - self._last < JUMP:
+            self._late.clear()
+        self._last = stamp
+        self._late.append(arrival - stamp)
+        return stamp + min(self._late)
+
+
+class Capture:
+    """A camera, a stream or a video file.
+
+    Args:
+        spec: `camera:0`, `/dev/video0`, an URL or a file.
+        latency: s from light to our having the frame, taken off the time of arrival.
+        size: width and height to ask a camera for, px.
+        rate: frames per second to ask a camera for, and at which a file is played.
+        clock: monotonic seconds.
+    """
+
+    live = True
+
+    def __init__(
+        self,
+        spec: str,
+        latency: float,
+        size: tuple[int, int],
+        rate: float,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._spec, self._latency, self._size, self._rate, self._clock = spec, latency, size, rate, clock
+        self._capture: Any = None
+        self._is_file, self._is_stream = os.path.isfile(spec), "://" in spec  # pathlib's raises on a long URL
+        self._is_stamped = spec.partition("://")[0].lower() in STAMPED
+        self._stream_clock = StreamClock()
+        self._next = 0.0
+        self._on_our_clock = False  # whether the driver's time stamps are
+
+    def open(self) -> None:
+        """Open it; ask a camera for size and rate, skip what a stream had kept.
+
+        Raises:
+            NoCamera: it cannot be opened.
+        """
+        be_silent()
+        self._on_our_clock = False
+        self._capture = self._opened()
+        if not self._capture.isOpened():
+            self.close()
+            raise NoCamera(f"cannot open {self._spec!r}")
+        if self._is_stream:
+            self._skip_backlog()
+        elif not self._is_file:
+            self._capture.set(cv2.CAP_PROP_FRAME_WIDTH, self._size[0])
+            self._capture.set(cv2.CAP_PROP_FRAME_HEIGHT, self._size[1])
+            self._capture.set(cv2.CAP_PROP_FPS, self._rate)
+            self._capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
+
+    def _opened(self) -> Any:
+        number = re.fullmatch(r"(?:camera:|/dev/video)([0-9]{1,3})", self._spec)
+        if number:
+            return cv2.VideoCapture(int(number[1]), cv2.CAP_V4L2)
+        if self._is_stream:
+            limits = [cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, OPENING, cv2.CAP_PROP_READ_TIMEOUT_MSEC, SILENCE]
+            return cv2.VideoCapture(self._spec, cv2.CAP_FFMPEG, limits)
+        return cv2.VideoCapture(self._spec, cv2.CAP_ANY)
+
+    def _skip_backlog(self) -> None:
+        """Until a frame had to be waited for: the first ones are as old as the opening took."""
+        self._stream_clock = StreamClock()
+        began = before = self._clock()
+        while before - began < BACKLOG and self._capture.grab():
+            now = self._clock()
+            if now - before > 0.25 / self._rate:
+                return
+            before = now
+
+    def read(self) -> Frame | None:
+        """The next frame; a file plays at its rate, and ends.
+
+        Raises:
+            NoCamera: what comes is no picture, or cannot be read; or the camera was unplugged.
+        """
+        if self._is_file:
+            self._wait_for_its_time()
+        asked = self._clock()
+        try:
+            good, image = self._capture.read()
+        except cv2.error as error:
+            raise NoCamera(f"{self._spec}: {error.err}") from error
+        now = self._clock()
+        if not good:
+            if self._is_gone():
+                raise NoCamera(f"{self._spec} is gone")
+            time.sleep(0.02)  # a dead camera answers at once: do not spin
+            return None
+        if self._is_stream and now - asked > 0.9 * SILENCE / 1000:
+            return None  # what the decoder still held when the stream fell silent
+        return Frame(grey(image), self._captured_at(now), now)
+
+    def _is_gone(self) -> bool:
+        """Whether a camera was unplugged: let go at once, it gets its number again when it returns."""
+        node = self._spec.replace("camera:", "/dev/video", 1)
+        return node.startswith("/dev/") and not os.path.exists(node)
+
+    def _wait_for_its_time(self) -> None:
+        now = self._clock()
+        self._next = max(self._next + 1.0 / self._rate, now - 1.0)
+        if self._next > now:
+            time.sleep(self._next - now)
+
+    def _captured_at(self, now: float) -> float:
+        """V4L2 stamps its frames with the monotonic clock; else when it arrived, or was sent, less the latency."""
+        stamp: float = self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
+        if self._is_stamped:
+            return self._stream_clock.sent(now, stamp) - self._latency
+        if not self._is_file and not self._is_stream and abs(now - stamp) < BEHIND:
+            self._on_our_clock = True  # and stays: a frame that waited for longer is old, not on another clock
+        return min(stamp, now) if self._on_our_clock else now - self._latency
+
+    def close(self) -> None:
+        """Release it."""
+        if self._capture is not None:
+            self._capture.release()
+            self._capture = None

@@ -1,0 +1,199 @@
+"""Where frames come from: what every source gives, folders of images, and frames that are posted.
+
+Cameras, streams and video files are in `capture`, GStreamer in `pipeline`, the rendered camera in `simulated`.
+A source is opened, read and closed by one thread, the worker's.
+"""
+
+from __future__ import annotations
+
+import queue
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mavproxy_vision.camera.image_size import size_of, why_costly
+from mavproxy_vision.errors import BadImage, NoCamera
+
+Image = NDArray[np.uint8]
+
+IMAGES = {".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".pgm"}
+POSTED_KEPT = 2  # posted frames that wait
+MOST_PIXELS = 40_000_000  # of a posted frame
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A frame.
+
+    Attributes:
+        image: grey, (height, width).
+        captured_at: when its light fell, as far as the source knows (s, monotonic).
+        received_at: when we had it (s, monotonic).
+    """
+
+    image: Image
+    captured_at: float
+    received_at: float
+
+
+class Source(Protocol):
+    """Gives frames.
+
+    Attributes:
+        live: whether two equal frames in a row mean that it is frozen.
+    """
+
+    live: bool
+
+    def open(self) -> None:
+        """Get ready. Raises NoCamera."""
+
+    def read(self) -> Frame | None:
+        """The next frame; None when there is none just now. Blocks for a fraction of a second at most.
+
+        Raises:
+            NoCamera: it has failed, and must be opened again.
+        """
+
+    def close(self) -> None:
+        """Let go."""
+
+
+def grey(image: Any) -> Image:
+    """A frame as OpenCV gives it, in grey of 8 bits; of 16 bits these are the upper ones.
+
+    Raises:
+        NoCamera: it is no picture.
+    """
+    if image.dtype == np.uint16:
+        image = (image >> 8).astype(np.uint8)
+    channels = 1 if image.ndim == 2 else image.shape[2]
+    if image.dtype != np.uint8 or channels > 4:
+        raise NoCamera(f"the camera gives {channels} channels of {image.dtype}: no picture")
+    if channels > 2:
+        image = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY if channels == 3 else cv2.COLOR_BGRA2GRAY)
+    elif image.ndim == 3:
+        image = image[..., 0]  # of two channels, YUYV, the first is the brightness
+    return np.ascontiguousarray(image)
+
+
+def decode(data: bytes) -> Image:
+    """A JPEG or PNG of up to MOST_PIXELS, in grey.
+
+    Raises:
+        BadImage: it is none.
+    """
+    size = size_of(data)
+    if size is None or 0 in size:
+        raise BadImage("the body is not an image, JPEG or PNG")
+    if size[0] * size[1] > MOST_PIXELS:
+        raise BadImage(f"an image of {size[0]}x{size[1]} px; at most {MOST_PIXELS // 1_000_000} megapixels are taken")
+    costly = why_costly(data)
+    if costly is not None:
+        raise BadImage(f"{costly} is not taken")
+    return decode_any(data)
+
+
+def decode_any(data: bytes) -> Image:
+    """An image of whatever kind OpenCV knows, in grey.
+
+    Raises:
+        BadImage: it is none.
+    """
+    try:
+        image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE) if data else None
+    except cv2.error as error:
+        raise BadImage(f"the image cannot be read: {error.err}") from error
+    if image is None:
+        raise BadImage("that is not an image")
+    return np.asarray(image, np.uint8)
+
+
+class Folder:
+    """The images of a folder, in the order of their names, over and over."""
+
+    live = False
+
+    def __init__(
+        self, folder: Path, latency: float, rate: float, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._folder, self._latency, self._rate, self._clock = folder, latency, rate, clock
+        self._files: list[Path] = []
+        self._index = 0
+
+    def open(self) -> None:
+        """Look what there is.
+
+        Raises:
+            NoCamera: no images.
+        """
+        try:
+            self._files = sorted(file for file in self._folder.iterdir() if file.suffix.lower() in IMAGES)
+        except OSError as error:
+            raise NoCamera(f"{self._folder}: {error.strerror}") from error
+        if not self._files:
+            raise NoCamera(f"no images in {self._folder}")
+
+    def read(self) -> Frame | None:
+        """The next image; None for a file that holds none.
+
+        Raises:
+            NoCamera: the file, or the folder, has gone.
+        """
+        time.sleep(1.0 / self._rate)
+        file = self._files[self._index % len(self._files)]
+        self._index += 1
+        try:
+            image = decode_any(file.read_bytes())
+        except OSError as error:
+            raise NoCamera(f"{file}: {error.strerror}") from error
+        except BadImage:
+            return None
+        now = self._clock()
+        return Frame(image, now - self._latency, now)
+
+    def close(self) -> None:
+        """Nothing to let go."""
+
+
+class Posted:
+    """Frames that somebody hands over, by HTTP."""
+
+    live = True
+
+    def __init__(self, latency: float, clock: Callable[[], float] = time.monotonic) -> None:
+        self._latency, self._clock = latency, clock
+        self._frames: queue.Queue[Frame] = queue.Queue(POSTED_KEPT)
+
+    def open(self) -> None:
+        """Nothing to do."""
+
+    def post(self, image: Image, latency: float | None = None) -> None:
+        """Hand a frame over, `latency` s after its light fell. Any thread."""
+        now = self._clock()
+        while True:
+            try:
+                self._frames.put_nowait(Frame(image, now - (self._latency if latency is None else latency), now))
+            except queue.Full:
+                try:
+                    self._frames.get_nowait()
+                except queue.Empty:
+                    continue  # the worker was quicker: there is room now
+            else:
+                return
+
+    def read(self) -> Frame | None:
+        """The next posted frame, if one comes soon."""
+        try:
+            return self._frames.get(timeout=0.1)
+        except queue.Empty:
+            return None
+
+    def close(self) -> None:
+        """Nothing to let go."""

@@ -1,0 +1,1 @@
+"""Rotations, the camera's mount, the camera model."""

@@ -1,0 +1,171 @@
+"""The two ways down onto a target: by velocities, or in ArduPilot's LAND, which is told where it is."""
+
+from __future__ import annotations
+
+import contextlib
+
+from mavproxy_uavapi.core.errors import NotArmed, TimedOut, UavApiError
+from mavproxy_uavapi.core.vehicle import time_limits
+from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
+from mavproxy_vision.landing.executor import Flight
+from mavproxy_vision.landing.precision_landing import PrecisionLanding, landing_target
+from mavproxy_vision.landing.state_machine import BLIND_BELOW, COAST, REST, Landing, Phase
+
+LOST = 1.2  # s without a sighting, or without telemetry, until we take the vehicle back from LAND
+SLOWER = 3.0  # times what a LAND should take, until it is given up low above the target
+HEARD = 3.0  # s until the autopilot must have said that it has a target
+
+
+class Descent:
+    """A way down onto the target: by velocities, then the autopilot's LAND.
+
+    Attributes:
+        by_velocity: whether the landing's own velocities descend.
+    """
+
+    by_velocity = True
+
+    def __init__(self, flight: Flight) -> None:
+        self.flight = flight
+
+    async def prepare(self) -> None:
+        """See whether it can be done, before the vehicle is taken over."""
+
+    async def __call__(self, landing: Landing) -> None:
+        """Land.
+
+        Raises:
+            LandingFailed: it was given up.
+        """
+        flight = self.flight
+        order = await flight.fly(landing)
+        if order.phase is Phase.FAILED:
+            await flight.give_up(landing, order.reason)
+        flight.vehicle.held_by("GUIDED")
+        flight.phase = Phase.LAND.value
+        await flight.fly_by("LAND", flight.vehicle.land)
+
+
+class PrecisionDescent(Descent):
+    """A way down in LAND by LANDING_TARGET: lets LAND fly, and takes the vehicle back when the target is lost.
+
+    Args:
+        flight: whose.
+        plnd: the vehicle's precision landing.
+    """
+
+    by_velocity = False
+
+    def __init__(self, flight: Flight, plnd: PrecisionLanding) -> None:
+        super().__init__(flight)
+        flight.plnd = self.plnd = plnd
+
+    async def prepare(self) -> None:
+        """See whether it can be done, before the vehicle is taken over.
+
+        Raises:
+            NotSupported, Rejected: the autopilot has no precision landing, or has to be rebooted for it.
+        """
+        await self.plnd.check()
+
+    async def __call__(self, landing: Landing) -> None:
+        """Land.
+
+        Raises:
+            LandingFailed: it was given up.
+            Rejected: the autopilot does not take its parameters.
+            TimedOut: it stays low above the target, in LAND.
+        """
+        flight = self.flight
+        await self.plnd.set_up()
+        while True:
+            order = await flight.fly(landing)
+            if order.phase is Phase.FAILED:
+                await flight.give_up(landing, order.reason)
+            await self._be_heard(landing)
+            if await self._follow_down(landing):
+                break
+        self.plnd.in_use = False
+        with contextlib.suppress(UavApiError):  # it has landed all the same; `Flights` goes on trying
+            await self.plnd.give_back()
+
+    async def _be_heard(self, landing: Landing) -> None:
+        """Send targets until the autopilot says that it has one."""
+        flight, vision = self.flight, self.flight.vision
+        state, began = flight.vehicle.state, vision.host.clock()
+        while vision.host.clock() - began < max(HEARD / max(state.time_ratio.ratio, 0.1), 1.0):
+            await self._tell(landing)
+            await flight.send(REST)
+            if any("Target Found" in text for text in state.said_since(began - 30.0)):
+                return
+            await flight.pause()
+        # It says so once only for a target that it did not lose meanwhile: go on, and see whether it follows.
+
+    async def _follow_down(self, landing: Landing) -> bool:
+        """Let LAND fly and tell it where the target is: True when it stands disarmed, False when taken back."""
+        flight, vehicle, vision = self.flight, self.flight.vehicle, self.flight.vision
+        limits = await vehicle.limits()
+        touchdown = Touchdown(limits)
+        vehicle.held_by("GUIDED")
+        flight.autopilot = "LAND"
+        await vehicle.set_mode(flight.job, "LAND")
+        late = vision.now() + SLOWER * time_limits.landing_time(limits, vehicle.height)
+        while not self._stands(touchdown):
+            now = vision.now()
+            if now > late and not self._is_high(landing):
+                flight.autopilot = None  # it is almost down: nobody takes it back
+                raise TimedOut(f"vehicle {vehicle.state.system} has not landed and disarmed; it is in LAND")
+            if self._must_come_back(landing, now):
+                await vehicle.set_mode(flight.job, "GUIDED")
+                flight.autopilot = None
+                motion = vision.history.last_motion
+                assert motion is not None
+                landing.resume(now, motion, flight.height(motion))
+                return False
+            await self._tell(landing)
+            await flight.pause()
+        flight.autopilot = None
+        return True
+
+    def _stands(self, touchdown: Touchdown) -> bool:
+        """Whether it has landed and disarmed.
+
+        Raises:
+            NotArmed: its motors stopped in flight.
+            ModeChanged: somebody else has it.
+        """
+        vehicle = self.flight.vehicle
+        touchdown.sinks_at((vehicle.state.field("GLOBAL_POSITION_INT", "vz") or 0) / 100.0)
+        if vehicle.state.armed is not False or vehicle.mode != "LAND":
+            vehicle.held_by("LAND")
+            return False
+        if touchdown.fell:
+            raise NotArmed("the vehicle was disarmed in flight, and fell")
+        return bool(touchdown.is_over(vehicle.clock(), vehicle.state.age("GLOBAL_POSITION_INT", vehicle.clock())))
+
+    def _must_come_back(self, landing: Landing, now: float) -> bool:
+        """Whether it may not go down any farther: it takes too long, or the target or the vehicle is lost."""
+        history, target = self.flight.vision.history, landing.target
+        if not self._is_high(landing):
+            return False  # too low to climb away from what may be the ground already
+        if landing.overdue(now) or now - history.newest > LOST:
+            return True
+        return self.flight.motion(now) is not None and (target.age(now) > LOST or target.contradiction is not None)
+
+    def _is_high(self, landing: Landing) -> bool:
+        """Whether it is high enough above the target to be taken back."""
+        place, motion = landing.target.place, self.flight.vision.history.last_motion
+        return place is not None and motion is not None and float(place[2] - motion.travelled[2]) > BLIND_BELOW
+
+    async def _tell(self, landing: Landing) -> None:
+        """Tell the autopilot where the target is, if that is known."""
+        flight, vision, place = self.flight, self.flight.vision, landing.target.place
+        now = vision.now()
+        motion, attitude = flight.motion(now), vision.history.attitude(now)
+        if motion is None or attitude is None or place is None:
+            return
+        relative = place - motion.travelled
+        landing.offset = float((relative[:2] ** 2).sum() ** 0.5)
+        flight.note(landing, motion)
+        if landing.target.age(now) <= COAST or relative[2] <= BLIND_BELOW:
+            await flight.tell(landing_target(now, relative, attitude))

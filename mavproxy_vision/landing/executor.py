@@ -1,0 +1,340 @@
+"""One landing, search or mission in flight: the verbs of this module, over those of the copter."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Awaitable, Callable, Iterator
+from typing import Any, Protocol
+
+from mavproxy_uavapi.core.errors import Conflict, LinkLost, Rejected, Stale, UavApiError
+from mavproxy_uavapi.core.timeout import wait_with_timeout
+from mavproxy_uavapi.core.vehicle.authority import Rank
+from mavproxy_uavapi.core.vehicle.copter import Copter
+from mavproxy_uavapi.core.vehicle.jobs import Job
+from mavproxy_vision.apriltag.tag_layout import Tag
+from mavproxy_vision.errors import LandingFailed
+from mavproxy_vision.geometry.frames import Vector
+from mavproxy_vision.landing.plan import landable, plan_for, tags_for
+from mavproxy_vision.landing.precision_landing import PrecisionLanding
+from mavproxy_vision.landing.report import Report
+from mavproxy_vision.landing.setpoints import setpoint
+from mavproxy_vision.landing.state_machine import REST, Landing, Order, Phase
+from mavproxy_vision.tracking.pose_history import Motion
+from mavproxy_vision.tracking.stream_rates import FLIGHT
+from mavproxy_vision.tracking.target_filter import Target
+from mavproxy_vision.tracking.tracker import Vision
+
+PERIOD = 0.05  # s of the vehicle's clock between two setpoints
+SHORTEST = 0.03  # s of ours, whatever the camera's rate and the vehicle's clock
+STALE = 0.5  # s of the vehicle's clock without telemetry until it rests
+UNTOLD = 10.0  # s of it until a landing is given up
+BLIND = 5.0  # s without a frame until a landing is given up
+FIRST = 3.0  # s of ours for the first telemetry
+SEARCHES = 1000  # attempts of a search, which its leash and its time limit end
+DID = {"rtl": "returned to launch", "land": "landed in place", "hold": "the vehicle holds"}
+
+
+class DescentMethod(Protocol):
+    """A way down onto the target: `descent.py` has them."""
+
+    @property
+    def by_velocity(self) -> bool:
+        """Whether the landing's own velocities descend."""
+
+    async def prepare(self) -> None:
+        """See whether it can be done, before the vehicle is taken over."""
+
+    async def __call__(self, landing: Landing) -> None:
+        """Land. Raises LandingFailed where it was given up."""
+
+
+class Flight:
+    """A flight that is under way.
+
+    Attributes:
+        autopilot: the mode in which the autopilot flies for us just now (LAND, RTL), None in GUIDED.
+        plnd: the vehicle's precision landing, when this flight has touched it.
+        phase: what it is doing.
+        ended: set when it is over, and has sent its last message.
+
+    Args:
+        vision: the eye.
+        vehicle: what carries it.
+        job: who flies.
+        report: filled in on the way.
+        succeed: awaits the end of the flight of ours that had the vehicle.
+    """
+
+    def __init__(
+        self,
+        vision: Vision,
+        vehicle: Copter,
+        job: Job,
+        report: Report,
+        succeed: Callable[[Flight], Awaitable[None]],
+    ) -> None:
+        self.vision, self.vehicle, self.job, self.report = vision, vehicle, job, report
+        self.plnd: PrecisionLanding | None = None
+        self.phase = "on its way"
+        self.autopilot: str | None = None
+        self.ended = asyncio.Event()
+        self._succeed = succeed
+        self._floor = 0.0  # of the target's ground, m down of the EKF origin: as it was when the flight began
+        self._sent_at = vision.host.clock()
+        # Number of the frame whose way to a setpoint was timed last; what is there before the flight waited for it.
+        self._timed = 0 if vision.seen is None else vision.seen.number
+
+    async def take_over(self) -> None:
+        """Take the vehicle; a flight of ours that had it has ended then. What flies in GUIDED rests.
+
+        To be called when nothing is left that would refuse the flight.
+        """
+        if self.commands:
+            return
+        self.vehicle.authority.take(self.job, Rank.MOVEMENT)
+        self.job.steers = True
+        await self._succeed(self)
+        if self.vehicle.mode == "GUIDED" and self.vehicle.state.armed and not self.vehicle.state.landed:
+            await self.send(REST)  # the setpoint of whoever had it would go on meanwhile
+
+    @property
+    def commands(self) -> bool:
+        """Whether the vehicle is this flight's: no newer command has it."""
+        return self.vehicle.authority.commander is self.job
+
+    # -- verbs ---------------------------------------------------------------------------------------------
+
+    async def land(self, number: int | None, method: str, way_down: Callable[[Flight], DescentMethod]) -> None:
+        """Land on the tag from wherever the vehicle is; done when it stands on it, disarmed.
+
+        A camera that gives no frames is a refusal at first, and a failure like that of a lost tag later.
+
+        Raises:
+            LandingFailed: no tag, or what is seen cannot be believed; the report says what was done instead.
+            ModeChanged, NotArmed, LinkLost: somebody else has the vehicle, or nobody; nothing more was sent.
+        """
+        self.vehicle.require_guided_flight()
+        if self.report.verb == "land":
+            self.vision.require_camera()
+        tags = landable(self.vision.settings, number)
+        descend = way_down(self)
+        await descend.prepare()
+        self.vehicle.require_guided_flight()
+        await self.take_over()
+        with self._watched():
+            await self._look_for(tags)
+            self.report.tag, self.report.method = next(iter(tags)), method
+            with self._lasting(), self.vision.aimed_at(tags, self._floor) as target:
+                plan = plan_for(self.vision.settings, tags, self._here(), descend=descend.by_velocity)
+                await descend(Landing(plan, target))
+            self.report.touchdown_error = self.vision.touchdown_error(self.report.tag)
+
+    async def search(self, number: int | None, leash: float | None) -> None:
+        """Fly an expanding square until the tag is in sight, and stay above where it was seen.
+
+        Raises:
+            LandingFailed: no tag within leash and time limit; the vehicle holds.
+        """
+        self.vehicle.require_guided_flight()
+        self.vision.require_camera()
+        tags = tags_for(self.vision.settings, number)
+        await self.take_over()
+        with self._watched():
+            await self._look_for(tags)
+            self.report.tag = next(iter(tags))
+            settings = self.vision.settings
+            given = {"attempts": SEARCHES, "leash": leash or settings.leash}
+            plan = plan_for(settings, tags, self._here(), descend=False, **given)
+            with self._lasting(), self.vision.aimed_at(tags, self._floor) as target:
+                order = await self.fly(Landing(plan, target))
+                if order.phase is Phase.FAILED:
+                    self.report.action = "hold"  # which the end of the job sees to
+                    raise self._failed(order.reason)
+                self.report.place = self._place_of(target)
+            await self.vehicle.rest(self.job)
+
+    def _place_of(self, target: Target) -> tuple[float, float, float] | None:
+        """The target in m NED from the EKF origin."""
+        motion = self.vision.history.last_motion
+        if target.place is None or motion is None:
+            return None
+        north, east, down = (motion.position + (target.place - motion.travelled)).round(3)
+        return float(north), float(east), float(down)
+
+    # -- what they share -----------------------------------------------------------------------------------
+
+    @contextlib.contextmanager
+    def _watched(self) -> Iterator[None]:
+        with self.vision.carried_by(self.vehicle.state.system), self.vision.rates.at(FLIGHT):
+            yield
+
+    @contextlib.contextmanager
+    def _lasting(self) -> Iterator[None]:
+        began = self.vision.now()
+        try:
+            yield
+        finally:
+            self.report.duration = self.vision.now() - began
+
+    async def _look_for(self, tags: dict[int, Tag]) -> None:
+        """Have the detector look for them, and wait for the first telemetry.
+
+        Raises:
+            Stale: none came.
+        """
+        for number in tags:
+            await self.vision.want(number)
+        vision, deadline = self.vision, self.vision.host.clock() + FIRST
+        while vision.floor is None or vision.history.motion(vision.now()) is None:
+            if vision.host.clock() > deadline:
+                raise Stale(f"vehicle {vision.system} has not told where it is for {FIRST:g} s")
+            await self.pause()
+        self._floor = vision.floor
+        await self.vehicle.limits()  # nothing is to be waited for between the last metre and LAND
+        self.vehicle.held_by("GUIDED")
+
+    def _here(self) -> float | None:
+        motion = self.vision.history.last_motion
+        return None if motion is None else self.height(motion)
+
+    def height(self, motion: Motion) -> float:
+        """Metres above the target's ground."""
+        return self._floor - float(motion.position[2])
+
+    def motion(self, now: float) -> Motion | None:
+        """Where the vehicle is; None when nobody knows."""
+        if now - self.vision.history.newest > STALE:
+            return None
+        return self.vision.history.motion(now)
+
+    async def fly(self, landing: Landing) -> Order:
+        """Send setpoints as the landing wants them until it is to touch down, or has failed."""
+        vision, vehicle = self.vision, self.vehicle
+        blind, untold = Since(), Since()
+        if landing.began is None:
+            landing.begin(vision.now())
+        while True:
+            vehicle.held_by("GUIDED")
+            now = vision.now()
+            motion = self.motion(now)
+            if untold(motion is None, now) > UNTOLD:
+                return landing.fail(f"the vehicle has not told where it is for {UNTOLD:g} s")
+            if motion is None:
+                await self.send(REST)  # nobody knows where it is; should it hear us, it shall rest
+            else:
+                state = vision.health.state
+                if blind(state not in ("ok", "starting"), now) > BLIND and landing.phase is not Phase.LAST_METRE:
+                    landing.fail(f"the camera: {state}")
+                order = landing.step(now, motion, self.height(motion))
+                self.note(landing, motion)
+                if order.phase in (Phase.LAND, Phase.FAILED):
+                    return order
+                await self.send(order.velocity)
+                self._time_latency()
+            await self.pause()
+
+    def _time_latency(self) -> None:
+        """Note how long the newest frame took from its arrival to the first setpoint that knows it."""
+        seen = self.vision.seen
+        if seen is not None and seen.number != self._timed:
+            self._timed = seen.number
+            self.vision.latencies.append(self.vision.host.clock() - seen.received_at)
+
+    async def pause(self) -> None:
+        """Until the next setpoint is due, or a frame was looked at.
+
+        Raises:
+            LinkLost: the vehicle's heartbeats stopped.
+        """
+        clock = self.vision.host.clock
+        seconds = max(PERIOD / max(self.vehicle.state.time_ratio.ratio, 0.1), SHORTEST)
+        with contextlib.suppress(asyncio.TimeoutError):
+            await wait_with_timeout(seconds, self.vision.changed.wait())
+        await asyncio.sleep(max(self._sent_at + SHORTEST - clock(), 0.0))
+        if not self.vision.host.link_watch.is_alive(self.vehicle.state):
+            raise LinkLost.since(self.vehicle.state.system, clock() - self.vehicle.state.heartbeat_at)
+
+    def note(self, landing: Landing, motion: Motion) -> None:
+        """Write down how far it is."""
+        report = self.report
+        report.attempts, report.last_offset = landing.attempt, landing.offset
+        report.phases = dict(landing.phases)
+        self.phase = "landing by LANDING_TARGET" if self.autopilot else landing.phase.value
+        self.job.progress = {"altitude": round(self.height(motion), 2), "attempt": float(landing.attempt)}
+        if landing.offset is not None:
+            self.job.progress["offset"] = round(landing.offset, 3)
+
+    async def send(self, velocity: Vector) -> None:
+        """Send a velocity (m/s NED) to a vehicle that is still in GUIDED.
+
+        Raises:
+            Superseded, Paused, ModeChanged, NotArmed: somebody else has it; nothing is sent.
+        """
+        attitude = self.vision.history.attitude(self.vision.now())
+        self._sent_at = self.vision.host.clock()
+        await self.vehicle.send_setpoint(self.job, setpoint(velocity, None if attitude is None else attitude.yaw))
+
+    async def tell(self, message: Any) -> None:
+        """Send the vehicle a message; `pause` sees to it that they do not come too often.
+
+        Raises:
+            Superseded, Paused: somebody else commands it; nothing is sent.
+        """
+        self.vehicle.authority.require(self.job)
+        self._sent_at = self.vision.host.clock()
+        await self.vehicle.link.send(message, self.vehicle.state.system)
+
+    async def fly_by(self, mode: str, verb: Callable[[Job], Awaitable[None]]) -> None:
+        """Let the autopilot fly in a mode of its own, until that is done."""
+        self.autopilot = mode
+        await verb(self.job)
+        self.autopilot = None
+
+    # -- when it fails -------------------------------------------------------------------------------------
+
+    def _failed(self, reason: str) -> LandingFailed:
+        self.report.reason = reason
+        done = f"; {DID[self.report.action]}" if self.report.action else ""
+        return LandingFailed(f"{reason}{done}", self.report.told)
+
+    async def give_up(self, landing: Landing, reason: str) -> None:
+        """What the settings say for a landing that failed, then the error."""
+        action = self.vision.settings.on_failure
+        if landing.refused and self.report.verb == "land":
+            action = "hold"  # nothing was wrong with where it is
+        self.report.action = action
+        await self.send(REST)
+        if self.plnd is not None:
+            try:
+                await self.plnd.switch_off()  # it would act in RTL too
+            except Rejected as error:
+                reason = f"{reason} ({error})"
+        self.vehicle.held_by("GUIDED")
+        try:
+            if action == "rtl":
+                await self.fly_by("RTL", self.vehicle.rtl)
+            elif action == "land":
+                await self.fly_by("LAND", self.vehicle.land)
+        except (Conflict, LinkLost):
+            raise
+        except UavApiError as error:  # refused, or it takes very long: then it goes on
+            self.autopilot, reason = None, f"{reason} ({error})"
+            if self.vehicle.mode == "GUIDED":
+                self.report.action = "hold"  # which the end of the job sees to
+        raise self._failed(reason)
+
+
+class Since:
+    """How long something has been so without a break."""
+
+    def __init__(self) -> None:
+        self._since: float | None = None
+
+    def __call__(self, so: bool, now: float) -> float:
+        """Seconds for which it has been so, at `now` (s)."""
+        if not so:
+            self._since = None
+        elif self._since is None:
+            self._since = now
+        return 0.0 if self._since is None else now - self._since

@@ -1,0 +1,290 @@
+"""The flights of this module as jobs: begun at the prompt or by HTTP, one at a time."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import Awaitable, Callable, Coroutine
+from pathlib import Path
+from typing import Any
+
+import cv2
+
+from mavproxy_uavapi.core.errors import Aborted, NotSupported, UavApiError
+from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
+from mavproxy_uavapi.core.vehicle.copter import Copter
+from mavproxy_uavapi.core.vehicle.endings import FIXED
+from mavproxy_uavapi.core.vehicle.jobs import CONSOLE, Ending, Job
+from mavproxy_vision.landing import mission
+from mavproxy_vision.landing.descent import Descent, PrecisionDescent
+from mavproxy_vision.landing.executor import Flight
+from mavproxy_vision.landing.flight_log import Track
+from mavproxy_vision.landing.mission import Errand
+from mavproxy_vision.landing.precision_landing import PrecisionLanding
+from mavproxy_vision.landing.report import Report
+from mavproxy_vision.tracking.tracker import Vision
+
+TIDY_EVERY = 1.0  # s between two tries to give parameters back
+TIDY_TRIES = 10
+log = logging.getLogger("vision")
+
+
+class Sortie:
+    """A flight that is asked for: the body of a job, and what it tells of itself.
+
+    Args:
+        flights: to which it belongs.
+        copter: what flies.
+        name: the verb, for the report.
+        fly: flies it.
+    """
+
+    def __init__(self, flights: Flights, copter: Copter, name: str, fly: Callable[[Flight], Awaitable[None]]) -> None:
+        self._flights, self._copter, self._fly = flights, copter, fly
+        self.report = Report(name)
+        self.begun = False
+
+    async def __call__(self, job: Job) -> None:
+        """Fly it, as that job."""
+        self.begun = True
+        flights = self._flights
+        flight = Flight(flights.vision, self._copter, job, self.report, flights.succeed)
+        flights.begun(flight)
+        try:
+            await self._fly(flight)
+        except UavApiError as error:
+            self.report.reason = str(error)
+            raise
+        finally:
+            flights.over(flight)
+
+    def result(self) -> str:
+        """One line about the flight, which ended well."""
+        return self.report.line()
+
+
+class ErrandSortie(Sortie):
+    """A whole mission, with its track.
+
+    Args:
+        flights: to which it belongs.
+        copter: what flies.
+        errand: where to.
+    """
+
+    def __init__(self, flights: Flights, copter: Copter, errand: Errand) -> None:
+        way_down = flights.way_down(errand.method)
+        super().__init__(flights, copter, "mission", lambda flight: mission.fly(flight, errand, way_down))
+        self._errand, self._track = errand, Track()
+
+    async def __call__(self, job: Job) -> None:
+        """Fly it, and write down its track when it is over."""
+        listeners = self._flights.vision.host.listeners
+        listeners.append(self._follow)
+        try:
+            await super().__call__(job)
+        finally:
+            listeners.remove(self._follow)
+            home = self._copter.state.messages.get("HOME_POSITION")
+            if home is not None:
+                where = home.message.latitude / 1e7, home.message.longitude / 1e7
+                self._track.target = self._errand.place(where)
+            await self._flights.keep(self._track, self.report)
+
+    def _follow(self, state: VehicleState, message: Any, _now: float) -> None:
+        if state is self._copter.state and message.get_type() == "GLOBAL_POSITION_INT":
+            self._track.add(message)
+
+
+class Flights:
+    """What is in flight, and what the last flight told. All methods belong to the asyncio thread.
+
+    Attributes:
+        report: of the flight under way, or the last one.
+
+    Args:
+        vision: the eye.
+        directory: where tracks and plots go.
+    """
+
+    def __init__(self, vision: Vision, directory: Callable[[], Path]) -> None:
+        self.vision = vision
+        self.report: Report | None = None
+        self._directory = directory
+        self._flight: Flight | None = None
+        self._begun: set[Flight] = set()  # that are not over, those too that have no vehicle yet
+        self._unfinished: set[Flight] = set()  # of these, those that took over
+        self._plnd: dict[int, PrecisionLanding] = {}
+        self._tidying: set[PrecisionLanding] = set()
+        self._tasks: set[asyncio.Task[None]] = set()
+        vision.host.last_words.append(self.last_words)
+
+    def copter(self) -> Copter:
+        """MAVProxy's current vehicle. Raises NoVehicle, LinkLost, NotSupported."""
+        return copter_of(self.vision.host.registry.commandable())
+
+    # -- flights, to be run as jobs --------------------------------------------------------------------------
+
+    def landing(self, copter: Copter, number: int | None, method: str) -> Sortie:
+        """Land on a tag from here."""
+        way_down = self.way_down(method)
+        return Sortie(self, copter, "land", lambda flight: flight.land(number, method, way_down))
+
+    def searching(self, copter: Copter, number: int | None, leash: float | None) -> Sortie:
+        """Find a tag from here."""
+        return Sortie(self, copter, "search", lambda flight: flight.search(number, leash))
+
+    def errand(self, copter: Copter, errand: Errand) -> Sortie:
+        """A whole mission, with its track."""
+        return ErrandSortie(self, copter, errand)
+
+    def way_down(self, method: str) -> Callable[[Flight], Descent]:
+        """What descends by that method."""
+        if method != "landing_target":
+            return Descent
+
+        def by_plnd(flight: Flight) -> Descent:
+            vehicle = flight.vehicle
+            plnd = self._plnd.get(vehicle.state.system)
+            if plnd is None or plnd.vehicle is not vehicle:
+                plnd = self._plnd[vehicle.state.system] = PrecisionLanding(vehicle)
+            return PrecisionDescent(flight, plnd)
+
+        return by_plnd
+
+    def begun(self, flight: Flight) -> None:
+        """It is being prepared; the vehicle is somebody else's still."""
+        self._begun.add(flight)
+
+    async def succeed(self, flight: Flight) -> None:
+        """Make it the flight under way, and await the end of those before."""
+        before = self._unfinished - {flight}
+        self._flight, self.report = flight, flight.report
+        self._unfinished.add(flight)
+        for one in before:
+            if one.job.running:  # of another vehicle; of this one it is superseded already
+                one.job.abort(Aborted(f"{flight.job.verb} took over"))
+            await one.ended.wait()
+
+    def over(self, flight: Flight) -> None:
+        """It has sent its last message."""
+        self._begun.discard(flight)
+        self._unfinished.discard(flight)
+        if self._flight is flight:
+            self._flight = None
+        flight.ended.set()
+        plnd = flight.plnd
+        if plnd is not None and not any(one.plnd is plnd for one in self._unfinished):
+            plnd.in_use = False
+            if plnd.before and plnd not in self._tidying:
+                self._do(self._tidy(plnd))
+
+    async def keep(self, track: Track, report: Report) -> None:
+        """Write track and plot; what cannot be written is said in the report."""
+        loop = asyncio.get_running_loop()
+        try:
+            base = self._directory().absolute() / time.strftime("vision_mission_%Y%m%d_%H%M%S")
+            await loop.run_in_executor(None, track.write, base.with_suffix(".csv"))
+            report.track = str(base.with_suffix(".csv"))
+            await loop.run_in_executor(None, track.plot, base.with_suffix(".png"))
+            report.plot = str(base.with_suffix(".png"))
+        except OSError as error:
+            report.track = f"not written: {error.strerror}"
+        except (RuntimeError, ValueError, cv2.error) as error:  # a `~user` that is none, a null in a name, no encoder
+            report.track = f"not written: {error}"
+
+    @property
+    def running(self) -> bool:
+        """Whether a flight is under way."""
+        return self._flight is not None and self._flight.job.running
+
+    @property
+    def phase(self) -> str:
+        """What it is doing."""
+        return self._flight.phase if self._flight is not None else "over"
+
+    # -- parameters that are still to be given back ----------------------------------------------------------
+
+    def _do(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
+        """Run it beside what else there is, held until it is done: the loop itself holds no task."""
+        self._tasks.add(task := asyncio.get_running_loop().create_task(work))
+        task.add_done_callback(self._tasks.discard)
+        return task
+
+    async def _tidy(self, plnd: PrecisionLanding) -> None:
+        """Give parameters back as soon as the vehicle hears us, and no flight needs them."""
+        self._tidying.add(plnd)
+        tries = 0
+        while plnd.before and tries < TIDY_TRIES:
+            if not plnd.in_use and self.vision.host.link_watch.is_alive(plnd.vehicle.state):
+                try:
+                    await plnd.give_back()
+                except UavApiError as error:
+                    tries += 1
+                    if tries == TIDY_TRIES:
+                        log.warning("vision: %s", error)
+            await asyncio.sleep(TIDY_EVERY)
+        self._tidying.discard(plnd)
+
+    # -- from the prompt, and at the end ---------------------------------------------------------------------
+
+    def begin(
+        self, copter: Copter, sortie: Sortie, path: str, request: dict[str, Any], tell: Callable[[str], None]
+    ) -> Job:
+        """Start a flight that nobody awaits over the network; `tell` is called with one line at its end."""
+
+        async def body(job: Job) -> str:
+            await sortie(job)
+            return sortie.result()
+
+        jobs = self.vision.host.jobs
+        job = jobs.begin(copter, path, request, body, client=CONSOLE, outlives_client=True)
+        self._do(self._tell_end(job, tell))
+        return job
+
+    async def _tell_end(self, job: Job, tell: Callable[[str], None]) -> None:
+        try:
+            tell(await job.outcome())
+        except UavApiError as error:
+            tell(str(error))
+
+    def stop(self, reason: str) -> str | None:
+        """End all flights; a vehicle that is ours is told to hold. What was done; None without a flight."""
+        return self._end(reason, Ending.ABORTED)
+
+    def abandon(self) -> None:
+        """End all flights, because the module is unloaded."""
+        self._end("vision was unloaded", Ending.UNLOADED)
+
+    def _end(self, reason: str, ending: Ending) -> str | None:
+        """End those in flight and those that are being prepared; what was done with the former goes first."""
+        told = None
+        for flight in sorted(self._begun, key=lambda one: one is not self._flight):
+            if flight.job.running:
+                error = _ended(self.vision, flight, reason, ending)
+                told = told or str(error)
+                flight.job.abort(error, ending)
+        return told
+
+    def last_words(self) -> list[tuple[Any, int]]:
+        """The parameters that are still to be given back, as messages, and the systems that they go to."""
+        return [(message, plnd.vehicle.state.system) for plnd in self._plnd.values() for message in plnd.remaining()]
+
+
+def _ended(vision: Vision, flight: Flight, reason: str, ending: Ending) -> Aborted:
+    vehicle = flight.vehicle
+    holds = flight.commands and vision.host.endings.what_follows(vehicle, FIXED[ending], flight.job.modes)
+    left = "the vehicle is told to hold" if holds else f"the vehicle is left alone: it is in {vehicle.mode}"
+    return Aborted(f"{reason}; {left}")
+
+
+def copter_of(vehicle: Any) -> Copter:
+    """The vehicle, which must be a copter.
+
+    Raises:
+        NotSupported: it is another type.
+    """
+    if not isinstance(vehicle, Copter):
+        raise NotSupported(f"a {vehicle.kind} cannot land on a tag")
+    return vehicle

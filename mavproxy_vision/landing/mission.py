@@ -1,0 +1,83 @@
+"""The whole mission: take off, fly to a place, land there, on the tag or without one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from mavproxy_uavapi.core.errors import Invalid
+from mavproxy_uavapi.core.vehicle.geodesy import METRES_PER_DEGREE
+from mavproxy_uavapi.core.vehicle.messages import GlobalTarget
+from mavproxy_vision.landing.descent import Descent
+from mavproxy_vision.landing.executor import Flight
+from mavproxy_vision.landing.plan import landable
+
+
+@dataclass(frozen=True)
+class Errand:
+    """Where to go.
+
+    Attributes:
+        alt: m above home.
+        north, east: m from home; None with lat and lon.
+        lat, lon: degrees; None with north and east.
+        tag: id to land on; None for the settings' main tag.
+        on_tag: whether to land on a tag at all.
+        method: how to land on it.
+    """
+
+    alt: float = 5.0
+    north: float | None = None
+    east: float | None = None
+    lat: float | None = None
+    lon: float | None = None
+    tag: int | None = None
+    on_tag: bool = True
+    method: str = "velocity"
+
+    def place(self, home: tuple[float, float]) -> tuple[float, float]:
+        """Latitude and longitude (degrees), for a home there.
+
+        Raises:
+            Invalid: neither metres nor degrees are given.
+        """
+        if self.lat is not None and self.lon is not None:
+            return self.lat, self.lon
+        if self.north is None or self.east is None:
+            raise Invalid("a mission needs north and east, or lat and long", "body")
+        lat, lon = home
+        there = lon + self.east / (METRES_PER_DEGREE * math.cos(math.radians(lat)))
+        return lat + self.north / METRES_PER_DEGREE, (there + 180.0) % 360.0 - 180.0
+
+
+async def fly(flight: Flight, errand: Errand, way_down: Callable[[Flight], Descent]) -> None:
+    """Arm, take off, fly there, land; done when disarmed there.
+
+    A vehicle that flies already in GUIDED goes there from where it is.
+
+    Raises:
+        LandingFailed: not landed on the tag; the settings' `on_failure` was done.
+        UavApiError: as the copter's verbs.
+    """
+    vehicle, job = flight.vehicle, flight.job
+    grounded = not vehicle.state.armed or vehicle.state.landed is not False
+    if errand.on_tag:
+        flight.vision.require_camera()
+        landable(flight.vision.settings, errand.tag)
+        await way_down(flight).prepare()
+    if not grounded:
+        vehicle.require_guided_flight()
+    await flight.take_over()
+    if grounded:
+        await vehicle.arm(job)
+        await vehicle.takeoff(job, errand.alt)
+    home = await vehicle.home()
+    lat, lon = errand.place((home.latitude / 1e7, home.longitude / 1e7))
+    vehicle.held_by("GUIDED")
+    await vehicle.go_to(job, GlobalTarget(lat, lon, errand.alt), wait=True)
+    vehicle.held_by("GUIDED")
+    if errand.on_tag:
+        await flight.land(errand.tag, errand.method, way_down)
+    else:
+        await flight.fly_by("LAND", vehicle.land)

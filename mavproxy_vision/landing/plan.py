@@ -1,0 +1,88 @@
+"""What the settings make of a target: the tags that tell where it is, and the plan of a landing on it. Pure."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from mavproxy_uavapi.core.errors import Invalid
+from mavproxy_vision.apriltag.tag_layout import FAMILIES, Tag
+from mavproxy_vision.landing.expanding_square import step_for
+from mavproxy_vision.landing.state_machine import Plan
+from mavproxy_vision.settings import Settings
+
+FINAL = 1.3  # of the height at which the tag fills the view
+LOWEST_FINAL = 0.4  # m
+HIGHEST_CLIP = 1.5  # m from which a tag would be landed on without being seen
+DEPENDABLE = 0.85  # of the detection range
+
+
+def tags_for(settings: Settings, number: int | None) -> dict[int, Tag]:
+    """The tags that tell where the target is, the main one first; None is that of the settings.
+
+    Raises:
+        Invalid: the family has no such id.
+    """
+    tags = settings.tag_list
+    if number is None or number == tags[0].id:
+        return {tag.id: tag for tag in tags}
+    if number >= FAMILIES[settings.families[0]][1]:
+        raise Invalid(f"{settings.families[0]} has no id {number}", "body", "id")
+    size = next((tag.size for tag in tags if tag.id == number), tags[0].size)
+    return {number: Tag(number, size)}
+
+
+def landable(settings: Settings, number: int | None) -> dict[int, Tag]:
+    """As `tags_for`, of tags that can be seen from low enough to land on.
+
+    Raises:
+        Invalid: the family has no such id, or the smallest of them fills the view too high up.
+    """
+    tags = tags_for(settings, number)
+    clip = clip_height(settings, tags)
+    if clip > HIGHEST_CLIP:
+        smallest = min(tags.values(), key=lambda tag: tag.size)
+        raise Invalid(
+            f"tag {smallest.id} of {smallest.size:g} m is not in view below {clip:.1f} m: it takes a smaller one "
+            "beside it (`tags`), or a lens that is nearer to the middle (`offset`)",
+            "body",
+            "id",
+        )
+    return tags
+
+
+def clip_height(settings: Settings, tags: dict[int, Tag]) -> float:
+    """Metres above the target below which the smallest tag does not fit into the view."""
+    forward, right, down = settings.camera_mount.offset
+    smallest = min(tag.size for tag in tags.values())
+    return settings.model.clip_height(smallest, math.hypot(forward, right)) + down
+
+
+def plan_for(settings: Settings, tags: dict[int, Tag], here: float | None, *, descend: bool, **changes: Any) -> Plan:
+    """The plan of a landing, or of a search.
+
+    Args:
+        settings: the snapshot in force.
+        tags: what tells where the target is.
+        here: m above the target's ground; None while unknown.
+        descend: whether it descends once the tag is found.
+        changes: members of the plan that are not as the settings have them.
+    """
+    model, cells = settings.model, FAMILIES[settings.families[0]][0]
+    largest = max(tag.size for tag in tags.values())
+    reach = DEPENDABLE * model.detection_range(largest, cells)
+    clip = clip_height(settings, tags)
+    known = {
+        "attempts": settings.attempts,
+        "tolerance": settings.tolerance,
+        "final": max(FINAL * clip, LOWEST_FINAL),
+        "clip": clip,
+        "speed": settings.speed,
+        "descent": settings.descent,
+        "step": step_for(model.footprint(min(max(reach if here is None else here, 1.0), reach)), largest),
+        "leash": settings.leash,
+        "ceiling": reach,
+        "time_limit": settings.time_limit,
+        "descend": descend,
+    }
+    return Plan(**{**known, **changes})

@@ -1,0 +1,181 @@
+"""ArduPilot's own precision landing: its parameters, lent and given back, and LANDING_TARGET."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import math
+from typing import Any
+
+from pymavlink import mavutil
+
+from mavproxy_uavapi.core.errors import NotSupported, Rejected, TimedOut
+from mavproxy_uavapi.core.vehicle.messages import read_parameter, set_parameter
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+from mavproxy_vision.geometry.frames import Attitude, Vector
+
+mavlink = mavutil.mavlink
+
+READ_BACK = 2.0  # s
+TRIES = 3
+AT_BOOT = "PLND_TYPE"
+ENABLE = "PLND_ENABLED"
+DOWNWARDS = 25.0  # MAV_SENSOR_ROTATION_PITCH_270
+# We take it back to GUIDED and search when the target is lost: no retries of its own. Should nobody be there to take
+# it back, strict 1 holds for a while, then lands; 2 would hover until the battery is empty.
+# With ALT_MIN and ALT_MAX other than 0 and no rangefinder ArduPilot just descends when the target is lost.
+# Alignment, orientation and offset of the sensor are in what we tell: it is the vehicle's frame already.
+WANTED = {
+    AT_BOOT: 1.0,
+    "PLND_STRICT": 1.0,
+    "PLND_RET_MAX": 0.0,
+    "PLND_ALT_MIN": 0.0,
+    "PLND_ALT_MAX": 0.0,
+    "PLND_YAW_ALIGN": 0.0,
+    "PLND_ORIENT": DOWNWARDS,
+    "PLND_CAM_POS_X": 0.0,
+    "PLND_CAM_POS_Y": 0.0,
+    "PLND_CAM_POS_Z": 0.0,
+    ENABLE: 1.0,
+}
+
+
+class PrecisionLanding:
+    """PLND on one vehicle: what it was set to before our landings, until it is that again.
+
+    Attributes:
+        vehicle: whose it is.
+        before: the values that are not given back yet, by name.
+        in_use: whether a landing needs it: nothing is given back then.
+    """
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        self.vehicle = vehicle
+        self.before: dict[str, float] = {}
+        self.in_use = False
+        self._lock = asyncio.Lock()
+
+    async def check(self) -> None:
+        """See whether the autopilot can do it, before anything is flown.
+
+        Raises:
+            NotSupported: the autopilot has no precision landing.
+            Rejected: the type was another one at boot.
+        """
+        if not mavutil.mavlink20():
+            raise NotSupported("LANDING_TARGET has a position in MAVLink 2 only: start MAVProxy without --mav10")
+        told = await self.vehicle.parameters.read((name,) for name in WANTED)
+        if ENABLE not in told:
+            raise NotSupported("the autopilot has no precision landing (no PLND_ENABLED)")
+        if told.get(AT_BOOT, WANTED[AT_BOOT]) != WANTED[AT_BOOT]:
+            await self._set(AT_BOOT, WANTED[AT_BOOT])
+            raise Rejected("PLND_TYPE is 1 now, but the autopilot reads it at boot: reboot it, then try again")
+
+    async def set_up(self) -> None:
+        """Set the parameters and read them back.
+
+        Raises:
+            Rejected: a parameter did not take its value.
+        """
+        self.in_use = True
+        async with self._lock:
+            told = await self.vehicle.parameters.read((name,) for name in WANTED)
+            for name, value in WANTED.items():
+                if name not in told or (told[name] == value and name not in self.before):
+                    continue
+                self.before.setdefault(name, told[name])  # of a landing cut short it is still the first value
+                await self._set(name, value)
+
+    async def switch_off(self) -> None:
+        """Give the switch back, without which the others mean nothing: LAND and RTL heed no target then.
+
+        Raises:
+            Rejected: it did not take its value.
+        """
+        async with self._lock:
+            await self._give_back(ENABLE)
+
+    async def give_back(self) -> None:
+        """Give every parameter the value that it had, the switch first, unless a landing begins that needs them.
+
+        What somebody has set to another value meanwhile stays as it is.
+
+        Raises:
+            Rejected: some did not take it; the others were given back all the same.
+        """
+        refused = []
+        async with self._lock:
+            for name in self._in_order():
+                try:
+                    if not self.in_use:
+                        await self._give_back(name)
+                except Rejected:
+                    refused.append(f"{name} = {self.before[name]:g}")
+        if refused:
+            raise Rejected(f"the autopilot does not take {', '.join(refused)}, which it had before the landing")
+
+    def _in_order(self) -> list[str]:
+        return sorted(self.before, key=lambda name: name != ENABLE)
+
+    async def _give_back(self, name: str) -> None:
+        if name in self.before and await self._told(name) == WANTED[name]:
+            await self._set(name, self.before[name])
+        self.before.pop(name, None)
+
+    def remaining(self) -> list[Any]:
+        """The PARAM_SETs that give everything back, for when nobody can wait."""
+        return [set_parameter(self.vehicle.address, name, self.before[name]) for name in self._in_order()]
+
+    async def _told(self, name: str) -> float:
+        """The parameter's value now, asked for: somebody may have set it while nobody heard the vehicle."""
+        message = await self._asked(name, read_parameter(self.vehicle.address, name), None)
+        if message is None:
+            raise Rejected(f"the autopilot does not tell {name}")
+        return float(message.param_value)
+
+    async def _set(self, name: str, value: float) -> None:
+        if await self._asked(name, set_parameter(self.vehicle.address, name, value), value) is None:
+            raise Rejected(f"the autopilot does not take {name} = {value:g}")
+
+    async def _asked(self, name: str, request: Any, value: float | None) -> Any:
+        """The PARAM_VALUE that answers a request, sent up to TRIES times; with `value` only one that tells that."""
+        vehicle = self.vehicle
+
+        def answer(message: Any) -> Any:
+            same = value is None or math.isclose(message.param_value, value, rel_tol=1e-5, abs_tol=1e-5)
+            return message if message.param_id == name and same else None
+
+        for _ in range(TRIES):
+            with vehicle.waiting.expecting({"PARAM_VALUE"}, answer) as told:
+                await vehicle.link.send(request, vehicle.state.system)
+                with contextlib.suppress(TimedOut):
+                    return await told.within(READ_BACK, f"answer for {name}")
+        return None
+
+
+def landing_target(time: float, relative: Vector, attitude: Attitude) -> Any:
+    """LANDING_TARGET in MAV_FRAME_BODY_FRD.
+
+    Args:
+        time: s, for the message's time stamp.
+        relative: from the vehicle to the target, m NED.
+        attitude: of the vehicle when the message is sent.
+    """
+    x, y, z = (float(part) for part in attitude.matrix.T @ relative)
+    distance = math.sqrt(x * x + y * y + z * z)
+    return mavlink.MAVLink_landing_target_message(
+        int(time * 1e6),
+        0,
+        mavlink.MAV_FRAME_BODY_FRD,
+        math.atan2(y, z) if z else 0.0,  # as ArduPilot reads them where it does not read the position:
+        math.atan2(-x, z) if z else 0.0,  # forward is -tan(angle_y), right is tan(angle_x)
+        max(distance, 0.01),
+        0.0,
+        0.0,
+        x,
+        y,
+        z,
+        (1.0, 0.0, 0.0, 0.0),
+        mavlink.LANDING_TARGET_TYPE_VISION_FIDUCIAL,
+        1,
+    )

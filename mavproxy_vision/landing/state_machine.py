@@ -1,0 +1,339 @@
+"""The landing as a state machine: time, motion and target in, velocity and phase out. Pure.
+
+    LOOK -> DESCEND -> LAST_METRE -> (done: land)
+      ^       | lost for 0.5 s, above BLIND_BELOW: HOLD -> 2 s: CLIMB -> LOOK -> SEARCH -> … -> (failed)
+      |       | lost below BLIND_BELOW: LAST_METRE all the same
+
+The last metre is flown by where the tag was and how the vehicle has moved since, because the autopilot's LAND holds a
+position that wanders with its GPS.
+
+An attempt is a time of looking: in place, then along one more ring of the expanding square each.
+Times are on the vehicle's clock (s), velocities m/s NED, places m NED in the frame of `Motion.travelled`.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from mavproxy_vision.geometry.frames import Vector, limited, vector
+from mavproxy_vision.landing.expanding_square import Waypoint, expanding_square
+from mavproxy_vision.tracking.pose_history import Motion
+from mavproxy_vision.tracking.target_filter import Target
+
+COAST = 0.5  # s without a sighting that change nothing
+HOLD = 2.0  # s without a sighting until it climbs
+BLIND_BELOW = 1.0  # m: a tag that is lost lower than that is landed on all the same
+CLIMB = 1.5  # m above the last fix
+GAIN = 0.9  # 1/s: velocity for each m of offset
+INTEGRAL = 0.15  # 1/s/s
+INTEGRAL_LIMIT = 0.25  # m/s
+VERTICAL_GAIN = 0.8  # 1/s
+CONE = ((3.0, math.radians(20)), (1.0, math.radians(10)))  # height (m) and half angle: wide high up, narrow low
+SLOWDOWN = (0.20, 0.45)  # descent rate: m/s, and 1/s of the height
+SLOWEST = 0.15  # m/s of descent
+LAST_DESCENT = 0.35  # m/s on the last metre
+LAST_GAIN = 1.3  # 1/s: no camera's latency is in what is flown by there
+LAST_SPEED = 0.4  # m/s, horizontally there
+TOUCH = 0.2  # m above the target from which the autopilot's LAND is left alone
+LATE = 1.0  # s longer than the last metre should take: it stands already, on legs that are higher than that
+NEAR = 0.4  # m from a waypoint that count as there
+STEP_TIME = 0.2  # s between two steps at most that are reckoned with
+
+
+class Phase(enum.Enum):
+    """What the landing is doing."""
+
+    LOOK = "looking"
+    DESCEND = "descending"
+    HOLD = "holding: tag lost"
+    CLIMB = "climbing to the last fix"
+    SEARCH = "searching"
+    LAST_METRE = "descending the last metre"
+    LAND = "touching down"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What it may do.
+
+    Attributes:
+        attempts: times of looking.
+        look: s of each in place.
+        tolerance: m from the target within which it may begin the last metre.
+        final: m above the target at which the last metre begins.
+        clip: m above the target below which the tag does not fit into the view.
+        speed: m/s, horizontally.
+        descent: m/s, at most.
+        climb: m/s, at most.
+        acceleration: m/s/s, at most.
+        step: m between two tracks of the search.
+        leash: m from where the search began.
+        ceiling: m above the target's ground that the search does not exceed.
+        time_limit: s for all.
+        descend: whether to descend; a search ends when the tag is found.
+    """
+
+    attempts: int = 5
+    look: float = 2.0
+    tolerance: float = 0.12
+    final: float = 0.6
+    clip: float = 0.4
+    speed: float = 1.5
+    descent: float = 1.0
+    climb: float = 1.0
+    acceleration: float = 1.5
+    step: float = 2.0
+    leash: float = 15.0
+    ceiling: float = 8.0
+    time_limit: float = 180.0
+    descend: bool = True
+
+
+@dataclass(frozen=True)
+class Order:
+    """What to do now: the phase, a velocity (m/s NED), and why it failed, if it did."""
+
+    phase: Phase
+    velocity: Vector
+    reason: str = ""
+
+
+REST = vector(0.0, 0.0, 0.0)
+
+
+class Landing:
+    """One landing, or one search."""
+
+    def __init__(self, plan: Plan, target: Target) -> None:
+        self.plan, self.target = plan, target
+        self.phase = Phase.LOOK
+        self.attempt = 0
+        self.refused = False  # failed because what is seen makes no sense
+        self.offset: float | None = None  # m, horizontally, at the last sighting
+        self.began: float | None = None
+        self.phases: dict[str, float] = {}  # s that each phase took
+        self._since = 0.0
+        self._last_step: float | None = None
+        self._velocity = REST
+        self._integral = np.zeros(2)
+        self._anchor: Vector = REST  # where it holds, climbs to, or searches from
+        self._height = 0.0  # m above the ground that it holds there
+        self._corners: Iterator[Waypoint] = iter(())
+        self._corner: Waypoint | None = None
+        self._down_by = math.inf  # when the last metre should be over
+        self._reason = ""
+
+    def step(self, now: float, motion: Motion, height: float) -> Order:
+        """One step.
+
+        Args:
+            now: vehicle time, s.
+            motion: of the vehicle now.
+            height: above the target's ground by its own estimate, m.
+        """
+        if self.began is None:
+            self.begin(now)
+        if self._last_step is None:
+            self._start_from(now, motion, height)
+        assert self._last_step is not None
+        elapsed = min(max(now - self._last_step, 0.0), STEP_TIME)
+        self._last_step = now
+        self.phases[self.phase.value] = self.phases.get(self.phase.value, 0.0) + elapsed
+        failure = self._failure(now)
+        if failure:
+            return self.fail(failure)
+        wanted = self._wanted(now, motion, height, elapsed)
+        if self.phase in (Phase.LAND, Phase.FAILED):
+            self._velocity = REST
+            return Order(self.phase, REST, self._reason)
+        change = limited((wanted - self._velocity)[:2], self.plan.acceleration * elapsed)
+        self._velocity = vector(self._velocity[0] + change[0], self._velocity[1] + change[1], wanted[2])
+        return Order(self.phase, self._velocity)
+
+    def begin(self, now: float) -> None:
+        """Its time begins to run."""
+        self.began = now
+
+    def _start_from(self, now: float, motion: Motion, height: float) -> None:
+        self._last_step = now
+        self.attempt = 1
+        self._velocity = motion.velocity.copy()
+        self._stay(now, Phase.LOOK, motion.travelled, min(height, self.plan.ceiling))
+        self._corners = expanding_square(self.plan.step, self.plan.leash)
+
+    def _stay(self, now: float, phase: Phase, anchor: Vector, height: float) -> None:
+        self.phase, self._since = phase, now
+        self._anchor, self._height = anchor.copy(), height
+        self._integral[:] = 0.0
+
+    def resume(self, now: float, motion: Motion, height: float) -> None:
+        """The tag was lost while the autopilot landed: hold, climb, look again."""
+        self._last_step = now
+        self._velocity = motion.velocity.copy()
+        self._stay(now, Phase.HOLD, motion.travelled, height)
+
+    def fail(self, reason: str) -> Order:
+        """End it for that reason."""
+        if self.phase is not Phase.FAILED:
+            self.phase, self._reason, self._velocity = Phase.FAILED, reason, REST
+        return Order(Phase.FAILED, REST, self._reason)
+
+    def _failure(self, now: float) -> str | None:
+        assert self.began is not None
+        if self.phase is Phase.FAILED:
+            return self._reason
+        if self.phase is Phase.LAST_METRE:
+            return None
+        self.refused = self.target.ambiguous >= 5 or self.target.contradiction is not None
+        if self.target.ambiguous >= 5:
+            return "two tags of the same id are in view: it is not clear on which to land"
+        if self.target.contradiction:
+            return self.target.contradiction
+        return self.overdue(now)
+
+    def overdue(self, now: float) -> str | None:
+        """Why it has to end, when its time is over."""
+        if self.began is None or now - self.began <= self.plan.time_limit:
+            return None
+        return f"not landed within {self.plan.time_limit:.0f} s"
+
+    # -- the phases ----------------------------------------------------------------------------------------
+
+    def _wanted(self, now: float, motion: Motion, height: float, elapsed: float) -> Vector:
+        target = self.target
+        visible = target.found and target.age(now) <= COAST
+        if visible and self.phase in (Phase.LOOK, Phase.HOLD, Phase.CLIMB, Phase.SEARCH):
+            return self._found(now, motion, height, elapsed)
+        if self.phase is Phase.DESCEND:
+            return self._descend(now, motion, height, elapsed)
+        if self.phase is Phase.LAST_METRE:
+            return self._touch_down(now, motion, height)
+        stepping = {Phase.HOLD: self._hold, Phase.CLIMB: self._climb, Phase.SEARCH: self._search}.get(self.phase)
+        if stepping is not None:
+            return stepping(now, motion, height)
+        if self.phase is Phase.LOOK and now - self._since > self.plan.look:
+            self._look_farther(now)
+        return self._towards(self._anchor, motion, height)
+
+    def _found(self, now: float, motion: Motion, height: float, elapsed: float) -> Vector:
+        """The tag is in sight."""
+        if not self.plan.descend:
+            self.phase = Phase.LAND
+            return REST
+        lost = self.phase is Phase.CLIMB  # on the way down, and seen again from higher up
+        if lost and not self._next_attempt("the tag was lost again on the way down"):
+            return REST
+        self.phase, self._since = Phase.DESCEND, now
+        return self._descend(now, motion, height, elapsed)
+
+    def _descend(self, now: float, motion: Motion, height: float, elapsed: float) -> Vector:
+        place = self.target.place
+        assert place is not None
+        offset = (place - motion.travelled)[:2]
+        above = float(place[2] - motion.travelled[2])
+        distance = float(np.linalg.norm(offset))
+        if self.target.age(now) > COAST:
+            if above < BLIND_BELOW:
+                return self._go_down(now, motion, height)
+            self._stay(now, Phase.HOLD, motion.travelled, height)
+            return REST
+        self.offset = distance
+        if above <= self.plan.final and distance <= self.plan.tolerance:
+            return self._go_down(now, motion, height)
+        if distance < 1.0:
+            self._integral = limited(self._integral + INTEGRAL * offset * elapsed, INTEGRAL_LIMIT)
+        sideways = limited(GAIN * offset + self._integral, self.plan.speed)
+        return vector(sideways[0], sideways[1], self._descent(distance, above))
+
+    def _go_down(self, now: float, motion: Motion, height: float) -> Vector:
+        place = self.target.place
+        assert place is not None
+        above = float(place[2] - motion.travelled[2])
+        self.phase, self._since = Phase.LAST_METRE, now
+        self._down_by = now + max(above - TOUCH, 0.0) / LAST_DESCENT + LATE
+        self.target.is_final = True
+        return self._touch_down(now, motion, height)
+
+    def _touch_down(self, now: float, motion: Motion, height: float) -> Vector:
+        place = self.target.place
+        assert place is not None
+        relative = place - motion.travelled
+        if relative[2] > max(BLIND_BELOW, self.plan.clip) and self.target.age(now) > COAST:
+            self.target.is_final = False
+            self._stay(now, Phase.HOLD, motion.travelled, height)
+            return REST
+        if relative[2] <= TOUCH or now >= self._down_by:
+            self.phase = Phase.LAND
+            return REST
+        sideways = limited(LAST_GAIN * relative[:2] + self._integral, LAST_SPEED)
+        return vector(sideways[0], sideways[1], LAST_DESCENT)
+
+    def _descent(self, distance: float, above: float) -> float:
+        if above <= self.plan.final:
+            return 0.0 if above > 0.7 * self.plan.final else -0.2  # centre first
+        room = 1.0 - distance / max(above * math.tan(cone(above)), self.plan.tolerance)
+        rate = min(self.plan.descent, SLOWDOWN[0] + SLOWDOWN[1] * (above - self.plan.final))
+        return max(rate * room, 0.0) if room < SLOWEST else max(rate * room, SLOWEST)
+
+    def _hold(self, now: float, motion: Motion, height: float) -> Vector:
+        if self.target.age(now) > HOLD:
+            last = self.target.last
+            assert last is not None
+            place = self.target.place if self.target.place is not None else last.place
+            top = min(max(last.height, height) + CLIMB, max(self.plan.ceiling, height))
+            self._stay(now, Phase.CLIMB, place, top)
+        return self._towards(self._anchor, motion, height)
+
+    def _climb(self, now: float, motion: Motion, height: float) -> Vector:
+        near = float(np.linalg.norm((self._anchor - motion.travelled)[:2])) < NEAR
+        if (near and abs(self._height - height) < NEAR) or now - self._since > 20.0:
+            self._corners = expanding_square(self.plan.step, self.plan.leash)
+            self._stay(now, Phase.LOOK, self._anchor, self._height)
+            self._next_attempt()
+        return self._towards(self._anchor, motion, height)
+
+    def _next_attempt(self, why: str = "no tag in sight") -> bool:
+        """Begin another attempt; false when there is none left, and the landing has failed."""
+        if self.attempt >= self.plan.attempts:
+            times = f"{self.attempt} attempt{'' if self.attempt == 1 else 's'}"
+            self.fail(f"{why} after {times}")
+            return False
+        self.attempt += 1
+        return True
+
+    def _look_farther(self, now: float) -> None:
+        """Nothing in sight from here: along the next leg of the search."""
+        corner = next(self._corners, None)
+        if corner is None:
+            self.fail(f"no tag in sight within {self.plan.leash:g} m")
+            return
+        if self._corner is None or corner.ring != self._corner.ring or self.phase is Phase.LOOK:
+            self._next_attempt()
+        if self.phase is not Phase.FAILED:
+            self.phase, self._since, self._corner = Phase.SEARCH, now, corner
+
+    def _search(self, now: float, motion: Motion, height: float) -> Vector:
+        assert self._corner is not None
+        there = self._anchor + vector(self._corner.north, self._corner.east, 0.0)
+        if np.linalg.norm((there - motion.travelled)[:2]) < NEAR or now - self._since > 60.0:
+            self._look_farther(now)
+        return self._towards(there, motion, height)
+
+    def _towards(self, place: Vector, motion: Motion, height: float) -> Vector:
+        """To above `place`, at the height that is held."""
+        sideways = limited(GAIN * (place - motion.travelled)[:2], self.plan.speed)
+        up = VERTICAL_GAIN * (self._height - height)
+        return vector(sideways[0], sideways[1], -min(max(up, -self.plan.descent), self.plan.climb))
+
+
+def cone(height: float) -> float:
+    """Half angle (rad) around the vertical within which it may descend, `height` m above the target."""
+    (high, wide), (low, narrow) = CONE
+    share = min(max((height - low) / (high - low), 0.0), 1.0)
+    return narrow + share * (wide - narrow)

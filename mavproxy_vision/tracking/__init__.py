@@ -1,0 +1,1 @@
+"""From frames and telemetry to where the target lies."""

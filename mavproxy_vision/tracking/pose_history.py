@@ -1,0 +1,204 @@
+"""Where the vehicle was when a frame's light fell. Pure: all times are arguments.
+
+Two clocks: the host's (monotonic s, frames are stamped by it) and the vehicle's (s since its boot, telemetry is
+stamped by it). A simulated vehicle's clock may run faster than ours.
+"""
+
+from __future__ import annotations
+
+import bisect
+import math
+from collections import deque
+from dataclasses import dataclass
+
+from mavproxy_vision.geometry.frames import Attitude, Vector, vector, wrap
+
+KEPT = 12.0  # s of the vehicle's clock
+BEYOND = 0.3  # s that the newest telemetry is carried on by its rates
+GAP = 0.6  # s between two messages within which nobody knows what the vehicle did
+SILENCE = 2.0  # s between them from which on two velocities tell less of the way than two positions
+CLOCK_WINDOW = 1.5  # s of the faster clock over which the least delayed message sets the clocks' offset
+REBOOT = 3.0  # s that a clock may step back without a reboot
+AFTER = 0.05  # s of the vehicle's clock, at least, that an unstamped message may be younger than a stamped one
+STOPPED = 0.5  # s of ours without a stamped message until it tells nothing
+
+
+class VehicleClock:
+    """Host time to vehicle time, by the messages that were least delayed on their way."""
+
+    def __init__(self) -> None:
+        self.ratio = 1.0
+        self._pairs: deque[tuple[float, float]] = deque()  # (host, vehicle)
+        self._best: tuple[float, float] | None = None
+
+    @property
+    def known(self) -> bool:
+        """Whether a message was heard."""
+        return self._best is not None
+
+    def hear(self, host: float, vehicle: float, ratio: float) -> None:
+        """A message stamped `vehicle` arrived at `host`; vehicle seconds per host second are `ratio`."""
+        self.ratio = ratio
+        self._pairs.append((host, vehicle))
+        while host - self._pairs[0][0] > CLOCK_WINDOW / max(ratio, 1.0):
+            self._pairs.popleft()
+        self._best = max(self._pairs, key=lambda pair: pair[1] - ratio * pair[0])
+
+    def vehicle(self, host: float) -> float:
+        """The vehicle's time at the host's time `host`; 0 before any message."""
+        if self._best is None:
+            return 0.0
+        return self._best[1] + self.ratio * (host - self._best[0])
+
+    def host(self, vehicle: float) -> float:
+        """The host's time at the vehicle's time `vehicle`; infinite before any message."""
+        if self._best is None:
+            return math.inf
+        return self._best[0] + (vehicle - self._best[1]) / max(self.ratio, 0.01)
+
+
+class Unstamped:
+    """When a message without a time was sent, by a stamped one that comes regularly.
+
+    A busy machine hears many at once: what was heard before a message tells when it was sent, while it comes at all.
+    """
+
+    def __init__(self) -> None:
+        self._vehicle = self._gap = 0.0
+        self._host = -math.inf
+
+    def hear(self, host: float, vehicle: float) -> None:
+        """A message stamped `vehicle` arrived at `host`."""
+        self._gap, self._vehicle, self._host = vehicle - self._vehicle, vehicle, host
+
+    def sent(self, host: float, clock: VehicleClock) -> float:
+        """Host time at which a message was sent that arrived at `host`."""
+        if host - self._host > STOPPED:
+            return host
+        return min(host, clock.host(self._vehicle + max(1.25 * self._gap, AFTER)))
+
+
+@dataclass(frozen=True)
+class Motion:
+    """The vehicle at one moment.
+
+    Attributes:
+        at: vehicle time, s.
+        position: m NED from the EKF origin.
+        velocity: m/s NED.
+        travelled: m NED, the velocity integrated: what relative measurements are referred to, because it does
+            not jump when the estimator's position does.
+    """
+
+    at: float
+    position: Vector
+    velocity: Vector
+    travelled: Vector
+
+    def later(self, seconds: float) -> Motion:
+        """The same, moving on at the same velocity."""
+        moved = self.velocity * seconds
+        return Motion(self.at + seconds, self.position + moved, self.velocity, self.travelled + moved)
+
+
+class History:
+    """The last seconds of attitude and motion. One thread adds, any may ask."""
+
+    def __init__(self) -> None:
+        self._attitudes: list[tuple[float, Attitude, tuple[float, float, float]]] = []
+        self._motions: list[Motion] = []
+
+    def add_attitude(self, at: float, attitude: Attitude, rates: tuple[float, float, float]) -> None:
+        """Take ATTITUDE: vehicle time (s), rad, rad/s."""
+        if self._attitudes and at <= self._attitudes[-1][0]:
+            if at > self._attitudes[-1][0] - REBOOT:
+                return
+            self._attitudes = []
+        self._attitudes.append((at, attitude, rates))
+        if at - self._attitudes[0][0] > 2 * KEPT:  # a new list: another thread may be reading the old one
+            self._attitudes = self._attitudes[len(self._attitudes) // 2 :]
+
+    def add_motion(self, at: float, position: Vector, velocity: Vector) -> None:
+        """Take LOCAL_POSITION_NED: vehicle time (s), m, m/s."""
+        if self._motions and at <= self._motions[-1].at:
+            if at > self._motions[-1].at - REBOOT:
+                return
+            self._motions = []
+        travelled = vector(0.0, 0.0, 0.0)
+        if self._motions:
+            last = self._motions[-1]
+            travelled = last.travelled + _moved_between(last, at, position, velocity)
+        self._motions.append(Motion(at, position, velocity, travelled))
+        if at - self._motions[0].at > 2 * KEPT:
+            self._motions = self._motions[len(self._motions) // 2 :]
+
+    @property
+    def newest(self) -> float:
+        """Vehicle time up to which both are known; -inf before."""
+        if not self._attitudes or not self._motions:
+            return -math.inf
+        return min(self._attitudes[-1][0], self._motions[-1].at)
+
+    def attitude(self, at: float) -> Attitude | None:
+        """The attitude at vehicle time `at` (s); None when it is not known."""
+        attitudes = self._attitudes
+        times = [entry[0] for entry in attitudes]
+        index = bisect.bisect_right(times, at)
+        if index == 0:
+            return None
+        time, attitude, rates = attitudes[index - 1]
+        if index == len(times):
+            after = at - time
+            if after > BEYOND:
+                return None
+            return _moved(attitude, [rate * after for rate in rates])
+        if times[index] - time > GAP:
+            return None
+        following, share = attitudes[index][1], (at - time) / (times[index] - time)
+        turn = (following.roll - attitude.roll, following.pitch - attitude.pitch, wrap(following.yaw - attitude.yaw))
+        return _moved(attitude, [share * angle for angle in turn])
+
+    def motion(self, at: float) -> Motion | None:
+        """Position and velocity at vehicle time `at` (s); None when they are not known."""
+        motions = self._motions
+        times = [motion.at for motion in motions]
+        index = bisect.bisect_right(times, at)
+        if index == 0:
+            return None
+        before = motions[index - 1]
+        if index == len(times):
+            return before.later(at - before.at) if at - before.at <= BEYOND else None
+        after = motions[index]
+        if after.at - before.at > GAP:
+            return None
+        share = (at - before.at) / (after.at - before.at)
+        return Motion(
+            at,
+            before.position + (after.position - before.position) * share,
+            before.velocity + (after.velocity - before.velocity) * share,
+            before.travelled + (after.travelled - before.travelled) * share,
+        )
+
+    @property
+    def last_motion(self) -> Motion | None:
+        """The newest motion, however old."""
+        return self._motions[-1] if self._motions else None
+
+
+def _moved_between(last: Motion, at: float, position: Vector, velocity: Vector) -> Vector:
+    """The way (m NED) from one message to the next, by the velocities.
+
+    After a gap the height is taken from the positions, whose wander is less than what a descent may have done; after
+    a longer silence all of it is.
+    """
+    seconds = at - last.at
+    moved = (last.velocity + velocity) * (seconds / 2)
+    if seconds > SILENCE:
+        return position - last.position
+    if seconds > GAP:
+        moved[2] = position[2] - last.position[2]
+    return moved
+
+
+def _moved(attitude: Attitude, by: list[float]) -> Attitude:
+    return Attitude(attitude.roll + by[0], attitude.pitch + by[1], wrap(attitude.yaw + by[2]))

@@ -1,0 +1,358 @@
+"""Everything of the module that lives in the asyncio thread: the camera's outcomes, and the vehicle's history."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import math
+import os
+from collections import deque
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import cv2
+
+from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+from mavproxy_vision.apriltag.detection import Seen
+from mavproxy_vision.apriltag.detector import Detector, Options
+from mavproxy_vision.apriltag.tag_layout import Tag
+from mavproxy_vision.camera.gstreamer import Pipeline
+from mavproxy_vision.camera.opencv_capture import Capture
+from mavproxy_vision.camera.renderer import Renderer
+from mavproxy_vision.camera.simulated import SimulatedCamera, parse_placed
+from mavproxy_vision.camera.source import Folder, Image, Posted, Source
+from mavproxy_vision.errors import NoCamera
+from mavproxy_vision.geometry.frames import Attitude, vector
+from mavproxy_vision.settings import Settings
+from mavproxy_vision.tracking.capture_worker import Health, Worker
+from mavproxy_vision.tracking.ground_truth import Pose, Truth
+from mavproxy_vision.tracking.measurement import Fixer, Wanted
+from mavproxy_vision.tracking.pose_history import History, Unstamped, VehicleClock
+from mavproxy_vision.tracking.stream_rates import TRUTH, Rates
+from mavproxy_vision.tracking.target_filter import Target
+
+FRESH = 1.0  # s; older sightings are not shown as what is in view
+SOON = 0.06  # s of the vehicle's clock that telemetry is carried on to a frame; one farther ahead waits for it
+
+
+class Vision:
+    """The eye. All methods belong to the asyncio thread, but for `deliver`.
+
+    Attributes:
+        settings: the snapshot in force.
+        history: where the vehicle was; its times are on `clock`.
+        truth: where a simulated vehicle truly is.
+        seen, image: the newest outcome, and its frame.
+        target: what is being landed on; None between landings.
+        changed: set and replaced with each outcome.
+
+    Args:
+        host: what our modules share.
+        settings: the first snapshot.
+    """
+
+    def __init__(self, host: Host, settings: Settings) -> None:
+        self.host, self.settings = host, settings
+        self.history, self.clock, self.truth = History(), VehicleClock(), Truth()
+        self.rates = Rates(host.clock)
+        self._unstamped = Unstamped()  # SIM_STATE has no time of its own; ATTITUDE tells it
+        self.worker: Worker | None = None
+        self.seen: Seen | None = None
+        self.image: Image | None = None
+        self.target: Target | None = None
+        self.changed = asyncio.Event()
+        self.latencies: deque[float] = deque(maxlen=1000)  # s from a frame's arrival to the setpoint that knows it
+        self._fixer: Fixer | None = None
+        self._carrier = 0  # the vehicle that a flight carries it on; 0 for MAVProxy's current one
+        self._unplaced: deque[Seen] = deque(maxlen=50)  # newer than the telemetry that tells where they were taken
+        self._system = 0
+        self._home_down: float | None = None
+        self._watching: asyncio.Task[None] | None = None
+        self._truth_needed = contextlib.ExitStack()
+        self._extra: set[int] = set()  # ids that `tags` does not name, but a flight
+        self._changing = asyncio.Lock()
+
+    # -- life ----------------------------------------------------------------------------------------------
+
+    def listen(self) -> None:
+        """Follow the vehicle's telemetry."""
+        self.host.listeners.append(self._hear)
+        self._watching = asyncio.get_running_loop().create_task(self.rates.run(self.vehicle))
+
+    async def start(self, settings: Settings) -> None:
+        """Look through the camera that the settings name; what was running ends.
+
+        Raises:
+            BadSetting: they make no sense together.
+            NoCamera: they name no camera.
+        """
+        async with self._changing:
+            await self._close_camera()
+            self.settings = settings
+            if not settings.source:
+                raise NoCamera("no camera is set: `vision set source camera:0`, sim, http, a path or a URL")
+            loop = asyncio.get_running_loop()
+            self.worker = await loop.run_in_executor(None, self._make_worker, settings)
+            self.worker.start()
+            if settings.source == "sim":
+                self._truth_needed.enter_context(self.rates.at(TRUTH))
+
+    async def stop(self) -> None:
+        """Close the camera."""
+        async with self._changing:
+            await self._close_camera()
+
+    async def _close_camera(self) -> None:
+        self._truth_needed.close()
+        worker, self.worker = self.worker, None
+        self.seen = self.image = None
+        if worker is not None:
+            await asyncio.get_running_loop().run_in_executor(None, worker.stop)
+
+    async def close(self) -> None:
+        """Give back everything."""
+        if self._hear in self.host.listeners:
+            self.host.listeners.remove(self._hear)
+        if self._watching is not None:
+            self._watching.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await self._watching
+        await self.stop()
+
+    def _make_worker(self, settings: Settings) -> Worker:
+        cv2.setNumThreads(settings.threads)
+        detector = Detector(settings.model, self.options(settings))
+        source = make_source(settings, self._where, self.host.clock)
+        worker = Worker(source, detector, lambda seen, image: self.deliver(worker, seen, image), self.host.clock)
+        return worker
+
+    def options(self, settings: Settings) -> Options:
+        """How the detector is to look."""
+        tags = settings.tag_list
+        sizes = dict.fromkeys(self._extra, tags[0].size) | {tag.id: tag.size for tag in tags}
+        return Options(settings.families, sizes, settings.any_id, settings.far)
+
+    async def want(self, number: int) -> None:
+        """Look for that id too; it has the main tag's size unless `tags` says otherwise."""
+        settings = self.settings
+        if number in self._extra or any(tag.id == number for tag in settings.tag_list):
+            return
+        self._extra.add(number)
+        if self.worker is not None:
+            loop = asyncio.get_running_loop()
+            self.worker.detector = await loop.run_in_executor(None, Detector, settings.model, self.options(settings))
+
+    # -- what comes in -------------------------------------------------------------------------------------
+
+    def deliver(self, worker: Worker, seen: Seen, image: Image) -> None:
+        """An outcome. The worker's thread."""
+
+        def arrive() -> None:
+            if worker is self.worker:  # else it comes late, from a camera that was closed
+                self.take(seen, image)
+
+        self.host.bridge.call_soon(arrive)
+
+    def take(self, seen: Seen, image: Image) -> None:
+        """An outcome."""
+        self.seen, self.image = seen, image
+        if self.target is not None:
+            self._unplaced.append(seen)
+            self._place()
+        self.changed.set()
+        self.changed = asyncio.Event()
+
+    def _place(self) -> None:
+        """Tell the target what was seen, as far as telemetry says where that was."""
+        while self._unplaced and self.target is not None and self._fixer is not None:
+            if self.clock.vehicle(self._unplaced[0].captured_at) > self.history.newest + SOON:
+                return
+            fixes = self._fixer.fixes(self._unplaced.popleft(), self.history, self.clock)
+            self.target.take(fixes)
+
+    def _hear(self, state: VehicleState, message: Any, now: float) -> None:
+        name = message.get_type()
+        if name not in HEARD or message.get_srcComponent() != state.component or not self._is_ours(state):
+            return
+        if not all(math.isfinite(getattr(message, field)) for field in HEARD[name]):
+            return  # it would be in every setpoint from now on
+        if name == "SIM_STATE":
+            self._hear_truth(state, message, now)
+            return
+        at = message.time_boot_ms / 1000.0
+        if name == "GLOBAL_POSITION_INT":
+            motion = self.history.motion(at)
+            if motion is not None:
+                self._home_down = float(motion.position[2]) + message.relative_alt / 1000.0
+            return
+        self.clock.hear(now, at, state.time_ratio.ratio)
+        if name == "ATTITUDE":
+            self._unstamped.hear(now, at)
+            attitude = Attitude(message.roll, message.pitch, message.yaw)
+            self.history.add_attitude(at, attitude, (message.rollspeed, message.pitchspeed, message.yawspeed))
+        else:
+            position, velocity = vector(message.x, message.y, message.z), vector(message.vx, message.vy, message.vz)
+            self.history.add_motion(at, position, velocity)
+        self._place()
+
+    @property
+    def system(self) -> int:
+        """The system id of the vehicle that carries the camera; 0 while there is none."""
+        return self.host.registry.resolve(self._carrier)
+
+    @contextlib.contextmanager
+    def carried_by(self, system: int) -> Iterator[None]:
+        """Look from that vehicle for as long as the context lasts, whichever MAVProxy's current one is."""
+        self._carrier = system
+        self._follow_carrier()
+        try:
+            yield
+        finally:
+            self._carrier = 0
+
+    def _follow_carrier(self) -> None:
+        if self.system != self._system:  # another vehicle: what was known is of no use
+            self._system = self.system
+            self.history, self.clock, self.truth = History(), VehicleClock(), Truth()
+            self._unstamped, self._home_down = Unstamped(), None
+
+    def _is_ours(self, state: VehicleState) -> bool:
+        self._follow_carrier()
+        return state.system == self._system
+
+    def _hear_truth(self, state: VehicleState, message: Any, now: float) -> None:
+        lat, lon = message.lat_int / 1e7, message.lon_int / 1e7
+        attitude = Attitude(message.roll, message.pitch, message.yaw)
+        at = self._unstamped.sent(now, self.clock)
+        pose = Pose(at, lat, lon, message.alt, (message.vn, message.ve, message.vd), attitude)
+        height = (state.field("GLOBAL_POSITION_INT", "relative_alt") or 0) / 1000.0
+        self.truth.add(pose, state.armed, height)
+
+    def _where(self, time: float) -> Any:
+        """Position and attitude for the simulated camera at host time `time`. The worker's thread."""
+        pose = self.truth.at(time)
+        newest = self.truth.newest
+        if pose is not None or (newest is not None and time - newest.at < FRESH):
+            return pose
+        at = self.clock.vehicle(time)  # not a simulation that tells the truth: its own word has to do
+        attitude, motion = self.history.attitude(at), self.history.motion(at)
+        if attitude is None or motion is None:
+            return None
+        return motion.position - vector(0.0, 0.0, self._home_down or 0.0), attitude
+
+    # -- what is asked of it -------------------------------------------------------------------------------
+
+    def vehicle(self) -> Vehicle:
+        """The vehicle that carries the camera, with a link that is alive."""
+        return self.host.registry.commandable(self._carrier)
+
+    @property
+    def health(self) -> Health:
+        """How the camera does."""
+        return self.worker.health if self.worker is not None else Health("closed")
+
+    def require_camera(self) -> None:
+        """Raises NoCamera unless frames come."""
+        if self.worker is None:
+            raise NoCamera("no camera runs: `vision set source …`, `vision start`")
+        health = self.health
+        if health.state not in ("ok", "starting"):
+            raise NoCamera(f"the camera: {health.state}{f' ({health.error})' if health.error else ''}")
+
+    @contextlib.contextmanager
+    def aimed_at(self, tags: dict[int, Tag], floor: float) -> Iterator[Target]:
+        """Keep track of a target, for as long as the context lasts.
+
+        Args:
+            tags: what tells where it is, by id.
+            floor: of its ground, m down of the EKF origin.
+        """
+        settings = self.settings
+        self._fixer = Fixer(settings.model, settings.camera_mount, Wanted(settings.families[0], tags, floor))
+        self.target = Target()
+        self._unplaced.clear()
+        try:
+            yield self.target
+        finally:
+            self.target = self._fixer = None
+
+    def now(self) -> float:
+        """The vehicle's time."""
+        return self.clock.vehicle(self.host.clock())
+
+    @property
+    def floor(self) -> float | None:
+        """The target's ground, m down of the EKF origin, by the home and the `ground` of now; None while unknown."""
+        return None if self._home_down is None else self._home_down - self.settings.ground
+
+    def touchdown_error(self, tag: int) -> float | None:
+        """Metres from the simulated vehicle to the simulated tag; None where nobody knows the truth."""
+        if self.settings.source != "sim" or self.truth.newest is None:
+            return None
+        if self.host.clock() - self.truth.newest.at > FRESH:
+            return None
+        placed = parse_placed(self.settings.sim_tags, self.settings.families[0])
+        errors = [self.truth.distance_to(one.north, one.east) for one in placed if one.id == tag]
+        return min((error for error in errors if error is not None), default=None)
+
+    @property
+    def fresh_seen(self) -> Seen | None:
+        """The newest outcome, if it shows what is in view now."""
+        if self.seen is None or self.host.clock() - self.seen.captured_at > FRESH:
+            return None
+        return self.seen
+
+
+HEARD: dict[str, tuple[str, ...]] = {  # with the fields that a faulty estimator may make no numbers of
+    "ATTITUDE": ("roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed"),
+    "LOCAL_POSITION_NED": ("x", "y", "z", "vx", "vy", "vz"),
+    "GLOBAL_POSITION_INT": (),
+    "SIM_STATE": ("roll", "pitch", "yaw", "alt", "vn", "ve", "vd"),
+}
+
+
+def make_source(settings: Settings, where: Any, clock: Callable[[], float]) -> Source:
+    """The source that the settings name.
+
+    Raises:
+        BadSetting: one of its settings makes no sense.
+    """
+    spec, latency = settings.source, settings.latency / 1000
+    if spec == "sim":
+        tags = parse_placed(settings.sim_tags, settings.families[0])
+        renderer = Renderer(settings.model, settings.camera_mount, tags, settings.look)
+        return SimulatedCamera(renderer, where, settings.timing, clock)
+    if spec == "http":
+        return Posted(latency, clock)
+    path = os.path.expanduser(spec)
+    if os.path.isdir(path):  # pathlib's raises on a long pipeline
+        return Folder(Path(path), latency, settings.fps, clock)
+    size = (settings.model.width, settings.model.height)
+    is_file = os.path.isfile(path)
+    if "!" in spec and not is_file:
+        return Pipeline(spec, latency, size, clock)
+    return Capture(path if is_file else spec, latency, size, settings.fps, clock)
+
+
+def in_view(seen: Seen | None) -> list[dict[str, Any]]:
+    """The tags of an outcome, as they are told to people."""
+    return [] if seen is None else [_told(seen, sighting) for sighting in seen.sightings]
+
+
+def _told(seen: Seen, sighting: Any) -> dict[str, Any]:
+    known = sighting.position is not None
+    return {
+        "id": sighting.id,
+        "family": sighting.family,
+        "hamming": sighting.hamming,
+        "corners": [[round(float(value), 2) for value in corner] for corner in sighting.corners],
+        "size": sighting.size or None,
+        "position": [round(float(value), 3) for value in sighting.position] if known else None,
+        "distance": round(sighting.distance, 3) if known else None,
+        "rotation": [[round(float(v), 4) for v in row] for row in sighting.rotation] if known else None,
+        "reprojection_error": round(sighting.error, 3) if known else None,
+        "latency_s": round(seen.latency, 3),
+    }

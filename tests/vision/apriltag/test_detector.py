@@ -1,0 +1,176 @@
+"""What is seen in rendered frames, where everything is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mavproxy_vision.apriltag.corner_refinement import refine
+from mavproxy_vision.apriltag.detector import Detector, Options, lit, locate
+from mavproxy_vision.apriltag.families import family, marker_image
+from mavproxy_vision.apriltag.template_alignment import Pattern, align
+from mavproxy_vision.camera.renderer import Look, PlacedTag, Renderer
+from mavproxy_vision.geometry.camera_model import CameraModel
+from mavproxy_vision.geometry.frames import Attitude, Mount, vector
+
+MODEL = CameraModel()
+SIZE = 0.166
+LEVEL, PLAIN = Attitude(), Look()
+
+
+def frame(height=3.0, north=0.0, east=0.0, attitude=LEVEL, tags=None, look=PLAIN, model=MODEL, seed=1):
+    tags = (PlacedTag("36h11", 0, SIZE, north, east),) if tags is None else tags
+    return Renderer(model, Mount(), tags, look, seed).render(vector(0, 0, -height), attitude)
+
+
+@pytest.mark.parametrize("name", ["36h11", "25h9", "16h5", "36h10"])
+def test_each_family_is_found_where_it_lies(name):
+    image = frame(tags=(PlacedTag(name, 3, SIZE, 0.4, -0.3, 20),))
+    (seen,) = Detector(MODEL, Options((name,), {3: SIZE})).detect(image)
+    assert (seen.family, seen.id, seen.hamming) == (name, 3, 0)
+    assert seen.position == pytest.approx([-0.3, -0.4, 3.0], abs=0.03)
+    assert seen.error < 0.3
+
+
+@pytest.mark.parametrize("height", [0.6, 1.5, 3.0, 5.0])
+def test_range_is_right(height):
+    detector = Detector(MODEL, Options(("25h9",), {0: SIZE}))
+    found = [detector.detect(frame(height, tags=(PlacedTag("25h9", 0, SIZE, 0, 0),), seed=seed)) for seed in range(5)]
+    ranges = [seen.distance for sightings in found for seen in sightings]
+    assert len(ranges) == 5
+    assert np.mean(ranges) == pytest.approx(height, abs=0.05)
+
+
+def test_refined_corners_are_where_the_tag_is():
+    image = frame(3.0, look=Look(noise=0, blur=0.7))
+    half = SIZE / 2 / 3.0 * MODEL.fx
+    true = np.array([[-half, -half], [half, -half], [half, half], [-half, half]]) + (MODEL.cx, MODEL.cy)
+    corners = refine(image, true + np.array([[1, -0.8], [-1, 0.7], [0.9, 0.9], [-0.6, -1]]))
+    assert corners == pytest.approx(true, abs=0.1)
+
+
+def test_corners_that_cannot_be_refined_stay():
+    rough = np.array([[100.0, 100], [140, 100], [140, 140], [100, 140]])
+    assert (refine(np.full((480, 640), 90, np.uint8), rough) == rough).all()
+
+
+def test_only_wanted_ids_are_seen_unless_all_are():
+    image = frame(tags=(PlacedTag("36h11", 5, SIZE, 0, 0),))
+    assert Detector(MODEL, Options(sizes={0: SIZE})).detect(image) == ()
+    (seen,) = Detector(MODEL, Options(sizes={0: SIZE}, any_id=True)).detect(image)
+    assert (seen.id, seen.position) == (5, None)
+
+
+def test_several_families_at_once():
+    image = frame(tags=(PlacedTag("36h11", 0, SIZE, 0, -0.3), PlacedTag("16h5", 0, SIZE, 0, 0.3)))
+    seen = Detector(MODEL, Options(("36h11", "16h5"), {0: SIZE})).detect(image)
+    assert {(one.family, one.id) for one in seen} == {("36h11", 0), ("16h5", 0)}
+
+
+@pytest.mark.parametrize("name", ["36h11", "25h9", "16h5", "36h10"])
+def test_no_ghosts_on_bare_ground(name):
+    renderer = Renderer(MODEL, Mount(), (), Look(), 4)
+    detector = Detector(MODEL, Options((name,), {0: SIZE, 1: SIZE}))
+    random = np.random.default_rng(2)
+    for _ in range(15):
+        place = vector(*random.uniform(-40, 40, 2), -random.uniform(1, 12))
+        assert detector.detect(renderer.render(place, Attitude(*random.uniform(-0.3, 0.3, 2), 1.0))) == ()
+
+
+def test_distortion_is_undone():
+    model = CameraModel(distortion=(-0.25, 0.08, 0.001, -0.001, 0.0))
+    image = frame(2.0, 0.5, 0.6, model=model, look=Look(noise=2))
+    (seen,) = Detector(model, Options(sizes={0: SIZE})).detect(image)
+    assert seen.position == pytest.approx([0.6, -0.5, 2.0], abs=0.02)
+
+
+def test_another_frame_size_is_the_same_lens():
+    half = MODEL.scaled_to(320, 240)
+    (seen,) = Detector(MODEL, Options(sizes={0: SIZE})).detect(frame(2.0, 0.2, 0.1, model=half))
+    assert seen.position == pytest.approx([0.1, -0.2, 2.0], abs=0.03)
+
+
+def test_the_far_setting_sees_farther():
+    tags = (PlacedTag("25h9", 0, SIZE, 0, 0),)
+    images = [frame(7.0, tags=tags, seed=seed, attitude=Attitude(yaw=0.3 * seed)) for seed in range(8)]
+    far = Detector(MODEL, Options(("25h9",), {0: SIZE}, far=True))
+    assert sum(bool(far.detect(image)) for image in images) >= 7
+
+
+@pytest.mark.parametrize("apart", [0.22, 0.5])
+def test_each_tag_is_told_once_however_often_it_is_looked_for(apart):
+    tags = (PlacedTag("36h11", 0, SIZE, 0, 0), PlacedTag("36h11", 0, SIZE, 0, apart))
+    for height in (1.5, 4.0):
+        seen = Detector(MODEL, Options(sizes={0: SIZE}, far=True)).detect(frame(height, tags=tags))
+        assert sorted(one.position[0] for one in seen) == pytest.approx([0, apart], abs=0.02)
+
+
+@pytest.mark.parametrize("exposure", [0.3, 0.15, 0.1])
+@pytest.mark.parametrize("far", [False, True])
+def test_a_dim_picture_is_seen_through(exposure, far):
+    detector = Detector(MODEL, Options(sizes={0: SIZE}, far=far))
+    for height in (0.8, 2.0, 4.0):
+        (seen,) = detector.detect(frame(height, look=Look(exposure=exposure, noise=1.5)))
+        assert seen.distance == pytest.approx(height, rel=0.02)
+
+
+def test_a_picture_that_is_bright_enough_is_left_as_it_is():
+    image = frame()
+    assert lit(image) is image
+    dark = np.zeros((480, 640), np.uint8)
+    assert not lit(dark).any()
+
+
+def test_a_picture_that_is_read_wrong_tells_how_many_bits():
+    picture = marker_image("36h11", 0, 16)
+    picture[3 * 16 : 4 * 16, 3 * 16 : 4 * 16] = 255 - picture[3 * 16 : 4 * 16, 3 * 16 : 4 * 16]
+    canvas = np.full((480, 640), 255, np.uint8)
+    canvas[100 : 100 + picture.shape[0], 100 : 100 + picture.shape[1]] = picture
+    (seen,) = Detector(MODEL, Options(sizes={0: SIZE})).detect(canvas)
+    assert seen.hamming == 1
+
+
+@pytest.mark.parametrize(("name", "bits"), [("36h11", 5), ("25h9", 4), ("16h5", 2), ("36h10", 4)])
+def test_as_many_bits_are_corrected_as_the_family_allows(name, bits):
+    assert family(name).dictionary.maxCorrectionBits == bits
+    assert family(name, [0, 1]).dictionary.maxCorrectionBits == bits
+
+
+def test_a_family_keeps_its_numbers():
+    cut = family("36h11", [7, 3, 9999])
+    assert cut.ids == (3, 7)
+    assert (cut.bits(1) == family("36h11").bits(7)).all()
+
+
+def test_a_square_is_located():
+    half = SIZE / 2 / 2.0 * MODEL.fx
+    corners = np.array([[-half, -half], [half, -half], [half, half], [-half, half]]) + (MODEL.cx, MODEL.cy)
+    position, _, error = locate(MODEL, corners, SIZE)
+    assert position == pytest.approx([0, 0, 2.0], abs=1e-6)
+    assert error < 1e-3
+
+
+@pytest.mark.parametrize("blur", [0.4, 0.7, 1.0])
+def test_the_range_of_a_small_tag_is_right_however_sharp_the_lens_is(blur):
+    def off(refine: bool) -> float:
+        detector = Detector(MODEL, Options(sizes={0: SIZE}, far=True, refine=refine))
+        look = Look(noise=3, blur=blur)
+        seen = [
+            detector.detect(frame(6.0, attitude=Attitude(yaw=0.4 * seed), look=look, seed=seed)) for seed in range(6)
+        ]
+        distances = [one.distance for sightings in seen for one in sightings]
+        assert len(distances) >= 5  # so blurred and so far away one may be missed
+        return float(np.mean(distances)) - 6.0
+
+    assert off(refine=True) == pytest.approx(0, abs=0.03)
+    assert off(refine=False) > 0.1  # the control: OpenCV's own corners
+
+
+def test_a_pattern_that_does_not_fit_leaves_the_corners():
+    image, half = frame(6.0, look=Look(noise=0)), SIZE / 2 / 6.0 * MODEL.fx
+    true = np.array([[-half, -half], [half, -half], [half, half], [-half, half]]) + (MODEL.cx, MODEL.cy)
+    rough, words = true + np.array([[0.3, 0.2], [-0.3, 0.2], [0.2, -0.3], [0.1, 0.3]]), family("36h11", [0, 1])
+    cell = 2 * half / 8
+    assert align(image, rough, Pattern.of(words.bits(0), cell)) == pytest.approx(true, abs=0.1)
+    assert (align(image, rough, Pattern.of(words.bits(1), cell)) == rough).all()
+    assert (align(255 - image, rough, Pattern.of(words.bits(0), cell)) == rough).all()

@@ -1,0 +1,204 @@
+"""The state machine, on a point that follows its velocities at once."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Any
+
+import pytest
+
+from mavproxy_vision.geometry.frames import vector
+from mavproxy_vision.landing.state_machine import Landing, Phase, Plan, cone
+from mavproxy_vision.tracking.pose_history import Motion
+from mavproxy_vision.tracking.target_filter import Fix, Target
+
+STEP = 0.05
+
+
+class Point:
+    """A vehicle without inertia over a tag at `tag` (north, east), seen while `sees(point)`."""
+
+    def __init__(self, plan: Plan | None = None, tag: tuple[float, float] = (2.0, -1.0), height: float = 5.0) -> None:
+        self.target = Target()
+        self.landing = Landing(plan or Plan(), self.target)
+        self.tag, self.now = tag, 100.0
+        self.at = vector(0, 0, -height)
+        self.velocity = vector(0, 0, 0)
+        self.sees: Any = lambda _: True
+        self.orders: list[Any] = []
+
+    @property
+    def height(self) -> float:
+        return -float(self.at[2])
+
+    def step(self) -> Any:
+        if self.sees(self):
+            place = vector(*self.tag, 0)
+            self.target.take([Fix(self.now, place, self.at.copy(), self.height, self.height, 0)])
+        order = self.landing.step(self.now, Motion(self.now, self.at, self.velocity, self.at), self.height)
+        self.orders.append(order)
+        self.velocity = order.velocity
+        self.at = self.at + order.velocity * STEP
+        self.now += STEP
+        return order
+
+    def run(self, seconds: float = 120.0) -> Any:
+        for _ in range(round(seconds / STEP)):
+            order = self.step()
+            if order.phase in (Phase.LAND, Phase.FAILED):
+                return order
+        return order
+
+    @property
+    def phases(self) -> list[Phase]:
+        found: list[Phase] = []
+        for order in self.orders:
+            if not found or found[-1] is not order.phase:
+                found.append(order.phase)
+        return found
+
+
+def test_it_centres_and_touches_down():
+    point = Point()
+    assert point.run().phase is Phase.LAND
+    assert math.dist(point.at[:2], point.tag) <= 0.05
+    assert point.height <= 0.2
+    assert point.phases == [Phase.LOOK, Phase.DESCEND, Phase.LAST_METRE, Phase.LAND]
+    assert point.landing.attempt == 1
+
+
+def test_speed_and_acceleration_are_limited():
+    point = Point(tag=(6, 0))
+    point.run()
+    speeds = [math.hypot(*order.velocity[:2]) for order in point.orders]
+    assert max(speeds) <= 1.5 + 1e-9
+    pairs = itertools.pairwise(point.orders[:-1])
+    changes = [math.dist(a.velocity[:2], b.velocity[:2]) for a, b in pairs]
+    assert max(changes) <= 1.5 * STEP + 1e-9
+    assert max(order.velocity[2] for order in point.orders) <= 1.0
+
+
+def test_outside_the_cone_it_does_not_descend():
+    point = Point(tag=(4, 0), height=5.0)
+    for _ in range(10):
+        point.step()
+        assert point.orders[-1].velocity[2] == 0
+
+
+def test_the_cone_is_wide_high_up_and_narrow_low():
+    assert cone(5) == pytest.approx(math.radians(20))
+    assert cone(2) == pytest.approx(math.radians(15))
+    assert cone(0.5) == pytest.approx(math.radians(10))
+
+
+def test_half_a_second_without_sight_changes_nothing():
+    point = Point()
+    point.sees = lambda p: not 103.0 < p.now < 103.4
+    assert point.run().phase is Phase.LAND
+    assert Phase.HOLD not in point.phases
+
+
+def test_a_loss_of_one_second_is_held_through():
+    point = Point()
+    point.sees = lambda p: not 103.0 < p.now < 104.2
+    assert point.run().phase is Phase.LAND
+    assert Phase.HOLD in point.phases
+    assert Phase.CLIMB not in point.phases
+
+
+def test_a_longer_loss_climbs_to_where_it_was_seen():
+    point = Point()
+    lost: list[float] = []
+
+    def sees(p: Point) -> bool:
+        if p.height < 3 and not lost:
+            lost.append(p.height)
+        return not lost or p.height > lost[0] + 0.9
+
+    point.sees = sees
+    for _ in range(2000):
+        point.step()
+        if Phase.CLIMB in point.phases and point.orders[-1].phase is Phase.DESCEND:
+            break
+    assert [phase.name for phase in point.phases] == ["LOOK", "DESCEND", "HOLD", "CLIMB", "DESCEND"]
+    assert math.dist(point.at[:2], point.tag) < 0.5
+
+
+def test_lost_below_one_metre_it_goes_on_straight_down():
+    point = Point()
+    point.sees = lambda p: p.height > 0.95
+    assert point.run().phase is Phase.LAND
+    assert Phase.HOLD not in point.phases
+    assert point.height <= 0.2
+    assert math.dist(point.at[:2], point.tag) <= 0.12  # it went on to above where the tag was
+
+
+def test_what_pushes_it_on_the_last_metre_is_answered_without_seeing():
+    point = Point()
+    point.sees = lambda p: p.height > 0.5
+    while not point.orders or point.orders[-1].phase is not Phase.LAND:
+        point.step()
+        if point.orders[-1].phase is Phase.LAST_METRE:
+            point.at = point.at + vector(0.10 * STEP, 0, 0)  # what its velocity estimate notices
+    assert math.dist(point.at[:2], point.tag) < 0.1
+
+
+def test_on_legs_that_are_higher_than_the_last_metre_expects_it_ends_all_the_same():
+    point = Point()
+    while not point.orders or point.orders[-1].phase is not Phase.LAND:
+        point.step()
+        point.at[2] = min(point.at[2], -0.45)
+        assert point.now < 160
+    began = next(i for i, order in enumerate(point.orders) if order.phase is Phase.LAST_METRE)
+    assert (len(point.orders) - began) * STEP < 3.0
+
+
+def test_without_a_tag_it_searches_and_fails_after_its_attempts():
+    point = Point(Plan(attempts=3, step=1.0, leash=20))
+    point.sees = lambda _: False
+    order = point.run()
+    assert order.phase is Phase.FAILED
+    assert "after 3 attempts" in order.reason
+    assert point.phases == [Phase.LOOK, Phase.SEARCH, Phase.FAILED]
+    assert order.velocity == pytest.approx([0, 0, 0])
+
+
+def test_the_leash_and_the_time_limit_end_a_search():
+    short = Point(Plan(attempts=99, step=1.0, leash=2.0))
+    short.sees = lambda _: False
+    assert "within 2 m" in short.run().reason
+    late = Point(Plan(attempts=99, step=1.0, leash=50, time_limit=20))
+    late.sees = lambda _: False
+    assert "20 s" in late.run(60).reason
+
+
+def test_it_finds_a_tag_on_its_search():
+    point = Point(Plan(step=1.5), tag=(-2.5, 2.5))
+    point.sees = lambda p: math.dist(p.at[:2], p.tag) < 1.2
+    assert point.run().phase is Phase.LAND
+    assert point.landing.attempt > 1
+
+
+def test_a_search_stays_below_the_range_of_detection():
+    point = Point(Plan(ceiling=4.0, attempts=3), height=9.0)
+    point.sees = lambda _: False
+    point.run()
+    assert point.height == pytest.approx(4.0, abs=0.5)
+
+
+def test_a_search_that_finds_does_not_descend():
+    point = Point(Plan(descend=False), tag=(0.5, 0))
+    assert point.run().phase is Phase.LAND
+    assert point.height == pytest.approx(5, abs=0.1)
+
+
+def test_taken_back_from_land_it_climbs_and_looks_again():
+    point = Point(Plan(descend=False))
+    point.run()
+    point.sees = lambda _: False
+    point.now += 2.0
+    point.landing.resume(point.now, Motion(point.now, point.at, point.velocity, point.at), point.height)
+    for _ in range(30):
+        point.step()
+    assert point.orders[-1].phase is Phase.CLIMB

@@ -1,0 +1,120 @@
+"""The two clocks, and where the vehicle was at a moment."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from mavproxy_vision.geometry.frames import Attitude, vector
+from mavproxy_vision.tracking.pose_history import History, Unstamped, VehicleClock
+
+
+def test_the_least_delayed_message_sets_the_offset():
+    clock = VehicleClock()
+    for step, delay in enumerate((0.05, 0.01, 0.2, 0.08)):
+        clock.hear(100 + 0.1 * step + delay, 5 + 0.1 * step, 1.0)
+    assert clock.vehicle(101) == pytest.approx(5 + 1 - 0.01)
+
+
+def test_a_faster_clock_is_followed():
+    clock = VehicleClock()
+    for step in range(50):
+        clock.hear(100 + 0.02 * step, 5 + 0.1 * step, 5.0)
+    assert clock.vehicle(101) == pytest.approx(10, abs=0.01)
+
+
+def test_an_offset_that_was_learned_is_forgotten():
+    clock = VehicleClock()
+    clock.hear(100, 5, 1.0)
+    for step in range(40):
+        clock.hear(100.5 + 0.1 * step, 5.2 + 0.1 * step, 1.0)  # 0.3 s later than the first
+    assert clock.vehicle(104) == pytest.approx(8.7, abs=0.01)
+
+
+def test_the_hosts_time_is_the_vehicles_the_other_way_round():
+    clock = VehicleClock()
+    assert clock.host(5) == math.inf
+    for step in range(50):
+        clock.hear(100 + 0.02 * step, 5 + 0.1 * step, 5.0)
+    assert clock.host(clock.vehicle(101.3)) == pytest.approx(101.3)
+
+
+def test_a_message_without_a_time_is_dated_by_those_heard_before_it():
+    clock, dated = VehicleClock(), Unstamped()
+    for step in range(20):
+        clock.hear(100 + 0.1 * step, 5 + 0.1 * step, 1.0)
+        dated.hear(100 + 0.1 * step, 5 + 0.1 * step)
+    assert dated.sent(101.95, clock) == pytest.approx(101.95)
+    for step in range(20, 30):  # a busy machine: a second's worth arrives at once
+        clock.hear(103, 5 + 0.1 * step, 1.0)
+        dated.hear(103, 5 + 0.1 * step)
+        assert dated.sent(103, clock) == pytest.approx(min(100 + 0.1 * step + 0.125, 103))
+
+
+def test_nothing_is_dated_by_what_comes_no_more():
+    clock, dated = VehicleClock(), Unstamped()
+    assert dated.sent(90.0, clock) == 90.0
+    clock.hear(100, 5, 1.0)
+    dated.hear(100, 5)
+    assert dated.sent(102.0, clock) == 102.0
+
+
+def test_what_happened_in_a_silence_is_not_known():
+    made = history()
+    made.add_attitude(3.0, Attitude(), (0, 0, 0))
+    made.add_motion(3.0, vector(3, 0, -5), vector(1, 0, 0))
+    assert made.attitude(2.0) is None
+    assert made.motion(2.0) is None
+    assert made.attitude(0.9) is not None
+
+
+def history() -> History:
+    made = History()
+    for step in range(21):
+        at = 0.05 * step
+        made.add_attitude(at, Attitude(0.1 * at, -0.1 * at, math.pi - 0.05 + 0.1 * at), (0.1, -0.1, 0.1))
+        made.add_motion(at, vector(at, 0, -5), vector(1, 0, 0))
+    return made
+
+
+def test_between_two_messages_it_is_interpolated():
+    attitude = history().attitude(0.475)
+    assert (attitude.roll, attitude.pitch) == pytest.approx((0.0475, -0.0475))
+
+
+def test_heading_is_interpolated_across_south():
+    assert abs(history().attitude(0.525).yaw) == pytest.approx(math.pi, abs=0.05)
+
+
+def test_shortly_after_the_newest_it_is_carried_on_and_later_unknown():
+    made = history()
+    assert made.attitude(1.1).roll == pytest.approx(0.11)
+    assert made.motion(1.2).position[0] == pytest.approx(1.2)
+    assert made.attitude(1.5) is None
+    assert made.motion(1.5) is None
+    assert made.attitude(-1) is None
+
+
+def test_the_way_travelled_does_not_jump_with_the_position():
+    made = history()
+    made.add_motion(1.05, vector(9, 9, -5), vector(1, 0, 0))  # the estimator changed its mind
+    assert made.motion(1.05).travelled[0] == pytest.approx(1.05)
+    assert made.motion(1.05).position[0] == pytest.approx(9)
+
+
+def test_a_reboot_begins_anew_and_a_message_out_of_order_is_left_out():
+    made = History()
+    made.add_motion(100, vector(0, 0, 0), vector(1, 0, 0))
+    made.add_motion(99.9, vector(5, 5, 5), vector(9, 9, 9))
+    assert made.motion(100).position[0] == 0
+    made.add_motion(1, vector(2, 0, 0), vector(0, 0, 0))
+    assert made.motion(1).position[0] == 2
+
+
+def test_what_is_old_is_forgotten():
+    made = History()
+    for step in range(4000):
+        made.add_motion(0.05 * step, vector(0, 0, 0), vector(1, 0, 0))
+    assert made.motion(10) is None
+    assert made.motion(195).travelled[0] == pytest.approx(195)
