@@ -36,8 +36,8 @@ import requests
 from rig import harness, machine, table
 
 from mavproxy_gradys.errors import NotStored
-from mavproxy_gradys.sink_address import sink_address
-from mavproxy_gradys.spool import Spool
+from mavproxy_gradys.forwarding.sink_address import sink_address
+from mavproxy_gradys.forwarding.spool import Spool
 
 MOSQUITTO = shutil.which("mosquitto", path="/usr/sbin:/usr/bin:/usr/local/sbin")
 SHORTEST, LONGEST = 0.2, 2.0  # s from MAVProxy's start, or the cut before, to the next

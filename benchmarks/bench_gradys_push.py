@@ -18,11 +18,11 @@ from typing import Any
 
 from pymavlink import mavutil
 
-from mavproxy_gradys.address import station
-from mavproxy_gradys.client import Client
-from mavproxy_gradys.pusher import Pusher
+from mavproxy_gradys.net.addresses import station
+from mavproxy_gradys.net.http_client import Client
+from mavproxy_gradys.push.pusher import Pusher
+from mavproxy_gradys.push.statistics import StationTally
 from mavproxy_gradys.settings import ModuleSettings
-from mavproxy_gradys.tally import StationTally
 from mavproxy_uavapi.core.host import Host
 
 mavlink = mavutil.mavlink

@@ -10,11 +10,11 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from mavproxy_gradys.readings import LONGEST_TEXT, NAME, Reading, Value, device_of
+from mavproxy_gradys.forwarding.readings import LONGEST_TEXT, NAME, Reading, Value, device_of
 from mavproxy_gradys.service import Gradys
-from mavproxy_gradys.track_flight import VERB, flight_of
-from mavproxy_gradys.track_request import Track, TrackFile
-from mavproxy_gradys.tracks import places_of
+from mavproxy_gradys.tracks.flight import VERB, flight_of
+from mavproxy_gradys.tracks.formats import places_of
+from mavproxy_gradys.tracks.request import Track, TrackFile
 from mavproxy_uavapi.core.errors import Invalid, NoVehicle
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.http.extension import EITHER, POST, Answer, Call, Empty, Request, Route

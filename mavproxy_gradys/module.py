@@ -13,8 +13,8 @@ try:
     from mavproxy_gradys.http import Handlers
     from mavproxy_gradys.service import Gradys
     from mavproxy_gradys.settings import ModuleSettings, Settings
-    from mavproxy_gradys.track_console import HELP as TRACK_HELP
-    from mavproxy_gradys.track_console import TrackConsole
+    from mavproxy_gradys.tracks.console import HELP as TRACK_HELP
+    from mavproxy_gradys.tracks.console import TrackConsole
 except ModuleNotFoundError as missing:  # MAVProxy prints the text of an ImportError as one line
     raise ImportError(f"gradys needs {missing.name}: pip install mavproxy-uavapi") from missing
 from mavproxy_uavapi.core.background import BackgroundCommands

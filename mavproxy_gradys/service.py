@@ -7,14 +7,14 @@ import random
 from collections.abc import Awaitable, Callable
 from typing import Any
 
-from mavproxy_gradys.address import Station
-from mavproxy_gradys.client import Client
-from mavproxy_gradys.pusher import Pusher
-from mavproxy_gradys.sensing import Sensing
+from mavproxy_gradys.forwarding.pipeline import Sensing
+from mavproxy_gradys.net.addresses import Station
+from mavproxy_gradys.net.http_client import Client
+from mavproxy_gradys.push.pusher import Pusher
+from mavproxy_gradys.push.statistics import StationTally
 from mavproxy_gradys.settings import Settings
-from mavproxy_gradys.tally import StationTally
 from mavproxy_gradys.tasks import begin, end
-from mavproxy_gradys.tracking import Tracking
+from mavproxy_gradys.tracks.service import Tracking
 from mavproxy_uavapi.core.host import Host
 
 

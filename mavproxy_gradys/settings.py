@@ -12,11 +12,11 @@ from typing import Any
 
 from MAVProxy.modules.lib.mp_settings import MPSetting, MPSettings
 
-from mavproxy_gradys.address import Station, check_ip, stations
-from mavproxy_gradys.client import tls_context
 from mavproxy_gradys.errors import NotDelivered
-from mavproxy_gradys.readings import Quantity, parse_quantities
-from mavproxy_gradys.sink_address import SinkAddress, sink_addresses
+from mavproxy_gradys.forwarding.readings import Quantity, parse_quantities
+from mavproxy_gradys.forwarding.sink_address import SinkAddress, sink_addresses
+from mavproxy_gradys.net.addresses import Station, check_ip, stations
+from mavproxy_gradys.net.http_client import tls_context
 from mavproxy_uavapi.settings import UNSET, SettingError
 
 SECTION = "gradys"

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from mavproxy_gradys.tracks import parse, waypoints
+from mavproxy_gradys.tracks.formats import parse, waypoints
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "centmesh"
 

@@ -38,7 +38,7 @@ class AtOnce(Executor):
 @pytest.fixture
 def at_once(monkeypatch: pytest.MonkeyPatch) -> type[AtOnce]:
     """Keepers work without a thread; for others, what to put in place of their pool."""
-    monkeypatch.setattr("mavproxy_gradys.keeper.ThreadPoolExecutor", AtOnce)
+    monkeypatch.setattr("mavproxy_gradys.forwarding.spool_thread.ThreadPoolExecutor", AtOnce)
     return AtOnce
 
 

@@ -6,8 +6,9 @@ from typing import Any
 import pytest
 
 from mavproxy_gradys import console
+from mavproxy_gradys.net.round_trips import RoundTrips
+from mavproxy_gradys.push.statistics import StationTally
 from mavproxy_gradys.service import Gradys
-from mavproxy_gradys.tally import RoundTrips, StationTally
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import pytest
 
 from mavproxy_gradys.http import LONGEST_LIST, LONGEST_TEXT, MOST_READINGS, Handlers, Readings
 from mavproxy_gradys.service import Gradys
-from mavproxy_gradys.track_request import Track
+from mavproxy_gradys.tracks.request import Track
 from mavproxy_uavapi.core.errors import Invalid
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import parse

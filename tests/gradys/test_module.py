@@ -12,9 +12,9 @@ import pytest
 
 import gradys
 from mavproxy_gradys.errors import NotDelivered
+from mavproxy_gradys.forwarding.readings import Reading
+from mavproxy_gradys.forwarding.spool import Spool
 from mavproxy_gradys.module import HELP
-from mavproxy_gradys.readings import Reading
-from mavproxy_gradys.spool import Spool
 
 
 @pytest.fixture
@@ -100,7 +100,7 @@ def test_the_prompt_waits_for_no_goodbye(make: Any, main_loop: Any, capsys: Any,
             leaving.set()
             await asyncio.to_thread(left.wait, 20)
 
-    monkeypatch.setattr("mavproxy_gradys.sender.make_sink", lambda *_: Slow())
+    monkeypatch.setattr("mavproxy_gradys.forwarding.sender.make_sink", lambda *_: Slow())
     module = make(sink="http://127.0.0.1:9/r", quantities="")
     main_loop.until(lambda: "no ground station" in capsys.readouterr().out)
     module.command(["set", "gs", "127.0.0.1:8"])
@@ -266,7 +266,7 @@ def test_a_sink_that_takes_long_to_say_goodbye_costs_no_reading(
         async def close(self) -> None:
             await leaving.wait()
 
-    monkeypatch.setattr("mavproxy_gradys.sender.make_sink", lambda *_: Slow())
+    monkeypatch.setattr("mavproxy_gradys.forwarding.sender.make_sink", lambda *_: Slow())
     monkeypatch.setattr("mavproxy_gradys.module.LONGEST_END", 0.5)
     module = make(sink="http://127.0.0.1:9/r", quantities="")
     main_loop.until(lambda: "no ground station" in capsys.readouterr().out)

@@ -1,0 +1,229 @@
+"""The MQTT sink: each reading to its topic with QoS 1; the broker's PUBACK is the acknowledgement.
+
+The URL's path is the topic, in which {sysid}, {device} and {quantity} stand for the reading's:
+`mqtt://broker/fleet/{sysid}/{quantity}`. Positions are retained, so that a new subscriber has the last one at
+once. Beside them a retained `status` says `online`, and by the broker's own hand `offline` when we are gone: the
+last will. A connection has one will, so each topic of that kind has a connection of its own.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import socket
+import ssl
+from collections import defaultdict
+from collections.abc import Awaitable, Sequence
+from urllib.parse import unquote
+
+import aiomqtt
+
+from mavproxy_gradys.errors import NotDelivered
+from mavproxy_gradys.forwarding.readings import POSITION, STATUS, Reading, Stored, device_of
+from mavproxy_gradys.net.addresses import split_url
+from mavproxy_gradys.net.http_client import tls_context
+from mavproxy_gradys.net.resolver import Names
+from mavproxy_gradys.tasks import begin
+from mavproxy_uavapi.core.timeout import wait_with_timeout
+
+KEEP_ALIVE = 15  # s; the broker gives a silent connection up after one and a half of it
+WINDOW = 20  # readings on their way at once, on one connection
+GOODBYE = 1.0  # s
+DEFAULT_TOPIC = "fleet/{sysid}/{quantity}"
+ONLINE, OFFLINE = "online", "offline"
+
+
+class MqttSink:
+    """Publishes to one broker.
+
+    Args:
+        url: mqtt(s)://[USER:PASSWORD@]HOST[:PORT]/TOPIC.
+        timeout: s for an answer of the broker.
+        ca_file: as for `Client`.
+    """
+
+    def __init__(self, url: str, timeout: float, ca_file: str) -> None:
+        self._parts, self._port = split_url(url, ("mqtt", "mqtts"))
+        self._topic = unquote(self._parts.path.lstrip("/")) or DEFAULT_TOPIC
+        self._timeout = timeout
+        self._ca_file = ca_file
+        self._clients: dict[str, aiomqtt.Client] = {}  # by status topic
+        self._names = Names()
+        self._connecting: defaultdict[str, asyncio.Lock] = defaultdict(asyncio.Lock)
+        self._leaving: dict[str, asyncio.Task[None]] = {}  # attempts that were given up, by status topic
+
+    async def send(self, batch: Sequence[Stored]) -> set[int]:
+        """See `Sink.send`; in order on each connection."""
+        by_status: defaultdict[str, list[Stored]] = defaultdict(list)
+        for stored in batch:
+            by_status[status_topic(self._topic, stored.reading)].append(stored)
+        await self._reach(next(iter(by_status)))
+        sending = [self._send(status, part) for status, part in by_status.items()]
+        results = await asyncio.gather(*sending, return_exceptions=True)
+        taken: set[int] = set()
+        failed: list[NotDelivered] = []
+        for result in results:
+            if isinstance(result, NotDelivered):
+                failed.append(result)
+            elif isinstance(result, BaseException):
+                raise result
+            else:
+                taken |= result
+        if failed and not taken:
+            raise failed[0]
+        return taken
+
+    async def _reach(self, status: str) -> None:
+        """One connection finds out whether the broker is there; if not, the others need not try."""
+        try:
+            await self._client(status)
+        except aiomqtt.MqttError as error:
+            raise NotDelivered(self._explain(error)) from error
+
+    async def _send(self, status: str, batch: Sequence[Stored]) -> set[int]:
+        try:
+            client = await self._client(status)
+            window = asyncio.Semaphore(WINDOW)
+            publishing = [self._publish(client, window, stored) for stored in batch]
+            results = await asyncio.gather(*publishing, return_exceptions=True)
+        except aiomqtt.MqttError as error:
+            raise NotDelivered(self._explain(error)) from error
+        for result in results:
+            if isinstance(result, BaseException) and not isinstance(result, aiomqtt.MqttError):
+                raise result
+        taken = {stored.seq for stored, result in zip(batch, results, strict=True) if result is None}
+        if len(taken) < len(batch):
+            await self._drop(status)
+        if not taken:
+            raise NotDelivered(self._explain(next(result for result in results if result is not None)))
+        return taken
+
+    async def _publish(self, client: aiomqtt.Client, window: asyncio.Semaphore, stored: Stored) -> None:
+        topic = topic_of(self._topic, stored.reading)
+        payload = json.dumps(stored.body(), allow_nan=False)
+        async with window:
+            await client.publish(topic, payload, qos=1, retain=is_position(stored.reading))
+
+    async def _client(self, status: str) -> aiomqtt.Client:
+        """The connection whose last will is for that topic, made if need be.
+
+        Raises:
+            aiomqtt.MqttError: the broker does not take it.
+        """
+        async with self._connecting[status]:
+            if status not in self._clients:
+                self._clients[status] = await self._connect(status)
+            return self._clients[status]
+
+    async def _connect(self, status: str) -> aiomqtt.Client:
+        """A connection that has said `online`. One that comes too late is closed, not forgotten.
+
+        Raises:
+            aiomqtt.MqttError: the broker does not take it in time.
+        """
+        if status in self._leaving:
+            raise aiomqtt.MqttError("the attempt to connect before has not ended yet")
+        await self._within(self._names.look_up(self._parts.hostname or "", self._port))  # no thread that others need
+        client = self._make(status)
+        connecting = asyncio.ensure_future(client.__aenter__())
+        try:
+            await self._within(asyncio.shield(connecting))
+            await client.publish(status, ONLINE, qos=1, retain=True)
+        except BaseException:
+            leaving = self._leaving[status] = begin(leave(client, connecting), f"the leaving of {self._port}")
+            leaving.add_done_callback(lambda _: self._leaving.pop(status))
+            raise
+        return client
+
+    async def _within(self, answer: Awaitable[object]) -> None:
+        """Await that for as long as the setting says.
+
+        Raises:
+            aiomqtt.MqttError: it took longer, or failed.
+        """
+        try:
+            await wait_with_timeout(self._timeout, answer)
+        except (asyncio.TimeoutError, OSError) as error:
+            raise aiomqtt.MqttError(str(error) or f"no answer within {self._timeout:g} s") from error
+
+    def _make(self, status: str) -> aiomqtt.Client:
+        parts = self._parts
+        return aiomqtt.Client(
+            parts.hostname or "",
+            self._port,
+            username=unquote(parts.username) if parts.username else None,
+            password=unquote(parts.password) if parts.password else None,
+            timeout=self._timeout,
+            keepalive=KEEP_ALIVE,
+            max_inflight_messages=WINDOW,
+            will=aiomqtt.Will(status, OFFLINE, qos=1, retain=True),
+            tls_context=self._tls() if parts.scheme == "mqtts" else None,
+        )
+
+    def _tls(self) -> ssl.SSLContext:
+        context = tls_context(self._ca_file)
+        return context if isinstance(context, ssl.SSLContext) else ssl.create_default_context()
+
+    def _explain(self, error: BaseException | None) -> str:
+        host = self._parts.hostname
+        return f"broker {host}:{self._port}: {str(error) or type(error).__name__}"
+
+    async def _drop(self, status: str) -> None:
+        """Give a connection up; the next batch makes a new one."""
+        client = self._clients.pop(status, None)
+        if client is not None:
+            await disconnect(client)
+
+    async def close(self) -> None:
+        """Say `offline` ourselves, since the broker keeps the will for those who go without a word."""
+
+        async def say(status: str, client: aiomqtt.Client) -> None:
+            with contextlib.suppress(aiomqtt.MqttError, asyncio.TimeoutError):
+                await wait_with_timeout(GOODBYE, client.publish(status, OFFLINE, qos=1, retain=True))
+            await self._drop(status)
+
+        if self._leaving:
+            await asyncio.wait(self._leaving.values(), timeout=GOODBYE)
+        await asyncio.gather(*(say(status, client) for status, client in list(self._clients.items())))
+
+
+async def leave(client: aiomqtt.Client, connecting: asyncio.Future[aiomqtt.Client]) -> None:
+    """Close a connection once the attempt to make it has ended, which nobody can hurry."""
+    await asyncio.gather(connecting, return_exceptions=True)
+    await disconnect(client)
+
+
+async def disconnect(client: aiomqtt.Client) -> None:
+    """Take leave; a broker that does not answer finds the connection closed."""
+    with contextlib.suppress(aiomqtt.MqttError, asyncio.TimeoutError):
+        await wait_with_timeout(GOODBYE, client.__aexit__(None, None, None))
+    left = client._client.socket()  # aiomqtt itself leaves it open when the broker was too slow
+    if isinstance(left, socket.socket):
+        with contextlib.suppress(OSError):
+            left.shutdown(socket.SHUT_RDWR)
+
+
+def is_position(reading: Reading) -> bool:
+    """Whether that is where a vehicle is, which new subscribers are to learn at once."""
+    return reading.quantity == POSITION and reading.device == device_of(reading.system)
+
+
+def topic_of(template: str, reading: Reading) -> str:
+    """The topic of a reading."""
+    return fill(template, reading, reading.quantity)
+
+
+def status_topic(template: str, reading: Reading) -> str:
+    """The topic that says whether its vehicle is online: beside its readings'."""
+    if "{quantity}" in template:
+        return fill(template, reading, STATUS)
+    return f"{fill(template, reading, '')}/{STATUS}"
+
+
+def fill(template: str, reading: Reading, quantity: str) -> str:
+    """The template with the reading's names in it."""
+    names = {"{sysid}": str(reading.system), "{device}": reading.device, "{quantity}": quantity}
+    for name, value in names.items():
+        template = template.replace(name, value)
+    return template

@@ -1,0 +1,196 @@
+"""Sensing with store and forward: samplers, the spool, and a sender for each sink."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from mavproxy_gradys.errors import NotStored
+from mavproxy_gradys.forwarding.readings import POSITION, STATUS, Quantity, Reading, Sampler
+from mavproxy_gradys.forwarding.sender import Sender
+from mavproxy_gradys.forwarding.spool import Spool
+from mavproxy_gradys.forwarding.spool_thread import Keeper
+from mavproxy_gradys.net.schedule import Cadence
+from mavproxy_gradys.position import position_of
+from mavproxy_gradys.settings import Settings
+from mavproxy_gradys.tasks import begin, end
+from mavproxy_uavapi.core.errors import Unavailable
+from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
+
+MEGABYTE = 1e6
+
+
+class Sensing:
+    """Samples the quantities while there is a sink, and keeps what is posted even while there is none.
+
+    Args:
+        host: the vehicles.
+        wall: s since 1970.
+    """
+
+    def __init__(self, host: Host, wall: Callable[[], float] = time.time) -> None:
+        self._host = host
+        self._wall = wall
+        self._settings: Settings | None = None
+        self._keeper: Keeper | None = None
+        self._settings_before: Settings | None = None  # of the last start
+        self._left: list[Reading] = []  # what the disk did not take before the last stop
+        self._why_left = ""
+        self._senders: list[Sender] = []
+        self._samplers: list[Sampler] = []
+        self._tasks: list[asyncio.Task[None]] = []
+
+    def start(self, settings: Settings) -> None:
+        """Sample and send, if there is a sink."""
+        self._settings = self._settings_before = settings
+        if settings.sink or self._left:
+            self._kept()
+        for address in settings.sink:
+            sender = Sender(address, self._kept(), self._host.clock)
+            self._senders.append(sender)
+            self._tasks.append(begin(sender.run(settings), f"the delivery to {address}"))
+        for quantity in settings.quantities if settings.sink else ():
+            sampler = Sampler(quantity)
+            self._samplers.append(sampler)
+            self._tasks.append(begin(self._sample(sampler, self._kept()), f"the sampling of {quantity.name}"))
+
+    async def stop(self) -> None:
+        """End it, and close the spool; what the disk does not take is kept in memory until the next start."""
+        self._settings = None
+        tasks, self._tasks = self._tasks, []
+        self._samplers.clear()
+        self._senders.clear()
+        try:
+            if self._keeper is not None:
+                await self._keeper.save()  # before the sinks' goodbyes, which may take long
+            await end(tasks)
+        finally:
+            await self._end_keeper()
+
+    async def _end_keeper(self) -> None:
+        keeper = self._keeper
+        if keeper is None:
+            return
+        try:
+            await keeper.stop()
+        finally:
+            self._left, self._why_left = keeper.left, keeper.problem
+            self._keeper = None
+
+    async def close(self) -> None:
+        """End it for good: what an earlier stop left in memory is tried once more."""
+        if self._settings is None and self._left and self._settings_before is not None:
+            self._kept(self._settings_before)
+        await self.stop()
+
+    @property
+    def lost(self) -> str:
+        """What is lost if nothing more is written: how many readings, and why; empty when none is."""
+        keeper = self._keeper  # it is there when its end was not waited for
+        count = len(self._left) if keeper is None else keeper.waiting
+        why = (self._why_left if keeper is None else keeper.problem) or "they were not written in time"
+        return f"{count} reading{'' if count == 1 else 's'} are lost: {why}" if count else ""
+
+    def _kept(self, settings: Settings | None = None) -> Keeper:
+        """The spool's keeper, started if need be."""
+        settings = settings or self._settings
+        if settings is None:
+            raise NotStored("gradys is stopped: `gradys start`")
+        if self._keeper is None:
+            spool, largest, longest = settings.spool, settings.spool_mb * MEGABYTE, settings.spool_hours * 3600
+            self._keeper = Keeper(lambda: Spool(spool, largest, longest))
+            self._keeper.start([address.name for address in settings.sink])
+            for reading in self._left:
+                self._keeper.put(reading)
+            self._left = []
+        return self._keeper
+
+    async def keep(self, readings: Sequence[Reading]) -> list[int]:
+        """Keep what was posted; the sequence numbers, when it is on the disk.
+
+        Raises:
+            NotStored: it is not.
+        """
+        return await self._kept().keep(readings)
+
+    @property
+    def reserved(self) -> set[str]:
+        """The quantities that only a vehicle itself tells: those that are sampled, and whether it is online."""
+        sampled = () if self._settings is None else self._settings.quantities
+        return {POSITION, STATUS, *(quantity.name for quantity in sampled)}
+
+    def flush(self) -> None:
+        """Try all sinks now."""
+        for sender in self._senders:
+            sender.flush()
+        if self._keeper is not None:
+            self._keeper.flush()
+
+    # -- sampling -----------------------------------------------------------------------------------------
+
+    async def _sample(self, sampler: Sampler, keeper: Keeper) -> None:
+        loop = asyncio.get_running_loop()
+        cadence = Cadence(sampler.quantity.period, loop.time())
+        while True:
+            await asyncio.sleep(cadence.wait(loop.time()))
+            for state in list(self._host.fleet.vehicles.values()):
+                reading = self._read(sampler, state)
+                if reading is not None:
+                    keeper.put(reading)
+
+    def _read(self, sampler: Sampler, state: VehicleState) -> Reading | None:
+        assert self._settings is not None
+        now, wall, max_age = self._host.clock(), self._wall(), self._settings.max_age
+        if sampler.quantity.name != POSITION or sampler.quantity.message:
+            return sampler.sample(state, now, wall, max_age)
+        try:
+            where = position_of(
+                state,
+                now,
+                max_age=max_age,
+                link_timeout=self._host.link_watch.timeout,
+                has_position=self._host.registry.find(state.system).has_position,
+            )
+        except Unavailable as nothing:
+            sampler.skip(state.system, str(nothing))
+            return None
+        told_at = state.messages["GLOBAL_POSITION_INT"].at
+        return sampler.take(state.system, [where.lat, where.lng, where.alt], told_at, wall - where.age)
+
+    # -- what the status says -------------------------------------------------------------------------------
+
+    def report(self) -> dict[str, Any]:
+        """spooled, oldest unsent, the spool, the sinks, the quantities."""
+        keeper = self._keeper
+        oldest = None if keeper is None else keeper.oldest_age
+        return {
+            "spooled": len(self._left) if keeper is None else spooled(keeper),
+            "oldest_unsent_s": None if oldest is None else round(oldest, 1),
+            "spool": None if keeper is None else self._spool_report(keeper),
+            "sinks": [sender.report() for sender in self._senders],
+            "quantities": [quantity_report(sampler) for sampler in self._samplers],
+        }
+
+    def _spool_report(self, keeper: Keeper) -> dict[str, Any]:
+        assert self._settings is not None
+        return {
+            "file": str(self._settings.spool),
+            "problem": keeper.problem or None,
+            "dropped": dict(keeper.dropped),
+            "set_aside": [str(file) for file in keeper.set_aside],
+        }
+
+
+def spooled(keeper: Keeper) -> int | None:
+    """How many readings are kept; None while nobody knows."""
+    return None if keeper.count is None else keeper.count + keeper.waiting
+
+
+def quantity_report(sampler: Sampler) -> dict[str, Any]:
+    """What the status says of one quantity."""
+    quantity: Quantity = sampler.quantity
+    why_not = {str(system): why for system, why in sorted(sampler.why_not.items())}
+    return {"quantity": quantity.name, "period_s": quantity.period, "taken": sampler.taken, "why_not": why_not}

@@ -1,0 +1,67 @@
+"""Where readings go, as the setting `sink` names it: URL, options, and what may be shown and stored of it. Pure."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from urllib.parse import unquote
+
+from mavproxy_gradys.net.addresses import PORTS, masked, split_url
+from mavproxy_uavapi.settings import SettingError
+
+SCHEMES = tuple(PORTS)
+STATUS_COUNTS = "ack=status"  # the one option there is
+
+
+@dataclass(frozen=True)
+class SinkAddress:
+    """One sink.
+
+    Attributes:
+        url: what to connect to. It may hold a password: it is neither shown nor stored.
+        status_counts: whether a 200 acknowledges all that was sent though it names no numbers.
+    """
+
+    url: str
+    status_counts: bool = False
+
+    def __str__(self) -> str:
+        """As it may be shown."""
+        return masked(self.url) + (f"#{STATUS_COUNTS}" if self.status_counts else "")
+
+    @property
+    def name(self) -> str:
+        """What the spool's file calls it, from which no secret can be read.
+
+        With another password or other options it is still the same sink.
+        """
+        parts, port = split_url(self.url, SCHEMES)
+        whole = f"{parts.scheme}://{parts.username or ''}@{parts.hostname}:{port}{parts.path}?{parts.query}"
+        return f"{parts.hostname}:{port} {hashlib.sha256(whole.encode()).hexdigest()[:16]}"
+
+
+def sink_addresses(text: str) -> list[SinkAddress]:
+    """The sinks of a list by comma.
+
+    Raises:
+        SettingError: one is no URL of a scheme that we know, no topic, or has an option that there is not.
+    """
+    found = [sink_address(part.strip()) for part in text.split(",") if part.strip()]
+    return list({sink.name: sink for sink in found}.values())
+
+
+def sink_address(text: str) -> SinkAddress:
+    """One sink.
+
+    Raises:
+        SettingError: as `sink_addresses`.
+    """
+    split_url(text, SCHEMES)
+    if text.startswith("mqtt"):
+        if set("+#?") & set(unquote(text.partition("://")[2].partition("/")[2])):
+            raise SettingError(f"{masked(text)}: a topic holds none of + # ?")
+        return SinkAddress(text)
+    url, _, option = text.partition("#")
+    if option not in ("", STATUS_COUNTS):
+        raise SettingError(f"{masked(text)}: the only option of a sink is #{STATUS_COUNTS}")
+    return SinkAddress(url, option == STATUS_COUNTS)

@@ -1,0 +1,292 @@
+"""The spool: readings in an SQLite file until every sink has acknowledged them.
+
+Blocking; one thread uses it at a time (`keeper.py` has a thread for it). A transaction is on the disk when a
+call returns (WAL, synchronous=FULL), so that neither `kill -9` nor a flat battery loses what was kept.
+
+A sequence number is given once, even after the file was lost: a new file begins at the milliseconds since
+1970, above whatever a former one can have reached at less than a thousand readings a second, and above what a
+corrupt one is known to have given, should the clock have been set back.
+"""
+
+from __future__ import annotations
+
+import os
+import sqlite3
+import time
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+from mavproxy_gradys.errors import NotStored
+from mavproxy_gradys.forwarding.readings import Reading, Stored
+from mavproxy_gradys.forwarding.spool_file import opened
+from mavproxy_gradys.forwarding.spool_rows import COLUMNS, row_of, size_of, stored_of
+from mavproxy_gradys.forwarding.transaction import Transaction
+
+DROPPED_AT_ONCE = 500  # rows
+DAMAGED_KEPT = 1000  # rows
+CAUSES = ("size", "age", "damage")
+
+
+def uptime() -> float:
+    """Seconds since this machine was started, sleep included: no clock jump moves it."""
+    return time.clock_gettime(time.CLOCK_BOOTTIME)
+
+
+def boot_id() -> str:
+    """Which start of this machine `uptime` counts from."""
+    return Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
+
+
+class Spool:
+    """Readings on the disk.
+
+    Ages are reckoned by the machine's uptime, so that a clock that is set does not make everything old. What
+    is left from before a restart of the machine ages from when it was found again.
+
+    Attributes:
+        count, size: readings, and their bytes.
+        dropped: how many readings were dropped, by cause (`size`, `age`, `damage`), over the file's whole life.
+        damaged: numbers of rows that could not be read, and that `trim` is to set aside.
+        set_aside: the corrupt file that this one replaced; None when there was none.
+
+    Args:
+        path: the file; made if need be.
+        largest: bytes of readings beyond which the oldest are dropped.
+        longest: age (s) after which a reading is dropped.
+        clock: uptime (s).
+        boot: which start of the machine that counts from.
+        wall: s since 1970.
+
+    Raises:
+        NotStored: the file cannot be opened: no room, no permission, another MAVProxy has it, or another program.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        largest: float,
+        longest: float,
+        *,
+        clock: Callable[[], float] = uptime,
+        boot: str | None = None,
+        wall: Callable[[], float] = time.time,
+    ) -> None:
+        self.path = Path(os.path.realpath(path))
+        self.largest = largest
+        self.longest = longest
+        self.sinks: list[str] = []
+        self.damaged: set[int] = set()
+        self._clock = clock
+        self._boot = boot_id() if boot is None else boot
+        try:
+            self._db, self.set_aside = opened(self.path, wall())
+        except (sqlite3.Error, OSError) as error:
+            raise NotStored(f"{path}: {error}{_hint(error)}") from error
+        try:
+            self._find()
+        except BaseException as error:
+            self._db.close()
+            if isinstance(error, sqlite3.Error):
+                raise NotStored(f"{path}: {error}") from error
+            raise
+
+    def _find(self) -> None:
+        with self._transaction():
+            now = self._clock()
+            self._db.execute(
+                "UPDATE readings SET boot = ?, uptime = ? WHERE boot != ?", (self._boot, now, self._boot)
+            )
+        self._look()
+
+    def _look(self) -> None:
+        self.count, self.size = self._db.execute(
+            "SELECT count(*), coalesce(sum(CAST(size AS INTEGER)), 0) FROM readings"
+        ).fetchone()
+        counts = self._db.execute("SELECT cause, CAST(count AS INTEGER) FROM dropped").fetchall()
+        self.dropped = {cause: count for cause, count in counts if cause in CAUSES}
+
+    def close(self) -> None:
+        """Close the file."""
+        self._db.close()
+
+    def _transaction(self) -> Transaction:
+        return Transaction(self._db)
+
+    # -- in -----------------------------------------------------------------------------------------------
+
+    def append(self, readings: Sequence[Reading]) -> list[int]:
+        """Keep readings; their sequence numbers.
+
+        Raises:
+            sqlite3.Error: nothing was kept.
+        """
+        now, numbers, added = self._clock(), [], 0
+        with self._transaction():
+            for reading in readings:
+                row = row_of(reading)
+                size = size_of(row)
+                cursor = self._db.execute(
+                    f"INSERT INTO readings ({COLUMNS}, boot, uptime, size) VALUES (NULL, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                    (*row, self._boot, now, size),
+                )
+                numbers.append(int(cursor.lastrowid or 0))
+                added += size
+        self.count += len(numbers)
+        self.size += added
+        return numbers
+
+    def trim(self) -> None:
+        """Set aside what is damaged; drop what is too old, then the oldest of what is too much.
+
+        Raises:
+            sqlite3.Error: as `append`.
+        """
+        if self.damaged:
+            self._set_aside_damaged()
+        while self.count and self._drop("age", "uptime < ?", self._clock() - self.longest) == DROPPED_AT_ONCE:
+            pass
+        while self.size > self.largest and self._drop_excess():
+            pass
+
+    def _set_aside_damaged(self) -> None:
+        """Move the rows that could not be read to a table of their own, of which the newest are kept."""
+        found, moved = sorted(self.damaged), 0
+        with self._transaction():
+            for seq in found:
+                moved += self._db.execute(
+                    f"INSERT OR REPLACE INTO damaged SELECT {COLUMNS} FROM readings WHERE seq = ?", (seq,)
+                ).rowcount
+                self._db.execute("DELETE FROM readings WHERE seq = ?", (seq,))
+                self._db.execute("DELETE FROM acknowledged WHERE seq = ?", (seq,))
+            self._db.execute(
+                "DELETE FROM damaged WHERE seq NOT IN (SELECT seq FROM damaged ORDER BY seq DESC LIMIT ?)",
+                (DAMAGED_KEPT,),
+            )
+            self._count_dropped("damage", moved)
+        self.damaged.clear()
+        self._look()
+
+    def _drop_excess(self) -> int:
+        oldest = self._db.execute(
+            "SELECT seq, CAST(size AS INTEGER) FROM readings ORDER BY seq LIMIT ?", (DROPPED_AT_ONCE,)
+        )
+        excess, last = self.size - self.largest, -1
+        for seq, size in oldest:
+            if excess <= 0:
+                break
+            excess, last = excess - size, seq
+        return self._drop("size", "seq <= ?", last)
+
+    def _drop(self, cause: str, condition: str, limit: float) -> int:
+        with self._transaction():
+            gone = self._db.execute(
+                "DELETE FROM readings WHERE seq IN (SELECT seq FROM readings ORDER BY seq LIMIT ?)"
+                f" AND {condition} RETURNING seq, CAST(size AS INTEGER)",
+                (DROPPED_AT_ONCE, limit),
+            ).fetchall()
+            if gone:
+                self._db.execute("DELETE FROM acknowledged WHERE seq <= ?", (max(seq for seq, _ in gone),))
+                self._count_dropped(cause, len(gone))
+        if gone:
+            self._forget(size for _, size in gone)
+            self.dropped[cause] = self.dropped.get(cause, 0) + len(gone)
+        return len(gone)
+
+    def _count_dropped(self, cause: str, count: int) -> None:
+        self._db.execute(
+            "INSERT INTO dropped VALUES (?, ?) ON CONFLICT (cause) DO UPDATE SET count = count + excluded.count",
+            (cause, count),
+        )
+
+    def _forget(self, sizes: Iterable[int]) -> None:
+        gone = list(sizes)
+        self.count -= len(gone)
+        self.size -= sum(gone)
+
+    # -- out ----------------------------------------------------------------------------------------------
+
+    def batch(self, sink: str, after: int, limit: int) -> list[Stored]:
+        """The oldest readings after number `after` that a sink has not acknowledged, in their order.
+
+        Rows that are damaged are passed over, until `trim` sets them aside.
+
+        Raises:
+            sqlite3.Error: the file cannot be read.
+        """
+        while True:
+            good, newest = self._look_through(sink, after, limit)
+            if good or newest is None:
+                return good
+            after = newest
+
+    def _look_through(self, sink: str, after: int, limit: int) -> tuple[list[Stored], int | None]:
+        """The sound ones of so many rows, and the last row's number; None when there are no rows."""
+        good, newest = [], None
+        rows = self._db.execute(
+            f"SELECT {COLUMNS} FROM readings WHERE seq > ? AND NOT EXISTS (SELECT 1 FROM acknowledged"
+            " WHERE sink = ? AND acknowledged.seq = readings.seq) ORDER BY seq LIMIT ?",
+            (after, sink, limit),
+        )
+        for row in rows:  # one at a time: a damaged one may be large
+            newest, stored = row[0], stored_of(row)
+            if stored is None:
+                self.damaged.add(newest)
+            else:
+                good.append(stored)
+        return good, newest
+
+    def acknowledge(self, sink: str, numbers: Sequence[int]) -> None:
+        """Note that a sink has acknowledged just these; what all sinks have is removed.
+
+        Raises:
+            sqlite3.Error: nothing was noted; the readings are sent again some time.
+        """
+        others = [other for other in self.sinks if other != sink]
+        with self._transaction():
+            gone = [size for number in numbers for size in self._acknowledge(sink, number, others)]
+        self._forget(gone)
+
+    def _acknowledge(self, sink: str, number: int, others: Sequence[str]) -> list[int]:
+        """Note one acknowledgement; the size of the reading if nobody else waits for it."""
+        marks = ", ".join("?" * len(others))
+        held = f"SELECT count(*) FROM acknowledged WHERE seq = ? AND sink IN ({marks})"
+        (by_others,) = self._db.execute(held, (number, *others)).fetchone()
+        if by_others < len(others):
+            self._db.execute("INSERT OR IGNORE INTO acknowledged VALUES (?, ?)", (sink, number))
+            return []
+        if others:
+            self._db.execute("DELETE FROM acknowledged WHERE seq = ?", (number,))
+        return [
+            size
+            for (size,) in self._db.execute(
+                "DELETE FROM readings WHERE seq = ? RETURNING CAST(size AS INTEGER)", (number,)
+            )
+        ]
+
+    def use_sinks(self, sinks: Sequence[str]) -> None:
+        """From now on readings are owed to these; what all of them have acknowledged already is removed.
+
+        Raises:
+            sqlite3.Error: as `append`.
+        """
+        self.sinks = list(sinks)
+        marks = ", ".join("?" * len(sinks))
+        with self._transaction():
+            self._db.execute(f"DELETE FROM acknowledged WHERE sink NOT IN ({marks})", sinks)
+            if sinks:
+                self._db.execute(
+                    "DELETE FROM readings WHERE seq IN"
+                    " (SELECT seq FROM acknowledged GROUP BY seq HAVING count(*) = ?)",
+                    (len(sinks),),
+                )
+                self._db.execute("DELETE FROM acknowledged WHERE seq NOT IN (SELECT seq FROM readings)")
+        self._look()
+
+    def oldest_since(self) -> float | None:
+        """The uptime (s) at which the oldest reading was kept; None when there is none."""
+        row = self._db.execute("SELECT CAST(uptime AS REAL) FROM readings ORDER BY seq LIMIT 1").fetchone()
+        return None if row is None else float(row[0])
+
+
+def _hint(error: BaseException) -> str:
+    return " (another MAVProxy uses it; `gradys set spool FILE` takes another)" if "locked" in str(error) else ""

@@ -1,0 +1,81 @@
+"""A reading as a row of the spool's file, and back. Pure.
+
+A file may be damaged within a row: by a flash chip, or by a program that wrote there. So what is read is looked at
+like what comes from outside.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Sequence
+from typing import Any
+
+from mavproxy_gradys.forwarding.readings import LONGEST_TEXT, NAME, Reading, Stored
+
+COLUMNS = "seq, device, system, quantity, representation, value, time"
+ROW_OVERHEAD = 100  # bytes of a row beyond its texts, about
+LONGEST_JSON = 16 * LONGEST_TEXT  # bytes; a letter of a text takes 12 at most
+
+
+def row_of(reading: Reading) -> tuple[Any, ...]:
+    """All of `COLUMNS` but the number.
+
+    Raises:
+        ValueError: the reading cannot be told.
+    """
+    value = json.dumps(reading.value, allow_nan=False)
+    return (reading.device, reading.system, reading.quantity, reading.representation, value, float(reading.time))
+
+
+def size_of(row: Sequence[Any]) -> int:
+    """How many bytes a row of `row_of` counts for."""
+    return ROW_OVERHEAD + sum(len(cell) for cell in row if isinstance(cell, str))
+
+
+def stored_of(row: Sequence[Any]) -> Stored | None:
+    """The reading of a row of `COLUMNS`; None when the row is damaged."""
+    seq, device, system, quantity, representation, value, time = row
+    if not (is_name(device) and is_name(quantity) and is_text(representation) and is_time(time)):
+        return None
+    if not isinstance(system, int) or not isinstance(value, str) or len(value) > LONGEST_JSON or not value.isascii():
+        return None
+    try:
+        found = json.loads(value)
+    except (ValueError, RecursionError):
+        return None
+    return Stored(seq, Reading(device, system, quantity, representation, found, time)) if is_value(found) else None
+
+
+def is_storable(reading: Reading) -> bool:
+    """Whether it comes back from its row."""
+    try:
+        return stored_of((0, *row_of(reading))) is not None
+    except ValueError:
+        return False
+
+
+def is_name(cell: Any) -> bool:
+    """Whether that is the name of a device or of a quantity."""
+    return isinstance(cell, str) and re.fullmatch(NAME, cell) is not None
+
+
+def is_text(cell: Any) -> bool:
+    """Whether that is a unit or a type; half a letter is none."""
+    return isinstance(cell, str) and len(cell) <= LONGEST_TEXT and cell.encode(errors="replace").decode() == cell
+
+
+def is_time(cell: Any) -> bool:
+    """Whether that is a moment."""
+    return isinstance(cell, float) and math.isfinite(cell)
+
+
+def is_value(found: Any) -> bool:
+    """Whether that is a value, of what JSON can say."""
+    return isinstance(found, str) or all(map(is_number, found if isinstance(found, list) else [found]))
+
+
+def is_number(found: Any) -> bool:
+    """Whether that is a finite number, true or false."""
+    return isinstance(found, float) and math.isfinite(found) or isinstance(found, int) and abs(found) < 2**64

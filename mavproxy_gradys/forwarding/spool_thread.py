@@ -1,0 +1,282 @@
+"""The spool seen from the asyncio thread: it blocks nobody, and readings outlast a disk that is full for a while."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import sqlite3
+from collections import deque
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import TypeVar
+
+from mavproxy_gradys.errors import NotStored
+from mavproxy_gradys.forwarding.readings import Reading, Stored
+from mavproxy_gradys.forwarding.sink_cursor import Owed
+from mavproxy_gradys.forwarding.spool import Spool, uptime
+from mavproxy_gradys.forwarding.spool_rows import is_storable
+from mavproxy_gradys.net.outage_log import Defects, Drops, Outage
+from mavproxy_gradys.tasks import begin
+from mavproxy_uavapi.core.timeout import wait_with_timeout
+
+T = TypeVar("T")
+log = logging.getLogger("gradys.spool")
+
+COMMIT_EVERY = 0.5  # s that sampled readings wait for one transaction
+TRIM_EVERY = 10.0  # s
+HELD = 5000  # sampled readings held in memory while the disk takes none; then the oldest are dropped
+
+
+class Keeper:
+    """Keeps readings; all methods belong to the asyncio thread, all work on the disk is done in another.
+
+    Attributes:
+        count: readings in the spool; None until it was opened.
+        problem: why the spool takes nothing just now; empty when it does.
+        set_aside: corrupt files that were replaced.
+        dropped: readings that were dropped, by cause: `size`, `age`, `disk`, `damage` (of the
+            file; set aside in it), `value` (none that can be told).
+
+    Args:
+        make: opens the spool; may raise NotStored.
+        clock: uptime (s), the spool's own.
+    """
+
+    def __init__(self, make: Callable[[], Spool], clock: Callable[[], float] = uptime) -> None:
+        self._make = make
+        self._clock = clock
+        self._spool: Spool | None = None
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="gradys-spool")
+        self._waiting: deque[Reading] = deque()
+        self._in_hand = 0  # readings that the other thread is writing
+        self._owed: dict[str, Owed] = {}
+        self._writer: asyncio.Task[None] | None = None
+        self._stopping = asyncio.Event()
+        self._closed = False
+        self._outage = Outage(log, "the spool fails", "the spool works again")
+        self._defects = Defects("the spool")
+        self._drops = Drops(log, clock)
+        self._oldest_since: float | None = None
+        self.count: int | None = None
+        self.problem = ""
+        self.set_aside: list[Path] = []
+        self.dropped: dict[str, int] = {}
+
+    def start(self, sinks: Sequence[str]) -> None:
+        """Begin to open the spool for these sinks; until it is open `problem` says why, and it is tried again."""
+        self._owed = {sink: Owed() for sink in sinks}
+        self.problem = "it is being opened"
+        self._writer = begin(self._write(), "the spool")
+
+    async def stop(self) -> None:
+        """Keep what still waits, and close the file; what the disk does not take is `left`."""
+        self._stopping.set()  # not cancelled: a transaction in flight must not be forgotten
+        try:
+            if self._writer is not None:
+                await asyncio.gather(self._writer, return_exceptions=True)
+            await self.save()
+        finally:
+            self._closed = True
+            closing = self._thread.submit(self._close)  # also when nobody waits for it any more
+            self._thread.shutdown(wait=False)
+        await asyncio.wrap_future(closing)
+        self._thread.shutdown()  # it has nothing left to do
+        self._drops.tell(self.dropped, at_once=True)
+
+    @property
+    def left(self) -> list[Reading]:
+        """The readings that the disk did not take."""
+        return list(self._waiting)
+
+    # -- in -----------------------------------------------------------------------------------------------
+
+    def put(self, reading: Reading) -> None:
+        """Take a sampled reading; it is on the disk within COMMIT_EVERY."""
+        if not is_storable(reading):
+            self._count_drop("value")
+            return
+        self._waiting.append(reading)
+        self._drop_excess()
+
+    def _drop_excess(self) -> None:
+        while len(self._waiting) > HELD:
+            self._waiting.popleft()
+            self._count_drop("disk")
+
+    async def keep(self, readings: Sequence[Reading]) -> list[int]:
+        """Take readings; their sequence numbers, when they are on the disk.
+
+        Raises:
+            NotStored: the disk took none of them.
+        """
+        numbers = await self._do(lambda spool: spool.append(readings))
+        self._tell()
+        return numbers
+
+    async def _write(self) -> None:
+        with contextlib.suppress(NotStored):  # `problem` has it; the readings wait for the next time
+            await self._do(lambda spool: None, trim=True)
+        trimmed = self._clock()
+        while not self._stopping.is_set():
+            with contextlib.suppress(asyncio.TimeoutError):
+                await wait_with_timeout(COMMIT_EVERY, self._stopping.wait())
+            with contextlib.suppress(NotStored):
+                await self._commit()
+                if self._clock() - trimmed >= TRIM_EVERY:
+                    trimmed = self._clock()
+                    await self._do(lambda spool: None, trim=True)
+            self._drops.tell(self.dropped)
+
+    async def save(self) -> None:
+        """Write what waits now, if the disk takes it."""
+        with contextlib.suppress(NotStored):  # `problem` has it
+            await self._commit()
+
+    async def _commit(self) -> None:
+        if not self._waiting:
+            return
+        readings = [self._waiting.popleft() for _ in range(len(self._waiting))]
+        self._in_hand += len(readings)
+        try:
+            await self._do(lambda spool: spool.append(readings))
+        except BaseException:
+            self._waiting.extendleft(reversed(readings))
+            self._drop_excess()  # others may have come meanwhile
+            raise
+        finally:
+            self._in_hand -= len(readings)
+        self._tell()
+
+    def _tell(self) -> None:
+        for owed in self._owed.values():
+            owed.news.set()
+
+    # -- out ----------------------------------------------------------------------------------------------
+
+    async def batch(self, sink: str, limit: int) -> list[Stored]:
+        """The oldest readings that a sink has not acknowledged; waits until there are some.
+
+        Raises:
+            NotStored: the file cannot be read.
+        """
+        owed = self._owed[sink]
+        while True:
+            owed.news.clear()
+            found = await self._batch(sink, owed, limit)
+            if found:
+                return found
+            with contextlib.suppress(asyncio.TimeoutError):
+                await wait_with_timeout(TRIM_EVERY, owed.news.wait())
+
+    async def _batch(self, sink: str, owed: Owed, limit: int) -> list[Stored]:
+        if owed.unnoted:
+            await self._note(sink, owed, set())
+        found = await self._do(lambda spool: spool.batch(sink, owed.after, limit + owed.passed_over))
+        return owed.choose(found, limit)
+
+    async def acknowledge(self, sink: str, batch: Sequence[Stored], numbers: set[int]) -> None:
+        """Remove what a sink has acknowledged: those of `batch` that are in `numbers`, and no others."""
+        owed, taken = self._owed[sink], {stored.seq for stored in batch} & numbers
+        owed.take(batch, taken)
+        await self._note(sink, owed, taken)
+
+    async def _note(self, sink: str, owed: Owed, numbers: set[int]) -> None:
+        owed.unnoted |= numbers  # they are not sent again while we remember, also on a full disk
+        noted = sorted(owed.unnoted)
+        with contextlib.suppress(NotStored):
+            await self._do(lambda spool: spool.acknowledge(sink, noted))
+            owed.unnoted.difference_update(noted)
+
+    def put_last(self, sink: str, refused: Stored) -> None:
+        """Have a reading that a sink refuses by itself sent to it when there is nothing else."""
+        self._owed[sink].put_last(refused.seq)
+
+    def flush(self) -> None:
+        """Have waiting senders look at once."""
+        self._tell()
+
+    # -- the other thread ---------------------------------------------------------------------------------
+
+    async def _do(self, work: Callable[[Spool], T], trim: bool = False) -> T:
+        """Do `work` on the spool in the other thread, opening it if need be.
+
+        Raises:
+            NotStored: it failed; `problem` says why until something succeeds.
+        """
+        if self._closed:
+            raise NotStored("gradys is stopping")
+        try:
+            result, self.problem = await asyncio.get_running_loop().run_in_executor(
+                self._thread, self._work, work, trim
+            )
+        except NotStored as error:
+            self.problem = str(error)
+            self._outage.now(self.problem)
+            raise
+        except Exception as error:
+            self._defects.tell(error)
+            self.problem = f"{type(error).__name__}: {error}"
+            raise NotStored(self.problem) from error
+        self._outage.now(self.problem)
+        return result
+
+    def _work(self, work: Callable[[Spool], T], trim: bool) -> tuple[T, str]:
+        """The outcome, and what is wrong although it is done."""
+        spool = self._spool or self._open()
+        try:
+            result = work(spool)
+        except (sqlite3.OperationalError, sqlite3.IntegrityError) as error:
+            raise NotStored(f"{spool.path}: {error}") from error
+        except sqlite3.DatabaseError as error:  # corrupt: the next opening sets the file aside
+            self._close()
+            raise NotStored(f"{spool.path}: {error}") from error
+        try:
+            if trim or spool.damaged or spool.size > spool.largest:
+                spool.trim()
+            self._look(spool)
+        except sqlite3.Error as error:
+            return result, f"{spool.path}: {error}"
+        return result, ""
+
+    def _open(self) -> Spool:
+        if self._closed:
+            raise NotStored("gradys is stopping")
+        spool = self._make()
+        if spool.set_aside is not None:
+            self.set_aside.append(spool.set_aside)
+            log.warning("the file of the readings was corrupt; it was set aside: %s", spool.set_aside)
+        self._drops.known(spool.dropped)
+        try:
+            spool.use_sinks(list(self._owed))
+        except sqlite3.Error as error:
+            spool.close()
+            raise NotStored(f"{spool.path}: {error}") from error
+        for owed in self._owed.values():
+            owed.forget()
+        self._spool = spool
+        return spool
+
+    def _close(self) -> None:
+        spool, self._spool = self._spool, None
+        if spool is not None:
+            spool.close()
+
+    def _look(self, spool: Spool) -> None:
+        self.count = spool.count
+        self.dropped.update(spool.dropped)
+        self._oldest_since = spool.oldest_since()
+
+    def _count_drop(self, cause: str) -> None:
+        self.dropped[cause] = self.dropped.get(cause, 0) + 1
+
+    @property
+    def waiting(self) -> int:
+        """Readings that are not on the disk yet."""
+        return len(self._waiting) + self._in_hand
+
+    @property
+    def oldest_age(self) -> float | None:
+        """Age (s) of the oldest reading that not every sink has acknowledged; None when there is none."""
+        return None if self._oldest_since is None else max(self._clock() - self._oldest_since, 0.0)

@@ -1,0 +1,1 @@
+"""Addresses, names, HTTP, and how often to try."""

@@ -1,0 +1,75 @@
+"""State -> the fields of the form that the ground station takes. Pure: the clock is an argument.
+
+Field names, order and units are the ground station's (http-contract, "The Gradys ground station"): lat and
+lng in degrees, alt in m above home, speeds in m/s, heading in degrees. The station answers 500 to a field that
+is no number, and passes NaN on as invalid JSON: what is unknown is left out, and without a position nothing is
+said at all.
+"""
+
+from __future__ import annotations
+
+import math
+from urllib.parse import urlencode
+
+from mavproxy_gradys.position import Position
+from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
+
+DEVICE = "uav"
+LOCATION = 102  # the station's number for "where a vehicle is"
+SPEED_DIGITS = 3  # more than a float of the link carries at these magnitudes
+
+
+def form(
+    state: VehicleState, where: Position, now: float, *, seq: int, ip: str, ready: bool, max_age: float
+) -> dict[str, str]:
+    """The form's fields as text, in the order in which the station's own clients send them.
+
+    Args:
+        state, now, max_age: as for `position_of`.
+        where: what `position_of` gave.
+        seq: number of this update; it advances when the station has acknowledged.
+        ip: HOST:PORT/ of the API.
+        ready: whether the vehicle is ready to be armed.
+    """
+    return {
+        "id": str(state.system),
+        "lat": str(where.lat),
+        "lng": str(where.lng),
+        "alt": str(where.alt),
+        **motion(state, now, max_age),
+        **battery(state, now, max_age),
+        "ready_to_arm": str(ready),
+        "device": DEVICE,
+        "type": str(LOCATION),
+        "seq": str(seq),
+        "ip": ip,
+    }
+
+
+def motion(state: VehicleState, now: float, max_age: float) -> dict[str, str]:
+    """ground_speed, air_speed, heading by VFR_HUD; without it, what GLOBAL_POSITION_INT knows of them."""
+    age = state.age("VFR_HUD", now)
+    if age is not None and age <= max_age:
+        hud = state.messages["VFR_HUD"].message
+        speeds = {"ground_speed": hud.groundspeed, "air_speed": hud.airspeed}
+        known = {name: str(round(speed, SPEED_DIGITS)) for name, speed in speeds.items() if math.isfinite(speed)}
+        return {**known, "heading": str(hud.heading)}
+    told = state.messages["GLOBAL_POSITION_INT"].message
+    found = {"ground_speed": str(round(math.hypot(told.vx, told.vy) / 100, SPEED_DIGITS))}
+    if told.hdg != 65535:
+        found["heading"] = str(round(told.hdg / 100))
+    return found
+
+
+def battery(state: VehicleState, now: float, max_age: float) -> dict[str, str]:
+    """battery_percent by SYS_STATUS; none where the autopilot does not measure it, which MAVLink tells as -1."""
+    age = state.age("SYS_STATUS", now)
+    if age is None or age > max_age:
+        return {}
+    left = state.messages["SYS_STATUS"].message.battery_remaining
+    return {} if left < 0 else {"battery_percent": str(left)}
+
+
+def encode(fields: dict[str, str]) -> bytes:
+    """The body, application/x-www-form-urlencoded."""
+    return urlencode(fields).encode("ascii")

@@ -1,0 +1,185 @@
+"""The push: one task for each ground station, which tells it where every vehicle is."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from typing import Any
+
+from mavproxy_gradys.errors import NotDelivered
+from mavproxy_gradys.net.addresses import Station, api_note, ip_field, own_address
+from mavproxy_gradys.net.http_client import FORM, Poster
+from mavproxy_gradys.net.outage_log import Outage
+from mavproxy_gradys.net.resolver import Names
+from mavproxy_gradys.net.schedule import Cadence
+from mavproxy_gradys.position import Position, position_of
+from mavproxy_gradys.push import position_update
+from mavproxy_gradys.push.statistics import StationTally, VehicleTally
+from mavproxy_gradys.settings import Settings
+from mavproxy_uavapi.core.errors import Unavailable
+from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
+from mavproxy_uavapi.core.timeout import wait_with_timeout
+
+DROPPED = 101  # the station's `type` when it received an update but no browser took it; 103 when one did
+log = logging.getLogger("gradys.push")
+ADDRESS_KEPT = 30.0  # s for which our own address is not looked up again
+
+
+class Pusher:
+    """Tells one station where the vehicles are; belongs to the asyncio thread.
+
+    Args:
+        station: whom to tell.
+        host: the vehicles, and the clock.
+        settings: the snapshot in force.
+        tally: what became of it.
+        poster: how it is told; closed at the end.
+    """
+
+    def __init__(self, station: Station, host: Host, settings: Settings, tally: StationTally, poster: Poster) -> None:
+        self.station = station
+        self.tally = tally
+        self._host = host
+        self._settings = settings
+        self._poster = poster
+        self._in_flight: dict[int, asyncio.Task[None]] = {}
+        self._names = Names()
+        self._outage = Outage(log, f"{station.url} does not answer", f"{station.url} answers again")
+        self._refusals: dict[int, Outage] = {}
+        self._own = ""
+        self._own_at = -ADDRESS_KEPT
+
+    async def run(self) -> None:
+        """Push at a fixed cadence, until cancelled."""
+        loop = asyncio.get_running_loop()
+        cadence = Cadence(self._settings.period, loop.time())
+        try:
+            while True:
+                await asyncio.sleep(cadence.wait(loop.time()))
+                self.turn()
+        finally:
+            for task in list(self._in_flight.values()):
+                task.cancel()
+            await asyncio.gather(*self._in_flight.values(), return_exceptions=True)
+            await self.close()
+
+    async def close(self) -> None:
+        """Close the connections."""
+        await self._poster.close()
+
+    def turn(self) -> None:
+        """Begin an update for every vehicle that has one to tell.
+
+        While a station does not answer one vehicle's update is enough to find out that it is back.
+        """
+        now = self._host.clock()
+        if self.tally.backoff.waits(now):
+            return
+        for system, state in list(self._host.fleet.vehicles.items()):
+            vehicle = self.tally.vehicle(system)
+            if system in self._in_flight or vehicle.backoff.waits(now):
+                continue
+            if self.tally.backoff.failures and self._in_flight:
+                return
+            if self._where(state, vehicle) is not None:
+                self._begin(state, vehicle)
+
+    def _begin(self, state: VehicleState, vehicle: VehicleTally) -> None:
+        task = asyncio.get_running_loop().create_task(self._push(state, vehicle))
+        self._in_flight[state.system] = task
+        task.add_done_callback(lambda _: self._in_flight.pop(state.system, None))
+
+    def _where(self, state: VehicleState, vehicle: VehicleTally) -> Position | None:
+        """Where it is now; None when that is unknown or too old, and then the tally says why."""
+        try:
+            where = position_of(
+                state,
+                self._host.clock(),
+                max_age=self._settings.max_age,
+                link_timeout=self._host.link_watch.timeout,
+                has_position=self._host.registry.find(state.system).has_position,
+            )
+        except Unavailable as nothing:
+            vehicle.withhold(str(nothing))
+            return None
+        vehicle.why_not = ""
+        return where
+
+    async def _push(self, state: VehicleState, vehicle: VehicleTally) -> None:
+        try:
+            self.tally.ip = await self._ip()
+            where = self._where(state, vehicle)  # finding our own address may have taken its time
+            if where is None:
+                return
+            body = position_update.encode(self._form(state, vehicle, where))
+            vehicle.sent += 1
+            started = self._host.clock()
+            answer = await self._poster.post(self.station.update_url, body, FORM)
+        except NotDelivered as error:
+            self._failed(state.system, vehicle, error)
+            return
+        now = self._host.clock()
+        self.tally.round_trips.add(now - started)
+        self.tally.backoff.succeeded()
+        vehicle.answered(was_dropped(answer), now)
+        self._outage.now("")
+        self._refusal(state.system).now("")
+
+    def _refusal(self, system: int) -> Outage:
+        began, ended = (
+            f"{self.station.url} refuses vehicle {system}",
+            f"{self.station.url} takes vehicle {system} again",
+        )
+        return self._refusals.setdefault(system, Outage(log, began, ended))
+
+    def _failed(self, system: int, vehicle: VehicleTally, error: NotDelivered) -> None:
+        now = self._host.clock()
+        vehicle.refused(str(error))
+        self.tally.failed(str(error), now)
+        self._outage.now("" if error.reached else str(error))
+        if error.reached:
+            self._refusal(system).now(str(error))
+            self.tally.backoff.succeeded()
+            vehicle.backoff.failed(now)
+        elif not self.tally.backoff.waits(now):  # several updates that fail together are one failure
+            self.tally.backoff.failed(now)
+            self._own_at = -ADDRESS_KEPT
+
+    def _form(self, state: VehicleState, vehicle: VehicleTally, where: Position) -> dict[str, str]:
+        return position_update.form(
+            state,
+            where,
+            self._host.clock(),
+            seq=vehicle.seq,
+            ip=self.tally.ip,
+            ready=self._host.registry.find(state.system).is_ready_to_arm,
+            max_age=self._settings.max_age,
+        )
+
+    async def _ip(self) -> str:
+        """The form's `ip`.
+
+        Raises:
+            NotDelivered: there is no way to the station.
+        """
+        api: tuple[str, int] | None = getattr(self._host, "api_address", None)
+        self.tally.note = api_note(api, self.station.host)
+        if self._settings.ip:
+            return ip_field(self._settings.ip, "", api)
+        now = self._host.clock()
+        if now - self._own_at >= ADDRESS_KEPT:
+            look_up = own_address(self._names, self.station.host, self.station.port)
+            try:
+                self._own = await wait_with_timeout(self._settings.timeout, look_up)
+            except asyncio.TimeoutError as error:
+                raise NotDelivered(f"no answer about the name {self.station.host}") from error
+            except OSError as error:
+                raise NotDelivered(f"no way to {self.station.host}: {error.strerror or error}") from error
+            self._own_at = now
+        return ip_field("", self._own, api)
+
+
+def was_dropped(answer: Any) -> bool:
+    """Whether the station's answer says that it received the update but dropped it."""
+    return isinstance(answer, dict) and str(answer.get("type")) == str(DROPPED)

@@ -1,0 +1,1 @@
+"""Tracks: recorded, read, and flown."""

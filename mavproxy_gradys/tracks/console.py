@@ -1,0 +1,163 @@
+"""`gradys track …` at the prompt: its words, and what it shows. Pure, but for `TrackConsole`."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+from collections.abc import Callable, Coroutine, Mapping
+from pathlib import Path
+from typing import Any, NoReturn
+
+from mavproxy_gradys.tracks.flight import (
+    HIGHEST_TAKEOFF,
+    LARGEST_REACH,
+    LOWEST_TRANSIT,
+    REACH,
+    TRANSIT,
+    VERB,
+    flight_of,
+)
+from mavproxy_gradys.tracks.formats import FORMATS, GROUND, Waypoint, places_of, style_of
+from mavproxy_gradys.tracks.service import Tracking
+from mavproxy_uavapi.core.background import BackgroundCommands
+from mavproxy_uavapi.core.errors import BadRequest
+from mavproxy_uavapi.core.host import Host
+
+HELP = """\
+gradys track                            what is recorded, and what is flown
+gradys track record FILE [SECONDS=5] [--format text|tuple|gpx] [--latest FILE] [--sysid N]
+gradys track stop                       end the recording
+gradys track fly FILE [--ground M] [--reach M] [--transit M] [--sysid N]
+                                        take off, fly through the track, return and land"""
+
+
+class Words(argparse.ArgumentParser):
+    """A parser that neither prints nor ends the program."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raises BadRequest."""
+        raise BadRequest(f"{message}\n{HELP}")
+
+
+def between(low: float, high: float) -> Callable[[str], float]:
+    """What reads an option's number, which must lie between both."""
+
+    def number(text: str) -> float:
+        if not low <= float(text) <= high:
+            raise argparse.ArgumentTypeError(f"{text} is not from {low:g} to {high:g}")
+        return float(text)
+
+    return number
+
+
+def words() -> argparse.ArgumentParser:
+    """What may follow `gradys track`."""
+    made = Words(prog="gradys track", add_help=False)
+    verbs = made.add_subparsers(dest="verb", parser_class=Words)
+    record = verbs.add_parser("record", add_help=False)
+    record.add_argument("file", type=Path)
+    record.add_argument("seconds", type=float, nargs="?", default=5.0)
+    record.add_argument("--format", choices=FORMATS)
+    record.add_argument("--latest", type=Path)
+    record.add_argument("--sysid", type=int, default=0)
+    verbs.add_parser("stop", add_help=False)
+    fly = verbs.add_parser("fly", add_help=False)
+    fly.add_argument("file", type=Path)
+    fly.add_argument("--ground", type=between(*GROUND))
+    fly.add_argument("--reach", type=between(1.0, LARGEST_REACH), default=REACH)
+    fly.add_argument("--transit", type=between(LOWEST_TRANSIT, HIGHEST_TAKEOFF), default=TRANSIT)
+    fly.add_argument("--sysid", type=int, default=0)
+    verbs.add_parser("help", add_help=False)
+    return made
+
+
+class TrackConsole:
+    """The command. MAVProxy does not wait for it: what comes of it is printed when it comes.
+
+    Args:
+        host: the vehicles, and the way into the main loop.
+        tracks: what is recorded and flown.
+    """
+
+    def __init__(self, host: Host, tracks: Tracking) -> None:
+        self._host = host
+        self._tracks = tracks
+        self._background = BackgroundCommands(host, "gradys")
+
+    def command(self, args: list[str]) -> None:
+        """What was typed. Main loop only."""
+        try:
+            given = words().parse_args(args)
+            if given.verb == "record" and not 0.1 <= given.seconds <= 86400:
+                raise BadRequest("SECONDS are from 0.1 to 86400")
+        except BadRequest as error:
+            print(f"gradys: {error}")
+            return
+        if given.verb == "help":
+            print(HELP)
+            return
+        verbs: dict[str | None, Callable[[argparse.Namespace], Coroutine[Any, Any, str]]] = {
+            None: self._show,
+            "record": self._record,
+            "stop": self._stop,
+            "fly": self._fly,
+        }
+        self._background.send(lambda: verbs[given.verb](given))
+
+    async def _show(self, _given: argparse.Namespace) -> str:
+        return shown(self._tracks.report())
+
+    async def _record(self, given: argparse.Namespace) -> str:
+        file = given.file.expanduser()
+        latest = None if given.latest is None else given.latest.expanduser()
+        style = given.format or style_of(file.name)
+        recorder = await self._tracks.record(
+            file, style=style, period=given.seconds, latest=latest, system=given.sysid
+        )
+        return f"recording vehicle {recorder.system} every {given.seconds:g} s into {file} ({style})"
+
+    async def _stop(self, _given: argparse.Namespace) -> str:
+        recorder = await self._tracks.stop_recording()
+        return "nothing is recorded" if recorder is None else f"{recorder.written} readings are in {recorder.file}"
+
+    async def _fly(self, given: argparse.Namespace) -> str:
+        vehicle = self._host.registry.commandable(given.sysid)
+        places = await asyncio.to_thread(read, given.file.expanduser(), given.ground)
+        flight = flight_of(vehicle, places, given.reach, given.transit)
+        request = {**{name: str(value) for name, value in vars(given).items()}, "digest": hash(tuple(places))}
+        job = self._host.jobs.begin(vehicle, VERB, request, lambda job: self._tracks.fly(flight, job))
+        self._background.say(
+            f"flying {len(places)} legs with vehicle {vehicle.state.system}; `gradys track` tells how far it is"
+        )
+        return await job.outcome()
+
+
+def read(file: Path, ground: float | None) -> list[Waypoint]:
+    """The places that a file's track leads through.
+
+    Raises:
+        BadRequest: it cannot be read.
+        Invalid: as `places_of`.
+    """
+    try:
+        return places_of(file.read_text(encoding="utf-8"), ground)
+    except (OSError, UnicodeDecodeError) as error:
+        raise BadRequest(f"{file}: {error}") from error
+
+
+def shown(report: Mapping[str, Any]) -> str:
+    """What is recorded and flown, in a few lines."""
+    recording = report["recording"]
+    lines = []
+    if recording is not None:
+        latest = f", the latest in {recording['latest']}" if recording["latest"] else ""
+        lines.append(
+            f"recording vehicle {recording['vehicle']} into {recording['file']}: {recording['written']}{latest}"
+        )
+        if recording["problem"]:
+            lines.append(f"  {recording['problem']}")
+    for flight in report["flights"]:
+        to_go = f", {flight['distance_to_go']:.0f} m to go" if "distance_to_go" in flight else ""
+        how = flight["error"] or f"{flight['stage']}, leg {flight['leg']} of {flight['legs']}{to_go}"
+        lines.append(f"track flight {flight['state']}, vehicle {flight['vehicle']}: {how}")
+    return "\n".join(lines) or "no track is recorded or flown"

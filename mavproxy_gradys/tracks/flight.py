@@ -1,0 +1,155 @@
+"""Flying a track: a job made of the copter's own verbs, and so by the rules of the air."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from mavproxy_gradys.tracks.formats import Waypoint
+from mavproxy_uavapi.core.errors import Invalid, NotSupported
+from mavproxy_uavapi.core.vehicle.copter import Copter
+from mavproxy_uavapi.core.vehicle.geodesy import offset
+from mavproxy_uavapi.core.vehicle.jobs import Job
+from mavproxy_uavapi.core.vehicle.messages import GlobalTarget
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+
+VERB = "/mission/fly-track"
+TOLERANCE = 1.0  # m
+REACH = 10_000.0  # m from here within which a track must lie
+LARGEST_REACH = 100_000.0  # m
+TRANSIT = 10.0  # m above home, at least, on the way to a first place that is not near
+LOWEST_TRANSIT = 2.0  # m
+HIGHEST_TAKEOFF = 500.0  # m above home, as for `takeoff`
+NEAR = 5.0  # m
+
+
+class Flight:
+    """A track that is flown.
+
+    Attributes:
+        leg: number of the leg that is flown, from 1; 0 before the first.
+        stage: `arming`, `taking off`, `approaching`, `flying`, `returning`, `done`.
+
+    Args:
+        copter: who flies.
+        places: where to.
+        transit: m above home, at least, on the way to a first place that is not near.
+    """
+
+    def __init__(self, copter: Copter, places: Sequence[Waypoint], transit: float = TRANSIT) -> None:
+        self.copter = copter
+        self.places = list(places)
+        self.transit = transit
+        self.leg = 0
+        self.stage = "arming"
+        self.job: Job | None = None
+
+    async def fly(self, job: Job) -> str:
+        """Take off if need be, fly every leg, return and land; the result's text.
+
+        Raises:
+            UavApiError: as the verbs `arm`, `takeoff`, `go_to` and `rtl`; nothing more is sent then.
+        """
+        self.job = job
+        self._enter("arming")
+        if self.copter.state.armed is False or self.copter.state.landed:
+            await self.copter.arm(job)
+            self._enter("taking off")
+            await self.copter.takeoff(job, min(self._height_there(), HIGHEST_TAKEOFF))
+        await self._approach(job)
+        for place in self.places:
+            self.leg += 1
+            self._enter("flying")
+            await self._go_to(job, place.lat, place.lon, place.alt)
+        self._enter("returning")
+        await self.copter.rtl(job)
+        self._enter("done")
+        return self.result
+
+    @property
+    def result(self) -> str:
+        """The text of its success."""
+        return f"Flew {len(self.places)} legs and landed at home"
+
+    async def _approach(self, job: Job) -> None:
+        """Fly above the first place; a recording begins on the ground, and the way there may lead through trees."""
+        if self._is_near():
+            return
+        self._enter("approaching")
+        here, first = self.copter.fresh("GLOBAL_POSITION_INT"), self.places[0]
+        height = max(self._height_there(), self.copter.height)
+        if height - self.copter.height > TOLERANCE:
+            await self._go_to(job, here.lat / 1e7, here.lon / 1e7, height)
+        await self._go_to(job, first.lat, first.lon, height)
+
+    async def _go_to(self, job: Job, lat: float, lon: float, alt: float) -> None:
+        await self.copter.go_to(job, GlobalTarget(lat, lon, alt), wait=True, tolerance=TOLERANCE)
+
+    def _height_there(self) -> float:
+        """Height (m above home) of the way to the first place."""
+        first = self.places[0].alt
+        return first if self._is_near() else max(first, self.transit)
+
+    def _is_near(self) -> bool:
+        return away(self.copter, self.places[0]) <= NEAR
+
+    def _enter(self, stage: str) -> None:
+        self.stage = stage
+        if self.job is not None:
+            self.job.stage = {"stage": stage, "leg": self.leg, "legs": len(self.places)}
+
+    @property
+    def running(self) -> bool:
+        """Whether it is under way."""
+        return self.job is not None and self.job.running
+
+    def report(self) -> dict[str, Any]:
+        """What the status says."""
+        job = self.job
+        state = "waiting" if job is None else "running" if job.running else "failed" if job.error else "done"
+        return {
+            "vehicle": self.copter.state.system,
+            "job": None if job is None else job.id,
+            "state": state,
+            "error": str(job.error) if job is not None and job.error else None,
+            "stage": self.stage,
+            "leg": self.leg,
+            "legs": len(self.places),
+            **({} if job is None else job.progress),
+        }
+
+
+def flight_of(vehicle: Vehicle, places: Sequence[Waypoint], reach: float, transit: float = TRANSIT) -> Flight:
+    """A flight through those places, looked at before anything is sent.
+
+    Args:
+        vehicle: who flies.
+        places: where to.
+        reach: m from here within which the places must lie.
+        transit: as for `Flight`.
+
+    Raises:
+        NotSupported: the vehicle is no copter.
+        Invalid: a place lies farther away.
+        Stale: the vehicle does not tell where it is.
+    """
+    if not isinstance(vehicle, Copter):
+        raise NotSupported(f"a {vehicle.kind} does not fly tracks")
+    for number, place in enumerate(places, 1):
+        metres = away(vehicle, place)
+        if not metres <= reach:
+            raise Invalid(
+                f"waypoint {number} of the track is {metres:.0f} m away; `reach` is {reach:g} m", "body", "track"
+            )
+    return Flight(vehicle, places, transit)
+
+
+def away(vehicle: Vehicle, place: Waypoint) -> float:
+    """Metres from a vehicle to a place, over the ground.
+
+    Raises:
+        Stale: the vehicle does not tell where it is.
+    """
+    here = vehicle.fresh("GLOBAL_POSITION_INT")
+    return math.hypot(*offset(here.lat / 1e7, here.lon / 1e7, place.lat, place.lon))

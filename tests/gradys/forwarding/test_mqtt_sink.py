@@ -1,0 +1,145 @@
+"""The topics, and brokers that are too slow; end_to_end/test_gradys_mqtt.py has a real one."""
+
+from __future__ import annotations
+
+import asyncio
+from types import SimpleNamespace
+from typing import Any
+
+import aiomqtt
+import pytest
+
+from mavproxy_gradys.errors import NotDelivered
+from mavproxy_gradys.forwarding.mqtt_sink import MqttSink, status_topic, topic_of
+from mavproxy_gradys.forwarding.readings import Reading, Stored
+
+ALT = Reading("uav-7", 7, "alt", "m", 1.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    "template,topic,status",
+    [
+        ("fleet/{sysid}/{quantity}", "fleet/7/alt", "fleet/7/status"),
+        ("{device}/{quantity}/raw", "uav-7/alt/raw", "uav-7/status/raw"),
+        ("everything", "everything", "everything/status"),
+    ],
+)
+def test_topics(template: str, topic: str, status: str) -> None:
+    assert topic_of(template, ALT) == topic
+    assert status_topic(template, ALT) == status
+
+
+class Broker:
+    """In the place of aiomqtt's clients: makes them, and answers as slowly as a test wants.
+
+    Attributes:
+        connects, publishes: s that each takes.
+        refuses: topic that it refuses.
+        made: how many clients there were.
+        open: connections that nobody has closed.
+        said: (topic, retained) of what was published.
+    """
+
+    def __init__(self) -> None:
+        self.connects = self.publishes = 0.0
+        self.refuses = ""
+        self.made = self.open = 0
+        self.said: list[tuple[str, bool]] = []
+
+    def client(self, *_: Any, **__: Any) -> Client:
+        self.made += 1
+        return Client(self)
+
+
+class Client:
+    def __init__(self, broker: Broker) -> None:
+        self._broker = broker
+        self._client = SimpleNamespace(socket=lambda: None)
+
+    async def __aenter__(self) -> Client:
+        await asyncio.sleep(self._broker.connects)
+        self._broker.open += 1
+        return self
+
+    async def __aexit__(self, *_: Any) -> None:
+        self._broker.open -= 1
+
+    async def publish(self, topic: str, _payload: Any, qos: int, retain: bool) -> None:
+        await asyncio.sleep(self._broker.publishes)
+        if topic == self._broker.refuses:
+            raise aiomqtt.MqttError("refused")
+        self._broker.said.append((topic, retain))
+
+
+@pytest.fixture
+def broker(monkeypatch: pytest.MonkeyPatch) -> Broker:
+    broker = Broker()
+    monkeypatch.setattr(aiomqtt, "Client", broker.client)
+    return broker
+
+
+@pytest.fixture
+def sink(loop: Any) -> MqttSink:
+    return MqttSink("mqtt://127.0.0.1/fleet/{sysid}/{quantity}", 3.0, "")
+
+
+def sent(loop: Any, sink: MqttSink, *readings: Reading) -> Any:
+    batch = [Stored(number, reading) for number, reading in enumerate(readings or (ALT,), 1)]
+    return loop.run(sink.send(batch))
+
+
+def test_each_connection_says_online_and_closes_with_offline(loop: Any, sink: MqttSink, broker: Broker) -> None:
+    assert sent(loop, sink) == {1}
+    loop.run(sink.close())
+    assert broker.said == [("fleet/7/status", True), ("fleet/7/alt", False), ("fleet/7/status", True)]
+    assert broker.open == 0
+
+
+def test_only_where_a_vehicle_is_stays_with_the_broker(loop: Any, sink: MqttSink, broker: Broker) -> None:
+    sent(loop, sink, *(Reading(device, 7, "position", "", [1, 2, 3], 0.0) for device in ("uav-7", "buoy")))
+    assert sorted(broker.said[1:]) == [("fleet/7/position", False), ("fleet/7/position", True)]
+
+
+def test_a_connection_that_comes_too_late_is_closed_and_meanwhile_none_is_made(
+    loop: Any, sink: MqttSink, broker: Broker
+) -> None:
+    broker.connects = 20.0
+    began = loop.time()
+    for why in ("no answer within 3 s", "has not ended yet", "has not ended yet"):
+        with pytest.raises(NotDelivered, match=why):
+            sent(loop, sink)
+    assert (loop.time() - began, broker.made) == (pytest.approx(3.0), 1)
+    loop.pass_time(18)
+    assert broker.open == 0
+    broker.connects = 0.0
+    assert sent(loop, sink) == {1}
+    assert (broker.made, broker.open) == (2, 1)
+
+
+def test_who_is_cancelled_while_connecting_leaves_no_connection(loop: Any, sink: MqttSink, broker: Broker) -> None:
+    broker.connects = 2.0
+    sending = loop.create_task(sink.send([Stored(1, ALT)]))
+    loop.pass_time(1)
+    sending.cancel()
+    loop.pass_time(2)
+    assert (broker.made, broker.open) == (1, 0)
+    loop.run(sink.close())
+
+
+def test_a_connection_that_cannot_say_online_is_none(loop: Any, sink: MqttSink, broker: Broker) -> None:
+    broker.refuses = "fleet/7/status"
+    with pytest.raises(NotDelivered, match="refused"):
+        sent(loop, sink)
+    loop.settle()
+    assert broker.open == 0
+    broker.refuses = ""
+    assert sent(loop, sink) == {1}
+    assert broker.said[0] == ("fleet/7/status", True)
+
+
+def test_one_vehicle_finds_out_that_the_broker_is_not_there(loop: Any, sink: MqttSink, broker: Broker) -> None:
+    broker.connects = 20.0
+    with pytest.raises(NotDelivered):
+        sent(loop, sink, *(Reading(f"uav-{n}", n, "alt", "m", 1.0, 0.0) for n in range(1, 101)))
+    assert broker.made == 1
+    loop.pass_time(20)

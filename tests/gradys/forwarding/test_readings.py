@@ -1,0 +1,110 @@
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from mavproxy_gradys.forwarding.readings import Quantity, Sampler, parse_quantities, parse_quantity
+from mavproxy_uavapi.settings import SettingError
+
+ALT = parse_quantity("alt=GLOBAL_POSITION_INT.relative_alt*0.001@1[m]")
+
+
+def test_a_quantity_as_it_is_written() -> None:
+    assert Quantity("alt", "GLOBAL_POSITION_INT", "relative_alt", None, 0.001, 0.0, 1.0, "m") == ALT
+    cell = parse_quantity("cell1=BATTERY_STATUS[0].voltages[1]*1e-3-0.5@10[V, loaded]")
+    assert cell == Quantity("cell1", "BATTERY_STATUS[0]", "voltages", 1, 0.001, -0.5, 10.0, "V, loaded")
+    assert parse_quantity("kelvin=SCALED_PRESSURE.temperature*0.01+273.15").offset == 273.15
+    assert parse_quantity("position@2").period == 2.0
+
+
+def test_a_list_by_comma_semicolon_or_space() -> None:
+    text = (
+        "position@1, alt=GLOBAL_POSITION_INT.relative_alt*0.001[m, above home];v=SYS_STATUS.load hdg=VFR_HUD.heading"
+    )
+    assert [quantity.name for quantity in parse_quantities(text)] == ["position", "alt", "v", "hdg"]
+    assert parse_quantities("") == []
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "alt",
+        "alt=",
+        "alt=X",
+        "alt=X.y*",
+        "alt=X.y@0",
+        "alt=X.y@nan",
+        "a/b=X.y",
+        "a b",
+        "alt=X.y*1.2.3",
+        "alt=X.y*1e400",
+        "alt=X.y+1e400",
+        "alt=X.y,alt=X.z",
+    ],
+)
+def test_what_is_no_quantity_is_refused(text: str) -> None:
+    with pytest.raises(SettingError):
+        parse_quantities(text)
+
+
+def sample(sampler: Sampler, teller: Any, now: float) -> Any:
+    return sampler.sample(teller.state, now, 1_800_000_000.0, 5.0)
+
+
+def test_a_field_of_a_message_scaled_with_the_time_at_which_it_came(teller: Any, loop: Any) -> None:
+    reading = sample(Sampler(ALT), teller, loop.time() + 0.5)
+    assert (reading.quantity, reading.value, reading.representation) == ("alt", 20.123, "m")
+    assert (reading.device, reading.system, reading.time) == ("uav-10", 10, 1_799_999_999.5)
+
+
+def test_one_message_is_one_measurement(teller: Any, loop: Any) -> None:
+    sampler = Sampler(ALT)
+    assert sample(sampler, teller, loop.time())
+    assert sample(sampler, teller, loop.time() + 1) is None
+    assert "not come anew" in sampler.why_not[10]
+    loop.now += 2
+    teller.tell_all()
+    assert sample(sampler, teller, loop.time())
+    assert sampler.why_not == {} and sampler.taken == 2
+
+
+def test_old_and_missing_messages_are_no_measurement(teller: Any, loop: Any) -> None:
+    sampler = Sampler(ALT)
+    assert sample(sampler, teller, loop.time() + 6) is None
+    assert "6.0 s old" in sampler.why_not[10]
+    other = Sampler(parse_quantity("rpm=RPM.rpm1"))
+    assert sample(other, teller, loop.time()) is None
+    assert "has not come yet" in other.why_not[10]
+
+
+def test_what_is_no_number_is_no_measurement(teller: Any, loop: Any) -> None:
+    teller.tell("vfr_hud", airspeed=math.nan)
+    for text in ("a=VFR_HUD.airspeed", "b=VFR_HUD.nothing", "c=VFR_HUD.heading[3]"):
+        sampler = Sampler(parse_quantity(text))
+        assert sample(sampler, teller, loop.time()) is None
+        assert "no such number" in sampler.why_not[10]
+
+
+def test_what_scaling_makes_too_large_is_no_measurement(teller: Any, loop: Any) -> None:
+    sampler = Sampler(parse_quantity("a=VFR_HUD.heading*1e308"))
+    assert sample(sampler, teller, loop.time()) is None
+    assert "no such number" in sampler.why_not[10]
+
+
+def test_a_field_with_capitals(teller: Any, loop: Any) -> None:
+    teller.tell("power_status", Vcc=5012)
+    assert sample(Sampler(parse_quantity("vcc=POWER_STATUS.Vcc*0.001[V]")), teller, loop.time()).value == 5.012
+
+
+def test_a_message_of_another_component(host: Any, msg: Any, teller: Any, loop: Any) -> None:
+    host._receive(msg("distance_sensor", 10, 158, current_distance=250, quaternion=[0.0] * 4))
+    sampler = Sampler(parse_quantity("range=DISTANCE_SENSOR.current_distance*0.01[m]"))
+    assert sample(sampler, teller, loop.time()).value == 2.5
+
+
+def test_an_element_of_an_array(teller: Any, loop: Any) -> None:
+    teller.tell("battery_status", voltages=[4100, 4090] + [65535] * 8, voltages_ext=[0] * 4)
+    reading = sample(Sampler(parse_quantity("cell=BATTERY_STATUS.voltages[1]*0.001")), teller, loop.time())
+    assert reading.value == 4.09

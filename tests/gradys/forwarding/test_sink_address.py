@@ -1,0 +1,45 @@
+from __future__ import annotations
+
+import pytest
+
+from mavproxy_gradys.forwarding.sink_address import sink_address, sink_addresses
+from mavproxy_uavapi.settings import SettingError
+
+
+@pytest.mark.parametrize(
+    "text,shown",
+    [
+        ("http://host/x", "http://host/x"),
+        ("mqtt://me:s3cret@broker/x", "mqtt://me:***@broker/x"),
+        ("mqtts://me:s3cret@r/e@t", "mqtts://me:***@t"),  # rather too much than too little
+        ("mqtt://me:s3cret/x@broker/t", None),
+        ("http://host/x?key=s3cret#ack=status", "http://host/x?***#ack=status"),
+        ("https://me:s3cret@host:8443/x?key=s3cret", "https://me:***@host:8443/x?***"),
+    ],
+)
+def test_no_secret_is_shown_or_stored(text: str, shown: str | None) -> None:
+    try:
+        sink = sink_address(text)
+    except SettingError as error:
+        assert shown is None and "s3cret" not in str(error)
+        return
+    assert str(sink) == shown
+    assert "s3cret" not in sink.name and "s3cret" not in f"{sink.name}{sink}"
+
+
+def test_another_password_or_option_is_the_same_sink_and_anything_else_another_one() -> None:
+    same = {
+        sink_address(text).name
+        for text in ("http://h/r?k=1", "http://h/r?k=1#ack=status", "http://:p@h/r?k=1", "http://h:80/r?k=1")
+    }
+    others = {
+        sink_address(text).name
+        for text in ("https://h/r?k=1", "http://h/s?k=1", "http://h/r?k=2", "http://me@h/r?k=1", "http://h:81/r?k=1")
+    }
+    assert len(same) == 1 and len(others) == 5 and not same & others
+
+
+def test_one_that_is_named_twice_is_one_and_the_later_word_counts() -> None:
+    found = sink_addresses("http://h/r, mqtt://u:old@b/t, http://h/r#ack=status, mqtt://u:new@b/t")
+    assert [sink.url for sink in found] == ["http://h/r", "mqtt://u:new@b/t"]
+    assert found[0].status_counts

@@ -1,0 +1,54 @@
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from mavproxy_gradys.tracks.console import TrackConsole, shown, words
+from mavproxy_gradys.tracks.service import Tracking
+from mavproxy_uavapi.core.errors import BadRequest
+
+
+@pytest.mark.parametrize(
+    "option",
+    ["--ground nan", "--ground inf", "--ground 9001", "--ground -501", "--reach nan", "--reach inf", "--reach 0",
+     "--reach 100001", "--transit nan", "--transit 501", "--ground x"],
+)  # fmt: skip
+def test_a_number_that_cannot_be_flown_by_is_refused(option: str) -> None:
+    with pytest.raises(BadRequest):
+        words().parse_args(["fly", "a.track", *option.split()])
+
+
+def test_numbers_within_their_limits_are_taken() -> None:
+    given = words().parse_args(["fly", "a.track", "--ground", "-3.5", "--reach", "200", "--transit", "20"])
+    assert (given.ground, given.reach, given.transit) == (-3.5, 200.0, 20.0)
+
+
+def test_all_flights_are_shown() -> None:
+    flight: dict[str, Any] = {"state": "running", "error": None, "stage": "flying", "leg": 2, "legs": 5}
+    said = shown({"recording": None, "flights": [{**flight, "vehicle": 1}, {**flight, "vehicle": 2}]})
+    assert said.splitlines() == [f"track flight running, vehicle {n}: flying, leg 2 of 5" for n in (1, 2)]
+    assert shown({"recording": None, "flights": []}) == "no track is recorded or flown"
+
+
+@pytest.mark.parametrize(
+    ("line", "answer"),
+    [
+        ("fly a.track", "gradys: a.track: [Errno 2] No such file or directory: 'a.track'"),  # vehicle 10 would do
+        ("fly a.track --sysid 11", "gradys: no vehicle 11 on the link yet; heard so far: 10"),
+        ("fly --sysid 11 a.track --sysid 10", "gradys: a.track: [Errno 2] No such file or directory: 'a.track'"),
+    ],
+)
+def test_track_is_flown_by_the_vehicle_that_is_named(
+    loop: Any, host: Any, teller: Any, capsys: Any, tmp_path: Any, monkeypatch: Any, line: str, answer: str
+) -> None:
+    async def at_once(call: Any, *args: Any) -> Any:
+        return call(*args)
+
+    monkeypatch.setattr("asyncio.to_thread", at_once)
+    monkeypatch.chdir(tmp_path)
+    teller.tell("heartbeat")
+    TrackConsole(host, Tracking(host)).command(line.split())
+    loop.pass_time(1.0)
+    host.bridge.turn()
+    assert capsys.readouterr().out.strip() == answer

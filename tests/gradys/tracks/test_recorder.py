@@ -1,0 +1,95 @@
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mavproxy_gradys.errors import NotStored
+from mavproxy_gradys.tracks.formats import parse
+from mavproxy_gradys.tracks.recorder import Recorder, replace
+
+
+@pytest.fixture(autouse=True)
+def no_thread(monkeypatch: pytest.MonkeyPatch, at_once: Any) -> None:
+    monkeypatch.setattr("mavproxy_gradys.tracks.recorder.ThreadPoolExecutor", at_once)
+
+
+def telling(loop: Any, teller: Any, seconds: float) -> None:
+    for _ in range(round(seconds * 4)):
+        teller.tell("gps_raw_int", time_usec=round(loop.time() * 1e6), lat=357713121, lon=-786743912, alt=584090)
+        loop.pass_time(0.25)
+
+
+def recorder(loop: Any, host: Any, file: Path, style: str = "text", **given: Any) -> Recorder:
+    made = Recorder(host, 10, file, style=style, period=5.0, **given)
+    loop.run(made.start())
+    return made
+
+
+@pytest.mark.parametrize("style", ["text", "tuple"])
+def test_a_reading_every_period(loop: Any, host: Any, teller: Any, tmp_path: Path, style: str) -> None:
+    made = recorder(loop, host, tmp_path / "track", style)
+    telling(loop, teller, 21)
+    loop.run(made.stop())
+    readings = parse((tmp_path / "track").read_text())
+    assert made.written == len(readings)
+    assert [
+        after.time_usec - before.time_usec for before, after in zip(readings[1:], readings[2:], strict=False)
+    ] == [5_000_000] * 3
+
+
+def test_gpx_is_whole_at_every_moment(loop: Any, host: Any, teller: Any, tmp_path: Path) -> None:
+    made = recorder(loop, host, tmp_path / "a.gpx", "gpx")
+    for count in range(3):
+        text = (tmp_path / "a.gpx").read_text()
+        assert text.endswith("</gpx>\n") and text.count("<trkpt") >= count
+        telling(loop, teller, 5)
+    loop.run(made.stop())
+
+
+def test_the_latest_is_written_on_every_message(loop: Any, host: Any, teller: Any, tmp_path: Path) -> None:
+    latest = tmp_path / "latest"
+    made = recorder(loop, host, tmp_path / "track", latest=latest)
+    seen = set()
+    for _ in range(8):
+        telling(loop, teller, 0.25)
+        seen.add(latest.read_text())
+    assert len(seen) == 8
+    assert all(len(parse(text)) == 1 for text in seen)
+    loop.run(made.stop())
+    assert host.listeners == []
+
+
+def test_stopping_writes_what_was_heard_last(loop: Any, host: Any, teller: Any, tmp_path: Path) -> None:
+    latest = tmp_path / "latest"
+    made = recorder(loop, host, tmp_path / "track", latest=latest)
+    telling(loop, teller, 1)
+    for number in (7, 8):
+        teller.tell("gps_raw_int", time_usec=number, lat=357713121, lon=-786743912, alt=584090, fix_type=3)
+    loop.run(made.stop())
+    loop.settle()
+    assert parse(latest.read_text())[0].time_usec == 8
+
+
+def test_nothing_old_is_recorded(loop: Any, host: Any, teller: Any, tmp_path: Path) -> None:
+    made = recorder(loop, host, tmp_path / "track")
+    telling(loop, teller, 6)
+    written = made.written
+    loop.pass_time(30)
+    assert made.written <= written + 1
+    assert "tells no GPS_RAW_INT" in made.problem
+    loop.run(made.stop())
+
+
+def test_a_file_that_cannot_be_written_is_said_at_once(loop: Any, host: Any, teller: Any, tmp_path: Path) -> None:
+    with pytest.raises(NotStored, match="No such file or directory"):
+        recorder(loop, host, tmp_path / "no" / "track")
+
+
+def test_replacing_leaves_the_old_or_the_new(tmp_path: Path) -> None:
+    file = tmp_path / "latest"
+    replace(file, "one")
+    replace(file, "two")
+    assert file.read_text() == "two"
+    assert [path.name for path in tmp_path.iterdir()] == ["latest"]
