@@ -21,7 +21,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from mavproxy_vision.apriltag.detector import Detector, Options
+from mavproxy_vision.apriltag.detector import Detector, DetectorOptions
 from mavproxy_vision.camera.renderer import Look, PlacedTag, Renderer
 from mavproxy_vision.geometry.camera_model import CameraModel
 from mavproxy_vision.geometry.frames import Attitude, Mount, vector
@@ -83,8 +83,8 @@ def reach(count: int, file: str) -> None:
         plain = cv2.aruco.ArucoDetector(
             cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, f"DICT_APRILTAG_{family}"))
         )
-        ours = Detector(MODEL, Options((family,), {0: SIZE}))
-        far = Detector(MODEL, Options((family,), {0: SIZE}, far=True))
+        ours = Detector(MODEL, DetectorOptions((family,), {0: SIZE}))
+        far = Detector(MODEL, DetectorOptions((family,), {0: SIZE}, far=True))
         print(f"\n{family:6} hits: default, far, plain, pupil | range error: default, far (m) | ms: the same four")
         for distance in DISTANCES:
             images, ranges = frames(family, distance, count, seed=distance)
@@ -110,7 +110,7 @@ def ghosts(count: int) -> None:
     """Tags seen where there are none."""
     chance = np.random.default_rng(77)
     renderer = Renderer(MODEL, MOUNT, (), Look(), 5)
-    detectors = {name: Detector(MODEL, Options((name,), {0: SIZE})) for name in (*FAMILIES, "36h10")}
+    detectors = {name: Detector(MODEL, DetectorOptions((name,), {0: SIZE})) for name in (*FAMILIES, "36h10")}
     found = dict.fromkeys(detectors, 0)
     for _ in range(count):
         place = vector(*chance.uniform(-60, 60, 2), -chance.uniform(0.5, 15))

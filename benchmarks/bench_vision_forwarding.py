@@ -21,7 +21,7 @@ from typing import Any
 import cv2
 from rig import Forwarding, cpu_seconds, fly, jitter, machine, percentile, put_first, rig, table
 
-from mavproxy_vision.apriltag.detector import Detector, Options
+from mavproxy_vision.apriltag.detector import Detector, DetectorOptions
 from mavproxy_vision.camera.renderer import Look, PlacedTag, Renderer
 from mavproxy_vision.geometry.camera_model import CameraModel
 from mavproxy_vision.geometry.frames import Attitude, Mount, vector
@@ -44,7 +44,7 @@ def draw(folder: Path) -> None:
 def look(folder: str) -> None:
     """Detect for ever."""
     cv2.setNumThreads(1)
-    detector = Detector(CameraModel(), Options(sizes={0: 0.30}, far=True))
+    detector = Detector(CameraModel(), DetectorOptions(sizes={0: 0.30}, far=True))
     while True:
         for file in sorted(Path(folder).iterdir()):
             image: Any = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from mavproxy_vision.landing.flight_jobs import Flights
-from mavproxy_vision.tracking.tracker import Vision, in_view
+from mavproxy_vision.landing.flight_jobs import FlightJobs
+from mavproxy_vision.tracking.tracker import Tracker, in_view
 
 HELP = """\
 vision status                      the camera, the tags in view, what is in flight
@@ -23,10 +23,10 @@ vision tag FILE.pdf [--family F] [--id N] [--size M]   a tag to scale, for print
 vision help                        this"""
 
 
-def status(vision: Vision, flights: Flights) -> dict[str, Any]:
+def status(tracker: Tracker, flights: FlightJobs) -> dict[str, Any]:
     """The camera and the flight as JSON has them."""
-    health, settings = vision.health, vision.settings
-    seen = vision.fresh_seen
+    health, settings = tracker.health, tracker.settings
+    seen = tracker.fresh_seen
     told: dict[str, Any] = {
         "source": settings.source or None,
         "camera": health.state,
@@ -39,11 +39,14 @@ def status(vision: Vision, flights: Flights) -> dict[str, Any]:
         "families": list(settings.families),
         "tags": [vars(tag) for tag in settings.tag_list],
         "in_view": [one["id"] for one in in_view(seen)],
-        "frame_age_s": None if seen is None else round(vision.host.clock() - seen.captured_at, 3),
+        "frame_age_s": None if seen is None else round(tracker.host.clock() - seen.captured_at, 3),
         "detector_ms": None if seen is None else round(1000 * (seen.done_at - seen.received_at), 1),
     }
-    if vision.latencies:
-        told["setpoint_ms"] = {"median": percentile(vision.latencies, 0.5), "p99": percentile(vision.latencies, 0.99)}
+    if tracker.latencies:
+        told["setpoint_ms"] = {
+            "median": percentile(tracker.latencies, 0.5),
+            "p99": percentile(tracker.latencies, 0.99),
+        }
     if flights.report is not None:
         told["flight"] = {"running": flights.running, "phase": flights.phase, **flights.report.told()}
     return told
@@ -55,15 +58,15 @@ def percentile(seconds: Iterable[float], share: float) -> float:
     return round(1000 * ordered[min(int(share * len(ordered)), len(ordered) - 1)], 1)
 
 
-def report(vision: Vision, flights: Flights) -> str:
+def report(tracker: Tracker, flights: FlightJobs) -> str:
     """The same in a few lines."""
-    told = status(vision, flights)
+    told = status(tracker, flights)
     source = told["source"] or "none; `vision set source camera:0`, sim, http, a path or a URL"
     camera = f"camera {told['camera']}" + (f" ({told['error']})" if told["error"] else "")
     lines = [
         f"vision: source {source}: {camera}, {told['rate']} frames/s, {told['frames']} looked at, "
         f"{told['repeated']} repeated, {told['reconnects']} reconnects",
-        f"AprilTags of {', '.join(told['families'])}: {vision.settings.tags}; in view: {told['in_view'] or 'none'}",
+        f"AprilTags of {', '.join(told['families'])}: {tracker.settings.tags}; in view: {told['in_view'] or 'none'}",
     ]
     if told["detector_ms"] is not None:
         lines.append(f"detector {told['detector_ms']} ms, newest frame {1000 * told['frame_age_s']:.0f} ms old")
@@ -74,12 +77,12 @@ def report(vision: Vision, flights: Flights) -> str:
     return "\n".join(lines)
 
 
-def tags(vision: Vision) -> str:
+def tags(tracker: Tracker) -> str:
     """A line for each tag in view."""
-    seen = vision.fresh_seen
+    seen = tracker.fresh_seen
     if seen is None:
-        return f"vision: no frames: {vision.health.state}"
-    if not seen.sightings:
+        return f"vision: no frames: {tracker.health.state}"
+    if not seen.detections:
         return "vision: no tags in view"
     lines = []
     for one in in_view(seen):
@@ -96,10 +99,12 @@ def tags(vision: Vision) -> str:
     return "\n".join(lines)
 
 
-def caption(vision: Vision, flights: Flights) -> list[str]:
+def caption(tracker: Tracker, flights: FlightJobs) -> list[str]:
     """What is written into the annotated frame."""
-    state = vision.health.state
-    lines = [f"{vision.settings.source}: {vision.health.rate:.0f} frames/s" if state == "ok" else f"camera: {state}"]
+    state = tracker.health.state
+    lines = [
+        f"{tracker.settings.source}: {tracker.health.rate:.0f} frames/s" if state == "ok" else f"camera: {state}"
+    ]
     if flights.running and flights.report is not None:
         flight = flights.report
         offset = "" if flight.last_offset is None else f", {flight.last_offset:.2f} m off"

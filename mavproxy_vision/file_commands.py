@@ -12,7 +12,7 @@ from typing import NoReturn
 
 import cv2
 
-from mavproxy_vision.apriltag.detection import Seen
+from mavproxy_vision.apriltag.detection import FrameResult
 from mavproxy_vision.apriltag.overlay import annotated
 from mavproxy_vision.apriltag.tag_layout import Tag
 from mavproxy_vision.apriltag.tag_pdf import tag_pdf
@@ -40,7 +40,7 @@ def calibrated(args: list[str]) -> str:
     return f"{made.views} views, error {made.error:.2f} px, {focal}; wrote {file}: `vision set calibration {file}`"
 
 
-def snapshot(args: list[str], seen: Seen | None, image: Image | None) -> str:
+def snapshot(args: list[str], seen: FrameResult | None, image: Image | None) -> str:
     """`FILE`: write the newest frame, with its tags drawn in."""
     if len(args) != 1:
         raise BadSetting("snapshot FILE.png")

@@ -27,16 +27,16 @@ from mavproxy_uavapi.http.extension import (
     envelope,
     in_time,
 )
-from mavproxy_vision.apriltag.detection import Seen
+from mavproxy_vision.apriltag.detection import FrameResult
 from mavproxy_vision.apriltag.overlay import annotated, jpeg
 from mavproxy_vision.camera.one_at_a_time import OneAtATime
 from mavproxy_vision.camera.source import Image, Posted, decode
 from mavproxy_vision.console import caption, status
 from mavproxy_vision.errors import BadImage, NoCamera
-from mavproxy_vision.landing.flight_jobs import Flights, Sortie
-from mavproxy_vision.landing.mission import Errand
+from mavproxy_vision.landing.flight_jobs import FlightJobs, FlightTask
+from mavproxy_vision.landing.mission import MissionPlan
 from mavproxy_vision.settings import METHODS
-from mavproxy_vision.tracking.tracker import FRESH, Vision, in_view
+from mavproxy_vision.tracking.tracker import FRESH, Tracker, in_view
 
 BOUNDARY = "frame"
 FRAME_TIMEOUT = 5.0  # s without a frame until a stream ends
@@ -93,14 +93,14 @@ class FrameRequest(Request):
     latency: Annotated[float | None, Field(ge=0, le=10_000), Written] = None
 
 
-class Pages:
+class Handlers:
     """The actions of the routes."""
 
-    def __init__(self, vision: Vision, flights: Flights) -> None:
-        self.vision, self.flights = vision, flights
+    def __init__(self, tracker: Tracker, flights: FlightJobs) -> None:
+        self.tracker, self.flights = tracker, flights
         self._posts = Slots(MOST_POSTED, "frames are on their way in")
         self._decoding, self._encoding = OneAtATime(), OneAtATime()
-        self._drawing: tuple[Seen, asyncio.Task[bytes]] | None = None  # the newest picture with its tags
+        self._drawing: tuple[FrameResult, asyncio.Task[bytes]] | None = None  # the newest picture with its tags
 
     def routes(self) -> list[Route]:
         """What is served."""
@@ -120,15 +120,15 @@ class Pages:
 
     async def status(self, _call: Call) -> dict[str, Any]:
         """The camera, what it sees, and what is in flight."""
-        return self._answer("Success", info=status(self.vision, self.flights))
+        return self._answer("Success", info=status(self.tracker, self.flights))
 
     async def tags(self, _call: Call) -> dict[str, Any]:
         """The tags in view."""
-        self.vision.require_camera()
-        seen = self.vision.fresh_seen
+        self.tracker.require_camera()
+        seen = self.tracker.fresh_seen
         if seen is None:
             raise NoCamera("no frame was looked at in the last second")
-        age = self.vision.host.clock() - seen.captured_at
+        age = self.tracker.host.clock() - seen.captured_at
         return self._answer("Success", info={"tags": in_view(seen), "frame": seen.number}, age_s=round(age, 3))
 
     async def frame(self, _call: Call) -> web.StreamResponse:
@@ -139,43 +139,43 @@ class Pages:
 
     async def newest_frame(self) -> bytes:
         """The newest frame as it came, as JPEG: what take_photo answers with `command=vision`."""
-        self.vision.require_camera()
+        self.tracker.require_camera()
         _, image = self._newest()
         return await self._encoding.run(lambda: jpeg(image))
 
-    def _newest(self) -> tuple[Seen, Image]:
+    def _newest(self) -> tuple[FrameResult, Image]:
         """The newest frame, and what was seen in it.
 
         Raises:
             NoCamera: there is none yet, or it is old: only a folder's frames keep.
         """
-        seen, image, worker = self.vision.seen, self.vision.image, self.vision.worker
+        seen, image, worker = self.tracker.seen, self.tracker.image, self.tracker.worker
         if seen is None or image is None or worker is None:
             raise NoCamera("there is no frame yet")
-        age = self.vision.host.clock() - seen.received_at
+        age = self.tracker.host.clock() - seen.received_at
         if age > FRESH and worker.source.live:
-            raise NoCamera(f"the newest frame is {age:.1f} s old; the camera: {self.vision.health.state}")
+            raise NoCamera(f"the newest frame is {age:.1f} s old; the camera: {self.tracker.health.state}")
         return seen, image
 
     async def _picture(self) -> bytes:
         """The newest frame with its tags; drawn once for all who ask, and none before the last one is done."""
         seen, image = self._newest()
         if self._drawing is None or (self._drawing[1].done() and self._drawing[0] is not seen):
-            lines = caption(self.vision, self.flights)
+            lines = caption(self.tracker, self.flights)
             work = self._encoding.run(lambda: jpeg(annotated(image, seen, lines)))
             self._drawing = seen, asyncio.get_running_loop().create_task(work)
         return await asyncio.shield(self._drawing[1])
 
     async def stream(self, call: Call) -> web.StreamResponse:
         """Annotated frames as they come, as browsers show them (MJPEG)."""
-        self.vision.require_camera()
+        self.tracker.require_camera()
         pause = 1.0 / call.params(StreamRequest).rate
         response = StreamingResponse(f"multipart/x-mixed-replace; boundary={BOUNDARY}")
         gone = ConnectionError, NoCamera, asyncio.TimeoutError  # the client, or the camera
         with call.service.streams.one_more(), contextlib.suppress(*gone):
             await response.prepare(call.request)
             while True:
-                await wait_with_timeout(FRAME_TIMEOUT, self.vision.changed.wait())
+                await wait_with_timeout(FRAME_TIMEOUT, self.tracker.changed.wait())
                 picture = await self._picture()
                 head = f"--{BOUNDARY}\r\nContent-Type: image/jpeg\r\nContent-Length: {len(picture)}\r\n\r\n"
                 await response.write(head.encode() + picture + b"\r\n")
@@ -184,7 +184,7 @@ class Pages:
 
     async def post_frame(self, call: Call) -> dict[str, Any]:
         """Take a frame: the body is a JPEG or PNG; source `http`."""
-        worker = self.vision.worker
+        worker = self.tracker.worker
         if worker is None or not isinstance(worker.source, Posted):
             raise BadRequest("frames are taken with `vision set source http` only")
         with self._posts.one_more():
@@ -202,7 +202,7 @@ class Pages:
     async def land(self, call: Call) -> Any:
         """Land on a tag from here; answers when it stands on it."""
         p = call.params(LandRequest)
-        sortie = self.flights.landing(call.copter, p.id, p.method or self.vision.settings.method)
+        sortie = self.flights.landing(call.copter, p.id, p.method or self.tracker.settings.method)
         return await self._fly(call, sortie)
 
     async def search(self, call: Call) -> Any:
@@ -213,8 +213,8 @@ class Pages:
     async def mission(self, call: Call) -> Any:
         """Take off, fly there, land on the tag or without one; return when there is none."""
         p = call.params(MissionRequest)
-        method = p.method or self.vision.settings.method
-        errand = Errand(p.alt, p.north, p.east, p.lat, p.long, p.id, p.tag, method)
+        method = p.method or self.tracker.settings.method
+        errand = MissionPlan(p.alt, p.north, p.east, p.lat, p.long, p.id, p.tag, method)
         return await self._fly(call, self.flights.errand(call.copter, errand))
 
     async def stop(self, _call: Call) -> dict[str, Any]:
@@ -222,7 +222,7 @@ class Pages:
         done = self.flights.stop("stopped")
         return self._answer("Nothing was in flight" if done is None else done.capitalize())
 
-    async def _fly(self, call: Call, sortie: Sortie) -> Any:
+    async def _fly(self, call: Call, sortie: FlightTask) -> Any:
         answer = await call.fly(call.copter, sortie, sortie.result, outlives_client=True)
         report = sortie.report if sortie.begun else self.flights.report  # of the flight in progress that it joined
         if isinstance(answer, dict) and report is not None:
@@ -230,4 +230,4 @@ class Pages:
         return answer
 
     def _answer(self, result: str, **members: Any) -> dict[str, Any]:
-        return envelope(self.vision.system, result, **members)
+        return envelope(self.tracker.system, result, **members)

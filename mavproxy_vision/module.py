@@ -25,11 +25,11 @@ from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.http.extension import NED_REACH
 from mavproxy_vision import console, file_commands
 from mavproxy_vision.errors import BadSetting
-from mavproxy_vision.http import Pages
-from mavproxy_vision.landing.flight_jobs import Flights, Sortie
-from mavproxy_vision.landing.mission import Errand
+from mavproxy_vision.http import Handlers
+from mavproxy_vision.landing.flight_jobs import FlightJobs, FlightTask
+from mavproxy_vision.landing.mission import MissionPlan
 from mavproxy_vision.settings import METHODS, ModuleSettings
-from mavproxy_vision.tracking.tracker import Vision
+from mavproxy_vision.tracking.tracker import Tracker
 
 NAME = "vision"
 COMPLETION = "(VISIONSETTING)"
@@ -52,11 +52,11 @@ class VisionModule(SharedModule):
         self.remembered = RememberedSettings(mpstate, NAME, given)
         self.vision_settings = ModuleSettings(self.remembered.given)
         actions: dict[str, Callable[[list[str]], None]] = {
-            "status": lambda _: self._tell(lambda: console.report(self.vision, self.flights)),
+            "status": lambda _: self._tell(lambda: console.report(self.tracker, self.flights)),
             "start": lambda _: self._start(),
             "stop": lambda _: self._stop(),
             "set": self._set,
-            "tags": lambda _: self._tell(lambda: console.tags(self.vision)),
+            "tags": lambda _: self._tell(lambda: console.tags(self.tracker)),
             "land": self._land,
             "search": self._search,
             "mission": self._mission,
@@ -68,10 +68,10 @@ class VisionModule(SharedModule):
         }
         super().__init__(mpstate, NAME, "AprilTags, search and precise landing", actions, COMPLETIONS)
         self.add_completion_function(COMPLETION, self.vision_settings.mp.completion)
-        self.vision = Vision(self.host, self.vision_settings.snapshot())
-        self.flights = Flights(self.vision, self._directory)
+        self.tracker = Tracker(self.host, self.vision_settings.snapshot())
+        self.flights = FlightJobs(self.tracker, self._directory)
         self._background = BackgroundCommands(self.host, NAME)
-        self._pages = Pages(self.vision, self.flights)
+        self._pages = Handlers(self.tracker, self.flights)
         self._routes = {route.path: route for route in self._pages.routes()}
         self.remembered.keep(self.vision_settings.mp.get)
 
@@ -81,13 +81,13 @@ class VisionModule(SharedModule):
         """Listen, and open the camera if one is set."""
         self.host.extensions.update(self._routes)
         self.host.newest_frame = self._pages.newest_frame
-        self.host.bridge.call_soon(self.vision.listen)
+        self.host.bridge.call_soon(self.tracker.listen)
         if self.vision_settings.snapshot().source:
             self._start()
 
     async def end(self) -> None:
         """Close everything."""
-        await self.vision.close()
+        await self.tracker.close()
         await self._background.close()
 
     def unload(self) -> None:
@@ -107,7 +107,7 @@ class VisionModule(SharedModule):
             return
 
         async def abandoned() -> None:
-            self.flights.abandon()
+            self.flights.abort_all()
 
         self.host.bridge.run(abandoned())
 
@@ -141,7 +141,7 @@ class VisionModule(SharedModule):
         settings = self.vision_settings.snapshot()
 
         async def started() -> str:
-            await self.vision.start(settings)
+            await self.tracker.start(settings)
             return f"looking for {settings.family} through {settings.source}"
 
         if self._awake():
@@ -149,7 +149,7 @@ class VisionModule(SharedModule):
 
     def _stop(self) -> None:
         async def stopped() -> str:
-            await self.vision.stop()
+            await self.tracker.stop()
             return "stopped"
 
         if self._awake():
@@ -186,7 +186,7 @@ class VisionModule(SharedModule):
         elif before.source and not after.source:
             self._stop()
         else:
-            self.host.bridge.call_soon(setattr, self.vision, "settings", after)
+            self.host.bridge.call_soon(setattr, self.tracker, "settings", after)
 
     def _flying(self) -> bool:
         async def flying() -> bool:
@@ -203,7 +203,7 @@ class VisionModule(SharedModule):
         if number is not False:
             self._fly("/vision/land", {"id": number, "method": method}, self._landing)
 
-    def _landing(self, request: dict[str, Any]) -> Sortie:
+    def _landing(self, request: dict[str, Any]) -> FlightTask:
         return self.flights.landing(self.flights.copter(), request["id"], request["method"])
 
     def _search(self, args: list[str]) -> None:
@@ -211,7 +211,7 @@ class VisionModule(SharedModule):
         if number is not False:
             self._fly("/vision/search", {"id": number}, self._searching)
 
-    def _searching(self, request: dict[str, Any]) -> Sortie:
+    def _searching(self, request: dict[str, Any]) -> FlightTask:
         return self.flights.searching(self.flights.copter(), request["id"], None)
 
     def _id(self, words: list[str]) -> Any:
@@ -244,12 +244,12 @@ class VisionModule(SharedModule):
         request = {"alt": alt, "north": north, "east": east, "id": number, "tag": tag != "none", "method": method}
         self._fly("/vision/mission", request, self._errand)
 
-    def _errand(self, request: dict[str, Any]) -> Sortie:
+    def _errand(self, request: dict[str, Any]) -> FlightTask:
         r = request
-        errand = Errand(r["alt"], r["north"], r["east"], None, None, r["id"], r["tag"], r["method"])
+        errand = MissionPlan(r["alt"], r["north"], r["east"], None, None, r["id"], r["tag"], r["method"])
         return self.flights.errand(self.flights.copter(), errand)
 
-    def _fly(self, path: str, request: dict[str, Any], make: Callable[[dict[str, Any]], Sortie]) -> None:
+    def _fly(self, path: str, request: dict[str, Any], make: Callable[[dict[str, Any]], FlightTask]) -> None:
         """Begin a flight and say so; its end is printed when it comes."""
 
         async def begin() -> Job:
@@ -271,7 +271,7 @@ class VisionModule(SharedModule):
         self._in_background(lambda: file_commands.calibrated(args))
 
     def _snapshot(self, args: list[str]) -> None:
-        self._in_background(lambda: file_commands.snapshot(args, self.vision.seen, self.vision.image))
+        self._in_background(lambda: file_commands.snapshot(args, self.tracker.seen, self.tracker.image))
 
     def _tag(self, args: list[str]) -> None:
         settings = self.vision_settings.snapshot()

@@ -12,7 +12,7 @@ from mavproxy_vision.geometry.frames import Matrix, Vector
 
 
 @dataclass(frozen=True)
-class Sighting:
+class TagDetection:
     """One tag in one frame.
 
     Attributes:
@@ -49,7 +49,7 @@ class Sighting:
 
 
 @dataclass(frozen=True)
-class Seen:
+class FrameResult:
     """The outcome of one frame.
 
     Attributes:
@@ -58,7 +58,7 @@ class Seen:
         received_at: when we had it (s).
         done_at: when the detector was done (s).
         size: width and height, px.
-        sightings: the tags in it.
+        detections: the tags in it.
     """
 
     number: int
@@ -66,7 +66,7 @@ class Seen:
     received_at: float
     done_at: float
     size: tuple[int, int]
-    sightings: tuple[Sighting, ...]
+    detections: tuple[TagDetection, ...]
 
     @property
     def latency(self) -> float:

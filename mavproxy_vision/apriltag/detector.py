@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mavproxy_vision.apriltag.corner_refinement import Corners, refine
-from mavproxy_vision.apriltag.detection import Sighting
+from mavproxy_vision.apriltag.detection import TagDetection
 from mavproxy_vision.apriltag.families import Family, family
 from mavproxy_vision.apriltag.tag_layout import FAMILIES
 from mavproxy_vision.apriltag.template_alignment import LARGE, SIZES, Pattern, align
@@ -37,7 +37,7 @@ SHARPEN = (1.0, 0.7)  # how much of what a blur takes away is added, and that bl
 
 
 @dataclass(frozen=True)
-class Options:
+class DetectorOptions:
     """How to look.
 
     Attributes:
@@ -63,7 +63,7 @@ class Detector:
         options: how to look.
     """
 
-    def __init__(self, model: CameraModel, options: Options) -> None:
+    def __init__(self, model: CameraModel, options: DetectorOptions) -> None:
         self.model, self.options = model, options
         self._sizes = dict(options.sizes or {})
         wanted: Iterable[int] | None = None if options.any_id or not self._sizes else self._sizes
@@ -78,7 +78,7 @@ class Detector:
         self._bits: dict[str, dict[int, NDArray[np.uint8]]] = {f.name: {} for f in self._families}
         self._patterns: dict[tuple[str, int, int], Pattern] = {}
 
-    def detect(self, image: Image) -> tuple[Sighting, ...]:
+    def detect(self, image: Image) -> tuple[TagDetection, ...]:
         """The tags in a grey frame, shape (height, width)."""
         image = lit(image)
         shown = {1: sharpened(image)}
@@ -93,10 +93,12 @@ class Detector:
                 rough = (np.asarray(quad, np.float64).reshape(4, 2) + 0.5) / zoom - 0.5
                 if not any(one is other and index == same and is_same(rough, there) for other, same, there in found):
                     found.append((one, int(index), rough))
-        sightings = (self._sight(image, model, *tag) for tag in found)
-        return tuple(sighting for sighting in sightings if sighting is not None)
+        detections = (self._sight(image, model, *tag) for tag in found)
+        return tuple(detection for detection in detections if detection is not None)
 
-    def _sight(self, image: Image, model: CameraModel, one: Family, index: int, rough: Corners) -> Sighting | None:
+    def _sight(
+        self, image: Image, model: CameraModel, one: Family, index: int, rough: Corners
+    ) -> TagDetection | None:
         if not is_squarish(rough):
             return None
         corners = self._refined(image, one, index, rough) if self.options.refine else rough
@@ -104,9 +106,9 @@ class Detector:
         hamming = self._hamming(image, one, index, corners)
         size = self._sizes.get(number, 0.0)
         if size <= 0:
-            return Sighting(one.name, number, hamming, corners)
+            return TagDetection(one.name, number, hamming, corners)
         position, turned, error = locate(model, corners, size)
-        return Sighting(one.name, number, hamming, corners, size, position, turned, error)
+        return TagDetection(one.name, number, hamming, corners, size, position, turned, error)
 
     def _refined(self, image: Image, one: Family, index: int, rough: Corners) -> Corners:
         corners = refine(image, rough)

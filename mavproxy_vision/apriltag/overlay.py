@@ -8,25 +8,25 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mavproxy_vision.apriltag.detection import Seen
+from mavproxy_vision.apriltag.detection import FrameResult
 
 GREEN, RED, YELLOW = (80, 220, 80), (60, 60, 230), (60, 220, 230)
 
 
-def annotated(image: NDArray[np.uint8], seen: Seen, lines: list[str]) -> NDArray[np.uint8]:
+def annotated(image: NDArray[np.uint8], seen: FrameResult, lines: list[str]) -> NDArray[np.uint8]:
     """A colour copy of a grey frame with its tags outlined, the middle marked, and lines of text."""
     drawn: Any = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
     height, width = image.shape
     cv2.drawMarker(drawn, (width // 2, height // 2), YELLOW, cv2.MARKER_CROSS, 24, 1, cv2.LINE_AA)
-    for sighting in seen.sightings:
-        corners = np.round(np.asarray(sighting.corners) * 8).astype(np.int32).reshape(-1, 1, 2)
+    for detection in seen.detections:
+        corners = np.round(np.asarray(detection.corners) * 8).astype(np.int32).reshape(-1, 1, 2)
         cv2.polylines(drawn, [corners], True, GREEN, 2, cv2.LINE_AA, shift=3)
-        first = tuple(int(value) for value in np.round(sighting.corners[0]))
+        first = tuple(int(value) for value in np.round(detection.corners[0]))
         cv2.circle(drawn, first, 4, RED, -1, cv2.LINE_AA)  # top left
-        x, y = (round(value) for value in sighting.centre)
+        x, y = (round(value) for value in detection.centre)
         cv2.line(drawn, (width // 2, height // 2), (x, y), YELLOW, 1, cv2.LINE_AA)
-        distance = "" if sighting.distance is None else f" {sighting.distance:.2f} m"
-        _text(drawn, f"{sighting.family} {sighting.id}{distance}", (first[0] + 8, max(first[1] - 8, 16)))
+        distance = "" if detection.distance is None else f" {detection.distance:.2f} m"
+        _text(drawn, f"{detection.family} {detection.id}{distance}", (first[0] + 8, max(first[1] - 8, 16)))
     for number, line in enumerate(lines):
         _text(drawn, line, (8, 20 + 20 * number))
     return np.asarray(drawn, np.uint8)

@@ -92,6 +92,6 @@ def target_from(tag: Tag, x_axis: tuple[float, float]) -> tuple[float, float]:
     """
     length = math.hypot(*x_axis) or 1.0
     north, east = x_axis[0] / length, x_axis[1] / length
-    # Seen from above, the tag's top is a quarter turn anticlockwise from its right.
+    # FrameResult from above, the tag's top is a quarter turn anticlockwise from its right.
     up_north, up_east = east, -north
     return -(tag.right * north + tag.up * up_north), -(tag.right * east + tag.up * up_east)

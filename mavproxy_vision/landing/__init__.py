@@ -1,1 +1,1 @@
-"""Flights: search, landing, mission, and what they tell of themselves."""
+"""FlightJobs: search, landing, mission, and what they tell of themselves."""

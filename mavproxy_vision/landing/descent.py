@@ -7,11 +7,11 @@ import contextlib
 from mavproxy_uavapi.core.errors import NotArmed, TimedOut, UavApiError
 from mavproxy_uavapi.core.vehicle import time_limits
 from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
-from mavproxy_vision.landing.executor import Flight
+from mavproxy_vision.landing.executor import TagFlight
 from mavproxy_vision.landing.precision_landing import PrecisionLanding, landing_target
 from mavproxy_vision.landing.state_machine import BLIND_BELOW, COAST, REST, Landing, Phase
 
-LOST = 1.2  # s without a sighting, or without telemetry, until we take the vehicle back from LAND
+LOST = 1.2  # s without a detection, or without telemetry, until we take the vehicle back from LAND
 SLOWER = 3.0  # times what a LAND should take, until it is given up low above the target
 HEARD = 3.0  # s until the autopilot must have said that it has a target
 
@@ -25,7 +25,7 @@ class Descent:
 
     by_velocity = True
 
-    def __init__(self, flight: Flight) -> None:
+    def __init__(self, flight: TagFlight) -> None:
         self.flight = flight
 
     async def prepare(self) -> None:
@@ -56,7 +56,7 @@ class PrecisionDescent(Descent):
 
     by_velocity = False
 
-    def __init__(self, flight: Flight, plnd: PrecisionLanding) -> None:
+    def __init__(self, flight: TagFlight, plnd: PrecisionLanding) -> None:
         super().__init__(flight)
         flight.plnd = self.plnd = plnd
 
@@ -86,14 +86,14 @@ class PrecisionDescent(Descent):
             if await self._follow_down(landing):
                 break
         self.plnd.in_use = False
-        with contextlib.suppress(UavApiError):  # it has landed all the same; `Flights` goes on trying
+        with contextlib.suppress(UavApiError):  # it has landed all the same; `FlightJobs` goes on trying
             await self.plnd.give_back()
 
     async def _be_heard(self, landing: Landing) -> None:
         """Send targets until the autopilot says that it has one."""
-        flight, vision = self.flight, self.flight.vision
-        state, began = flight.vehicle.state, vision.host.clock()
-        while vision.host.clock() - began < max(HEARD / max(state.time_ratio.ratio, 0.1), 1.0):
+        flight, tracker = self.flight, self.flight.tracker
+        state, began = flight.vehicle.state, tracker.host.clock()
+        while tracker.host.clock() - began < max(HEARD / max(state.time_ratio.ratio, 0.1), 1.0):
             await self._tell(landing)
             await flight.send(REST)
             if any("Target Found" in text for text in state.said_since(began - 30.0)):
@@ -103,22 +103,22 @@ class PrecisionDescent(Descent):
 
     async def _follow_down(self, landing: Landing) -> bool:
         """Let LAND fly and tell it where the target is: True when it stands disarmed, False when taken back."""
-        flight, vehicle, vision = self.flight, self.flight.vehicle, self.flight.vision
+        flight, vehicle, tracker = self.flight, self.flight.vehicle, self.flight.tracker
         limits = await vehicle.limits()
         touchdown = Touchdown(limits)
         vehicle.held_by("GUIDED")
         flight.autopilot = "LAND"
         await vehicle.set_mode(flight.job, "LAND")
-        late = vision.now() + SLOWER * time_limits.landing_time(limits, vehicle.height)
+        late = tracker.now() + SLOWER * time_limits.landing_time(limits, vehicle.height)
         while not self._stands(touchdown):
-            now = vision.now()
+            now = tracker.now()
             if now > late and not self._is_high(landing):
                 flight.autopilot = None  # it is almost down: nobody takes it back
                 raise TimedOut(f"vehicle {vehicle.state.system} has not landed and disarmed; it is in LAND")
             if self._must_come_back(landing, now):
                 await vehicle.set_mode(flight.job, "GUIDED")
                 flight.autopilot = None
-                motion = vision.history.last_motion
+                motion = tracker.history.last_motion
                 assert motion is not None
                 landing.resume(now, motion, flight.height(motion))
                 return False
@@ -145,7 +145,7 @@ class PrecisionDescent(Descent):
 
     def _must_come_back(self, landing: Landing, now: float) -> bool:
         """Whether it may not go down any farther: it takes too long, or the target or the vehicle is lost."""
-        history, target = self.flight.vision.history, landing.target
+        history, target = self.flight.tracker.history, landing.target
         if not self._is_high(landing):
             return False  # too low to climb away from what may be the ground already
         if landing.overdue(now) or now - history.newest > LOST:
@@ -154,14 +154,14 @@ class PrecisionDescent(Descent):
 
     def _is_high(self, landing: Landing) -> bool:
         """Whether it is high enough above the target to be taken back."""
-        place, motion = landing.target.place, self.flight.vision.history.last_motion
+        place, motion = landing.target.place, self.flight.tracker.history.last_motion
         return place is not None and motion is not None and float(place[2] - motion.travelled[2]) > BLIND_BELOW
 
     async def _tell(self, landing: Landing) -> None:
         """Tell the autopilot where the target is, if that is known."""
-        flight, vision, place = self.flight, self.flight.vision, landing.target.place
-        now = vision.now()
-        motion, attitude = flight.motion(now), vision.history.attitude(now)
+        flight, tracker, place = self.flight, self.flight.tracker, landing.target.place
+        now = tracker.now()
+        motion, attitude = flight.motion(now), tracker.history.attitude(now)
         if motion is None or attitude is None or place is None:
             return
         relative = place - motion.travelled

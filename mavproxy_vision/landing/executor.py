@@ -19,11 +19,11 @@ from mavproxy_vision.landing.plan import landable, plan_for, tags_for
 from mavproxy_vision.landing.precision_landing import PrecisionLanding
 from mavproxy_vision.landing.report import Report
 from mavproxy_vision.landing.setpoints import setpoint
-from mavproxy_vision.landing.state_machine import REST, Landing, Order, Phase
+from mavproxy_vision.landing.state_machine import REST, Landing, LandingCommand, Phase
 from mavproxy_vision.tracking.pose_history import Motion
 from mavproxy_vision.tracking.stream_rates import FLIGHT
 from mavproxy_vision.tracking.target_filter import Target
-from mavproxy_vision.tracking.tracker import Vision
+from mavproxy_vision.tracking.tracker import Tracker
 
 PERIOD = 0.05  # s of the vehicle's clock between two setpoints
 SHORTEST = 0.03  # s of ours, whatever the camera's rate and the vehicle's clock
@@ -49,7 +49,7 @@ class DescentMethod(Protocol):
         """Land. Raises LandingFailed where it was given up."""
 
 
-class Flight:
+class TagFlight:
     """A flight that is under way.
 
     Attributes:
@@ -59,31 +59,31 @@ class Flight:
         ended: set when it is over, and has sent its last message.
 
     Args:
-        vision: the eye.
+        tracker: the camera's outcomes, and where the target lies.
         vehicle: what carries it.
         job: who flies.
         report: filled in on the way.
-        succeed: awaits the end of the flight of ours that had the vehicle.
+        replace_running_flight: awaits the end of the flight of ours that had the vehicle.
     """
 
     def __init__(
         self,
-        vision: Vision,
+        tracker: Tracker,
         vehicle: Copter,
         job: Job,
         report: Report,
-        succeed: Callable[[Flight], Awaitable[None]],
+        replace_running_flight: Callable[[TagFlight], Awaitable[None]],
     ) -> None:
-        self.vision, self.vehicle, self.job, self.report = vision, vehicle, job, report
+        self.tracker, self.vehicle, self.job, self.report = tracker, vehicle, job, report
         self.plnd: PrecisionLanding | None = None
         self.phase = "on its way"
         self.autopilot: str | None = None
         self.ended = asyncio.Event()
-        self._succeed = succeed
+        self._replace_running_flight = replace_running_flight
         self._floor = 0.0  # of the target's ground, m down of the EKF origin: as it was when the flight began
-        self._sent_at = vision.host.clock()
+        self._sent_at = tracker.host.clock()
         # Number of the frame whose way to a setpoint was timed last; what is there before the flight waited for it.
-        self._timed = 0 if vision.seen is None else vision.seen.number
+        self._timed = 0 if tracker.seen is None else tracker.seen.number
 
     async def take_over(self) -> None:
         """Take the vehicle; a flight of ours that had it has ended then. What flies in GUIDED rests.
@@ -94,7 +94,7 @@ class Flight:
             return
         self.vehicle.authority.take(self.job, Rank.MOVEMENT)
         self.job.steers = True
-        await self._succeed(self)
+        await self._replace_running_flight(self)
         if self.vehicle.mode == "GUIDED" and self.vehicle.state.armed and not self.vehicle.state.landed:
             await self.send(REST)  # the setpoint of whoever had it would go on meanwhile
 
@@ -105,7 +105,9 @@ class Flight:
 
     # -- verbs ---------------------------------------------------------------------------------------------
 
-    async def land(self, number: int | None, method: str, way_down: Callable[[Flight], DescentMethod]) -> None:
+    async def land(
+        self, number: int | None, method: str, descent_method: Callable[[TagFlight], DescentMethod]
+    ) -> None:
         """Land on the tag from wherever the vehicle is; done when it stands on it, disarmed.
 
         A camera that gives no frames is a refusal at first, and a failure like that of a lost tag later.
@@ -116,19 +118,19 @@ class Flight:
         """
         self.vehicle.require_guided_flight()
         if self.report.verb == "land":
-            self.vision.require_camera()
-        tags = landable(self.vision.settings, number)
-        descend = way_down(self)
+            self.tracker.require_camera()
+        tags = landable(self.tracker.settings, number)
+        descend = descent_method(self)
         await descend.prepare()
         self.vehicle.require_guided_flight()
         await self.take_over()
         with self._watched():
             await self._look_for(tags)
             self.report.tag, self.report.method = next(iter(tags)), method
-            with self._lasting(), self.vision.aimed_at(tags, self._floor) as target:
-                plan = plan_for(self.vision.settings, tags, self._here(), descend=descend.by_velocity)
+            with self._lasting(), self.tracker.aimed_at(tags, self._floor) as target:
+                plan = plan_for(self.tracker.settings, tags, self._here(), descend=descend.by_velocity)
                 await descend(Landing(plan, target))
-            self.report.touchdown_error = self.vision.touchdown_error(self.report.tag)
+            self.report.touchdown_error = self.tracker.touchdown_error(self.report.tag)
 
     async def search(self, number: int | None, leash: float | None) -> None:
         """Fly an expanding square until the tag is in sight, and stay above where it was seen.
@@ -137,16 +139,16 @@ class Flight:
             LandingFailed: no tag within leash and time limit; the vehicle holds.
         """
         self.vehicle.require_guided_flight()
-        self.vision.require_camera()
-        tags = tags_for(self.vision.settings, number)
+        self.tracker.require_camera()
+        tags = tags_for(self.tracker.settings, number)
         await self.take_over()
         with self._watched():
             await self._look_for(tags)
             self.report.tag = next(iter(tags))
-            settings = self.vision.settings
+            settings = self.tracker.settings
             given = {"attempts": SEARCHES, "leash": leash or settings.leash}
             plan = plan_for(settings, tags, self._here(), descend=False, **given)
-            with self._lasting(), self.vision.aimed_at(tags, self._floor) as target:
+            with self._lasting(), self.tracker.aimed_at(tags, self._floor) as target:
                 order = await self.fly(Landing(plan, target))
                 if order.phase is Phase.FAILED:
                     self.report.action = "hold"  # which the end of the job sees to
@@ -156,7 +158,7 @@ class Flight:
 
     def _place_of(self, target: Target) -> tuple[float, float, float] | None:
         """The target in m NED from the EKF origin."""
-        motion = self.vision.history.last_motion
+        motion = self.tracker.history.last_motion
         if target.place is None or motion is None:
             return None
         north, east, down = (motion.position + (target.place - motion.travelled)).round(3)
@@ -166,16 +168,16 @@ class Flight:
 
     @contextlib.contextmanager
     def _watched(self) -> Iterator[None]:
-        with self.vision.carried_by(self.vehicle.state.system), self.vision.rates.at(FLIGHT):
+        with self.tracker.carried_by(self.vehicle.state.system), self.tracker.rates.at(FLIGHT):
             yield
 
     @contextlib.contextmanager
     def _lasting(self) -> Iterator[None]:
-        began = self.vision.now()
+        began = self.tracker.now()
         try:
             yield
         finally:
-            self.report.duration = self.vision.now() - began
+            self.report.duration = self.tracker.now() - began
 
     async def _look_for(self, tags: dict[int, Tag]) -> None:
         """Have the detector look for them, and wait for the first telemetry.
@@ -184,18 +186,18 @@ class Flight:
             Stale: none came.
         """
         for number in tags:
-            await self.vision.want(number)
-        vision, deadline = self.vision, self.vision.host.clock() + FIRST
-        while vision.floor is None or vision.history.motion(vision.now()) is None:
-            if vision.host.clock() > deadline:
-                raise Stale(f"vehicle {vision.system} has not told where it is for {FIRST:g} s")
+            await self.tracker.want(number)
+        tracker, deadline = self.tracker, self.tracker.host.clock() + FIRST
+        while tracker.floor is None or tracker.history.motion(tracker.now()) is None:
+            if tracker.host.clock() > deadline:
+                raise Stale(f"vehicle {tracker.system} has not told where it is for {FIRST:g} s")
             await self.pause()
-        self._floor = vision.floor
+        self._floor = tracker.floor
         await self.vehicle.limits()  # nothing is to be waited for between the last metre and LAND
         self.vehicle.held_by("GUIDED")
 
     def _here(self) -> float | None:
-        motion = self.vision.history.last_motion
+        motion = self.tracker.history.last_motion
         return None if motion is None else self.height(motion)
 
     def height(self, motion: Motion) -> float:
@@ -204,26 +206,26 @@ class Flight:
 
     def motion(self, now: float) -> Motion | None:
         """Where the vehicle is; None when nobody knows."""
-        if now - self.vision.history.newest > STALE:
+        if now - self.tracker.history.newest > STALE:
             return None
-        return self.vision.history.motion(now)
+        return self.tracker.history.motion(now)
 
-    async def fly(self, landing: Landing) -> Order:
+    async def fly(self, landing: Landing) -> LandingCommand:
         """Send setpoints as the landing wants them until it is to touch down, or has failed."""
-        vision, vehicle = self.vision, self.vehicle
-        blind, untold = Since(), Since()
+        tracker, vehicle = self.tracker, self.vehicle
+        blind, untold = ConditionTimer(), ConditionTimer()
         if landing.began is None:
-            landing.begin(vision.now())
+            landing.begin(tracker.now())
         while True:
             vehicle.held_by("GUIDED")
-            now = vision.now()
+            now = tracker.now()
             motion = self.motion(now)
             if untold(motion is None, now) > UNTOLD:
                 return landing.fail(f"the vehicle has not told where it is for {UNTOLD:g} s")
             if motion is None:
                 await self.send(REST)  # nobody knows where it is; should it hear us, it shall rest
             else:
-                state = vision.health.state
+                state = tracker.health.state
                 if blind(state not in ("ok", "starting"), now) > BLIND and landing.phase is not Phase.LAST_METRE:
                     landing.fail(f"the camera: {state}")
                 order = landing.step(now, motion, self.height(motion))
@@ -236,10 +238,10 @@ class Flight:
 
     def _time_latency(self) -> None:
         """Note how long the newest frame took from its arrival to the first setpoint that knows it."""
-        seen = self.vision.seen
+        seen = self.tracker.seen
         if seen is not None and seen.number != self._timed:
             self._timed = seen.number
-            self.vision.latencies.append(self.vision.host.clock() - seen.received_at)
+            self.tracker.latencies.append(self.tracker.host.clock() - seen.received_at)
 
     async def pause(self) -> None:
         """Until the next setpoint is due, or a frame was looked at.
@@ -247,12 +249,12 @@ class Flight:
         Raises:
             LinkLost: the vehicle's heartbeats stopped.
         """
-        clock = self.vision.host.clock
+        clock = self.tracker.host.clock
         seconds = max(PERIOD / max(self.vehicle.state.time_ratio.ratio, 0.1), SHORTEST)
         with contextlib.suppress(asyncio.TimeoutError):
-            await wait_with_timeout(seconds, self.vision.changed.wait())
+            await wait_with_timeout(seconds, self.tracker.changed.wait())
         await asyncio.sleep(max(self._sent_at + SHORTEST - clock(), 0.0))
-        if not self.vision.host.link_watch.is_alive(self.vehicle.state):
+        if not self.tracker.host.link_watch.is_alive(self.vehicle.state):
             raise LinkLost.since(self.vehicle.state.system, clock() - self.vehicle.state.heartbeat_at)
 
     def note(self, landing: Landing, motion: Motion) -> None:
@@ -271,8 +273,8 @@ class Flight:
         Raises:
             Superseded, Paused, ModeChanged, NotArmed: somebody else has it; nothing is sent.
         """
-        attitude = self.vision.history.attitude(self.vision.now())
-        self._sent_at = self.vision.host.clock()
+        attitude = self.tracker.history.attitude(self.tracker.now())
+        self._sent_at = self.tracker.host.clock()
         await self.vehicle.send_setpoint(self.job, setpoint(velocity, None if attitude is None else attitude.yaw))
 
     async def tell(self, message: Any) -> None:
@@ -282,7 +284,7 @@ class Flight:
             Superseded, Paused: somebody else commands it; nothing is sent.
         """
         self.vehicle.authority.require(self.job)
-        self._sent_at = self.vision.host.clock()
+        self._sent_at = self.tracker.host.clock()
         await self.vehicle.link.send(message, self.vehicle.state.system)
 
     async def fly_by(self, mode: str, verb: Callable[[Job], Awaitable[None]]) -> None:
@@ -300,7 +302,7 @@ class Flight:
 
     async def give_up(self, landing: Landing, reason: str) -> None:
         """What the settings say for a landing that failed, then the error."""
-        action = self.vision.settings.on_failure
+        action = self.tracker.settings.on_failure
         if landing.refused and self.report.verb == "land":
             action = "hold"  # nothing was wrong with where it is
         self.report.action = action
@@ -325,7 +327,7 @@ class Flight:
         raise self._failed(reason)
 
 
-class Since:
+class ConditionTimer:
     """How long something has been so without a break."""
 
     def __init__(self) -> None:

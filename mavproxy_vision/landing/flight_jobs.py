@@ -18,19 +18,19 @@ from mavproxy_uavapi.core.vehicle.endings import FIXED
 from mavproxy_uavapi.core.vehicle.jobs import CONSOLE, Ending, Job
 from mavproxy_vision.landing import mission
 from mavproxy_vision.landing.descent import Descent, PrecisionDescent
-from mavproxy_vision.landing.executor import Flight
-from mavproxy_vision.landing.flight_log import Track
-from mavproxy_vision.landing.mission import Errand
+from mavproxy_vision.landing.executor import TagFlight
+from mavproxy_vision.landing.flight_log import FlightLog
+from mavproxy_vision.landing.mission import MissionPlan
 from mavproxy_vision.landing.precision_landing import PrecisionLanding
 from mavproxy_vision.landing.report import Report
-from mavproxy_vision.tracking.tracker import Vision
+from mavproxy_vision.tracking.tracker import Tracker
 
 TIDY_EVERY = 1.0  # s between two tries to give parameters back
 TIDY_TRIES = 10
 log = logging.getLogger("vision")
 
 
-class Sortie:
+class FlightTask:
     """A flight that is asked for: the body of a job, and what it tells of itself.
 
     Args:
@@ -40,7 +40,9 @@ class Sortie:
         fly: flies it.
     """
 
-    def __init__(self, flights: Flights, copter: Copter, name: str, fly: Callable[[Flight], Awaitable[None]]) -> None:
+    def __init__(
+        self, flights: FlightJobs, copter: Copter, name: str, fly: Callable[[TagFlight], Awaitable[None]]
+    ) -> None:
         self._flights, self._copter, self._fly = flights, copter, fly
         self.report = Report(name)
         self.begun = False
@@ -49,22 +51,22 @@ class Sortie:
         """Fly it, as that job."""
         self.begun = True
         flights = self._flights
-        flight = Flight(flights.vision, self._copter, job, self.report, flights.succeed)
-        flights.begun(flight)
+        flight = TagFlight(flights.tracker, self._copter, job, self.report, flights.replace_running_flight)
+        flights.on_flight_begun(flight)
         try:
             await self._fly(flight)
         except UavApiError as error:
             self.report.reason = str(error)
             raise
         finally:
-            flights.over(flight)
+            flights.on_flight_ended(flight)
 
     def result(self) -> str:
         """One line about the flight, which ended well."""
         return self.report.line()
 
 
-class ErrandSortie(Sortie):
+class MissionTask(FlightTask):
     """A whole mission, with its track.
 
     Args:
@@ -73,14 +75,14 @@ class ErrandSortie(Sortie):
         errand: where to.
     """
 
-    def __init__(self, flights: Flights, copter: Copter, errand: Errand) -> None:
-        way_down = flights.way_down(errand.method)
-        super().__init__(flights, copter, "mission", lambda flight: mission.fly(flight, errand, way_down))
-        self._errand, self._track = errand, Track()
+    def __init__(self, flights: FlightJobs, copter: Copter, errand: MissionPlan) -> None:
+        descent_method = flights.descent_method(errand.method)
+        super().__init__(flights, copter, "mission", lambda flight: mission.fly(flight, errand, descent_method))
+        self._errand, self._track = errand, FlightLog()
 
     async def __call__(self, job: Job) -> None:
         """Fly it, and write down its track when it is over."""
-        listeners = self._flights.vision.host.listeners
+        listeners = self._flights.tracker.host.listeners
         listeners.append(self._follow)
         try:
             await super().__call__(job)
@@ -97,54 +99,54 @@ class ErrandSortie(Sortie):
             self._track.add(message)
 
 
-class Flights:
+class FlightJobs:
     """What is in flight, and what the last flight told. All methods belong to the asyncio thread.
 
     Attributes:
         report: of the flight under way, or the last one.
 
     Args:
-        vision: the eye.
+        tracker: the camera's outcomes, and where the target lies.
         directory: where tracks and plots go.
     """
 
-    def __init__(self, vision: Vision, directory: Callable[[], Path]) -> None:
-        self.vision = vision
+    def __init__(self, tracker: Tracker, directory: Callable[[], Path]) -> None:
+        self.tracker = tracker
         self.report: Report | None = None
         self._directory = directory
-        self._flight: Flight | None = None
-        self._begun: set[Flight] = set()  # that are not over, those too that have no vehicle yet
-        self._unfinished: set[Flight] = set()  # of these, those that took over
+        self._flight: TagFlight | None = None
+        self._begun: set[TagFlight] = set()  # that are not over, those too that have no vehicle yet
+        self._unfinished: set[TagFlight] = set()  # of these, those that took over
         self._plnd: dict[int, PrecisionLanding] = {}
         self._tidying: set[PrecisionLanding] = set()
         self._tasks: set[asyncio.Task[None]] = set()
-        vision.host.last_words.append(self.last_words)
+        tracker.host.last_words.append(self.last_words)
 
     def copter(self) -> Copter:
         """MAVProxy's current vehicle. Raises NoVehicle, LinkLost, NotSupported."""
-        return copter_of(self.vision.host.registry.commandable())
+        return copter_of(self.tracker.host.registry.commandable())
 
     # -- flights, to be run as jobs --------------------------------------------------------------------------
 
-    def landing(self, copter: Copter, number: int | None, method: str) -> Sortie:
+    def landing(self, copter: Copter, number: int | None, method: str) -> FlightTask:
         """Land on a tag from here."""
-        way_down = self.way_down(method)
-        return Sortie(self, copter, "land", lambda flight: flight.land(number, method, way_down))
+        descent_method = self.descent_method(method)
+        return FlightTask(self, copter, "land", lambda flight: flight.land(number, method, descent_method))
 
-    def searching(self, copter: Copter, number: int | None, leash: float | None) -> Sortie:
+    def searching(self, copter: Copter, number: int | None, leash: float | None) -> FlightTask:
         """Find a tag from here."""
-        return Sortie(self, copter, "search", lambda flight: flight.search(number, leash))
+        return FlightTask(self, copter, "search", lambda flight: flight.search(number, leash))
 
-    def errand(self, copter: Copter, errand: Errand) -> Sortie:
+    def errand(self, copter: Copter, errand: MissionPlan) -> FlightTask:
         """A whole mission, with its track."""
-        return ErrandSortie(self, copter, errand)
+        return MissionTask(self, copter, errand)
 
-    def way_down(self, method: str) -> Callable[[Flight], Descent]:
+    def descent_method(self, method: str) -> Callable[[TagFlight], Descent]:
         """What descends by that method."""
         if method != "landing_target":
             return Descent
 
-        def by_plnd(flight: Flight) -> Descent:
+        def by_plnd(flight: TagFlight) -> Descent:
             vehicle = flight.vehicle
             plnd = self._plnd.get(vehicle.state.system)
             if plnd is None or plnd.vehicle is not vehicle:
@@ -153,11 +155,11 @@ class Flights:
 
         return by_plnd
 
-    def begun(self, flight: Flight) -> None:
+    def on_flight_begun(self, flight: TagFlight) -> None:
         """It is being prepared; the vehicle is somebody else's still."""
         self._begun.add(flight)
 
-    async def succeed(self, flight: Flight) -> None:
+    async def replace_running_flight(self, flight: TagFlight) -> None:
         """Make it the flight under way, and await the end of those before."""
         before = self._unfinished - {flight}
         self._flight, self.report = flight, flight.report
@@ -167,7 +169,7 @@ class Flights:
                 one.job.abort(Aborted(f"{flight.job.verb} took over"))
             await one.ended.wait()
 
-    def over(self, flight: Flight) -> None:
+    def on_flight_ended(self, flight: TagFlight) -> None:
         """It has sent its last message."""
         self._begun.discard(flight)
         self._unfinished.discard(flight)
@@ -180,7 +182,7 @@ class Flights:
             if plnd.before and plnd not in self._tidying:
                 self._do(self._tidy(plnd))
 
-    async def keep(self, track: Track, report: Report) -> None:
+    async def keep(self, track: FlightLog, report: Report) -> None:
         """Write track and plot; what cannot be written is said in the report."""
         loop = asyncio.get_running_loop()
         try:
@@ -217,7 +219,7 @@ class Flights:
         self._tidying.add(plnd)
         tries = 0
         while plnd.before and tries < TIDY_TRIES:
-            if not plnd.in_use and self.vision.host.link_watch.is_alive(plnd.vehicle.state):
+            if not plnd.in_use and self.tracker.host.link_watch.is_alive(plnd.vehicle.state):
                 try:
                     await plnd.give_back()
                 except UavApiError as error:
@@ -230,7 +232,7 @@ class Flights:
     # -- from the prompt, and at the end ---------------------------------------------------------------------
 
     def begin(
-        self, copter: Copter, sortie: Sortie, path: str, request: dict[str, Any], tell: Callable[[str], None]
+        self, copter: Copter, sortie: FlightTask, path: str, request: dict[str, Any], tell: Callable[[str], None]
     ) -> Job:
         """Start a flight that nobody awaits over the network; `tell` is called with one line at its end."""
 
@@ -238,7 +240,7 @@ class Flights:
             await sortie(job)
             return sortie.result()
 
-        jobs = self.vision.host.jobs
+        jobs = self.tracker.host.jobs
         job = jobs.begin(copter, path, request, body, client=CONSOLE, outlives_client=True)
         self._do(self._tell_end(job, tell))
         return job
@@ -253,7 +255,7 @@ class Flights:
         """End all flights; a vehicle that is ours is told to hold. What was done; None without a flight."""
         return self._end(reason, Ending.ABORTED)
 
-    def abandon(self) -> None:
+    def abort_all(self) -> None:
         """End all flights, because the module is unloaded."""
         self._end("vision was unloaded", Ending.UNLOADED)
 
@@ -262,7 +264,7 @@ class Flights:
         told = None
         for flight in sorted(self._begun, key=lambda one: one is not self._flight):
             if flight.job.running:
-                error = _ended(self.vision, flight, reason, ending)
+                error = _ended(self.tracker, flight, reason, ending)
                 told = told or str(error)
                 flight.job.abort(error, ending)
         return told
@@ -272,9 +274,9 @@ class Flights:
         return [(message, plnd.vehicle.state.system) for plnd in self._plnd.values() for message in plnd.remaining()]
 
 
-def _ended(vision: Vision, flight: Flight, reason: str, ending: Ending) -> Aborted:
+def _ended(tracker: Tracker, flight: TagFlight, reason: str, ending: Ending) -> Aborted:
     vehicle = flight.vehicle
-    holds = flight.commands and vision.host.endings.what_follows(vehicle, FIXED[ending], flight.job.modes)
+    holds = flight.commands and tracker.host.endings.what_follows(vehicle, FIXED[ending], flight.job.modes)
     left = "the vehicle is told to hold" if holds else f"the vehicle is left alone: it is in {vehicle.mode}"
     return Aborted(f"{reason}; {left}")
 

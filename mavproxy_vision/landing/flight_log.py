@@ -20,7 +20,7 @@ COLOURS = {"track": (200, 120, 40), "start": (80, 160, 60), "target": (40, 40, 2
 
 
 @dataclass
-class Track:
+class FlightLog:
     """Positions as GLOBAL_POSITION_INT told them.
 
     Attributes:

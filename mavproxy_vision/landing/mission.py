@@ -10,12 +10,12 @@ from mavproxy_uavapi.core.errors import Invalid
 from mavproxy_uavapi.core.vehicle.geodesy import METRES_PER_DEGREE
 from mavproxy_uavapi.core.vehicle.messages import GlobalTarget
 from mavproxy_vision.landing.descent import Descent
-from mavproxy_vision.landing.executor import Flight
+from mavproxy_vision.landing.executor import TagFlight
 from mavproxy_vision.landing.plan import landable
 
 
 @dataclass(frozen=True)
-class Errand:
+class MissionPlan:
     """Where to go.
 
     Attributes:
@@ -51,7 +51,7 @@ class Errand:
         return lat + self.north / METRES_PER_DEGREE, (there + 180.0) % 360.0 - 180.0
 
 
-async def fly(flight: Flight, errand: Errand, way_down: Callable[[Flight], Descent]) -> None:
+async def fly(flight: TagFlight, errand: MissionPlan, descent_method: Callable[[TagFlight], Descent]) -> None:
     """Arm, take off, fly there, land; done when disarmed there.
 
     A vehicle that flies already in GUIDED goes there from where it is.
@@ -63,9 +63,9 @@ async def fly(flight: Flight, errand: Errand, way_down: Callable[[Flight], Desce
     vehicle, job = flight.vehicle, flight.job
     grounded = not vehicle.state.armed or vehicle.state.landed is not False
     if errand.on_tag:
-        flight.vision.require_camera()
-        landable(flight.vision.settings, errand.tag)
-        await way_down(flight).prepare()
+        flight.tracker.require_camera()
+        landable(flight.tracker.settings, errand.tag)
+        await descent_method(flight).prepare()
     if not grounded:
         vehicle.require_guided_flight()
     await flight.take_over()
@@ -78,6 +78,6 @@ async def fly(flight: Flight, errand: Errand, way_down: Callable[[Flight], Desce
     await vehicle.go_to(job, GlobalTarget(lat, lon, errand.alt), wait=True)
     vehicle.held_by("GUIDED")
     if errand.on_tag:
-        await flight.land(errand.tag, errand.method, way_down)
+        await flight.land(errand.tag, errand.method, descent_method)
     else:
         await flight.fly_by("LAND", vehicle.land)

@@ -25,10 +25,10 @@ from mavproxy_vision.landing.expanding_square import Waypoint, expanding_square
 from mavproxy_vision.tracking.pose_history import Motion
 from mavproxy_vision.tracking.target_filter import Target
 
-COAST = 0.5  # s without a sighting that change nothing
-HOLD = 2.0  # s without a sighting until it climbs
+COAST = 0.5  # s without a detection that change nothing
+HOLD = 2.0  # s without a detection until it climbs
 BLIND_BELOW = 1.0  # m: a tag that is lost lower than that is landed on all the same
-CLIMB = 1.5  # m above the last fix
+CLIMB = 1.5  # m above the last measurement
 GAIN = 0.9  # 1/s: velocity for each m of offset
 INTEGRAL = 0.15  # 1/s/s
 INTEGRAL_LIMIT = 0.25  # m/s
@@ -96,7 +96,7 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class Order:
+class LandingCommand:
     """What to do now: the phase, a velocity (m/s NED), and why it failed, if it did."""
 
     phase: Phase
@@ -115,7 +115,7 @@ class Landing:
         self.phase = Phase.LOOK
         self.attempt = 0
         self.refused = False  # failed because what is seen makes no sense
-        self.offset: float | None = None  # m, horizontally, at the last sighting
+        self.offset: float | None = None  # m, horizontally, at the last detection
         self.began: float | None = None
         self.phases: dict[str, float] = {}  # s that each phase took
         self._since = 0.0
@@ -129,7 +129,7 @@ class Landing:
         self._down_by = math.inf  # when the last metre should be over
         self._reason = ""
 
-    def step(self, now: float, motion: Motion, height: float) -> Order:
+    def step(self, now: float, motion: Motion, height: float) -> LandingCommand:
         """One step.
 
         Args:
@@ -151,10 +151,10 @@ class Landing:
         wanted = self._wanted(now, motion, height, elapsed)
         if self.phase in (Phase.LAND, Phase.FAILED):
             self._velocity = REST
-            return Order(self.phase, REST, self._reason)
+            return LandingCommand(self.phase, REST, self._reason)
         change = limited((wanted - self._velocity)[:2], self.plan.acceleration * elapsed)
         self._velocity = vector(self._velocity[0] + change[0], self._velocity[1] + change[1], wanted[2])
-        return Order(self.phase, self._velocity)
+        return LandingCommand(self.phase, self._velocity)
 
     def begin(self, now: float) -> None:
         """Its time begins to run."""
@@ -178,11 +178,11 @@ class Landing:
         self._velocity = motion.velocity.copy()
         self._stay(now, Phase.HOLD, motion.travelled, height)
 
-    def fail(self, reason: str) -> Order:
+    def fail(self, reason: str) -> LandingCommand:
         """End it for that reason."""
         if self.phase is not Phase.FAILED:
             self.phase, self._reason, self._velocity = Phase.FAILED, reason, REST
-        return Order(Phase.FAILED, REST, self._reason)
+        return LandingCommand(Phase.FAILED, REST, self._reason)
 
     def _failure(self, now: float) -> str | None:
         assert self.began is not None

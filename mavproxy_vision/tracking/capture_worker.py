@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from mavproxy_uavapi.core.errors import UavApiError
-from mavproxy_vision.apriltag.detection import Seen
+from mavproxy_vision.apriltag.detection import FrameResult
 from mavproxy_vision.apriltag.detector import Detector
 from mavproxy_vision.camera.source import Frame, Image, Source
 
@@ -88,7 +88,7 @@ class Worker:
         self,
         source: Source,
         detector: Detector,
-        tell: Callable[[Seen, Image], None],
+        tell: Callable[[FrameResult, Image], None],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.source, self.detector = source, detector
@@ -215,9 +215,9 @@ class Worker:
             gap = gap + 0.1 * (now - last - gap) if gap else now - last
             self._rate, last = 1.0 / max(gap, 1e-3), now
 
-    def look_at(self, frame: Frame) -> Seen:
+    def look_at(self, frame: Frame) -> FrameResult:
         """Look for tags in a frame."""
-        sightings = self.detector.detect(frame.image)
+        detections = self.detector.detect(frame.image)
         self._frames += 1
         size = (frame.image.shape[1], frame.image.shape[0])
-        return Seen(self._frames, frame.captured_at, frame.received_at, self._clock(), size, sightings)
+        return FrameResult(self._frames, frame.captured_at, frame.received_at, self._clock(), size, detections)

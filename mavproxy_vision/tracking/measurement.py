@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from mavproxy_vision.apriltag.detection import Seen, Sighting
+from mavproxy_vision.apriltag.detection import FrameResult, TagDetection
 from mavproxy_vision.apriltag.tag_layout import Tag, target_from
 from mavproxy_vision.geometry.camera_model import CameraModel
 from mavproxy_vision.geometry.frames import Attitude, Mount, vector
 from mavproxy_vision.tracking.pose_history import History, VehicleClock
-from mavproxy_vision.tracking.target_filter import Fix
+from mavproxy_vision.tracking.target_filter import TargetMeasurement
 
 WORST_ERROR = 0.03  # of the tag's side in px: a reprojection error beyond it is no square
 LEAST_WORST = 1.0  # px
@@ -34,8 +34,8 @@ class Wanted:
     floor: float = 0.0
 
 
-class Fixer:
-    """Makes fixes of sightings.
+class TargetMeasurer:
+    """Makes measurements of detections.
 
     Args:
         model: the camera.
@@ -46,8 +46,8 @@ class Fixer:
     def __init__(self, model: CameraModel, mount: Mount, wanted: Wanted) -> None:
         self.model, self.mount, self.wanted = model, mount, wanted
 
-    def fixes(self, seen: Seen, history: History, clock: VehicleClock) -> list[Fix]:
-        """The fixes of one frame; none when nobody knows where the vehicle was at its capture time.
+    def measure(self, seen: FrameResult, history: History, clock: VehicleClock) -> list[TargetMeasurement]:
+        """The measurements of one frame; none when nobody knows where the vehicle was at its capture time.
 
         Args:
             seen: the frame's outcome.
@@ -60,23 +60,23 @@ class Fixer:
             return []
         height = self.wanted.floor - float(motion.position[2])
         found = []
-        for sighting in seen.sightings:
-            tag = self.wanted.tags.get(sighting.id)
-            if tag is None or sighting.family != self.wanted.family or not is_sound(sighting):
+        for detection in seen.detections:
+            tag = self.wanted.tags.get(detection.id)
+            if tag is None or detection.family != self.wanted.family or not is_sound(detection):
                 continue
-            assert sighting.position is not None and sighting.distance is not None
-            relative = self.mount.sighted(sighting.position, attitude)
+            assert detection.position is not None and detection.distance is not None
+            relative = self.mount.sighted(detection.position, attitude)
             if tag.right or tag.up:
                 model = self.model.scaled_to(*seen.size)
-                north, east = target_from(tag, self._right_of(sighting, model, attitude))
+                north, east = target_from(tag, self._right_of(detection, model, attitude))
                 relative = relative + vector(north, east, 0.0)
             place = motion.travelled + relative
-            found.append(Fix(at, place, motion.travelled, sighting.distance, height, sighting.id))
+            found.append(TargetMeasurement(at, place, motion.travelled, detection.distance, height, detection.id))
         return found
 
-    def _right_of(self, sighting: Sighting, model: CameraModel, attitude: Attitude) -> tuple[float, float]:
+    def _right_of(self, detection: TagDetection, model: CameraModel, attitude: Attitude) -> tuple[float, float]:
         """North and east components of the tag's right, for a tag that lies level."""
-        corners = np.asarray(sighting.corners, np.float64).reshape(-1, 1, 2)
+        corners = np.asarray(detection.corners, np.float64).reshape(-1, 1, 2)
         rays = cv2.undistortPoints(corners, model.matrix, model.coefficients).reshape(4, 2)
         down = (self.mount.in_ned(attitude) @ np.column_stack([rays, np.ones(4)]).T).T
         on_ground = down[:, :2] / np.maximum(down[:, 2:], 0.05)
@@ -84,9 +84,9 @@ class Fixer:
         return float(right[0]), float(right[1])
 
 
-def is_sound(sighting: Sighting) -> bool:
-    """Whether a sighting has a position, in front of the lens, and fits a square."""
-    if sighting.position is None or sighting.position[2] <= 0:
+def is_sound(detection: TagDetection) -> bool:
+    """Whether a detection has a position, in front of the lens, and fits a square."""
+    if detection.position is None or detection.position[2] <= 0:
         return False
-    side = float(np.linalg.norm(sighting.corners[1] - sighting.corners[0]))
-    return bool(sighting.error <= max(WORST_ERROR * side, LEAST_WORST))
+    side = float(np.linalg.norm(detection.corners[1] - detection.corners[0]))
+    return bool(detection.error <= max(WORST_ERROR * side, LEAST_WORST))

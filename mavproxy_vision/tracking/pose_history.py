@@ -57,7 +57,7 @@ class VehicleClock:
         return self._best[0] + (vehicle - self._best[1]) / max(self.ratio, 0.01)
 
 
-class Unstamped:
+class UnstampedClock:
     """When a message without a time was sent, by a stamped one that comes regularly.
 
     A busy machine hears many at once: what was heard before a message tells when it was sent, while it comes at all.

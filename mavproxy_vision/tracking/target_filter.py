@@ -16,19 +16,19 @@ from mavproxy_vision.geometry.frames import Vector
 WANDER = 0.12  # m/sqrt(s): how fast a place drifts in a frame that is integrated from velocities
 GATE = 0.45  # m, and 8 % of the range: farther off, it is another tag or an outlier
 REJECTED_IN_A_ROW = 12  # then it was the old place that was wrong
-FIXES = 3  # sightings that make a target
-WINDOW = 5.0  # s over which motion and sightings are compared
+FIXES = 3  # detections that make a target
+WINDOW = 5.0  # s over which motion and detections are compared
 MOVED = 0.8  # m that the vehicle must have moved for that: a late frame alone moves a place by half of it
 WRONG_WAY = 0.8  # share of its motion that the place of a resting tag may seem to move; 1.4 when turned by 90 degrees
-WRONG_TIMES = 4  # sightings in a row
+WRONG_TIMES = 4  # detections in a row
 HEIGHT_FROM = 2.0  # m; lower, a barometer says nothing about a tag's size
 HEIGHT_OFF = (0.7, 0.22)  # m, and share of the height, by which range and height may disagree
-HEIGHTS = 10  # sightings over which they are compared
+HEIGHTS = 10  # detections over which they are compared
 
 
 @dataclass(frozen=True)
-class Fix:
-    """One sighting, made ready.
+class TargetMeasurement:
+    """One detection, made ready.
 
     Attributes:
         at: capture time.
@@ -58,90 +58,90 @@ class Target:
     def __init__(self) -> None:
         self.place: Vector | None = None
         self.seen_at = -math.inf
-        self.fixes = 0
+        self.measurements = 0
         self.ambiguous = 0  # frames in a row that showed two tags of the same id
-        self.last: Fix | None = None
+        self.last: TargetMeasurement | None = None
         self.is_final = False  # no other place is believed any more, whatever is seen
         self._variance = np.zeros(3)
         self._rejected = 0
-        self._recent: deque[Fix] = deque()
+        self._recent: deque[TargetMeasurement] = deque()
         self._wrong_way = 0
 
     @property
     def found(self) -> bool:
-        """Whether enough sightings agree."""
-        return self.place is not None and self.fixes >= FIXES
+        """Whether enough detections agree."""
+        return self.place is not None and self.measurements >= FIXES
 
     def age(self, now: float) -> float:
         """Seconds since it was last seen."""
         return now - self.seen_at
 
-    def take(self, fixes: list[Fix]) -> None:
-        """Take the sightings of one frame, of which no two show the same tag but when there are two of it."""
-        twice = len({fix.tag for fix in fixes}) < len(fixes)
+    def take(self, measurements: list[TargetMeasurement]) -> None:
+        """Take the measurements of one frame. A repeated id means two physical tags."""
+        twice = len({measurement.tag for measurement in measurements}) < len(measurements)
         self.ambiguous = self.ambiguous + 1 if twice and not self.found else 0
         if twice and not self.found:
             return
-        for fix in sorted(fixes, key=self._distance):
-            if self._update(fix) and twice:
+        for measurement in sorted(measurements, key=self._distance):
+            if self._update(measurement) and twice:
                 return  # the other one is not ours
 
-    def _distance(self, fix: Fix) -> float:
-        return 0.0 if self.place is None else float(np.linalg.norm(fix.place - self.place))
+    def _distance(self, measurement: TargetMeasurement) -> float:
+        return 0.0 if self.place is None else float(np.linalg.norm(measurement.place - self.place))
 
-    def _update(self, fix: Fix) -> bool:
-        sideways = 0.015 + 0.012 * fix.range
-        noise = np.array([sideways, sideways, 0.02 + 0.015 * fix.range]) ** 2
-        self._watch(fix)
+    def _update(self, measurement: TargetMeasurement) -> bool:
+        sideways = 0.015 + 0.012 * measurement.range
+        noise = np.array([sideways, sideways, 0.02 + 0.015 * measurement.range]) ** 2
+        self._watch(measurement)
         if self.place is None:
-            self._begin(fix, noise)
+            self._begin(measurement, noise)
             return True
-        self._variance += WANDER**2 * max(fix.at - self.seen_at, 0.0)
-        if self._distance(fix) > GATE + 0.08 * fix.range + math.sqrt(float(self._variance.max())):
+        self._variance += WANDER**2 * max(measurement.at - self.seen_at, 0.0)
+        if self._distance(measurement) > GATE + 0.08 * measurement.range + math.sqrt(float(self._variance.max())):
             self._rejected += 1
             if self._rejected >= REJECTED_IN_A_ROW and not self.is_final:
-                self._begin(fix, noise)
+                self._begin(measurement, noise)
             return False
         gain = self._variance / (self._variance + noise)
-        self.place = self.place + gain * (fix.place - self.place)
+        self.place = self.place + gain * (measurement.place - self.place)
         self._variance = self._variance * (1 - gain)
-        self._count(fix)
+        self._count(measurement)
         return True
 
-    def _begin(self, fix: Fix, noise: Vector) -> None:
-        self.place, self._variance, self.fixes = fix.place.copy(), noise.copy(), 0
-        self._count(fix)
+    def _begin(self, measurement: TargetMeasurement, noise: Vector) -> None:
+        self.place, self._variance, self.measurements = measurement.place.copy(), noise.copy(), 0
+        self._count(measurement)
 
-    def _count(self, fix: Fix) -> None:
+    def _count(self, measurement: TargetMeasurement) -> None:
         self._rejected = 0
-        self.fixes += 1
-        self.seen_at = max(self.seen_at, fix.at)
-        self.last = fix
+        self.measurements += 1
+        self.seen_at = max(self.seen_at, measurement.at)
+        self.last = measurement
 
     # -- what does not fit together ------------------------------------------------------------------------
 
-    def _watch(self, fix: Fix) -> None:
-        self._recent.append(fix)
-        while fix.at - self._recent[0].at > WINDOW:
+    def _watch(self, measurement: TargetMeasurement) -> None:
+        self._recent.append(measurement)
+        while measurement.at - self._recent[0].at > WINDOW:
             self._recent.popleft()
         first = self._recent[0]
-        moved = (fix.travelled - first.travelled)[:2]
-        seemed = (fix.place - first.place)[:2]
+        moved = (measurement.travelled - first.travelled)[:2]
+        seemed = (measurement.place - first.place)[:2]
         if np.linalg.norm(moved) < MOVED:
             return
-        wrong = np.linalg.norm(seemed) > WRONG_WAY * np.linalg.norm(moved) + 0.05 * fix.range
+        wrong = np.linalg.norm(seemed) > WRONG_WAY * np.linalg.norm(moved) + 0.05 * measurement.range
         self._wrong_way = self._wrong_way + 1 if wrong else 0
 
     @property
     def contradiction(self) -> str | None:
-        """Why these sightings cannot be believed; None when they can."""
+        """Why these detections cannot be believed; None when they can."""
         if self._wrong_way >= WRONG_TIMES:
             return "the tag does not move in the image as the vehicle moves: is the camera mounted as `mount` says?"
-        heights = [fix for fix in list(self._recent)[-HEIGHTS:] if fix.height >= HEIGHT_FROM]
+        heights = [measurement for measurement in list(self._recent)[-HEIGHTS:] if measurement.height >= HEIGHT_FROM]
         if len(heights) < HEIGHTS:
             return None
-        depth = float(np.median([fix.depth for fix in heights]))
-        height = float(np.median([fix.height for fix in heights]))
+        depth = float(np.median([measurement.depth for measurement in heights]))
+        height = float(np.median([measurement.height for measurement in heights]))
         if abs(depth - height) <= max(HEIGHT_OFF[0], HEIGHT_OFF[1] * height):
             return None
         return (

@@ -16,8 +16,8 @@ import cv2
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
-from mavproxy_vision.apriltag.detection import Seen
-from mavproxy_vision.apriltag.detector import Detector, Options
+from mavproxy_vision.apriltag.detection import FrameResult
+from mavproxy_vision.apriltag.detector import Detector, DetectorOptions
 from mavproxy_vision.apriltag.tag_layout import Tag
 from mavproxy_vision.camera.gstreamer import Pipeline
 from mavproxy_vision.camera.opencv_capture import Capture
@@ -29,16 +29,16 @@ from mavproxy_vision.geometry.frames import Attitude, vector
 from mavproxy_vision.settings import Settings
 from mavproxy_vision.tracking.capture_worker import Health, Worker
 from mavproxy_vision.tracking.ground_truth import Pose, Truth
-from mavproxy_vision.tracking.measurement import Fixer, Wanted
-from mavproxy_vision.tracking.pose_history import History, Unstamped, VehicleClock
+from mavproxy_vision.tracking.measurement import TargetMeasurer, Wanted
+from mavproxy_vision.tracking.pose_history import History, UnstampedClock, VehicleClock
 from mavproxy_vision.tracking.stream_rates import TRUTH, Rates
 from mavproxy_vision.tracking.target_filter import Target
 
-FRESH = 1.0  # s; older sightings are not shown as what is in view
+FRESH = 1.0  # s; older detections are not shown as what is in view
 SOON = 0.06  # s of the vehicle's clock that telemetry is carried on to a frame; one farther ahead waits for it
 
 
-class Vision:
+class Tracker:
     """The eye. All methods belong to the asyncio thread, but for `deliver`.
 
     Attributes:
@@ -58,16 +58,18 @@ class Vision:
         self.host, self.settings = host, settings
         self.history, self.clock, self.truth = History(), VehicleClock(), Truth()
         self.rates = Rates(host.clock)
-        self._unstamped = Unstamped()  # SIM_STATE has no time of its own; ATTITUDE tells it
+        self._unstamped = UnstampedClock()  # SIM_STATE has no time of its own; ATTITUDE tells it
         self.worker: Worker | None = None
-        self.seen: Seen | None = None
+        self.seen: FrameResult | None = None
         self.image: Image | None = None
         self.target: Target | None = None
         self.changed = asyncio.Event()
         self.latencies: deque[float] = deque(maxlen=1000)  # s from a frame's arrival to the setpoint that knows it
-        self._fixer: Fixer | None = None
+        self._measurer: TargetMeasurer | None = None
         self._carrier = 0  # the vehicle that a flight carries it on; 0 for MAVProxy's current one
-        self._unplaced: deque[Seen] = deque(maxlen=50)  # newer than the telemetry that tells where they were taken
+        self._unplaced: deque[FrameResult] = deque(
+            maxlen=50
+        )  # newer than the telemetry that tells where they were taken
         self._system = 0
         self._home_down: float | None = None
         self._watching: asyncio.Task[None] | None = None
@@ -129,11 +131,11 @@ class Vision:
         worker = Worker(source, detector, lambda seen, image: self.deliver(worker, seen, image), self.host.clock)
         return worker
 
-    def options(self, settings: Settings) -> Options:
+    def options(self, settings: Settings) -> DetectorOptions:
         """How the detector is to look."""
         tags = settings.tag_list
         sizes = dict.fromkeys(self._extra, tags[0].size) | {tag.id: tag.size for tag in tags}
-        return Options(settings.families, sizes, settings.any_id, settings.far)
+        return DetectorOptions(settings.families, sizes, settings.any_id, settings.far)
 
     async def want(self, number: int) -> None:
         """Look for that id too; it has the main tag's size unless `tags` says otherwise."""
@@ -147,7 +149,7 @@ class Vision:
 
     # -- what comes in -------------------------------------------------------------------------------------
 
-    def deliver(self, worker: Worker, seen: Seen, image: Image) -> None:
+    def deliver(self, worker: Worker, seen: FrameResult, image: Image) -> None:
         """An outcome. The worker's thread."""
 
         def arrive() -> None:
@@ -156,7 +158,7 @@ class Vision:
 
         self.host.bridge.call_soon(arrive)
 
-    def take(self, seen: Seen, image: Image) -> None:
+    def take(self, seen: FrameResult, image: Image) -> None:
         """An outcome."""
         self.seen, self.image = seen, image
         if self.target is not None:
@@ -167,11 +169,11 @@ class Vision:
 
     def _place(self) -> None:
         """Tell the target what was seen, as far as telemetry says where that was."""
-        while self._unplaced and self.target is not None and self._fixer is not None:
+        while self._unplaced and self.target is not None and self._measurer is not None:
             if self.clock.vehicle(self._unplaced[0].captured_at) > self.history.newest + SOON:
                 return
-            fixes = self._fixer.fixes(self._unplaced.popleft(), self.history, self.clock)
-            self.target.take(fixes)
+            measurements = self._measurer.measure(self._unplaced.popleft(), self.history, self.clock)
+            self.target.take(measurements)
 
     def _hear(self, state: VehicleState, message: Any, now: float) -> None:
         name = message.get_type()
@@ -217,7 +219,7 @@ class Vision:
         if self.system != self._system:  # another vehicle: what was known is of no use
             self._system = self.system
             self.history, self.clock, self.truth = History(), VehicleClock(), Truth()
-            self._unstamped, self._home_down = Unstamped(), None
+            self._unstamped, self._home_down = UnstampedClock(), None
 
     def _is_ours(self, state: VehicleState) -> bool:
         self._follow_carrier()
@@ -271,13 +273,15 @@ class Vision:
             floor: of its ground, m down of the EKF origin.
         """
         settings = self.settings
-        self._fixer = Fixer(settings.model, settings.camera_mount, Wanted(settings.families[0], tags, floor))
+        self._measurer = TargetMeasurer(
+            settings.model, settings.camera_mount, Wanted(settings.families[0], tags, floor)
+        )
         self.target = Target()
         self._unplaced.clear()
         try:
             yield self.target
         finally:
-            self.target = self._fixer = None
+            self.target = self._measurer = None
 
     def now(self) -> float:
         """The vehicle's time."""
@@ -299,7 +303,7 @@ class Vision:
         return min((error for error in errors if error is not None), default=None)
 
     @property
-    def fresh_seen(self) -> Seen | None:
+    def fresh_seen(self) -> FrameResult | None:
         """The newest outcome, if it shows what is in view now."""
         if self.seen is None or self.host.clock() - self.seen.captured_at > FRESH:
             return None
@@ -337,22 +341,22 @@ def make_source(settings: Settings, where: Any, clock: Callable[[], float]) -> S
     return Capture(path if is_file else spec, latency, size, settings.fps, clock)
 
 
-def in_view(seen: Seen | None) -> list[dict[str, Any]]:
+def in_view(seen: FrameResult | None) -> list[dict[str, Any]]:
     """The tags of an outcome, as they are told to people."""
-    return [] if seen is None else [_told(seen, sighting) for sighting in seen.sightings]
+    return [] if seen is None else [_told(seen, detection) for detection in seen.detections]
 
 
-def _told(seen: Seen, sighting: Any) -> dict[str, Any]:
-    known = sighting.position is not None
+def _told(seen: FrameResult, detection: Any) -> dict[str, Any]:
+    known = detection.position is not None
     return {
-        "id": sighting.id,
-        "family": sighting.family,
-        "hamming": sighting.hamming,
-        "corners": [[round(float(value), 2) for value in corner] for corner in sighting.corners],
-        "size": sighting.size or None,
-        "position": [round(float(value), 3) for value in sighting.position] if known else None,
-        "distance": round(sighting.distance, 3) if known else None,
-        "rotation": [[round(float(v), 4) for v in row] for row in sighting.rotation] if known else None,
-        "reprojection_error": round(sighting.error, 3) if known else None,
+        "id": detection.id,
+        "family": detection.family,
+        "hamming": detection.hamming,
+        "corners": [[round(float(value), 2) for value in corner] for corner in detection.corners],
+        "size": detection.size or None,
+        "position": [round(float(value), 3) for value in detection.position] if known else None,
+        "distance": round(detection.distance, 3) if known else None,
+        "rotation": [[round(float(v), 4) for v in row] for row in detection.rotation] if known else None,
+        "reprojection_error": round(detection.error, 3) if known else None,
         "latency_s": round(seen.latency, 3),
     }

@@ -26,14 +26,14 @@ from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.mavlink.link import Address, require_finite
 from mavproxy_uavapi.sim.options import Home, Options, Wind
 from mavproxy_uavapi.sim.simulator import STEP, Simulator
-from mavproxy_vision.apriltag.detection import Seen
+from mavproxy_vision.apriltag.detection import FrameResult
 from mavproxy_vision.apriltag.detector import Detector
 from mavproxy_vision.camera.source import Frame
-from mavproxy_vision.landing.flight_jobs import Flights
+from mavproxy_vision.landing.flight_jobs import FlightJobs
 from mavproxy_vision.settings import ModuleSettings
 from mavproxy_vision.tracking.capture_worker import Health, Watch
 from mavproxy_vision.tracking.stream_rates import TRUTH
-from mavproxy_vision.tracking.tracker import Vision, make_source
+from mavproxy_vision.tracking.tracker import Tracker, make_source
 
 DETECTOR_TIME = 0.015  # s from a frame's arrival to its outcome
 STREAMS_EVERY = 15.0  # s: as often does MAVProxy ask for all streams at its rate
@@ -85,10 +85,10 @@ class Eye:
         self.task: Any = None
 
     def start(self) -> None:
-        settings = self.rig.vision.settings
-        self.source = make_source(settings, self.rig.vision._where, self.rig.loop.time)
+        settings = self.rig.tracker.settings
+        self.source = make_source(settings, self.rig.tracker._where, self.rig.loop.time)
         self.source._random = random.Random(self.rig.seed + 11)
-        self.detector = Detector(settings.model, self.rig.vision.options(settings))
+        self.detector = Detector(settings.model, self.rig.tracker.options(settings))
         self.task = self.rig.loop.create_task(self._run())
 
     def stop(self) -> None:
@@ -115,16 +115,16 @@ class Eye:
             return
         self._last = frame
         self._number += 1
-        sightings = self.detector.detect(frame.image)
+        detections = self.detector.detect(frame.image)
         size = (frame.image.shape[1], frame.image.shape[0])
         done = now + DETECTOR_TIME
-        seen = Seen(self._number, frame.captured_at, frame.received_at, done, size, sightings)
-        self.rig.loop.call_later(DETECTOR_TIME, self.rig.vision.take, seen, frame.image)
+        seen = FrameResult(self._number, frame.captured_at, frame.received_at, done, size, detections)
+        self.rig.loop.call_later(DETECTOR_TIME, self.rig.tracker.take, seen, frame.image)
 
     def _frame(self, light: float, now: float) -> Frame | None:
         if self.frozen and self._last is not None:
             return replace(self._last, received_at=now, captured_at=now)
-        renderer, pose = self.source.renderer, self.rig.vision._where(light)
+        renderer, pose = self.source.renderer, self.rig.tracker._where(light)
         tags, renderer.tags = renderer.tags, () if pose is not None and self.blind(pose) else renderer.tags
         try:
             return self.source.frame(light, now)
@@ -188,8 +188,8 @@ class Lockstep:
         self._heard_at = 0.0
         self.settings = ModuleSettings({"source": "sim", **settings})
         self.directory = Path(tempfile.mkdtemp())
-        self.vision = Vision(self.host, self.settings.snapshot())
-        self.flights = Flights(self.vision, lambda: self.directory)
+        self.tracker = Tracker(self.host, self.settings.snapshot())
+        self.flights = FlightJobs(self.tracker, lambda: self.directory)
         self.loop.call_soon(self._step)
         self.loop.call_soon(self._streams)
         self.eye = Eye(self)
@@ -257,7 +257,7 @@ class Lockstep:
             await asyncio.Event().wait()  # MAVProxy's main loop waits for the unload, and sends nothing
 
         async def unloaded() -> list[Any]:
-            self.flights.abandon()
+            self.flights.abort_all()
             await asyncio.sleep(0)
             return [message for words in self.host.last_words for message, _ in words()] if last else []
 
@@ -283,10 +283,10 @@ class Lockstep:
         """Switch everything on but the camera."""
 
         async def listen() -> None:
-            self.vision.listen()
+            self.tracker.listen()
 
         self.run(listen())
-        self._truth.enter_context(self.vision.rates.at(TRUTH))
+        self._truth.enter_context(self.tracker.rates.at(TRUTH))
         self.pass_time(3.0)
 
     def start(self, alt: float = 6.0) -> None:
@@ -303,7 +303,7 @@ class Lockstep:
         self.open_eye()
 
     def open_eye(self) -> None:
-        self.vision.worker = self.eye  # type: ignore[assignment]
+        self.tracker.worker = self.eye  # type: ignore[assignment]
         self.eye.start()
         self.pass_time(0.3)
 
@@ -311,7 +311,7 @@ class Lockstep:
         """Change settings; the camera sees it at once."""
         for name, value in settings.items():
             self.settings.set(name, value)
-        self.vision.settings = self.settings.snapshot()
+        self.tracker.settings = self.settings.snapshot()
         if self.eye.task is not None:
             self.eye.stop()
             self.eye.start()

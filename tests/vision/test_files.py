@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from mavproxy_vision import file_commands
-from mavproxy_vision.apriltag.detection import Seen
+from mavproxy_vision.apriltag.detection import FrameResult
 from mavproxy_vision.apriltag.overlay import annotated, jpeg
 from mavproxy_vision.apriltag.tag_layout import Tag
 from mavproxy_vision.apriltag.tag_pdf import POINTS_PER_METRE, tag_pdf
@@ -25,10 +25,10 @@ from mavproxy_vision.camera.opencv_capture import Capture
 from mavproxy_vision.camera.source import Folder, Frame, Posted, decode, decode_any, grey
 from mavproxy_vision.errors import BadImage, BadSetting, NoCamera
 from mavproxy_vision.geometry.camera_model import CameraModel
-from mavproxy_vision.landing.flight_log import SIDE, Track
+from mavproxy_vision.landing.flight_log import SIDE, FlightLog
 from mavproxy_vision.settings import ModuleSettings
 from mavproxy_vision.tracking.capture_worker import Watch, Worker
-from mavproxy_vision.tracking.tracker import Vision
+from mavproxy_vision.tracking.tracker import Tracker
 
 
 def picture(value: int = 0) -> np.ndarray:
@@ -285,7 +285,7 @@ def test_a_camera_of_the_wrong_shape_is_no_camera_to_fly_by():
     worker, told = watched(np.full((720, 1280), 9, np.uint8))
     assert told[1].state == "wrong shape"
     with pytest.raises(NoCamera, match=r"the camera: wrong shape \(asked for is 640x480 px .* 1280x720 came\)"):
-        Vision.require_camera(SimpleNamespace(worker=worker, health=told[1]))
+        Tracker.require_camera(SimpleNamespace(worker=worker, health=told[1]))
 
 
 def test_a_lens_that_is_scaled_keeps_its_shape():
@@ -474,7 +474,7 @@ def position(lat, lon, alt, ms):
 
 
 def test_a_track_is_written_and_drawn(tmp_path):
-    track = Track(target=(-35.36319, 149.16518))
+    track = FlightLog(target=(-35.36319, 149.16518))
     for step in range(20):
         track.add(position(-35.363261 + 4e-6 * step, 149.165230 - 3e-6 * step, 5, 1000 + 200 * step))
     track.add(position(0, 0, 0, 500))  # out of order
@@ -485,7 +485,7 @@ def test_a_track_is_written_and_drawn(tmp_path):
     assert lines[1] == "-35.3632610,149.1652300,5.000,1.000"
     track.plot(tmp_path / "track.png")
     assert cv2.imread(str(tmp_path / "track.png")).shape == (SIDE, SIDE, 3)
-    assert Track().drawn().min() == 255
+    assert FlightLog().drawn().min() == 255
 
 
 def test_a_printed_tag_is_to_scale_and_can_be_read():
@@ -516,7 +516,7 @@ def test_tags_that_cannot_be_printed():
 
 
 def test_the_prompts_file_commands(tmp_path):
-    seen = Seen(1, 0.0, 0.0, 0.0, (64, 48), ())
+    seen = FrameResult(1, 0.0, 0.0, 0.0, (64, 48), ())
     assert file_commands.snapshot([str(tmp_path / "a.png")], seen, picture(9)).startswith("wrote ")
     assert file_commands.tag(
         [str(tmp_path / "t.pdf"), "--family", "16h5", "--id", "2"], "36h11", Tag(0, 0.1)
@@ -546,7 +546,7 @@ def test_the_prompts_file_commands(tmp_path):
 
 
 def test_an_annotated_frame_has_colour():
-    seen = Seen(1, 0.0, 0.0, 0.0, (64, 48), ())
+    seen = FrameResult(1, 0.0, 0.0, 0.0, (64, 48), ())
     drawn = annotated(picture(80), seen, ["camera: ok"])
     assert drawn.shape == (48, 64, 3)
     assert jpeg(drawn)[:2] == b"\xff\xd8"

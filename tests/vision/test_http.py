@@ -19,7 +19,7 @@ from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import parse
 from mavproxy_uavapi.http.streaming import Slots
 from mavproxy_vision import http
-from mavproxy_vision.apriltag.detection import Seen
+from mavproxy_vision.apriltag.detection import FrameResult
 from mavproxy_vision.apriltag.overlay import jpeg
 from mavproxy_vision.camera.one_at_a_time import OneAtATime
 from mavproxy_vision.camera.source import Folder, Posted
@@ -28,9 +28,9 @@ from mavproxy_vision.geometry.camera_model import CameraModel
 from mavproxy_vision.http import (
     MOST_POSTED,
     FrameRequest,
+    Handlers,
     LandRequest,
     MissionRequest,
-    Pages,
     SearchRequest,
     StreamRequest,
 )
@@ -60,9 +60,9 @@ def test_true_is_no_number(model, name):
             parse(model, "body", {**rest, name: value})
 
 
-def pages(age, source):
+def handlers(age, source):
     """The routes' actions, over a camera whose newest frame is `age` s old."""
-    seen = Seen(1, NOW - age - 0.1, NOW - age, NOW - age, (64, 48), ())
+    seen = FrameResult(1, NOW - age - 0.1, NOW - age, NOW - age, (64, 48), ())
     vision = SimpleNamespace(
         seen=seen,
         image=IMAGE,
@@ -73,21 +73,21 @@ def pages(age, source):
         settings=SimpleNamespace(source="http"),
         require_camera=lambda: None,
     )
-    return Pages(vision, SimpleNamespace(running=False, report=None))
+    return Handlers(vision, SimpleNamespace(running=False, report=None))
 
 
 def test_the_newest_frame_is_served_while_it_is_new(tmp_path):
-    for fresh in (pages(FRESH - 0.1, Posted(0.0)), pages(60.0, Folder(tmp_path, 0.0, 0.1))):
+    for fresh in (handlers(FRESH - 0.1, Posted(0.0)), handlers(60.0, Folder(tmp_path, 0.0, 0.1))):
         assert asyncio.run(fresh.frame(None)).body[:2] == b"\xff\xd8"
         assert asyncio.run(fresh.newest_frame())[:2] == b"\xff\xd8"
 
 
 def test_an_old_frame_is_no_camera():
-    old = pages(FRESH + 0.1, Posted(0.0))
+    old = handlers(FRESH + 0.1, Posted(0.0))
     for ask in (lambda: old.frame(None), old.newest_frame):
         with pytest.raises(NoCamera, match=r"the newest frame is 1\.1 s old; the camera: frozen"):
             asyncio.run(ask())
-    old.vision.worker = None
+    old.tracker.worker = None
     with pytest.raises(NoCamera, match="no frame yet"):
         asyncio.run(old.frame(None))
 
@@ -114,22 +114,22 @@ def posted(over, body):
 
 
 def test_a_posted_frame_is_taken_and_leaves_no_trail():
-    over = pages(0.0, Posted(0.0))
+    over = handlers(0.0, Posted(0.0))
     assert posted(over, jpeg(IMAGE))["result"] == "Frame taken"
-    assert over.vision.worker.source.read().image.shape == (48, 64)
+    assert over.tracker.worker.source.read().image.shape == (48, 64)
     routes = over.routes()
     assert [route.path for route in routes if not route.trail] == ["/vision/frame"]
 
 
 def test_what_is_no_frame_of_the_camera_is_told():
-    over = pages(0.0, Posted(0.0))
+    over = handlers(0.0, Posted(0.0))
     refusal = posted(over, cv2.imencode(".png", np.zeros((72, 128), np.uint8))[1].tobytes())
     assert isinstance(refusal, BadImage)
     assert "128x72 came" in str(refusal)
-    assert over.vision.worker.source.read().image.shape == (72, 128)  # the status says so too
+    assert over.tracker.worker.source.read().image.shape == (72, 128)  # the status says so too
     assert isinstance(posted(over, b"nonsense"), BadImage)
-    assert over.vision.worker.source.read() is None
-    assert "source http" in str(posted(pages(0.0, SimpleNamespace(live=True)), jpeg(IMAGE)))
+    assert over.tracker.worker.source.read() is None
+    assert "source http" in str(posted(handlers(0.0, SimpleNamespace(live=True)), jpeg(IMAGE)))
 
 
 def test_a_frame_that_does_not_arrive_is_told(monkeypatch):
@@ -139,7 +139,7 @@ def test_a_frame_that_does_not_arrive_is_told(monkeypatch):
         yield b"\xff\xd8"
         await asyncio.sleep(0.5)
 
-    assert "did not arrive within 0.05 s" in str(posted(pages(0.0, Posted(0.0)), slow()))
+    assert "did not arrive within 0.05 s" in str(posted(handlers(0.0, Posted(0.0)), slow()))
 
 
 # -- many at once -----------------------------------------------------------------------------------------
@@ -183,12 +183,12 @@ def post_many(over, count):
 def test_frames_are_decoded_one_at_a_time(monkeypatch):
     decoding = Counting(IMAGE)
     monkeypatch.setattr(http, "decode", decoding)
-    assert post_many(pages(0.0, Posted(0.0)), 24) == [200] * 24
+    assert post_many(handlers(0.0, Posted(0.0)), 24) == [200] * 24
     assert (decoding.count, decoding.most) == (24, 1)
 
 
 def test_frames_beyond_those_on_their_way_are_429():
-    over = pages(0.0, Posted(0.0))
+    over = handlers(0.0, Posted(0.0))
     with contextlib.ExitStack() as on_their_way:
         for _ in range(MOST_POSTED):
             on_their_way.enter_context(over._posts.one_more())
@@ -214,7 +214,7 @@ def test_decoding_goes_on_when_its_client_has_gone(monkeypatch):
 def test_a_picture_is_drawn_once_for_all_who_ask(monkeypatch):
     drawing = Counting(b"\xff\xd8")
     monkeypatch.setattr(http, "jpeg", drawing)
-    over = pages(0.0, Posted(0.0))
+    over = handlers(0.0, Posted(0.0))
 
     async def ask(count):
         return await asyncio.gather(*(over.frame(None) for _ in range(count)))
@@ -222,7 +222,7 @@ def test_a_picture_is_drawn_once_for_all_who_ask(monkeypatch):
     async def run():
         await ask(100)
         await ask(100)
-        over.vision.seen = Seen(2, NOW, NOW, NOW, (64, 48), ())
+        over.tracker.seen = FrameResult(2, NOW, NOW, NOW, (64, 48), ())
         await ask(100)
 
     asyncio.run(run())
@@ -232,12 +232,12 @@ def test_a_picture_is_drawn_once_for_all_who_ask(monkeypatch):
 def test_a_slow_drawing_is_joined_rather_than_overtaken(monkeypatch):
     drawing = Counting(b"\xff\xd8")
     monkeypatch.setattr(http, "jpeg", drawing)
-    over = pages(0.0, Posted(0.0))
+    over = handlers(0.0, Posted(0.0))
 
     async def run():
         asked = []
         for number in range(20):
-            over.vision.seen = Seen(number, NOW, NOW, NOW, (64, 48), ())
+            over.tracker.seen = FrameResult(number, NOW, NOW, NOW, (64, 48), ())
             asked.append(asyncio.create_task(over.frame(None)))
             await asyncio.sleep(0)
         await asyncio.gather(*asked)
@@ -247,8 +247,8 @@ def test_a_slow_drawing_is_joined_rather_than_overtaken(monkeypatch):
 
 
 def test_frame_streams_count_among_the_open_ones():
-    over = pages(0.0, Posted(0.0))
-    over.vision.changed = asyncio.Event()
+    over = handlers(0.0, Posted(0.0))
+    over.tracker.changed = asyncio.Event()
     service = SimpleNamespace(streams=Slots(1, "streams are open"))
 
     async def run():

@@ -144,7 +144,7 @@ def test_nothing_else_of_the_project_needs_opencv() -> None:
 def test_a_camera_that_hangs_does_not_hold_up_the_main_loop(running: Any, capsys: Any, main_loop: Any) -> None:
     assert "looking for 36h11 through http" in said_later(running, capsys, main_loop, "set", "source", "http")
     hang = threading.Event()
-    running.vision.worker.source.read = lambda: hang.wait(5) and None
+    running.tracker.worker.source.read = lambda: hang.wait(5) and None
     time.sleep(0.3)  # its thread is in there now
     began = time.monotonic()
     try:
@@ -159,7 +159,7 @@ def test_settings_that_need_no_camera_end_no_flight(running: Any, capsys: Any, m
     assert said(running, capsys, "set", "tags", "0:0.5") == ""
     main_loop.turn()
     time.sleep(0.1)
-    assert running.vision.settings.tags == "0:0.5"
+    assert running.tracker.settings.tags == "0:0.5"
     assert said(running, capsys, "status").startswith("vision: source none")
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mavproxy_vision.apriltag.corner_refinement import refine
-from mavproxy_vision.apriltag.detector import Detector, Options, lit, locate
+from mavproxy_vision.apriltag.detector import Detector, DetectorOptions, lit, locate
 from mavproxy_vision.apriltag.families import family, marker_image
 from mavproxy_vision.apriltag.template_alignment import Pattern, align
 from mavproxy_vision.camera.renderer import Look, PlacedTag, Renderer
@@ -26,7 +26,7 @@ def frame(height=3.0, north=0.0, east=0.0, attitude=LEVEL, tags=None, look=PLAIN
 @pytest.mark.parametrize("name", ["36h11", "25h9", "16h5", "36h10"])
 def test_each_family_is_found_where_it_lies(name):
     image = frame(tags=(PlacedTag(name, 3, SIZE, 0.4, -0.3, 20),))
-    (seen,) = Detector(MODEL, Options((name,), {3: SIZE})).detect(image)
+    (seen,) = Detector(MODEL, DetectorOptions((name,), {3: SIZE})).detect(image)
     assert (seen.family, seen.id, seen.hamming) == (name, 3, 0)
     assert seen.position == pytest.approx([-0.3, -0.4, 3.0], abs=0.03)
     assert seen.error < 0.3
@@ -34,9 +34,9 @@ def test_each_family_is_found_where_it_lies(name):
 
 @pytest.mark.parametrize("height", [0.6, 1.5, 3.0, 5.0])
 def test_range_is_right(height):
-    detector = Detector(MODEL, Options(("25h9",), {0: SIZE}))
+    detector = Detector(MODEL, DetectorOptions(("25h9",), {0: SIZE}))
     found = [detector.detect(frame(height, tags=(PlacedTag("25h9", 0, SIZE, 0, 0),), seed=seed)) for seed in range(5)]
-    ranges = [seen.distance for sightings in found for seen in sightings]
+    ranges = [seen.distance for detections in found for seen in detections]
     assert len(ranges) == 5
     assert np.mean(ranges) == pytest.approx(height, abs=0.05)
 
@@ -56,21 +56,21 @@ def test_corners_that_cannot_be_refined_stay():
 
 def test_only_wanted_ids_are_seen_unless_all_are():
     image = frame(tags=(PlacedTag("36h11", 5, SIZE, 0, 0),))
-    assert Detector(MODEL, Options(sizes={0: SIZE})).detect(image) == ()
-    (seen,) = Detector(MODEL, Options(sizes={0: SIZE}, any_id=True)).detect(image)
+    assert Detector(MODEL, DetectorOptions(sizes={0: SIZE})).detect(image) == ()
+    (seen,) = Detector(MODEL, DetectorOptions(sizes={0: SIZE}, any_id=True)).detect(image)
     assert (seen.id, seen.position) == (5, None)
 
 
 def test_several_families_at_once():
     image = frame(tags=(PlacedTag("36h11", 0, SIZE, 0, -0.3), PlacedTag("16h5", 0, SIZE, 0, 0.3)))
-    seen = Detector(MODEL, Options(("36h11", "16h5"), {0: SIZE})).detect(image)
+    seen = Detector(MODEL, DetectorOptions(("36h11", "16h5"), {0: SIZE})).detect(image)
     assert {(one.family, one.id) for one in seen} == {("36h11", 0), ("16h5", 0)}
 
 
 @pytest.mark.parametrize("name", ["36h11", "25h9", "16h5", "36h10"])
 def test_no_ghosts_on_bare_ground(name):
     renderer = Renderer(MODEL, Mount(), (), Look(), 4)
-    detector = Detector(MODEL, Options((name,), {0: SIZE, 1: SIZE}))
+    detector = Detector(MODEL, DetectorOptions((name,), {0: SIZE, 1: SIZE}))
     random = np.random.default_rng(2)
     for _ in range(15):
         place = vector(*random.uniform(-40, 40, 2), -random.uniform(1, 12))
@@ -80,20 +80,20 @@ def test_no_ghosts_on_bare_ground(name):
 def test_distortion_is_undone():
     model = CameraModel(distortion=(-0.25, 0.08, 0.001, -0.001, 0.0))
     image = frame(2.0, 0.5, 0.6, model=model, look=Look(noise=2))
-    (seen,) = Detector(model, Options(sizes={0: SIZE})).detect(image)
+    (seen,) = Detector(model, DetectorOptions(sizes={0: SIZE})).detect(image)
     assert seen.position == pytest.approx([0.6, -0.5, 2.0], abs=0.02)
 
 
 def test_another_frame_size_is_the_same_lens():
     half = MODEL.scaled_to(320, 240)
-    (seen,) = Detector(MODEL, Options(sizes={0: SIZE})).detect(frame(2.0, 0.2, 0.1, model=half))
+    (seen,) = Detector(MODEL, DetectorOptions(sizes={0: SIZE})).detect(frame(2.0, 0.2, 0.1, model=half))
     assert seen.position == pytest.approx([0.1, -0.2, 2.0], abs=0.03)
 
 
 def test_the_far_setting_sees_farther():
     tags = (PlacedTag("25h9", 0, SIZE, 0, 0),)
     images = [frame(7.0, tags=tags, seed=seed, attitude=Attitude(yaw=0.3 * seed)) for seed in range(8)]
-    far = Detector(MODEL, Options(("25h9",), {0: SIZE}, far=True))
+    far = Detector(MODEL, DetectorOptions(("25h9",), {0: SIZE}, far=True))
     assert sum(bool(far.detect(image)) for image in images) >= 7
 
 
@@ -101,14 +101,14 @@ def test_the_far_setting_sees_farther():
 def test_each_tag_is_told_once_however_often_it_is_looked_for(apart):
     tags = (PlacedTag("36h11", 0, SIZE, 0, 0), PlacedTag("36h11", 0, SIZE, 0, apart))
     for height in (1.5, 4.0):
-        seen = Detector(MODEL, Options(sizes={0: SIZE}, far=True)).detect(frame(height, tags=tags))
+        seen = Detector(MODEL, DetectorOptions(sizes={0: SIZE}, far=True)).detect(frame(height, tags=tags))
         assert sorted(one.position[0] for one in seen) == pytest.approx([0, apart], abs=0.02)
 
 
 @pytest.mark.parametrize("exposure", [0.3, 0.15, 0.1])
 @pytest.mark.parametrize("far", [False, True])
 def test_a_dim_picture_is_seen_through(exposure, far):
-    detector = Detector(MODEL, Options(sizes={0: SIZE}, far=far))
+    detector = Detector(MODEL, DetectorOptions(sizes={0: SIZE}, far=far))
     for height in (0.8, 2.0, 4.0):
         (seen,) = detector.detect(frame(height, look=Look(exposure=exposure, noise=1.5)))
         assert seen.distance == pytest.approx(height, rel=0.02)
@@ -126,7 +126,7 @@ def test_a_picture_that_is_read_wrong_tells_how_many_bits():
     picture[3 * 16 : 4 * 16, 3 * 16 : 4 * 16] = 255 - picture[3 * 16 : 4 * 16, 3 * 16 : 4 * 16]
     canvas = np.full((480, 640), 255, np.uint8)
     canvas[100 : 100 + picture.shape[0], 100 : 100 + picture.shape[1]] = picture
-    (seen,) = Detector(MODEL, Options(sizes={0: SIZE})).detect(canvas)
+    (seen,) = Detector(MODEL, DetectorOptions(sizes={0: SIZE})).detect(canvas)
     assert seen.hamming == 1
 
 
@@ -153,12 +153,12 @@ def test_a_square_is_located():
 @pytest.mark.parametrize("blur", [0.4, 0.7, 1.0])
 def test_the_range_of_a_small_tag_is_right_however_sharp_the_lens_is(blur):
     def off(refine: bool) -> float:
-        detector = Detector(MODEL, Options(sizes={0: SIZE}, far=True, refine=refine))
+        detector = Detector(MODEL, DetectorOptions(sizes={0: SIZE}, far=True, refine=refine))
         look = Look(noise=3, blur=blur)
         seen = [
             detector.detect(frame(6.0, attitude=Attitude(yaw=0.4 * seed), look=look, seed=seed)) for seed in range(6)
         ]
-        distances = [one.distance for sightings in seen for one in sightings]
+        distances = [one.distance for detections in seen for one in detections]
         assert len(distances) >= 5  # so blurred and so far away one may be missed
         return float(np.mean(distances)) - 6.0
 

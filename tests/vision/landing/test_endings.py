@@ -15,9 +15,9 @@ from mavproxy_uavapi.core.vehicle.messages import NedTarget, VelocityTarget
 from mavproxy_uavapi.sim.mission import Item
 from mavproxy_vision.errors import LandingFailed
 from mavproxy_vision.geometry.frames import Attitude, vector
-from mavproxy_vision.landing.mission import Errand
+from mavproxy_vision.landing.mission import MissionPlan
 from mavproxy_vision.landing.precision_landing import WANTED, landing_target
-from mavproxy_vision.landing.state_machine import Landing, Order, Phase
+from mavproxy_vision.landing.state_machine import Landing, LandingCommand, Phase
 
 TAG = "0:0.30@0.8,-0.6"
 FAR_TAG = "0:0.30@1.6,-1.2"
@@ -129,7 +129,7 @@ def test_a_mission_that_is_stopped_at_its_takeoff_does_not_take_off(lockstep, af
     rig = lockstep(sim_tags=TAG, **SMALL)
     rig.switch_on()
     rig.open_eye()
-    job = rig.begin(rig.flights.errand(rig.copter, Errand(alt=5, north=8, east=-5)))
+    job = rig.begin(rig.flights.errand(rig.copter, MissionPlan(alt=5, north=8, east=-5)))
     until(rig, lambda: any(m.command == TAKEOFF for m in sent(rig, "COMMAND_LONG")))
     rig.pass_time(after)
     rig.stop()
@@ -165,8 +165,8 @@ def test_stopped_and_unloaded_in_one_breath_it_holds_and_plnd_is_as_before(flyin
     until(rig, lambda: rig.mode == "LAND")
     rig.pass_time(1.0)
 
-    flights, abandon = rig.flights, rig.flights.abandon
-    flights.abandon = lambda: (flights.stop("stopped"), abandon())
+    flights, abort_all = rig.flights, rig.flights.abort_all
+    flights.abort_all = lambda: (flights.stop("stopped"), abort_all())
     rig.unload(last=True)
     assert holds(rig, "BRAKE")
     assert plnd(rig) == before
@@ -187,7 +187,7 @@ def test_unloaded_in_the_autopilots_land_it_lands(flying):
 def test_a_mission_that_is_stopped_holds_before_it_writes_its_track(flying):
     rig = flying()
     rig.flights._directory = lambda: (_ for _ in ()).throw(RuntimeError("no home directory"))
-    job = rig.begin(rig.flights.errand(rig.copter, Errand(alt=20, north=60, east=0)))
+    job = rig.begin(rig.flights.errand(rig.copter, MissionPlan(alt=20, north=60, east=0)))
     rig.pass_time(4.0)
     assert rig.stop()
     error = rig.outcome(job)
@@ -208,7 +208,7 @@ def under_way(lockstep: Any, name: str) -> tuple[Any, Any]:
     if name in ("takeoff", "leg"):
         rig.switch_on()
         rig.open_eye()
-        errand = Errand(alt=10, north=60, east=0, on_tag=False)
+        errand = MissionPlan(alt=10, north=60, east=0, on_tag=False)
         job = rig.begin(rig.flights.errand(rig.copter, errand), "/vision/mission")
         until(rig, lambda: any(m.command == TAKEOFF for m in sent(rig, "COMMAND_LONG")))
         until(rig, lambda: rig.truth.north > 2.0 if name == "leg" else height(rig) > 0.5)
@@ -245,10 +245,10 @@ def defect(rig: Any, _job: Any) -> None:
     rig.loop.set_exception_handler(lambda _loop, _context: None)  # it is told there, too
 
     def broken(*_: Any) -> Any:
-        del rig.copter.held_by, rig.vision.now  # once: what sees to the vehicle afterwards asks too
+        del rig.copter.held_by, rig.tracker.now  # once: what sees to the vehicle afterwards asks too
         raise ZeroDivisionError("a defect")
 
-    rig.copter.held_by, rig.vision.now = broken, broken
+    rig.copter.held_by, rig.tracker.now = broken, broken
     rig.pass_time(0.3)
 
 
@@ -362,7 +362,7 @@ def test_a_flight_that_is_ended_while_it_is_prepared_never_begins(lockstep, ende
     rig.open_eye()
     hear = rig.host._receive
     silent(rig, "PARAM_VALUE")
-    errand = Errand(alt=5, north=8, east=-5, method="landing_target")
+    errand = MissionPlan(alt=5, north=8, east=-5, method="landing_target")
     job = rig.begin(rig.flights.errand(rig.copter, errand), "/vision/mission")
     rig.pass_time(0.3)
     getattr(rig, ended)()
@@ -479,13 +479,13 @@ def test_a_landing_that_takes_over_stops_what_was_flown(flying):
 
     rig.begin(drive, "/movement/travel")
     rig.pass_time(2.0)
-    want = rig.vision.want
+    want = rig.tracker.want
 
     async def slowly(number: int) -> None:
         await asyncio.sleep(2.0)
         await want(number)
 
-    rig.vision.want = slowly
+    rig.tracker.want = slowly
     mark = len(rig.wire.sent)
     rig.land()
     rig.pass_time(0.2)
@@ -763,7 +763,7 @@ def test_another_home_in_flight_changes_no_height(flying):
     rig = flying(alt=4.0, sim_tags="", attempts=3, leash=6.0, on_failure="hold")
     job = rig.land()
     rig.pass_time(2.0)
-    rig.vision._home_down += 4.0
+    rig.tracker._home_down += 4.0
     lowest: list[float] = []
     rig.each_step.append(lambda: lowest.append(height(rig)))
     rig.outcome(job)
@@ -828,7 +828,7 @@ def test_a_velocity_that_is_no_number_is_not_sent_and_the_vehicle_holds(flying, 
     rig = flying(sim_tags="")
     job = rig.land()
     rig.pass_time(1.0)
-    monkeypatch.setattr(Landing, "step", lambda *_: Order(Phase.LOOK, vector(0, bad, 0)))
+    monkeypatch.setattr(Landing, "step", lambda *_: LandingCommand(Phase.LOOK, vector(0, bad, 0)))
     assert "a number in it is not finite" in str(rig.outcome(job))
     assert holds(rig, seconds=3.0)
 
@@ -839,7 +839,7 @@ def test_a_target_that_is_no_number_is_not_told_and_the_landing_goes_on_by_itsel
     job = rig.land(method="landing_target")
     until(rig, lambda: rig.mode == "LAND")
     rig.pass_time(1.5)
-    rig.vision.target.place[:] = math.nan
+    rig.tracker.target.place[:] = math.nan
     assert "a number in it is not finite" in str(rig.outcome(job))
     rig.pass_time(3.0)
     assert rig.mode == "LAND"
@@ -849,7 +849,7 @@ def test_a_target_that_is_no_number_is_not_told_and_the_landing_goes_on_by_itsel
 
 def test_an_id_that_tags_does_not_name_has_the_size_of_the_main_tag_of_now(lockstep):
     rig = lockstep(sim_tags=TAG, **SMALL)
-    rig.run(rig.vision.want(5))
-    assert rig.vision.options(rig.vision.settings).sizes == {0: 0.3, 5: 0.3}
+    rig.run(rig.tracker.want(5))
+    assert rig.tracker.options(rig.tracker.settings).sizes == {0: 0.3, 5: 0.3}
     rig.put(tags="0:0.6")
-    assert rig.vision.options(rig.vision.settings).sizes == {0: 0.6, 5: 0.6}
+    assert rig.tracker.options(rig.tracker.settings).sizes == {0: 0.6, 5: 0.6}

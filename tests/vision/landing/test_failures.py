@@ -198,7 +198,7 @@ def sights(rig: Any) -> list[tuple[float, int]]:
     found: list[tuple[float, int]] = []
 
     def look() -> None:
-        target = rig.vision.target
+        target = rig.tracker.target
         if target is not None and target.last is not None and rig.flights.phase == "descending":
             found.append((-rig.truth.down, target.last.tag))
 

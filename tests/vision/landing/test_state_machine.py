@@ -11,7 +11,7 @@ import pytest
 from mavproxy_vision.geometry.frames import vector
 from mavproxy_vision.landing.state_machine import Landing, Phase, Plan, cone
 from mavproxy_vision.tracking.pose_history import Motion
-from mavproxy_vision.tracking.target_filter import Fix, Target
+from mavproxy_vision.tracking.target_filter import Target, TargetMeasurement
 
 STEP = 0.05
 
@@ -35,7 +35,7 @@ class Point:
     def step(self) -> Any:
         if self.sees(self):
             place = vector(*self.tag, 0)
-            self.target.take([Fix(self.now, place, self.at.copy(), self.height, self.height, 0)])
+            self.target.take([TargetMeasurement(self.now, place, self.at.copy(), self.height, self.height, 0)])
         order = self.landing.step(self.now, Motion(self.now, self.at, self.velocity, self.at), self.height)
         self.orders.append(order)
         self.velocity = order.velocity

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from mavproxy_vision.geometry.frames import Attitude, vector
-from mavproxy_vision.tracking.pose_history import History, Unstamped, VehicleClock
+from mavproxy_vision.tracking.pose_history import History, UnstampedClock, VehicleClock
 
 
 def test_the_least_delayed_message_sets_the_offset():
@@ -41,7 +41,7 @@ def test_the_hosts_time_is_the_vehicles_the_other_way_round():
 
 
 def test_a_message_without_a_time_is_dated_by_those_heard_before_it():
-    clock, dated = VehicleClock(), Unstamped()
+    clock, dated = VehicleClock(), UnstampedClock()
     for step in range(20):
         clock.hear(100 + 0.1 * step, 5 + 0.1 * step, 1.0)
         dated.hear(100 + 0.1 * step, 5 + 0.1 * step)
@@ -53,7 +53,7 @@ def test_a_message_without_a_time_is_dated_by_those_heard_before_it():
 
 
 def test_nothing_is_dated_by_what_comes_no_more():
-    clock, dated = VehicleClock(), Unstamped()
+    clock, dated = VehicleClock(), UnstampedClock()
     assert dated.sent(90.0, clock) == 90.0
     clock.hear(100, 5, 1.0)
     dated.hear(100, 5)

@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 
 from mavproxy_vision.geometry.frames import vector
-from mavproxy_vision.tracking.target_filter import Fix, Target
+from mavproxy_vision.tracking.target_filter import Target, TargetMeasurement
 
 
-def fix(at, place, travelled=(0, 0, -5), height=5.0, tag=0):
-    return Fix(at, vector(*place), vector(*travelled), 5.0, height, tag)
+def measurement(at, place, travelled=(0, 0, -5), height=5.0, tag=0):
+    return TargetMeasurement(at, vector(*place), vector(*travelled), 5.0, height, tag)
 
 
 def test_three_sightings_make_a_target():
     target = Target()
     for step in range(3):
         assert not target.found
-        target.take([fix(step * 0.05, (1, 2, 0))])
+        target.take([measurement(step * 0.05, (1, 2, 0))])
     assert target.found
     assert target.place == pytest.approx([1, 2, 0])
     assert target.age(1.0) == pytest.approx(0.9)
@@ -26,15 +26,15 @@ def test_three_sightings_make_a_target():
 def test_noise_is_averaged():
     target, random = Target(), np.random.default_rng(1)
     for step in range(100):
-        target.take([fix(step * 0.05, (1 + random.normal(0, 0.1), 2 + random.normal(0, 0.1), 0))])
+        target.take([measurement(step * 0.05, (1 + random.normal(0, 0.1), 2 + random.normal(0, 0.1), 0))])
     assert target.place[:2] == pytest.approx([1, 2], abs=0.1)
 
 
 def test_a_far_outlier_is_left_out_and_does_not_count_as_seen():
     target = Target()
     for step in range(5):
-        target.take([fix(step * 0.05, (1, 2, 0))])
-    target.take([fix(0.5, (4, 2, 0))])
+        target.take([measurement(step * 0.05, (1, 2, 0))])
+    target.take([measurement(0.5, (4, 2, 0))])
     assert target.place == pytest.approx([1, 2, 0])
     assert target.seen_at == pytest.approx(0.2)
 
@@ -42,7 +42,7 @@ def test_a_far_outlier_is_left_out_and_does_not_count_as_seen():
 def test_two_equal_tags_before_one_is_chosen_are_ambiguous():
     target = Target()
     for step in range(5):
-        target.take([fix(step * 0.05, (1, 2, 0)), fix(step * 0.05, (-1, 2, 0))])
+        target.take([measurement(step * 0.05, (1, 2, 0)), measurement(step * 0.05, (-1, 2, 0))])
     assert target.ambiguous == 5
     assert not target.found
 
@@ -50,9 +50,9 @@ def test_two_equal_tags_before_one_is_chosen_are_ambiguous():
 def test_a_second_equal_tag_that_comes_into_view_later_is_ignored():
     target = Target()
     for step in range(5):
-        target.take([fix(step * 0.05, (1, 2, 0))])
+        target.take([measurement(step * 0.05, (1, 2, 0))])
     for step in range(5, 30):
-        target.take([fix(step * 0.05, (-1, 2, 0)), fix(step * 0.05, (1.01, 2, 0))])
+        target.take([measurement(step * 0.05, (-1, 2, 0)), measurement(step * 0.05, (1.01, 2, 0))])
     assert target.place == pytest.approx([1, 2, 0], abs=0.05)
     assert target.ambiguous == 0
 
@@ -60,7 +60,7 @@ def test_a_second_equal_tag_that_comes_into_view_later_is_ignored():
 def test_a_tag_that_rests_while_the_vehicle_moves_is_believed():
     target = Target()
     for step in range(60):
-        target.take([fix(step * 0.05, (1, 2, 0), (0.02 * step, 0, -5))])
+        target.take([measurement(step * 0.05, (1, 2, 0), (0.02 * step, 0, -5))])
     assert target.contradiction is None
 
 
@@ -69,7 +69,7 @@ def test_a_tag_that_moves_with_the_vehicle_is_not(north, east):
     target = Target()
     for step in range(60):
         moved = 0.02 * step
-        target.take([fix(step * 0.05, (1 + north * moved, 2 + east * moved, 0), (moved, 0, -5))])
+        target.take([measurement(step * 0.05, (1 + north * moved, 2 + east * moved, 0), (moved, 0, -5))])
     assert "mount" in target.contradiction
 
 
@@ -77,21 +77,21 @@ def test_a_tag_that_moves_with_the_vehicle_is_not(north, east):
 def test_range_is_checked_against_height(depth, believed):
     target = Target()
     for step in range(12):
-        target.take([fix(step * 0.05, (0, 0, depth - 5))])
+        target.take([measurement(step * 0.05, (0, 0, depth - 5))])
     assert (target.contradiction is None) is believed
 
 
 def test_near_the_ground_height_says_nothing_about_size():
     target = Target()
     for step in range(12):
-        target.take([fix(step * 0.05, (0, 0, 0), (0, 0, -0.9), height=1.8)])
+        target.take([measurement(step * 0.05, (0, 0, 0), (0, 0, -0.9), height=1.8)])
     assert target.contradiction is None
 
 
 def test_the_old_place_is_given_up_when_all_sightings_are_elsewhere():
     target = Target()
     for step in range(5):
-        target.take([fix(step * 0.05, (1, 2, 0))])
+        target.take([measurement(step * 0.05, (1, 2, 0))])
     for step in range(5, 40):
-        target.take([fix(step * 0.05, (9, 2, 0))])
+        target.take([measurement(step * 0.05, (9, 2, 0))])
     assert target.place == pytest.approx([9, 2, 0], abs=0.05)
