@@ -99,7 +99,7 @@ class Handlers:
         """Keep measurements of a program on the companion computer; answered when they are on the disk."""
         now = time.time()
         found = [self._reading(call, given, now) for given in call.params(Readings).readings]
-        numbers = await self._gradys.sensing.keep(found)
+        numbers = await self._gradys.pipeline.keep(found)
         plural = "" if len(numbers) == 1 else "s"
         return {
             "device": "uav",
@@ -124,7 +124,7 @@ class Handlers:
         system = given.sysid or call.seen.state.system
         at = now if given.time is None else given.time
         device = given.device or device_of(system)
-        if given.quantity in self._gradys.sensing.reserved and VEHICLE.fullmatch(device):
+        if given.quantity in self._gradys.pipeline.reserved and VEHICLE.fullmatch(device):
             raise Invalid(f"{given.quantity} of {device} is told by the vehicle itself", "body", "quantity")
         return Reading(device, system, given.quantity, given.representation, given.value, at)
 

@@ -91,7 +91,7 @@ class GradysModule(SharedModule):
             with contextlib.suppress(asyncio.TimeoutError):  # the spool is closed in its own thread
                 await wait_with_timeout(LONGEST_END, self.gradys.close())
         finally:
-            self._lost = self.gradys.sensing.lost
+            self._lost = self.gradys.pipeline.lost
             if self._lost:
                 log.warning("%s", self._lost)
         await self._background.close()

@@ -1,4 +1,4 @@
-"""The module as one thing that is started and stopped: its pushers, its sensing, its senders."""
+"""The module as one thing that is started and stopped: its pushers, its pipeline, its senders."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import random
 from collections.abc import Awaitable, Callable
 from typing import Any
 
-from mavproxy_gradys.forwarding.pipeline import Sensing
+from mavproxy_gradys.forwarding.pipeline import ReadingPipeline
 from mavproxy_gradys.net.addresses import Station
 from mavproxy_gradys.net.http_client import Client
 from mavproxy_gradys.push.pusher import Pusher
@@ -23,14 +23,14 @@ class Gradys:
 
     Attributes:
         stations: what became of the updates, by station; it outlives a stop and a start.
-        sensing: readings, their spool and their sinks.
+        pipeline: readings, their spool and their sinks.
         tracks: what is recorded, and what is flown.
     """
 
     def __init__(self, host: Host) -> None:
         self.host = host
         self.stations: dict[str, StationTally] = {}
-        self.sensing = Sensing(host)
+        self.pipeline = ReadingPipeline(host)
         self.tracks = Tracking(host)
         self.settings: Settings | None = None
         self._pushers: list[Pusher] = []
@@ -56,7 +56,7 @@ class Gradys:
         pushers = [self._pusher(station, settings) for station in settings.gs]
         self.settings, self._pushers = settings, pushers
         self._tasks = [begin(pusher.run(), f"the push to {pusher.station.url}") for pusher in pushers]
-        self.sensing.start(settings)
+        self.pipeline.start(settings)
 
     def _pusher(self, station: Station, settings: Settings) -> Pusher:
         client = Client(settings.timeout, settings.token, settings.ca_file)
@@ -85,18 +85,18 @@ class Gradys:
             self._start(settings)
             return True
 
-    async def _stop(self, stop_sensing: Callable[[], Awaitable[None]] | None = None) -> None:
+    async def _stop(self, stop_pipeline: Callable[[], Awaitable[None]] | None = None) -> None:
         self.settings = None
         tasks, self._tasks = self._tasks, []
         await end(tasks)
         for pusher in self._pushers:  # also those that had not begun
             await pusher.close()
-        await (stop_sensing or self.sensing.stop)()
+        await (stop_pipeline or self.pipeline.stop)()
 
     async def close(self) -> None:
         """End it for good; what the spool did not take is tried once more."""
         async with self._changing:
-            await self._stop(self.sensing.close)
+            await self._stop(self.pipeline.close)
 
     def flush(self) -> None:
         """End all pauses after failures: everything is tried now."""
@@ -104,7 +104,7 @@ class Gradys:
             tally.backoff.hurry()
             for vehicle in tally.vehicles.values():
                 vehicle.backoff.hurry()
-        self.sensing.flush()
+        self.pipeline.flush()
 
     def report(self) -> dict[str, Any]:
         """What `GET /gradys/status` says."""
@@ -121,6 +121,6 @@ class Gradys:
             "last_error": newest.last_error if newest else None,
             "round_trip_ms": next((trip for trip in trips if trip), None),
             "stations": [tally.report(now) for tally in tallies],
-            **self.sensing.report(),
+            **self.pipeline.report(),
             "tracks": self.tracks.report(),
         }

@@ -23,7 +23,7 @@ from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.forwarding.readings import POSITION, STATUS, Reading, Stored, device_of
 from mavproxy_gradys.net.addresses import split_url
 from mavproxy_gradys.net.http_client import tls_context
-from mavproxy_gradys.net.resolver import Names
+from mavproxy_gradys.net.resolver import Resolver
 from mavproxy_gradys.tasks import begin
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
@@ -49,7 +49,7 @@ class MqttSink:
         self._timeout = timeout
         self._ca_file = ca_file
         self._clients: dict[str, aiomqtt.Client] = {}  # by status topic
-        self._names = Names()
+        self._names = Resolver()
         self._connecting: defaultdict[str, asyncio.Lock] = defaultdict(asyncio.Lock)
         self._leaving: dict[str, asyncio.Task[None]] = {}  # attempts that were given up, by status topic
 

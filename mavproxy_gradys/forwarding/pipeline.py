@@ -1,4 +1,4 @@
-"""Sensing with store and forward: samplers, the spool, and a sender for each sink."""
+"""ReadingPipeline with store and forward: samplers, the spool, and a sender for each sink."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.forwarding.readings import POSITION, STATUS, Quantity, Reading, Sampler
 from mavproxy_gradys.forwarding.sender import Sender
 from mavproxy_gradys.forwarding.spool import Spool
-from mavproxy_gradys.forwarding.spool_thread import Keeper
-from mavproxy_gradys.net.schedule import Cadence
+from mavproxy_gradys.forwarding.spool_thread import SpoolThread
+from mavproxy_gradys.net.schedule import Ticker
 from mavproxy_gradys.position import position_of
 from mavproxy_gradys.settings import Settings
 from mavproxy_gradys.tasks import begin, end
@@ -23,7 +23,7 @@ from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 MEGABYTE = 1e6
 
 
-class Sensing:
+class ReadingPipeline:
     """Samples the quantities while there is a sink, and keeps what is posted even while there is none.
 
     Args:
@@ -35,7 +35,7 @@ class Sensing:
         self._host = host
         self._wall = wall
         self._settings: Settings | None = None
-        self._keeper: Keeper | None = None
+        self.spool_thread: SpoolThread | None = None
         self._settings_before: Settings | None = None  # of the last start
         self._left: list[Reading] = []  # what the disk did not take before the last stop
         self._why_left = ""
@@ -64,21 +64,21 @@ class Sensing:
         self._samplers.clear()
         self._senders.clear()
         try:
-            if self._keeper is not None:
-                await self._keeper.save()  # before the sinks' goodbyes, which may take long
+            if self.spool_thread is not None:
+                await self.spool_thread.save()  # before the sinks' goodbyes, which may take long
             await end(tasks)
         finally:
             await self._end_keeper()
 
     async def _end_keeper(self) -> None:
-        keeper = self._keeper
-        if keeper is None:
+        spool_thread = self.spool_thread
+        if spool_thread is None:
             return
         try:
-            await keeper.stop()
+            await spool_thread.stop()
         finally:
-            self._left, self._why_left = keeper.left, keeper.problem
-            self._keeper = None
+            self._left, self._why_left = spool_thread.left, spool_thread.problem
+            self.spool_thread = None
 
     async def close(self) -> None:
         """End it for good: what an earlier stop left in memory is tried once more."""
@@ -89,24 +89,24 @@ class Sensing:
     @property
     def lost(self) -> str:
         """What is lost if nothing more is written: how many readings, and why; empty when none is."""
-        keeper = self._keeper  # it is there when its end was not waited for
-        count = len(self._left) if keeper is None else keeper.waiting
-        why = (self._why_left if keeper is None else keeper.problem) or "they were not written in time"
+        spool_thread = self.spool_thread  # it is there when its end was not waited for
+        count = len(self._left) if spool_thread is None else spool_thread.waiting
+        why = (self._why_left if spool_thread is None else spool_thread.problem) or "they were not written in time"
         return f"{count} reading{'' if count == 1 else 's'} are lost: {why}" if count else ""
 
-    def _kept(self, settings: Settings | None = None) -> Keeper:
-        """The spool's keeper, started if need be."""
+    def _kept(self, settings: Settings | None = None) -> SpoolThread:
+        """The spool's thread, started if need be."""
         settings = settings or self._settings
         if settings is None:
             raise NotStored("gradys is stopped: `gradys start`")
-        if self._keeper is None:
+        if self.spool_thread is None:
             spool, largest, longest = settings.spool, settings.spool_mb * MEGABYTE, settings.spool_hours * 3600
-            self._keeper = Keeper(lambda: Spool(spool, largest, longest))
-            self._keeper.start([address.name for address in settings.sink])
+            self.spool_thread = SpoolThread(lambda: Spool(spool, largest, longest))
+            self.spool_thread.start([address.name for address in settings.sink])
             for reading in self._left:
-                self._keeper.put(reading)
+                self.spool_thread.put(reading)
             self._left = []
-        return self._keeper
+        return self.spool_thread
 
     async def keep(self, readings: Sequence[Reading]) -> list[int]:
         """Keep what was posted; the sequence numbers, when it is on the disk.
@@ -126,20 +126,20 @@ class Sensing:
         """Try all sinks now."""
         for sender in self._senders:
             sender.flush()
-        if self._keeper is not None:
-            self._keeper.flush()
+        if self.spool_thread is not None:
+            self.spool_thread.flush()
 
     # -- sampling -----------------------------------------------------------------------------------------
 
-    async def _sample(self, sampler: Sampler, keeper: Keeper) -> None:
+    async def _sample(self, sampler: Sampler, spool_thread: SpoolThread) -> None:
         loop = asyncio.get_running_loop()
-        cadence = Cadence(sampler.quantity.period, loop.time())
+        ticker = Ticker(sampler.quantity.period, loop.time())
         while True:
-            await asyncio.sleep(cadence.wait(loop.time()))
+            await asyncio.sleep(ticker.wait(loop.time()))
             for state in list(self._host.fleet.vehicles.values()):
                 reading = self._read(sampler, state)
                 if reading is not None:
-                    keeper.put(reading)
+                    spool_thread.put(reading)
 
     def _read(self, sampler: Sampler, state: VehicleState) -> Reading | None:
         assert self._settings is not None
@@ -164,29 +164,29 @@ class Sensing:
 
     def report(self) -> dict[str, Any]:
         """spooled, oldest unsent, the spool, the sinks, the quantities."""
-        keeper = self._keeper
-        oldest = None if keeper is None else keeper.oldest_age
+        spool_thread = self.spool_thread
+        oldest = None if spool_thread is None else spool_thread.oldest_age
         return {
-            "spooled": len(self._left) if keeper is None else spooled(keeper),
+            "spooled": len(self._left) if spool_thread is None else spooled(spool_thread),
             "oldest_unsent_s": None if oldest is None else round(oldest, 1),
-            "spool": None if keeper is None else self._spool_report(keeper),
+            "spool": None if spool_thread is None else self._spool_report(spool_thread),
             "sinks": [sender.report() for sender in self._senders],
             "quantities": [quantity_report(sampler) for sampler in self._samplers],
         }
 
-    def _spool_report(self, keeper: Keeper) -> dict[str, Any]:
+    def _spool_report(self, spool_thread: SpoolThread) -> dict[str, Any]:
         assert self._settings is not None
         return {
             "file": str(self._settings.spool),
-            "problem": keeper.problem or None,
-            "dropped": dict(keeper.dropped),
-            "set_aside": [str(file) for file in keeper.set_aside],
+            "problem": spool_thread.problem or None,
+            "dropped": dict(spool_thread.dropped),
+            "set_aside": [str(file) for file in spool_thread.set_aside],
         }
 
 
-def spooled(keeper: Keeper) -> int | None:
+def spooled(spool_thread: SpoolThread) -> int | None:
     """How many readings are kept; None while nobody knows."""
-    return None if keeper.count is None else keeper.count + keeper.waiting
+    return None if spool_thread.count is None else spool_thread.count + spool_thread.waiting
 
 
 def quantity_report(sampler: Sampler) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from mavproxy_gradys.errors import NotDelivered, NotStored
 from mavproxy_gradys.forwarding.readings import Stored
 from mavproxy_gradys.forwarding.sink_address import SinkAddress
 from mavproxy_gradys.forwarding.sinks import Sink, make_sink
-from mavproxy_gradys.forwarding.spool_thread import Keeper
+from mavproxy_gradys.forwarding.spool_thread import SpoolThread
 from mavproxy_gradys.net.outage_log import Defects, Outage
 from mavproxy_gradys.net.round_trips import RoundTrips
 from mavproxy_gradys.net.schedule import LONGEST_OF_SINKS, Backoff
@@ -36,7 +36,7 @@ class Sender:
 
     Args:
         address: the sink's.
-        keeper: the spool.
+        spool_thread: the spool.
         clock: monotonic seconds.
         chance: numbers from 0 to 1.
     """
@@ -44,7 +44,7 @@ class Sender:
     def __init__(
         self,
         address: SinkAddress,
-        keeper: Keeper,
+        spool_thread: SpoolThread,
         clock: Callable[[], float],
         chance: Callable[[], float] = random.random,
     ) -> None:
@@ -53,7 +53,7 @@ class Sender:
         self.batches = self.sent = self.acknowledged = self.put_last = 0
         self.last_error = ""
         self.round_trips = RoundTrips()
-        self._keeper = keeper
+        self.spool_thread = spool_thread
         self._clock = clock
         self._backoff = Backoff(chance, LONGEST_OF_SINKS)
         self._batch: list[Stored] = []  # on its way, or the last one
@@ -91,14 +91,14 @@ class Sender:
             NotDelivered, NotStored: it came to nothing.
         """
         self._batch = []
-        self._batch = batch = await self._keeper.batch(self._name, self._size)
+        self._batch = batch = await self.spool_thread.batch(self._name, self._size)
         self.batches += 1
         self.sent += len(batch)
         started = self._clock()
         taken = await sink.send(batch)
         self.round_trips.add(self._clock() - started)
         self.acknowledged += len(taken)
-        await self._keeper.acknowledge(self._name, batch, taken)
+        await self.spool_thread.acknowledge(self._name, batch, taken)
         if not taken:
             raise NotDelivered("it acknowledges nothing", reached=True, for_content=True)
         self.last_error = ""
@@ -114,7 +114,7 @@ class Sender:
         if not error.for_content or not count:
             return
         if count == 1:
-            self._keeper.put_last(self._name, self._batch[0])
+            self.spool_thread.put_last(self._name, self._batch[0])
             self.put_last += 1
             return
         self._size = count // 2

@@ -1,4 +1,4 @@
-"""What a sink is owed, as far as the spool's file does not say it. Pure."""
+"""How far a sink has acknowledged the readings, as far as the spool's file does not say it. Pure."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from mavproxy_gradys.forwarding.readings import Stored
 MOST_LAST = 1000  # readings that are sent last; when there are more, all get their turn again
 
 
-class Owed:
-    """One sink's.
+class SinkCursor:
+    """One sink's place among the readings.
 
     Attributes:
         news: set when there may be something new to send.
@@ -36,10 +36,10 @@ class Owed:
         return len(self.unnoted) + len(self.last)
 
     def choose(self, found: Sequence[Stored], limit: int) -> list[Stored]:
-        """What to send of those that the file owes: at most `limit`, or one of the last ones."""
-        owed = {stored.seq: stored for stored in found if stored.seq not in self.unnoted}
-        first = [stored for seq, stored in owed.items() if seq not in self.last]
-        return first[:limit] or [owed[seq] for seq in self.last if seq in owed][:1]
+        """What to send of those that the file has for it: at most `limit`, or one of the last ones."""
+        unsent = {stored.seq: stored for stored in found if stored.seq not in self.unnoted}
+        first = [stored for seq, stored in unsent.items() if seq not in self.last]
+        return first[:limit] or [unsent[seq] for seq in self.last if seq in unsent][:1]
 
     def put_last(self, seq: int) -> None:
         """Send that one when there is nothing else, and after all that were put last before."""

@@ -1,6 +1,6 @@
 """The spool: readings in an SQLite file until every sink has acknowledged them.
 
-Blocking; one thread uses it at a time (`keeper.py` has a thread for it). A transaction is on the disk when a
+Blocking; one thread uses it at a time (`spool_thread.py` has a thread for it). A transaction is on the disk when a
 call returns (WAL, synchronous=FULL), so that neither `kill -9` nor a flat battery loses what was kept.
 
 A sequence number is given once, even after the file was lost: a new file begins at the milliseconds since
@@ -264,7 +264,7 @@ class Spool:
         ]
 
     def use_sinks(self, sinks: Sequence[str]) -> None:
-        """From now on readings are owed to these; what all of them have acknowledged already is removed.
+        """From now on readings are kept for these; what all of them have acknowledged already is removed.
 
         Raises:
             sqlite3.Error: as `append`.

@@ -14,7 +14,7 @@ from typing import TypeVar
 
 from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.forwarding.readings import Reading, Stored
-from mavproxy_gradys.forwarding.sink_cursor import Owed
+from mavproxy_gradys.forwarding.sink_cursor import SinkCursor
 from mavproxy_gradys.forwarding.spool import Spool, uptime
 from mavproxy_gradys.forwarding.spool_rows import is_storable
 from mavproxy_gradys.net.outage_log import Defects, Drops, Outage
@@ -29,7 +29,7 @@ TRIM_EVERY = 10.0  # s
 HELD = 5000  # sampled readings held in memory while the disk takes none; then the oldest are dropped
 
 
-class Keeper:
+class SpoolThread:
     """Keeps readings; all methods belong to the asyncio thread, all work on the disk is done in another.
 
     Attributes:
@@ -51,7 +51,7 @@ class Keeper:
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="gradys-spool")
         self._waiting: deque[Reading] = deque()
         self._in_hand = 0  # readings that the other thread is writing
-        self._owed: dict[str, Owed] = {}
+        self._cursors: dict[str, SinkCursor] = {}
         self._writer: asyncio.Task[None] | None = None
         self._stopping = asyncio.Event()
         self._closed = False
@@ -66,7 +66,7 @@ class Keeper:
 
     def start(self, sinks: Sequence[str]) -> None:
         """Begin to open the spool for these sinks; until it is open `problem` says why, and it is tried again."""
-        self._owed = {sink: Owed() for sink in sinks}
+        self._cursors = {sink: SinkCursor() for sink in sinks}
         self.problem = "it is being opened"
         self._writer = begin(self._write(), "the spool")
 
@@ -150,8 +150,8 @@ class Keeper:
         self._tell()
 
     def _tell(self) -> None:
-        for owed in self._owed.values():
-            owed.news.set()
+        for cursor in self._cursors.values():
+            cursor.news.set()
 
     # -- out ----------------------------------------------------------------------------------------------
 
@@ -161,37 +161,37 @@ class Keeper:
         Raises:
             NotStored: the file cannot be read.
         """
-        owed = self._owed[sink]
+        cursor = self._cursors[sink]
         while True:
-            owed.news.clear()
-            found = await self._batch(sink, owed, limit)
+            cursor.news.clear()
+            found = await self._batch(sink, cursor, limit)
             if found:
                 return found
             with contextlib.suppress(asyncio.TimeoutError):
-                await wait_with_timeout(TRIM_EVERY, owed.news.wait())
+                await wait_with_timeout(TRIM_EVERY, cursor.news.wait())
 
-    async def _batch(self, sink: str, owed: Owed, limit: int) -> list[Stored]:
-        if owed.unnoted:
-            await self._note(sink, owed, set())
-        found = await self._do(lambda spool: spool.batch(sink, owed.after, limit + owed.passed_over))
-        return owed.choose(found, limit)
+    async def _batch(self, sink: str, cursor: SinkCursor, limit: int) -> list[Stored]:
+        if cursor.unnoted:
+            await self._note(sink, cursor, set())
+        found = await self._do(lambda spool: spool.batch(sink, cursor.after, limit + cursor.passed_over))
+        return cursor.choose(found, limit)
 
     async def acknowledge(self, sink: str, batch: Sequence[Stored], numbers: set[int]) -> None:
         """Remove what a sink has acknowledged: those of `batch` that are in `numbers`, and no others."""
-        owed, taken = self._owed[sink], {stored.seq for stored in batch} & numbers
-        owed.take(batch, taken)
-        await self._note(sink, owed, taken)
+        cursor, taken = self._cursors[sink], {stored.seq for stored in batch} & numbers
+        cursor.take(batch, taken)
+        await self._note(sink, cursor, taken)
 
-    async def _note(self, sink: str, owed: Owed, numbers: set[int]) -> None:
-        owed.unnoted |= numbers  # they are not sent again while we remember, also on a full disk
-        noted = sorted(owed.unnoted)
+    async def _note(self, sink: str, cursor: SinkCursor, numbers: set[int]) -> None:
+        cursor.unnoted |= numbers  # they are not sent again while we remember, also on a full disk
+        noted = sorted(cursor.unnoted)
         with contextlib.suppress(NotStored):
             await self._do(lambda spool: spool.acknowledge(sink, noted))
-            owed.unnoted.difference_update(noted)
+            cursor.unnoted.difference_update(noted)
 
     def put_last(self, sink: str, refused: Stored) -> None:
         """Have a reading that a sink refuses by itself sent to it when there is nothing else."""
-        self._owed[sink].put_last(refused.seq)
+        self._cursors[sink].put_last(refused.seq)
 
     def flush(self) -> None:
         """Have waiting senders look at once."""
@@ -249,12 +249,12 @@ class Keeper:
             log.warning("the file of the readings was corrupt; it was set aside: %s", spool.set_aside)
         self._drops.known(spool.dropped)
         try:
-            spool.use_sinks(list(self._owed))
+            spool.use_sinks(list(self._cursors))
         except sqlite3.Error as error:
             spool.close()
             raise NotStored(f"{spool.path}: {error}") from error
-        for owed in self._owed.values():
-            owed.forget()
+        for cursor in self._cursors.values():
+            cursor.forget()
         self._spool = spool
         return spool
 

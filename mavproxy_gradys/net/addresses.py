@@ -8,7 +8,7 @@ import socket
 from dataclasses import dataclass
 from urllib.parse import SplitResult, urlsplit
 
-from mavproxy_gradys.net.resolver import Names
+from mavproxy_gradys.net.resolver import Resolver
 from mavproxy_uavapi.settings import SettingError
 
 PORTS = {"http": 80, "https": 443, "mqtt": 1883, "mqtts": 8883}
@@ -93,7 +93,7 @@ def bracketed(host: str) -> str:
     return f"[{host.partition('%')[0]}]" if ":" in host else host
 
 
-async def own_address(names: Names, host: str, port: int) -> str:
+async def own_address(names: Resolver, host: str, port: int) -> str:
     """Our address on the interface that reaches `host`; nothing is sent.
 
     Raises:

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 import aiohttp
 
 from mavproxy_gradys.errors import NotDelivered
-from mavproxy_gradys.net.resolver import Names
+from mavproxy_gradys.net.resolver import Resolver
 
 CONNECTIONS = 8  # to one receiver at a time
 LARGEST_ANSWER = 1024 * 1024  # bytes; a receiver that says more is not heard out
@@ -50,7 +50,7 @@ class Client:
             headers["Authorization"] = f"Bearer {token}"
         self._timeout = timeout
         self._session = aiohttp.ClientSession(
-            connector=aiohttp.TCPConnector(limit=CONNECTIONS, ssl=tls_context(ca_file), resolver=Names()),
+            connector=aiohttp.TCPConnector(limit=CONNECTIONS, ssl=tls_context(ca_file), resolver=Resolver()),
             timeout=aiohttp.ClientTimeout(total=timeout),
             headers=headers,
             cookie_jar=aiohttp.DummyCookieJar(),

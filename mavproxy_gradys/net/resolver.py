@@ -16,7 +16,7 @@ Info = tuple[Any, ...]  # family, kind, protocol, canonical name, address: as ge
 NUMERIC = socket.AI_NUMERICHOST | socket.AI_NUMERICSERV
 
 
-class Names(AbstractResolver):
+class Resolver(AbstractResolver):
     """Looks names up; while the answer about one is awaited, nobody asks for it again.
 
     Args:

@@ -1,4 +1,4 @@
-"""When the next turn is due: a fixed cadence, and the pauses after failures. Pure: the clock is an argument."""
+"""When the next turn is due: a fixed ticker, and the pauses after failures. Pure: the clock is an argument."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ LONGEST_PAUSE = 30.0  # s
 LONGEST_OF_SINKS = 20.0  # s: all readings are to be there within 30 s of a receiver's return
 
 
-class Cadence:
+class Ticker:
     """Turns at `start`, `start + period`, …: a turn that comes late does not move the later ones.
 
     Args:

@@ -10,8 +10,8 @@ from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.net.addresses import Station, api_note, ip_field, own_address
 from mavproxy_gradys.net.http_client import FORM, Poster
 from mavproxy_gradys.net.outage_log import Outage
-from mavproxy_gradys.net.resolver import Names
-from mavproxy_gradys.net.schedule import Cadence
+from mavproxy_gradys.net.resolver import Resolver
+from mavproxy_gradys.net.schedule import Ticker
 from mavproxy_gradys.position import Position, position_of
 from mavproxy_gradys.push import position_update
 from mavproxy_gradys.push.statistics import StationTally, VehicleTally
@@ -44,19 +44,19 @@ class Pusher:
         self._settings = settings
         self._poster = poster
         self._in_flight: dict[int, asyncio.Task[None]] = {}
-        self._names = Names()
+        self._names = Resolver()
         self._outage = Outage(log, f"{station.url} does not answer", f"{station.url} answers again")
         self._refusals: dict[int, Outage] = {}
         self._own = ""
         self._own_at = -ADDRESS_KEPT
 
     async def run(self) -> None:
-        """Push at a fixed cadence, until cancelled."""
+        """Push at a fixed rate, until cancelled."""
         loop = asyncio.get_running_loop()
-        cadence = Cadence(self._settings.period, loop.time())
+        ticker = Ticker(self._settings.period, loop.time())
         try:
             while True:
-                await asyncio.sleep(cadence.wait(loop.time()))
+                await asyncio.sleep(ticker.wait(loop.time()))
                 self.turn()
         finally:
             for task in list(self._in_flight.values()):

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from mavproxy_gradys.errors import NotStored
-from mavproxy_gradys.net.schedule import Cadence
+from mavproxy_gradys.net.schedule import Ticker
 from mavproxy_gradys.tasks import begin, end
 from mavproxy_gradys.tracks.formats import GPX, GPX_HEAD, GPX_TAIL, Reading
 from mavproxy_uavapi.core.host import Host
@@ -80,9 +80,9 @@ class Recorder:
 
     async def _record(self) -> None:
         loop = asyncio.get_running_loop()
-        cadence = Cadence(self.period, loop.time())
+        ticker = Ticker(self.period, loop.time())
         while True:
-            await asyncio.sleep(cadence.wait(loop.time()))
+            await asyncio.sleep(ticker.wait(loop.time()))
             state = self._host.fleet.vehicles.get(self.system)
             received = None if state is None else state.messages.get("GPS_RAW_INT")
             now = self._host.clock()

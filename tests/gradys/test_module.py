@@ -149,7 +149,7 @@ def put(module: Any, count: int) -> None:
 
     async def wait() -> None:
         for number in range(count):
-            module.gradys.sensing._kept().put(Reading("uav-1", 1, "alt", "m", float(number), 0.0))
+            module.gradys.pipeline._kept().put(Reading("uav-1", 1, "alt", "m", float(number), 0.0))
 
     module.host.bridge.run(wait())
 

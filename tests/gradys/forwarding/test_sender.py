@@ -13,85 +13,89 @@ from mavproxy_gradys.forwarding.sender import BATCH, Sender
 from mavproxy_gradys.forwarding.sink_address import sink_address
 from mavproxy_gradys.forwarding.sinks import HttpSink, acknowledged
 from mavproxy_gradys.forwarding.spool import Spool
-from mavproxy_gradys.forwarding.spool_thread import Keeper
+from mavproxy_gradys.forwarding.spool_thread import SpoolThread
 from mavproxy_gradys.net.http_client import refusal
 
 SINK = sink_address("http://a/readings")
 
 
 @pytest.fixture
-def keeper(loop: Any, tmp_path: Path, at_once: None) -> Iterator[Keeper]:
-    keeper = Keeper(lambda: Spool(tmp_path / "spool.db", 1e9, 1e9, clock=loop.time), loop.time)
+def spool_thread(loop: Any, tmp_path: Path, at_once: None) -> Iterator[SpoolThread]:
+    spool_thread = SpoolThread(lambda: Spool(tmp_path / "spool.db", 1e9, 1e9, clock=loop.time), loop.time)
 
     async def started() -> None:
-        keeper.start([SINK.name])
+        spool_thread.start([SINK.name])
 
     loop.run(started())
-    yield keeper
-    loop.run(keeper.stop())
+    yield spool_thread
+    loop.run(spool_thread.stop())
 
 
 @pytest.fixture
-def sender(loop: Any, keeper: Keeper, poster: Any, settings: Any, monkeypatch: pytest.MonkeyPatch) -> Sender:
+def sender(
+    loop: Any, spool_thread: SpoolThread, poster: Any, settings: Any, monkeypatch: pytest.MonkeyPatch
+) -> Sender:
     """Sends to `poster` from now on."""
     poster.answer = poster.acknowledging
     monkeypatch.setattr("mavproxy_gradys.forwarding.sender.make_sink", lambda sink, _: HttpSink(sink, poster))
-    sender = Sender(SINK, keeper, loop.time, lambda: 0.0)
+    sender = Sender(SINK, spool_thread, loop.time, lambda: 0.0)
     loop.create_task(sender.run(settings()))
     return sender
 
 
-def keep(loop: Any, keeper: Keeper, count: int) -> list[int]:
-    kept: list[int] = loop.run(keeper.keep([Reading("uav-1", 1, "alt", "m", float(n), 5.0) for n in range(count)]))
+def keep(loop: Any, spool_thread: SpoolThread, count: int) -> list[int]:
+    kept: list[int] = loop.run(
+        spool_thread.keep([Reading("uav-1", 1, "alt", "m", float(n), 5.0) for n in range(count)])
+    )
     return kept
 
 
-def test_readings_go_out_at_once_and_leave_the_spool(loop: Any, keeper: Any, sender: Any, poster: Any) -> None:
-    kept = keep(loop, keeper, 3)
+def test_readings_go_out_at_once_and_leave_the_spool(loop: Any, spool_thread: Any, sender: Any, poster: Any) -> None:
+    kept = keep(loop, spool_thread, 3)
     loop.pass_time(0.1)
     assert poster.batches == [kept]
-    assert (keeper.count, sender.acknowledged) == (0, 3)
+    assert (spool_thread.count, sender.acknowledged) == (0, 3)
     first = json.loads(poster.posts[0][2])["readings"][0]
     named = {"quantity": "alt", "representation": "m", "value": 0.0, "time": 5.0}
     assert first == {"device": "uav-1", "id": "1", "seq": kept[0], **named}
 
 
-def test_many_go_in_batches_in_order(loop: Any, keeper: Any, sender: Any, poster: Any) -> None:
-    kept = keep(loop, keeper, 2 * BATCH + 5)
+def test_many_go_in_batches_in_order(loop: Any, spool_thread: Any, sender: Any, poster: Any) -> None:
+    kept = keep(loop, spool_thread, 2 * BATCH + 5)
     loop.pass_time(1)
     assert [len(batch) for batch in poster.batches] == [BATCH, BATCH, 5]
     assert sum(poster.batches, []) == kept
 
 
-def test_what_is_not_acknowledged_is_sent_again(loop: Any, keeper: Any, sender: Any, poster: Any) -> None:
+def test_what_is_not_acknowledged_is_sent_again(loop: Any, spool_thread: Any, sender: Any, poster: Any) -> None:
     poster.answer = lambda body: {"acknowledged": [reading["seq"] for reading in json.loads(body)["readings"]][::2]}
-    kept = keep(loop, keeper, 5)
+    kept = keep(loop, spool_thread, 5)
     loop.pass_time(1)
     assert poster.batches == [kept, [kept[1], kept[3]], [kept[3]]]
-    assert keeper.count == 0
+    assert spool_thread.count == 0
 
 
 @pytest.mark.parametrize("answer", [None, "OK", {}, {"status": "ok"}, [1, 2, 3], {"Acknowledged": [1]}])
 def test_a_200_that_names_no_numbers_acknowledges_nothing(
-    loop: Any, keeper: Any, sender: Any, poster: Any, answer: Any
+    loop: Any, spool_thread: Any, sender: Any, poster: Any, answer: Any
 ) -> None:
     answers, poster.answer = poster.answer, answer  # None: a captive portal's login page
-    kept = keep(loop, keeper, 5)
+    kept = keep(loop, spool_thread, 5)
     loop.pass_time(100)
-    assert keeper.count == 5 and "names no numbers" in sender.last_error
+    assert spool_thread.count == 5 and "names no numbers" in sender.last_error
     assert {len(batch) for batch in poster.batches} == {5}  # it is nobody's fault but the answer's
     poster.answer = answers
     loop.pass_time(30)
-    assert keeper.count == 0 and poster.batches[-1] == kept
+    assert spool_thread.count == 0 and poster.batches[-1] == kept
 
 
 def test_a_receiver_that_is_down_gets_them_in_order_when_it_is_back(
-    loop: Any, keeper: Any, sender: Any, poster: Any, down: Any
+    loop: Any, spool_thread: Any, sender: Any, poster: Any, down: Any
 ) -> None:
     answers, poster.answer = poster.answer, down
     kept = []
     for _ in range(600):
-        kept += keep(loop, keeper, 11)
+        kept += keep(loop, spool_thread, 11)
         loop.pass_time(1)
     assert len(poster.posts) < 40
     assert sender.last_error == "cannot connect"
@@ -99,12 +103,12 @@ def test_a_receiver_that_is_down_gets_them_in_order_when_it_is_back(
     poster.posts.clear()
     loop.pass_time(30)
     assert sum(poster.batches, []) == kept
-    assert (keeper.count, sender.last_error) == (0, "")
+    assert (spool_thread.count, sender.last_error) == (0, "")
 
 
-def test_flush_does_not_wait_for_the_pause(loop: Any, keeper: Any, sender: Any, poster: Any, down: Any) -> None:
+def test_flush_does_not_wait_for_the_pause(loop: Any, spool_thread: Any, sender: Any, poster: Any, down: Any) -> None:
     poster.answer = down
-    keep(loop, keeper, 1)
+    keep(loop, spool_thread, 1)
     loop.pass_time(20)
     before = len(poster.posts)
     sender.flush()
@@ -113,13 +117,13 @@ def test_flush_does_not_wait_for_the_pause(loop: Any, keeper: Any, sender: Any, 
 
 
 def test_a_receiver_that_acknowledges_nothing_is_not_asked_again_at_once(
-    loop: Any, keeper: Any, sender: Any, poster: Any
+    loop: Any, spool_thread: Any, sender: Any, poster: Any
 ) -> None:
     poster.answer = {"acknowledged": []}
-    keep(loop, keeper, 1)
+    keep(loop, spool_thread, 1)
     loop.pass_time(20)
     assert len(poster.posts) == 5
-    assert keeper.count == 1 and "acknowledges nothing" in sender.last_error
+    assert spool_thread.count == 1 and "acknowledges nothing" in sender.last_error
 
 
 def refusing(poster: Any, refuses: Any, **given: Any) -> None:
@@ -132,48 +136,50 @@ def values(body: bytes) -> list[float]:
     return [reading["value"] for reading in json.loads(body)["readings"]]
 
 
-def test_batches_that_are_too_large_get_smaller_and_stay_so(loop: Any, keeper: Any, sender: Any, poster: Any) -> None:
+def test_batches_that_are_too_large_get_smaller_and_stay_so(
+    loop: Any, spool_thread: Any, sender: Any, poster: Any
+) -> None:
     refusing(poster, lambda found: len(found) > 60, too_large=True)
-    keep(loop, keeper, 1000)
+    keep(loop, spool_thread, 1000)
     loop.pass_time(20)
-    assert keeper.count == 0
+    assert spool_thread.count == 0
     sizes = [len(batch) for batch in poster.batches]
     assert sizes == [200, 100] + [50] * 20  # refused twice, and never tried again
 
 
 def test_one_that_is_refused_by_itself_holds_up_nobody_and_is_sent_last(
-    loop: Any, keeper: Any, sender: Any, poster: Any
+    loop: Any, spool_thread: Any, sender: Any, poster: Any
 ) -> None:
     answers = poster.answer
     refusing(poster, lambda found: 150.0 in found)
-    keep(loop, keeper, 300)
+    keep(loop, spool_thread, 300)
     loop.pass_time(20)
-    assert keeper.count == 1 and sender.report()["put_last"] >= 1
-    keep(loop, keeper, 3)
+    assert spool_thread.count == 1 and sender.report()["put_last"] >= 1
+    keep(loop, spool_thread, 3)
     loop.pass_time(40)
-    assert keeper.count == 1 and values(poster.posts[-1][2]) == [150.0]  # it is still tried, alone
+    assert spool_thread.count == 1 and values(poster.posts[-1][2]) == [150.0]  # it is still tried, alone
     poster.answer = answers
     loop.pass_time(30)
-    assert keeper.count == 0
+    assert spool_thread.count == 0
 
 
-def test_those_that_are_sent_last_take_turns(loop: Any, keeper: Any, sender: Any, poster: Any) -> None:
+def test_those_that_are_sent_last_take_turns(loop: Any, spool_thread: Any, sender: Any, poster: Any) -> None:
     refused = {3.0, 7.0}
     refusing(poster, lambda found: refused & set(found))
-    keep(loop, keeper, 10)
+    keep(loop, spool_thread, 10)
     loop.pass_time(60)
-    assert keeper.count == 2
+    assert spool_thread.count == 2
     refused.remove(7.0)
     loop.pass_time(60)
-    assert keeper.count == 1
+    assert spool_thread.count == 1
 
 
 @pytest.mark.parametrize("status", [301, 401, 403, 404, 429, 503])
 def test_a_receiver_that_is_not_ready_is_offered_the_same_again(
-    loop: Any, keeper: Any, sender: Any, poster: Any, status: int
+    loop: Any, spool_thread: Any, sender: Any, poster: Any, status: int
 ) -> None:
     answers, poster.answer = poster.answer, refusal(status, "")
-    kept = keep(loop, keeper, 300)
+    kept = keep(loop, spool_thread, 300)
     loop.pass_time(100)
     assert {len(batch) for batch in poster.batches} == {BATCH}
     poster.answer = answers
@@ -182,24 +188,24 @@ def test_a_receiver_that_is_not_ready_is_offered_the_same_again(
 
 
 def test_a_defect_is_told_once_and_does_not_end_the_delivery(
-    loop: Any, keeper: Any, sender: Any, poster: Any
+    loop: Any, spool_thread: Any, sender: Any, poster: Any
 ) -> None:
     answers, poster.answer = poster.answer, RecursionError("too deep")
-    keep(loop, keeper, 2)
+    keep(loop, spool_thread, 2)
     loop.pass_time(60)
     assert [str(defect["exception"]) for defect in loop.defects] == ["too deep"]
     assert "too deep" in sender.last_error
     loop.defects.clear()
     poster.answer = answers
     loop.pass_time(30)
-    assert (keeper.count, sender.last_error) == (0, "")
+    assert (spool_thread.count, sender.last_error) == (0, "")
 
 
 def test_the_log_tells_of_an_outage_once(
-    loop: Any, keeper: Any, sender: Any, poster: Any, down: Any, caplog: Any
+    loop: Any, spool_thread: Any, sender: Any, poster: Any, down: Any, caplog: Any
 ) -> None:
     answers, poster.answer = poster.answer, down
-    keep(loop, keeper, 1)
+    keep(loop, spool_thread, 1)
     loop.pass_time(100)
     poster.answer = answers
     loop.pass_time(30)
@@ -210,10 +216,10 @@ def test_the_log_tells_of_an_outage_once(
 
 
 def test_after_a_receivers_return_nobody_waits_longer_than_it_is_said(
-    loop: Any, keeper: Any, sender: Any, poster: Any, down: Any
+    loop: Any, spool_thread: Any, sender: Any, poster: Any, down: Any
 ) -> None:
     poster.answer = down
-    keep(loop, keeper, 1)
+    keep(loop, spool_thread, 1)
     loop.pass_time(300)
     gaps = [after - before for before, after in zip(poster.times, poster.times[1:], strict=False)]
     assert max(gaps) == pytest.approx(20.0)

@@ -13,7 +13,7 @@ from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.forwarding import spool_thread as keepers
 from mavproxy_gradys.forwarding.readings import Reading
 from mavproxy_gradys.forwarding.spool import Spool
-from mavproxy_gradys.forwarding.spool_thread import Keeper
+from mavproxy_gradys.forwarding.spool_thread import SpoolThread
 
 SINK = "http://a"
 
@@ -47,93 +47,97 @@ def disk(loop: Any, tmp_path: Path, at_once: None) -> Disk:
     return Disk(loop, tmp_path / "spool.db")
 
 
-def begin(loop: Any, keeper: Keeper) -> None:
+def begin(loop: Any, spool_thread: SpoolThread) -> None:
     """Start it, and let it open its file."""
 
     async def started() -> None:
-        keeper.start([SINK])
+        spool_thread.start([SINK])
 
     loop.run(started())
     loop.settle()
 
 
 @pytest.fixture
-def keeper(loop: Any, disk: Disk) -> Iterator[Keeper]:
-    keeper = Keeper(disk.make, loop.time)
-    begin(loop, keeper)
-    yield keeper
-    loop.run(keeper.stop())
+def spool_thread(loop: Any, disk: Disk) -> Iterator[SpoolThread]:
+    spool_thread = SpoolThread(disk.make, loop.time)
+    begin(loop, spool_thread)
+    yield spool_thread
+    loop.run(spool_thread.stop())
 
 
 def reading(value: Any = 1.0) -> Reading:
     return Reading("uav-1", 1, "alt", "m", value, 0.0)
 
 
-def taken(loop: Any, keeper: Keeper, limit: int = 100) -> list[Any]:
-    return [stored.reading.value for stored in loop.run(keeper.batch(SINK, limit))]
+def taken(loop: Any, spool_thread: SpoolThread, limit: int = 100) -> list[Any]:
+    return [stored.reading.value for stored in loop.run(spool_thread.batch(SINK, limit))]
 
 
-def test_sampled_readings_are_on_the_disk_within_half_a_second(loop: Any, keeper: Keeper, disk: Disk) -> None:
+def test_sampled_readings_are_on_the_disk_within_half_a_second(
+    loop: Any, spool_thread: SpoolThread, disk: Disk
+) -> None:
     for value in (1, 2, 3):
-        keeper.put(reading(value))
-    assert (keeper.count, keeper.waiting) == (0, 3)
+        spool_thread.put(reading(value))
+    assert (spool_thread.count, spool_thread.waiting) == (0, 3)
     loop.pass_time(0.6)
-    assert (keeper.count, keeper.waiting) == (3, 0)
-    assert taken(loop, keeper) == [1, 2, 3]
+    assert (spool_thread.count, spool_thread.waiting) == (3, 0)
+    assert taken(loop, spool_thread) == [1, 2, 3]
 
 
-def test_posted_readings_are_on_the_disk_when_it_answers(loop: Any, keeper: Keeper) -> None:
-    kept = loop.run(keeper.keep([reading(1), reading(2)]))
-    assert len(kept) == 2 and keeper.count == 2
+def test_posted_readings_are_on_the_disk_when_it_answers(loop: Any, spool_thread: SpoolThread) -> None:
+    kept = loop.run(spool_thread.keep([reading(1), reading(2)]))
+    assert len(kept) == 2 and spool_thread.count == 2
 
 
-def test_a_batch_waits_until_there_is_something(loop: Any, keeper: Keeper) -> None:
+def test_a_batch_waits_until_there_is_something(loop: Any, spool_thread: SpoolThread) -> None:
     began = loop.time()
-    loop.call_later(5.0, keeper.put, reading(7))
-    assert taken(loop, keeper) == [7]
+    loop.call_later(5.0, spool_thread.put, reading(7))
+    assert taken(loop, spool_thread) == [7]
     assert 5.0 <= loop.time() - began < 6.0
 
 
-def test_what_is_acknowledged_goes_and_nothing_else(loop: Any, keeper: Keeper) -> None:
-    kept = loop.run(keeper.keep([reading(n) for n in range(4)]))
-    batch = loop.run(keeper.batch(SINK, 3))
-    loop.run(keeper.acknowledge(SINK, batch, {kept[0], kept[2], kept[3]}))  # kept[3] was never sent
-    assert taken(loop, keeper) == [1, 3]
+def test_what_is_acknowledged_goes_and_nothing_else(loop: Any, spool_thread: SpoolThread) -> None:
+    kept = loop.run(spool_thread.keep([reading(n) for n in range(4)]))
+    batch = loop.run(spool_thread.batch(SINK, 3))
+    loop.run(spool_thread.acknowledge(SINK, batch, {kept[0], kept[2], kept[3]}))  # kept[3] was never sent
+    assert taken(loop, spool_thread) == [1, 3]
 
 
-def test_a_full_disk_is_said_and_sampled_readings_wait_in_memory(loop: Any, keeper: Keeper, disk: Disk) -> None:
-    loop.run(keeper.keep([reading(0)]))
+def test_a_full_disk_is_said_and_sampled_readings_wait_in_memory(
+    loop: Any, spool_thread: SpoolThread, disk: Disk
+) -> None:
+    loop.run(spool_thread.keep([reading(0)]))
     disk.fill()
     for value in range(1, 4):
-        keeper.put(reading(f"{value}" * 3000))
+        spool_thread.put(reading(f"{value}" * 3000))
     loop.pass_time(5)
-    assert "full" in keeper.problem and keeper.waiting == 3
+    assert "full" in spool_thread.problem and spool_thread.waiting == 3
     with pytest.raises(NotStored, match="full"):
-        loop.run(keeper.keep([reading("x" * 3000)] * 10))
+        loop.run(spool_thread.keep([reading("x" * 3000)] * 10))
     disk.make_room()
     loop.pass_time(1)
-    assert (keeper.problem, keeper.waiting, keeper.count) == ("", 0, 4)
-    assert [value if value == 0 else value[0] for value in taken(loop, keeper)] == [0, "1", "2", "3"]
+    assert (spool_thread.problem, spool_thread.waiting, spool_thread.count) == ("", 0, 4)
+    assert [value if value == 0 else value[0] for value in taken(loop, spool_thread)] == [0, "1", "2", "3"]
 
 
 def test_memory_is_bounded_and_what_it_drops_is_counted(
-    loop: Any, keeper: Keeper, disk: Disk, monkeypatch: pytest.MonkeyPatch
+    loop: Any, spool_thread: SpoolThread, disk: Disk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(keepers, "HELD", 10)
     disk.fill()
     for value in range(25):
-        keeper.put(reading(value))
-    assert (keeper.waiting, keeper.dropped["disk"]) == (10, 15)
+        spool_thread.put(reading(value))
+    assert (spool_thread.waiting, spool_thread.dropped["disk"]) == (10, 15)
     disk.make_room()
     loop.pass_time(1)
-    assert taken(loop, keeper) == list(range(15, 25))
+    assert taken(loop, spool_thread) == list(range(15, 25))
 
 
 def test_acknowledgements_that_the_disk_does_not_take_are_remembered(
-    loop: Any, keeper: Keeper, disk: Disk, monkeypatch: pytest.MonkeyPatch
+    loop: Any, spool_thread: SpoolThread, disk: Disk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    kept = loop.run(keeper.keep([reading(n) for n in range(4)]))
-    batch = loop.run(keeper.batch(SINK, 2))
+    kept = loop.run(spool_thread.keep([reading(n) for n in range(4)]))
+    batch = loop.run(spool_thread.batch(SINK, 2))
     assert disk.spool is not None
 
     def full(sink: str, numbers: Any) -> None:
@@ -141,29 +145,29 @@ def test_acknowledgements_that_the_disk_does_not_take_are_remembered(
 
     with monkeypatch.context() as patch:
         patch.setattr(disk.spool, "acknowledge", full)
-        loop.run(keeper.acknowledge(SINK, batch, set(kept[:2])))
-        assert "full" in keeper.problem
-        assert taken(loop, keeper) == [2, 3]  # nothing is sent again
-    assert taken(loop, keeper) == [2, 3]
-    assert keeper.count == 2
+        loop.run(spool_thread.acknowledge(SINK, batch, set(kept[:2])))
+        assert "full" in spool_thread.problem
+        assert taken(loop, spool_thread) == [2, 3]  # nothing is sent again
+    assert taken(loop, spool_thread) == [2, 3]
+    assert spool_thread.count == 2
 
 
 def test_a_spool_that_cannot_be_opened_is_tried_again(loop: Any, disk: Disk) -> None:
     disk.broken = "no room"
-    keeper = Keeper(disk.make, loop.time)
-    begin(loop, keeper)
-    assert keeper.problem == "no room"
-    keeper.put(reading(5))
+    spool_thread = SpoolThread(disk.make, loop.time)
+    begin(loop, spool_thread)
+    assert spool_thread.problem == "no room"
+    spool_thread.put(reading(5))
     loop.pass_time(2)
-    assert keeper.waiting == 1
+    assert spool_thread.waiting == 1
     disk.broken = ""
     loop.pass_time(1)
-    assert (keeper.problem, taken(loop, keeper)) == ("", [5])
-    loop.run(keeper.stop())
+    assert (spool_thread.problem, taken(loop, spool_thread)) == ("", [5])
+    loop.run(spool_thread.stop())
 
 
-def test_a_file_that_turns_out_corrupt_is_set_aside(loop: Any, keeper: Keeper, disk: Disk) -> None:
-    loop.run(keeper.keep([reading(n) for n in range(2000)]))
+def test_a_file_that_turns_out_corrupt_is_set_aside(loop: Any, spool_thread: SpoolThread, disk: Disk) -> None:
+    loop.run(spool_thread.keep([reading(n) for n in range(2000)]))
     assert disk.spool is not None
     disk.spool.close()
     content = bytearray(disk.path.read_bytes())
@@ -172,28 +176,28 @@ def test_a_file_that_turns_out_corrupt_is_set_aside(loop: Any, keeper: Keeper, d
     disk.spool._open = lambda: None  # type: ignore[method-assign]
     disk.spool._db = sqlite3.connect(disk.path, isolation_level=None, check_same_thread=False)
     with pytest.raises(NotStored, match="malformed"):
-        loop.run(keeper.batch(SINK, 2000))
-    keeper.put(reading(7))
+        loop.run(spool_thread.batch(SINK, 2000))
+    spool_thread.put(reading(7))
     loop.pass_time(1)
-    assert [file.name for file in keeper.set_aside] == ["spool.db.corrupt-1"]
-    assert taken(loop, keeper) == [7]
+    assert [file.name for file in spool_thread.set_aside] == ["spool.db.corrupt-1"]
+    assert taken(loop, spool_thread) == [7]
 
 
 def test_stopping_keeps_what_still_waits(loop: Any, disk: Disk) -> None:
-    keeper = Keeper(disk.make, loop.time)
-    begin(loop, keeper)
-    keeper.put(reading(1))
-    loop.run(keeper.stop())
+    spool_thread = SpoolThread(disk.make, loop.time)
+    begin(loop, spool_thread)
+    spool_thread.put(reading(1))
+    loop.run(spool_thread.stop())
     spool = Spool(disk.path, 1e9, 1e9)
     assert spool.count == 1
     spool.close()
 
 
-def test_the_oldest_has_an_age(loop: Any, keeper: Keeper) -> None:
-    assert keeper.oldest_age is None
-    loop.run(keeper.keep([reading()]))
+def test_the_oldest_has_an_age(loop: Any, spool_thread: SpoolThread) -> None:
+    assert spool_thread.oldest_age is None
+    loop.run(spool_thread.keep([reading()]))
     loop.pass_time(30)
-    assert keeper.oldest_age == pytest.approx(30, abs=0.5)
+    assert spool_thread.oldest_age == pytest.approx(30, abs=0.5)
 
 
 @contextlib.contextmanager
@@ -210,52 +214,54 @@ def failing(monkeypatch: pytest.MonkeyPatch, name: str, error: Exception) -> Ite
 
 @pytest.mark.parametrize("name", ["trim", "oldest_since"])
 def test_what_fails_after_readings_were_kept_does_not_keep_them_twice(
-    loop: Any, keeper: Keeper, disk: Disk, monkeypatch: pytest.MonkeyPatch, name: str
+    loop: Any, spool_thread: SpoolThread, disk: Disk, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     assert disk.spool is not None
     disk.spool.largest = 1 if name == "trim" else 1e9
     with failing(monkeypatch, name, sqlite3.OperationalError("database or disk is full")):
-        assert len(loop.run(keeper.keep([reading(0)]))) == 1
-        keeper.put(reading(1))
+        assert len(loop.run(spool_thread.keep([reading(0)]))) == 1
+        spool_thread.put(reading(1))
         loop.pass_time(3)
-        assert "full" in keeper.problem and keeper.waiting == 0
-        assert taken(loop, keeper) == [0, 1]
+        assert "full" in spool_thread.problem and spool_thread.waiting == 0
+        assert taken(loop, spool_thread) == [0, 1]
     disk.spool.largest = 1e9
-    keeper.put(reading(2))
+    spool_thread.put(reading(2))
     loop.pass_time(1)
-    assert (keeper.problem, taken(loop, keeper)) == ("", [0, 1, 2])
+    assert (spool_thread.problem, taken(loop, spool_thread)) == ("", [0, 1, 2])
 
 
 @pytest.mark.parametrize("wrong", [math.inf, math.nan, [math.inf]])
-def test_a_value_that_cannot_be_told_is_dropped_alone_and_counted(loop: Any, keeper: Keeper, wrong: Any) -> None:
+def test_a_value_that_cannot_be_told_is_dropped_alone_and_counted(
+    loop: Any, spool_thread: SpoolThread, wrong: Any
+) -> None:
     for value in (1, wrong, 2):
-        keeper.put(reading(value))
+        spool_thread.put(reading(value))
     loop.pass_time(1)
-    keeper.put(reading(3))
+    spool_thread.put(reading(3))
     loop.pass_time(1)
-    assert taken(loop, keeper) == [1, 2, 3]
-    assert keeper.dropped == {"value": 1}
+    assert taken(loop, spool_thread) == [1, 2, 3]
+    assert spool_thread.dropped == {"value": 1}
 
 
 def test_a_defect_loses_no_reading_is_told_once_and_leaves_no_file_open(
     loop: Any, disk: Disk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    keeper = Keeper(disk.make, loop.time)
-    begin(loop, keeper)
+    spool_thread = SpoolThread(disk.make, loop.time)
+    begin(loop, spool_thread)
     with failing(monkeypatch, "append", RuntimeError("a defect")):
-        keeper.put(reading(1))
+        spool_thread.put(reading(1))
         loop.pass_time(5)
-        assert keeper.waiting == 1 and "a defect" in keeper.problem
+        assert spool_thread.waiting == 1 and "a defect" in spool_thread.problem
         with pytest.raises(NotStored, match="a defect"):
-            loop.run(keeper.keep([reading(2)]))
+            loop.run(spool_thread.keep([reading(2)]))
     assert [str(defect["exception"]) for defect in loop.defects] == ["a defect"]
     loop.defects.clear()
     loop.pass_time(1)
-    assert (keeper.problem, taken(loop, keeper)) == ("", [1])
+    assert (spool_thread.problem, taken(loop, spool_thread)) == ("", [1])
     with failing(monkeypatch, "append", RuntimeError("another defect")):
-        keeper.put(reading(3))
-        loop.run(keeper.stop())
-    assert len(keeper.left) == 1
+        spool_thread.put(reading(3))
+        loop.run(spool_thread.stop())
+    assert len(spool_thread.left) == 1
     assert [str(defect["exception"]) for defect in loop.defects] == ["another defect"]
     loop.defects.clear()
     Spool(disk.path, 1e9, 1e9).close()  # not locked
@@ -266,47 +272,47 @@ def test_a_disk_that_is_full_from_the_start_still_gives_what_it_has(
 ) -> None:
     with contextlib.closing(Spool(disk.path, 1e9, 1e9)) as before:
         before.append([reading(1)])
-    keeper = Keeper(disk.make, loop.time)
+    spool_thread = SpoolThread(disk.make, loop.time)
     with failing(monkeypatch, "trim", sqlite3.OperationalError("database or disk is full")):
-        begin(loop, keeper)
-        assert "full" in keeper.problem
-        assert taken(loop, keeper) == [1]
-    loop.run(keeper.stop())
+        begin(loop, spool_thread)
+        assert "full" in spool_thread.problem
+        assert taken(loop, spool_thread) == [1]
+    loop.run(spool_thread.stop())
 
 
 def test_what_the_disk_does_not_take_is_handed_back_at_the_end(loop: Any, disk: Disk) -> None:
-    keeper = Keeper(disk.make, loop.time)
-    begin(loop, keeper)
+    spool_thread = SpoolThread(disk.make, loop.time)
+    begin(loop, spool_thread)
     disk.fill()
     for value in range(3):
-        keeper.put(reading(f"{value}" * 3000))
+        spool_thread.put(reading(f"{value}" * 3000))
     loop.pass_time(1)
-    loop.run(keeper.stop())
-    assert [left.value[0] for left in keeper.left] == ["0", "1", "2"]
+    loop.run(spool_thread.stop())
+    assert [left.value[0] for left in spool_thread.left] == ["0", "1", "2"]
     with pytest.raises(NotStored, match="stopping"):
-        loop.run(keeper.keep([reading(1)]))
+        loop.run(spool_thread.keep([reading(1)]))
 
 
 def test_while_the_file_is_being_opened_it_says_so(loop: Any, disk: Disk) -> None:
-    keeper = Keeper(disk.make, loop.time)
+    spool_thread = SpoolThread(disk.make, loop.time)
 
     async def started() -> tuple[str, int | None]:
-        keeper.start([SINK])
-        return keeper.problem, keeper.count
+        spool_thread.start([SINK])
+        return spool_thread.problem, spool_thread.count
 
     assert loop.run(started()) == ("it is being opened", None)  # what is in it nobody knows
     loop.settle()
-    assert (keeper.problem, keeper.count) == ("", 0)
-    loop.run(keeper.stop())
+    assert (spool_thread.problem, spool_thread.count) == ("", 0)
+    loop.run(spool_thread.stop())
 
 
 def test_the_log_tells_of_a_full_disk_once_and_of_drops_once_a_minute(
-    loop: Any, keeper: Keeper, disk: Disk, monkeypatch: pytest.MonkeyPatch, caplog: Any
+    loop: Any, spool_thread: SpoolThread, disk: Disk, monkeypatch: pytest.MonkeyPatch, caplog: Any
 ) -> None:
     monkeypatch.setattr(keepers, "HELD", 10)
     with failing(monkeypatch, "append", sqlite3.OperationalError("database or disk is full")):
         for value in range(100):
-            keeper.put(reading(value))
+            spool_thread.put(reading(value))
             loop.pass_time(1)
     loop.pass_time(1)
     failed, first, second, works = (record.message for record in caplog.records)
@@ -322,7 +328,7 @@ def test_the_log_names_the_file_that_was_set_aside(loop: Any, disk: Disk, caplog
     content = bytearray(disk.path.read_bytes())
     content[8192:20480] = b"\xff" * 12288
     disk.path.write_bytes(content)
-    keeper = Keeper(disk.make, loop.time)
-    begin(loop, keeper)
+    spool_thread = SpoolThread(disk.make, loop.time)
+    begin(loop, spool_thread)
     assert [record.message.rpartition("/")[2] for record in caplog.records] == ["spool.db.corrupt-1"]
-    loop.run(keeper.stop())
+    loop.run(spool_thread.stop())

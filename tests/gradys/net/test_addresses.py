@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from mavproxy_gradys.net.addresses import api_note, check_ip, ip_field, own_address, station, stations
-from mavproxy_gradys.net.resolver import Names
+from mavproxy_gradys.net.resolver import Resolver
 from mavproxy_uavapi.settings import SettingError
 
 
@@ -82,7 +82,7 @@ def test_the_note_says_when_the_station_cannot_command_us() -> None:
 
 
 def test_own_address_is_that_of_the_interface_that_reaches_the_station(loop: Any) -> None:
-    names = Names()
+    names = Resolver()
     assert loop.run(own_address(names, "127.0.0.1", 9)) == "127.0.0.1"
     with pytest.raises(OSError):
         loop.run(own_address(names, "no.such.host.invalid", 9))

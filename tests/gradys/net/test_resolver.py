@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from mavproxy_gradys.net.resolver import Names
+from mavproxy_gradys.net.resolver import Resolver
 
 INFO = (socket.AF_INET, socket.SOCK_STREAM, 6, "", ("192.0.2.7", 80))
 
@@ -30,7 +30,7 @@ class Server:
 
 def test_a_name_that_is_not_answered_holds_up_no_other_and_is_asked_once(loop: Any) -> None:
     server = Server()
-    names = Names(server.ask)
+    names = Resolver(server.ask)
 
     async def look_up() -> None:
         for _ in range(3):
@@ -47,7 +47,7 @@ def test_a_name_that_is_not_answered_holds_up_no_other_and_is_asked_once(loop: A
 
 
 def test_an_address_needs_no_name_server(loop: Any) -> None:
-    names = Names(lambda *_: pytest.fail("it was asked"))
+    names = Resolver(lambda *_: pytest.fail("it was asked"))
     for address in ("192.0.2.7", "2001:db8::7"):
         assert loop.run(names.look_up(address, 80))[0][4][:2] == (address, 80)
 
@@ -57,9 +57,9 @@ def test_what_is_no_host_is_an_error_of_the_system(loop: Any, host: str) -> None
     server = Server()
     server.answers.set()
     with pytest.raises(OSError):
-        loop.run(Names(server.ask if host == "nobody" else socket.getaddrinfo).look_up(host, 80))
+        loop.run(Resolver(server.ask if host == "nobody" else socket.getaddrinfo).look_up(host, 80))
 
 
 def test_as_aiohttp_asks(loop: Any) -> None:
-    (found,) = loop.run(Names(Server().ask).resolve("good", 80))
+    (found,) = loop.run(Resolver(Server().ask).resolve("good", 80))
     assert (found["hostname"], found["host"], found["port"], found["family"]) == ("good", "192.0.2.7", 80, 2)

@@ -2,29 +2,29 @@ from __future__ import annotations
 
 import pytest
 
-from mavproxy_gradys.net.schedule import Backoff, Cadence
+from mavproxy_gradys.net.schedule import Backoff, Ticker
 
 
 def test_a_late_turn_does_not_move_the_later_ones() -> None:
-    cadence, now, turns = Cadence(1.0, 100.0), 100.0, []
+    ticker, now, turns = Ticker(1.0, 100.0), 100.0, []
     for late in (0.0, 0.3, 0.0, 0.9, 0.0):
-        now += cadence.wait(now)
+        now += ticker.wait(now)
         turns.append(now)
         now += late
     assert turns == pytest.approx([100, 101, 102, 103, 104])
 
 
 def test_turns_that_were_slept_through_are_left_out() -> None:
-    cadence = Cadence(1.0, 100.0)
-    assert cadence.wait(100.0) == 0.0
-    assert cadence.wait(103.4) == pytest.approx(0.6)
-    assert cadence.wait(104.0) == pytest.approx(1.0)
+    ticker = Ticker(1.0, 100.0)
+    assert ticker.wait(100.0) == 0.0
+    assert ticker.wait(103.4) == pytest.approx(0.6)
+    assert ticker.wait(104.0) == pytest.approx(1.0)
 
 
 def test_a_thousand_turns_do_not_drift() -> None:
-    cadence, now = Cadence(0.1, 7.0), 7.0
+    ticker, now = Ticker(0.1, 7.0), 7.0
     for _ in range(10_000):
-        now += cadence.wait(now)
+        now += ticker.wait(now)
     assert now == pytest.approx(7.0 + 999.9, abs=1e-6)
 
 
