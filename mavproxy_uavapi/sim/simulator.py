@@ -86,7 +86,7 @@ class Simulator:
             "SET_POSITION_TARGET_LOCAL_NED": self._local_setpoint,
             "SET_POSITION_TARGET_GLOBAL_INT": self._global_setpoint,
             "RC_CHANNELS_OVERRIDE": self._sticks,
-            "LANDING_TARGET": lambda _link, message: self.copter.precland.hear(message),
+            "LANDING_TARGET": lambda _link, message: self.copter.precland.hear(message, self.copter.now),
             "TIMESYNC": self._timesync,
             "FILE_TRANSFER_PROTOCOL": self._file_transfer,
         }
