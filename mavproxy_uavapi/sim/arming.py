@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from .copter import Copter
+from .aircraft import Aircraft
+from .modes import Mode
 
 FORCE_ARM = 2989.0
 FORCE = 21196.0
@@ -14,40 +12,40 @@ REPORT_INTERVAL = 30.0
 """Seconds between reports of what keeps a disarmed vehicle from arming."""
 
 
-def mandatory_failures(copter: Copter) -> list[str]:
+def mandatory_failures(aircraft: Aircraft, mode: Mode) -> list[str]:
     """Checks that hold even for a forced arming or with ARMING_CHECK 0."""
-    estimator = copter.estimator
+    estimator = aircraft.estimator
     if not estimator.aligned:
         return ["AHRS: EKF3 still initialising"]
-    if copter.mode.needs_position and not estimator.ready:
+    if mode.needs_position and not estimator.ready:
         return ["Need Position Estimate"]
     return []
 
 
-def prearm_failures(copter: Copter) -> list[str]:
+def prearm_failures(aircraft: Aircraft, mode: Mode) -> list[str]:
     """Why the pre-arm check fails now; empty when the vehicle is ready. An armed vehicle passes."""
-    if copter.armed:
+    if aircraft.armed:
         return []
-    failures = mandatory_failures(copter)
-    if copter.parameters["ARMING_CHECK"] == 0:
+    failures = mandatory_failures(aircraft, mode)
+    if aircraft.parameters["ARMING_CHECK"] == 0:
         return failures
-    if not copter.estimator.has_fix:
+    if not aircraft.estimator.has_fix:
         failures.append("GPS 1: Bad fix")
-    if copter.home is None:
+    if aircraft.home is None:
         failures.append("AHRS: waiting for home")
-    if copter.mode.name == "AUTO" and not copter.mission.present:
+    if mode.name == "AUTO" and not aircraft.mission.present:
         failures.append("Mode requires mission")
-    if copter.battery.low:
+    if aircraft.battery.low:
         failures.append("Battery 1 low voltage failsafe")
     return failures
 
 
-def arm_failures(copter: Copter) -> list[str]:
+def arm_failures(aircraft: Aircraft, mode: Mode) -> list[str]:
     """What else must hold at the moment of arming from the ground station."""
-    if not copter.mode.armable:
-        return [f"{copter.mode.name} mode not armable"]
-    if copter.parameters["ARMING_CHECK"] == 0:
+    if not mode.armable:
+        return [f"{mode.name} mode not armable"]
+    if aircraft.parameters["ARMING_CHECK"] == 0:
         return []
-    throttle_matters = copter.mode.name not in ("GUIDED", "AUTO")
-    high = copter.sticks.throttle(copter.now) > (0.0 if copter.mode.manual_throttle else 0.6)
+    throttle_matters = mode.name not in ("GUIDED", "AUTO")
+    high = aircraft.sticks.throttle(aircraft.now) > (0.0 if mode.manual_throttle else 0.6)
     return ["Throttle too high"] if throttle_matters and high else []

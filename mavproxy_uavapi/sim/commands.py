@@ -9,21 +9,21 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from . import arming
+from .copter import Copter
 from .frames import AMSL_FRAMES, GLOBAL_FRAMES, HIGHEST_ALTITUDE, global_target, valid_location
 from .geodesy import Location
+from .link import Link
 from .modes import Guided
 from .modes.auto import Auto
 from .position_control import SPEED_KINDS
 from .streams import HEARTBEAT_INTERVAL, RATE_PARAMETERS, group_of
-
-if TYPE_CHECKING:
-    from .link import Link
-    from .simulator import Simulator
+from .telemetry import Telemetry
+from .transmitter import Transmitter
 
 ACCEPTED: int = mavlink.MAV_RESULT_ACCEPTED
 DENIED: int = mavlink.MAV_RESULT_DENIED
@@ -94,10 +94,15 @@ def _finite(value: float) -> float:
 
 
 class Commands:
-    """Carries out commands on the vehicle of a simulator."""
+    """Carries out commands on one vehicle; reboot makes it boot again once the acknowledgement is out."""
 
-    def __init__(self, simulator: Simulator) -> None:
-        self._simulator = simulator
+    def __init__(
+        self, copter: Copter, telemetry: Telemetry, transmitter: Transmitter, reboot: Callable[[], None]
+    ) -> None:
+        self._copter = copter
+        self._telemetry = telemetry
+        self._transmitter = transmitter
+        self._reboot_soon = reboot
         self._handlers: dict[int, Callable[[Command, Link], int]] = {
             mavlink.MAV_CMD_COMPONENT_ARM_DISARM: self._arm_disarm,
             mavlink.MAV_CMD_RUN_PREARM_CHECKS: self._run_prearm_checks,
@@ -134,7 +139,7 @@ class Commands:
 
     def _arm_disarm(self, command: Command, link: Link) -> int:
         del link
-        copter = self._simulator.copter
+        copter = self._copter
         if command.param1 == 1:
             forced = command.param2 in (arming.FORCE, arming.FORCE_ARM)
             return ACCEPTED if copter.arm(forced=forced) else FAILED
@@ -144,26 +149,32 @@ class Commands:
 
     def _run_prearm_checks(self, command: Command, link: Link) -> int:
         del command, link
-        copter = self._simulator.copter
+        copter = self._copter
         if copter.armed:
             return BUSY
         copter.report_prearm()
         return ACCEPTED
 
+    def set_mode(self, base_mode: int, custom_mode: int) -> int:
+        """Change the mode as MAV_CMD_DO_SET_MODE and SET_MODE ask; a MAV_RESULT."""
+        if not base_mode & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
+            return DENIED
+        return ACCEPTED if self._copter.set_mode(custom_mode) else FAILED
+
     def _set_mode(self, command: Command, link: Link) -> int:
         del link
-        return self._simulator.set_mode(int(command.param1), int(command.param2))
+        return self.set_mode(int(command.param1), int(command.param2))
 
     def _mode_command(self, number: int) -> Callable[[Command, Link], int]:
         def handler(command: Command, link: Link) -> int:
             del command, link
-            return ACCEPTED if self._simulator.copter.set_mode(number) else FAILED
+            return ACCEPTED if self._copter.set_mode(number) else FAILED
 
         return handler
 
     def _take_off(self, command: Command, link: Link) -> int:
         del link
-        copter = self._simulator.copter
+        copter = self._copter
         if command.frame not in (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT):
             return DENIED
         if not copter.armed or not copter.landed or not abs(command.z) <= HIGHEST_ALTITUDE:
@@ -172,7 +183,7 @@ class Commands:
 
     def _reposition(self, command: Command, link: Link) -> int:
         del link
-        copter = self._simulator.copter
+        copter = self._copter
         change = bool(int(command.param2) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
         if copter.mode is not copter.guided and not change:
             return DENIED
@@ -188,7 +199,7 @@ class Commands:
 
     def _mission_start(self, command: Command, link: Link) -> int:
         del link
-        copter = self._simulator.copter
+        copter = self._copter
         if command.param1 != 0 or command.param2 != 0:
             return DENIED
         if not copter.set_mode(Auto.number):
@@ -199,16 +210,16 @@ class Commands:
 
     def _set_mission_current(self, command: Command, link: Link) -> int:
         del link
-        if not self._simulator.copter.current_item(int(command.param1)):
+        if not self._copter.current_item(int(command.param1)):
             return DENIED
-        self._simulator.broadcast("MISSION_CURRENT")
+        self._transmitter.broadcast("MISSION_CURRENT")
         return ACCEPTED
 
     def _condition_yaw(self, command: Command, link: Link) -> int:
         del link
         if not 0 <= command.param1 <= 360 or command.param4 not in (0, 1):
             return FAILED
-        self._simulator.copter.fix_yaw(command.param1, command.param2, int(command.param3), command.param4 == 1)
+        self._copter.fix_yaw(command.param1, command.param2, int(command.param3), command.param4 == 1)
         return ACCEPTED
 
     def _change_speed(self, command: Command, link: Link) -> int:
@@ -216,12 +227,12 @@ class Commands:
         kind = SPEED_KINDS.get(int(command.param1))
         if not command.param2 > 0 or int(command.param1) == NO_SPEED_KIND:
             return DENIED
-        changed = kind is not None and self._simulator.copter.mode.set_speed(kind, command.param2)
+        changed = kind is not None and self._copter.mode.set_speed(kind, command.param2)
         return ACCEPTED if changed else FAILED
 
     def _pause_continue(self, command: Command, link: Link) -> int:
         del link
-        copter = self._simulator.copter
+        copter = self._copter
         if int(command.param1) not in (0, 1):
             return DENIED
         pause = int(command.param1) == 0
@@ -232,7 +243,7 @@ class Commands:
 
     def _set_home(self, command: Command, link: Link) -> int:
         del link
-        copter = self._simulator.copter
+        copter = self._copter
         if command.param1 == 1 or (command.x == 0 and command.y == 0):
             return ACCEPTED if copter.set_home_here(lock=True) else FAILED
         if command.param1 != 0:
@@ -247,16 +258,16 @@ class Commands:
 
     def _get_home(self, command: Command, link: Link) -> int:
         del command
-        if self._simulator.copter.home is None:
+        if self._copter.home is None:
             return FAILED
-        self._simulator.send(link, "HOME_POSITION")
-        self._simulator.send(link, "GPS_GLOBAL_ORIGIN")
+        self._transmitter.send(link, "HOME_POSITION")
+        self._transmitter.send(link, "GPS_GLOBAL_ORIGIN")
         return ACCEPTED
 
     def _set_roi(self, command: Command, link: Link) -> int:
         if not (command.x or command.y or command.z):
             return self._clear_roi(command, link)
-        copter = self._simulator.copter
+        copter = self._copter
         if not valid_location(command.x, command.y, command.z):
             return FAILED
         target = global_target(copter, command.frame, command.x, command.y, command.z)
@@ -267,21 +278,21 @@ class Commands:
 
     def _clear_roi(self, command: Command, link: Link) -> int:
         del command, link
-        copter = self._simulator.copter
+        copter = self._copter
         copter.yaw.roi = None
         copter.yaw.by_parameter(int(copter.parameters["WP_YAW_BEHAVIOR"]), returning=False)
         return ACCEPTED
 
     def _set_servo(self, command: Command, link: Link) -> int:
         del link
-        done = self._simulator.copter.set_servo(int(command.param1), int(command.param2))
+        done = self._copter.set_servo(int(command.param1), int(command.param2))
         return ACCEPTED if done else FAILED
 
     def _terminate(self, command: Command, link: Link) -> int:
         del link
         if command.param1 <= 0.5:
             return FAILED
-        self._simulator.copter.disarm_landed()
+        self._copter.disarm_landed()
         return ACCEPTED
 
     def _request_message(self, command: Command, link: Link) -> int:
@@ -292,11 +303,11 @@ class Commands:
         if name is None:
             return FAILED
         # Like most messages in ArduPilot it waits its turn, so the acknowledgement comes first.
-        self._simulator.send_soon(link, name)
+        self._transmitter.send_soon(link, name)
         return ACCEPTED
 
     def _set_interval(self, command: Command, link: Link) -> int:
-        copter = self._simulator.copter
+        copter = self._copter
         name = self._name_of(int(command.param1))
         if name is None:
             text = f"No ap_message for mavlink id ({int(command.param1)})"
@@ -320,7 +331,7 @@ class Commands:
         if name == "HEARTBEAT":
             return HEARTBEAT_INTERVAL
         group = group_of(name)
-        rate = self._simulator.parameters[RATE_PARAMETERS[group]] if group is not None else 0.0
+        rate = self._copter.parameters[RATE_PARAMETERS[group]] if group is not None else 0.0
         return 1 / rate if rate > 0 else None
 
     def _get_interval(self, command: Command, link: Link) -> int:
@@ -339,24 +350,24 @@ class Commands:
     def _name_of(self, message_id: int) -> str | None:
         kind = mavlink.mavlink_map.get(message_id)
         name = None if kind is None else str(kind.msgname)
-        return name if name is not None and self._simulator.telemetry.knows(name) else None
+        return name if name is not None and self._telemetry.knows(name) else None
 
     def _capabilities(self, command: Command, link: Link) -> int:
         if command.param1 != 1:
             return FAILED
-        self._simulator.send(link, "AUTOPILOT_VERSION")
+        self._transmitter.send(link, "AUTOPILOT_VERSION")
         return ACCEPTED
 
     def _banner(self, command: Command, link: Link) -> int:
         del command, link
-        self._simulator.copter.say_banner()
+        self._copter.say_banner()
         return ACCEPTED
 
     def _reboot(self, command: Command, link: Link) -> int:
         del link
-        if self._simulator.copter.armed and command.y != FORCE_REBOOT:
+        if self._copter.armed and command.y != FORCE_REBOOT:
             return FAILED
         if command.param1 not in (1, 3):
             return UNSUPPORTED
-        self._simulator.reboot_soon()
+        self._reboot_soon()
         return ACCEPTED

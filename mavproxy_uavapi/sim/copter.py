@@ -1,71 +1,29 @@
-"""The vehicle without its radio: flight state, failsafes and the control loop of one ArduCopter."""
+"""The vehicle without its radio: modes, arming, failsafes and the control loop of one ArduCopter."""
 
 from __future__ import annotations
 
-import math
-import random
 from collections import deque
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from . import arming
-from .battery import Battery
-from .channels import Servos, Sticks
-from .estimator import Estimator
-from .events import Broadcast, Event, StatusText
+from .aircraft import Aircraft
+from .events import Broadcast
 from .failsafes import Failsafes
-from .geodesy import Location, Ned, to_ned
-from .land_detector import LandDetector
-from .mission import Mission, State, home_item
+from .mission import Mission, State
 from .modes import Guided, Mode, build
-from .modes.base import Demand
 from .options import Options
 from .parameters import Parameters
-from .physics import Body
-from .position_control import Limits, PositionController, Speed
-from .precland import PrecisionLanding
-from .yaw_control import AutoYaw
 
-ARMING_DELAY = 2.0
-"""Seconds after arming in which the motors do not spool up yet (ARMING_DELAY_SEC)."""
-ARRIVAL_DISTANCE = 0.1
-ARRIVAL_SPEED = 0.1
 FIRMWARE = "ArduCopter V4.6.0 (embedded)"
 
 
-class Copter:
-    """All state of one vehicle between two boots.
-
-    Time is `now`, seconds since boot on the simulated clock. The flight code tells the ground through
-    `events`, which the owner empties.
-    """
+class Copter(Aircraft):
+    """An aircraft with its flight modes and what chooses among them: the ground, the pilot's switch, failsafes."""
 
     def __init__(self, options: Options, parameters: Parameters, mission: Mission, seed: int) -> None:
-        self.options = options
-        self.parameters = parameters
-        self.mission = mission
-        self.events: deque[Event] = deque()
-        self.now = 0.0
-        self._steps = 0
-        home = options.home
-        start = Location(home.latitude, home.longitude, home.altitude)
-        self.body = Body.at_rest(home.heading, options.wind)
-        self.estimator = Estimator(start, options.ready_after, options.gps_noise, random.Random(seed))
-        self.position = PositionController()
-        self.yaw = AutoYaw()
-        self.battery = Battery(parameters)
-        self.sticks = Sticks()
-        self.servos = Servos(parameters)
-        self.home: Location | None = None
-        self._home_locked = False
-        self.armed = False
-        self.auto_armed = False
-        self.landed = True
+        super().__init__(options, parameters, mission, seed)
         self.failsafes = Failsafes(self)
-        self.precland = PrecisionLanding(self)
-        self._spool = 0.0
-        self._armed_since = 0.0
-        self._detector = LandDetector()
         self._idle_since = 0.0
         self._last_report = -arming.REPORT_INTERVAL + 1.0
         self._switch: int | None = None
@@ -73,24 +31,11 @@ class Copter:
         self.modes = build(self)
         self.mode: Mode = self.modes[0]
         self.mode.enter(checked=False)
-        mission.reset()
-
-    # What the ground is told.
-
-    def tell(self, event: Event) -> None:
-        """Queue an event for the ground."""
-        self.events.append(event)
-
-    def say(self, severity: int, text: str) -> None:
-        """Queue a STATUSTEXT of a MAV_SEVERITY."""
-        self.events.append(StatusText(severity, text))
 
     def say_banner(self) -> None:
         """The firmware and frame, as at boot."""
         self.say(mavlink.MAV_SEVERITY_INFO, FIRMWARE)
         self.say(mavlink.MAV_SEVERITY_INFO, "Frame: QUAD/PLUS")
-
-    # Derived state.
 
     @property
     def guided(self) -> Guided:
@@ -98,103 +43,6 @@ class Copter:
         mode = self.modes[Guided.number]
         assert isinstance(mode, Guided)
         return mode
-
-    @property
-    def home_offset(self) -> Ned:
-        """Home in NED metres from the EKF origin; the origin itself before home is set."""
-        if self.home is None or self.estimator.origin is None:
-            return Ned(0.0, 0.0, 0.0)
-        return to_ned(self.estimator.origin, self.home)
-
-    @property
-    def altitude(self) -> float:
-        """Estimated metres above home."""
-        return self.home_offset.down - self.estimator.position.down
-
-    @property
-    def grounded(self) -> bool:
-        """Whether modes must keep the motors at idle: ArduCopter's is_disarmed_or_landed."""
-        return not self.armed or not self.auto_armed or self.landed
-
-    @property
-    def spooled_up(self) -> bool:
-        """Whether the motors give full thrust."""
-        return self._spool >= 1.0
-
-    @property
-    def spooled_down(self) -> bool:
-        """Whether the motors are at ground idle."""
-        return self._spool <= 0.0
-
-    @property
-    def maybe_landed(self) -> bool:
-        """Whether the land detector has its first suspicion."""
-        return self.landed or self._detector.suspects
-
-    def arrived(self, target: Ned) -> bool:
-        """Whether the trajectory has stopped at target and the vehicle is within WPNAV_RADIUS of it."""
-        control = self.position
-        radius = self.parameters["WPNAV_RADIUS"] / 100
-        return (
-            math.dist(control.position, target) < ARRIVAL_DISTANCE
-            and math.hypot(*control.velocity) < ARRIVAL_SPEED
-            and math.dist(self.estimator.position, target) < radius
-        )
-
-    def default_limits(self) -> Limits:
-        """Speeds and accelerations of the WPNAV parameters, in SI units."""
-        parameters = self.parameters
-        return Limits(
-            speed=max(parameters["WPNAV_SPEED"], 10) / 100,
-            speed_up=max(parameters["WPNAV_SPEED_UP"], 10) / 100,
-            speed_down=max(parameters["WPNAV_SPEED_DN"], 10) / 100,
-            acceleration=max(parameters["WPNAV_ACCEL"], 10) / 100,
-            acceleration_z=max(parameters["WPNAV_ACCEL_Z"], 10) / 100,
-            lean=math.radians(max(1000, min(8000, parameters["ANGLE_MAX"])) / 100),
-        )
-
-    def change_limit(self, kind: Speed, speed: float) -> None:
-        """Set a speed limit in m/s until the mode or its submode resets them."""
-        self.position.limits.change(kind, speed)
-
-    # What the ground or the flight code can do.
-
-    def relax(self) -> None:
-        """Bring all targets to where the vehicle is."""
-        self.position.start_at(self.estimator.position, self.estimator.velocity)
-
-    def lift_off(self) -> None:
-        """The vehicle leaves the ground now."""
-        self.landed = False
-        self.auto_armed = True
-        self._detector.restart()
-        self.relax()
-
-    def fix_yaw(self, angle: float, speed: float, direction: int, relative: bool) -> None:
-        """MAV_CMD_CONDITION_YAW with angle in degrees and speed in deg/s."""
-        self.yaw.fix(math.radians(angle), math.radians(speed), direction, relative, self.body.yaw)
-
-    def set_servo(self, channel: int, pulse: int) -> bool:
-        """Drive a free servo output; says so when it is not free."""
-        if self.servos.set(channel, pulse):
-            return True
-        self.say(mavlink.MAV_SEVERITY_INFO, f"ServoRelayEvent: Channel {channel} is already in use")
-        return False
-
-    def set_home(self, home: Location, *, lock: bool) -> bool:
-        """Move home; False before there is an EKF origin. A locked home is not moved by arming."""
-        if self.estimator.origin is None:
-            return False
-        self.home = home
-        self.mission.remember_home(home_item(home))
-        self._home_locked = self._home_locked or lock
-        self.tell(Broadcast("HOME_POSITION"))
-        self.tell(Broadcast("GPS_GLOBAL_ORIGIN"))
-        return True
-
-    def set_home_here(self, *, lock: bool) -> bool:
-        """Make the present place home; False without a position."""
-        return self.estimator.ready and self.set_home(self.estimator.location, lock=lock)
 
     def set_mode(self, number: int) -> bool:
         """Change the flight mode; False with a STATUSTEXT that says why. While disarmed nothing is checked."""
@@ -228,19 +76,14 @@ class Copter:
         """Arm the motors; False with STATUSTEXTs that say why not."""
         if self.armed:
             return True
-        if not (forced and not arming.mandatory_failures(self)):
-            failures = arming.prearm_failures(self) or arming.arm_failures(self)
+        if not (forced and not arming.mandatory_failures(self, self.mode)):
+            failures = arming.prearm_failures(self, self.mode) or arming.arm_failures(self, self.mode)
             for failure in failures:
                 self.say(mavlink.MAV_SEVERITY_CRITICAL, f"Arm: {failure}")
             if failures:
                 return False
-        self.say(mavlink.MAV_SEVERITY_INFO, "Arming motors")
-        self.yaw.armed_yaw = self.body.yaw
-        if self.home is not None and not self._home_locked:
-            self.set_home_here(lock=False)
-        self.armed = True
-        self._armed_since = self._idle_since = self.now
-        self._spool = 0.0
+        self.arm_motors()
+        self._idle_since = self.now
         return True
 
     def disarm(self, *, forced: bool) -> bool:
@@ -250,34 +93,20 @@ class Copter:
         self.disarm_landed()
         return True
 
-    def disarm_landed(self) -> None:
-        """Stop the motors, whatever the vehicle is doing."""
-        if not self.armed:
-            return
-        self.say(mavlink.MAV_SEVERITY_INFO, "Disarming motors")
-        self.armed = self.auto_armed = False
-        self.landed = True
-        self._spool = 0.0
-        self.mission.reset()
-
     def report_prearm(self) -> None:
         """Tell the ground what keeps the vehicle from arming."""
-        for failure in arming.prearm_failures(self):
+        for failure in arming.prearm_failures(self, self.mode):
             self.say(mavlink.MAV_SEVERITY_CRITICAL, f"PreArm: {failure}")
 
     # The control loop.
 
     def step(self, dt: float) -> None:
         """Advance the vehicle by dt seconds. Call it with the same dt always: time is counted in steps."""
-        self._steps += 1
-        self.now = self._steps * dt
-        self.estimator.update(self.now, self.body, dt)
+        self.sense(dt)
         self._housekeeping()
         self.failsafes.update(dt)
         self._update_auto_armed()
-        demand = self.mode.step(dt)
-        self._update_motors(demand, dt)
-        self._detect_landing(demand, dt)
+        self.obey(self.mode.step(dt), dt)
         self._disarm_when_forgotten()
 
     def _housekeeping(self) -> None:
@@ -296,11 +125,6 @@ class Copter:
             self.set_mode(int(self.parameters[f"FLTMODE{position}"]))
         self._switch = position
 
-    @property
-    def home_altitude(self) -> float:
-        """Metres AMSL of home; of the start before home is set."""
-        return (self.home or self.estimator.start).altitude
-
     def _update_auto_armed(self) -> None:
         throttle = self.sticks.throttle(self.now)
         if not self.armed:
@@ -309,40 +133,6 @@ class Copter:
             self.auto_armed = True
         elif self.mode.manual_throttle and self.landed:
             self.auto_armed = False
-
-    def _update_motors(self, demand: Demand, dt: float) -> None:
-        change = dt / max(self.parameters["MOT_SPOOL_TIME"], 0.05)
-        if not self.armed:
-            self._spool = 0.0
-        elif demand.idle:
-            self._spool = max(0.0, self._spool - change)
-        elif self.motors_turn:
-            self._spool = min(1.0, self._spool + change)
-        lifting = self.armed and not self.landed and not demand.idle
-        thrust = demand.thrust if lifting else Demand().thrust
-        self.body.step(thrust, demand.yaw_rate if lifting else 0.0, dt)
-        self.battery.drain(self.throttle, dt)
-
-    @property
-    def motors_turn(self) -> bool:
-        """Whether the motors turn, if only at ground idle: armed and past the arming delay."""
-        return self.armed and self.now - self._armed_since >= ARMING_DELAY
-
-    @property
-    def hover_throttle(self) -> float:
-        """Motor output 0..1 that hovers, MOT_THST_HOVER within what AP_Motors allows."""
-        return max(0.125, min(0.6875, self.parameters["MOT_THST_HOVER"]))
-
-    @property
-    def throttle(self) -> float:
-        """Thrust as a share of the thrust that hovers; a little at ground idle, zero disarmed."""
-        if not self.armed:
-            return 0.0
-        return self.body.throttle_share if not self.landed else 0.1 * self._spool
-
-    def _detect_landing(self, demand: Demand, dt: float) -> None:
-        if not self.armed or (not self.landed and self._detector.update(self.body.on_ground, demand.thrust, dt)):
-            self.landed = True
 
     def _disarm_when_forgotten(self) -> None:
         """DISARM_DELAY: armed, on the ground, motors at idle and the throttle stick down."""

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from .aircraft import Aircraft
 from .geodesy import Location, Ned, to_ned
-
-if TYPE_CHECKING:
-    from .copter import Copter
-    from .mission import Item
+from .mission import Item
 
 AMSL_FRAMES = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
 HOME_FRAMES = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
@@ -31,23 +28,23 @@ def valid_location(latitude_e7: int, longitude_e7: int, altitude: float) -> bool
     )
 
 
-def global_target(copter: Copter, frame: int, latitude_e7: int, longitude_e7: int, altitude: float) -> Ned | None:
+def global_target(aircraft: Aircraft, frame: int, latitude_e7: int, longitude_e7: int, altitude: float) -> Ned | None:
     """NED metres from the EKF origin, or None without an origin or for a frame that is not global.
 
     altitude is metres AMSL or above home by frame; the ground is flat here, so above terrain is above home.
     """
-    origin = copter.estimator.origin
+    origin = aircraft.estimator.origin
     if origin is None or frame not in GLOBAL_FRAMES:
         return None
     if frame not in AMSL_FRAMES:
-        altitude += copter.home.altitude if copter.home is not None else origin.altitude
+        altitude += aircraft.home.altitude if aircraft.home is not None else origin.altitude
     return to_ned(origin, Location(latitude_e7 / 1e7, longitude_e7 / 1e7, altitude))
 
 
-def item_target(copter: Copter, item: Item) -> Ned:
+def item_target(aircraft: Aircraft, item: Item) -> Ned:
     """Where a mission item leads; without a latitude and longitude straight up or down from here."""
-    here = copter.estimator.location
+    here = aircraft.estimator.location
     latitude = item.x if item.x or item.y else round(here.latitude * 1e7)
     longitude = item.y if item.x or item.y else round(here.longitude * 1e7)
-    target = global_target(copter, item.frame, latitude, longitude, item.z)
-    return target if target is not None else copter.estimator.position
+    target = global_target(aircraft, item.frame, latitude, longitude, item.z)
+    return target if target is not None else aircraft.estimator.position

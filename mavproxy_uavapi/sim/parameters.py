@@ -7,15 +7,13 @@ from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from . import parameter_table, precland
+from . import parameter_table
 
 _BLOCKS = (
     (parameter_table.INT8, mavlink.MAV_PARAM_TYPE_INT8),
     (parameter_table.INT16, mavlink.MAV_PARAM_TYPE_INT16),
     (parameter_table.INT32, mavlink.MAV_PARAM_TYPE_INT32),
     (parameter_table.REAL32, mavlink.MAV_PARAM_TYPE_REAL32),
-    (precland.DEFAULTS, mavlink.MAV_PARAM_TYPE_INT8),
-    (precland.DEFAULTS_REAL, mavlink.MAV_PARAM_TYPE_REAL32),
 )
 _INTEGER_RANGE = {
     mavlink.MAV_PARAM_TYPE_INT8: (-128, 127),

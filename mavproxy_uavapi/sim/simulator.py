@@ -13,19 +13,16 @@ The same options and the same inputs at the same simulated times give the same s
 
 from __future__ import annotations
 
-import heapq
 import math
 from collections import deque
 from dataclasses import dataclass
-from itertools import count
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from . import setpoints
-from .commands import ACCEPTED, DENIED, FAILED, UNSUPPORTED, Commands, from_message
+from .commands import UNSUPPORTED, Commands, from_message
 from .copter import Copter
-from .events import Broadcast, Event, ItemReached, StatusText
 from .faults import Faults, PlannedAck
 from .link import COMPONENT, Link
 from .mission import Mission
@@ -34,12 +31,12 @@ from .options import Options
 from .parameters import Parameter, Parameters
 from .streams import RATE_PARAMETERS
 from .telemetry import Telemetry
+from .transmitter import Transmitter
 
 STEP = 0.01
 """Seconds of simulated time in one step, at any speedup."""
 PARAMETERS_PER_STEP = 20
 UNKNOWN_INDEX = 65535
-TEXT_LENGTH = 50
 REMEMBERED_MESSAGES = 20000
 FTP_NAK = 129
 FTP_UNKNOWN_COMMAND = 7
@@ -86,7 +83,7 @@ class Simulator:
             "SET_POSITION_TARGET_LOCAL_NED": self._local_setpoint,
             "SET_POSITION_TARGET_GLOBAL_INT": self._global_setpoint,
             "RC_CHANNELS_OVERRIDE": self._sticks,
-            "LANDING_TARGET": lambda _link, message: self.copter.precland.hear(message),
+            "LANDING_TARGET": lambda _link, message: self.copter.precland.hear(message, self.copter.now),
             "TIMESYNC": self._timesync,
             "FILE_TRANSFER_PROTOCOL": self._file_transfer,
         }
@@ -98,9 +95,8 @@ class Simulator:
         self.copter = Copter(self.options, self.parameters, mission, self.options.seed + self._boots - 1)
         self.telemetry = Telemetry(self.copter, self._epoch)
         self.missions = MissionProtocol(self.copter)
-        self.commands = Commands(self)
-        self._planned: list[tuple[float, int, Link, Any, tuple[int, int] | None]] = []
-        self._order = count()
+        self._transmitter = Transmitter(self.copter, self.telemetry, self.faults, self.links)
+        self.commands = Commands(self.copter, self.telemetry, self._transmitter, self.reboot_soon)
         self._reboot_wanted = False
         for link in self.links:
             link.restart()
@@ -127,26 +123,6 @@ class Simulator:
         """The peer has gone."""
         self.links.remove(link)
 
-    def send(self, link: Link, name: str) -> None:
-        """Queue a message about the present state for one link, if there is something to say."""
-        message = self.telemetry.build(name)
-        if message is not None:
-            link.send(self.faults.spoilt(message, self.copter.now))
-
-    def send_soon(self, link: Link, name: str) -> None:
-        """The same with the next step."""
-        message = self.telemetry.build(name)
-        if message is not None:
-            self._plan(self.copter.now, link, self.faults.spoilt(message, self.copter.now))
-
-    def _plan(self, at: float, link: Link, message: Any, source: tuple[int, int] | None = None) -> None:
-        heapq.heappush(self._planned, (at, next(self._order), link, message, source))
-
-    def broadcast(self, name: str) -> None:
-        """Queue a message about the present state for all links."""
-        for link in self.links:
-            self.send(link, name)
-
     # Time.
 
     def step(self) -> None:
@@ -156,13 +132,11 @@ class Simulator:
         copter.step(STEP)
         self.missions.step()
         while copter.events:
-            self._tell(copter.events.popleft())
-        while self._planned and self._planned[0][0] <= copter.now:
-            _, _, link, message, source = heapq.heappop(self._planned)
-            link.send(message, source)
+            self._transmitter.tell(copter.events.popleft())
+        self._transmitter.send_planned()
         for link in self.links:
             for name in link.streams.due(copter.now):
-                self.send(link, name)
+                self._transmitter.send(link, name)
             if link.parameter_cursor is not None:
                 self._send_parameters(link)
         if self._reboot_wanted:
@@ -173,17 +147,6 @@ class Simulator:
         """Advance by about seconds of simulated time."""
         for _ in range(round(seconds / STEP)):
             self.step()
-
-    def _tell(self, event: Event) -> None:
-        if isinstance(event, Broadcast):
-            self.broadcast(event.name)
-            return
-        for link in self.links:
-            if isinstance(event, StatusText):
-                text = event.text.encode()[:TEXT_LENGTH]
-                link.send(mavlink.MAVLink_statustext_message(event.severity, text))
-            elif isinstance(event, ItemReached):
-                link.send(mavlink.MAVLink_mission_item_reached_message(event.seq))
 
     # What comes in.
 
@@ -225,17 +188,11 @@ class Simulator:
         if planned.at <= self.copter.now:
             link.send(ack, planned.source)
         else:
-            self._plan(planned.at, link, ack, planned.source)
-
-    def set_mode(self, base_mode: int, custom_mode: int) -> int:
-        """Change the mode as MAV_CMD_DO_SET_MODE and SET_MODE ask; a MAV_RESULT."""
-        if not base_mode & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
-            return int(DENIED)
-        return int(ACCEPTED if self.copter.set_mode(custom_mode) else FAILED)
+            self._transmitter.plan(planned.at, link, ack, planned.source)
 
     def _set_mode(self, link: Link, message: Any) -> None:
         del link
-        self.set_mode(message.base_mode, message.custom_mode)
+        self.commands.set_mode(message.base_mode, message.custom_mode)
 
     def _request_stream(self, link: Link, message: Any) -> None:
         rate = message.req_message_rate if message.start_stop == 1 else 0

@@ -69,7 +69,7 @@ class SystemMessages(MessageSource):
         copter = self.copter
         battery = copter.battery
         health = SENSORS
-        if arming.prearm_failures(copter):
+        if arming.prearm_failures(copter, copter.mode):
             health &= ~mavlink.MAV_SYS_STATUS_PREARM_CHECK
         if not copter.estimator.aligned:
             health &= ~mavlink.MAV_SYS_STATUS_AHRS

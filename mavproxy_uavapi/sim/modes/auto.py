@@ -8,12 +8,13 @@ from enum import Enum, auto
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from ..demand import Demand
 from ..events import Broadcast, ItemReached
 from ..frames import item_target
 from ..geodesy import Ned
 from ..mission import CONDITION, NAVIGATION, Item, State
 from ..position_control import SPEED_KINDS, Speed
-from .base import Demand, Mode
+from .base import Mode
 from .landing import descend
 from .rtl import Rtl
 from .takeoff import Takeoff
@@ -66,34 +67,34 @@ class Auto(Mode):
     @property
     def armable(self) -> bool:  # type: ignore[override]
         """AUTO_OPTIONS bit 0 allows arming here; by default it is refused."""
-        return bool(int(self.copter.parameters["AUTO_OPTIONS"]) & 1)
+        return bool(int(self.aircraft.parameters["AUTO_OPTIONS"]) & 1)
 
     def enter(self, checked: bool) -> bool:
-        copter, mission = self.copter, self.copter.mission
+        aircraft, mission = self.aircraft, self.aircraft.mission
         if checked and not mission.present:
             return False
-        if copter.armed and copter.landed and not mission.starts_with_takeoff:
-            copter.say(mavlink.MAV_SEVERITY_CRITICAL, "Auto: Missing Takeoff Cmd")
+        if aircraft.armed and aircraft.landed and not mission.starts_with_takeoff:
+            aircraft.say(mavlink.MAV_SEVERITY_CRITICAL, "Auto: Missing Takeoff Cmd")
             return False
-        copter.position.limits = copter.default_limits()
-        self.takeoff = Takeoff(copter)
-        self.rtl = Rtl(copter)
+        aircraft.position.limits = aircraft.default_limits()
+        self.takeoff = Takeoff(aircraft)
+        self.rtl = Rtl(aircraft)
         self._alongside: deque[tuple[int, Item]] = deque()
         self._condition_since = 0.0
         self.submode, self.paused, self.waiting_to_start = Submode.HOLD, False, True
         return True
 
     def leave(self) -> None:
-        if self.copter.mission.state is State.RUNNING:
-            self.copter.mission.state = State.STOPPED
+        if self.aircraft.mission.state is State.RUNNING:
+            self.aircraft.mission.state = State.STOPPED
 
     def step(self, dt: float) -> Demand:
-        copter = self.copter
-        if not copter.armed:
+        aircraft = self.aircraft
+        if not aircraft.armed:
             return self.wait_on_ground()
         if self.waiting_to_start:
             self.start_or_resume()
-        elif copter.mission.state is State.RUNNING:
+        elif aircraft.mission.state is State.RUNNING:
             self._watch_for_changes()
             self._update()
         if self.submode is Submode.TAKEOFF:
@@ -102,13 +103,13 @@ class Auto(Mode):
             return descend(self, dt)
         if self.submode is Submode.RTL:
             return self.rtl.step(dt)
-        if copter.grounded:
+        if aircraft.grounded:
             return self.wait_on_ground()
         self._fly_leg(dt)
         return self.fly(dt)
 
     def _fly_leg(self, dt: float) -> None:
-        control = self.copter.position
+        control = self.aircraft.position
         if self.paused or self.submode is Submode.HOLD:
             control.fly_at(0.0, 0.0, dt)
             control.climb_at(0.0, dt)
@@ -117,30 +118,30 @@ class Auto(Mode):
 
     def start_or_resume(self) -> None:
         """Begin at the first item, or where the mission was left (MIS_RESTART 0)."""
-        copter, mission = self.copter, self.copter.mission
+        aircraft, mission = self.aircraft, self.aircraft.mission
         self.waiting_to_start = False
         self._seen_changes = mission.changes
-        if mission.state is not State.STOPPED or copter.parameters["MIS_RESTART"] == 1:
+        if mission.state is not State.STOPPED or aircraft.parameters["MIS_RESTART"] == 1:
             mission.reset()
         mission.state = State.RUNNING
         self._run_from(max(mission.current, 1))
 
     def jump_to(self, seq: int) -> None:
         """The ground chose another current item while the mission runs."""
-        self.copter.mission.state = State.RUNNING
+        self.aircraft.mission.state = State.RUNNING
         self._run_from(max(seq, 1))
 
     def _watch_for_changes(self) -> None:
-        if self.copter.mission.changes == self._seen_changes:
+        if self.aircraft.mission.changes == self._seen_changes:
             return
-        self._seen_changes = self.copter.mission.changes
+        self._seen_changes = self.aircraft.mission.changes
         if self.submode is Submode.WAYPOINT:
-            self.copter.say(mavlink.MAV_SEVERITY_CRITICAL, "Auto mission changed, restarted command")
-            self._run_from(max(self.copter.mission.current, 1))
+            self.aircraft.say(mavlink.MAV_SEVERITY_CRITICAL, "Auto mission changed, restarted command")
+            self._run_from(max(self.aircraft.mission.current, 1))
 
     def _run_from(self, seq: int) -> None:
         """Do immediate items from seq on and begin the first navigation item there."""
-        mission = self.copter.mission
+        mission = self.aircraft.mission
         self._alongside.clear()
         for _ in range(LONGEST_CHAIN):
             if seq >= len(mission.items):
@@ -163,28 +164,28 @@ class Auto(Mode):
         self._complete()
 
     def _jump(self, seq: int, item: Item) -> int:
-        left = self.copter.mission.jumps_left.setdefault(seq, int(item.param2))
+        left = self.aircraft.mission.jumps_left.setdefault(seq, int(item.param2))
         if left == 0:
             return seq + 1
         if left > 0:
-            self.copter.mission.jumps_left[seq] = left - 1
+            self.aircraft.mission.jumps_left[seq] = left - 1
         return int(item.param1)
 
     def _announce(self, seq: int, item: Item) -> None:
         name = NAMES.get(item.command, f"Cmd {item.command}")
-        self.copter.say(mavlink.MAV_SEVERITY_INFO, f"Mission: {seq} {name}")
+        self.aircraft.say(mavlink.MAV_SEVERITY_INFO, f"Mission: {seq} {name}")
 
     def _begin(self, seq: int, item: Item) -> None:
-        copter = self.copter
-        copter.mission.current = seq
+        aircraft = self.aircraft
+        aircraft.mission.current = seq
         self._announce(seq, item)
-        copter.tell(Broadcast("MISSION_CURRENT"))
-        self._arrived_at, self._started_at = None, copter.now
+        aircraft.tell(Broadcast("MISSION_CURRENT"))
+        self._arrived_at, self._started_at = None, aircraft.now
         if item.command == mavlink.MAV_CMD_NAV_TAKEOFF:
             self.submode = Submode.TAKEOFF
-            lowest = copter.altitude + (1.0 if copter.landed else 0.0)
-            altitude = max(copter.home_offset.down - item_target(copter, item).down, lowest)
-            self.takeoff.start(copter.home_offset.down - altitude)
+            lowest = aircraft.altitude + (1.0 if aircraft.landed else 0.0)
+            altitude = max(aircraft.home_offset.down - item_target(aircraft, item).down, lowest)
+            self.takeoff.start(aircraft.home_offset.down - altitude)
         elif item.command == mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH:
             self.submode = Submode.RTL
             self.rtl.enter(checked=True)
@@ -196,73 +197,73 @@ class Auto(Mode):
             self._begin_leg(item)
 
     def _begin_leg(self, item: Item) -> None:
-        copter = self.copter
+        aircraft = self.aircraft
         self.submode = Submode.WAYPOINT
-        target = item_target(copter, item)
+        target = item_target(aircraft, item)
         if item.command == mavlink.MAV_CMD_NAV_LAND:
             # The way to a landing place is flown at the present altitude.
-            target = Ned(target.north, target.east, copter.estimator.position.down)
+            target = Ned(target.north, target.east, aircraft.estimator.position.down)
         self._target = target
-        if copter.yaw.roi is None:
-            copter.yaw.by_parameter(int(copter.parameters["WP_YAW_BEHAVIOR"]), returning=False)
+        if aircraft.yaw.roi is None:
+            aircraft.yaw.by_parameter(int(aircraft.parameters["WP_YAW_BEHAVIOR"]), returning=False)
 
     def _begin_descent(self) -> None:
         self.submode = Submode.LAND
-        self.copter.yaw.hold()
+        self.aircraft.yaw.hold()
 
     def _update(self) -> None:
         """Is the current item done, is a condition fulfilled?"""
-        copter, mission = self.copter, self.copter.mission
+        aircraft, mission = self.aircraft, self.aircraft.mission
         self._run_alongside()
         item = mission.items[mission.current]
         if not self._done(item) or mission.state is not State.RUNNING:
             return
-        copter.tell(ItemReached(mission.current))
+        aircraft.tell(ItemReached(mission.current))
         self._run_from(mission.current + 1)
 
     def _done(self, item: Item) -> bool:
-        copter = self.copter
+        aircraft = self.aircraft
         if item.command == mavlink.MAV_CMD_NAV_TAKEOFF:
             return self.takeoff.complete
         if item.command == mavlink.MAV_CMD_NAV_DELAY:
-            return copter.now - self._started_at >= item.param1
+            return aircraft.now - self._started_at >= item.param1
         if item.command == mavlink.MAV_CMD_NAV_LAND:
-            if self.submode is Submode.WAYPOINT and copter.arrived(self._target):
+            if self.submode is Submode.WAYPOINT and aircraft.arrived(self._target):
                 self._begin_descent()
-            return self.submode is Submode.LAND and not copter.armed
+            return self.submode is Submode.LAND and not aircraft.armed
         if item.command == mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH:
-            return self.rtl.landing and not copter.armed
+            return self.rtl.landing and not aircraft.armed
         if item.command == mavlink.MAV_CMD_NAV_LOITER_UNLIM or self.paused:
             return False
         return self._waited_at(item)
 
     def _waited_at(self, item: Item) -> bool:
         """Waypoints: within WPNAV_RADIUS when flown through, at a stop when there is something to wait for."""
-        copter = self.copter
+        aircraft = self.aircraft
         if self._arrived_at is None:
-            radius = copter.parameters["WPNAV_RADIUS"] / 100
-            position = copter.estimator.position
+            radius = aircraft.parameters["WPNAV_RADIUS"] / 100
+            position = aircraft.estimator.position
             near = math.dist(position, self._target) <= radius
-            if not (near and self._flown_through(item)) and not copter.arrived(self._target):
+            if not (near and self._flown_through(item)) and not aircraft.arrived(self._target):
                 return False
-            self._arrived_at = copter.now
-        if copter.now - self._arrived_at < item.param1:
+            self._arrived_at = aircraft.now
+        if aircraft.now - self._arrived_at < item.param1:
             return False
-        copter.say(mavlink.MAV_SEVERITY_INFO, f"Reached command #{copter.mission.current}")
+        aircraft.say(mavlink.MAV_SEVERITY_INFO, f"Reached command #{aircraft.mission.current}")
         return True
 
     def _flown_through(self, item: Item) -> bool:
         """A waypoint without a delay before another waypoint need not be stopped at."""
-        items, following = self.copter.mission.items, self.copter.mission.current + 1
+        items, following = self.aircraft.mission.items, self.aircraft.mission.current + 1
         waypoints = (mavlink.MAV_CMD_NAV_WAYPOINT, mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT)
         if item.command not in waypoints or item.param1 > 0 or following >= len(items):
             return False
         return items[following].command in waypoints
 
     def _start_condition(self, item: Item) -> None:
-        self._condition_since = self.copter.now
+        self._condition_since = self.aircraft.now
         if item.command == mavlink.MAV_CMD_CONDITION_YAW:
-            self.copter.fix_yaw(item.param1, item.param2, int(item.param3), item.param4 > 0)
+            self.aircraft.fix_yaw(item.param1, item.param2, int(item.param3), item.param4 > 0)
 
     def _run_alongside(self) -> None:
         while self._alongside:
@@ -277,43 +278,44 @@ class Auto(Mode):
                 self._start_condition(self._alongside[0][1])
 
     def _fulfilled(self, item: Item) -> bool:
-        copter = self.copter
+        aircraft = self.aircraft
         if item.command == mavlink.MAV_CMD_CONDITION_DELAY:
-            return copter.now - self._condition_since >= item.param1
+            return aircraft.now - self._condition_since >= item.param1
         if item.command == mavlink.MAV_CMD_CONDITION_DISTANCE:
-            position = copter.estimator.position
+            position = aircraft.estimator.position
             return math.dist(position[:2], self._target[:2]) <= item.param1
-        return copter.yaw.reached(copter.body.yaw)
+        return aircraft.yaw.reached(aircraft.body.yaw)
 
     def _do(self, seq: int, item: Item) -> None:
-        copter = self.copter
+        aircraft = self.aircraft
         self._announce(seq, item)
         if item.command == mavlink.MAV_CMD_DO_CHANGE_SPEED and item.param2 > 0:
             self.set_speed(SPEED_KINDS.get(int(item.param1), Speed.HORIZONTAL), item.param2)
         elif item.command == mavlink.MAV_CMD_DO_SET_SERVO:
-            copter.set_servo(int(item.param1), int(item.param2))
+            aircraft.set_servo(int(item.param1), int(item.param2))
         elif item.command == mavlink.MAV_CMD_DO_SET_HOME:
-            copter.set_home_here(lock=True)
+            aircraft.set_home_here(lock=True)
         elif item.command in (mavlink.MAV_CMD_DO_SET_ROI, mavlink.MAV_CMD_DO_SET_ROI_LOCATION) and (item.x or item.y):
-            target = item_target(copter, item)
-            copter.yaw.look_at(target.north, target.east)
+            target = item_target(aircraft, item)
+            aircraft.yaw.look_at(target.north, target.east)
         elif item.command in (mavlink.MAV_CMD_DO_SET_ROI_NONE, mavlink.MAV_CMD_DO_SET_ROI):
-            copter.yaw.roi = None
+            aircraft.yaw.roi = None
 
     def _complete(self) -> None:
         """Nothing left: hold the position in the air, disarm on the ground."""
-        copter = self.copter
-        copter.mission.state = State.COMPLETE
+        aircraft = self.aircraft
+        aircraft.mission.state = State.COMPLETE
         self.submode = Submode.HOLD
-        if copter.landed:
-            copter.disarm_landed()
+        if aircraft.landed:
+            aircraft.disarm_landed()
 
     def set_speed(self, kind: Speed, speed: float) -> bool:
-        self.copter.change_limit(kind, speed)
+        self.aircraft.change_limit(kind, speed)
         return True
 
     def pause(self) -> bool:
-        if self.submode is not Submode.WAYPOINT or self._arrived_at is not None or self.copter.arrived(self._target):
+        on_the_way = self.submode is Submode.WAYPOINT and self._arrived_at is None
+        if not on_the_way or self.aircraft.arrived(self._target):
             return False
         self.paused = True
         return True

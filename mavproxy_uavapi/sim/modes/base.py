@@ -2,33 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
+from ..aircraft import Aircraft
+from ..demand import IDLE, Demand
 from ..geodesy import Ned
-from ..physics import GRAVITY
 from ..position_control import Speed
-
-if TYPE_CHECKING:
-    from ..copter import Copter
-
-NO_LIFT = Ned(0.0, 0.0, GRAVITY)
-
-
-@dataclass(frozen=True)
-class Demand:
-    """What a mode asks of the airframe.
-
-    thrust is m/s/s beyond weight, yaw_rate rad/s; idle lets the motors spool down to ground idle.
-    """
-
-    thrust: Ned = NO_LIFT
-    yaw_rate: float = 0.0
-    idle: bool = False
-
-
-IDLE = Demand(idle=True)
-SPOOLING = Demand()
 
 
 class Mode:
@@ -42,8 +21,8 @@ class Mode:
     positions: ClassVar[bool] = True
     """Whether the horizontal position is under the controller, which base_mode's guided bit tells."""
 
-    def __init__(self, copter: Copter) -> None:
-        self.copter = copter
+    def __init__(self, aircraft: Aircraft) -> None:
+        self.aircraft = aircraft
 
     def enter(self, checked: bool) -> bool:
         """Prepare to fly; False refuses the mode ("init failed"). checked is False while disarmed."""
@@ -91,22 +70,22 @@ class Mode:
 
     def hold_still(self, dt: float) -> Demand:
         """Brake to a stop and stay there, without turning."""
-        control, estimate = self.copter.position, self.copter.estimator
+        control, estimate = self.aircraft.position, self.aircraft.estimator
         control.fly_at(0.0, 0.0, dt)
         control.climb_at(0.0, dt)
         return Demand(control.thrust(estimate.position, estimate.velocity, dt))
 
     def fly(self, dt: float) -> Demand:
         """Follow the position controller's trajectory and the automatic yaw."""
-        copter = self.copter
-        control, estimate = copter.position, copter.estimator
+        aircraft = self.aircraft
+        control, estimate = aircraft.position, aircraft.estimator
         course = (control.velocity[0], control.velocity[1])
-        rate = copter.yaw.rate(
-            copter.body.yaw, course, control.limits.speed, (estimate.position.north, estimate.position.east), dt
+        rate = aircraft.yaw.rate(
+            aircraft.body.yaw, course, control.limits.speed, (estimate.position.north, estimate.position.east), dt
         )
         return Demand(control.thrust(estimate.position, estimate.velocity, dt), rate)
 
     def wait_on_ground(self) -> Demand:
         """Motors at ground idle, targets where the vehicle stands."""
-        self.copter.relax()
+        self.aircraft.relax()
         return IDLE

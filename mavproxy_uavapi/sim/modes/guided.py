@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from enum import Enum, auto
 
+from ..demand import Demand
 from ..geodesy import Ned
 from ..position_control import Speed
-from .base import Demand, Mode
+from .base import Mode
 from .takeoff import Takeoff
 
 ZERO = Ned(0.0, 0.0, 0.0)
@@ -49,7 +50,7 @@ class Guided(Mode):
 
     def enter(self, checked: bool) -> bool:
         del checked
-        self.takeoff = Takeoff(self.copter)
+        self.takeoff = Takeoff(self.aircraft)
         self.stop()
         return True
 
@@ -62,16 +63,16 @@ class Guided(Mode):
     def _start(self, submode: Submode) -> None:
         """Change the submode. Limits go back to the parameters: DO_CHANGE_SPEED does not outlive it."""
         self.submode = submode
-        self.copter.position.limits = self.copter.default_limits()
-        self.copter.yaw.by_parameter(int(self.copter.parameters["WP_YAW_BEHAVIOR"]), returning=False)
+        self.aircraft.position.limits = self.aircraft.default_limits()
+        self.aircraft.yaw.by_parameter(int(self.aircraft.parameters["WP_YAW_BEHAVIOR"]), returning=False)
 
     def _accept(self, submode: Submode, yaw: YawSetpoint) -> None:
         if self.submode is not submode:
             self._start(submode)
-        copter = self.copter
-        behaviour = int(copter.parameters["WP_YAW_BEHAVIOR"])
-        copter.yaw.setpoint(yaw.angle, yaw.rate, yaw.relative, behaviour, copter.body.yaw)
-        self._updated = copter.now
+        aircraft = self.aircraft
+        behaviour = int(aircraft.parameters["WP_YAW_BEHAVIOR"])
+        aircraft.yaw.setpoint(yaw.angle, yaw.rate, yaw.relative, behaviour, aircraft.body.yaw)
+        self._updated = aircraft.now
 
     def go_to(self, target: Ned, yaw: YawSetpoint = NO_YAW) -> None:
         """Fly to target and hold there."""
@@ -95,23 +96,23 @@ class Guided(Mode):
         self.position_target, self.velocity_target, self.acceleration_target = ZERO, ZERO, acceleration
 
     def take_off(self, altitude: float) -> bool:
-        copter = self.copter
-        if altitude <= copter.altitude:
+        aircraft = self.aircraft
+        if altitude <= aircraft.altitude:
             return False
         self.submode = Submode.TAKEOFF
-        self.takeoff.start(copter.home_offset.down - altitude)
-        copter.auto_armed = True
+        self.takeoff.start(aircraft.home_offset.down - altitude)
+        aircraft.auto_armed = True
         return True
 
     def step(self, dt: float) -> Demand:
-        copter = self.copter
+        aircraft = self.aircraft
         if self.submode is Submode.TAKEOFF and not self.paused:
             return self.takeoff.step(self, dt)
-        if copter.grounded:
+        if aircraft.grounded:
             return self.wait_on_ground()
         if self.paused:
             return self.hold_still(dt)
-        expired = copter.now - self._updated > max(copter.parameters["GUID_TIMEOUT"], SHORTEST_TIMEOUT)
+        expired = aircraft.now - self._updated > max(aircraft.parameters["GUID_TIMEOUT"], SHORTEST_TIMEOUT)
         if expired:
             self._expire()
         self._move(expired, dt)
@@ -119,11 +120,11 @@ class Guided(Mode):
 
     def _expire(self) -> None:
         """Nobody has renewed the setpoint: stop moving and turning. A position stays the target."""
-        self.copter.yaw.stop_turning()
+        self.aircraft.yaw.stop_turning()
         self.velocity_target = self.acceleration_target = ZERO
 
     def _move(self, expired: bool, dt: float) -> None:
-        control = self.copter.position
+        control = self.aircraft.position
         if self.submode is Submode.POSITION:
             control.go_to(self.position_target, dt)
         elif self.submode is Submode.TRACKING:
@@ -139,10 +140,10 @@ class Guided(Mode):
 
     def set_speed(self, kind: Speed, speed: float) -> bool:
         """As in ArduCopter a new speed up brings back the default speed down, and the other way round."""
-        limits, default = self.copter.position.limits, self.copter.default_limits()
+        limits, default = self.aircraft.position.limits, self.aircraft.default_limits()
         if kind is not Speed.HORIZONTAL:
             limits.speed_up, limits.speed_down = default.speed_up, default.speed_down
-        self.copter.change_limit(kind, speed)
+        self.aircraft.change_limit(kind, speed)
         return True
 
     def pause(self) -> bool:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from .. import shaping
-from .base import Demand, Mode
+from ..demand import Demand
+from .base import Mode
 
 
 def descend(mode: Mode, dt: float) -> Demand:
@@ -11,28 +12,29 @@ def descend(mode: Mode, dt: float) -> Demand:
 
     Down at LAND_SPEED_HIGH (or WPNAV_SPEED_DN) until LAND_ALT_LOW above home, slowing to LAND_SPEED.
     """
-    copter = mode.copter
-    if copter.armed and copter.landed and copter.spooled_down:
-        copter.disarm_landed()
-    if copter.grounded:
+    aircraft = mode.aircraft
+    if aircraft.armed and aircraft.landed and aircraft.spooled_down:
+        aircraft.disarm_landed()
+    if aircraft.grounded:
         return mode.wait_on_ground()
-    parameters, control = copter.parameters, copter.position
+    parameters, control = aircraft.parameters, aircraft.position
     slow = abs(parameters["LAND_SPEED"]) / 100
     fast = max(parameters["LAND_SPEED_HIGH"] / 100 or control.limits.speed_down, slow)
     control.limits.speed_down = max(control.limits.speed_down, fast)
-    above = copter.altitude - max(parameters["LAND_ALT_LOW"], 100) / 100
+    above = aircraft.altitude - max(parameters["LAND_ALT_LOW"], 100) / 100
     speed = slow
     if above > 0:
         planned = shaping.square_root_speed(above, shaping.POSITION_GAIN, control.limits.acceleration_z)
         speed = max(slow, min(fast, planned))
-    if copter.maybe_landed:
-        control.follow_horizontally(copter.estimator.position, copter.estimator.velocity)
-    target = copter.precland.target
-    if target is None or copter.maybe_landed:
+    if aircraft.maybe_landed:
+        control.follow_horizontally(aircraft.estimator.position, aircraft.estimator.velocity)
+    target = aircraft.precland.target(aircraft.now)
+    if target is None or aircraft.maybe_landed:
         control.fly_at(0.0, 0.0, dt)
     else:
         control.go_to(target, dt)
-    control.climb_at(0.0 if copter.precland.must_hover else speed, dt)
+    hover = aircraft.precland.must_hover(aircraft.now, aircraft.altitude)
+    control.climb_at(0.0 if hover else speed, dt)
     return mode.fly(dt)
 
 
@@ -46,8 +48,8 @@ class Land(Mode):
 
     def enter(self, checked: bool) -> bool:
         del checked
-        self.copter.position.limits = self.copter.default_limits()
-        self.copter.yaw.hold()
+        self.aircraft.position.limits = self.aircraft.default_limits()
+        self.aircraft.yaw.hold()
         return True
 
     def step(self, dt: float) -> Demand:

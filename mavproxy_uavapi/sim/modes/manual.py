@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
+from ..demand import Demand
 from ..geodesy import Ned, rotate_to_ne
 from ..physics import GRAVITY
-from .base import Demand, Mode
+from .base import Mode
 
 BRAKE_DECELERATION = 7.5
 """m/s/s, BRAKE_MODE_DECEL_RATE."""
@@ -17,20 +18,21 @@ class PilotMode(Mode):
 
     def _lean(self) -> tuple[float, float]:
         """Horizontal acceleration north, east (m/s/s) that the roll and pitch sticks ask for."""
-        copter = self.copter
-        longest = GRAVITY * math.tan(copter.position.limits.lean)
-        forward = -copter.sticks.axis(2, copter.now) * longest
-        right = copter.sticks.axis(1, copter.now) * longest
-        return rotate_to_ne(forward, right, copter.body.yaw)
+        aircraft = self.aircraft
+        longest = GRAVITY * math.tan(aircraft.position.limits.lean)
+        forward = -aircraft.sticks.axis(2, aircraft.now) * longest
+        right = aircraft.sticks.axis(1, aircraft.now) * longest
+        return rotate_to_ne(forward, right, aircraft.body.yaw)
 
     def _yaw_rate(self) -> float:
-        return self.copter.sticks.axis(4, self.copter.now) * math.radians(self.copter.parameters["PILOT_Y_RATE"])
+        aircraft = self.aircraft
+        return aircraft.sticks.axis(4, aircraft.now) * math.radians(aircraft.parameters["PILOT_Y_RATE"])
 
     def _climb_rate(self) -> float:
         """Metres per second upwards; the middle of the throttle stick (THR_DZ wide) holds the altitude."""
-        copter = self.copter
-        offset = copter.sticks.throttle(copter.now) - 0.5
-        deadzone = max(0.0, min(0.3, copter.parameters["THR_DZ"] / 1000))
+        aircraft = self.aircraft
+        offset = aircraft.sticks.throttle(aircraft.now) - 0.5
+        deadzone = max(0.0, min(0.3, aircraft.parameters["THR_DZ"] / 1000))
         if abs(offset) <= deadzone:
             return 0.0
         up, down = self._pilot_speeds()
@@ -39,25 +41,25 @@ class PilotMode(Mode):
 
     def _pilot_speeds(self) -> tuple[float, float]:
         """Fastest climb and descent, m/s; PILOT_SPEED_DN 0 means the same as up."""
-        parameters = self.copter.parameters
+        parameters = self.aircraft.parameters
         up = max(parameters["PILOT_SPEED_UP"], 10) / 100
         return up, max(parameters["PILOT_SPEED_DN"], 0) / 100 or up
 
     def _apply_pilot_limits(self) -> None:
-        copter = self.copter
-        limits = copter.default_limits()
+        aircraft = self.aircraft
+        limits = aircraft.default_limits()
         limits.speed_up, limits.speed_down = self._pilot_speeds()
-        limits.acceleration_z = max(copter.parameters["PILOT_ACCEL_Z"], 10) / 100
-        copter.position.limits = limits
+        limits.acceleration_z = max(aircraft.parameters["PILOT_ACCEL_Z"], 10) / 100
+        aircraft.position.limits = limits
 
     def _still_on_ground(self) -> bool:
         """Whether to stay at idle; a raised throttle stick lifts the vehicle off."""
-        copter = self.copter
-        if not copter.armed:
+        aircraft = self.aircraft
+        if not aircraft.armed:
             return True
-        if copter.landed and self._climb_rate() > 0 and copter.spooled_up:
-            copter.lift_off()
-        return copter.landed
+        if aircraft.landed and self._climb_rate() > 0 and aircraft.spooled_up:
+            aircraft.lift_off()
+        return aircraft.landed
 
 
 class Stabilize(PilotMode):
@@ -71,21 +73,21 @@ class Stabilize(PilotMode):
 
     def enter(self, checked: bool) -> bool:
         del checked
-        self.copter.position.limits = self.copter.default_limits()
+        self.aircraft.position.limits = self.aircraft.default_limits()
         return True
 
     def step(self, dt: float) -> Demand:
         del dt
-        copter = self.copter
-        throttle = copter.sticks.throttle(copter.now)
-        if not copter.armed or (copter.landed and throttle == 0):
+        aircraft = self.aircraft
+        throttle = aircraft.sticks.throttle(aircraft.now)
+        if not aircraft.armed or (aircraft.landed and throttle == 0):
             return self.wait_on_ground()
-        copter.relax()
-        hover = copter.hover_throttle
+        aircraft.relax()
+        hover = aircraft.hover_throttle
         # Half stick hovers: below it thrust is linear to nothing, above it linear to full.
         share = throttle / 0.5 if throttle <= 0.5 else 1 + (throttle - 0.5) / 0.5 * (1 / hover - 1)
-        if copter.landed and copter.spooled_up and share > 0.9:
-            copter.lift_off()
+        if aircraft.landed and aircraft.spooled_up and share > 0.9:
+            aircraft.lift_off()
         north, east = self._lean()
         return Demand(Ned(north, east, GRAVITY * (1 - share)), self._yaw_rate())
 
@@ -104,10 +106,10 @@ class AltHold(PilotMode):
         return True
 
     def step(self, dt: float) -> Demand:
-        copter = self.copter
+        aircraft = self.aircraft
         if self._still_on_ground():
             return self._wait()
-        control, estimate = copter.position, copter.estimator
+        control, estimate = aircraft.position, aircraft.estimator
         control.follow_horizontally(estimate.position, estimate.velocity)
         control.climb_at(-self._climb_rate(), dt)
         north, east = self._lean()
@@ -127,14 +129,14 @@ class Loiter(AltHold):
     positions = True
 
     def step(self, dt: float) -> Demand:
-        copter = self.copter
+        aircraft = self.aircraft
         if self._still_on_ground():
             return self._wait()
-        control = copter.position
-        speed = max(copter.parameters["LOIT_SPEED"], 20) / 100
+        control = aircraft.position
+        speed = max(aircraft.parameters["LOIT_SPEED"], 20) / 100
         control.limits.speed = speed
-        forward, right = -copter.sticks.axis(2, copter.now) * speed, copter.sticks.axis(1, copter.now) * speed
-        control.fly_at(*rotate_to_ne(forward, right, copter.body.yaw), dt)
+        forward, right = -aircraft.sticks.axis(2, aircraft.now) * speed, aircraft.sticks.axis(1, aircraft.now) * speed
+        control.fly_at(*rotate_to_ne(forward, right, aircraft.body.yaw), dt)
         control.climb_at(-self._climb_rate(), dt)
         return Demand(self.fly(dt).thrust, self._yaw_rate())
 
@@ -148,15 +150,15 @@ class Brake(Mode):
 
     def enter(self, checked: bool) -> bool:
         del checked
-        limits = self.copter.default_limits()
+        limits = self.aircraft.default_limits()
         limits.acceleration = BRAKE_DECELERATION
-        limits.speed = max(limits.speed, math.hypot(*self.copter.position.velocity[:2]))
-        self.copter.position.limits = limits
+        limits.speed = max(limits.speed, math.hypot(*self.aircraft.position.velocity[:2]))
+        self.aircraft.position.limits = limits
         # Braking begins now, not after a started acceleration has run out.
-        self.copter.position.acceleration[:2] = [0.0, 0.0]
+        self.aircraft.position.acceleration[:2] = [0.0, 0.0]
         return True
 
     def step(self, dt: float) -> Demand:
-        if self.copter.grounded:
+        if self.aircraft.grounded:
             return self.wait_on_ground()
         return self.hold_still(dt)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from enum import Enum, auto
 
+from ..demand import Demand
 from ..geodesy import Ned, wrap_pi
 from ..position_control import Speed
 from ..yaw_control import YawMode
-from .base import Demand, Mode
+from .base import Mode
 from .landing import descend
 
 MINIMUM_ALTITUDE = 0.3
@@ -40,23 +41,23 @@ class Rtl(Mode):
     _arrived_at = 0.0
 
     def enter(self, checked: bool) -> bool:
-        if checked and self.copter.home is None:
+        if checked and self.aircraft.home is None:
             return False
-        limits = self.copter.default_limits()
-        limits.speed = max(self.copter.parameters["RTL_SPEED"], 0) / 100 or limits.speed
-        self.copter.position.limits = limits
+        limits = self.aircraft.default_limits()
+        limits.speed = max(self.aircraft.parameters["RTL_SPEED"], 0) / 100 or limits.speed
+        self.aircraft.position.limits = limits
         self.stage, self._planned = Stage.CLIMB, False
         return True
 
     def step(self, dt: float) -> Demand:
-        copter = self.copter
-        if not copter.armed:
+        aircraft = self.aircraft
+        if not aircraft.armed:
             return self.wait_on_ground()
         if not self._planned:
             self._plan()
         if self.stage is Stage.LAND:
             return descend(self, dt)
-        if copter.grounded:
+        if aircraft.grounded:
             return self.wait_on_ground()
         demand = self._fly_stage(dt)
         self._advance()
@@ -64,57 +65,57 @@ class Rtl(Mode):
 
     def _fly_stage(self, dt: float) -> Demand:
         if self.stage is Stage.DESCENT:
-            self.copter.position.fly_at(0.0, 0.0, dt)
-            self.copter.position.go_to_altitude(self._target.down, dt)
+            self.aircraft.position.fly_at(0.0, 0.0, dt)
+            self.aircraft.position.go_to_altitude(self._target.down, dt)
         else:
-            self.copter.position.go_to(self._target, dt)
+            self.aircraft.position.go_to(self._target, dt)
         return self.fly(dt)
 
     def _plan(self) -> None:
         """Fix the return altitude now, as ArduCopter does on its first step."""
-        copter = self.copter
-        start = copter.position.stopping_point
-        home = copter.home_offset
+        aircraft = self.aircraft
+        start = aircraft.position.stopping_point
+        home = aircraft.home_offset
         distance = math.hypot(home.north - start.north, home.east - start.east)
-        altitude = copter.altitude
-        lowest = max(MINIMUM_ALTITUDE, altitude + max(0.0, copter.parameters["RTL_CLIMB_MIN"] / 100))
-        wanted = max(copter.parameters["RTL_ALT"] / 100, lowest)
-        slope = copter.parameters["RTL_CONE_SLOPE"]
+        altitude = aircraft.altitude
+        lowest = max(MINIMUM_ALTITUDE, altitude + max(0.0, aircraft.parameters["RTL_CLIMB_MIN"] / 100))
+        wanted = max(aircraft.parameters["RTL_ALT"] / 100, lowest)
+        slope = aircraft.parameters["RTL_CONE_SLOPE"]
         if slope >= MINIMUM_CONE_SLOPE:
             wanted = min(wanted, max(distance * slope, lowest))
         self._return_down = home.down - max(wanted, altitude)
         self._target = Ned(start.north, start.east, self._return_down)
         self._planned = True
-        copter.yaw.hold()
+        aircraft.yaw.hold()
 
     def _advance(self) -> None:
-        copter = self.copter
-        if self.stage is Stage.CLIMB and copter.arrived(self._target):
+        aircraft = self.aircraft
+        if self.stage is Stage.CLIMB and aircraft.arrived(self._target):
             self.stage = Stage.RETURN
-            home = copter.home_offset
+            home = aircraft.home_offset
             self._target = Ned(home.north, home.east, self._return_down)
-            copter.yaw.by_parameter(int(copter.parameters["WP_YAW_BEHAVIOR"]), returning=True)
-        elif self.stage is Stage.RETURN and copter.arrived(self._target):
+            aircraft.yaw.by_parameter(int(aircraft.parameters["WP_YAW_BEHAVIOR"]), returning=True)
+        elif self.stage is Stage.RETURN and aircraft.arrived(self._target):
             self.stage = Stage.LOITER
-            self._arrived_at = copter.now
-            if copter.yaw.mode is not YawMode.HOLD:
-                copter.yaw.to_armed_yaw()
+            self._arrived_at = aircraft.now
+            if aircraft.yaw.mode is not YawMode.HOLD:
+                aircraft.yaw.to_armed_yaw()
         elif self.stage is Stage.LOITER and self._waited():
-            final = copter.parameters["RTL_ALT_FINAL"] / 100
+            final = aircraft.parameters["RTL_ALT_FINAL"] / 100
             self.stage = Stage.LAND if final <= 0 else Stage.DESCENT
-            self._target = Ned(self._target.north, self._target.east, copter.home_offset.down - final)
-            copter.yaw.hold()
+            self._target = Ned(self._target.north, self._target.east, aircraft.home_offset.down - final)
+            aircraft.yaw.hold()
 
     def _waited(self) -> bool:
-        copter = self.copter
-        if copter.now - self._arrived_at < copter.parameters["RTL_LOIT_TIME"] / 1000:
+        aircraft = self.aircraft
+        if aircraft.now - self._arrived_at < aircraft.parameters["RTL_LOIT_TIME"] / 1000:
             return False
-        if copter.yaw.mode is not YawMode.ARMED:
+        if aircraft.yaw.mode is not YawMode.ARMED:
             return True
-        return abs(wrap_pi(copter.body.yaw - copter.yaw.armed_yaw)) <= math.radians(2)
+        return abs(wrap_pi(aircraft.body.yaw - aircraft.yaw.armed_yaw)) <= math.radians(2)
 
     def set_speed(self, kind: Speed, speed: float) -> bool:
-        self.copter.change_limit(kind, speed)
+        self.aircraft.change_limit(kind, speed)
         return True
 
     @property

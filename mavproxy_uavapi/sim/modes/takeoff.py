@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from .base import IDLE, SPOOLING, Demand, Mode
-
-if TYPE_CHECKING:
-    from ..copter import Copter
+from ..aircraft import Aircraft
+from ..demand import IDLE, SPOOLING, Demand
+from .base import Mode
 
 DONE_SPEED_SHARE = 0.1
 """A takeoff is complete below this share of the climb speed limit, as in ArduCopter."""
@@ -16,8 +13,8 @@ DONE_SPEED_SHARE = 0.1
 class Takeoff:
     """Spools up, raises the throttle until the vehicle lifts, climbs straight up to the altitude."""
 
-    def __init__(self, copter: Copter) -> None:
-        self.copter = copter
+    def __init__(self, aircraft: Aircraft) -> None:
+        self.aircraft = aircraft
         self.target_down = 0.0
         self.complete = False
         self._throttle = 0.0
@@ -27,31 +24,31 @@ class Takeoff:
         self.target_down = target_down
         self.complete = False
         self._throttle = 0.0
-        self.copter.yaw.hold()
+        self.aircraft.yaw.hold()
 
     def step(self, mode: Mode, dt: float) -> Demand:
         """One control step on behalf of mode."""
-        copter = self.copter
-        if not copter.armed or not copter.auto_armed:
+        aircraft = self.aircraft
+        if not aircraft.armed or not aircraft.auto_armed:
             mode.wait_on_ground()
             return IDLE
-        if copter.landed:
-            copter.relax()
-            if not copter.spooled_up:
+        if aircraft.landed:
+            aircraft.relax()
+            if not aircraft.spooled_up:
                 self._throttle = 0.0
                 return SPOOLING
-            self._throttle += dt / max(copter.parameters["TKOFF_SLEW_TIME"], 0.1)
-            if self._throttle < copter.hover_throttle:
+            self._throttle += dt / max(aircraft.parameters["TKOFF_SLEW_TIME"], 0.1)
+            if self._throttle < aircraft.hover_throttle:
                 return SPOOLING
-            copter.lift_off()
-        control = copter.position
+            aircraft.lift_off()
+        control = aircraft.position
         control.fly_at(0.0, 0.0, dt)
         control.go_to_altitude(self.target_down, dt)
         self.complete = self._arrived()
         return mode.fly(dt)
 
     def _arrived(self) -> bool:
-        control = self.copter.position
+        control = self.aircraft.position
         slow = DONE_SPEED_SHARE * control.limits.speed_up
         margin = 0.5 * slow * slow / control.limits.acceleration_z
         return control.position[2] <= self.target_down + margin and -control.velocity[2] < slow

@@ -7,8 +7,6 @@ import random
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from mavproxy_uavapi.sim.commands import Commands
-
 STRANGE = (math.nan, math.inf, -math.inf, 1e30, -1e30, -1.0, 0.0, 1.0, 255.0)
 
 
@@ -28,7 +26,7 @@ def check(ground):
 def test_strange_command_parameters(ground, flying, armed):
     station = flying if armed else ground
     source = random.Random(1)
-    for command in [*Commands(station.simulator)._handlers, 31000]:
+    for command in [*station.simulator.commands._handlers, 31000]:
         for value in STRANGE:
             station.command(command, *[value] * 7)
             station.command(command, *[source.choice(STRANGE) for _ in range(7)])

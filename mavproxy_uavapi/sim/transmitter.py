@@ -1,0 +1,68 @@
+"""What the vehicle says: messages to its links, at once or later, as far as the faults let them through."""
+
+from __future__ import annotations
+
+import heapq
+from itertools import count
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from .copter import Copter
+from .events import Broadcast, Event, StatusText
+from .faults import Faults
+from .link import Link
+from .telemetry import Telemetry
+
+TEXT_LENGTH = 50
+
+
+class Transmitter:
+    """Sends for one vehicle from one boot to the next; links is its owner's list, which may change meanwhile."""
+
+    def __init__(self, copter: Copter, telemetry: Telemetry, faults: Faults, links: list[Link]) -> None:
+        self._copter = copter
+        self._telemetry = telemetry
+        self._faults = faults
+        self._links = links
+        self._planned: list[tuple[float, int, Link, Any, tuple[int, int] | None]] = []
+        self._order = count()
+
+    def send(self, link: Link, name: str) -> None:
+        """Queue a message about the present state for one link, if there is something to say."""
+        message = self._telemetry.build(name)
+        if message is not None:
+            link.send(self._faults.spoilt(message, self._copter.now))
+
+    def send_soon(self, link: Link, name: str) -> None:
+        """The same with the next step."""
+        message = self._telemetry.build(name)
+        if message is not None:
+            self.plan(self._copter.now, link, self._faults.spoilt(message, self._copter.now))
+
+    def broadcast(self, name: str) -> None:
+        """Queue a message about the present state for all links."""
+        for link in self._links:
+            self.send(link, name)
+
+    def tell(self, event: Event) -> None:
+        """Queue what the flight code wants told for all links."""
+        if isinstance(event, Broadcast):
+            self.broadcast(event.name)
+            return
+        for link in self._links:
+            if isinstance(event, StatusText):
+                text = event.text.encode()[:TEXT_LENGTH]
+                link.send(mavlink.MAVLink_statustext_message(event.severity, text))
+            else:
+                link.send(mavlink.MAVLink_mission_item_reached_message(event.seq))
+
+    def plan(self, at: float, link: Link, message: Any, source: tuple[int, int] | None = None) -> None:
+        """Send message at `at` seconds since boot; source makes it come from another system and component."""
+        heapq.heappush(self._planned, (at, next(self._order), link, message, source))
+
+    def send_planned(self) -> None:
+        """Queue the planned messages whose time has come."""
+        while self._planned and self._planned[0][0] <= self._copter.now:
+            _, _, link, message, source = heapq.heappop(self._planned)
+            link.send(message, source)
