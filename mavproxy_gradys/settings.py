@@ -15,7 +15,7 @@ from MAVProxy.modules.lib.mp_settings import MPSetting, MPSettings
 from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.forwarding.readings import Quantity, parse_quantities
 from mavproxy_gradys.forwarding.sink_address import SinkAddress, sink_addresses
-from mavproxy_gradys.net.addresses import Station, check_ip, stations
+from mavproxy_gradys.net.addresses import StationAddress, check_ip, stations
 from mavproxy_gradys.net.http_client import tls_context
 from mavproxy_uavapi.settings import UNSET, SettingError
 
@@ -42,7 +42,7 @@ class Settings:
         spool_hours: age (h) after which readings are dropped.
     """
 
-    gs: tuple[Station, ...]
+    gs: tuple[StationAddress, ...]
     ip: str
     period: float
     max_age: float

@@ -25,7 +25,7 @@ from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.http.extension import NED_REACH
 from mavproxy_vision import console, file_commands
 from mavproxy_vision.errors import BadSetting
-from mavproxy_vision.http import Handlers
+from mavproxy_vision.http import VisionHandlers
 from mavproxy_vision.landing.flight_jobs import FlightJobs, FlightTask
 from mavproxy_vision.landing.mission import MissionPlan
 from mavproxy_vision.settings import METHODS, ModuleSettings
@@ -71,7 +71,7 @@ class VisionModule(SharedModule):
         self.tracker = Tracker(self.host, self.vision_settings.snapshot())
         self.flights = FlightJobs(self.tracker, self._directory)
         self._background = BackgroundCommands(self.host, NAME)
-        self._pages = Handlers(self.tracker, self.flights)
+        self._pages = VisionHandlers(self.tracker, self.flights)
         self._routes = {route.path: route for route in self._pages.routes()}
         self.remembered.keep(self.vision_settings.mp.get)
 

@@ -7,7 +7,7 @@ import logging
 from typing import Any
 
 from mavproxy_gradys.errors import NotDelivered
-from mavproxy_gradys.net.addresses import Station, api_note, ip_field, own_address
+from mavproxy_gradys.net.addresses import StationAddress, api_note, ip_field, own_address
 from mavproxy_gradys.net.http_client import FORM, Poster
 from mavproxy_gradys.net.outage_log import Outage
 from mavproxy_gradys.net.resolver import Resolver
@@ -37,7 +37,9 @@ class Pusher:
         poster: how it is told; closed at the end.
     """
 
-    def __init__(self, station: Station, host: Host, settings: Settings, tally: StationTally, poster: Poster) -> None:
+    def __init__(
+        self, station: StationAddress, host: Host, settings: Settings, tally: StationTally, poster: Poster
+    ) -> None:
         self.station = station
         self.tally = tally
         self._host = host

@@ -1,4 +1,4 @@
-"""Command line and INI file -> one frozen `Options`; one table serves both, so they cannot disagree.
+"""Command line and INI file -> one frozen `RunOptions`; one table serves both, so they cannot disagree.
 
 The names are those of the original service, and so are the sections of the file. Unlike there the command
 line wins over the file, and a missing file or a misspelt key is an error.
@@ -21,7 +21,7 @@ from mavproxy_uavapi.settings import ModuleSettings, SettingError
 
 
 @dataclass(frozen=True)
-class Options:
+class RunOptions:
     """What to start. `None` and empty tuples mean "not given".
 
     Attributes:
@@ -145,7 +145,7 @@ def build_parser() -> argparse.ArgumentParser:
     return parser
 
 
-def parse(argv: Sequence[str], environ: Mapping[str, str] | None = None) -> Options:
+def parse(argv: Sequence[str], environ: Mapping[str, str] | None = None) -> RunOptions:
     """Read the arguments, the environment (`UAVAPI_PORT` …) and the file; the former win over the latter.
 
     Raises:
@@ -170,7 +170,7 @@ def parse(argv: Sequence[str], environ: Mapping[str, str] | None = None) -> Opti
             else:
                 merged[row.name] = row.read(text, f"--{row.name}")
                 origins[row.name] = "command line"
-    options = Options(**merged, mavproxy_args=tuple(arguments[cut + 1 :]), origins=origins)
+    options = RunOptions(**merged, mavproxy_args=tuple(arguments[cut + 1 :]), origins=origins)
     check(options)
     return options
 
@@ -283,7 +283,7 @@ def _modules_own(file: Path, parser: configparser.ConfigParser) -> tuple[tuple[s
     return tuple(own)
 
 
-def check(options: Options) -> None:
+def check(options: RunOptions) -> None:
     """Refuse combinations that cannot work, before anything starts."""
     if not options.simulated:
         _check_connection(options.connection_type, options.uav_connection)

@@ -19,7 +19,7 @@ import pytest
 from aiohttp import web
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from mavproxy_gradys.http import Handlers
+from mavproxy_gradys.http import GradysHandlers
 from mavproxy_gradys.service import Gradys
 from mavproxy_uavapi.core.errors import LinkLost
 from mavproxy_uavapi.core.host import Host
@@ -161,7 +161,7 @@ class World:
         self._parser = mavlink.MAVLink(None)
         self._arriving: list[Any] = []
         self.service = Service(host, ModuleSettings(settings, environ={}).snapshot())
-        for route in Handlers(Gradys(host)).routes():
+        for route in GradysHandlers(Gradys(host)).routes():
             host.extensions[route.path] = route
         self._runner = web.AppRunner(make_app(self.service), access_log=None, handler_cancellation=True)
         self._tasks: list[asyncio.Task[None]] = []

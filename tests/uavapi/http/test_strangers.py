@@ -20,7 +20,7 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.http.app import Server
+from mavproxy_uavapi.http.app import ApiServer
 from mavproxy_uavapi.http.call import BODY_TIMEOUT
 from mavproxy_uavapi.http.routes import ROUTES
 from mavproxy_uavapi.settings import ModuleSettings
@@ -69,7 +69,7 @@ class Wire:
 class Port:
     """A server that listens, and connections to it."""
 
-    def __init__(self, loop: Any, server: Server, port: int) -> None:
+    def __init__(self, loop: Any, server: ApiServer, port: int) -> None:
         self.loop, self.server, self.port = loop, server, port
         self._wires: list[Wire] = []
 
@@ -130,7 +130,7 @@ def port(loop: Any, service: Any) -> Iterator[Port]:
         probe.bind(("127.0.0.1", 0))
         free = int(probe.getsockname()[1])
     service.settings = ModuleSettings({"port": free, "token": TOKEN}, environ={}).snapshot()
-    server = Server(service)
+    server = ApiServer(service)
     loop.run(server.start())
     port = Port(loop, server, free)
     yield port
@@ -236,7 +236,7 @@ def test_tls_handshake_that_stops_half_way_is_given_up_and_holds_up_nobody(
         free = int(probe.getsockname()[1])
     given = {"port": free, "certfile": cert, "keyfile": key}
     service.settings = ModuleSettings(given, environ={}).snapshot()
-    server = Server(service)
+    server = ApiServer(service)
     port = Port(loop, server, free)
 
     async def act() -> tuple[int, float, int]:
