@@ -23,6 +23,7 @@ import pytest
 from mavproxy_uavapi.http.app import Server
 from mavproxy_uavapi.http.call import BODY_TIMEOUT
 from mavproxy_uavapi.http.routes import ROUTES
+from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.settings import ModuleSettings
 
 TOKEN = "a-long-and-secret-word"
@@ -123,13 +124,15 @@ def idle_strangers(port: Port) -> Iterator[Callable[[int], list[socket.socket]]]
 
 
 @pytest.fixture
-def port(loop: Any, service: Any) -> Iterator[Port]:
+def port(loop: Any, service: Any, tmp_path: Path) -> Iterator[Port]:
     """The API with a token, on a real port of the loopback."""
     loop.patience = 0.002
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         free = int(probe.getsockname()[1])
-    service.settings = ModuleSettings({"port": free, "token": TOKEN}, environ={}).snapshot()
+    given = {"port": free, "token": TOKEN, "scripts_path": str(tmp_path / "scripts")}
+    service.settings = ModuleSettings(given, environ={}).snapshot()
+    service.scripts = Scripts(service.host, service.settings)
     server = Server(service)
     loop.run(server.start())
     port = Port(loop, server, free)
@@ -450,6 +453,42 @@ def test_form_with_an_endless_part_before_its_file_is_refused(flying: Any, port:
     answer, sent = port.run(act)
     assert answer is None or (answer.status, answer.body["code"]) == (400, "bad_request")
     assert sent < 20_000_000
+
+
+PART = b'Content-Disposition: form-data; name="%b"; filename="a.py"\r\n'
+NESTED = b"--b\r\nContent-Type: multipart/mixed; boundary=%b\r\n\r\n"
+SCRIPT = b"--b\r\n" + PART % b"file" + b"\r\nprint(1)\r\n--b--\r\n"
+
+
+def post_script(port: Port, body: bytes) -> Any:
+    """Send a form with boundary `b`."""
+    length = f"Content-Length: {len(body)}"
+    return port.run(lambda: port.ask("POST", "/mission/upload-script", OWNER, FORM, length, body=body))
+
+
+@pytest.mark.parametrize(
+    ("before", "why"),
+    [
+        (NESTED % b"c" + b"--c\r\n\r\nx\r\n--c--\r\n\r\n", "multipart itself"),
+        (NESTED % b"b" * 12_000, "multipart itself"),
+        (b"--b\r\n" + PART % b"other" + b"x" * 9000 + b": y\r\n\r\n", "bad headers"),
+        (b"--b\r\n" + PART % b"other" + b"x: y\r\n" * 200 + b"\r\n", "bad headers"),
+        (b"--b\r\n" + PART % b"other" + b"no header\r\n\r\nx\r\n", "bad headers"),
+        (b"--b\r\n\r\nx\r\n" * 20_000, "100 parts"),
+    ],
+    ids=["a form", "forms in forms", "a long header", "many headers", "no header", "many parts"],
+)
+def test_form_is_refused_for_what_comes_before_its_file(
+    flying: Any, port: Port, caplog: pytest.LogCaptureFixture, before: bytes, why: str
+) -> None:
+    answer = post_script(port, before + SCRIPT)
+    assert (answer.status, answer.body["code"]) == (400, "bad_request")
+    assert why in answer.body["detail"]
+    assert [record for record in caplog.records if record.exc_info] == []
+
+
+def test_form_with_a_few_other_parts_before_its_file_is_taken(flying: Any, port: Port) -> None:
+    assert post_script(port, (b"--b\r\n" + PART % b"other" + b"\r\nx\r\n") * 99 + SCRIPT).status == 200
 
 
 # -- pages --------------------------------------------------------------------------------------------------
