@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import fcntl
 import gzip
+import ipaddress
 import json
 import logging
 import os
@@ -20,9 +21,12 @@ from typing import Any
 
 import pytest
 
+from mavproxy_uavapi.http import listener
 from mavproxy_uavapi.http.app import Server
 from mavproxy_uavapi.http.call import BODY_TIMEOUT
+from mavproxy_uavapi.http.listener import SHARE
 from mavproxy_uavapi.http.routes import ROUTES
+from mavproxy_uavapi.http.streaming import MOST_OPEN
 from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.settings import ModuleSettings
 
@@ -74,8 +78,8 @@ class Port:
         self.loop, self.server, self.port = loop, server, port
         self._wires: list[Wire] = []
 
-    async def connect(self) -> Wire:
-        wire = Wire(*await asyncio.open_connection("127.0.0.1", self.port))
+    async def connect(self, source: str = "127.0.0.1") -> Wire:
+        wire = Wire(*await asyncio.open_connection("127.0.0.1", self.port, local_addr=(source, 0)))
         self._wires.append(wire)
         return wire
 
@@ -209,6 +213,35 @@ def test_idle_connection_is_closed_after_30_s_and_a_stream_is_not(drone: Any, po
 
     closed, _ = port.run(act)
     assert 29 <= closed <= 31
+
+
+def test_streams_of_one_address_leave_most_to_others(
+    drone: Any, port: Port, service: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A stream takes a connection, so that the share of connections is one of streams too."""
+    far = "127.0.0.2"  # stands for another computer
+    addresses = {far: ipaddress.ip_address("10.0.0.5")}
+    monkeypatch.setattr(listener, "address_of", lambda remote: addresses.get(remote, ipaddress.ip_address(remote)))
+    upgrade = ("Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13")
+    kinds = (OWNER,), (OWNER, *upgrade, "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==")
+
+    async def status_of_stream(source: str, *headers: str) -> int | None:
+        wire = await port.connect(source)
+        wire.send("GET", "/telemetry/stream", *headers)
+        try:
+            return int((await wire.reader.readuntil(b"\r\n")).split()[1])
+        except (asyncio.IncompleteReadError, ConnectionError):
+            return None
+
+    async def act() -> tuple[list[int | None], list[int | None], int]:
+        theirs = [await status_of_stream(far, *kinds[number % 2]) for number in range(2 * SHARE)]
+        ours = [await status_of_stream("127.0.0.1", *kinds[number % 2]) for number in range(MOST_OPEN - SHARE + 1)]
+        return theirs, ours, service.streams.count
+
+    theirs, ours, count = port.run(act)
+    assert theirs == [200, 101] * (SHARE // 2) + [None] * SHARE
+    assert ours == [200, 101] * ((MOST_OPEN - SHARE) // 2) + [429]
+    assert count == MOST_OPEN
 
 
 @pytest.mark.parametrize("drop", ["G", "\r\n", "\x00"])
