@@ -172,6 +172,22 @@ def test_stopped_and_unloaded_in_one_breath_it_holds_and_plnd_is_as_before(flyin
     assert plnd(rig) == before
 
 
+def test_last_words_of_an_unloaded_module_go_when_its_parameters_are_given_back(flying):
+    rig = flying(alt=6.0, plnd=True, **LARGE)
+    before, words = plnd(rig), rig.host.last_words
+    rig.land(method="landing_target")
+    until(rig, lambda: rig.mode == "LAND")
+    rig.pass_time(1.0)
+    hear = rig.host._receive
+    silent(rig, "PARAM_VALUE")
+    rig.unload()
+    rig.pass_time(5.0)
+    assert rig.flights.last_words in words
+    rig.host._receive = hear
+    until(rig, lambda: rig.flights.last_words not in words)
+    assert plnd(rig) == before
+
+
 def test_unloaded_in_the_autopilots_land_it_lands(flying):
     rig = flying(alt=6.0, sim_tags="", attempts=1, leash=1.0, on_failure="land")
     job = rig.land()
