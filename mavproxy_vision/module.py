@@ -103,13 +103,14 @@ class VisionModule(SharedModule):
 
     def _abandon(self) -> None:
         """End what is in flight."""
-        if not self.host.bridge.running:
-            return
 
         async def abandoned() -> None:
             self.flights.abort_all()
 
-        self.host.bridge.run(abandoned())
+        if self.host.bridge.running:
+            self.host.bridge.run(abandoned())
+        else:  # there is no asyncio thread yet, and nothing flies
+            self.flights.abort_all()
 
     def _directory(self) -> Path:
         """Where files go."""

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 import vision
+from mavproxy_uavapi.core import host as hosts
 from mavproxy_vision.console import HELP
 
 SOURCES = "`vision set source camera:0`, sim, http, a path or a URL"
@@ -72,6 +73,21 @@ def test_loading_and_unloading_leaves_nothing_behind(mpstate: Any, descriptors: 
     assert (mpstate.command_map, mpstate.completions, mpstate.select_extra) == ({}, {}, {})
     assert list(mpstate.completion_functions) == ["(OTHER)"]
     assert (threading.active_count(), descriptors()) == (threads, before)
+
+
+@pytest.mark.parametrize("turns", [0, 1], ids=["before the first turn", "running"])
+def test_a_reload_leaves_nothing_to_say_at_the_end(mpstate: Any, turns: int) -> None:
+    host = hosts.join(mpstate, None)  # another module that stays
+    words = list(host.last_words)
+    if turns:
+        host.bridge.start()
+    for _ in range(3):
+        module = vision.init(mpstate)
+        for _ in range(turns):
+            module.idle_task()
+        module.unload()
+    assert host.last_words == words
+    hosts.leave(mpstate, None)
 
 
 def test_a_running_camera_ends_with_the_module(mpstate: Any, main_loop: Any) -> None:
