@@ -15,7 +15,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Protocol
 from unittest.mock import patch
 
 os.environ["MAVLINK20"] = "1"  # before pymavlink is imported anywhere
@@ -64,6 +64,14 @@ class _Jump(selectors.DefaultSelector):
         return ready
 
 
+class Rig(Protocol):
+    """What an eye belongs to: the loop of the virtual clock, the module's own side, and what chance begins with."""
+
+    loop: Any
+    vision: Vision
+    seed: int
+
+
 class Eye:
     """Stands in for the worker: frames come, and are looked at, on the virtual clock.
 
@@ -73,7 +81,7 @@ class Eye:
         blind: called with the truth (position, attitude); true hides the tags.
     """
 
-    def __init__(self, rig: Lockstep) -> None:
+    def __init__(self, rig: Rig) -> None:
         self.rig = rig
         self.watch = Watch(True, rig.loop.time())
         self.frozen = self.dead = False
@@ -86,6 +94,7 @@ class Eye:
         self.task: Any = None
 
     def start(self) -> None:
+        self.rig.vision.worker = self  # type: ignore[assignment]
         settings = self.rig.vision.settings
         self.source = make_source(settings, self.rig.vision._where, self.rig.loop.time)
         self.source._random = random.Random(self.rig.seed + 11)
@@ -305,7 +314,6 @@ class Lockstep:
         self.open_eye()
 
     def open_eye(self) -> None:
-        self.vision.worker = self.eye  # type: ignore[assignment]
         self.eye.start()
         self.pass_time(0.3)
 
