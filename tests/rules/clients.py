@@ -51,7 +51,7 @@ class Typed:
 
 
 def fly_track(world: Any, request: dict[str, Any]) -> Typed:
-    """`gradys track fly FILE --ground M`."""
+    """`uavapi fly FILE --ground M`, which is `gradys track fly`."""
     file: Path = world.directory / "track.txt"
     file.write_text(request["track"])
     words = ["fly", str(file), "--ground", str(request["ground"])]
@@ -118,5 +118,6 @@ class Script:
         self.reply.cancel()
         for connection in self._connections:
             connection.hang_up()
+        self._world.loop.settle()  # a closed connection is seen at once, a run's end when it is looked for
         run: Any = SimpleNamespace(session=SESSION, script="mission.py")
         self.death = self._world.loop.create_task(on_exit.after_death(self._world.host, 0, run, []))

@@ -75,8 +75,8 @@ FAULTS = {
     ),
     "client gone": Fault(
         "The client hangs up: the verb ends and is forgotten, the vehicle keeps its last setpoint. What lands, "
-        "returns or stops it goes on. A script that began a job dies: `on_script_exit` says what follows, as it is by "
-        "default here.",
+        "returns or stops it goes on, and so do vision's flights. A script does not hang up but dies: what it flew "
+        "ends, but for a landing or return, and the vehicle does what `on_script_exit` says, here as by default.",
         0.1,
     ),
     "another client streams": Fault(
@@ -108,8 +108,9 @@ GUIDED_ONLY = {"during a take-off": "409 busy", "in AUTO": "409 mode_changed"}
 OTHERS = {"another client streams": "409 superseded", "another station flies it": "409 superseded"}
 MOVING = {**SUCCESS, **LOST, **FLIGHT, **OTHERS, **GUIDED_ONLY}  # by setpoints, which nobody acknowledges
 TRACK = {**MOVING, **REFUSED}  # of the gradys module: movements, and a return
-BY_VISION = {**MOVING, "client gone": GOES_ON, "another station flies it": "200"}  # it repeats its own
-VISION_LAND = {**BY_VISION, **dict.fromkeys(REFUSED, f"500 rejected{HOLDS}")}  # LAND is refused, in GUIDED
+VISION = {**MOVING, "client gone": GOES_ON, "another station flies it": "200"}  # it repeats its own
+VISION_LAND = {**VISION, **dict.fromkeys(REFUSED, f"500 rejected{HOLDS}")}  # LAND is refused, in GUIDED
+VISION_MISSION = {**VISION_LAND, "another station flies it": "409 superseded"}
 TRAVEL = {**MOVING, "another station flies it": "200"}  # it repeats its own
 MODE = {**SUCCESS, **LOST, **REFUSED, "reboot": "409 mode_changed", "pilot's mode": "409 mode_changed"}
 LANDING = {**SUCCESS, **LOST, **REFUSED, **FLIGHT, "client gone": GOES_ON}
@@ -176,10 +177,10 @@ VERBS = {
     "set_climb_speed": Verb("/command/set_climb_speed", 0.5, SPEED),
     "set_descent_speed": Verb("/command/set_descent_speed", 0.5, SPEED),
     "vision/land": Verb("/vision/land", 30.0, VISION_LAND),
-    "vision/search": Verb("/vision/search", 60.0, BY_VISION),
-    "vision/mission": Verb("/vision/mission", 60.0, VISION_LAND),
+    "vision/search": Verb("/vision/search", 60.0, VISION),
+    "vision/mission": Verb("/vision/mission", 60.0, VISION_MISSION),
     "prompt: vision land": Verb("vision land", 30.0, {**VISION_LAND, **PROMPT}),
-    "prompt: gradys track fly": Verb("gradys track fly", 60.0, {**TRACK, **PROMPT}),
+    "prompt: uavapi fly": Verb("uavapi fly", 60.0, {**TRACK, **PROMPT}),
     "script: go_to_ned_wait": Verb("/movement/go_to_ned_wait", 10.0, {**MOVING, "client gone": f"{ENDED}{HOLDS}"}),
     "script: land": Verb("/command/land", 20.0, LANDING),
 }
@@ -197,6 +198,9 @@ def page() -> str:
         "",
         "A flight has been under way for 3 s when the link, the autopilot, the pilot or the client does something;",
         "the other verbs wait for an acknowledgement then. Movements go by setpoints, which nobody acknowledges.",
+        "What is typed at MAVProxy's prompt, and what a script begins with `?wait=false`, has a job: its outcome is",
+        'what the answer would have been, and the prompt prints its sentence. "Holds": the vehicle is sent zero',
+        "velocities until telemetry shows that it stands still, and nothing else; the table at the end says why.",
         "",
         "| fault | what happens | ends it within, or delays it by |",
         "| --- | --- | --- |",

@@ -13,7 +13,6 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 
-
 def _load(name: str) -> Any:
     spec = importlib.util.spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
     module = importlib.util.module_from_spec(spec)
@@ -41,8 +40,8 @@ DEAF = 1.0  # s for which the vehicle does not hear that command
 DARK = 2.0  # s that a reboot takes
 OVERHEAR = (1, 190)  # another component of the vehicle
 AT_REST = 0.5  # m/s: slower than this a vehicle holds
-CAMERA = {"width": 320, "height": 240, "fps": 12.0, "sim_noise": 3.0, "sim_jitter": 0.0}
-TAG_BELOW, TAG_BESIDE = "0:0.30@0.8,-0.6", "0:0.30@4,0"  # in view at once, or when it was searched for
+CAMERA = {"width": 240, "height": 180, "fps": 8.0, "sim_noise": 0.0, "sim_blur": 0.0, "sim_jitter": 0.0}
+TAG_BELOW, TAG_BESIDE = "0:0.30@0.6,-0.4", "0:0.30@0.5,3"  # in view at once, or when it was searched for
 PLACE = (-35.363261, 149.165230)  # where it stands: the simulator's default home
 
 
@@ -93,23 +92,23 @@ REQUESTS |= {
     "vision/land": Request("above a tag", {}, {}, {**CAMERA, "sim_tags": TAG_BELOW}),
     "vision/search": Request("above a tag", {}, {}, {**CAMERA, "sim_tags": TAG_BESIDE}),
     "vision/mission": Request(
-        "boot",
-        {"alt": 4, "north": 6, "east": 3, "tag": False},
-        {"alt": 4, "north": 300, "east": 0, "tag": False},
+        "flying",
+        {"alt": 6, "north": 6, "east": 3, "tag": False},
+        {"alt": 6, "north": 300, "east": 0, "tag": False},
         {**CAMERA, "fps": 0.5},  # it looks for nothing
     ),
-    "prompt: gradys track fly": REQUESTS["fly-track"],
+    "prompt: uavapi fly": REQUESTS["fly-track"],
     "script: go_to_ned_wait": REQUESTS["go_to_ned_wait"],
     "script: land": REQUESTS["land"],
 }
 REQUESTS["prompt: vision land"] = REQUESTS["vision/land"]
 # Verbs that are made of others, of which the last one is refused.
-OF_OTHERS = {"fly-track", "vision/land", "vision/mission", "prompt: vision land", "prompt: gradys track fly"}
+OF_OTHERS = {"fly-track", "vision/land", "vision/mission", "prompt: vision land", "prompt: uavapi fly"}
 STAGES: dict[str, Callable[[Any], None]] = {
     "boot": lambda world: world.boot(),
     "armed": lambda world: world.armed(),
     "flying": lambda world: world.flying(),
-    "above a tag": lambda world: world.flying(height=5.0),
+    "above a tag": lambda world: world.flying(height=3.5),
     "loitering": lambda world: world.flying("LOITER"),
     "stopped": lambda world: world.flying(),
 }
@@ -180,7 +179,7 @@ DONE: dict[str, Callable[[Any], bool]] = {
         ("land", "rtl", "script: land", "vision/land", "vision/mission"),
         lambda world: not world.copter.armed and world.at[2] > -0.1,
     ),
-    "vision/search": lambda world: world.copter.armed and math.hypot(world.at[0] - 4.0, world.at[1]) < 3.0,
+    "vision/search": lambda world: world.copter.armed and math.hypot(world.at[0] - 0.5, world.at[1] - 3.0) < 2.0,
     "brake": lambda world: world.copter.mode.name == "BRAKE",
     "stop": lambda world: world.copter.guided.paused,
 }
@@ -247,6 +246,7 @@ def strike(world: Any, verb: str, fault: str) -> tuple[float, Any]:
     if meanwhile is None:
         return began, wire
     world.loop.pass_time(delay)
+    assert wire.reply.done() == ((verb, fault) == ("arm", "disarmed"))
     meanwhile(world, wire)
     return world.loop.time(), wire
 
@@ -262,7 +262,7 @@ def begin(world: Any, verb: str, given: Any) -> Any:
     return world.begin("GET", path + given)
 
 
-AT_THE_PROMPT = {"prompt: vision land": clients.vision_land, "prompt: gradys track fly": clients.fly_track}
+AT_THE_PROMPT = {"prompt: vision land": clients.vision_land, "prompt: uavapi fly": clients.fly_track}
 
 
 def says_why(body: dict[str, Any], fault: str) -> bool:
@@ -361,6 +361,31 @@ def test_a_turn_right_after_a_takeoff_is_flown(make_world: Any) -> None:
     world = make_world(STAGES["armed"])
     assert world.ask("GET", "/command/takeoff?alt=10").outcome == "200"
     assert world.ask("GET", "/movement/set_yaw_rate?yaw_rate=20").outcome == "200"
+
+
+@pytest.mark.parametrize("waits", [True, False])
+@pytest.mark.parametrize("verb", ["go_to_ned_wait", "land", "vision/search", "fly-track"])
+def test_what_a_script_leaves_behind_is_the_same_whether_it_waited_or_not(
+    make_world: Any, verb: str, waits: bool
+) -> None:
+    request = REQUESTS[verb]
+    world = make_world(STAGES[request.stage], camera=request.camera)
+    method = "GET" if request.far == "" else "POST"
+    script = clients.Script(world, method, outcomes.VERBS[verb].path, request.far or None, waits=waits)
+    world.loop.pass_time(UNDER_WAY)
+    died = world.loop.time()
+    script.hang_up()
+    world.loop.settle()
+    if verb == "land":
+        assert script.death.result() == "left alone: the vehicle is in LAND"
+        world.loop.pass_time(outcomes.VERBS[verb].takes)
+        assert DONE[verb](world)
+        return
+    quiet_since = hold_after(world, died)
+    world.loop.pass_time(GUARD)
+    assert script.death.result() == "hold is done"
+    assert world.orders(since=quiet_since) == []
+    assert world.host.jobs.running() == []
 
 
 def test_page_about_faults_is_up_to_date() -> None:

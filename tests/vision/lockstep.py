@@ -20,6 +20,7 @@ from unittest.mock import patch
 
 os.environ["MAVLINK20"] = "1"  # before pymavlink is imported anywhere
 
+import cv2
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.errors import Aborted
@@ -96,6 +97,7 @@ class Eye:
     def start(self) -> None:
         self.rig.vision.worker = self  # type: ignore[assignment]
         settings = self.rig.vision.settings
+        cv2.setNumThreads(settings.threads)
         self.source = make_source(settings, self.rig.vision._where, self.rig.loop.time)
         self.source._random = random.Random(self.rig.seed + 11)
         self.detector = Detector(settings.model, self.rig.vision.options(settings))
