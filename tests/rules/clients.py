@@ -11,10 +11,9 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from mavproxy_gradys.track_console import TrackConsole
-from mavproxy_uavapi.host.errands import Errands
-from mavproxy_uavapi.vehicle.jobs import CONSOLE, Job
-
+from mavproxy_gradys.tracks.console import TrackConsole
+from mavproxy_uavapi.core.background import BackgroundCommands
+from mavproxy_uavapi.core.vehicle.jobs import CONSOLE, Job
 from mavproxy_uavapi.http.jobs import error_of
 from mavproxy_uavapi.scripts import on_exit
 
@@ -62,7 +61,7 @@ def fly_track(world: Any, request: dict[str, Any]) -> Typed:
 
 def vision_land(world: Any, _request: dict[str, Any]) -> Typed:
     """`vision land`, from where the module hands it to the asyncio thread."""
-    say = Errands(world.host, "vision").say
+    say = BackgroundCommands(world.host, "vision").say
 
     def begin() -> None:
         copter, request = world.flights.copter(), {"id": None, "method": "velocity"}

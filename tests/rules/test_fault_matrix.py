@@ -3,24 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-import importlib.util
 import math
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-
-def _load(name: str) -> Any:
-    spec = importlib.util.spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-outcomes, clients = _load("outcomes"), _load("clients")
+from tests.rules import clients, outcomes
 
 ARM = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
 TAKEOFF = mavlink.MAV_CMD_NAV_TAKEOFF

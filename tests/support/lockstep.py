@@ -9,7 +9,6 @@ import asyncio
 import contextlib
 import os
 import random
-import selectors
 import tempfile
 from collections.abc import Callable
 from dataclasses import replace
@@ -35,33 +34,11 @@ from mavproxy_vision.settings import ModuleSettings
 from mavproxy_vision.tracking.capture_worker import Health, Watch
 from mavproxy_vision.tracking.stream_rates import TRUTH
 from mavproxy_vision.tracking.tracker import Tracker, make_source
+from tests.support.virtual_time import TimeTravellingLoop
 
 DETECTOR_TIME = 0.015  # s from a frame's arrival to its outcome
 STREAMS_EVERY = 15.0  # s: as often does MAVProxy ask for all streams at its rate
 STREAM_RATE = 4  # Hz
-
-
-class VirtualLoop(asyncio.SelectorEventLoop):
-    """An asyncio loop whose clock jumps to the next timer."""
-
-    def __init__(self) -> None:
-        self.now = 1000.0
-        super().__init__(_Jump(self))
-
-    def time(self) -> float:
-        return self.now
-
-
-class _Jump(selectors.DefaultSelector):
-    def __init__(self, loop: VirtualLoop) -> None:
-        super().__init__()
-        self._loop = loop
-
-    def select(self, timeout: float | None = None) -> Any:
-        ready = super().select(0 if timeout is not None else 5.0)
-        if not ready and timeout is not None:
-            self._loop.now += max(timeout, 0.0)
-        return ready
 
 
 class Rig(Protocol):
@@ -178,7 +155,7 @@ class Lockstep:
         **settings: Any,
     ) -> None:
         self.seed = seed
-        self.loop = VirtualLoop()
+        self.loop = TimeTravellingLoop()
         asyncio.set_event_loop(self.loop)
         home = Home(heading=heading)
         options = Options(seed=seed, home=home, wind=Wind(*wind), gps_noise=gps_noise, ready_after=1.0)
