@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import importlib.util
 import os
+import runpy
 import selectors
 import shutil
 import signal
@@ -235,6 +236,18 @@ def load_file(path: str) -> Any:
 def helper() -> Callable[[str], Any]:
     """`load_file`."""
     return load_file
+
+
+@pytest.fixture
+def setup_py() -> dict[str, Any]:
+    """What setup.py gives to setuptools."""
+    import setuptools
+
+    with pytest.MonkeyPatch.context() as patch:
+        given: dict[str, Any] = {}
+        patch.setattr(setuptools, "setup", given.update)
+        runpy.run_path(str(Path(__file__).parents[1] / "setup.py"))
+    return given
 
 
 @pytest.fixture
