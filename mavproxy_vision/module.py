@@ -7,15 +7,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-try:
-    import cv2
-    import numpy  # noqa: F401
-except ImportError as missing:  # MAVProxy prints the text of an ImportError as one line
-    raise ImportError(f"vision needs {missing.name}: pip install 'mavproxy-uavapi[vision]'") from missing
-if not hasattr(getattr(cv2, "aruco", None), "ArucoDetector"):
-    raise ImportError(
-        f"vision needs OpenCV 4.10 or newer, this is {cv2.__version__}: pip install -U 'mavproxy-uavapi[vision]'"
-    )
+from mavproxy_vision import opencv_install
+
+if (_problem := opencv_install.problem()) is not None:
+    raise ImportError(_problem)  # MAVProxy prints the text of an ImportError as one line
+
+import cv2
 
 from mavproxy_uavapi.core.background import BackgroundCommands
 from mavproxy_uavapi.core.errors import UavApiError
@@ -306,6 +303,9 @@ def init(mpstate: Any, **kwargs: Any) -> VisionModule:
             kind of error in one line, and goes on.
     """
     try:
-        return VisionModule(mpstate, kwargs)
+        module = VisionModule(mpstate, kwargs)
     except BadSetting as error:
         raise ImportError(f"vision: {error}") from error
+    if (overlap := opencv_install.overlap()) is not None:
+        print(f"vision: {overlap}")
+    return module

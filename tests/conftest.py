@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import os
+import runpy
 import shutil
 import signal
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -160,6 +162,18 @@ def open_descriptors() -> int:
 def descriptors() -> Callable[[], int]:
     """`open_descriptors`."""
     return open_descriptors
+
+
+@pytest.fixture
+def setup_py() -> dict[str, Any]:
+    """What setup.py gives to setuptools."""
+    import setuptools
+
+    with pytest.MonkeyPatch.context() as patch:
+        given: dict[str, Any] = {}
+        patch.setattr(setuptools, "setup", given.update)
+        runpy.run_path(str(Path(__file__).parents[1] / "setup.py"))
+    return given
 
 
 @pytest.fixture

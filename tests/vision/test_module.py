@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import builtins
-import importlib
 import sys
 import threading
 import time
@@ -129,24 +127,6 @@ def test_a_setting_that_does_not_exist_is_an_import_error(mpstate: Any) -> None:
     with pytest.raises(ImportError, match="vision: no setting 'nonsense'"):
         vision.init(mpstate, nonsense=1)
     assert mpstate.command_map == {}
-
-
-def test_without_opencv_one_line_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    real = builtins.__import__
-
-    def without(name: str, *args: Any, **kwargs: Any) -> Any:
-        if name == "cv2":
-            raise ModuleNotFoundError("No module named 'cv2'", name="cv2")
-        return real(name, *args, **kwargs)
-
-    import mavproxy_vision.module as loaded
-
-    monkeypatch.setattr(builtins, "__import__", without)
-    monkeypatch.delitem(sys.modules, "mavproxy_vision.module")
-    with pytest.raises(ImportError, match=r"vision needs cv2: pip install 'mavproxy-uavapi\[vision\]'"):
-        importlib.import_module("mavproxy_vision.module")
-    monkeypatch.undo()
-    sys.modules["mavproxy_vision.module"] = loaded
 
 
 def test_nothing_else_of_the_project_needs_opencv() -> None:
