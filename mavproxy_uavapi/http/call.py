@@ -138,8 +138,10 @@ class Call:
             outlives_client=outlives_client or is_async,
             timeout=getattr(params, "timeout", None),
         )
-        if is_async:
+        if is_async or (outlives_client and not urgent):  # else it ends with its client, or stops the vehicle
+            self.job = job
             job.script = await self.service.scripts.session_of(self.peer)
+        if is_async:
             return self.accepted(job)
         return self.answer(await self.outcome(job))
 
