@@ -7,6 +7,8 @@ and the vehicle's clock and ours advance together on the time-travelling loop.
 from __future__ import annotations
 
 import asyncio
+import concurrent.futures
+import contextlib
 import importlib.util
 import json
 import math
@@ -38,6 +40,7 @@ STEPS = 2  # of the simulator, in each tick
 STREAMS_EVERY = 15.0  # s; MAVProxy asks for all streams so often
 STREAM_RATE = 4  # Hz, MAVProxy's default
 US = Address(255, 230)
+CLIENT = 50000  # a client's port
 HOUSEKEEPING = {mavlink.MAV_CMD_SET_MESSAGE_INTERVAL}  # what is asked for whether anybody flies or not
 MODES = {"STABILIZE": 0, "ALT_HOLD": 2, "AUTO": 3, "GUIDED": 4, "LOITER": 5, "RTL": 6, "LAND": 9, "BRAKE": 17}
 # A vehicle whose landings and returns are quick; deadlines follow from the same parameters.
@@ -52,6 +55,18 @@ def item_at(lat: float, lon: float) -> Item:
     """A waypoint 10 m above home."""
     frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
     return Item(mavlink.MAV_CMD_NAV_WAYPOINT, frame, 0, 0, 0, 0, round(lat * 1e7), round(lon * 1e7), 10.0)
+
+
+class AtOnce(concurrent.futures.ThreadPoolExecutor):
+    """Does in no time what the code gives to threads: theirs is the wall clock, and ours would run on meanwhile."""
+
+    def submit(self, call: Callable[..., Any], /, *args: Any, **kwargs: Any) -> concurrent.futures.Future[Any]:
+        done: concurrent.futures.Future[Any] = concurrent.futures.Future()
+        try:
+            done.set_result(call(*args, **kwargs))
+        except Exception as error:  # noqa: BLE001  it is for whoever awaits it
+            done.set_exception(error)
+        return done
 
 
 class Reply(NamedTuple):
@@ -72,8 +87,8 @@ class Reply(NamedTuple):
 class Wire(asyncio.Transport):
     """One HTTP connection in memory; `reply` is there when the server has closed it."""
 
-    def __init__(self, loop: asyncio.AbstractEventLoop, protocol: Any) -> None:
-        super().__init__({"peername": ("127.0.0.1", 50000), "sockname": ("127.0.0.1", 8000)})
+    def __init__(self, loop: asyncio.AbstractEventLoop, protocol: Any, port: int = CLIENT) -> None:
+        super().__init__({"peername": ("127.0.0.1", port), "sockname": ("127.0.0.1", 8000)})
         self._loop = loop
         self._protocol = protocol
         self._written = bytearray()
@@ -144,12 +159,21 @@ class World:
         sent: what the host sent, oldest first; MAVProxy's own requests are not in it.
         simulator: the vehicle.
         uplink_until, cut_until: s; until then nothing reaches the vehicle, or nothing goes either way.
+        gradys: the module's own side.
+        tracker, flights: vision's own side, with a simulated camera; only in a world that was made with one.
+        screen: what was printed at the prompt since it was last asked for.
+        directory: for files.
     """
 
+    tracker: Any
+    flights: Any
+
     def __init__(self, loop: Any, mpstate: Any, settings: dict[str, Any]) -> None:
-        self.loop = loop
+        self.loop, self.seed = loop, 1
         self.host = host = Host(mpstate, clock=loop.time, link=self, loop=loop)
-        self.simulator = Simulator(Options(seed=1, ready_after=1.0))
+        self.screen: Callable[[], str] = str
+        self.directory = Path()
+        self.simulator = Simulator(Options(seed=self.seed, ready_after=1.0))
         for name, value in PARAMETERS.items():
             self.simulator.parameters.set(name, value)
         self.control = Control(self.simulator)
@@ -161,11 +185,36 @@ class World:
         self._parser = mavlink.MAVLink(None)
         self._arriving: list[Any] = []
         self.service = Service(host, ModuleSettings(settings, environ={}).snapshot())
-        for route in GradysHandlers(Gradys(host)).routes():
+        self.gradys = Gradys(host)
+        for route in GradysHandlers(self.gradys).routes():
             host.extensions[route.path] = route
         self._runner = web.AppRunner(make_app(self.service), access_log=None, handler_cancellation=True)
         self._tasks: list[asyncio.Task[None]] = []
         self._streams: list[asyncio.Task[None]] = []
+        self._look: list[Callable[[], None]] = []
+        self._camera = contextlib.AsyncExitStack()
+
+    def mount_camera(self, settings: dict[str, Any]) -> None:
+        """Give it vision with a simulated camera, which looks from `go_live` on; needs OpenCV."""
+        from mavproxy_vision.http import VisionHandlers  # noqa: PLC0415
+        from mavproxy_vision.landing.flight_jobs import FlightJobs  # noqa: PLC0415
+        from mavproxy_vision.settings import ModuleSettings as VisionSettings  # noqa: PLC0415
+        from mavproxy_vision.tracking.stream_rates import TRUTH  # noqa: PLC0415
+        from mavproxy_vision.tracking.tracker import Tracker  # noqa: PLC0415
+
+        self.tracker = Tracker(self.host, VisionSettings({"source": "sim", **settings}).snapshot())
+        self.flights = FlightJobs(self.tracker, lambda: self.directory)
+        for route in VisionHandlers(self.tracker, self.flights).routes():
+            self.host.extensions[route.path] = route
+        eye = load("vision/lockstep.py").Eye(self)
+
+        def look() -> None:
+            self.tracker.listen()
+            self._camera.push_async_callback(self.tracker.close)
+            self._camera.enter_context(self.tracker.rates.at(TRUTH))
+            eye.start()
+
+        self._look.append(look)
 
     # -- the vehicle before anybody looks -------------------------------------------------------------------
 
@@ -226,6 +275,8 @@ class World:
         self.loop.run(self._runner.setup())
         watch = StreamRequester(self.host.registry, 0)
         self._tasks = [self.loop.create_task(self._run()), self.loop.create_task(watch.run())]
+        for look in self._look:
+            self.loop.call_soon(look)
         self.loop.pass_time(1.5)
 
     # -- time -----------------------------------------------------------------------------------------------
@@ -245,7 +296,7 @@ class World:
             if self.loop.time() >= self.cut_until and data:
                 for message in self._parser.parse_buffer(data) or []:
                     self.host.bridge.feed(message)
-                self.host.bridge.turn()
+            self.host.bridge.turn()
             await asyncio.sleep(TICK)
 
     def _deliver(self, message: Any) -> None:
@@ -269,9 +320,11 @@ class World:
         """A request in flight; `body` is bytes, or made JSON of."""
         return self.loop.run(self.request(method, path, body, kind))
 
-    async def request(self, method: str, path: str, body: Any = None, kind: str = "application/json") -> Wire:
-        """As `begin`, for clients that run in the loop."""
-        wire = Wire(self.loop, Connection(self._runner.server))
+    async def request(
+        self, method: str, path: str, body: Any = None, kind: str = "application/json", port: int = CLIENT
+    ) -> Wire:
+        """As `begin`, for clients that run in the loop, at a port of their own."""
+        wire = Wire(self.loop, Connection(self._runner.server), port)
         content = b"" if body is None else body if isinstance(body, bytes) else json.dumps(body).encode()
         head = [f"{method} {path} HTTP/1.1", "Host: localhost", "Connection: close"]
         if body is not None:
@@ -288,6 +341,10 @@ class World:
         reply = self.loop.run(asyncio.wait_for(wire.reply, within))
         assert reply is not None, "the server closed the connection without an answer"
         return reply
+
+    def told(self, status: int, body: dict[str, Any]) -> Reply:
+        """What somebody has learnt just now, as an answer."""
+        return Reply(status, body, self.loop.time(), {}, b"")
 
     # -- what happens to it ---------------------------------------------------------------------------------
 
@@ -334,18 +391,32 @@ class World:
         for task in [*self._tasks, *self._streams]:
             task.cancel()
         self.loop.settle()
+        self.loop.run(self._camera.aclose())
         self.loop.run(self._runner.cleanup())
         self.service.host.audit.close()
 
 
 @pytest.fixture
-def make_world(loop: Any, mpstate: Any) -> Iterator[Callable[..., World]]:
-    """Makes a world of which nobody knows yet; `stage` brings its vehicle to where a test begins."""
-    worlds: list[World] = []
+def make_world(
+    loop: Any, mpstate: Any, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> Iterator[Callable[..., World]]:
+    """Makes a world of which nobody knows yet; `stage` brings its vehicle to where a test begins.
 
-    def make(stage: Callable[[World], None] = World.flying, **settings: Any) -> World:
+    With settings for a `camera` it has vision, or the test is skipped where there is no OpenCV.
+    """
+    worlds: list[World] = []
+    loop.set_default_executor(AtOnce())
+
+    def make(
+        stage: Callable[[World], None] = World.flying, camera: dict[str, Any] | None = None, **settings: Any
+    ) -> World:
+        if camera is not None:
+            pytest.importorskip("cv2")
         world = World(loop, mpstate, settings)
         worlds.append(world)
+        world.screen, world.directory = lambda: capsys.readouterr().out, tmp_path
+        if camera is not None:
+            world.mount_camera(camera)
         stage(world)
         world.go_live()
         return world

@@ -15,10 +15,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Protocol
 
 os.environ["MAVLINK20"] = "1"  # before pymavlink is imported anywhere
 
+import cv2
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.errors import Aborted
@@ -63,6 +64,14 @@ class _Jump(selectors.DefaultSelector):
         return ready
 
 
+class Rig(Protocol):
+    """What an eye belongs to: the loop of the virtual clock, the module's own side, and what chance begins with."""
+
+    loop: Any
+    tracker: Tracker
+    seed: int
+
+
 class Eye:
     """Stands in for the worker: frames come, and are looked at, on the virtual clock.
 
@@ -72,7 +81,7 @@ class Eye:
         blind: called with the truth (position, attitude); true hides the tags.
     """
 
-    def __init__(self, rig: Lockstep) -> None:
+    def __init__(self, rig: Rig) -> None:
         self.rig = rig
         self.watch = Watch(True, rig.loop.time())
         self.frozen = self.dead = False
@@ -85,7 +94,9 @@ class Eye:
         self.task: Any = None
 
     def start(self) -> None:
+        self.rig.tracker.worker = self  # type: ignore[assignment]
         settings = self.rig.tracker.settings
+        cv2.setNumThreads(settings.threads)
         self.source = make_source(settings, self.rig.tracker._where, self.rig.loop.time)
         self.source._random = random.Random(self.rig.seed + 11)
         self.detector = Detector(settings.model, self.rig.tracker.options(settings))
@@ -303,7 +314,6 @@ class Lockstep:
         self.open_eye()
 
     def open_eye(self) -> None:
-        self.tracker.worker = self.eye  # type: ignore[assignment]
         self.eye.start()
         self.pass_time(0.3)
 
