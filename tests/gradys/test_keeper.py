@@ -116,6 +116,38 @@ def test_a_full_disk_is_said_and_sampled_readings_wait_in_memory(loop: Any, keep
     assert [value if value == 0 else value[0] for value in taken(loop, keeper)] == [0, "1", "2", "3"]
 
 
+def test_full_disk_that_can_be_read_is_full_all_the_same(
+    loop: Any, keeper: Keeper, disk: Disk, caplog: pytest.LogCaptureFixture
+) -> None:
+    loop.run(keeper.keep([reading(0)]))
+    disk.fill()
+    keeper.put(reading("1" * 30_000))
+    loop.pass_time(1)
+    for _ in range(50):  # a sink that does not answer has the oldest read again and again
+        assert taken(loop, keeper) == [0]
+        assert "full" in keeper.problem
+        loop.pass_time(0.3)
+        assert "full" in keeper.problem
+    disk.make_room()
+    loop.pass_time(1)
+    assert keeper.problem == ""
+    said = [record.getMessage().partition(":")[0] for record in caplog.records]
+    assert said == ["the spool fails", "the spool works again"]
+
+
+def test_posted_reading_that_a_full_disk_refused_is_a_problem_for_a_while(
+    loop: Any, keeper: Keeper, disk: Disk
+) -> None:
+    loop.run(keeper.keep([reading(0)]))
+    disk.fill()
+    with pytest.raises(NotStored, match="full"):
+        loop.run(keeper.keep([reading("1" * 30_000)]))
+    assert taken(loop, keeper) == [0]
+    assert "full" in keeper.problem
+    loop.pass_time(keepers.TRIM_EVERY + 1)
+    assert keeper.problem == ""  # nothing waits to be kept
+
+
 def test_memory_is_bounded_and_what_it_drops_is_counted(
     loop: Any, keeper: Keeper, disk: Disk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
