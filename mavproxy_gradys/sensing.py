@@ -92,7 +92,7 @@ class Sensing:
         keeper = self._keeper  # it is there when its end was not waited for
         count = len(self._left) if keeper is None else keeper.waiting
         why = (self._why_left if keeper is None else keeper.problem) or "they were not written in time"
-        return f"{count} reading{'' if count == 1 else 's'} are lost: {why}" if count else ""
+        return f"{count} {'reading is' if count == 1 else 'readings are'} lost: {why}" if count else ""
 
     def _kept(self, settings: Settings | None = None) -> Keeper:
         """The spool's keeper, started if need be."""
