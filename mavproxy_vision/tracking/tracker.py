@@ -36,7 +36,7 @@ from mavproxy_vision.tracking.stream_rates import TRUTH, Rates
 from mavproxy_vision.tracking.target_filter import Target
 
 FRESH = 1.0  # s; older detections are not shown as what is in view
-SOON = 0.06  # s of the vehicle's clock that telemetry is carried on to a frame; one farther ahead waits for it
+SOON = 0.06  # s of the vehicle's clock: the longest extrapolation of telemetry to a frame; a later frame waits
 
 
 class Tracker:
@@ -308,7 +308,7 @@ class Tracker:
         return self.seen
 
 
-HEARD: dict[str, tuple[str, ...]] = {  # with the fields that a faulty estimator may make no numbers of
+HEARD: dict[str, tuple[str, ...]] = {  # with the fields that must be finite
     "ATTITUDE": ("roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed"),
     "LOCAL_POSITION_NED": ("x", "y", "z", "vx", "vy", "vz"),
     "GLOBAL_POSITION_INT": (),
