@@ -38,7 +38,7 @@ $(LEAN): requirements/lean.txt setup.py
 	@$(PYTHON) -m venv $(if $(wildcard $(VENV)/pyvenv.cfg),--clear) $(VENV)
 	@echo "== 2/3 MAVProxy and what the modules need: requirements/lean.txt, about 150 MB to fetch the first time"
 	@$(PIP) $(LOCKED) requirements/lean.txt
-	@rm -r $(VENV)/lib/python3*/site-packages/MAVProxy/modules/mavproxy_cesium  # 114 MB that need tornado to start
+	@rm -rf $(VENV)/lib/python3*/site-packages/MAVProxy/modules/mavproxy_cesium  # 114 MB that need tornado to start
 	@echo "== 3/3 the modules themselves"
 	@$(PIP) install --quiet --no-deps --no-build-isolation -e .
 	@touch $@
