@@ -10,7 +10,7 @@ from mavproxy_uavapi.core.vehicle.endings import Policy
 from mavproxy_uavapi.core.vehicle.stream_requester import StreamRequester
 from mavproxy_uavapi.http.app import Server
 from mavproxy_uavapi.http.call import Service
-from mavproxy_uavapi.settings import Settings
+from mavproxy_uavapi.settings import ApiSettings
 
 
 class Api:
@@ -27,7 +27,7 @@ class Api:
         """Whether the server is up."""
         return self._server is not None
 
-    async def start(self, settings: Settings) -> None:
+    async def start(self, settings: ApiSettings) -> None:
         """Listen as the settings say; does nothing when it listens already.
 
         Raises:
@@ -47,8 +47,8 @@ class Api:
         self._freshness = asyncio.create_task(StreamRequester(self.host.registry, settings.sysid).run())
         self._finding_scripts = asyncio.create_task(server.service.scripts.start())
 
-    async def renew(self, settings: Settings) -> None:
-        """Take up settings that need no other listening (`Settings.listens_as`): what is in flight goes on."""
+    async def renew(self, settings: ApiSettings) -> None:
+        """Take up settings that need no other listening (`ApiSettings.listens_as`): what is in flight goes on."""
         if self._server is None:
             return
         self._take_up(settings)
@@ -56,7 +56,7 @@ class Api:
         service.settings = settings
         service.scripts.renew(settings)
 
-    def _take_up(self, settings: Settings) -> None:
+    def _take_up(self, settings: ApiSettings) -> None:
         self.host.link_watch.timeout = settings.link_timeout
         self.host.endings.on_disconnect = Policy.HOLD if settings.on_disconnect == "hold" else Policy.NOTHING
         self.host.endings.on_script_exit = Policy(settings.on_script_exit)

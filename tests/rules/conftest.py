@@ -28,7 +28,7 @@ from mavproxy_uavapi.core.vehicle.stream_requester import StreamRequester
 from mavproxy_uavapi.http.app import make_app
 from mavproxy_uavapi.http.call import Service
 from mavproxy_uavapi.http.connection import Connection
-from mavproxy_uavapi.settings import ModuleSettings
+from mavproxy_uavapi.settings import ApiModuleSettings
 from mavproxy_uavapi.sim import Options, Simulator
 from mavproxy_uavapi.sim.control import Control
 from mavproxy_uavapi.sim.mission import Item
@@ -160,7 +160,7 @@ class World:
         self._encoder = mavlink.MAVLink(None, *US)
         self._parser = mavlink.MAVLink(None)
         self._arriving: list[Any] = []
-        self.service = Service(host, ModuleSettings(settings, environ={}).snapshot())
+        self.service = Service(host, ApiModuleSettings(settings, environ={}).snapshot())
         for route in Handlers(Gradys(host)).routes():
             host.extensions[route.path] = route
         self._runner = web.AppRunner(make_app(self.service), access_log=None, handler_cancellation=True)

@@ -23,7 +23,7 @@ import pytest
 from mavproxy_uavapi.http.app import Server
 from mavproxy_uavapi.http.call import BODY_TIMEOUT
 from mavproxy_uavapi.http.routes import ROUTES
-from mavproxy_uavapi.settings import ModuleSettings
+from mavproxy_uavapi.settings import ApiModuleSettings
 
 TOKEN = "a-long-and-secret-word"
 OWNER = f"Authorization: Bearer {TOKEN}\r\n"
@@ -129,7 +129,7 @@ def port(loop: Any, service: Any) -> Iterator[Port]:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         free = int(probe.getsockname()[1])
-    service.settings = ModuleSettings({"port": free, "token": TOKEN}, environ={}).snapshot()
+    service.settings = ApiModuleSettings({"port": free, "token": TOKEN}, environ={}).snapshot()
     server = Server(service)
     loop.run(server.start())
     port = Port(loop, server, free)
@@ -235,7 +235,7 @@ def test_tls_handshake_that_stops_half_way_is_given_up_and_holds_up_nobody(
         probe.bind(("127.0.0.1", 0))
         free = int(probe.getsockname()[1])
     given = {"port": free, "certfile": cert, "keyfile": key}
-    service.settings = ModuleSettings(given, environ={}).snapshot()
+    service.settings = ApiModuleSettings(given, environ={}).snapshot()
     server = Server(service)
     port = Port(loop, server, free)
 
