@@ -8,7 +8,6 @@ with a last will of its own; one Mosquitto on this machine; this process subscri
 from __future__ import annotations
 
 import argparse
-import importlib.util
 import json
 import math
 import os
@@ -21,19 +20,10 @@ import time
 from pathlib import Path
 from typing import Any
 
-HARNESS = Path(__file__).parents[1] / "tests" / "end_to_end" / "conftest.py"
+from rig import harness
+
 MOSQUITTO = shutil.which("mosquitto", path="/usr/sbin:/usr/bin:/usr/local/sbin")
 TICKS = os.sysconf("SC_CLK_TCK")
-
-
-def harness() -> Any:
-    """The processes of the end-to-end tests."""
-    spec = importlib.util.spec_from_file_location("harness", HARNESS)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["harness"] = module
-    spec.loader.exec_module(module)
-    return module
 
 
 def generate(port: int, vehicles: int) -> None:
@@ -114,7 +104,7 @@ def main() -> int:
         print("fleet: Mosquitto is not installed (apt install mosquitto)")
         return 0
     with tempfile.TemporaryDirectory() as name:
-        return run(harness(), Path(name), given.vehicles, given.seconds)
+        return run(harness, Path(name), given.vehicles, given.seconds)
 
 
 def run(tools: Any, directory: Path, vehicles: int, seconds: float) -> int:

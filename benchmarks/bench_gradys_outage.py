@@ -7,7 +7,6 @@ receiver is ended, started again after `--minutes`, and then asked what it has.
 from __future__ import annotations
 
 import argparse
-import importlib.util
 import json
 import sys
 import tempfile
@@ -16,19 +15,9 @@ from pathlib import Path
 from typing import Any
 
 import requests
+from rig import harness
 
-HARNESS = Path(__file__).parents[1] / "tests" / "end_to_end" / "conftest.py"
 RATE = 10  # posted readings per second
-
-
-def harness() -> Any:
-    """The processes of the end-to-end tests."""
-    spec = importlib.util.spec_from_file_location("harness", HARNESS)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["harness"] = module
-    spec.loader.exec_module(module)
-    return module
 
 
 def post_for(rig: Any, session: requests.Session, seconds: float) -> list[int]:
@@ -50,7 +39,7 @@ def main() -> int:
     arguments.add_argument("--minutes", type=float, default=1.0, help="how long the receiver is down (%(default)g)")
     minutes = arguments.parse_args().minutes
     with tempfile.TemporaryDirectory() as name:
-        return run(harness(), Path(name), minutes * 60)
+        return run(harness, Path(name), minutes * 60)
 
 
 def run(tools: Any, directory: Path, seconds: float) -> int:

@@ -21,8 +21,8 @@ from typing import Any
 
 import cv2
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "vision"))
-from lockstep import Lockstep
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from tests.support.lockstep import Lockstep
 
 ON_TAG = 0.20  # m
 LIMIT = {"median": 0.10, "95 %": 0.20, "on the tag": 0.98}

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import importlib.util
 import json
 import math
 import multiprocessing
@@ -15,6 +14,7 @@ import os
 import selectors
 import socket
 import struct
+import sys
 import tempfile
 import threading
 import time
@@ -31,15 +31,10 @@ MAVLINK2 = 0xFD
 SIGNED = 1  # incompatibility flag: 13 bytes of signature follow
 
 
-def _end_to_end() -> Any:
-    spec = importlib.util.spec_from_file_location("end_to_end", ROOT / "tests" / "end_to_end" / "conftest.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+sys.path.insert(0, str(ROOT))  # for `tests.support`, whose processes these are
 
+from tests.support import processes as harness  # noqa: E402
 
-harness = _end_to_end()
 # The harness gives each worker of pytest-xdist ports of its own: ours must not be those of a test run.
 os.environ.setdefault("PYTEST_XDIST_WORKER", f"gw{10 + os.getpid() % 15}")
 

@@ -14,7 +14,7 @@ from mavproxy_gradys.forwarding.readings import LONGEST_TEXT, NAME, Reading, Val
 from mavproxy_gradys.service import Gradys
 from mavproxy_gradys.tracks.flight import VERB, flight_of
 from mavproxy_gradys.tracks.formats import places_of
-from mavproxy_gradys.tracks.request import Track, TrackFile
+from mavproxy_gradys.tracks.request import TrackFile, TrackRequest
 from mavproxy_uavapi.core.errors import Invalid, NoVehicle
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.http.extension import EITHER, POST, Answer, Call, Empty, Request, Route
@@ -71,7 +71,7 @@ class Readings(Request):
         return given if not isinstance(given, dict) or "readings" in given else {"readings": [given]}
 
 
-class Handlers:
+class GradysHandlers:
     """Answers, by the module's service."""
 
     def __init__(self, gradys: Gradys) -> None:
@@ -83,7 +83,7 @@ class Handlers:
             Route("/gradys/status", self.status, Empty),
             Route("/gradys/readings", self.readings, Readings, POST),
             Route("/gradys/flush", self.flush, Empty, EITHER),
-            Route(VERB, self.fly_track, Track, POST, job=True),
+            Route(VERB, self.fly_track, TrackRequest, POST, job=True),
         ]
 
     async def status(self, call: Call) -> dict[str, Any]:
@@ -110,7 +110,7 @@ class Handlers:
 
     async def fly_track(self, call: Call) -> Answer:
         """Take off, fly through a track's places, return and land."""
-        given = call.params(Track)
+        given = call.params(TrackRequest)
         call.remembered = TrackFile.of(given)
         places = await asyncio.to_thread(places_of, given.track, given.ground)
         flight = flight_of(call.vehicle, places, given.reach, given.transit)

@@ -10,7 +10,7 @@ from typing import Any
 
 try:
     from mavproxy_gradys import console
-    from mavproxy_gradys.http import Handlers
+    from mavproxy_gradys.http import GradysHandlers
     from mavproxy_gradys.service import Gradys
     from mavproxy_gradys.settings import GradysModuleSettings, GradysSettings
     from mavproxy_gradys.tracks.console import HELP as TRACK_HELP
@@ -71,7 +71,7 @@ class GradysModule(SharedModule):
         self._background = BackgroundCommands(self.host, NAME)
         self._lost = ""  # what the end found unwritten
         self._track = TrackConsole(self.host, self.gradys.tracks)
-        self._routes = Handlers(self.gradys).routes()
+        self._routes = GradysHandlers(self.gradys).routes()
         self.remembered.keep(self.gradys_settings.shown)
 
     def begin(self) -> None:

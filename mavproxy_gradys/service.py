@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 from mavproxy_gradys.forwarding.pipeline import ReadingPipeline
-from mavproxy_gradys.net.addresses import Station
+from mavproxy_gradys.net.addresses import StationAddress
 from mavproxy_gradys.net.http_client import Client
 from mavproxy_gradys.push.pusher import Pusher
 from mavproxy_gradys.push.statistics import StationTally
@@ -58,11 +58,11 @@ class Gradys:
         self._tasks = [begin(pusher.run(), f"the push to {pusher.station.url}") for pusher in pushers]
         self.pipeline.start(settings)
 
-    def _pusher(self, station: Station, settings: GradysSettings) -> Pusher:
+    def _pusher(self, station: StationAddress, settings: GradysSettings) -> Pusher:
         client = Client(settings.timeout, settings.token, settings.ca_file)
         return Pusher(station, self.host, settings, self._tally(station), client)
 
-    def _tally(self, station: Station) -> StationTally:
+    def _tally(self, station: StationAddress) -> StationTally:
         tally = self.stations.setdefault(station.url, StationTally(station.url, random.random))
         tally.backoff.hurry()
         return tally

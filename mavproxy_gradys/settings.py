@@ -13,7 +13,7 @@ from MAVProxy.modules.lib.mp_settings import MPSetting
 from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.forwarding.readings import Quantity, parse_quantities
 from mavproxy_gradys.forwarding.sink_address import SinkAddress, sink_addresses
-from mavproxy_gradys.net.addresses import Station, checked_ip, stations
+from mavproxy_gradys.net.addresses import StationAddress, checked_ip, stations
 from mavproxy_gradys.net.http_client import tls_context
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.ini_file import IniFile
@@ -40,7 +40,7 @@ class GradysSettings:
         spool_hours: age (h) after which readings are dropped.
     """
 
-    gs: tuple[Station, ...]
+    gs: tuple[StationAddress, ...]
     ip: str
     period: float
     max_age: float

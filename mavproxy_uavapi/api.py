@@ -8,7 +8,7 @@ import contextlib
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.vehicle.endings import Policy
 from mavproxy_uavapi.core.vehicle.stream_requester import StreamRequester
-from mavproxy_uavapi.http.app import Server
+from mavproxy_uavapi.http.app import ApiServer
 from mavproxy_uavapi.http.call import Service
 from mavproxy_uavapi.settings import ApiSettings
 
@@ -18,7 +18,7 @@ class Api:
 
     def __init__(self, host: Host) -> None:
         self.host = host
-        self._server: Server | None = None
+        self._server: ApiServer | None = None
         self._freshness: asyncio.Task[None] | None = None
         self._finding_scripts: asyncio.Task[None] | None = None
 
@@ -36,7 +36,7 @@ class Api:
         if self._server is not None:
             return
         self._take_up(settings)
-        server = Server(Service(self.host, settings))
+        server = ApiServer(Service(self.host, settings))
         try:
             await server.start()
         except BaseException:  # a cancellation too: nobody would close the port

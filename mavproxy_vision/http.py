@@ -93,7 +93,7 @@ class FrameRequest(Request):
     latency: Annotated[float | None, Field(ge=0, le=10_000), Written] = None
 
 
-class Handlers:
+class VisionHandlers:
     """The actions of the routes."""
 
     def __init__(self, tracker: Tracker, flights: FlightJobs) -> None:

@@ -7,15 +7,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-try:
-    import cv2
-    import numpy  # noqa: F401
-except ImportError as missing:  # MAVProxy prints the text of an ImportError as one line
-    raise ImportError(f"vision needs {missing.name}: pip install 'mavproxy-uavapi[vision]'") from missing
-if not hasattr(getattr(cv2, "aruco", None), "ArucoDetector"):
-    raise ImportError(
-        f"vision needs OpenCV 4.10 or newer, this is {cv2.__version__}: pip install -U 'mavproxy-uavapi[vision]'"
-    )
+from mavproxy_vision import opencv_install
+
+if (_problem := opencv_install.problem()) is not None:
+    raise ImportError(_problem)  # MAVProxy prints the text of an ImportError as one line
+
+import cv2
 
 from mavproxy_uavapi.core.background import BackgroundCommands
 from mavproxy_uavapi.core.errors import SettingError, UavApiError
@@ -24,7 +21,7 @@ from mavproxy_uavapi.core.remembered_settings import RememberedSettings
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.http.extension import NED_REACH
 from mavproxy_vision import console, file_commands
-from mavproxy_vision.http import Handlers
+from mavproxy_vision.http import VisionHandlers
 from mavproxy_vision.landing.flight_jobs import FlightJobs, FlightTask
 from mavproxy_vision.landing.mission import MissionPlan
 from mavproxy_vision.settings import METHODS, VisionModuleSettings
@@ -71,7 +68,7 @@ class VisionModule(SharedModule):
         self.tracker = Tracker(self.host, self.vision_settings.snapshot())
         self.flights = FlightJobs(self.tracker, self._directory)
         self._background = BackgroundCommands(self.host, NAME)
-        self._pages = Handlers(self.tracker, self.flights)
+        self._pages = VisionHandlers(self.tracker, self.flights)
         self._routes = {route.path: route for route in self._pages.routes()}
         self.remembered.keep(self.vision_settings.shown)
 
@@ -103,13 +100,14 @@ class VisionModule(SharedModule):
 
     def _abandon(self) -> None:
         """End what is in flight."""
-        if not self.host.bridge.running:
-            return
 
         async def abandoned() -> None:
             self.flights.abort_all()
 
-        self.host.bridge.run(abandoned())
+        if self.host.bridge.running:
+            self.host.bridge.run(abandoned())
+        else:  # there is no asyncio thread yet, and nothing flies
+            self.flights.abort_all()
 
     def _directory(self) -> Path:
         """Where files go."""
@@ -311,6 +309,9 @@ def init(mpstate: Any, **kwargs: Any) -> VisionModule:
             kind of error in one line, and goes on.
     """
     try:
-        return VisionModule(mpstate, kwargs)
+        module = VisionModule(mpstate, kwargs)
     except SettingError as error:
         raise ImportError(f"vision: {error}") from error
+    if (overlap := opencv_install.overlap()) is not None:
+        print(f"vision: {overlap}")
+    return module

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import asyncio
-import importlib.util
 import os
+import runpy
 import shutil
 import signal
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -165,29 +164,25 @@ def descriptors() -> Callable[[], int]:
     return open_descriptors
 
 
-def load_file(path: str) -> Any:
-    """A module of our tests that is no test, by its path under tests/, loaded once."""
-    name = "helpers_" + path.replace("/", "_").removesuffix(".py")
-    if name not in sys.modules:
-        spec = importlib.util.spec_from_file_location(name, Path(__file__).parent / path)
-        assert spec is not None and spec.loader is not None
-        module = importlib.util.module_from_spec(spec)
-        sys.modules[name] = module
-        spec.loader.exec_module(module)
-    return sys.modules[name]
+@pytest.fixture
+def setup_py() -> dict[str, Any]:
+    """What setup.py gives to setuptools."""
+    import setuptools
 
-
-@pytest.fixture(scope="session")
-def helper() -> Callable[[str], Any]:
-    """`load_file`."""
-    return load_file
+    with pytest.MonkeyPatch.context() as patch:
+        given: dict[str, Any] = {}
+        patch.setattr(setuptools, "setup", given.update)
+        runpy.run_path(str(Path(__file__).parents[1] / "setup.py"))
+    return given
 
 
 @pytest.fixture
-def boards(helper: Callable[[str], Any]) -> Any:
+def boards() -> Any:
     """The module that draws chessboards."""
     pytest.importorskip("cv2")
-    return helper("vision/boards.py")
+    from tests.support import boards
+
+    return boards
 
 
 def pytest_configure() -> None:

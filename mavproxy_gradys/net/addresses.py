@@ -15,7 +15,7 @@ PORTS = {"http": 80, "https": 443, "mqtt": 1883, "mqtts": 8883}
 
 
 @dataclass(frozen=True)
-class Station:
+class StationAddress:
     """A ground station.
 
     Attributes:
@@ -34,7 +34,7 @@ class Station:
         return f"{self.url}/update-info/"
 
 
-def stations(text: str) -> tuple[Station, ...]:
+def stations(text: str) -> tuple[StationAddress, ...]:
     """The stations of a list by comma: HOST:PORT, [IPV6]:PORT, or http(s)://HOST:PORT.
 
     Raises:
@@ -44,7 +44,7 @@ def stations(text: str) -> tuple[Station, ...]:
     return tuple(dict.fromkeys(found))
 
 
-def station(text: str) -> Station:
+def station(text: str) -> StationAddress:
     """One station.
 
     Raises:
@@ -55,7 +55,7 @@ def station(text: str) -> Station:
         raise SettingError(f"{text!r}: it takes HOST:PORT, or http(s)://HOST:PORT")
     host = parts.hostname or ""
     shown = f":{port}" if parts.port is not None else ""
-    return Station(f"{parts.scheme}://{bracketed(host)}{shown}", host, port)
+    return StationAddress(f"{parts.scheme}://{bracketed(host)}{shown}", host, port)
 
 
 def masked(url: str) -> str:

@@ -7,7 +7,7 @@ import logging
 from typing import Any
 
 from mavproxy_gradys.errors import NotDelivered
-from mavproxy_gradys.net.addresses import Station, api_note, ip_field, own_address
+from mavproxy_gradys.net.addresses import StationAddress, api_note, ip_field, own_address
 from mavproxy_gradys.net.http_client import FORM, Poster
 from mavproxy_gradys.net.outage_log import Outage
 from mavproxy_gradys.net.resolver import Resolver
@@ -38,7 +38,7 @@ class Pusher:
     """
 
     def __init__(
-        self, station: Station, host: Host, settings: GradysSettings, tally: StationTally, poster: Poster
+        self, station: StationAddress, host: Host, settings: GradysSettings, tally: StationTally, poster: Poster
     ) -> None:
         self.station = station
         self.tally = tally

@@ -13,14 +13,14 @@ from pathlib import Path
 from aiohttp import web
 
 from mavproxy_gradys.station.app import Station
-from mavproxy_gradys.station.store import Store
+from mavproxy_gradys.station.store import PositionStore
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Serve until SIGINT or SIGTERM; the exit status (1 when it cannot listen)."""
     chosen = parser().parse_args(arguments)
-    store = Store(chosen.database)
+    store = PositionStore(chosen.database)
     try:
         asyncio.run(serve(chosen, store))
     except OSError as error:
@@ -45,7 +45,7 @@ def parser() -> argparse.ArgumentParser:
     return made
 
 
-async def serve(chosen: argparse.Namespace, store: Store) -> None:
+async def serve(chosen: argparse.Namespace, store: PositionStore) -> None:
     """Serve until told to end.
 
     Raises:

@@ -23,7 +23,7 @@ from urllib.parse import urlsplit
 from aiohttp import web
 
 from mavproxy_gradys.station.page import PAGE
-from mavproxy_gradys.station.store import COLUMNS, DEVICE_COLUMNS, Store, parse, whole
+from mavproxy_gradys.station.store import COLUMNS, DEVICE_COLUMNS, PositionStore, parse, whole
 
 RECEIVED, DROPPED = 103, 101
 LARGEST_BODY = 16 * 1024 * 1024  # bytes
@@ -40,7 +40,7 @@ class Station:
         token: bearer token that senders must know; empty for none.
     """
 
-    def __init__(self, store: Store, watched: bool = False, token: str = "") -> None:
+    def __init__(self, store: PositionStore, watched: bool = False, token: str = "") -> None:
         self.store = store
         self._watched = watched
         self._token = token

@@ -62,7 +62,7 @@ def parse(form: Mapping[str, str]) -> dict[str, Any]:
     return {**device, "device": device["device"], "id": device["id"]}
 
 
-class Store:
+class PositionStore:
     """Devices and readings; each call blocks for a transaction at most.
 
     Attributes:

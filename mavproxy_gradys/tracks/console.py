@@ -17,7 +17,7 @@ from mavproxy_gradys.tracks.flight import (
     VERB,
     flight_of,
 )
-from mavproxy_gradys.tracks.formats import FORMATS, GROUND, Waypoint, places_of, style_of
+from mavproxy_gradys.tracks.formats import FORMATS, GROUND, TrackWaypoint, places_of, style_of
 from mavproxy_gradys.tracks.service import Tracking
 from mavproxy_uavapi.core.background import BackgroundCommands
 from mavproxy_uavapi.core.errors import BadRequest
@@ -132,7 +132,7 @@ class TrackConsole:
         return await job.outcome()
 
 
-def read(file: Path, ground: float | None) -> list[Waypoint]:
+def read(file: Path, ground: float | None) -> list[TrackWaypoint]:
     """The places that a file's track leads through.
 
     Raises:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from mavproxy_gradys.tracks.formats import Waypoint
+from mavproxy_gradys.tracks.formats import TrackWaypoint
 from mavproxy_uavapi.core.errors import Invalid, NotSupported
 from mavproxy_uavapi.core.vehicle.copter import Copter
 from mavproxy_uavapi.core.vehicle.geodesy import offset
@@ -24,7 +24,7 @@ HIGHEST_TAKEOFF = 500.0  # m above home, as for `takeoff`
 NEAR = 5.0  # m
 
 
-class Flight:
+class TrackFlight:
     """A track that is flown.
 
     Attributes:
@@ -37,7 +37,7 @@ class Flight:
         transit: m above home, at least, on the way to a first place that is not near.
     """
 
-    def __init__(self, copter: Copter, places: Sequence[Waypoint], transit: float = TRANSIT) -> None:
+    def __init__(self, copter: Copter, places: Sequence[TrackWaypoint], transit: float = TRANSIT) -> None:
         self.copter = copter
         self.places = list(places)
         self.transit = transit
@@ -120,14 +120,16 @@ class Flight:
         }
 
 
-def flight_of(vehicle: Vehicle, places: Sequence[Waypoint], reach: float, transit: float = TRANSIT) -> Flight:
+def flight_of(
+    vehicle: Vehicle, places: Sequence[TrackWaypoint], reach: float, transit: float = TRANSIT
+) -> TrackFlight:
     """A flight through those places, looked at before anything is sent.
 
     Args:
         vehicle: who flies.
         places: where to.
         reach: m from here within which the places must lie.
-        transit: as for `Flight`.
+        transit: as for `TrackFlight`.
 
     Raises:
         NotSupported: the vehicle is no copter.
@@ -142,10 +144,10 @@ def flight_of(vehicle: Vehicle, places: Sequence[Waypoint], reach: float, transi
             raise Invalid(
                 f"waypoint {number} of the track is {metres:.0f} m away; `reach` is {reach:g} m", "body", "track"
             )
-    return Flight(vehicle, places, transit)
+    return TrackFlight(vehicle, places, transit)
 
 
-def away(vehicle: Vehicle, place: Waypoint) -> float:
+def away(vehicle: Vehicle, place: TrackWaypoint) -> float:
     """Metres from a vehicle to a place, over the ground.
 
     Raises:

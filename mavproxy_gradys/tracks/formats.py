@@ -46,7 +46,7 @@ GPX_TAIL = "</trkseg></trk>\n</gpx>\n"
 
 
 @dataclass(frozen=True)
-class Reading:
+class GpsReading:
     """A GPS_RAW_INT reading, its fields in the order of the wire."""
 
     time_usec: int
@@ -61,7 +61,7 @@ class Reading:
     satellites_visible: int = 255
 
     @classmethod
-    def of(cls, message: Any) -> Reading:
+    def of(cls, message: Any) -> GpsReading:
         """The reading of a GPS_RAW_INT message."""
         return cls(**{field.name: getattr(message, field.name) for field in fields(cls)})
 
@@ -81,7 +81,7 @@ class Reading:
 
 
 @dataclass(frozen=True)
-class Waypoint:
+class TrackWaypoint:
     """A place to fly to: degrees, and m above home."""
 
     lat: float
@@ -95,7 +95,7 @@ def style_of(name: str) -> str:
     return ending if ending in (GPX, TUPLE) else TEXT
 
 
-def parse(text: str) -> list[Reading]:
+def parse(text: str) -> list[GpsReading]:
     """The readings of a track in either of CentMesh's formats; empty lines and lines that begin with # are left out.
 
     Raises:
@@ -110,7 +110,7 @@ def parse(text: str) -> list[Reading]:
     return found
 
 
-def parse_line(line: str, number: int) -> Reading:
+def parse_line(line: str, number: int) -> GpsReading:
     """One reading.
 
     Raises:
@@ -119,7 +119,7 @@ def parse_line(line: str, number: int) -> Reading:
     if len(line) > LONGEST_LINE:
         raise Invalid(f"line {number} is longer than {LONGEST_LINE} characters: {line[:60]!r}", "body", "track")
     try:
-        reading = Reading(**(_of_text(line) or _of_tuple(line)))
+        reading = GpsReading(**(_of_text(line) or _of_tuple(line)))
     except (TypeError, ValueError) as error:
         raise Invalid(f"line {number} is no GPS_RAW_INT reading: {line[:60]!r}", "body", "track") from error
     if abs(reading.lat) > 90e7 or abs(reading.lon) > 180e7:
@@ -137,7 +137,7 @@ def _of_text(line: str) -> dict[str, int]:
 def _of_tuple(line: str) -> dict[str, int]:
     match = TUPLE_LINE.fullmatch(line)
     numbers = [part for part in match["body"].split(",") if part.strip()] if match else []
-    names = [field.name for field in fields(Reading)]
+    names = [field.name for field in fields(GpsReading)]
     return dict(zip(names, map(_integer, numbers), strict=True)) if numbers else {}
 
 
@@ -148,7 +148,7 @@ def _integer(text: str) -> int:
     return int(text)
 
 
-def places_of(text: str, ground: float | None = None) -> list[Waypoint]:
+def places_of(text: str, ground: float | None = None) -> list[TrackWaypoint]:
     """The places that a track's text leads through; long ones take their time.
 
     Raises:
@@ -157,7 +157,7 @@ def places_of(text: str, ground: float | None = None) -> list[Waypoint]:
     return waypoints(parse(text), ground)
 
 
-def waypoints(track: Sequence[Reading], ground: float | None = None) -> list[Waypoint]:
+def waypoints(track: Sequence[GpsReading], ground: float | None = None) -> list[TrackWaypoint]:
     """The places that a track leads through.
 
     Args:
@@ -172,7 +172,7 @@ def waypoints(track: Sequence[Reading], ground: float | None = None) -> list[Way
     if not fixed:
         raise Invalid("the track holds no reading with a 3D fix", "body", "track")
     level = min(reading.alt for reading in fixed) / 1e3 if ground is None else ground
-    places = [Waypoint(r.lat / 1e7, r.lon / 1e7, round(max(r.alt / 1e3 - level, LOWEST), 3)) for r in fixed]
+    places = [TrackWaypoint(r.lat / 1e7, r.lon / 1e7, round(max(r.alt / 1e3 - level, LOWEST), 3)) for r in fixed]
     if not all(place.alt <= HIGHEST for place in places):
         highest = max(place.alt for place in places)
         raise Invalid(f"the track leads {highest:.0f} m above its ground; {HIGHEST:g} are the most", "body", "track")
@@ -182,16 +182,16 @@ def waypoints(track: Sequence[Reading], ground: float | None = None) -> list[Way
     return found
 
 
-def thinned(places: Iterable[Waypoint]) -> Iterable[Waypoint]:
+def thinned(places: Iterable[TrackWaypoint]) -> Iterable[TrackWaypoint]:
     """The places without those that are hardly away from the one before."""
-    last: Waypoint | None = None
+    last: TrackWaypoint | None = None
     for place in places:
         if last is None or distance(last, place) >= CLOSEST:
             last = place
             yield place
 
 
-def distance(one: Waypoint, other: Waypoint) -> float:
+def distance(one: TrackWaypoint, other: TrackWaypoint) -> float:
     """Metres between two places, height included."""
     north, east = offset(one.lat, one.lon, other.lat, other.lon)
     up = other.alt - one.alt

@@ -12,7 +12,7 @@ from typing import Any
 from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.net.schedule import Ticker
 from mavproxy_gradys.tasks import begin, end
-from mavproxy_gradys.tracks.formats import GPX, GPX_HEAD, GPX_TAIL, Reading
+from mavproxy_gradys.tracks.formats import GPX, GPX_HEAD, GPX_TAIL, GpsReading
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 
@@ -45,7 +45,7 @@ class Recorder:
         self._host, self._style = host, style
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="gradys-track")
         self._task: asyncio.Task[None] | None = None
-        self._newest: Reading | None = None
+        self._newest: GpsReading | None = None
         self._replacing: asyncio.Task[None] | None = None
         self._recorded_at = -1.0
 
@@ -90,9 +90,9 @@ class Recorder:
                 self.problem = f"vehicle {self.system} tells no GPS_RAW_INT"
                 continue
             self._recorded_at = received.at
-            await self._write(Reading.of(received.message))
+            await self._write(GpsReading.of(received.message))
 
-    async def _write(self, reading: Reading) -> None:
+    async def _write(self, reading: GpsReading) -> None:
         point = reading.gpx(time.time()) if self._style == GPX else reading.line(self._style) + "\n"
         try:
             await self._run(append, self.file, point, GPX_TAIL if self._style == GPX else "")
@@ -105,7 +105,7 @@ class Recorder:
     def _heard(self, state: VehicleState, message: Any, _now: float) -> None:
         if state.system != self.system or message.get_type() != "GPS_RAW_INT":
             return
-        self._newest = Reading.of(message)
+        self._newest = GpsReading.of(message)
         if self._replacing is None or self._replacing.done():  # a slow disk gets the newest, not all
             self._replacing = self._host.bridge.loop.create_task(self._write_latest())
 

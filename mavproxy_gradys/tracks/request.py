@@ -12,7 +12,7 @@ from mavproxy_gradys.tracks.formats import GROUND
 from mavproxy_uavapi.http.extension import Request
 
 
-class Limits(Request):
+class TrackLimits(Request):
     """How a track is to be flown.
 
     `ground` is the AMSL altitude (m) that heights count from, by default the track's lowest; every waypoint must
@@ -24,20 +24,20 @@ class Limits(Request):
     transit: Annotated[float, Field(ge=LOWEST_TRANSIT, le=HIGHEST_TAKEOFF, description="m above home")] = TRANSIT
 
 
-class Track(Limits):
+class TrackRequest(TrackLimits):
     """A track to fly: its text, in either of CentMesh's formats."""
 
     track: Annotated[str, Field(min_length=1)]
 
 
-class TrackFile(Limits):
+class TrackFile(TrackLimits):
     """What is remembered of a track that was to be flown: enough to tell one from another."""
 
     digest: str
     size: int
 
     @classmethod
-    def of(cls, given: Track) -> TrackFile:
+    def of(cls, given: TrackRequest) -> TrackFile:
         """What stands for `given`."""
         data = given.track.encode("utf-8", "surrogatepass")
         limits = given.model_dump(exclude={"track"})

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from mavproxy_gradys.tracks.flight import VERB, Flight
+from mavproxy_gradys.tracks.flight import VERB, TrackFlight
 from mavproxy_gradys.tracks.recorder import Recorder
 from mavproxy_uavapi.core.errors import Aborted, Busy
 from mavproxy_uavapi.core.host import Host
@@ -18,7 +18,7 @@ class Tracking:
     def __init__(self, host: Host) -> None:
         self._host = host
         self._recorder: Recorder | None = None
-        self._flights: list[Flight] = []  # those under way, and each vehicle's newest
+        self._flights: list[TrackFlight] = []  # those under way, and each vehicle's newest
 
     async def record(
         self, file: Path, *, style: str, period: float, latest: Path | None, system: int = 0
@@ -49,12 +49,12 @@ class Tracking:
             await recorder.stop()
         return recorder
 
-    async def fly(self, flight: Flight, job: Job) -> str:
+    async def fly(self, flight: TrackFlight, job: Job) -> str:
         """Fly a track, by `Flight.fly`."""
         self._flights = [*self._told(), flight]
         return await flight.fly(job)
 
-    def _told(self) -> list[Flight]:
+    def _told(self) -> list[TrackFlight]:
         newest = {flight.copter: flight for flight in self._flights}
         return [flight for flight in self._flights if flight.running or newest[flight.copter] is flight]
 

@@ -13,18 +13,18 @@ from aiohttp import web
 from aiohttp.http_exceptions import HttpProcessingError
 
 from mavproxy_uavapi.core.errors import NotFound
+from mavproxy_uavapi.http.auditing import audited
 from mavproxy_uavapi.http.bodies import invite
 from mavproxy_uavapi.http.call import ROUTE, SERVICE, Call, Service, parameters
 from mavproxy_uavapi.http.connection import IDLE_TIMEOUT, LINGER, headers_are_here
 from mavproxy_uavapi.http.docs_page import TABLE
-from mavproxy_uavapi.http.limits import BUCKET, STRANGERS, Bucket, at_a_bearable_rate, yield_to_main_loop
 from mavproxy_uavapi.http.listener import Listener, listening_socket
 from mavproxy_uavapi.http.log_throttle import LogThrottle
+from mavproxy_uavapi.http.rate_limits import BUCKET, STRANGERS, Bucket, at_a_bearable_rate, yield_to_main_loop
 from mavproxy_uavapi.http.responses import REFUSED, Handler, errors_as_answers, success
 from mavproxy_uavapi.http.route import Route
 from mavproxy_uavapi.http.routes import ROUTES
 from mavproxy_uavapi.http.security import THROTTLE, door, name_the_trusted
-from mavproxy_uavapi.http.trail import audited
 
 log = logging.getLogger("uavapi.http.server")
 MAX_BODY = 1024 * 1024  # bytes
@@ -109,7 +109,7 @@ def is_ours(record: logging.LogRecord) -> bool:
 log.addFilter(is_ours)
 
 
-class Server:
+class ApiServer:
     """A listening server; all methods belong to the asyncio thread."""
 
     def __init__(self, service: Service) -> None:

@@ -91,7 +91,7 @@ class Subscription:
         return [self._queue.popleft() for _ in range(min(len(self._queue), TOGETHER))]
 
 
-class Broadcast:
+class TelemetryBroadcast:
     """Tells every subscription of the messages that arrive.
 
     Args:

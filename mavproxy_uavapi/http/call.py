@@ -15,7 +15,7 @@ from mavproxy_uavapi.core.timeout import wait_with_timeout
 from mavproxy_uavapi.core.vehicle.copter import Copter
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
-from mavproxy_uavapi.http.broadcast import Broadcast
+from mavproxy_uavapi.http.broadcast import TelemetryBroadcast
 from mavproxy_uavapi.http.requests import Request, parse
 from mavproxy_uavapi.http.responses import envelope
 from mavproxy_uavapi.http.streaming import MOST_OPEN, Slots
@@ -46,12 +46,12 @@ class Service:
     host: Host
     settings: ApiSettings
     scripts: Scripts = field(init=False)
-    broadcast: Broadcast = field(init=False)
+    broadcast: TelemetryBroadcast = field(init=False)
     streams: Slots = field(default_factory=lambda: Slots(MOST_OPEN, "streams are open"))
 
     def __post_init__(self) -> None:
         self.scripts = Scripts(self.host, self.settings)
-        self.broadcast = Broadcast(self.host.listeners)
+        self.broadcast = TelemetryBroadcast(self.host.listeners)
 
 
 class Call:
@@ -138,8 +138,10 @@ class Call:
             outlives_client=outlives_client or is_async,
             timeout=getattr(params, "timeout", None),
         )
-        if is_async:
+        if is_async or (outlives_client and not urgent):  # else it ends with its client, or stops the vehicle
+            self.job = job
             job.script = await self.service.scripts.session_of(self.peer)
+        if is_async:
             return self.accepted(job)
         return self.answer(await self.outcome(job))
 

@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from aiohttp import BodyPartReader, MultipartReader, StreamReader, web
 from aiohttp.base_protocol import BaseProtocol
+from aiohttp.http_exceptions import HttpProcessingError
 
 from mavproxy_uavapi.core.errors import BadRequest
 from mavproxy_uavapi.http.call import in_time
@@ -14,6 +15,7 @@ from mavproxy_uavapi.http.call import in_time
 CHUNK = 65536  # bytes
 WRAPPING = 65536  # bytes of a form besides its file
 FIELD = "file"
+MOST_PARTS = 100  # up to the file; each of tens of thousands would hold up the loop a little
 
 
 def any_name(name: str) -> str:
@@ -30,18 +32,26 @@ async def file_of(request: web.Request, limit: int, checked: Callable[[str], str
         checked: looks at the name before anything is read; what it raises refuses the file.
 
     Raises:
-        BadRequest: there is none, it is too large, or it does not arrive in time.
+        BadRequest: there is none, it is too large, it does not arrive in time, or a form within the form or too many
+            other parts come before it.
     """
     if request.content_type != "multipart/form-data":
         raise BadRequest(f"the file goes into field `{FIELD}` of a multipart/form-data body")
     try:
         form = MultipartReader(request.headers, _stream_of(await _body(request, limit)))
-        while (part := await form.next()) is not None:
-            if isinstance(part, BodyPartReader) and part.name == FIELD and part.filename is not None:
+        for _ in range(MOST_PARTS):
+            part = await form.next()
+            if part is None:
+                raise BadRequest(f"the form has no file in its field `{FIELD}`")
+            if not isinstance(part, BodyPartReader):
+                raise BadRequest("a part of the form is multipart itself")
+            if part.name == FIELD and part.filename is not None:
                 return checked(part.filename), await _contents(part, limit)
     except (ValueError, LookupError, AssertionError, RuntimeError) as error:
         raise BadRequest(f"the body is no multipart form: {error}") from error
-    raise BadRequest(f"the form has no file in its field `{FIELD}`")
+    except HttpProcessingError as error:
+        raise BadRequest(f"a part of the form has bad headers: {error.message}") from error
+    raise BadRequest(f"the form has {MOST_PARTS} parts before its file")
 
 
 async def _body(request: web.Request, limit: int) -> bytes:

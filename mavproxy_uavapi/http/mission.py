@@ -1,161 +1,101 @@
-"""/mission: scripts, each in a tmux session of its own."""
+"""/mission/waypoints, /mission/start, /mission/progress: the mission that the autopilot itself flies."""
 
 from __future__ import annotations
 
 import asyncio
-import json
-import time
-from contextlib import suppress
-from typing import Any
+import hashlib
 
-from aiohttp import web
-
-from mavproxy_uavapi.core.errors import Forbidden, NotFound
-from mavproxy_uavapi.http.call import Call
-from mavproxy_uavapi.http.caller import CALLER, Caller
+from mavproxy_uavapi.core.errors import BadRequest, Busy, Stale
+from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission
+from mavproxy_uavapi.core.vehicle import mission_files, mission_flight
+from mavproxy_uavapi.core.vehicle.jobs import Job
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+from mavproxy_uavapi.http.call import Answer, Call, in_time
 from mavproxy_uavapi.http.forms import file_of
-from mavproxy_uavapi.http.requests import ExecuteScript, ScriptLog, ScriptName
-from mavproxy_uavapi.http.responses import dumps, envelope
-from mavproxy_uavapi.http.streaming import COMMENT, KEEP_ALIVE, EventStream
-from mavproxy_uavapi.scripts import names, runs
-from mavproxy_uavapi.scripts.follower import Follower
-from mavproxy_uavapi.scripts.manager import Scripts
-from mavproxy_uavapi.scripts.runs import Run
+from mavproxy_uavapi.http.requests import MissionFile, Read, StartMission
 
-# The kinds of these answers, as clients of the original service know them.
-SAVED, LISTED, STARTED, CLEARED, RUNNING, STOPPED = 44, 42, 46, 48, 50, 52
-
-LOG_SERVED = 1024 * 1024  # bytes of a log's end
-FOLLOW_EVERY = 0.25  # s between looks at a log: a file tells nobody when it grows
+LARGEST = 1024 * 1024  # bytes of a mission file
 
 
-async def upload_script(call: Call) -> dict[str, Any]:
-    """Save a .py or .sh file, sent as the multipart field `file`, in place of one of that name."""
-    scripts = _scripts(call)
-    name, data = await file_of(call.request, scripts.store.size_limit, names.checked)
-    path = await scripts.save(name, data)
-    return _answer(call, SAVED, info=f"Mission File '{name}' saved at {path} successfully.")
+async def upload(call: Call) -> Answer:
+    """Replace the vehicle's mission and read it back; one that fails leaves the old mission, or says why not."""
+    vehicle = call.vehicle
+    body = await _body(call)
+    items = await asyncio.to_thread(mission_files.read, body)
+    asked = MissionFile(digest=hashlib.sha256(body.encode()).hexdigest(), items=len(items))
+
+    async def verb(job: Job) -> None:
+        _require_no_flown_mission(vehicle)
+
+        def told(done: int, of: int) -> None:
+            job.progress = {"item": done, "items": of}
+
+        await vehicle.waypoints.upload(items, told, check=lambda: _require_no_flown_mission(vehicle))
+
+    # A client that hangs up must not leave half a mission.
+    result = f"Mission of {len(items)} items uploaded"
+    return await call.fly(vehicle, verb, result, outlives_client=True, asked=asked)
 
 
-async def list_scripts(call: Call) -> dict[str, Any]:
-    """The uploaded .py scripts; `shell_scripts` has the .sh ones."""
-    store = _scripts(call).store
-    python = await asyncio.to_thread(store.listed, (".py",))
-    return _answer(call, LISTED, scripts=python, shell_scripts=await asyncio.to_thread(store.listed, (".sh",)))
+async def download(call: Call) -> Answer:
+    """The vehicle's mission, read from it now: `home`, and `items` from number 1 on."""
+    vehicle = call.vehicle
+    home, items = await vehicle.waypoints.download()
+    told = {"home": None if home is None else home.report(0), "items": [i.report(n) for n, i in enumerate(items, 1)]}
+    return call.answer("Success", **told)
 
 
-async def execute_script(call: Call) -> dict[str, Any]:
-    """Run a script in a tmux session of its own; answers when it runs."""
-    scripts, p = _scripts(call), call.params(ExecuteScript)
-    run = await scripts.execute(p.script_name, p.args)
-    return _answer(call, STARTED, **_report(run))
+async def clear(call: Call) -> Answer:
+    """Remove the vehicle's mission."""
+    vehicle = call.vehicle
+
+    async def verb(_job: Job) -> None:
+        _require_no_flown_mission(vehicle)
+        await vehicle.waypoints.clear(check=lambda: _require_no_flown_mission(vehicle))
+
+    return await call.fly(vehicle, verb, "Mission cleared", outlives_client=True)
 
 
-async def running_scripts(call: Call) -> dict[str, Any]:
-    """The scripts that run now, and of those being stopped the seconds until they are killed."""
-    return _answer(call, RUNNING, scripts=[_report(run) for run in await _scripts(call).running()])
+async def start(call: Call) -> Answer:
+    """Fly the mission from its first item, in AUTO; needs an armed vehicle in GUIDED or AUTO."""
+    vehicle, p = call.vehicle, call.params(StartMission)
+    result = "Mission complete" if p.until_complete else "Mission started"
+    return await call.fly(vehicle, lambda job: mission_flight.fly(vehicle, job, p.until_complete, p.timeout), result)
 
 
-async def stop_script(call: Call) -> dict[str, Any]:
-    """Ctrl-C, so that the script can land the vehicle; a kill after the grace period; answers at its end."""
-    run = await _scripts(call).halt(call.params(ScriptName).script_name)
-    return _answer(call, STOPPED, info="Stopped", **_report(run))
+async def progress(call: Call) -> Answer:
+    """Which item is flown, of how many, which was reached last, and how far (m) it is."""
+    vehicle = call.seen
+    told = mission_flight.progress(vehicle)
+    age = vehicle.state.newest("MISSION_CURRENT")
+    assert age is not None
+    seconds = max(vehicle.clock() - age.at, 0.0)
+    limit = call.params(Read).max_age or call.service.settings.max_age
+    if seconds > limit:
+        raise Stale(f"vehicle {vehicle.state.system} last told MISSION_CURRENT {seconds:.1f} s ago")
+    return call.answer("Success", info=told, age_s=round(seconds, 3))
 
 
-async def clear_scripts(call: Call) -> dict[str, Any]:
-    """Remove all uploaded scripts. Those that run go on; logs stay."""
-    removed = await asyncio.to_thread(_scripts(call).store.clear)
-    return _answer(call, CLEARED, info=f"Removed {len(removed)} script(s)", removed=removed)
+def _require_no_flown_mission(vehicle: Vehicle) -> None:
+    """Raises Busy while the vehicle flies the mission that is to be changed."""
+    if vehicle.state.armed and flies_mission(vehicle.mode):
+        raise Busy("the vehicle flies its mission; /command/guided or /command/brake first")
 
 
-async def show_script(call: Call) -> dict[str, Any]:
-    """A script's newest run: whether it goes on, its exit status, and the ends of both logs."""
-    scripts, script = _scripts(call), _script_of(call)
-    run = await scripts.newest(script)
-    if run is None:
-        path = await asyncio.to_thread(scripts.store.find, script)
-        return _answer(call, None, script=script, path=str(path), running=False, run=None)
-    out, err = [await asyncio.to_thread(runs.tail, log) for log in (run.out_log, run.err_log)]
-    return _answer(call, None, script=script, running=run.running, run={**_report(run), "out": out, "err": err})
-
-
-async def script_log(call: Call) -> web.StreamResponse:
-    """The end of a log of a script's newest run, as text; with `follow` both logs as they grow."""
-    scripts, script, p = _scripts(call), _script_of(call), call.params(ScriptLog)
-    run = await scripts.newest(script)
-    if run is None:
-        raise NotFound(f"{script} never ran")
-    if p.follow:
-        with call.service.streams.one_more():
-            return await _follow(call, run)
-    text = await asyncio.to_thread(runs.tail, run.out_log if p.stream == "out" else run.err_log, LOG_SERVED)
-    return web.Response(text=text, content_type="text/plain", charset="utf-8")
-
-
-# -- what they are made of ----------------------------------------------------------------------------------
-
-
-def _scripts(call: Call) -> Scripts:
-    """The scripts, for whoever may have them.
+async def _body(call: Call) -> str:
+    """The mission's text: the body itself, or the file of a multipart form.
 
     Raises:
-        Forbidden: the caller has no token, is no program of this machine, and his network was not named.
+        BadRequest: there is none, or it is no text.
     """
-    caller: Caller = call.request[CALLER]
-    if not (caller.has_token or caller.is_local or caller.is_in(call.service.settings.allow_scripts_from)):
-        raise Forbidden("scripts run on this machine: call with the token, or from here, or set allow_scripts_from")
-    return call.service.scripts
-
-
-def _script_of(call: Call) -> str:
-    return names.resolved(call.request.match_info["name"])
-
-
-def _answer(call: Call, kind: int | None, **members: Any) -> dict[str, Any]:
-    """A success body; a script needs no vehicle, so neither do these."""
-    of_that_kind = {} if kind is None else {"type": kind}
-    return envelope(call.service.scripts.sysid, "Success", **of_that_kind, **members)
-
-
-def _report(run: Run) -> dict[str, Any]:
-    return run.report(time.time())
-
-
-async def _follow(call: Call, run: Run) -> web.StreamResponse:
-    """Both logs from their beginning, line by line, then how the run ended."""
-    response = EventStream()
-    followers = {"out": Follower(run.out_log), "err": Follower(run.err_log)}
-    now = asyncio.get_running_loop().time
-    said_at = now()
-    with suppress(ConnectionError):  # the client has gone, or reads no more: that is how following ends
-        await response.prepare(call.request)
-        while True:
-            run, events = await asyncio.to_thread(_next_events, run, followers)
-            if not events and now() - said_at > KEEP_ALIVE:
-                events = COMMENT
-            if events:
-                await response.write(events)
-                said_at = now()
-            if any(follower.behind for follower in followers.values()):
-                await call.service.host.bridge.wait_for_main_loop()
-            elif run.running:
-                await asyncio.sleep(FOLLOW_EVERY)
-            else:
-                await response.write(f"event: end\ndata: {dumps(_report(run))}\n\n".encode())
-                return response
-    return response
-
-
-def _next_events(run: Run, followers: dict[str, Follower]) -> tuple[Run, bytes]:
-    """The run as it is now, and an event for each of the next lines. Blocking."""
-    run = runs.refreshed(run)  # before the logs: then nothing of them is missed
-    events = [_events(kind, follower.lines(not run.running)) for kind, follower in followers.items()]
-    return run, "".join(events).encode()
-
-
-def _events(kind: str, lines: list[str]) -> str:
-    """An event for each line: a log may have a million, so that they are encoded all at once."""
-    if not lines:
-        return ""
-    before, after = f'event: {kind}\ndata: {{"line": ', "}\n\n"
-    return before + json.dumps(lines, separators=(after + before, ": "))[1:-1] + after
+    request = call.request
+    if request.content_type == "multipart/form-data":
+        _, data = await file_of(request, LARGEST)
+    else:
+        data = await in_time(request.read())
+    if not data.strip():
+        raise BadRequest("the body is the mission: a QGC WPL 110 file, a .plan file, or JSON items")
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise BadRequest(f"the mission is no UTF-8 text: {error}") from error

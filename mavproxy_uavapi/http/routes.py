@@ -11,9 +11,9 @@ from mavproxy_uavapi.http import (
     peripherical,
     photo,
     requests,
+    scripts,
     stream,
     telemetry,
-    waypoints,
 )
 from mavproxy_uavapi.http.route import EITHER, POST, Route
 
@@ -74,20 +74,20 @@ JOBS = [
 ]
 
 MISSION = [
-    Route("/mission/upload-script", mission.upload_script, requests.Empty, POST, raw=True),
-    Route("/mission/list-scripts", mission.list_scripts, requests.Empty),
-    Route("/mission/execute-script", mission.execute_script, requests.ExecuteScript, POST),
-    Route("/mission/running-scripts", mission.running_scripts, requests.Empty),
-    Route("/mission/stop-script", mission.stop_script, requests.ScriptName, POST),
-    Route("/mission/clear-scripts", mission.clear_scripts, requests.Empty, ("DELETE",)),
-    Route("/mission/clear", mission.clear_scripts, requests.Empty, ("DELETE",)),
-    Route("/mission/scripts/{name}", mission.show_script, requests.Empty),
-    Route("/mission/scripts/{name}/log", mission.script_log, requests.ScriptLog),
-    Route("/mission/waypoints", waypoints.upload, requests.Empty, POST, raw=True, job=True),
-    Route("/mission/waypoints", waypoints.download, requests.Empty),
-    Route("/mission/waypoints", waypoints.clear, requests.Empty, ("DELETE",), job=True),
-    Route("/mission/start", waypoints.start, requests.StartMission, POST, job=True),
-    Route("/mission/progress", waypoints.progress, requests.Read),
+    Route("/mission/upload-script", scripts.upload_script, requests.Empty, POST, raw=True),
+    Route("/mission/list-scripts", scripts.list_scripts, requests.Empty),
+    Route("/mission/execute-script", scripts.execute_script, requests.ExecuteScript, POST),
+    Route("/mission/running-scripts", scripts.running_scripts, requests.Empty),
+    Route("/mission/stop-script", scripts.stop_script, requests.ScriptName, POST),
+    Route("/mission/clear-scripts", scripts.clear_scripts, requests.Empty, ("DELETE",)),
+    Route("/mission/clear", scripts.clear_scripts, requests.Empty, ("DELETE",)),
+    Route("/mission/scripts/{name}", scripts.show_script, requests.Empty),
+    Route("/mission/scripts/{name}/log", scripts.script_log, requests.ScriptLog),
+    Route("/mission/waypoints", mission.upload, requests.Empty, POST, raw=True, job=True),
+    Route("/mission/waypoints", mission.download, requests.Empty),
+    Route("/mission/waypoints", mission.clear, requests.Empty, ("DELETE",), job=True),
+    Route("/mission/start", mission.start, requests.StartMission, POST, job=True),
+    Route("/mission/progress", mission.progress, requests.Read),
 ]
 
 PERIPHERICAL = [

@@ -23,8 +23,8 @@ from mavproxy_uavapi.core.errors import Forbidden, TooManyRequests, UavApiError,
 from mavproxy_uavapi.http.call import ROUTE, SERVICE
 from mavproxy_uavapi.http.caller import CALLER, Caller, address_of, group_of
 from mavproxy_uavapi.http.connection import Connection
-from mavproxy_uavapi.http.limits import STRANGERS, STRANGERS_RATE
 from mavproxy_uavapi.http.log_throttle import LogThrottle
+from mavproxy_uavapi.http.rate_limits import STRANGERS, STRANGERS_RATE
 from mavproxy_uavapi.http.responses import REFUSED, Handler, failure
 from mavproxy_uavapi.settings import ApiSettings
 

@@ -16,6 +16,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         the signal's number when a signal that we did not send killed MAVProxy.
     """
     # The watchdog is a module of this package too: it must not carry argparse and asyncio about.
-    from mavproxy_uavapi.launcher.command import run  # noqa: PLC0415
+    from mavproxy_uavapi.launcher.cli import run  # noqa: PLC0415
 
     return run(argv)

@@ -6,7 +6,7 @@ import os
 import time
 from pathlib import Path
 
-from mavproxy_uavapi.launcher.options import Options
+from mavproxy_uavapi.launcher.options import RunOptions
 
 
 def state_root() -> Path:
@@ -30,7 +30,7 @@ def split_log_path(log_path: str | None, sysid: int) -> tuple[Path, str | None]:
     return given, str(given / f"uav_{sysid}.log")
 
 
-def new_run(root: Path, options: Options) -> Path:
+def new_run(root: Path, options: RunOptions) -> Path:
     """Make a fresh directory for this run, readable by its user only: `uav<sysid>/<date>-<time>`."""
     started = time.strftime("%Y%m%d-%H%M%S")
     for attempt in range(1, 1000):

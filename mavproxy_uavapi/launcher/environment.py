@@ -12,7 +12,7 @@ from pathlib import Path
 
 import mavproxy_uavapi
 from mavproxy_uavapi.core.settings import CONFIG_VARIABLE
-from mavproxy_uavapi.launcher.commands import WINDOW_VARIABLES
+from mavproxy_uavapi.launcher.command_lines import WINDOW_VARIABLES
 from mavproxy_uavapi.launcher.errors import LaunchError
 from mavproxy_uavapi.launcher.options import VARIABLES
 

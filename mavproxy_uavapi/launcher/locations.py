@@ -11,7 +11,7 @@ from typing import NamedTuple
 from mavproxy_uavapi.launcher.errors import OptionError
 
 
-class Home(NamedTuple):
+class HomePosition(NamedTuple):
     """Latitude and longitude in degrees (WGS 84), altitude in m AMSL, heading in degrees from north."""
 
     lat: float
@@ -23,13 +23,13 @@ class Home(NamedTuple):
         return f"{self.lat:.7f},{self.lon:.7f},{self.alt:g},{self.heading:g}"
 
 
-BUILT_IN: Mapping[str, Home] = {
-    "AbraDF": Home(-15.840081, -47.926642, 1042, 30),
-    "CMAC": Home(-35.363261, 149.165230, 584, 353),
+BUILT_IN: Mapping[str, HomePosition] = {
+    "AbraDF": HomePosition(-15.840081, -47.926642, 1042, 30),
+    "CMAC": HomePosition(-35.363261, 149.165230, 584, 353),
 }
 
 
-def read_home(text: str) -> Home | None:
+def read_home(text: str) -> HomePosition | None:
     """`lat,lon,alt,heading` -> a home; None where the text is not four numbers or one is out of range."""
     try:
         numbers = [float(part) for part in text.split(",")]
@@ -37,13 +37,13 @@ def read_home(text: str) -> Home | None:
         return None
     if len(numbers) != 4 or not all(map(math.isfinite, numbers)):
         return None
-    home = Home(*numbers)
+    home = HomePosition(*numbers)
     return home if abs(home.lat) <= 90 and abs(home.lon) <= 180 and 0 <= home.heading <= 360 else None
 
 
-def read_locations(lines: Iterable[str]) -> dict[str, Home]:
+def read_locations(lines: Iterable[str]) -> dict[str, HomePosition]:
     """The lines `NAME=lat,lon,alt,heading  # comment` of an ArduPilot locations.txt; others are passed by."""
-    found: dict[str, Home] = {}
+    found: dict[str, HomePosition] = {}
     for line in lines:
         name, _, numbers = line.partition("#")[0].partition("=")
         home = read_home(numbers)
@@ -53,7 +53,7 @@ def read_locations(lines: Iterable[str]) -> dict[str, Home]:
     return found
 
 
-def resolve(location: str, ardupilot_path: str | None = None) -> Home:
+def resolve(location: str, ardupilot_path: str | None = None) -> HomePosition:
     """The home of a location as written on the command line.
 
     Names are looked up where sim_vehicle.py does (the user's own file, then ArduPilot's locations.txt), then

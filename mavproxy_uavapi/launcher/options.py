@@ -1,4 +1,4 @@
-"""Command line and INI file -> one frozen `Options`; one table serves both, so they cannot disagree.
+"""Command line and INI file -> one frozen `RunOptions`; one table serves both, so they cannot disagree.
 
 The names are those of the original service, and so are the sections of the file. Unlike there the command
 line wins over the file, and a missing file or a misspelt key is an error.
@@ -21,10 +21,11 @@ from mavproxy_uavapi.core.values import boolean, is_unset
 from mavproxy_uavapi.launcher import values
 from mavproxy_uavapi.launcher.errors import OptionError
 from mavproxy_uavapi.settings import ApiModuleSettings
+from mavproxy_vision import opencv_install
 
 
 @dataclass(frozen=True)
-class Options:
+class RunOptions:
     """What to start. `None` and empty tuples mean "not given".
 
     Attributes:
@@ -149,7 +150,7 @@ def build_parser() -> argparse.ArgumentParser:
     return parser
 
 
-def parse(argv: Sequence[str], environ: Mapping[str, str] | None = None) -> Options:
+def parse(argv: Sequence[str], environ: Mapping[str, str] | None = None) -> RunOptions:
     """Read the arguments, the environment (`UAVAPI_PORT` …) and the file; the former win over the latter.
 
     Where no argument names the file, `UAVAPI_CONFIG` may.
@@ -177,7 +178,7 @@ def parse(argv: Sequence[str], environ: Mapping[str, str] | None = None) -> Opti
             else:
                 merged[row.name] = row.read(text, f"--{row.name}")
                 origins[row.name] = "command line"
-    options = Options(**merged, mavproxy_args=tuple(arguments[cut + 1 :]), origins=origins)
+    options = RunOptions(**merged, mavproxy_args=tuple(arguments[cut + 1 :]), origins=origins)
     check(options)
     return options
 
@@ -295,16 +296,16 @@ def _modules_own(ini: IniFile) -> tuple[tuple[str, str], ...]:
 
 
 def _check_vision(given: Mapping[str, Any], environ: Mapping[str, str]) -> None:
-    try:
-        from mavproxy_vision.settings import VisionModuleSettings  # noqa: PLC0415  needs OpenCV, which may be missing
-    except ImportError as error:
-        missing = f"[vision] needs {error.name}: pip install 'mavproxy-uavapi[vision]'"
-        raise SettingError(f"{given['config']}: {missing}") from error
+    problem = opencv_install.problem()
+    if problem is not None:
+        raise SettingError(f"{given['config']}: [vision]: {problem}")
+    from mavproxy_vision.settings import VisionModuleSettings  # noqa: PLC0415  it imports OpenCV
+
     VisionModuleSettings(given, environ)
 
 
 def _check_gradys(given: Mapping[str, Any], environ: Mapping[str, str]) -> None:
-    from mavproxy_gradys.settings import GradysModuleSettings  # noqa: PLC0415  who does not use it does not wait
+    from mavproxy_gradys.settings import GradysModuleSettings  # noqa: PLC0415  others need not wait
 
     GradysModuleSettings(given, environ)
 
@@ -316,7 +317,7 @@ MODULES: Mapping[str, Callable[[Mapping[str, Any], Mapping[str, str]], None]] = 
 }
 
 
-def check(options: Options) -> None:
+def check(options: RunOptions) -> None:
     """Refuse combinations that cannot work, before anything starts."""
     if not options.simulated:
         _check_connection(options.connection_type, options.uav_connection)

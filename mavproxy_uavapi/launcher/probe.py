@@ -6,13 +6,13 @@ import asyncio
 from urllib.parse import urlsplit
 
 from mavproxy_uavapi.core.timeout import wait_with_timeout
-from mavproxy_uavapi.launcher.commands import api_url
-from mavproxy_uavapi.launcher.options import Options
+from mavproxy_uavapi.launcher.command_lines import api_url
+from mavproxy_uavapi.launcher.options import RunOptions
 
 TIMEOUT_S = 2.0
 
 
-async def answers(options: Options) -> int | None:
+async def answers(options: RunOptions) -> int | None:
     """The HTTP status of `/telemetry/status`; None while nothing answers. 401 is an answer too: no token is
     sent, for it is not certain who listens on the port.
     """

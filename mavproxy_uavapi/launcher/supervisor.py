@@ -12,10 +12,10 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from mavproxy_uavapi.launcher import commands, environment, processes
+from mavproxy_uavapi.launcher import command_lines, environment, processes
 from mavproxy_uavapi.launcher.errors import LaunchError
-from mavproxy_uavapi.launcher.locations import Home
-from mavproxy_uavapi.launcher.options import Options
+from mavproxy_uavapi.launcher.locations import HomePosition
+from mavproxy_uavapi.launcher.options import RunOptions
 from mavproxy_uavapi.launcher.probe import answers
 
 VEHICLE_START_S = 30.0
@@ -42,7 +42,7 @@ _DEBUG_HINT = " Use 'set moddebug"
 class Supervisor:
     """One run: a MAVProxy, perhaps a vehicle, and the watchdog."""
 
-    def __init__(self, options: Options, run_dir: Path, instance: int | None, home: Home | None) -> None:
+    def __init__(self, options: RunOptions, run_dir: Path, instance: int | None, home: HomePosition | None) -> None:
         self.options = options
         self.run_dir = run_dir
         self.instance = instance
@@ -136,12 +136,12 @@ class Supervisor:
     async def _start_vehicle(self, instance: int) -> None:
         assert self.home is not None
         if self.options.ardupilot_path is None:
-            command = commands.embedded_command(self.options, instance, self.home)
+            command = command_lines.embedded_command(self.options, instance, self.home)
             self.vehicle = await self._start(command, environment.for_python(os.environ), "vehicle.log")
             await self._vehicle_ready()
         else:
             env = environment.for_sim_vehicle(os.environ, self.run_dir)
-            command = commands.sim_vehicle_command(
+            command = command_lines.sim_vehicle_command(
                 self.options, environment.ardupilot_python(), instance, self.home, self.run_dir / "vehicle"
             )
             self.vehicle = await self._start(command, env, "vehicle.log")
@@ -160,11 +160,11 @@ class Supervisor:
 
     async def _start_mavproxy(self) -> None:
         config = None
-        text = commands.settings_file(self.options)
+        text = command_lines.settings_file(self.options)
         if text is not None:
             config = self.run_dir / "uavapi.ini"
             config.write_text(text, encoding="utf-8")
-        command = commands.mavproxy_command(
+        command = command_lines.mavproxy_command(
             self.options, environment.mavproxy_program(), self.run_dir, self.instance, config
         )
         # With components logging to the console the console is where MAVProxy's output belongs.
@@ -201,7 +201,7 @@ class Supervisor:
 
     async def _announce(self) -> None:
         """Say where the API is once it answers. Without a prompt to look at, not answering is the end."""
-        url = commands.api_url(self.options)
+        url = command_lines.api_url(self.options)
         deadline = asyncio.get_running_loop().time() + API_START_S
         status = await answers(self.options)
         while status is None or (status == 503 and self.options.simulated):
@@ -216,7 +216,7 @@ class Supervisor:
             await asyncio.sleep(0.2)
             status = await answers(self.options)
         self.came_up = True
-        print("\n" + commands.greeting(self.options, bool(os.environ.get("UAVAPI_TOKEN"))), flush=True)
+        print("\n" + command_lines.greeting(self.options, bool(os.environ.get("UAVAPI_TOKEN"))), flush=True)
 
     def _check_api_loaded(self) -> None:
         """Do not wait for an API whose module MAVProxy could not load: it says so, and goes on without.

@@ -16,7 +16,7 @@ from mavproxy_uavapi.core.errors import BadRequest, NoVehicle, ToolFailed
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.scripts import clients, names, on_exit, runner, runs, tmux
 from mavproxy_uavapi.scripts.runs import Run
-from mavproxy_uavapi.scripts.store import Store
+from mavproxy_uavapi.scripts.store import ScriptStore
 from mavproxy_uavapi.settings import ApiSettings
 
 log = logging.getLogger("uavapi.script")
@@ -44,7 +44,7 @@ class Scripts:
     def renew(self, settings: ApiSettings) -> None:
         """Take up other settings. Scripts that run go on as they were started."""
         self._settings = settings
-        self.store = Store(
+        self.store = ScriptStore(
             Path(settings.scripts_path).expanduser().absolute(),
             settings.script_size * 1024,
             settings.script_quota * 1024 * 1024,

@@ -9,7 +9,8 @@ from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.scripts.runs import Run
 
 FLOWN_BY_SCRIPTS = "GUIDED"  # in any other mode the vehicle is its pilot's, or on its way down already
-GOES_ON = {"/command/land", "/command/rtl"}  # a dead script's landing or return is what is best for the vehicle
+# A dead script's landing or return is what is best for the vehicle; half a mission is no use to anybody.
+GOES_ON = {"/command/land", "/command/rtl", "/mission/waypoints"}
 
 
 async def after_death(host: Host, sysid: int, run: Run, others: list[str]) -> str:

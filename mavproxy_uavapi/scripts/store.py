@@ -14,7 +14,7 @@ MODE = 0o755
 
 
 @dataclass(frozen=True)
-class Store:
+class ScriptStore:
     """The folder, and how much it may hold.
 
     Attributes:

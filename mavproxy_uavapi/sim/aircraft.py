@@ -12,15 +12,15 @@ from .battery import Battery
 from .channels import Servos, Sticks
 from .demand import Demand
 from .estimator import Estimator
-from .events import Broadcast, Event, StatusText
+from .events import Broadcast, Event, StatusTextEvent
 from .geodesy import Location, Ned, to_ned
 from .land_detector import LandDetector
 from .mission import Mission, home_item
 from .options import Options
-from .parameters import Parameters
+from .parameters import ParameterStore
 from .physics import Body
 from .position_control import Limits, PositionController, Speed
-from .precland import PrecisionLanding
+from .precland import PrecisionLander
 from .yaw_control import AutoYaw
 
 ARMING_DELAY = 2.0
@@ -36,7 +36,7 @@ class Aircraft:
     `events`, which the owner empties.
     """
 
-    def __init__(self, options: Options, parameters: Parameters, mission: Mission, seed: int) -> None:
+    def __init__(self, options: Options, parameters: ParameterStore, mission: Mission, seed: int) -> None:
         self.parameters = parameters
         self.mission = mission
         self.events: deque[Event] = deque()
@@ -51,7 +51,7 @@ class Aircraft:
         self.battery = Battery(parameters)
         self.sticks = Sticks()
         self.servos = Servos(parameters)
-        self.precland = PrecisionLanding(parameters, self.body, self.estimator, self.events)
+        self.precland = PrecisionLander(parameters, self.body, self.estimator, self.events)
         self.home: Location | None = None
         self._home_locked = False
         self.armed = False
@@ -70,7 +70,7 @@ class Aircraft:
 
     def say(self, severity: int, text: str) -> None:
         """Queue a STATUSTEXT of a MAV_SEVERITY."""
-        self.events.append(StatusText(severity, text))
+        self.events.append(StatusTextEvent(severity, text))
 
     # Derived state.
 

@@ -6,7 +6,7 @@ becomes empty.
 
 from __future__ import annotations
 
-from .parameters import Parameters
+from .parameters import ParameterStore
 
 FULL_VOLTAGE = 12.6
 EMPTY_VOLTAGE = 10.2
@@ -19,7 +19,7 @@ HOVER_CURRENT = 18.0
 class Battery:
     """State of charge; voltage in volts, current in amperes, consumed in mAh."""
 
-    def __init__(self, parameters: Parameters) -> None:
+    def __init__(self, parameters: ParameterStore) -> None:
         self._parameters = parameters
         self.consumed = 0.0
         self.consumed_wh = 0.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .parameters import Parameters
+from .parameters import ParameterStore
 
 NEUTRAL = (1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800)
 """What SITL's radio sends before anybody touches it: sticks centred, throttle down, mode switch on 6."""
@@ -66,7 +66,7 @@ class Sticks:
 class Servos:
     """Outputs 1..16; a free one (SERVOn_FUNCTION 0) can be set by command."""
 
-    def __init__(self, parameters: Parameters) -> None:
+    def __init__(self, parameters: ParameterStore) -> None:
         self._parameters = parameters
         self._pulses = [DISABLED_OUTPUT] * SERVO_COUNT
 

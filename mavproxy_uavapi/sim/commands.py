@@ -14,10 +14,10 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from . import arming
-from .copter import Copter
+from .copter import SimulatedCopter
 from .frames import AMSL_FRAMES, GLOBAL_FRAMES, HIGHEST_ALTITUDE, global_target, valid_location
 from .geodesy import Location
-from .link import Link
+from .link import PeerLink
 from .modes import Guided
 from .modes.auto import Auto
 from .position_control import SPEED_KINDS
@@ -46,7 +46,7 @@ LOCATION_COMMANDS = {
 
 
 @dataclass(frozen=True)
-class Command:
+class CommandInt:
     """A command as COMMAND_INT has it: x, y in 1e-7 degrees for a location, z in metres of its frame."""
 
     command: int
@@ -61,7 +61,7 @@ class Command:
     sender: tuple[int, int]
 
 
-def from_message(message: Any) -> Command | None:
+def from_message(message: Any) -> CommandInt | None:
     """COMMAND_LONG or COMMAND_INT as a Command; None for a COMMAND_LONG that ArduPilot takes as INT only.
 
     A parameter that is not a finite number stands for "not given" and reads as 0; z is left as it is, for an
@@ -75,16 +75,16 @@ def from_message(message: Any) -> Command | None:
         _finite(message.param4),
     )
     if message.get_type() == "COMMAND_INT":
-        return Command(message.command, message.frame, *parameters, message.x, message.y, message.z, sender)
+        return CommandInt(message.command, message.frame, *parameters, message.x, message.y, message.z, sender)
     frame = LOCATION_COMMANDS.get(message.command, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT)
     if frame is None:
         return None
     scale = 1e7 if message.command in LOCATION_COMMANDS else 1.0
     x, y = int(_finite(message.param5) * scale), int(_finite(message.param6) * scale)
-    return Command(message.command, frame, *parameters, x, y, message.param7, sender)
+    return CommandInt(message.command, frame, *parameters, x, y, message.param7, sender)
 
 
-def _means_here(command: Command) -> bool:
+def _means_here(command: CommandInt) -> bool:
     """Zeros that stand for the present place or height in a mission; a reposition must not have them."""
     return (command.x == 0 and command.y == 0) or (command.z == 0 and command.frame not in AMSL_FRAMES)
 
@@ -97,13 +97,13 @@ class Commands:
     """Carries out commands on one vehicle; reboot makes it boot again once the acknowledgement is out."""
 
     def __init__(
-        self, copter: Copter, telemetry: Telemetry, transmitter: Transmitter, reboot: Callable[[], None]
+        self, copter: SimulatedCopter, telemetry: Telemetry, transmitter: Transmitter, reboot: Callable[[], None]
     ) -> None:
         self._copter = copter
         self._telemetry = telemetry
         self._transmitter = transmitter
         self._reboot_soon = reboot
-        self._handlers: dict[int, Callable[[Command, Link], int]] = {
+        self._handlers: dict[int, Callable[[CommandInt, PeerLink], int]] = {
             mavlink.MAV_CMD_COMPONENT_ARM_DISARM: self._arm_disarm,
             mavlink.MAV_CMD_RUN_PREARM_CHECKS: self._run_prearm_checks,
             mavlink.MAV_CMD_DO_SET_MODE: self._set_mode,
@@ -132,12 +132,12 @@ class Commands:
             mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._reboot,
         }
 
-    def run(self, command: Command, link: Link) -> int:
+    def run(self, command: CommandInt, link: PeerLink) -> int:
         """Carry the command out; its MAV_RESULT. link is where answers beyond the ack go."""
         handler = self._handlers.get(command.command)
         return UNSUPPORTED if handler is None else handler(command, link)
 
-    def _arm_disarm(self, command: Command, link: Link) -> int:
+    def _arm_disarm(self, command: CommandInt, link: PeerLink) -> int:
         del link
         copter = self._copter
         if command.param1 == 1:
@@ -147,7 +147,7 @@ class Commands:
             return ACCEPTED if copter.disarm(forced=command.param2 == arming.FORCE) else FAILED
         return UNSUPPORTED
 
-    def _run_prearm_checks(self, command: Command, link: Link) -> int:
+    def _run_prearm_checks(self, command: CommandInt, link: PeerLink) -> int:
         del command, link
         copter = self._copter
         if copter.armed:
@@ -161,18 +161,18 @@ class Commands:
             return DENIED
         return ACCEPTED if self._copter.set_mode(custom_mode) else FAILED
 
-    def _set_mode(self, command: Command, link: Link) -> int:
+    def _set_mode(self, command: CommandInt, link: PeerLink) -> int:
         del link
         return self.set_mode(int(command.param1), int(command.param2))
 
-    def _mode_command(self, number: int) -> Callable[[Command, Link], int]:
-        def handler(command: Command, link: Link) -> int:
+    def _mode_command(self, number: int) -> Callable[[CommandInt, PeerLink], int]:
+        def handler(command: CommandInt, link: PeerLink) -> int:
             del command, link
             return ACCEPTED if self._copter.set_mode(number) else FAILED
 
         return handler
 
-    def _take_off(self, command: Command, link: Link) -> int:
+    def _take_off(self, command: CommandInt, link: PeerLink) -> int:
         del link
         copter = self._copter
         if command.frame not in (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT):
@@ -181,7 +181,7 @@ class Commands:
             return FAILED
         return ACCEPTED if copter.mode.take_off(command.z) else FAILED
 
-    def _reposition(self, command: Command, link: Link) -> int:
+    def _reposition(self, command: CommandInt, link: PeerLink) -> int:
         del link
         copter = self._copter
         change = bool(int(command.param2) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
@@ -197,7 +197,7 @@ class Commands:
         copter.guided.go_to(target)
         return ACCEPTED
 
-    def _mission_start(self, command: Command, link: Link) -> int:
+    def _mission_start(self, command: CommandInt, link: PeerLink) -> int:
         del link
         copter = self._copter
         if command.param1 != 0 or command.param2 != 0:
@@ -208,21 +208,21 @@ class Commands:
         copter.auto_armed = copter.armed
         return ACCEPTED
 
-    def _set_mission_current(self, command: Command, link: Link) -> int:
+    def _set_mission_current(self, command: CommandInt, link: PeerLink) -> int:
         del link
         if not self._copter.current_item(int(command.param1)):
             return DENIED
         self._transmitter.broadcast("MISSION_CURRENT")
         return ACCEPTED
 
-    def _condition_yaw(self, command: Command, link: Link) -> int:
+    def _condition_yaw(self, command: CommandInt, link: PeerLink) -> int:
         del link
         if not 0 <= command.param1 <= 360 or command.param4 not in (0, 1):
             return FAILED
         self._copter.fix_yaw(command.param1, command.param2, int(command.param3), command.param4 == 1)
         return ACCEPTED
 
-    def _change_speed(self, command: Command, link: Link) -> int:
+    def _change_speed(self, command: CommandInt, link: PeerLink) -> int:
         del link
         kind = SPEED_KINDS.get(int(command.param1))
         if not command.param2 > 0 or int(command.param1) == NO_SPEED_KIND:
@@ -230,7 +230,7 @@ class Commands:
         changed = kind is not None and self._copter.mode.set_speed(kind, command.param2)
         return ACCEPTED if changed else FAILED
 
-    def _pause_continue(self, command: Command, link: Link) -> int:
+    def _pause_continue(self, command: CommandInt, link: PeerLink) -> int:
         del link
         copter = self._copter
         if int(command.param1) not in (0, 1):
@@ -241,7 +241,7 @@ class Commands:
         copter.say(mavlink.MAV_SEVERITY_INFO, "Failed to pause" if pause else "Failed to resume")
         return FAILED
 
-    def _set_home(self, command: Command, link: Link) -> int:
+    def _set_home(self, command: CommandInt, link: PeerLink) -> int:
         del link
         copter = self._copter
         if command.param1 == 1 or (command.x == 0 and command.y == 0):
@@ -256,7 +256,7 @@ class Commands:
         home = Location(command.x / 1e7, command.y / 1e7, altitude)
         return ACCEPTED if copter.set_home(home, lock=True) else FAILED
 
-    def _get_home(self, command: Command, link: Link) -> int:
+    def _get_home(self, command: CommandInt, link: PeerLink) -> int:
         del command
         if self._copter.home is None:
             return FAILED
@@ -264,7 +264,7 @@ class Commands:
         self._transmitter.send(link, "GPS_GLOBAL_ORIGIN")
         return ACCEPTED
 
-    def _set_roi(self, command: Command, link: Link) -> int:
+    def _set_roi(self, command: CommandInt, link: PeerLink) -> int:
         if not (command.x or command.y or command.z):
             return self._clear_roi(command, link)
         copter = self._copter
@@ -276,26 +276,26 @@ class Commands:
         copter.yaw.look_at(target.north, target.east)
         return ACCEPTED
 
-    def _clear_roi(self, command: Command, link: Link) -> int:
+    def _clear_roi(self, command: CommandInt, link: PeerLink) -> int:
         del command, link
         copter = self._copter
         copter.yaw.roi = None
         copter.yaw.by_parameter(int(copter.parameters["WP_YAW_BEHAVIOR"]), returning=False)
         return ACCEPTED
 
-    def _set_servo(self, command: Command, link: Link) -> int:
+    def _set_servo(self, command: CommandInt, link: PeerLink) -> int:
         del link
         done = self._copter.set_servo(int(command.param1), int(command.param2))
         return ACCEPTED if done else FAILED
 
-    def _terminate(self, command: Command, link: Link) -> int:
+    def _terminate(self, command: CommandInt, link: PeerLink) -> int:
         del link
         if command.param1 <= 0.5:
             return FAILED
         self._copter.disarm_landed()
         return ACCEPTED
 
-    def _request_message(self, command: Command, link: Link) -> int:
+    def _request_message(self, command: CommandInt, link: PeerLink) -> int:
         wanted = int(command.param1)
         if wanted == mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
             return self._send_interval(int(command.param2), link)
@@ -306,7 +306,7 @@ class Commands:
         self._transmitter.send_soon(link, name)
         return ACCEPTED
 
-    def _set_interval(self, command: Command, link: Link) -> int:
+    def _set_interval(self, command: CommandInt, link: PeerLink) -> int:
         copter = self._copter
         name = self._name_of(int(command.param1))
         if name is None:
@@ -334,10 +334,10 @@ class Commands:
         rate = self._copter.parameters[RATE_PARAMETERS[group]] if group is not None else 0.0
         return 1 / rate if rate > 0 else None
 
-    def _get_interval(self, command: Command, link: Link) -> int:
+    def _get_interval(self, command: CommandInt, link: PeerLink) -> int:
         return self._send_interval(int(command.param1), link)
 
-    def _send_interval(self, message_id: int, link: Link) -> int:
+    def _send_interval(self, message_id: int, link: PeerLink) -> int:
         name = self._name_of(message_id)
         if name is None:
             link.send(mavlink.MAVLink_message_interval_message(message_id & 0xFFFF, 0))
@@ -352,18 +352,18 @@ class Commands:
         name = None if kind is None else str(kind.msgname)
         return name if name is not None and self._telemetry.knows(name) else None
 
-    def _capabilities(self, command: Command, link: Link) -> int:
+    def _capabilities(self, command: CommandInt, link: PeerLink) -> int:
         if command.param1 != 1:
             return FAILED
         self._transmitter.send(link, "AUTOPILOT_VERSION")
         return ACCEPTED
 
-    def _banner(self, command: Command, link: Link) -> int:
+    def _banner(self, command: CommandInt, link: PeerLink) -> int:
         del command, link
         self._copter.say_banner()
         return ACCEPTED
 
-    def _reboot(self, command: Command, link: Link) -> int:
+    def _reboot(self, command: CommandInt, link: PeerLink) -> int:
         del link
         if self._copter.armed and command.y != FORCE_REBOOT:
             return FAILED

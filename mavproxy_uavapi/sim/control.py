@@ -34,7 +34,7 @@ from typing import Any
 from .faults import FaultError
 from .geodesy import Ned, from_ned
 from .modes.guided import ZERO
-from .simulator import Received, Simulator
+from .simulator import ReceivedMessage, Simulator
 
 LOW_VOLTAGE = 9.9
 CLIMBING_THROTTLE = 1700
@@ -194,7 +194,7 @@ class Control:
         return {"last": last, "messages": [_describe(entry) for entry in wanted]}
 
 
-def _describe(entry: Received) -> dict[str, Any]:
+def _describe(entry: ReceivedMessage) -> dict[str, Any]:
     fields = entry.message.to_dict()
     name = fields.pop("mavpackettype")
     return {

@@ -13,15 +13,15 @@ from .failsafes import Failsafes
 from .mission import Mission, State
 from .modes import Guided, Mode, build
 from .options import Options
-from .parameters import Parameters
+from .parameters import ParameterStore
 
 FIRMWARE = "ArduCopter V4.6.0 (embedded)"
 
 
-class Copter(Aircraft):
+class SimulatedCopter(Aircraft):
     """An aircraft with its flight modes and what chooses among them: the ground, the pilot's switch, failsafes."""
 
-    def __init__(self, options: Options, parameters: Parameters, mission: Mission, seed: int) -> None:
+    def __init__(self, options: Options, parameters: ParameterStore, mission: Mission, seed: int) -> None:
         super().__init__(options, parameters, mission, seed)
         self.failsafes = Failsafes(self)
         self._idle_since = 0.0

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class StatusText:
+class StatusTextEvent:
     """A line for people; severity is a MAV_SEVERITY."""
 
     severity: int
@@ -27,4 +27,4 @@ class ItemReached:
     seq: int
 
 
-Event = StatusText | Broadcast | ItemReached
+Event = StatusTextEvent | Broadcast | ItemReached

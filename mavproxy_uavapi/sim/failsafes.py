@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from .battery import Battery
 from .estimator import Estimator
 from .modes import Land, Mode, Rtl
-from .parameters import Parameters
+from .parameters import ParameterStore
 
 POSITION_LOST_AFTER = 1.0
 """Seconds without a position after which ArduCopter's EKF failsafe acts."""
@@ -26,7 +26,7 @@ class WatchedVehicle(Protocol):
     mode: Mode
     battery: Battery
     estimator: Estimator
-    parameters: Parameters
+    parameters: ParameterStore
 
     def say(self, severity: int, text: str) -> None:
         """Queue a STATUSTEXT of a MAV_SEVERITY."""

@@ -12,7 +12,7 @@ from .streams import Streams
 COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
 
 
-class Link:
+class PeerLink:
     """Messages for one peer; the owner of the socket takes them with `drain` or `messages`.
 
     While muted() is true what is to be sent is lost, as on a link that is down.

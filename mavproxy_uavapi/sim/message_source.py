@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .copter import Copter
+from .copter import SimulatedCopter
 from .geodesy import Location, Ned
 
 
@@ -12,7 +12,7 @@ class MessageSource:
     unix_epoch is the unix time in seconds at which the vehicle booted.
     """
 
-    def __init__(self, copter: Copter, unix_epoch: float) -> None:
+    def __init__(self, copter: SimulatedCopter, unix_epoch: float) -> None:
         self.copter = copter
         self.unix_epoch = unix_epoch
         self._frozen: tuple[float, Ned, Ned, Location] | None = None

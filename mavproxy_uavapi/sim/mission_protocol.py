@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from .events import StatusText
+from .events import StatusTextEvent
 from .frames import HIGHEST_ALTITUDE, global_target
 from .mission import SUPPORTED, Item, home_item
 
 if TYPE_CHECKING:
-    from .copter import Copter
-    from .link import Link
+    from .copter import SimulatedCopter
+    from .link import PeerLink
 
 LIMIT = 724
 """What ArduCopter can store in SITL."""
@@ -35,7 +35,7 @@ OTHER_LISTS = (mavlink.MAV_MISSION_TYPE_FENCE, mavlink.MAV_MISSION_TYPE_RALLY)
 class Upload:
     """An upload under way from one sender; next and last are item numbers, times simulated seconds."""
 
-    link: Link
+    link: PeerLink
     sender: tuple[int, int]
     kind: int
     next: int
@@ -48,7 +48,7 @@ class Upload:
 class MissionProtocol:
     """Answers MISSION_* messages for one vehicle."""
 
-    def __init__(self, copter: Copter) -> None:
+    def __init__(self, copter: SimulatedCopter) -> None:
         self.copter = copter
         self._lists: dict[int, list[Item]] = {kind: [] for kind in OTHER_LISTS}
         self._upload: Upload | None = None
@@ -63,7 +63,7 @@ class MissionProtocol:
             "MISSION_CLEAR_ALL": self._clear,
         }
 
-    def handle(self, link: Link, message: Any) -> bool:
+    def handle(self, link: PeerLink, message: Any) -> bool:
         """Answer a message on its link; False when it is not of this protocol."""
         handler = self._handlers.get(message.get_type())
         if handler is None:
@@ -99,23 +99,23 @@ class MissionProtocol:
             return items
         return [home_item(home), *items[1:]]
 
-    def _ack(self, link: Link, message: Any, result: int) -> None:
+    def _ack(self, link: PeerLink, message: Any, result: int) -> None:
         link.send(mavlink.MAVLink_mission_ack_message(*_sender(message), result, message.mission_type))
 
-    def _busy(self, link: Link, message: Any) -> bool:
+    def _busy(self, link: PeerLink, message: Any) -> bool:
         if self._upload is None:
             return False
         self._ack(link, message, mavlink.MAV_MISSION_DENIED)
         return True
 
-    def _foreign_upload(self, link: Link, message: Any) -> bool:
+    def _foreign_upload(self, link: PeerLink, message: Any) -> bool:
         """Somebody else's upload must not be disturbed; the own one may be started anew."""
         if self._upload is not None and self._upload.sender != _sender(message):
             return self._busy(link, message)
         self._upload = None
         return False
 
-    def _count(self, link: Link, message: Any) -> None:
+    def _count(self, link: PeerLink, message: Any) -> None:
         if self._foreign_upload(link, message):
             return
         if message.count > LIMIT:
@@ -127,13 +127,13 @@ class MissionProtocol:
             kept = self.items(message.mission_type)[: message.count]
             self._begin(Upload(link, _sender(message), message.mission_type, 0, message.count - 1, kept))
 
-    def _partial(self, link: Link, message: Any) -> None:
+    def _partial(self, link: PeerLink, message: Any) -> None:
         if self._busy(link, message):
             return
         items = list(self.items(message.mission_type))
         first, last = message.start_index, message.end_index
         if not 0 <= first <= last < len(items):
-            self.copter.tell(StatusText(mavlink.MAV_SEVERITY_WARNING, "Flight plan update rejected"))
+            self.copter.tell(StatusTextEvent(mavlink.MAV_SEVERITY_WARNING, "Flight plan update rejected"))
             self._ack(link, message, mavlink.MAV_MISSION_ERROR)
             return
         self._begin(Upload(link, _sender(message), message.mission_type, first, last, items))
@@ -149,7 +149,7 @@ class MissionProtocol:
             upload.asked_at = self.copter.now
             upload.link.send(mavlink.MAVLink_mission_request_message(*upload.sender, upload.next, upload.kind))
 
-    def _item(self, link: Link, message: Any) -> None:
+    def _item(self, link: PeerLink, message: Any) -> None:
         if message.mission_type == MISSION and message.current in (GUIDED_TARGET, ALTITUDE_CHANGE):
             self._ack(link, message, self._take_guided(message))
             return
@@ -186,7 +186,7 @@ class MissionProtocol:
         copter.guided.go_to(target)
         return True
 
-    def _take(self, link: Link, message: Any, upload: Upload) -> None:
+    def _take(self, link: PeerLink, message: Any, upload: Upload) -> None:
         refusal = _refusal(message) if upload.kind == MISSION and message.seq > 0 else None
         if refusal is not None:
             self._abandon(upload)
@@ -215,15 +215,15 @@ class MissionProtocol:
         else:
             self._lists[kind] = items
 
-    def _request_list(self, link: Link, message: Any) -> None:
+    def _request_list(self, link: PeerLink, message: Any) -> None:
         if not self._busy(link, message):
             self._send_count(link, message)
 
-    def _send_count(self, link: Link, message: Any) -> None:
+    def _send_count(self, link: PeerLink, message: Any) -> None:
         count = len(self.items(message.mission_type))
         link.send(mavlink.MAVLink_mission_count_message(*_sender(message), count, message.mission_type))
 
-    def _request(self, link: Link, message: Any) -> None:
+    def _request(self, link: PeerLink, message: Any) -> None:
         if self._busy(link, message):
             return
         items = self.items(message.mission_type)
@@ -233,7 +233,7 @@ class MissionProtocol:
             return
         link.send(_as_message(items[message.seq], message))
 
-    def _clear(self, link: Link, message: Any) -> None:
+    def _clear(self, link: PeerLink, message: Any) -> None:
         if self._foreign_upload(link, message):
             return
         cleared = True

@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from .geodesy import from_ned
 from .message_source import MessageSource
-from .modes.guided import ZERO, Submode
+from .modes.guided import ZERO, GuidedSubmode
 from .physics import GRAVITY
 from .setpoints import ACCELERATION_IGNORE, POSITION_IGNORE, VELOCITY_IGNORE, YAW_IGNORE, YAW_RATE_IGNORE
 
@@ -18,11 +18,11 @@ ONLY_POSITION = VELOCITY_IGNORE | ACCELERATION_IGNORE | NO_YAW
 UNUSED_MASK_BITS = 0xF000
 """ArduCopter sets them in POSITION_TARGET_GLOBAL_INT."""
 TARGET_MASKS = {
-    Submode.TAKEOFF: ONLY_POSITION,
-    Submode.POSITION: ONLY_POSITION,
-    Submode.TRACKING: NO_YAW,
-    Submode.VELOCITY: POSITION_IGNORE | NO_YAW,
-    Submode.ACCELERATION: POSITION_IGNORE | VELOCITY_IGNORE | NO_YAW,
+    GuidedSubmode.TAKEOFF: ONLY_POSITION,
+    GuidedSubmode.POSITION: ONLY_POSITION,
+    GuidedSubmode.TRACKING: NO_YAW,
+    GuidedSubmode.VELOCITY: POSITION_IGNORE | NO_YAW,
+    GuidedSubmode.ACCELERATION: POSITION_IGNORE | VELOCITY_IGNORE | NO_YAW,
 }
 """The type mask of POSITION_TARGET_LOCAL_NED in each submode of GUIDED."""
 UNKNOWN_QUATERNION = [math.nan] * 4

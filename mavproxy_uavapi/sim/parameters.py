@@ -32,7 +32,7 @@ class Parameter:
     value: float
 
 
-class Parameters:
+class ParameterStore:
     """All parameters, by name and by index; they outlive a reboot."""
 
     def __init__(self) -> None:

@@ -14,9 +14,9 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from .estimator import Estimator
-from .events import Event, StatusText
+from .events import Event, StatusTextEvent
 from .geodesy import Ned
-from .parameters import Parameters
+from .parameters import ParameterStore
 from .physics import Body
 
 MAVLINK_TYPE = 1
@@ -26,10 +26,10 @@ SMOOTHING = 0.3
 HOVER = 2
 
 
-class PrecisionLanding:
+class PrecisionLander:
     """The target of one vehicle: NED metres from the EKF origin; now is seconds since boot."""
 
-    def __init__(self, parameters: Parameters, body: Body, estimator: Estimator, events: deque[Event]) -> None:
+    def __init__(self, parameters: ParameterStore, body: Body, estimator: Estimator, events: deque[Event]) -> None:
         self._parameters = parameters
         self._body = body
         self._estimator = estimator
@@ -48,7 +48,7 @@ class PrecisionLanding:
         north, east = _level((message.x, message.y, message.z), self._body)
         place = (here.north + north, here.east + east)
         if self._target is None or not self.acquired(now):
-            self._events.append(StatusText(mavlink.MAV_SEVERITY_INFO, "PrecLand: Target Found"))
+            self._events.append(StatusTextEvent(mavlink.MAV_SEVERITY_INFO, "PrecLand: Target Found"))
             self._target = place
         else:
             old = self._target

@@ -12,7 +12,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from .control import Control
-from .link import Link
+from .link import PeerLink
 from .simulator import STEP, Simulator
 
 BACKLOG_LIMIT = 1 << 20
@@ -28,7 +28,7 @@ READ_SIZE = 65536
 class Peer:
     """A connected ground link: its socket, parser and unsent bytes."""
 
-    def __init__(self, link: Link, sock: socket.socket, address: Any = None) -> None:
+    def __init__(self, link: PeerLink, sock: socket.socket, address: Any = None) -> None:
         self.link, self.sock, self.address = link, sock, address
         self.unsent = b""
         self._parser = mavlink.MAVLink(None)
@@ -88,7 +88,7 @@ class Server:
         self._peers.append(peer)
         self._selector.register(sock, selectors.EVENT_READ, lambda: self._read_datagrams(peer))
 
-    def _open_link(self, name: str) -> Link:
+    def _open_link(self, name: str) -> PeerLink:
         self._links_made += 1
         return self.simulator.open_link(f"{name}#{self._links_made}")
 

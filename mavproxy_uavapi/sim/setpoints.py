@@ -11,7 +11,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from .copter import Copter
+from .copter import SimulatedCopter
 from .frames import TERRAIN_FRAMES, global_target
 from .geodesy import Ned, rotate_to_ne
 from .modes.guided import ZERO, YawSetpoint
@@ -33,17 +33,17 @@ class InvalidSetpoint(Exception):
     """A setpoint that ArduCopter answers by stopping."""
 
 
-def apply_local(copter: Copter, message: Any) -> None:
+def apply_local(copter: SimulatedCopter, message: Any) -> None:
     """SET_POSITION_TARGET_LOCAL_NED; ignored outside GUIDED."""
     _apply(copter, message, _local_position, message.coordinate_frame in LOCAL_FRAMES)
 
 
-def apply_global(copter: Copter, message: Any) -> None:
+def apply_global(copter: SimulatedCopter, message: Any) -> None:
     """SET_POSITION_TARGET_GLOBAL_INT; ignored outside GUIDED."""
     _apply(copter, message, _global_position, True)
 
 
-def _apply(copter: Copter, message: Any, read_position: Any, frame_known: bool) -> None:
+def _apply(copter: SimulatedCopter, message: Any, read_position: Any, frame_known: bool) -> None:
     guided = copter.guided
     if copter.mode is not guided:
         return
@@ -55,7 +55,7 @@ def _apply(copter: Copter, message: Any, read_position: Any, frame_known: bool) 
         guided.stop()
 
 
-def _dispatch(copter: Copter, message: Any, read_position: Any) -> None:
+def _dispatch(copter: SimulatedCopter, message: Any, read_position: Any) -> None:
     guided, mask = copter.guided, message.type_mask
     if mask & FORCE and not mask & ACCELERATION_IGNORE:
         raise InvalidSetpoint
@@ -78,7 +78,7 @@ def _dispatch(copter: Copter, message: Any, read_position: Any) -> None:
         raise InvalidSetpoint
 
 
-def _local_position(copter: Copter, message: Any) -> Ned:
+def _local_position(copter: SimulatedCopter, message: Any) -> Ned:
     north, east, down = message.x, message.y, message.z
     if not all(map(math.isfinite, (north, east, down))):
         raise InvalidSetpoint
@@ -92,7 +92,7 @@ def _local_position(copter: Copter, message: Any) -> Ned:
     return Ned(north, east, down)
 
 
-def _global_position(copter: Copter, message: Any) -> Ned:
+def _global_position(copter: SimulatedCopter, message: Any) -> Ned:
     if abs(message.lat_int) > 900000000 or abs(message.lon_int) > 1800000000 or not math.isfinite(message.alt):
         raise InvalidSetpoint
     target = global_target(copter, message.coordinate_frame, message.lat_int, message.lon_int, message.alt)
@@ -101,21 +101,21 @@ def _global_position(copter: Copter, message: Any) -> Ned:
     return target
 
 
-def _velocity(copter: Copter, message: Any) -> Ned:
+def _velocity(copter: SimulatedCopter, message: Any) -> Ned:
     velocity = (message.vx, message.vy, message.vz)
     if not all(math.isfinite(part) and abs(part) <= HIGHEST_SPEED for part in velocity):
         raise InvalidSetpoint
     return _rotated(copter, message, velocity)
 
 
-def _acceleration(copter: Copter, message: Any) -> Ned:
+def _acceleration(copter: SimulatedCopter, message: Any) -> Ned:
     acceleration = (message.afx, message.afy, message.afz)
     if not all(map(math.isfinite, acceleration)):
         raise InvalidSetpoint
     return _rotated(copter, message, acceleration)
 
 
-def _rotated(copter: Copter, message: Any, vector: tuple[float, float, float]) -> Ned:
+def _rotated(copter: SimulatedCopter, message: Any, vector: tuple[float, float, float]) -> Ned:
     """In the body frames of a local setpoint x is forward and y right."""
     local = message.get_type() == "SET_POSITION_TARGET_LOCAL_NED"
     if local and message.coordinate_frame in BODY_FRAMES:

@@ -22,13 +22,13 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from . import setpoints
 from .commands import UNSUPPORTED, Commands, from_message
-from .copter import Copter
+from .copter import SimulatedCopter
 from .faults import Faults, PlannedAck
-from .link import COMPONENT, Link
+from .link import COMPONENT, PeerLink
 from .mission import Mission
 from .mission_protocol import MissionProtocol
 from .options import Options
-from .parameters import Parameter, Parameters
+from .parameters import Parameter, ParameterStore
 from .streams import RATE_PARAMETERS
 from .telemetry import Telemetry
 from .transmitter import Transmitter
@@ -44,7 +44,7 @@ FTP_HEADER = 12
 
 
 @dataclass(frozen=True)
-class Received:
+class ReceivedMessage:
     """A message that came from a ground link: simulated seconds since boot, wall time as given."""
 
     index: int
@@ -59,14 +59,14 @@ class Simulator:
 
     def __init__(self, options: Options, epoch: float = 0.0) -> None:
         self.options = options
-        self.parameters = Parameters()
+        self.parameters = ParameterStore()
         self.parameters.set("SIM_SPEEDUP", options.speedup)
         self.parameters.set("SYSID_THISMAV", options.sysid)
         self.parameters.set("SIM_WIND_SPD", options.wind.speed)
         self.parameters.set("SIM_WIND_DIR", options.wind.direction)
         self.faults = Faults()
-        self.links: list[Link] = []
-        self.received: deque[Received] = deque(maxlen=REMEMBERED_MESSAGES)
+        self.links: list[PeerLink] = []
+        self.received: deque[ReceivedMessage] = deque(maxlen=REMEMBERED_MESSAGES)
         self._received_count = 0
         self._boots = 0
         self._epoch = epoch
@@ -92,7 +92,7 @@ class Simulator:
     def _boot(self, mission: Mission) -> None:
         """Start from nothing: time zero, disarmed, where the vehicle began. Parameters and mission stay."""
         self._boots += 1
-        self.copter = Copter(self.options, self.parameters, mission, self.options.seed + self._boots - 1)
+        self.copter = SimulatedCopter(self.options, self.parameters, mission, self.options.seed + self._boots - 1)
         self.telemetry = Telemetry(self.copter, self._epoch)
         self.missions = MissionProtocol(self.copter)
         self._transmitter = Transmitter(self.copter, self.telemetry, self.faults, self.links)
@@ -113,13 +113,13 @@ class Simulator:
 
     # Links.
 
-    def open_link(self, name: str = "") -> Link:
+    def open_link(self, name: str = "") -> PeerLink:
         """A new link; it gets heartbeats at once and streams when it asks for them."""
-        link = Link(self.options.sysid, name, lambda: self.faults.mute(self.copter.now))
+        link = PeerLink(self.options.sysid, name, lambda: self.faults.mute(self.copter.now))
         self.links.append(link)
         return link
 
-    def close_link(self, link: Link) -> None:
+    def close_link(self, link: PeerLink) -> None:
         """The peer has gone."""
         self.links.remove(link)
 
@@ -150,13 +150,13 @@ class Simulator:
 
     # What comes in.
 
-    def receive(self, link: Link, message: Any, wall: float = 0.0) -> None:
+    def receive(self, link: PeerLink, message: Any, wall: float = 0.0) -> None:
         """Take a decoded message from a link; wall is the caller's clock, kept for `received` only."""
         copter = self.copter
         if self.faults.deaf(copter.now) or not self._for_us(message) or self.faults.drops(message):
             return
         self._received_count += 1
-        self.received.append(Received(self._received_count, copter.now, wall, link.name, message))
+        self.received.append(ReceivedMessage(self._received_count, copter.now, wall, link.name, message))
         if self.missions.handle(link, message):
             return
         handler = self._handlers.get(message.get_type())
@@ -168,7 +168,7 @@ class Simulator:
         component = getattr(message, "target_component", 0)
         return system in (0, self.options.sysid) and component in (0, COMPONENT)
 
-    def _command(self, link: Link, message: Any) -> None:
+    def _command(self, link: PeerLink, message: Any) -> None:
         fault = self.faults.refusal(message.command)
         if fault is not None:
             result = fault.result
@@ -183,27 +183,27 @@ class Simulator:
         for ack in self.faults.acks(message.command, result, self.copter.now):
             self._plan_ack(link, message.command, ack, sender)
 
-    def _plan_ack(self, link: Link, command: int, planned: PlannedAck, sender: tuple[int, int]) -> None:
+    def _plan_ack(self, link: PeerLink, command: int, planned: PlannedAck, sender: tuple[int, int]) -> None:
         ack = mavlink.MAVLink_command_ack_message(command, planned.result, 0, 0, *sender)
         if planned.at <= self.copter.now:
             link.send(ack, planned.source)
         else:
             self._transmitter.plan(planned.at, link, ack, planned.source)
 
-    def _set_mode(self, link: Link, message: Any) -> None:
+    def _set_mode(self, link: PeerLink, message: Any) -> None:
         del link
         self.commands.set_mode(message.base_mode, message.custom_mode)
 
-    def _request_stream(self, link: Link, message: Any) -> None:
+    def _request_stream(self, link: PeerLink, message: Any) -> None:
         rate = message.req_message_rate if message.start_stop == 1 else 0
         for group in link.streams.request_group(message.req_stream_id, rate, self.copter.now):
             self.parameters.set(RATE_PARAMETERS[group], rate)  # as ArduPilot: it is the stream's default from now on
 
-    def _parameter_list(self, link: Link, message: Any) -> None:
+    def _parameter_list(self, link: PeerLink, message: Any) -> None:
         del message
         link.parameter_cursor = 0
 
-    def _send_parameters(self, link: Link) -> None:
+    def _send_parameters(self, link: PeerLink) -> None:
         start = link.parameter_cursor or 0
         for parameter in self.parameters.ordered[start : start + PARAMETERS_PER_STEP]:
             link.send(self._parameter_value(parameter, parameter.index))
@@ -214,13 +214,13 @@ class Simulator:
         name = parameter.name.encode()
         return mavlink.MAVLink_param_value_message(name, parameter.value, parameter.kind, len(self.parameters), index)
 
-    def _parameter_read(self, link: Link, message: Any) -> None:
+    def _parameter_read(self, link: PeerLink, message: Any) -> None:
         parameter = self.parameters.find(message.param_id, message.param_index)
         if parameter is not None:
             index = message.param_index if message.param_index >= 0 else UNKNOWN_INDEX
             link.send(self._parameter_value(parameter, index))
 
-    def _parameter_set(self, link: Link, message: Any) -> None:
+    def _parameter_set(self, link: PeerLink, message: Any) -> None:
         """An unknown name is not answered; a new value is told to all links."""
         del link
         value = message.param_value
@@ -231,28 +231,28 @@ class Simulator:
             for link in self.links:
                 link.send(self._parameter_value(parameter, UNKNOWN_INDEX))
 
-    def _mission_set_current(self, link: Link, message: Any) -> None:
+    def _mission_set_current(self, link: PeerLink, message: Any) -> None:
         if self.copter.current_item(message.seq):
             link.send(self.telemetry.mission_current(message.seq))
 
-    def _local_setpoint(self, link: Link, message: Any) -> None:
+    def _local_setpoint(self, link: PeerLink, message: Any) -> None:
         del link
         setpoints.apply_local(self.copter, message)
 
-    def _global_setpoint(self, link: Link, message: Any) -> None:
+    def _global_setpoint(self, link: PeerLink, message: Any) -> None:
         del link
         setpoints.apply_global(self.copter, message)
 
-    def _sticks(self, link: Link, message: Any) -> None:
+    def _sticks(self, link: PeerLink, message: Any) -> None:
         del link
         pulses = [getattr(message, f"chan{channel}_raw") for channel in range(1, 9)]
         self.copter.sticks.override(pulses, self.copter.now)
 
-    def _timesync(self, link: Link, message: Any) -> None:
+    def _timesync(self, link: PeerLink, message: Any) -> None:
         if message.tc1 == 0:
             link.send(mavlink.MAVLink_timesync_message(int(self.copter.now * 1e9), message.ts1))
 
-    def _file_transfer(self, link: Link, message: Any) -> None:
+    def _file_transfer(self, link: PeerLink, message: Any) -> None:
         """There is no file system: a NAK lets MAVProxy fall back to PARAM_REQUEST_LIST at once."""
         request = bytes(message.payload)
         sequence = (int.from_bytes(request[0:2], "little") + 1) & 0xFFFF

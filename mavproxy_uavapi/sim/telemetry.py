@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from .copter import Copter
+from .copter import SimulatedCopter
 from .motion_messages import MotionMessages
 from .system_messages import SystemMessages
 from .truth_messages import TruthMessages
@@ -14,7 +14,7 @@ from .truth_messages import TruthMessages
 class Telemetry(MotionMessages, SystemMessages, TruthMessages):
     """Builds messages by name; None where ArduCopter would not send one either."""
 
-    def __init__(self, copter: Copter, unix_epoch: float) -> None:
+    def __init__(self, copter: SimulatedCopter, unix_epoch: float) -> None:
         super().__init__(copter, unix_epoch)
         self._builders: dict[str, Callable[[], Any]] = {
             name.removeprefix("_build_").upper(): getattr(self, name)

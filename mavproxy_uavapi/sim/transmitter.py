@@ -8,10 +8,10 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from .copter import Copter
-from .events import Broadcast, Event, StatusText
+from .copter import SimulatedCopter
+from .events import Broadcast, Event, StatusTextEvent
 from .faults import Faults
-from .link import Link
+from .link import PeerLink
 from .telemetry import Telemetry
 
 TEXT_LENGTH = 50
@@ -20,21 +20,21 @@ TEXT_LENGTH = 50
 class Transmitter:
     """Sends for one vehicle from one boot to the next; links is its owner's list, which may change meanwhile."""
 
-    def __init__(self, copter: Copter, telemetry: Telemetry, faults: Faults, links: list[Link]) -> None:
+    def __init__(self, copter: SimulatedCopter, telemetry: Telemetry, faults: Faults, links: list[PeerLink]) -> None:
         self._copter = copter
         self._telemetry = telemetry
         self._faults = faults
         self._links = links
-        self._planned: list[tuple[float, int, Link, Any, tuple[int, int] | None]] = []
+        self._planned: list[tuple[float, int, PeerLink, Any, tuple[int, int] | None]] = []
         self._order = count()
 
-    def send(self, link: Link, name: str) -> None:
+    def send(self, link: PeerLink, name: str) -> None:
         """Queue a message about the present state for one link, if there is something to say."""
         message = self._telemetry.build(name)
         if message is not None:
             link.send(self._faults.spoilt(message, self._copter.now))
 
-    def send_soon(self, link: Link, name: str) -> None:
+    def send_soon(self, link: PeerLink, name: str) -> None:
         """The same with the next step."""
         message = self._telemetry.build(name)
         if message is not None:
@@ -51,13 +51,13 @@ class Transmitter:
             self.broadcast(event.name)
             return
         for link in self._links:
-            if isinstance(event, StatusText):
+            if isinstance(event, StatusTextEvent):
                 text = event.text.encode()[:TEXT_LENGTH]
                 link.send(mavlink.MAVLink_statustext_message(event.severity, text))
             else:
                 link.send(mavlink.MAVLink_mission_item_reached_message(event.seq))
 
-    def plan(self, at: float, link: Link, message: Any, source: tuple[int, int] | None = None) -> None:
+    def plan(self, at: float, link: PeerLink, message: Any, source: tuple[int, int] | None = None) -> None:
         """Send message at `at` seconds since boot; source makes it come from another system and component."""
         heapq.heappush(self._planned, (at, next(self._order), link, message, source))
 

@@ -74,10 +74,11 @@ class PrecisionDescent(Descent):
         Raises:
             LandingFailed: it was given up.
             Rejected: the autopilot does not take its parameters.
+            Superseded, Paused, ModeChanged, NotArmed: somebody else has it; no more parameters are set.
             TimedOut: it stays low above the target, in LAND.
         """
-        flight = self.flight
-        await self.plnd.set_up()
+        flight, vehicle = self.flight, self.flight.vehicle
+        await self.plnd.set_up(vehicle.commanding(flight.job, lambda: vehicle.held_by("GUIDED")))
         while True:
             order = await flight.fly(landing)
             if order.phase is Phase.FAILED:

@@ -120,6 +120,7 @@ class FlightJobs:
         self._plnd: dict[int, PrecisionLanding] = {}
         self._tidying: set[PrecisionLanding] = set()
         self._tasks: set[asyncio.Task[None]] = set()
+        self._unloaded = False
         tracker.host.last_words.append(self.last_words)
 
     def copter(self) -> Copter:
@@ -181,6 +182,7 @@ class FlightJobs:
             plnd.in_use = False
             if plnd.before and plnd not in self._tidying:
                 self._do(self._tidy(plnd))
+        self._leave_host()
 
     async def keep(self, track: FlightLog, report: Report) -> None:
         """Write track and plot; what cannot be written is said in the report."""
@@ -228,6 +230,7 @@ class FlightJobs:
                         log.warning("vision: %s", error)
             await asyncio.sleep(TIDY_EVERY)
         self._tidying.discard(plnd)
+        self._leave_host()
 
     # -- from the prompt, and at the end ---------------------------------------------------------------------
 
@@ -258,6 +261,14 @@ class FlightJobs:
     def abort_all(self) -> None:
         """End all flights, because the module is unloaded."""
         self._end("vision was unloaded", Ending.UNLOADED)
+        self._unloaded = True
+        self._leave_host()
+
+    def _leave_host(self) -> None:
+        """Have nothing more to say at the host's end, once nothing flies and all parameters are given back."""
+        words = self.tracker.host.last_words
+        if self._unloaded and not self._begun and not self.last_words() and self.last_words in words:
+            words.remove(self.last_words)
 
     def _end(self, reason: str, ending: Ending) -> str | None:
         """End those in flight and those that are being prepared; what was done with the former goes first."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
+from collections.abc import Callable
 from typing import Any
 
 from pymavlink import mavutil
@@ -40,6 +41,10 @@ WANTED = {
 }
 
 
+def no_check() -> None:
+    """What may be sent whoever has the vehicle: parameters are read, and given back."""
+
+
 class PrecisionLanding:
     """PLND on one vehicle: what it was set to before our landings, until it is that again.
 
@@ -71,11 +76,14 @@ class PrecisionLanding:
             await self._set(AT_BOOT, WANTED[AT_BOOT])
             raise Rejected("PLND_TYPE is 1 now, but the autopilot reads it at boot: reboot it, then try again")
 
-    async def set_up(self) -> None:
+    async def set_up(self, check: Callable[[], None]) -> None:
         """Set the parameters and read them back.
 
+        Args:
+            check: asked before each sending, and with each heartbeat: what it raises ends this, and no more is set.
+
         Raises:
-            Rejected: a parameter did not take its value.
+            Rejected: a parameter did not take its value; and whatever `check` raises.
         """
         self.in_use = True
         async with self._lock:
@@ -84,7 +92,7 @@ class PrecisionLanding:
                 if name not in told or (told[name] == value and name not in self.before):
                     continue
                 self.before.setdefault(name, told[name])  # of a landing cut short it is still the first value
-                await self._set(name, value)
+                await self._set(name, value, check)
 
     async def switch_off(self) -> None:
         """Give the switch back, without which the others mean nothing: LAND and RTL heed no target then.
@@ -133,20 +141,24 @@ class PrecisionLanding:
             raise Rejected(f"the autopilot does not tell {name}")
         return float(message.param_value)
 
-    async def _set(self, name: str, value: float) -> None:
-        if await self._asked(name, set_parameter(self.vehicle.address, name, value), value) is None:
+    async def _set(self, name: str, value: float, check: Callable[[], None] = no_check) -> None:
+        if await self._asked(name, set_parameter(self.vehicle.address, name, value), value, check) is None:
             raise Rejected(f"the autopilot does not take {name} = {value:g}")
 
-    async def _asked(self, name: str, request: Any, value: float | None) -> Any:
+    async def _asked(self, name: str, request: Any, value: float | None, check: Callable[[], None] = no_check) -> Any:
         """The PARAM_VALUE that answers a request, sent up to TRIES times; with `value` only one that tells that."""
         vehicle = self.vehicle
 
         def answer(message: Any) -> Any:
+            if message.get_type() == "HEARTBEAT":
+                check()
+                return None
             same = value is None or math.isclose(message.param_value, value, rel_tol=1e-5, abs_tol=1e-5)
             return message if message.param_id == name and same else None
 
         for _ in range(TRIES):
-            with vehicle.waiting.expecting({"PARAM_VALUE"}, answer) as told:
+            check()
+            with vehicle.waiting.expecting({"PARAM_VALUE", "HEARTBEAT"}, answer) as told:
                 await vehicle.link.send(request, vehicle.state.system)
                 with contextlib.suppress(TimedOut):
                     return await told.within(READ_BACK, f"answer for {name}")

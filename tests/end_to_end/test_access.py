@@ -210,7 +210,8 @@ print(json.dumps(told))
 @pytest.mark.needs("ip", "iproute2")
 def test_network_that_may_fly_has_a_share_of_the_connections_and_no_scripts(lan, harness, tmp_path):
     folders = {"scripts_path": str(tmp_path / "scripts"), "script_logs": str(tmp_path / "logs")}
-    rig = harness.embedded(tmp_path, host="0.0.0.0", allow_from=lan.network, **folders)
+    named = f"{lan.network},127.0.0.0/8"
+    rig = harness.embedded(tmp_path, host="0.0.0.0", token=TOKEN, allow_from=named, **folders)
     try:
         url = f"http://{lan.here}:{rig.port}"
 

@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
-from mavproxy_gradys.http import LONGEST_LIST, LONGEST_TEXT, MOST_READINGS, Handlers, Readings
+from mavproxy_gradys.http import LONGEST_LIST, LONGEST_TEXT, MOST_READINGS, GradysHandlers, Readings
 from mavproxy_gradys.service import Gradys
-from mavproxy_gradys.tracks.request import Track
+from mavproxy_gradys.tracks.request import TrackRequest
 from mavproxy_uavapi.core.errors import Invalid
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import parse
@@ -73,7 +73,7 @@ def test_nobody_poses_as_a_vehicle(loop: Any, host: Any, teller: Any, settings: 
 
     def post(**body: Any) -> Any:
         call = Call(service, SimpleNamespace(), parse(Readings, "body", {"value": 1, **body}))  # type: ignore[arg-type]
-        return loop.run(Handlers(gradys).readings(call))
+        return loop.run(GradysHandlers(gradys).readings(call))
 
     for body in ({"quantity": "position"}, {"quantity": "alt", "device": "uav-1"}, {"quantity": "status"}):
         with pytest.raises(Invalid, match="told by the vehicle itself"):
@@ -92,4 +92,4 @@ def test_a_track_has_limits() -> None:
         {"track": "x", "transit": 501},
     ):
         with pytest.raises(Invalid):
-            parse(Track, "body", body)
+            parse(TrackRequest, "body", body)

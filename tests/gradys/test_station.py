@@ -9,7 +9,7 @@ import pytest
 from aiohttp.test_utils import TestClient, TestServer
 
 from mavproxy_gradys.station.app import Station
-from mavproxy_gradys.station.store import Store, parse
+from mavproxy_gradys.station.store import PositionStore, parse
 
 FORM = {"id": "10", "lat": "-15.84", "lng": "-47.9", "alt": "20.1", "device": "uav", "type": "102", "seq": "0"}
 
@@ -27,8 +27,8 @@ def clock() -> Clock:
 
 
 @pytest.fixture
-def store(tmp_path: Path, clock: Clock) -> Iterator[Store]:
-    store = Store(tmp_path / "station.db", clock)
+def store(tmp_path: Path, clock: Clock) -> Iterator[PositionStore]:
+    store = PositionStore(tmp_path / "station.db", clock)
     yield store
     store.close()
 
@@ -46,7 +46,7 @@ def reading(seq: Any, **given: Any) -> dict[str, Any]:
     }
 
 
-def test_readings_are_kept_once_each(store: Store) -> None:
+def test_readings_are_kept_once_each(store: PositionStore) -> None:
     assert store.add([reading(1), reading(2)]) == [1, 2]
     assert store.add([reading(2, value=9), reading(3)]) == [2, 3]  # a repeat is acknowledged again
     assert [(row[1], row[5]) for row in store.readings()] == [(1, 1.5), (2, 1.5), (3, 1.5)]
@@ -58,19 +58,19 @@ def test_readings_are_kept_once_each(store: Store) -> None:
 @pytest.mark.parametrize("bad", [{}, reading("1"), reading(True), reading(1, value=float("nan")), 7, reading(2**63),
                                  reading(1, time=float("nan")), reading(1, time=10**400),
                                  reading(1, device="\ud800")])  # fmt: skip
-def test_a_batch_with_something_else_in_it_is_not_kept(store: Store, bad: Any) -> None:
+def test_a_batch_with_something_else_in_it_is_not_kept(store: PositionStore, bad: Any) -> None:
     with pytest.raises(ValueError):
         store.add([reading(5), bad])
     assert store.count() == 0
 
 
-def test_readings_by_device_quantity_and_number(store: Store) -> None:
+def test_readings_by_device_quantity_and_number(store: PositionStore) -> None:
     store.add([reading(n, quantity="alt" if n % 2 else "volt") for n in range(10)])
     assert [row[1] for row in store.readings(quantity="alt", after=3, limit=2)] == [5, 7]
     assert list(store.readings(device="nobody")) == []
 
 
-def test_devices_have_an_age_and_a_status(store: Store, clock: Clock) -> None:
+def test_devices_have_an_age_and_a_status(store: PositionStore, clock: Clock) -> None:
     store.update(parse(FORM))
     for age, status in ((0.0, "active"), (6.0, "on_hold"), (11.0, "inactive")):
         clock.now = 100.0 + age
@@ -88,7 +88,7 @@ def test_what_the_ground_station_cannot_read_this_cannot_either(change: dict[str
 
 
 @pytest.fixture
-def ask(loop: Any, store: Store) -> Iterator[Callable[..., Any]]:
+def ask(loop: Any, store: PositionStore) -> Iterator[Callable[..., Any]]:
     """Asks the station: `ask("GET", "/readings")`; (status, text)."""
     loop.patience = 0.05
 

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 from typing import NamedTuple
 
@@ -23,7 +24,7 @@ class Fault(NamedTuple):
 
 
 class Verb(NamedTuple):
-    """A verb: its path, what a success takes when all goes well (s), and its outcome by fault."""
+    """A verb: its path or words, what a success takes when all goes well (s), and its outcome by fault."""
 
     path: str
     takes: float
@@ -74,7 +75,8 @@ FAULTS = {
     ),
     "client gone": Fault(
         "The client hangs up: the verb ends and is forgotten, the vehicle keeps its last setpoint. What lands, "
-        "returns or stops it goes on.",
+        "returns or stops it goes on, and so do vision's flights. A script does not hang up but dies: what it flew "
+        "ends, but for a landing or return, and the vehicle does what `on_script_exit` says, here as by default.",
         0.1,
     ),
     "another client streams": Fault(
@@ -91,6 +93,7 @@ FAULTS = {
 
 REFUSAL = 2.0  # s; the autopilot's own word, after sending again
 ENDED, GOES_ON = "ended", "goes on"  # where nobody is left to be answered
+HOLDS = "; holds"  # after an outcome: the vehicle is told to hold then, until telemetry shows it, and nothing else
 NONE = ""  # where it cannot happen
 
 SUCCESS = dict.fromkeys(FAULTS, "200")
@@ -105,6 +108,9 @@ GUIDED_ONLY = {"during a take-off": "409 busy", "in AUTO": "409 mode_changed"}
 OTHERS = {"another client streams": "409 superseded", "another station flies it": "409 superseded"}
 MOVING = {**SUCCESS, **LOST, **FLIGHT, **OTHERS, **GUIDED_ONLY}  # by setpoints, which nobody acknowledges
 TRACK = {**MOVING, **REFUSED}  # of the gradys module: movements, and a return
+VISION = {**MOVING, "client gone": GOES_ON, "another station flies it": "200"}  # it repeats its own
+VISION_LAND = {**VISION, **dict.fromkeys(REFUSED, f"500 rejected{HOLDS}")}  # LAND is refused, in GUIDED
+VISION_MISSION = {**VISION_LAND, "another station flies it": "409 superseded"}
 TRAVEL = {**MOVING, "another station flies it": "200"}  # it repeats its own
 MODE = {**SUCCESS, **LOST, **REFUSED, "reboot": "409 mode_changed", "pilot's mode": "409 mode_changed"}
 LANDING = {**SUCCESS, **LOST, **REFUSED, **FLIGHT, "client gone": GOES_ON}
@@ -122,6 +128,7 @@ RESUME = {
 }
 TURN = {**ACKED, "acks lost for good": "504 timeout", "another client streams": "409 superseded"}
 TURN_RATE = {**MOVING, "another station flies it": "200"}
+PROMPT = {"client gone": NONE}  # nobody hangs up there
 HOME = {**SUCCESS, **LOST, **REFUSED, "busy once": "200", "acks lost for good": "504 timeout"}
 SPEED = {
     **SUCCESS,
@@ -169,7 +176,15 @@ VERBS = {
     "set_ground_speed": Verb("/command/set_ground_speed", 0.5, SPEED),
     "set_climb_speed": Verb("/command/set_climb_speed", 0.5, SPEED),
     "set_descent_speed": Verb("/command/set_descent_speed", 0.5, SPEED),
+    "vision/land": Verb("/vision/land", 30.0, VISION_LAND),
+    "vision/search": Verb("/vision/search", 60.0, VISION),
+    "vision/mission": Verb("/vision/mission", 60.0, VISION_MISSION),
+    "prompt: vision land": Verb("vision land", 30.0, {**VISION_LAND, **PROMPT}),
+    "prompt: uavapi fly": Verb("uavapi fly", 60.0, {**TRACK, **PROMPT}),
+    "script: go_to_ned_wait": Verb("/movement/go_to_ned_wait", 10.0, {**MOVING, "client gone": f"{ENDED}{HOLDS}"}),
+    "script: land": Verb("/command/land", 20.0, LANDING),
 }
+TABLES = (4, 10, 8, 3, 4)  # verbs in each table of the page
 
 
 def page() -> str:
@@ -183,13 +198,17 @@ def page() -> str:
         "",
         "A flight has been under way for 3 s when the link, the autopilot, the pilot or the client does something;",
         "the other verbs wait for an acknowledgement then. Movements go by setpoints, which nobody acknowledges.",
+        "What is typed at MAVProxy's prompt, and what a script begins with `?wait=false`, has a job: its outcome is",
+        'what the answer would have been, and the prompt prints its sentence. "Holds": the vehicle is sent zero',
+        "velocities until telemetry shows that it stands still, and nothing else; the table at the end says why.",
         "",
         "| fault | what happens | ends it within, or delays it by |",
         "| --- | --- | --- |",
     ]
     lines += [f"| {name} | {fault.meaning} | {_seconds(fault)} |" for name, fault in FAULTS.items()]
-    for verbs in (("arm", "takeoff", "land", "rtl"), tuple(list(VERBS)[4:14]), tuple(list(VERBS)[14:])):
-        groups = _alike(verbs)
+    names = iter(VERBS)
+    for count in TABLES:
+        groups = _alike(tuple(itertools.islice(names, count)))
         lines += ["", "| fault | " + " | ".join(", ".join(f"`{name}`" for name in group) for group in groups) + " |"]
         lines += ["| --- |" + " --- |" * len(groups)]
         for fault in FAULTS:

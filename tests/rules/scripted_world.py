@@ -28,11 +28,11 @@ from mavproxy_uavapi.http.call import Service
 from mavproxy_uavapi.http.connection import Connection
 from mavproxy_uavapi.scripts import on_exit
 from mavproxy_uavapi.settings import ApiModuleSettings
-from tests.rules.conftest import Wire
 from tests.support.drone import Drone, mavlink
 from tests.support.mavproxy import mavproxy_state
 from tests.support.messages import message_of
 from tests.support.virtual_time import TimeTravellingLoop
+from tests.support.wire import Wire
 
 ASKING = {
     mavlink.MAV_CMD_REQUEST_MESSAGE,

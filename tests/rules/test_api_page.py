@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from mavproxy_gradys.http import Handlers
+from mavproxy_gradys.http import GradysHandlers
 from mavproxy_uavapi.http.routes import ROUTES
-from mavproxy_vision.http import Pages
+from mavproxy_vision.http import VisionHandlers
 
 LINES = (Path(__file__).parents[2] / "docs" / "api.md").read_text(encoding="utf-8").lower().splitlines()
 # Neither asks its module for anything until a request comes.
-OTHERS = [*Handlers(None).routes(), *Pages(None, None).routes()]  # type: ignore[arg-type]
+OTHERS = [*GradysHandlers(None).routes(), *VisionHandlers(None, None).routes()]  # type: ignore[arg-type]
 
 
 def tells_of(line: str, path: str) -> bool:

@@ -5,11 +5,8 @@ MACHINE_STEPS=200000 takes more steps, other ones each time. What it finds is wr
 
 from __future__ import annotations
 
-import importlib.util
 import os
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -17,16 +14,7 @@ from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
 
-
-def _beside(name: str) -> Any:
-    spec = importlib.util.spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
-    assert spec is not None and spec.loader is not None
-    module = sys.modules[name] = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-scripted_world, rules_of_the_air = _beside("scripted_world"), _beside("rules_of_the_air")
+from tests.rules import rules_of_the_air, scripted_world
 
 STEPS_OF_ONE = 50
 IN_CI = 10_000

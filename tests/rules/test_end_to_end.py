@@ -2,27 +2,16 @@
 
 from __future__ import annotations
 
-import importlib.util
 import threading
 import time
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
 import requests
 
-
-def _load(path: Path) -> Any:
-    spec = importlib.util.spec_from_file_location(path.parent.name + "_" + path.stem, path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-HERE = Path(__file__).parent
-outcomes = _load(HERE / "outcomes.py")
-processes = _load(HERE.parent / "end_to_end" / "conftest.py")
+from tests.rules import outcomes
+from tests.support import processes
 
 GUARD = 1.8  # s; a command would be sent again after 1.5 s
 MODE, HOME, SPEED = 176, 179, 178  # MAV_CMD_DO_SET_MODE, DO_SET_HOME, DO_CHANGE_SPEED

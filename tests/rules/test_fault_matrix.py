@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import importlib.util
+import asyncio
+import math
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-_spec = importlib.util.spec_from_file_location("outcomes", Path(__file__).with_name("outcomes.py"))
-outcomes = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(outcomes)
+from tests.rules import clients, outcomes
 
 ARM = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
 TAKEOFF = mavlink.MAV_CMD_NAV_TAKEOFF
@@ -31,6 +29,9 @@ WAITING = 0.5  # s after which something happens to a command that is waiting fo
 DEAF = 1.0  # s for which the vehicle does not hear that command
 DARK = 2.0  # s that a reboot takes
 OVERHEAR = (1, 190)  # another component of the vehicle
+AT_REST = 0.5  # m/s: slower than this a vehicle holds
+CAMERA = {"width": 240, "height": 180, "fps": 8.0, "sim_noise": 0.0, "sim_blur": 0.0, "sim_jitter": 0.0}
+TAG_BELOW, TAG_BESIDE = "0:0.30@0.6,-0.4", "0:0.30@0.5,3"  # in view at once, or when it was searched for
 PLACE = (-35.363261, 149.165230)  # where it stands: the simulator's default home
 
 
@@ -40,6 +41,7 @@ class Request(NamedTuple):
     stage: str
     near: dict[str, Any] | str
     far: dict[str, Any] | str | None = None
+    camera: dict[str, Any] | None = None
 
 
 def track(north: float) -> str:
@@ -76,10 +78,27 @@ REQUESTS = {
         ("set_air_speed", "set_ground_speed", "set_climb_speed", "set_descent_speed"), Request("flying", "?new_v=2")
     ),
 }
+REQUESTS |= {
+    "vision/land": Request("above a tag", {}, {}, {**CAMERA, "sim_tags": TAG_BELOW}),
+    "vision/search": Request("above a tag", {}, {}, {**CAMERA, "sim_tags": TAG_BESIDE}),
+    "vision/mission": Request(
+        "flying",
+        {"alt": 6, "north": 6, "east": 3, "tag": False},
+        {"alt": 6, "north": 300, "east": 0, "tag": False},
+        {**CAMERA, "fps": 0.5},  # it looks for nothing
+    ),
+    "prompt: uavapi fly": REQUESTS["fly-track"],
+    "script: go_to_ned_wait": REQUESTS["go_to_ned_wait"],
+    "script: land": REQUESTS["land"],
+}
+REQUESTS["prompt: vision land"] = REQUESTS["vision/land"]
+# Verbs that are made of others, of which the last one is refused.
+OF_OTHERS = {"fly-track", "vision/land", "vision/mission", "prompt: vision land", "prompt: uavapi fly"}
 STAGES: dict[str, Callable[[Any], None]] = {
     "boot": lambda world: world.boot(),
     "armed": lambda world: world.armed(),
     "flying": lambda world: world.flying(),
+    "above a tag": lambda world: world.flying(height=3.5),
     "loitering": lambda world: world.flying("LOITER"),
     "stopped": lambda world: world.flying(),
 }
@@ -146,7 +165,11 @@ MEANWHILE: dict[str, Callable[[Any, Any], None]] = {
 }
 # How a verb shows that has gone on without its client.
 DONE: dict[str, Callable[[Any], bool]] = {
-    **dict.fromkeys(("land", "rtl"), lambda world: not world.copter.armed and world.at[2] > -0.1),
+    **dict.fromkeys(
+        ("land", "rtl", "script: land", "vision/land", "vision/mission"),
+        lambda world: not world.copter.armed and world.at[2] > -0.1,
+    ),
+    "vision/search": lambda world: world.copter.armed and math.hypot(world.at[0] - 0.5, world.at[1] - 3.0) < 2.0,
     "brake": lambda world: world.copter.mode.name == "BRAKE",
     "stop": lambda world: world.copter.guided.paused,
 }
@@ -157,25 +180,25 @@ CELLS = [(name, fault) for name, verb in outcomes.VERBS.items() for fault in out
 @pytest.mark.parametrize(("verb", "fault"), CELLS)
 def test_verb_meets_fault(make_world: Any, verb: str, fault: str) -> None:
     stage = REQUESTS[verb].stage
-    world = make_world(INSTEAD.get(fault, STAGES[stage]))
+    world = make_world(INSTEAD.get(fault, STAGES[stage]), camera=REQUESTS[verb].camera)
     prepare(world, stage, fault)
-    expected = outcomes.VERBS[verb].outcomes[fault]
+    expected, holds, _ = outcomes.VERBS[verb].outcomes[fault].partition(outcomes.HOLDS)
     struck, wire = strike(world, verb, fault)
     allowed = outcomes.FAULTS[fault].within
     if expected == "200":
         allowed += outcomes.VERBS[verb].takes
     elif expected == "500 rejected":
         allowed = max(allowed, outcomes.REFUSAL)
-        allowed += outcomes.VERBS[verb].takes if verb == "fly-track" else 0.0  # it is refused its return
+        allowed += outcomes.VERBS[verb].takes if verb in OF_OTHERS else 0.0
     if expected in (outcomes.ENDED, outcomes.GOES_ON):
-        after_hanging_up(world, verb, expected, struck)
+        after_hanging_up(world, verb, wire, struck)
         return
     reply = world.answer(wire, 200.0)
     assert reply.outcome == expected, reply.body
     assert reply.at - struck <= allowed + 1e-6
     assert says_why(reply.body, fault)
     world.end_streams()
-    quiet_since = max(reply.at, world.loop.time())
+    quiet_since = hold_after(world, reply.at) if holds else max(reply.at, world.loop.time())
     world.loop.pass_time(GUARD)
     assert world.orders(since=quiet_since) == []
     if (verb, fault) == ("arm", "disarmed"):
@@ -213,15 +236,23 @@ def strike(world: Any, verb: str, fault: str) -> tuple[float, Any]:
     if meanwhile is None:
         return began, wire
     world.loop.pass_time(delay)
+    assert wire.reply.done() == ((verb, fault) == ("arm", "disarmed"))
     meanwhile(world, wire)
     return world.loop.time(), wire
 
 
 def begin(world: Any, verb: str, given: Any) -> Any:
     path = outcomes.VERBS[verb].path
+    if verb in AT_THE_PROMPT:
+        return AT_THE_PROMPT[verb](world, given)
+    if verb.startswith("script: "):
+        return clients.Script(world, *(("POST", path, given) if isinstance(given, dict) else ("GET", path + given)))
     if isinstance(given, dict):
         return world.begin("POST", path, given)
     return world.begin("GET", path + given)
+
+
+AT_THE_PROMPT = {"prompt: vision land": clients.vision_land, "prompt: uavapi fly": clients.fly_track}
 
 
 def says_why(body: dict[str, Any], fault: str) -> bool:
@@ -233,23 +264,44 @@ def says_why(body: dict[str, Any], fault: str) -> bool:
     return True
 
 
-def after_hanging_up(world: Any, verb: str, expected: str, struck: float) -> None:
-    """The verb has ended and nothing more is sent, or it goes on to its end by itself."""
+def hold_after(world: Any, since: float) -> float:
+    """See that it is told to hold and nothing else; since when telemetry has shown that it does (s)."""
+    closing = world.host.jobs.all()[-1]
+    assert closing.verb.startswith("hold after ")
+    world.loop.run(closing.outcome())
+    told = world.orders(since=since)
+    assert told
+    assert {m.get_type() for m in told} == {"SET_POSITION_TARGET_LOCAL_NED"}
+    assert {(m.vx, m.vy, m.vz) for m in told} == {(0.0, 0.0, 0.0)}
+    assert math.hypot(*world.copter.body.velocity) < AT_REST
+    return float(world.loop.time())
+
+
+def after_hanging_up(world: Any, verb: str, wire: Any, struck: float) -> None:
+    """The verb has ended and nothing more is sent but for a hold, or it goes on to its end by itself."""
+    expected, holds, _ = outcomes.VERBS[verb].outcomes["client gone"].partition(outcomes.HOLDS)
     world.loop.settle()
-    running = [job.verb for job in world.host.jobs.running()]
-    if expected == outcomes.ENDED:
+    running = world.host.jobs.running()
+    quiet_since = struck
+    if holds:
+        assert [job.verb.partition(" ")[0] for job in running] == ["hold"]
+        quiet_since = hold_after(world, struck)
+    elif expected == outcomes.ENDED:
         assert running == []
-        world.loop.pass_time(GUARD)
     else:
         assert len(running) == 1
-        world.loop.pass_time(30.0)
-        assert world.host.jobs.running() == []
+        world.loop.run(asyncio.wait_for(running[0].outcome(), outcomes.VERBS[verb].takes))
         assert DONE[verb](world)
-    entry = world.service.host.audit.entries[-1]  # of what went on without its client, when that had ended
-    assert entry.outcome == "client_gone"
+    world.loop.pass_time(GUARD)
+    assert world.host.jobs.running() == []
+    if isinstance(wire, clients.Script):
+        assert wire.death.result() == "hold is done" if holds else wire.death.result().startswith("left alone")
+    else:
+        entry = world.service.host.audit.entries[-1]  # of what went on without its client, when that had ended
+        assert entry.outcome == "client_gone"
     repeated = {m.command for m in world.orders(since=struck) if m.get_type() == "COMMAND_LONG"}
     assert len(repeated) <= 1  # a command that was not heard yet is sent again, and nothing else is
-    assert expected == outcomes.GOES_ON or world.orders(since=struck) == []
+    assert expected == outcomes.GOES_ON or world.orders(since=quiet_since) == []
 
 
 def test_command_in_progress_for_ever_is_given_up(make_world: Any) -> None:
@@ -299,6 +351,31 @@ def test_a_turn_right_after_a_takeoff_is_flown(make_world: Any) -> None:
     world = make_world(STAGES["armed"])
     assert world.ask("GET", "/command/takeoff?alt=10").outcome == "200"
     assert world.ask("GET", "/movement/set_yaw_rate?yaw_rate=20").outcome == "200"
+
+
+@pytest.mark.parametrize("waits", [True, False])
+@pytest.mark.parametrize("verb", ["go_to_ned_wait", "land", "vision/search", "fly-track"])
+def test_what_a_script_leaves_behind_is_the_same_whether_it_waited_or_not(
+    make_world: Any, verb: str, waits: bool
+) -> None:
+    request = REQUESTS[verb]
+    world = make_world(STAGES[request.stage], camera=request.camera)
+    method = "GET" if request.far == "" else "POST"
+    script = clients.Script(world, method, outcomes.VERBS[verb].path, request.far or None, waits=waits)
+    world.loop.pass_time(UNDER_WAY)
+    died = world.loop.time()
+    script.hang_up()
+    world.loop.settle()
+    if verb == "land":
+        assert script.death.result() == "left alone: the vehicle is in LAND"
+        world.loop.pass_time(outcomes.VERBS[verb].takes)
+        assert DONE[verb](world)
+        return
+    quiet_since = hold_after(world, died)
+    world.loop.pass_time(GUARD)
+    assert script.death.result() == "hold is done"
+    assert world.orders(since=quiet_since) == []
+    assert world.host.jobs.running() == []
 
 
 def test_page_about_faults_is_up_to_date() -> None:

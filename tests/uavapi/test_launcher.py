@@ -20,8 +20,8 @@ from pathlib import Path
 import pytest
 
 from mavproxy_uavapi.launcher import (
-    command,
-    commands,
+    cli,
+    command_lines,
     directories,
     environment,
     instances,
@@ -31,9 +31,9 @@ from mavproxy_uavapi.launcher import (
     processes,
 )
 from mavproxy_uavapi.launcher.errors import LaunchError, OptionError
-from mavproxy_uavapi.launcher.options import Options, parse
+from mavproxy_uavapi.launcher.options import RunOptions, parse
 
-ROOT = Path(command.__file__).resolve().parents[2]
+ROOT = Path(cli.__file__).resolve().parents[2]
 
 
 @pytest.fixture(autouse=True)
@@ -56,14 +56,14 @@ def ini(tmp_path, text):
 
 def test_the_table_and_the_options_name_the_same_things():
     others = {"module", "mavproxy_args", "further", "gradys_config", "origins"}
-    assert {row.name for row in options.TABLE} | others == {field.name for field in dataclasses.fields(Options)}
+    assert {row.name for row in options.TABLE} | others == {field.name for field in dataclasses.fields(RunOptions)}
 
 
 def test_defaults_are_those_of_the_original_service():
-    assert parse([]) == Options()
-    assert Options().port == 8000
-    assert Options().sysid == 10
-    assert Options().uav_connection == "127.0.0.1:17171"
+    assert parse([]) == RunOptions()
+    assert RunOptions().port == 8000
+    assert RunOptions().sysid == 10
+    assert RunOptions().uav_connection == "127.0.0.1:17171"
 
 
 @pytest.mark.parametrize(
@@ -108,7 +108,7 @@ def test_file_of_the_original_service_loads(tmp_path):
             )
         ]
     )
-    assert loaded == Options(
+    assert loaded == RunOptions(
         port=8001,
         uav_connection="127.0.0.1:17172",
         sysid=11,
@@ -232,12 +232,12 @@ def as_mavproxy_reads(load):
 
 def test_module_settings_survive_mavproxys_splitting():
     settings = {"config": "/home/a b/c;d\te,'f'/\"g\".ini", "port": 8001}
-    assert as_mavproxy_reads(commands.module_load("uavapi", settings)) == ("uavapi", settings)
+    assert as_mavproxy_reads(command_lines.module_load("uavapi", settings)) == ("uavapi", settings)
 
 
 def test_mavproxy_command_for_a_real_vehicle():
-    given = Options(port=8001, sysid=3, gradys_gs="10.0.2.5:8000", module=("vision",), mavproxy_args=("--map",))
-    line = commands.mavproxy_command(given, ["mavproxy.py"], Path("/run"), None, None)
+    given = RunOptions(port=8001, sysid=3, gradys_gs="10.0.2.5:8000", module=("vision",), mavproxy_args=("--map",))
+    line = command_lines.mavproxy_command(given, ["mavproxy.py"], Path("/run"), None, None)
     assert line[:4] == [
         *("mavproxy.py", "--master=udpin:127.0.0.1:17171", "--target-system=3", "--logfile=/run/mav.tlog")
     ]
@@ -254,19 +254,19 @@ def test_mavproxy_command_for_a_real_vehicle():
 @pytest.mark.parametrize(
     ("given", "instance", "expected"),
     [
-        (Options(connection_type="udpout"), None, "udpout:127.0.0.1:17171"),
-        (Options(connection_type="tcp", uav_connection="10.0.0.1:5760"), None, "tcp:10.0.0.1:5760"),
-        (Options(connection_type="usb", uav_connection="/dev/ttyACM0,57600"), None, "/dev/ttyACM0,57600"),
-        (Options(simulated=True), 2, "tcp:127.0.0.1:5780"),
+        (RunOptions(connection_type="udpout"), None, "udpout:127.0.0.1:17171"),
+        (RunOptions(connection_type="tcp", uav_connection="10.0.0.1:5760"), None, "tcp:10.0.0.1:5760"),
+        (RunOptions(connection_type="usb", uav_connection="/dev/ttyACM0,57600"), None, "/dev/ttyACM0,57600"),
+        (RunOptions(simulated=True), 2, "tcp:127.0.0.1:5780"),
     ],
 )
 def test_link_to_the_vehicle(given, instance, expected):
-    assert commands.master(given, instance) == expected
+    assert command_lines.master(given, instance) == expected
 
 
 def test_headless_mavproxy_is_a_daemon_and_forwards():
-    given = Options(headless=True, simulated=True, gs_connection=("1.1.1.1:1",))
-    line = commands.mavproxy_command(given, [], Path("/run"), 0, None)
+    given = RunOptions(headless=True, simulated=True, gs_connection=("1.1.1.1:1",))
+    line = command_lines.mavproxy_command(given, [], Path("/run"), 0, None)
     assert "--daemon" in line
     assert "--out=1.1.1.1:1" in line
     assert not any(word.startswith("--sitl") for word in line)
@@ -274,53 +274,53 @@ def test_headless_mavproxy_is_a_daemon_and_forwards():
 
 def test_vehicle_commands():
     home = locations.BUILT_IN["AbraDF"]
-    embedded = commands.embedded_command(Options(speedup=2.5), 3, home)
+    embedded = command_lines.embedded_command(RunOptions(speedup=2.5), 3, home)
     assert embedded[1:] == [
         *("-m", "mavproxy_uavapi.sim", "--instance=3", "--sysid=10", "--speedup=2.5"),
         "--home=-15.8400810,-47.9266420,1042,30",
     ]
-    given = Options(ardupilot_path="/ap", vehicle="plane", speedup=5.0, sysid=7)
-    sitl = commands.sim_vehicle_command(given, "python3", 1, home, Path("/run/vehicle"))
+    given = RunOptions(ardupilot_path="/ap", vehicle="plane", speedup=5.0, sysid=7)
+    sitl = command_lines.sim_vehicle_command(given, "python3", 1, home, Path("/run/vehicle"))
     assert sitl[:2] == ["python3", "/ap/Tools/autotest/sim_vehicle.py"]
     assert {"--vehicle=ArduPlane", "--instance=1", "--sysid=7", "--speedup=5", "--no-mavproxy"} < set(sitl)
 
 
 def test_settings_without_a_keyword_travel_by_file():
-    assert commands.settings_file(Options(port=9000)) is None
-    text = commands.settings_file(Options(scripts_path="/a%b", log_console=("API",), log_path="/l/u.log"))
+    assert command_lines.settings_file(RunOptions(port=9000)) is None
+    text = command_lines.settings_file(RunOptions(scripts_path="/a%b", log_console=("API",), log_path="/l/u.log"))
     assert text is not None
     assert text == "[api]\nscripts_path = /a%b\n\n[logs]\nlog_console = [API]\nlog_path = /l/u.log\n\n"
 
 
 def test_token_is_on_no_command_line_and_in_no_greeting(monkeypatch):
     monkeypatch.setenv("UAVAPI_TOKEN", "very-secret")
-    given = Options(simulated=True, host="0.0.0.0", scripts_path="/s")
+    given = RunOptions(simulated=True, host="0.0.0.0", scripts_path="/s")
     lines = [
-        *commands.mavproxy_command(given, ["m"], Path("/run"), 0, Path("/run/uavapi.ini")),
-        *commands.embedded_command(given, 0, locations.BUILT_IN["CMAC"]),
-        commands.greeting(given, with_token=True),
-        commands.settings_file(given) or "",
+        *command_lines.mavproxy_command(given, ["m"], Path("/run"), 0, Path("/run/uavapi.ini")),
+        *command_lines.embedded_command(given, 0, locations.BUILT_IN["CMAC"]),
+        command_lines.greeting(given, with_token=True),
+        command_lines.settings_file(given) or "",
     ]
     assert "very-secret" not in " ".join(lines)
     assert environment.for_mavproxy(os.environ)["UAVAPI_TOKEN"] == "very-secret"
 
 
 def test_greeting_has_three_lines_to_try_for_a_simulated_vehicle():
-    lines = commands.greeting(Options(simulated=True, port=8001), with_token=False).splitlines()
+    lines = command_lines.greeting(RunOptions(simulated=True, port=8001), with_token=False).splitlines()
     assert lines == [
         "API of vehicle 10: http://127.0.0.1:8001",
         "  curl http://127.0.0.1:8001/command/arm",
         "  curl 'http://127.0.0.1:8001/command/takeoff?alt=10'",
         "  curl http://127.0.0.1:8001/telemetry/gps",
     ]
-    assert commands.greeting(Options(), with_token=False).count("\n") == 0
-    rover = commands.greeting(Options(simulated=True, vehicle="rover"), with_token=False)
+    assert command_lines.greeting(RunOptions(), with_token=False).count("\n") == 0
+    rover = command_lines.greeting(RunOptions(simulated=True, vehicle="rover"), with_token=False)
     assert "takeoff" not in rover and rover.count("\n") == 3
 
 
 def test_sim_vehicle_gets_no_window_and_no_working_pkill(tmp_path):
     env = environment.for_sim_vehicle({"DISPLAY": ":0", "TMUX": "x", "PATH": os.defpath}, tmp_path)
-    assert not set(env) & set(commands.WINDOW_VARIABLES)
+    assert not set(env) & set(command_lines.WINDOW_VARIABLES)
     assert shutil.which("pkill", path=env["PATH"]) == str(tmp_path / "bin" / "pkill")
     assert subprocess.run([tmp_path / "bin" / "pkill", "none"], check=False).returncode == 1
 
@@ -340,8 +340,8 @@ def test_mavproxy_beside_this_python_comes_before_path(tmp_path, monkeypatch):
 
 
 def test_run_directories_never_collide_and_are_private(tmp_path):
-    first = directories.new_run(directories.state_root(), Options())
-    second = directories.new_run(directories.state_root(), Options())
+    first = directories.new_run(directories.state_root(), RunOptions())
+    second = directories.new_run(directories.state_root(), RunOptions())
     assert first != second
     assert first.parent == second.parent == tmp_path / "state" / "mavproxy-uavapi" / "uav10"
     assert first.stat().st_mode & 0o777 == 0o700
@@ -422,12 +422,13 @@ DRIVER = """
 import fcntl, os, sys, termios
 if os.isatty(0):
     fcntl.ioctl(0, termios.TIOCSCTTY, 0)
-from mavproxy_uavapi.launcher import command, commands, environment, instances, supervisor
+from mavproxy_uavapi.launcher import environment, instances, supervisor
+from mavproxy_uavapi.launcher import cli, command_lines
 environment.mavproxy_program = lambda: [sys.executable, {mavproxy!r}]
-commands.embedded_command = lambda *_: [sys.executable, {vehicle!r}]
+command_lines.embedded_command = lambda *_: [sys.executable, {vehicle!r}]
 instances.ports_are_free = lambda _: True
 supervisor.MAVPROXY_GRACE_S = supervisor.PROMPT_GRACE_S = supervisor.MAVPROXY_FORCED_S = 0.3
-sys.exit(command.run())
+sys.exit(cli.run())
 """
 
 
@@ -636,7 +637,7 @@ def test_the_modules_own_keys_of_the_file_reach_the_module(tmp_path: Path) -> No
     file = tmp_path / "uav.ini"
     file.write_text("[api]\nport = 8005\nmax_age = 2\nallow_from = 10.0.0.0/8\n", encoding="utf-8")
     read = parse(["--config", str(file)], environ={})
-    text = commands.settings_file(read)
+    text = command_lines.settings_file(read)
     assert text is not None and "max_age = 2" in text and "allow_from = 10.0.0.0/8" in text
 
 
@@ -658,7 +659,7 @@ def test_module_is_told_where_each_setting_came_from(tmp_path: Path) -> None:
     file = tmp_path / "uav.ini"
     file.write_text("[api]\nport = 8005\nsysid = 5\nscript_grace = 20\n", encoding="utf-8")
     read = parse(["--config", str(file), "--sysid", "7"], environ={"UAVAPI_LOG_PATH": "/l/u.log"})
-    name, given = as_mavproxy_reads(commands.module_loads(read, Path("/run/uavapi.ini"))[0])
+    name, given = as_mavproxy_reads(command_lines.module_loads(read, Path("/run/uavapi.ini"))[0])
     assert name == "uavapi"
     assert given["origins"] == {
         "host": "default",
@@ -679,7 +680,7 @@ def test_section_of_the_module_gradys_is_its_own_to_read(tmp_path: Path) -> None
     file = tmp_path / "uav.ini"
     file.write_text("[api]\ngradys_gs = 10.0.2.5:8000\n[gradys]\nperiod = 2\n", encoding="utf-8")
     read = parse(["--config", str(file), "--module", "gradys,vision"], environ={})
-    loads = commands.module_loads(read, None)
+    loads = command_lines.module_loads(read, None)
     assert as_mavproxy_reads(loads[1]) == ("gradys", {"config": str(file), "gs": "10.0.2.5:8000"})
     assert loads[2:] == ["module load vision"]
 

@@ -9,14 +9,16 @@ import pytest
 
 pytest.importorskip("cv2")
 
+from tests.support.lockstep import Lockstep
+
 
 @pytest.fixture
-def lockstep(helper: Callable[[str], Any]) -> Iterator[Callable[..., Any]]:
-    """Makes closed loops; see `lockstep.py`."""
+def lockstep() -> Iterator[Callable[..., Any]]:
+    """Makes closed loops; see `tests/support/lockstep.py`."""
     made: list[Any] = []
 
     def make(**settings: Any) -> Any:
-        made.append(helper("vision/lockstep.py").Lockstep(**settings))
+        made.append(Lockstep(**settings))
         return made[-1]
 
     yield make

@@ -28,11 +28,11 @@ from mavproxy_vision.geometry.camera_model import CameraModel
 from mavproxy_vision.http import (
     MOST_POSTED,
     FrameRequest,
-    Handlers,
     LandRequest,
     MissionRequest,
     SearchRequest,
     StreamRequest,
+    VisionHandlers,
 )
 from mavproxy_vision.tracking.capture_worker import Health
 from mavproxy_vision.tracking.tracker import FRESH
@@ -73,7 +73,7 @@ def handlers(age, source):
         settings=SimpleNamespace(source="http"),
         require_camera=lambda: None,
     )
-    return Handlers(vision, SimpleNamespace(running=False, report=None))
+    return VisionHandlers(vision, SimpleNamespace(running=False, report=None))
 
 
 def test_the_newest_frame_is_served_while_it_is_new(tmp_path):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import builtins
-import importlib
 import sys
 import threading
 import time
@@ -12,6 +10,7 @@ from typing import Any
 import pytest
 
 import vision
+from mavproxy_uavapi.core import host as hosts
 from mavproxy_vision.console import HELP
 
 SOURCES = "`vision set source camera:0`, sim, http, a path or a URL"
@@ -74,6 +73,21 @@ def test_loading_and_unloading_leaves_nothing_behind(mpstate: Any, descriptors: 
     assert (threading.active_count(), descriptors()) == (threads, before)
 
 
+@pytest.mark.parametrize("turns", [0, 1], ids=["before the first turn", "running"])
+def test_a_reload_leaves_nothing_to_say_at_the_end(mpstate: Any, turns: int) -> None:
+    host = hosts.join(mpstate, None)  # another module that stays
+    words = list(host.last_words)
+    if turns:
+        host.bridge.start()
+    for _ in range(3):
+        module = vision.init(mpstate)
+        for _ in range(turns):
+            module.idle_task()
+        module.unload()
+    assert host.last_words == words
+    hosts.leave(mpstate, None)
+
+
 def test_a_running_camera_ends_with_the_module(mpstate: Any, main_loop: Any) -> None:
     threads = threading.active_count()
     module = vision.init(mpstate, source="http")
@@ -113,24 +127,6 @@ def test_a_setting_that_does_not_exist_is_an_import_error(mpstate: Any) -> None:
     with pytest.raises(ImportError, match="vision: no setting 'nonsense'"):
         vision.init(mpstate, nonsense=1)
     assert mpstate.command_map == {}
-
-
-def test_without_opencv_one_line_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    real = builtins.__import__
-
-    def without(name: str, *args: Any, **kwargs: Any) -> Any:
-        if name == "cv2":
-            raise ModuleNotFoundError("No module named 'cv2'", name="cv2")
-        return real(name, *args, **kwargs)
-
-    import mavproxy_vision.module as loaded
-
-    monkeypatch.setattr(builtins, "__import__", without)
-    monkeypatch.delitem(sys.modules, "mavproxy_vision.module")
-    with pytest.raises(ImportError, match=r"vision needs cv2: pip install 'mavproxy-uavapi\[vision\]'"):
-        importlib.import_module("mavproxy_vision.module")
-    monkeypatch.undo()
-    sys.modules["mavproxy_vision.module"] = loaded
 
 
 def test_nothing_else_of_the_project_needs_opencv() -> None:

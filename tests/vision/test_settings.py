@@ -9,10 +9,10 @@ import pytest
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_vision.apriltag.tag_layout import FAMILIES, Tag, parse_tags
 from mavproxy_vision.camera.simulated import parse_placed
-from mavproxy_vision.settings import VisionModuleSettings, table
+from mavproxy_vision.settings import VisionModuleSettings
 
-FLOATS = [setting.name for setting in table() if setting.type is float]
-INTS = [setting.name for setting in table() if setting.type is int]
+FLOATS = [setting.name for setting in VisionModuleSettings.table() if setting.type is float]
+INTS = [setting.name for setting in VisionModuleSettings.table() if setting.type is int]
 NO_NUMBERS = ("nan", "inf", "-inf", "1e400", "-1e400", "", "1.2.3", "1_0", "0x10", "\u0662", True, None, [1], {})
 
 
@@ -30,7 +30,7 @@ def refused(settings, name, value):
 @pytest.mark.parametrize("name", FLOATS + INTS)
 def test_a_number_is_finite_and_in_its_range(name, capsys):
     settings = VisionModuleSettings()
-    low, high = settings.mp.get_setting(name).range
+    (low, high) = next(row.range for row in settings.table() if row.name == name)
     for value in (*NO_NUMBERS, float("nan"), float("inf"), low - 1, high + 1, 10**400):
         assert refused(settings, name, value).startswith(f"{name} = {value!r}: it takes a ")
     for value in (low, str(high)):

@@ -236,7 +236,7 @@ class BaseVehicle:
             raise
         self.authority.shown(job)
 
-    async def limits(self) -> time_limits.Limits:
+    async def limits(self) -> time_limits.FlightLimits:
         """Its speeds and heights, for deadlines; asked for where they are not known."""
         return time_limits.limits(await self.parameters.read(time_limits.WANTED), self.speeds.in_force)
 

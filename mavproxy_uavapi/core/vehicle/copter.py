@@ -125,7 +125,7 @@ class Copter(GuidedVehicle):
         expected = time_limits.return_time(limits, self.distance_home() or 0.0, self.height)
         await self._flown_home(job, "RTL", limits, self.allowed(expected, timeout))
 
-    async def _flown_home(self, job: Job, mode: str, limits: time_limits.Limits, timeout: float) -> None:
+    async def _flown_home(self, job: Job, mode: str, limits: time_limits.FlightLimits, timeout: float) -> None:
         """Wait until it has landed and disarmed in that mode; motors that stop in flight are no landing."""
         landing = Touchdown(limits)
 

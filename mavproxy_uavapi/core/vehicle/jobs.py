@@ -45,7 +45,7 @@ class Job:
         ending: why it ended; None while it runs.
         steers: whether the vehicle is flown by what the job goes on sending, so that it must not go on without it.
         modes: names of the flight modes that it switched to: in any other the vehicle is somebody else's.
-        script: the session of the script that asked for it; None where none did.
+        script: the session of the script that asked for it; None where none did, or it ends with its client anyhow.
         outlives_client: whether it goes on when its client hangs up (land, rtl).
         stage: of a verb that is made of others, which one it is at: its name and numbers.
         progress: what it last said of itself, such as distance_to_go (m) and altitude (m above home).

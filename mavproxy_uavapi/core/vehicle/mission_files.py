@@ -39,7 +39,7 @@ DEGREES = 1e7
 
 
 @dataclass(frozen=True)
-class Item:
+class MissionItem:
     """One mission item.
 
     Attributes:
@@ -86,7 +86,7 @@ class Item:
         return {**told, "autocontinue": self.autocontinue}
 
 
-HOME = Item(mavlink.MAV_CMD_NAV_WAYPOINT, mavlink.MAV_FRAME_GLOBAL, (0.0, 0.0, 0.0, 0.0), 0, 0, 0.0)
+HOME = MissionItem(mavlink.MAV_CMD_NAV_WAYPOINT, mavlink.MAV_FRAME_GLOBAL, (0.0, 0.0, 0.0, 0.0), 0, 0, 0.0)
 
 
 def has_location(command: int) -> bool:
@@ -95,7 +95,7 @@ def has_location(command: int) -> bool:
     return bool(entry is not None and entry.has_location)
 
 
-def read(text: str) -> list[Item]:
+def read(text: str) -> list[MissionItem]:
     """The items of a mission in any of the three formats.
 
     Raises:
@@ -118,16 +118,16 @@ def read(text: str) -> list[Item]:
     return checked(_loaded(given, _from_json_item))
 
 
-def from_message(message: Any) -> Item:
+def from_message(message: Any) -> MissionItem:
     """The item of a MISSION_ITEM_INT or MISSION_ITEM."""
     as_int = message.get_type() == "MISSION_ITEM_INT"
     scale = DEGREES if has_location(message.command) and not as_int else 1.0
     x, y = (_whole(value * scale) for value in (message.x, message.y))
     params = (message.param1, message.param2, message.param3, message.param4)
-    return Item(message.command, message.frame, params, x, y, message.z, bool(message.autocontinue))
+    return MissionItem(message.command, message.frame, params, x, y, message.z, bool(message.autocontinue))
 
 
-def difference(wanted: Sequence[Item], found: Sequence[Item]) -> str | None:
+def difference(wanted: Sequence[MissionItem], found: Sequence[MissionItem]) -> str | None:
     """How a mission that was read back differs from what was sent, in words; None where it does not.
 
     Command, place and altitude are looked at: of the parameters each autopilot keeps what it needs.
@@ -142,7 +142,7 @@ def difference(wanted: Sequence[Item], found: Sequence[Item]) -> str | None:
     return None
 
 
-def _same_place(one: Item, other: Item) -> bool:
+def _same_place(one: MissionItem, other: MissionItem) -> bool:
     return (
         SAME_FRAMES.get(one.frame, one.frame) == SAME_FRAMES.get(other.frame, other.frame)
         and abs(one.x - other.x) <= PLACE_TOLERANCE
@@ -151,7 +151,7 @@ def _same_place(one: Item, other: Item) -> bool:
     )
 
 
-def checked(messages: Sequence[Any]) -> list[Item]:
+def checked(messages: Sequence[Any]) -> list[MissionItem]:
     """The items of MISSION_ITEMs whose values can be flown.
 
     Raises:

@@ -12,7 +12,7 @@ from mavproxy_uavapi.core.mavlink.flight_modes import MISSION_MODES, flies_missi
 from mavproxy_uavapi.core.vehicle import messages
 from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_uavapi.core.vehicle.jobs import Job
-from mavproxy_uavapi.core.vehicle.mission_files import Item
+from mavproxy_uavapi.core.vehicle.mission_files import MissionItem
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 mavlink = mavutil.mavlink
@@ -96,7 +96,7 @@ def _is_active(vehicle: Vehicle, since: float) -> bool:
     return received.message.mission_state in flown
 
 
-async def _flown_to_its_end(vehicle: Vehicle, job: Job, items: Sequence[Item], timeout: float) -> None:
+async def _flown_to_its_end(vehicle: Vehicle, job: Job, items: Sequence[MissionItem], timeout: float) -> None:
     final = {seq for seq, item in enumerate(items, 1) if item.command in LANDINGS} | {len(items)}
     flown = 0  # the item flown last: a vehicle that has disarmed is back at the mission's beginning
 

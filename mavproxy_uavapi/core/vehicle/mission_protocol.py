@@ -18,7 +18,7 @@ from mavproxy_uavapi.core.mavlink.link import Address, Link
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle.message_exchange import MessageExchange
 from mavproxy_uavapi.core.vehicle.message_waiter import MessageWaiter
-from mavproxy_uavapi.core.vehicle.mission_files import HOME, Item, difference, from_message
+from mavproxy_uavapi.core.vehicle.mission_files import HOME, MissionItem, difference, from_message
 
 T = TypeVar("T")
 mavlink = mavutil.mavlink
@@ -51,7 +51,7 @@ class Waypoints:
 
     # -- verbs --------------------------------------------------------------------------------------------
 
-    async def download(self) -> tuple[Item | None, list[Item]]:
+    async def download(self) -> tuple[MissionItem | None, list[MissionItem]]:
         """Home (None where the vehicle has no item 0 yet), and the items from 1 on.
 
         Raises:
@@ -62,7 +62,7 @@ class Waypoints:
             return await self._download()
 
     async def upload(
-        self, items: Sequence[Item], progress: Progress = lambda done, of: None, check: Check = lambda: None
+        self, items: Sequence[MissionItem], progress: Progress = lambda done, of: None, check: Check = lambda: None
     ) -> None:
         """Put `items` in place of the vehicle's mission, and read them back.
 
@@ -147,7 +147,7 @@ class Waypoints:
         question = mavlink.MAVLink_mission_request_list_message(*self._address, MISSION)
         return await self._asked(talk, question, _count_of, "tell how many mission items it has")
 
-    async def _download(self) -> tuple[Item | None, list[Item]]:
+    async def _download(self) -> tuple[MissionItem | None, list[MissionItem]]:
         with self._talk(ANSWERS) as talk:
             found = []
             for seq in range(await self._ask_count(talk)):
@@ -170,7 +170,7 @@ class Waypoints:
 
         await self._asked(talk, question, accepted, "clear its mission")
 
-    async def _put(self, items: Sequence[Item], progress: Progress) -> None:
+    async def _put(self, items: Sequence[MissionItem], progress: Progress) -> None:
         """Upload and read back; once more where the transfer itself failed.
 
         Raises:
@@ -187,11 +187,11 @@ class Waypoints:
         if differs is not None:
             raise Rejected(f"the mission was read back otherwise than it was sent: {differs}")
 
-    async def _hand_over(self, items: Sequence[Item], progress: Progress) -> None:
+    async def _hand_over(self, items: Sequence[MissionItem], progress: Progress) -> None:
         with self._talk(REQUESTS) as talk:
             await self._answer_requests(talk, items, progress)
 
-    async def _answer_requests(self, talk: MessageExchange, items: Sequence[Item], progress: Progress) -> None:
+    async def _answer_requests(self, talk: MessageExchange, items: Sequence[MissionItem], progress: Progress) -> None:
         """Offer the items and give each as often as the vehicle asks for it, which knows what it lacks.
 
         Nothing is sent unasked but the offer: an item that comes twice is an error to an ArduPilot. When the
@@ -237,7 +237,7 @@ class Waypoints:
             return message
         return None
 
-    async def _undo(self, old: Sequence[Item], error: UavApiError) -> str:
+    async def _undo(self, old: Sequence[MissionItem], error: UavApiError) -> str:
         """After a failed upload: have the old mission there, and say whether that is so."""
         if isinstance(error, LinkLost):
             return "; its mission may be incomplete now, because the link is lost"
@@ -265,8 +265,8 @@ def _count_of(message: Any) -> int | None:
     return int(message.count) if message.get_type() == "MISSION_COUNT" else None
 
 
-def _item_number(seq: int) -> Callable[[Any], Item | None]:
-    def of(message: Any) -> Item | None:
+def _item_number(seq: int) -> Callable[[Any], MissionItem | None]:
+    def of(message: Any) -> MissionItem | None:
         is_item = message.get_type().startswith("MISSION_ITEM") and message.seq == seq
         return from_message(message) if is_item else None
 

@@ -32,7 +32,7 @@ SLOWEST = 0.1  # m/s; a parameter of 0 or less must not make a flight endless
 
 
 @dataclass(frozen=True)
-class Limits:
+class FlightLimits:
     """A copter's speeds (m/s), acceleration (m/s/s), heights (m) and times (s)."""
 
     horizontal: float
@@ -48,7 +48,7 @@ class Limits:
     guided_timeout: float
 
 
-def limits(parameters: Mapping[str, float], speeds: Mapping[str, float]) -> Limits:
+def limits(parameters: Mapping[str, float], speeds: Mapping[str, float]) -> FlightLimits:
     """The limits in force.
 
     Args:
@@ -61,7 +61,7 @@ def limits(parameters: Mapping[str, float], speeds: Mapping[str, float]) -> Limi
     cruise, up, down = known["horizontal"], known["up"], known["down"]
     horizontal = min(cruise, speeds.get("ground", cruise), speeds.get("air", cruise))
     down = min(down, speeds.get("descent", down))
-    return Limits(
+    return FlightLimits(
         horizontal=max(horizontal, SLOWEST),
         up=max(min(up, speeds.get("climb", up)), SLOWEST),
         down=max(down, SLOWEST),
@@ -83,21 +83,21 @@ def _value(parameters: Mapping[str, float], in_cm: str, in_m: str, default: floa
     return parameters[in_cm] / 100 if in_cm in parameters else default
 
 
-def leg_time(limits: Limits, horizontal: float, up: float) -> float:
+def leg_time(limits: FlightLimits, horizontal: float, up: float) -> float:
     """Seconds for a leg of `horizontal` m that ends `up` m higher (negative: lower), from rest to rest."""
     ramps = limits.horizontal / limits.acceleration if horizontal else 0.0
     vertical = up / limits.up if up > 0 else -up / limits.down
     return max(horizontal / limits.horizontal + ramps, vertical)
 
 
-def landing_time(limits: Limits, height: float) -> float:
+def landing_time(limits: FlightLimits, height: float) -> float:
     """Seconds to land from `height` m above home, touchdown detection and disarming included."""
     height = max(height, 0.0)
     low = min(height, limits.land_low_alt)
     return (height - low) / limits.land_high + low / limits.land + 5.0
 
 
-def return_time(limits: Limits, distance: float, height: float) -> float:
+def return_time(limits: FlightLimits, distance: float, height: float) -> float:
     """Seconds for RTL from `distance` m away at `height` m above home: climb, return, loiter, land."""
     return_height = max(limits.rtl_alt, height)
     climb = (return_height - height) / limits.up

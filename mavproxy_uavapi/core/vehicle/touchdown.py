@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mavproxy_uavapi.core.vehicle.time_limits import Limits
+from mavproxy_uavapi.core.vehicle.time_limits import FlightLimits
 
 STANDING = 1.0  # m/s; what sinks faster than this after its disarming does not stand
 PATIENCE = 2.0  # s in which a position must come after the disarming, if positions come at all
@@ -11,7 +11,7 @@ PATIENCE = 2.0  # s in which a position must come after the disarming, if positi
 class Touchdown:
     """Tells a landing from a fall: after a landing's disarming the vehicle stands."""
 
-    def __init__(self, limits: Limits) -> None:
+    def __init__(self, limits: FlightLimits) -> None:
         self._fall = 2 * max(limits.down, limits.land, limits.land_high) + STANDING  # m/s; no descent is as fast
         self._sinking = 0.0
         self._disarmed_at: float | None = None

@@ -17,7 +17,7 @@ from ..position_control import SPEED_KINDS, Speed
 from .base import Mode
 from .landing import descend
 from .rtl import Rtl
-from .takeoff import Takeoff
+from .takeoff import TakeoffClimb
 
 LONGEST_CHAIN = 100
 """Items that are stepped through at once; a jump loop without a waypoint ends here."""
@@ -40,7 +40,7 @@ NAMES = {
 }
 
 
-class Submode(Enum):
+class AutoSubmode(Enum):
     """What the current navigation item makes the vehicle do."""
 
     HOLD = auto()
@@ -56,7 +56,7 @@ class Auto(Mode):
     name = "AUTO"
     number = 3
 
-    submode = Submode.HOLD
+    submode = AutoSubmode.HOLD
     paused = False
     waiting_to_start = False
     _target = Ned(0.0, 0.0, 0.0)
@@ -77,11 +77,11 @@ class Auto(Mode):
             aircraft.say(mavlink.MAV_SEVERITY_CRITICAL, "Auto: Missing Takeoff Cmd")
             return False
         aircraft.position.limits = aircraft.default_limits()
-        self.takeoff = Takeoff(aircraft)
+        self.takeoff = TakeoffClimb(aircraft)
         self.rtl = Rtl(aircraft)
         self._alongside: deque[tuple[int, Item]] = deque()
         self._condition_since = 0.0
-        self.submode, self.paused, self.waiting_to_start = Submode.HOLD, False, True
+        self.submode, self.paused, self.waiting_to_start = AutoSubmode.HOLD, False, True
         return True
 
     def leave(self) -> None:
@@ -97,11 +97,11 @@ class Auto(Mode):
         elif aircraft.mission.state is State.RUNNING:
             self._watch_for_changes()
             self._update()
-        if self.submode is Submode.TAKEOFF:
+        if self.submode is AutoSubmode.TAKEOFF:
             return self.takeoff.step(self, dt)
-        if self.submode is Submode.LAND:
+        if self.submode is AutoSubmode.LAND:
             return descend(self, dt)
-        if self.submode is Submode.RTL:
+        if self.submode is AutoSubmode.RTL:
             return self.rtl.step(dt)
         if aircraft.grounded:
             return self.wait_on_ground()
@@ -110,7 +110,7 @@ class Auto(Mode):
 
     def _fly_leg(self, dt: float) -> None:
         control = self.aircraft.position
-        if self.paused or self.submode is Submode.HOLD:
+        if self.paused or self.submode is AutoSubmode.HOLD:
             control.fly_at(0.0, 0.0, dt)
             control.climb_at(0.0, dt)
         else:
@@ -135,7 +135,7 @@ class Auto(Mode):
         if self.aircraft.mission.changes == self._seen_changes:
             return
         self._seen_changes = self.aircraft.mission.changes
-        if self.submode is Submode.WAYPOINT:
+        if self.submode is AutoSubmode.WAYPOINT:
             self.aircraft.say(mavlink.MAV_SEVERITY_CRITICAL, "Auto mission changed, restarted command")
             self._run_from(max(self.aircraft.mission.current, 1))
 
@@ -182,23 +182,23 @@ class Auto(Mode):
         aircraft.tell(Broadcast("MISSION_CURRENT"))
         self._arrived_at, self._started_at = None, aircraft.now
         if item.command == mavlink.MAV_CMD_NAV_TAKEOFF:
-            self.submode = Submode.TAKEOFF
+            self.submode = AutoSubmode.TAKEOFF
             lowest = aircraft.altitude + (1.0 if aircraft.landed else 0.0)
             altitude = max(aircraft.home_offset.down - item_target(aircraft, item).down, lowest)
             self.takeoff.start(aircraft.home_offset.down - altitude)
         elif item.command == mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH:
-            self.submode = Submode.RTL
+            self.submode = AutoSubmode.RTL
             self.rtl.enter(checked=True)
         elif item.command == mavlink.MAV_CMD_NAV_LAND and not (item.x or item.y):
             self._begin_descent()
         elif item.command == mavlink.MAV_CMD_NAV_DELAY:
-            self.submode = Submode.HOLD
+            self.submode = AutoSubmode.HOLD
         else:
             self._begin_leg(item)
 
     def _begin_leg(self, item: Item) -> None:
         aircraft = self.aircraft
-        self.submode = Submode.WAYPOINT
+        self.submode = AutoSubmode.WAYPOINT
         target = item_target(aircraft, item)
         if item.command == mavlink.MAV_CMD_NAV_LAND:
             # The way to a landing place is flown at the present altitude.
@@ -208,7 +208,7 @@ class Auto(Mode):
             aircraft.yaw.by_parameter(int(aircraft.parameters["WP_YAW_BEHAVIOR"]), returning=False)
 
     def _begin_descent(self) -> None:
-        self.submode = Submode.LAND
+        self.submode = AutoSubmode.LAND
         self.aircraft.yaw.hold()
 
     def _update(self) -> None:
@@ -228,9 +228,9 @@ class Auto(Mode):
         if item.command == mavlink.MAV_CMD_NAV_DELAY:
             return aircraft.now - self._started_at >= item.param1
         if item.command == mavlink.MAV_CMD_NAV_LAND:
-            if self.submode is Submode.WAYPOINT and aircraft.arrived(self._target):
+            if self.submode is AutoSubmode.WAYPOINT and aircraft.arrived(self._target):
                 self._begin_descent()
-            return self.submode is Submode.LAND and not aircraft.armed
+            return self.submode is AutoSubmode.LAND and not aircraft.armed
         if item.command == mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH:
             return self.rtl.landing and not aircraft.armed
         if item.command == mavlink.MAV_CMD_NAV_LOITER_UNLIM or self.paused:
@@ -305,7 +305,7 @@ class Auto(Mode):
         """Nothing left: hold the position in the air, disarm on the ground."""
         aircraft = self.aircraft
         aircraft.mission.state = State.COMPLETE
-        self.submode = Submode.HOLD
+        self.submode = AutoSubmode.HOLD
         if aircraft.landed:
             aircraft.disarm_landed()
 
@@ -314,7 +314,7 @@ class Auto(Mode):
         return True
 
     def pause(self) -> bool:
-        on_the_way = self.submode is Submode.WAYPOINT and self._arrived_at is None
+        on_the_way = self.submode is AutoSubmode.WAYPOINT and self._arrived_at is None
         if not on_the_way or self.aircraft.arrived(self._target):
             return False
         self.paused = True
@@ -326,14 +326,14 @@ class Auto(Mode):
 
     @property
     def landing(self) -> bool:
-        return self.submode is Submode.LAND or (self.submode is Submode.RTL and self.rtl.landing)
+        return self.submode is AutoSubmode.LAND or (self.submode is AutoSubmode.RTL and self.rtl.landing)
 
     @property
     def taking_off(self) -> bool:
-        return self.submode is Submode.TAKEOFF and not self.takeoff.complete
+        return self.submode is AutoSubmode.TAKEOFF and not self.takeoff.complete
 
     @property
     def target(self) -> Ned | None:
-        if self.submode is Submode.RTL:
+        if self.submode is AutoSubmode.RTL:
             return self.rtl.target
-        return self._target if self.submode is Submode.WAYPOINT else None
+        return self._target if self.submode is AutoSubmode.WAYPOINT else None

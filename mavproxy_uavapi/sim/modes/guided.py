@@ -8,14 +8,14 @@ from ..demand import Demand
 from ..geodesy import Ned
 from ..position_control import Speed
 from .base import Mode
-from .takeoff import Takeoff
+from .takeoff import TakeoffClimb
 
 ZERO = Ned(0.0, 0.0, 0.0)
 SHORTEST_TIMEOUT = 0.1
 """Seconds; a smaller GUID_TIMEOUT counts as this."""
 
 
-class Submode(Enum):
+class GuidedSubmode(Enum):
     """Which kind of setpoint came last."""
 
     TAKEOFF = auto()
@@ -41,7 +41,7 @@ class Guided(Mode):
     name = "GUIDED"
     number = 4
 
-    submode = Submode.VELOCITY
+    submode = GuidedSubmode.VELOCITY
     paused = False
     position_target = ZERO
     velocity_target = ZERO
@@ -50,23 +50,23 @@ class Guided(Mode):
 
     def enter(self, checked: bool) -> bool:
         del checked
-        self.takeoff = Takeoff(self.aircraft)
+        self.takeoff = TakeoffClimb(self.aircraft)
         self.stop()
         return True
 
     def stop(self) -> None:
         """Brake and hold: on entry, and what ArduCopter does with a setpoint that makes no sense."""
-        self._start(Submode.VELOCITY)
+        self._start(GuidedSubmode.VELOCITY)
         self.velocity_target = self.acceleration_target = ZERO
         self.paused = False
 
-    def _start(self, submode: Submode) -> None:
+    def _start(self, submode: GuidedSubmode) -> None:
         """Change the submode. Limits go back to the parameters: DO_CHANGE_SPEED does not outlive it."""
         self.submode = submode
         self.aircraft.position.limits = self.aircraft.default_limits()
         self.aircraft.yaw.by_parameter(int(self.aircraft.parameters["WP_YAW_BEHAVIOR"]), returning=False)
 
-    def _accept(self, submode: Submode, yaw: YawSetpoint) -> None:
+    def _accept(self, submode: GuidedSubmode, yaw: YawSetpoint) -> None:
         if self.submode is not submode:
             self._start(submode)
         aircraft = self.aircraft
@@ -76,37 +76,37 @@ class Guided(Mode):
 
     def go_to(self, target: Ned, yaw: YawSetpoint = NO_YAW) -> None:
         """Fly to target and hold there."""
-        self._accept(Submode.POSITION, yaw)
+        self._accept(GuidedSubmode.POSITION, yaw)
         self.position_target = target
         self.velocity_target = self.acceleration_target = ZERO
 
     def track(self, target: Ned, velocity: Ned, acceleration: Ned, yaw: YawSetpoint = NO_YAW) -> None:
         """Follow a target that is at a position and moves with velocity; repeat within GUID_TIMEOUT."""
-        self._accept(Submode.TRACKING, yaw)
+        self._accept(GuidedSubmode.TRACKING, yaw)
         self.position_target, self.velocity_target, self.acceleration_target = target, velocity, acceleration
 
     def fly_at(self, velocity: Ned, acceleration: Ned, yaw: YawSetpoint = NO_YAW) -> None:
         """Fly with velocity (m/s) until GUID_TIMEOUT passes without another setpoint."""
-        self._accept(Submode.VELOCITY, yaw)
+        self._accept(GuidedSubmode.VELOCITY, yaw)
         self.position_target, self.velocity_target, self.acceleration_target = ZERO, velocity, acceleration
 
     def accelerate_at(self, acceleration: Ned, yaw: YawSetpoint = NO_YAW) -> None:
         """Accelerate (m/s/s) until GUID_TIMEOUT passes without another setpoint."""
-        self._accept(Submode.ACCELERATION, yaw)
+        self._accept(GuidedSubmode.ACCELERATION, yaw)
         self.position_target, self.velocity_target, self.acceleration_target = ZERO, ZERO, acceleration
 
     def take_off(self, altitude: float) -> bool:
         aircraft = self.aircraft
         if altitude <= aircraft.altitude:
             return False
-        self.submode = Submode.TAKEOFF
+        self.submode = GuidedSubmode.TAKEOFF
         self.takeoff.start(aircraft.home_offset.down - altitude)
         aircraft.auto_armed = True
         return True
 
     def step(self, dt: float) -> Demand:
         aircraft = self.aircraft
-        if self.submode is Submode.TAKEOFF and not self.paused:
+        if self.submode is GuidedSubmode.TAKEOFF and not self.paused:
             return self.takeoff.step(self, dt)
         if aircraft.grounded:
             return self.wait_on_ground()
@@ -125,14 +125,14 @@ class Guided(Mode):
 
     def _move(self, expired: bool, dt: float) -> None:
         control = self.aircraft.position
-        if self.submode is Submode.POSITION:
+        if self.submode is GuidedSubmode.POSITION:
             control.go_to(self.position_target, dt)
-        elif self.submode is Submode.TRACKING:
+        elif self.submode is GuidedSubmode.TRACKING:
             self.position_target = Ned(
                 *(p + v * dt for p, v in zip(self.position_target, self.velocity_target, strict=True))
             )
             control.track(self.position_target, self.velocity_target, self.acceleration_target, dt)
-        elif self.submode is Submode.ACCELERATION and not expired:
+        elif self.submode is GuidedSubmode.ACCELERATION and not expired:
             control.accelerate_at(self.acceleration_target, dt)
         else:
             control.fly_at(self.velocity_target.north, self.velocity_target.east, dt)
@@ -156,8 +156,8 @@ class Guided(Mode):
 
     @property
     def taking_off(self) -> bool:
-        return self.submode is Submode.TAKEOFF and not self.takeoff.complete
+        return self.submode is GuidedSubmode.TAKEOFF and not self.takeoff.complete
 
     @property
     def target(self) -> Ned | None:
-        return self.position_target if self.submode is Submode.POSITION else None
+        return self.position_target if self.submode is GuidedSubmode.POSITION else None

@@ -10,7 +10,7 @@ DONE_SPEED_SHARE = 0.1
 """A takeoff is complete below this share of the climb speed limit, as in ArduCopter."""
 
 
-class Takeoff:
+class TakeoffClimb:
     """Spools up, raises the throttle until the vehicle lifts, climbs straight up to the altitude."""
 
     def __init__(self, aircraft: Aircraft) -> None:

@@ -10,7 +10,7 @@ from pymavlink import mavutil
 from mavproxy_uavapi.core.errors import BadRequest, Invalid
 from mavproxy_uavapi.core.mavlink.link import Address
 from mavproxy_uavapi.core.vehicle import mission_files
-from mavproxy_uavapi.core.vehicle.mission_files import Item, difference, read
+from mavproxy_uavapi.core.vehicle.mission_files import MissionItem, difference, read
 
 mavlink = mavutil.mavlink
 
@@ -22,9 +22,9 @@ ROWS = [
     "3\t0\t3\t203\t1\t0\t0\t0\t1\t0\t0\t1",
 ]
 WPL = "\n".join(ROWS)
-TAKEOFF = Item(22, 3, (0.0, 0.0, 0.0, 0.0), 0, 0, 10.0)
-LEG = Item(16, 3, (0.0, 0.0, 0.0, 0.0), -353630000, 1491653001, 12.5)
-SHOOT = Item(203, 3, (1.0, 0.0, 0.0, 0.0), 1, 0, 0.0)
+TAKEOFF = MissionItem(22, 3, (0.0, 0.0, 0.0, 0.0), 0, 0, 10.0)
+LEG = MissionItem(16, 3, (0.0, 0.0, 0.0, 0.0), -353630000, 1491653001, 12.5)
+SHOOT = MissionItem(203, 3, (1.0, 0.0, 0.0, 0.0), 1, 0, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -152,6 +152,6 @@ def test_answer_in_floats_is_understood() -> None:
         ([TAKEOFF, replace(LEG, frame=0)], "item 2"),
     ],
 )
-def test_read_back_is_compared_by_what_every_autopilot_keeps(found: list[Item], words: str | None) -> None:
+def test_read_back_is_compared_by_what_every_autopilot_keeps(found: list[MissionItem], words: str | None) -> None:
     told = difference([TAKEOFF, LEG], found)
     assert told is None if words is None else told is not None and words in told

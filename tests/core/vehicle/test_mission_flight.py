@@ -7,11 +7,11 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import Busy, ModeChanged, NotArmed, Stale
 from mavproxy_uavapi.core.vehicle import mission_flight
-from mavproxy_uavapi.core.vehicle.mission_files import Item
+from mavproxy_uavapi.core.vehicle.mission_files import MissionItem
 
 mavlink = mavutil.mavlink
 
-ITEMS = [Item(number, 3, (0.0, 0.0, 0.0, 0.0), 0, 0, 10.0) for number in (22, 16, 20)]
+ITEMS = [MissionItem(number, 3, (0.0, 0.0, 0.0, 0.0), 0, 0, 10.0) for number in (22, 16, 20)]
 
 
 class Flight:

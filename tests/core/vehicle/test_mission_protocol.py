@@ -10,13 +10,17 @@ import pytest
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import LinkLost, Rejected, TimedOut
-from mavproxy_uavapi.core.vehicle.mission_files import HOME, Item, from_message
+from mavproxy_uavapi.core.vehicle.mission_files import HOME, MissionItem, from_message
 
 mavlink = mavutil.mavlink
 
 PLACE = (0.0, 0.0, 0.0, 0.0)
-OLD = [Item(22, 3, PLACE, 0, 0, 10.0), Item(16, 3, PLACE, 10, 20, 15.0)]
-NEW = [Item(22, 3, PLACE, 0, 0, 5.0), Item(16, 3, PLACE, 30, 40, 7.0), Item(20, 3, PLACE, 0, 0, 0.0)]
+OLD = [MissionItem(22, 3, PLACE, 0, 0, 10.0), MissionItem(16, 3, PLACE, 10, 20, 15.0)]
+NEW = [
+    MissionItem(22, 3, PLACE, 0, 0, 5.0),
+    MissionItem(16, 3, PLACE, 30, 40, 7.0),
+    MissionItem(20, 3, PLACE, 0, 0, 0.0),
+]
 
 
 class Store:

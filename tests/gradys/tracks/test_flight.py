@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from mavproxy_gradys.tracks.flight import Flight, flight_of
-from mavproxy_gradys.tracks.formats import Waypoint
+from mavproxy_gradys.tracks.flight import TrackFlight, flight_of
+from mavproxy_gradys.tracks.formats import TrackWaypoint
 from mavproxy_uavapi.core.errors import Invalid, NotSupported
 
 METRES_PER_DEGREE = 111318.845
@@ -43,13 +43,13 @@ class Copter:
         self.did.append("rtl")
 
 
-def place(north: float, alt: float) -> Waypoint:
-    return Waypoint(HERE.lat / 1e7 + north / METRES_PER_DEGREE, HERE.lon / 1e7, alt)
+def place(north: float, alt: float) -> TrackWaypoint:
+    return TrackWaypoint(HERE.lat / 1e7 + north / METRES_PER_DEGREE, HERE.lon / 1e7, alt)
 
 
-def flown(loop: Any, copter: Any, *places: Waypoint, **given: Any) -> list[Any]:
+def flown(loop: Any, copter: Any, *places: TrackWaypoint, **given: Any) -> list[Any]:
     job: Any = SimpleNamespace(stage={})
-    loop.run(Flight(copter, places, **given).fly(job))
+    loop.run(TrackFlight(copter, places, **given).fly(job))
     assert copter.did[-1] == "rtl"
     did: list[Any] = copter.did[:-1]
     return did

@@ -11,15 +11,15 @@ from typing import Any
 
 import pytest
 
-from mavproxy_gradys.http import Handlers
+from mavproxy_gradys.http import GradysHandlers
 from mavproxy_gradys.service import Gradys
-from mavproxy_gradys.tracks.request import Track
+from mavproxy_gradys.tracks.request import TrackRequest
 from mavproxy_uavapi.core.errors import Invalid, TooManyRequests
 from mavproxy_uavapi.core.vehicle.endings import Policy
+from mavproxy_uavapi.http.auditing import audited
 from mavproxy_uavapi.http.call import Call, Service
 from mavproxy_uavapi.http.jobs import list_jobs
 from mavproxy_uavapi.http.requests import Empty
-from mavproxy_uavapi.http.trail import audited
 from mavproxy_uavapi.settings import ApiModuleSettings
 
 LINE = "(1, -158400810, -479266420, 584090, 0, 65535, 0, 0, 3, 10)\n"
@@ -43,11 +43,11 @@ def call_of(service: Service, text: str = LONG, **query: str) -> Call:
     request: Any = SimpleNamespace(
         path="/mission/fly-track", remote="10.0.0.9", headers={}, query=query, transport=None
     )
-    return Call(service, request, Track(track=text))
+    return Call(service, request, TrackRequest(track=text))
 
 
 def asked(service: Service, call: Call) -> Any:
-    return audited(call, Handlers(Gradys(service.host)).fly_track)
+    return audited(call, GradysHandlers(Gradys(service.host)).fly_track)
 
 
 def sizes(service: Service, loop: Any) -> list[int]:

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from mavproxy_gradys.tracks.formats import GPX_HEAD, GPX_TAIL, Reading, parse, style_of, waypoints
+from mavproxy_gradys.tracks.formats import GPX_HEAD, GPX_TAIL, GpsReading, parse, style_of, waypoints
 from mavproxy_uavapi.core.errors import Invalid
 
 TEXT = (
@@ -14,13 +14,13 @@ TEXT = (
     " eph : 0, epv : 65535, vel : 0, cog : 0, satellites_visible : 10}"
 )
 TUPLE = "(251908000, 357713121, -786743912, 584090, 0, 65535, 0, 0, 3, 10)"
-READING = Reading(251908000, 357713121, -786743912, 584090, 0, 65535, 0, 0, 3, 10)
+READING = GpsReading(251908000, 357713121, -786743912, 584090, 0, 65535, 0, 0, 3, 10)
 DEGREES_PER_METRE = 1e7 / 111318.845
 
 
-def at(metres: float, alt: float, fix: int = 3) -> Reading:
+def at(metres: float, alt: float, fix: int = 3) -> GpsReading:
     """A reading so many metres north, at `alt` m AMSL."""
-    return Reading(0, 357713121 + round(metres * DEGREES_PER_METRE), -786743912, round(alt * 1000), fix_type=fix)
+    return GpsReading(0, 357713121 + round(metres * DEGREES_PER_METRE), -786743912, round(alt * 1000), fix_type=fix)
 
 
 def test_both_formats_are_read_and_written() -> None:
@@ -37,7 +37,7 @@ def test_what_mavlink_2_adds_is_passed_over() -> None:
 def test_a_message_makes_a_reading(msg: Any) -> None:
     message = msg("gps_raw_int", time_usec=251908000, fix_type=3, lat=357713121, lon=-786743912, alt=584090,
                   epv=65535, satellites_visible=10)  # fmt: skip
-    assert Reading.of(message) == READING
+    assert GpsReading.of(message) == READING
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import pytest
 from aiohttp import ClientSession, web
 from aiohttp.test_utils import TestClient, TestServer
 
-from mavproxy_uavapi.http.app import MAX_BODY, Server, listening_socket, make_app
+from mavproxy_uavapi.http.app import MAX_BODY, ApiServer, listening_socket, make_app
 from mavproxy_uavapi.http.requests import Servo
 from mavproxy_uavapi.http.route import Route
 from mavproxy_uavapi.settings import ApiModuleSettings
@@ -29,7 +29,7 @@ def free_port() -> int:
 def server(loop: Any, service: Any, free_port: int) -> Any:
     loop.patience = 0.002
     service.settings = ApiModuleSettings({"port": free_port}).snapshot()
-    server = Server(service)
+    server = ApiServer(service)
     yield server
     loop.run(server.stop())
 
@@ -151,7 +151,7 @@ def test_port_can_be_bound_again_at_once(loop: Any, service: Any, free_port: int
     loop.patience = 0.002
     service.settings = ApiModuleSettings({"port": free_port}).snapshot()
     for _ in range(3):
-        server = Server(service)
+        server = ApiServer(service)
         loop.run(server.start())
         assert loop.run(status_of(free_port)) == 200
         loop.run(server.stop())

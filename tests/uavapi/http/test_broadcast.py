@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.http.broadcast import QUEUED, TOGETHER, Broadcast, Event, Subscription
+from mavproxy_uavapi.http.broadcast import QUEUED, TOGETHER, Event, Subscription, TelemetryBroadcast
 
 
 @pytest.fixture
@@ -51,7 +51,7 @@ def test_event_tells_each_client_what_that_has_lost(msg: Any) -> None:
 
 def test_broadcast_listens_while_somebody_does() -> None:
     listeners: list[Any] = []
-    broadcast = Broadcast(listeners)
+    broadcast = TelemetryBroadcast(listeners)
     with broadcast.heard_by(Subscription(frozenset(), None, None)):
         with pytest.raises(KeyError), broadcast.heard_by(Subscription(frozenset(), None, None)):
             assert len(listeners) == 1

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import fcntl
 import gzip
+import ipaddress
 import json
 import logging
 import os
@@ -20,9 +21,13 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.http.app import Server
+from mavproxy_uavapi.http import listener
+from mavproxy_uavapi.http.app import ApiServer
 from mavproxy_uavapi.http.call import BODY_TIMEOUT
+from mavproxy_uavapi.http.listener import SHARE
 from mavproxy_uavapi.http.routes import ROUTES
+from mavproxy_uavapi.http.streaming import MOST_OPEN
+from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.settings import ApiModuleSettings
 
 TOKEN = "a-long-and-secret-word"
@@ -69,12 +74,12 @@ class Wire:
 class Port:
     """A server that listens, and connections to it."""
 
-    def __init__(self, loop: Any, server: Server, port: int) -> None:
+    def __init__(self, loop: Any, server: ApiServer, port: int) -> None:
         self.loop, self.server, self.port = loop, server, port
         self._wires: list[Wire] = []
 
-    async def connect(self) -> Wire:
-        wire = Wire(*await asyncio.open_connection("127.0.0.1", self.port))
+    async def connect(self, source: str = "127.0.0.1") -> Wire:
+        wire = Wire(*await asyncio.open_connection("127.0.0.1", self.port, local_addr=(source, 0)))
         self._wires.append(wire)
         return wire
 
@@ -123,14 +128,16 @@ def idle_strangers(port: Port) -> Iterator[Callable[[int], list[socket.socket]]]
 
 
 @pytest.fixture
-def port(loop: Any, service: Any) -> Iterator[Port]:
+def port(loop: Any, service: Any, tmp_path: Path) -> Iterator[Port]:
     """The API with a token, on a real port of the loopback."""
     loop.patience = 0.002
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         free = int(probe.getsockname()[1])
-    service.settings = ApiModuleSettings({"port": free, "token": TOKEN}, environ={}).snapshot()
-    server = Server(service)
+    given = {"port": free, "token": TOKEN, "scripts_path": str(tmp_path / "scripts")}
+    service.settings = ApiModuleSettings(given, environ={}).snapshot()
+    service.scripts = Scripts(service.host, service.settings)
+    server = ApiServer(service)
     loop.run(server.start())
     port = Port(loop, server, free)
     yield port
@@ -208,6 +215,35 @@ def test_idle_connection_is_closed_after_30_s_and_a_stream_is_not(drone: Any, po
     assert 29 <= closed <= 31
 
 
+def test_streams_of_one_address_leave_most_to_others(
+    drone: Any, port: Port, service: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A stream takes a connection, so that the share of connections is one of streams too."""
+    far = "127.0.0.2"  # stands for another computer
+    addresses = {far: ipaddress.ip_address("10.0.0.5")}
+    monkeypatch.setattr(listener, "address_of", lambda remote: addresses.get(remote, ipaddress.ip_address(remote)))
+    upgrade = ("Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13")
+    kinds = (OWNER,), (OWNER, *upgrade, "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==")
+
+    async def status_of_stream(source: str, *headers: str) -> int | None:
+        wire = await port.connect(source)
+        wire.send("GET", "/telemetry/stream", *headers)
+        try:
+            return int((await wire.reader.readuntil(b"\r\n")).split()[1])
+        except (asyncio.IncompleteReadError, ConnectionError):
+            return None
+
+    async def act() -> tuple[list[int | None], list[int | None], int]:
+        theirs = [await status_of_stream(far, *kinds[number % 2]) for number in range(2 * SHARE)]
+        ours = [await status_of_stream("127.0.0.1", *kinds[number % 2]) for number in range(MOST_OPEN - SHARE + 1)]
+        return theirs, ours, service.streams.count
+
+    theirs, ours, count = port.run(act)
+    assert theirs == [200, 101] * (SHARE // 2) + [None] * SHARE
+    assert ours == [200, 101] * ((MOST_OPEN - SHARE) // 2) + [429]
+    assert count == MOST_OPEN
+
+
 @pytest.mark.parametrize("drop", ["G", "\r\n", "\x00"])
 def test_connection_that_sends_a_byte_every_29_s_is_closed(drone: Any, port: Port, loop: Any, drop: str) -> None:
     async def act() -> float:
@@ -236,7 +272,7 @@ def test_tls_handshake_that_stops_half_way_is_given_up_and_holds_up_nobody(
         free = int(probe.getsockname()[1])
     given = {"port": free, "certfile": cert, "keyfile": key}
     service.settings = ApiModuleSettings(given, environ={}).snapshot()
-    server = Server(service)
+    server = ApiServer(service)
     port = Port(loop, server, free)
 
     async def act() -> tuple[int, float, int]:
@@ -450,6 +486,42 @@ def test_form_with_an_endless_part_before_its_file_is_refused(flying: Any, port:
     answer, sent = port.run(act)
     assert answer is None or (answer.status, answer.body["code"]) == (400, "bad_request")
     assert sent < 20_000_000
+
+
+PART = b'Content-Disposition: form-data; name="%b"; filename="a.py"\r\n'
+NESTED = b"--b\r\nContent-Type: multipart/mixed; boundary=%b\r\n\r\n"
+SCRIPT = b"--b\r\n" + PART % b"file" + b"\r\nprint(1)\r\n--b--\r\n"
+
+
+def post_script(port: Port, body: bytes) -> Any:
+    """Send a form with boundary `b`."""
+    length = f"Content-Length: {len(body)}"
+    return port.run(lambda: port.ask("POST", "/mission/upload-script", OWNER, FORM, length, body=body))
+
+
+@pytest.mark.parametrize(
+    ("before", "why"),
+    [
+        (NESTED % b"c" + b"--c\r\n\r\nx\r\n--c--\r\n\r\n", "multipart itself"),
+        (NESTED % b"b" * 12_000, "multipart itself"),
+        (b"--b\r\n" + PART % b"other" + b"x" * 9000 + b": y\r\n\r\n", "bad headers"),
+        (b"--b\r\n" + PART % b"other" + b"x: y\r\n" * 200 + b"\r\n", "bad headers"),
+        (b"--b\r\n" + PART % b"other" + b"no header\r\n\r\nx\r\n", "bad headers"),
+        (b"--b\r\n\r\nx\r\n" * 20_000, "100 parts"),
+    ],
+    ids=["a form", "forms in forms", "a long header", "many headers", "no header", "many parts"],
+)
+def test_form_is_refused_for_what_comes_before_its_file(
+    flying: Any, port: Port, caplog: pytest.LogCaptureFixture, before: bytes, why: str
+) -> None:
+    answer = post_script(port, before + SCRIPT)
+    assert (answer.status, answer.body["code"]) == (400, "bad_request")
+    assert why in answer.body["detail"]
+    assert [record for record in caplog.records if record.exc_info] == []
+
+
+def test_form_with_a_few_other_parts_before_its_file_is_taken(flying: Any, port: Port) -> None:
+    assert post_script(port, (b"--b\r\n" + PART % b"other" + b"\r\nx\r\n") * 99 + SCRIPT).status == 200
 
 
 # -- pages --------------------------------------------------------------------------------------------------

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import asyncio
 from pathlib import Path
 from typing import Any
 
@@ -91,6 +92,18 @@ def test_a_dead_scripts_own_job_ends_with_it(
     assert after(loop, host, "hold", others=others) == "hold is done"
     assert (job.running, job.ending.value) == (False, "script gone")
     assert flying.setpoints()[-1].vx == 0.0
+
+
+def test_a_dead_scripts_mission_is_uploaded_to_its_end(
+    loop: Any, host: Any, flying: Any, pilotage: Any, copter: Any
+) -> None:
+    async def upload(_job: Any) -> None:
+        await asyncio.sleep(60.0)
+
+    job = pilotage.start(upload)
+    job.verb, job.script = "/mission/waypoints", run_of().session
+    assert after(loop, host, "hold") == "hold is done"
+    assert job.running
 
 
 def test_somebody_elses_job_does_not_end_with_a_script(

@@ -6,28 +6,28 @@ from pathlib import Path
 import pytest
 
 from mavproxy_uavapi.core.errors import BadRequest, NotFound
-from mavproxy_uavapi.scripts.store import Store
+from mavproxy_uavapi.scripts.store import ScriptStore
 
 
 @pytest.fixture
-def store(tmp_path: Path) -> Store:
-    return Store(tmp_path / "scripts", size_limit=2048, quota=4096)
+def store(tmp_path: Path) -> ScriptStore:
+    return ScriptStore(tmp_path / "scripts", size_limit=2048, quota=4096)
 
 
-def test_saved_script_is_there_whole_and_can_be_run(store: Store) -> None:
+def test_saved_script_is_there_whole_and_can_be_run(store: ScriptStore) -> None:
     path = store.save("a.sh", b"echo hi\n")
     assert path == store.folder / "a.sh"
     assert path.read_bytes() == b"echo hi\n"
     assert os.access(path, os.X_OK)
 
 
-def test_a_second_upload_takes_the_place_of_the_first(store: Store) -> None:
+def test_a_second_upload_takes_the_place_of_the_first(store: ScriptStore) -> None:
     store.save("a.py", b"1")
     store.save("a.py", b"2")
     assert (store.folder / "a.py").read_bytes() == b"2"
 
 
-def test_a_symbolic_link_is_replaced_and_not_followed(store: Store, tmp_path: Path) -> None:
+def test_a_symbolic_link_is_replaced_and_not_followed(store: ScriptStore, tmp_path: Path) -> None:
     target = tmp_path / "precious"
     target.write_text("keep")
     store.folder.mkdir()
@@ -36,13 +36,13 @@ def test_a_symbolic_link_is_replaced_and_not_followed(store: Store, tmp_path: Pa
     assert target.read_text() == "keep"
 
 
-def test_too_large_a_script_is_refused_and_nothing_is_left(store: Store) -> None:
+def test_too_large_a_script_is_refused_and_nothing_is_left(store: ScriptStore) -> None:
     with pytest.raises(BadRequest, match="larger than 2 kB"):
         store.save("a.py", b"x" * 2049)
     assert not store.folder.exists() or list(store.folder.iterdir()) == []
 
 
-def test_quota_counts_all_scripts_but_the_one_that_is_replaced(store: Store) -> None:
+def test_quota_counts_all_scripts_but_the_one_that_is_replaced(store: ScriptStore) -> None:
     store.save("a.py", b"x" * 2048)
     store.save("b.py", b"x" * 2048)
     store.save("b.py", b"y" * 2048)
@@ -52,7 +52,7 @@ def test_quota_counts_all_scripts_but_the_one_that_is_replaced(store: Store) -> 
 
 
 def test_failure_half_way_leaves_the_old_script_and_no_temporary_file(
-    store: Store, monkeypatch: pytest.MonkeyPatch
+    store: ScriptStore, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     store.save("a.py", b"old")
 
@@ -65,7 +65,7 @@ def test_failure_half_way_leaves_the_old_script_and_no_temporary_file(
     assert [(file.name, file.read_bytes()) for file in store.folder.iterdir()] == [("a.py", b"old")]
 
 
-def test_only_scripts_are_listed_found_and_cleared(store: Store) -> None:
+def test_only_scripts_are_listed_found_and_cleared(store: ScriptStore) -> None:
     assert store.listed() == store.clear() == []
     store.save("b.py", b"")
     store.save("a.sh", b"")

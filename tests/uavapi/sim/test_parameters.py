@@ -1,7 +1,7 @@
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from mavproxy_uavapi.sim.parameters import Parameters
+from mavproxy_uavapi.sim.parameters import ParameterStore
 
 
 @pytest.mark.parametrize(
@@ -9,17 +9,17 @@ from mavproxy_uavapi.sim.parameters import Parameters
     [("WPNAV_SPEED", 1000), ("RTL_ALT", 1500), ("LAND_SPEED", 50), ("GUID_TIMEOUT", 3), ("SYSID_THISMAV", 1)],
 )
 def test_defaults_are_arducopters(name, value):
-    assert Parameters()[name] == value
+    assert ParameterStore()[name] == value
 
 
 def test_names_are_unique_and_fit_into_mavlink():
-    names = [parameter.name for parameter in Parameters().ordered]
+    names = [parameter.name for parameter in ParameterStore().ordered]
     assert len(names) == len(set(names)) > 300
     assert all(len(name) <= 16 for name in names)
 
 
 def test_values_are_stored_as_their_type_can_hold_them():
-    parameters = Parameters()
+    parameters = ParameterStore()
     assert parameters.set("DISARM_DELAY", 300.0).value == 127.0
     assert parameters.set("LAND_SPEED", 49.6).value == 50.0
     assert parameters.set("GUID_TIMEOUT", 0.1).value == pytest.approx(0.1, abs=1e-7)

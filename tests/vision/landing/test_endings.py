@@ -172,6 +172,22 @@ def test_stopped_and_unloaded_in_one_breath_it_holds_and_plnd_is_as_before(flyin
     assert plnd(rig) == before
 
 
+def test_last_words_of_an_unloaded_module_go_when_its_parameters_are_given_back(flying):
+    rig = flying(alt=6.0, plnd=True, **LARGE)
+    before, words = plnd(rig), rig.host.last_words
+    rig.land(method="landing_target")
+    until(rig, lambda: rig.mode == "LAND")
+    rig.pass_time(1.0)
+    hear = rig.host._receive
+    silent(rig, "PARAM_VALUE")
+    rig.unload()
+    rig.pass_time(5.0)
+    assert rig.flights.last_words in words
+    rig.host._receive = hear
+    until(rig, lambda: rig.flights.last_words not in words)
+    assert plnd(rig) == before
+
+
 def test_unloaded_in_the_autopilots_land_it_lands(flying):
     rig = flying(alt=6.0, sim_tags="", attempts=1, leash=1.0, on_failure="land")
     job = rig.land()
@@ -524,6 +540,35 @@ def test_parameters_are_given_back_after_two_landings_in_a_row(flying, pause):
     assert during[100] == wanted
     rig.pass_time(20.0)
     assert plnd(rig) == before
+
+
+@pytest.mark.parametrize("answers", ["slow", "lost"])
+def test_pilot_who_switches_while_parameters_are_set_ends_that(flying, answers):
+    rig = flying(alt=6.0, plnd=True, **LARGE)
+    for name, value in (("PLND_RET_MAX", 4), ("PLND_ALT_MAX", 8), ("PLND_STRICT", 2), ("PLND_ALT_MIN", 0.75)):
+        rig.simulator.parameters.set(name, value)
+    before, hear = plnd(rig), rig.host._receive
+
+    def hampered(message: Any) -> None:
+        if message.get_type() != "PARAM_VALUE":
+            hear(message)
+        elif answers == "slow":
+            rig.loop.call_later(0.5, hear, message)
+
+    job = rig.land(method="landing_target")
+    until(rig, lambda: sent(rig, "PARAM_SET"))
+    rig.host._receive = hampered
+    pilot(rig, 5)
+    until(rig, lambda: rig.copter.mode == "LOITER")
+    mark = len(rig.wire.sent)
+    rig.pass_time(0.1)
+    assert isinstance(rig.outcome(job), ModeChanged)
+    rig.pass_time(2.0)
+    rig.host._receive = hear
+    rig.pass_time(20.0)
+    assert [m.param_id for m in sent(rig, "PARAM_SET", mark) if m.param_value != before[m.param_id]] == []
+    assert plnd(rig) == before
+    assert rig.mode == "LOITER"
 
 
 def test_a_parting_is_not_cut_short_by_the_next_flight(flying):

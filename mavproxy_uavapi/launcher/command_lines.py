@@ -13,8 +13,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from mavproxy_uavapi.core.settings import DEFAULT
-from mavproxy_uavapi.launcher.locations import Home
-from mavproxy_uavapi.launcher.options import Options
+from mavproxy_uavapi.launcher.locations import HomePosition
+from mavproxy_uavapi.launcher.options import RunOptions
 from mavproxy_uavapi.settings import ApiModuleSettings
 
 # What makes run_in_terminal_window.sh put the vehicle into a window, a tmux server or a screen that is not
@@ -27,7 +27,7 @@ SITL_RETRIES = 30
 
 
 def mavproxy_command(
-    options: Options, program: Sequence[str], run_dir: Path, instance: int | None, config: Path | None
+    options: RunOptions, program: Sequence[str], run_dir: Path, instance: int | None, config: Path | None
 ) -> list[str]:
     """MAVProxy's command line.
 
@@ -55,7 +55,7 @@ def mavproxy_command(
     return command + list(options.mavproxy_args)
 
 
-def master(options: Options, instance: int | None) -> str:
+def master(options: RunOptions, instance: int | None) -> str:
     """The link to the vehicle in MAVProxy's notation."""
     if instance is not None:
         return f"tcp:127.0.0.1:{5760 + 10 * instance}"
@@ -64,7 +64,7 @@ def master(options: Options, instance: int | None) -> str:
     return f"{options.connection_type}:{options.uav_connection}"
 
 
-def module_loads(options: Options, config: Path | None) -> list[str]:
+def module_loads(options: RunOptions, config: Path | None) -> list[str]:
     """One `module load` command per module; keywords that the user gave one of ours (`--module NAME:{…}`) win."""
     settings: dict[str, object] = {"host": options.host, "port": options.port, "sysid": options.sysid}
     names = ApiModuleSettings.names()
@@ -87,7 +87,7 @@ def module_loads(options: Options, config: Path | None) -> list[str]:
     return [module_load(name, keywords) for name, keywords in given.items() if keywords] + others
 
 
-def gradys_keywords(options: Options) -> dict[str, object]:
+def gradys_keywords(options: RunOptions) -> dict[str, object]:
     """What the module `gradys` is loaded with; nothing where the user set nothing of it."""
     keywords: dict[str, object] = {}
     if options.gradys_config is not None:
@@ -108,7 +108,7 @@ def module_load(name: str, settings: Mapping[str, object]) -> str:
     return f"module load {name}:{text.replace(' ', chr(92) + 'u0020').replace(';', chr(92) + 'u003b')}"
 
 
-def settings_file(options: Options) -> str | None:
+def settings_file(options: RunOptions) -> str | None:
     """The INI text with what the `uavapi` module takes by file only; None where the user set none of it."""
     parser = configparser.ConfigParser(interpolation=None)
     for section, names in {
@@ -131,7 +131,7 @@ def _ini_text(value: str | tuple[str, ...]) -> str:
     return f"[{', '.join(value)}]" if isinstance(value, tuple) else value
 
 
-def embedded_command(options: Options, instance: int, home: Home) -> list[str]:
+def embedded_command(options: RunOptions, instance: int, home: HomePosition) -> list[str]:
     """The embedded vehicle's command line."""
     return [
         sys.executable,
@@ -144,7 +144,9 @@ def embedded_command(options: Options, instance: int, home: Home) -> list[str]:
     ]
 
 
-def sim_vehicle_command(options: Options, python: str, instance: int, home: Home, use_dir: Path) -> list[str]:
+def sim_vehicle_command(
+    options: RunOptions, python: str, instance: int, home: HomePosition, use_dir: Path
+) -> list[str]:
     """The command line of ArduPilot's sim_vehicle.py, for the vehicle alone.
 
     MAVProxy is ours to start (`--no-mavproxy`): it keeps the terminal, and its arguments need not survive
@@ -170,19 +172,19 @@ def sim_vehicle(ardupilot_path: str) -> Path:
     return Path(ardupilot_path, "Tools", "autotest", "sim_vehicle.py")
 
 
-def sitl_binary(options: Options) -> Path:
+def sitl_binary(options: RunOptions) -> Path:
     """The vehicle that sim_vehicle.py will start."""
     assert options.ardupilot_path is not None
     return Path(options.ardupilot_path, "build", "sitl", "bin", "ardu" + options.vehicle)
 
 
-def api_url(options: Options) -> str:
+def api_url(options: RunOptions) -> str:
     """Where to reach the API from this machine."""
     host = {"0.0.0.0": "127.0.0.1", "::": "::1", "": "127.0.0.1"}.get(options.host, options.host)
     return f"http://[{host}]:{options.port}" if ":" in host else f"http://{host}:{options.port}"
 
 
-def greeting(options: Options, with_token: bool) -> str:
+def greeting(options: RunOptions, with_token: bool) -> str:
     """What is printed once the API answers: its address and, with a simulated vehicle, three lines to try."""
     url = api_url(options)
     lines = [f"API of vehicle {options.sysid}: {url}"]

@@ -10,10 +10,10 @@ import termios
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 
-from mavproxy_uavapi.launcher import commands, directories, instances
+from mavproxy_uavapi.launcher import command_lines, directories, instances
 from mavproxy_uavapi.launcher.errors import LaunchError, OptionError
-from mavproxy_uavapi.launcher.locations import Home, resolve
-from mavproxy_uavapi.launcher.options import Options, parse
+from mavproxy_uavapi.launcher.locations import HomePosition, resolve
+from mavproxy_uavapi.launcher.options import RunOptions, parse
 from mavproxy_uavapi.launcher.supervisor import Supervisor
 
 # sim_vehicle.py first kills whatever it takes for its own vehicles when it is instance 0.
@@ -33,7 +33,7 @@ def run(argv: Sequence[str] | None = None) -> int:
         return LaunchError.status
 
 
-def prepare(options: Options) -> Options:
+def prepare(options: RunOptions) -> RunOptions:
     """Settle what depends on the terminal, and refuse what cannot work on this machine.
 
     Raises:
@@ -41,10 +41,10 @@ def prepare(options: Options) -> Options:
         LaunchError: the API's port is taken.
     """
     if options.simulated and options.ardupilot_path is not None:
-        script = commands.sim_vehicle(options.ardupilot_path)
+        script = command_lines.sim_vehicle(options.ardupilot_path)
         if not script.is_file():
             raise OptionError(f"--ardupilot_path: there is no {script}")
-        binary = commands.sitl_binary(options)
+        binary = command_lines.sitl_binary(options)
         if not binary.is_file():
             raise OptionError(f"--ardupilot_path: {binary} is missing, build it first")
     if not instances.is_free(options.port, options.host):
@@ -57,11 +57,11 @@ def has_terminal() -> bool:
     return sys.stdin is not None and sys.stdin.isatty() and os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
 
 
-def launch(options: Options) -> int:
+def launch(options: RunOptions) -> int:
     """Give the run its directory and its simulated vehicle a number, and supervise it to its end."""
     root, log_file = directories.split_log_path(options.log_path, options.sysid)
     options = dataclasses.replace(options, log_path=log_file)
-    home: Home | None = None
+    home: HomePosition | None = None
     if options.simulated:
         home = resolve(options.location, options.ardupilot_path)
     run_dir = directories.new_run(root, options)

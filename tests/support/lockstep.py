@@ -9,16 +9,16 @@ import asyncio
 import contextlib
 import os
 import random
-import selectors
 import tempfile
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Protocol
 
 os.environ["MAVLINK20"] = "1"  # before pymavlink is imported anywhere
 
+import cv2
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.errors import Aborted
@@ -34,33 +34,19 @@ from mavproxy_vision.settings import VisionModuleSettings
 from mavproxy_vision.tracking.capture_worker import Health, Watch
 from mavproxy_vision.tracking.stream_rates import TRUTH
 from mavproxy_vision.tracking.tracker import Tracker, make_source
+from tests.support.virtual_time import TimeTravellingLoop
 
 DETECTOR_TIME = 0.015  # s from a frame's arrival to its outcome
 STREAMS_EVERY = 15.0  # s: as often does MAVProxy ask for all streams at its rate
 STREAM_RATE = 4  # Hz
 
 
-class VirtualLoop(asyncio.SelectorEventLoop):
-    """An asyncio loop whose clock jumps to the next timer."""
+class Rig(Protocol):
+    """What an eye belongs to: the loop of the virtual clock, the module's own side, and what chance begins with."""
 
-    def __init__(self) -> None:
-        self.now = 1000.0
-        super().__init__(_Jump(self))
-
-    def time(self) -> float:
-        return self.now
-
-
-class _Jump(selectors.DefaultSelector):
-    def __init__(self, loop: VirtualLoop) -> None:
-        super().__init__()
-        self._loop = loop
-
-    def select(self, timeout: float | None = None) -> Any:
-        ready = super().select(0 if timeout is not None else 5.0)
-        if not ready and timeout is not None:
-            self._loop.now += max(timeout, 0.0)
-        return ready
+    loop: Any
+    tracker: Tracker
+    seed: int
 
 
 class Eye:
@@ -72,7 +58,7 @@ class Eye:
         blind: called with the truth (position, attitude); true hides the tags.
     """
 
-    def __init__(self, rig: Lockstep) -> None:
+    def __init__(self, rig: Rig) -> None:
         self.rig = rig
         self.watch = Watch(True, rig.loop.time())
         self.frozen = self.dead = False
@@ -85,7 +71,9 @@ class Eye:
         self.task: Any = None
 
     def start(self) -> None:
+        self.rig.tracker.worker = self  # type: ignore[assignment]
         settings = self.rig.tracker.settings
+        cv2.setNumThreads(settings.threads)
         self.source = make_source(settings, self.rig.tracker._where, self.rig.loop.time)
         self.source._random = random.Random(self.rig.seed + 11)
         self.detector = Detector(settings.model, self.rig.tracker.options(settings))
@@ -167,7 +155,7 @@ class Lockstep:
         **settings: Any,
     ) -> None:
         self.seed = seed
-        self.loop = VirtualLoop()
+        self.loop = TimeTravellingLoop()
         asyncio.set_event_loop(self.loop)
         home = Home(heading=heading)
         options = Options(seed=seed, home=home, wind=Wind(*wind), gps_noise=gps_noise, ready_after=1.0)
@@ -303,7 +291,6 @@ class Lockstep:
         self.open_eye()
 
     def open_eye(self) -> None:
-        self.tracker.worker = self.eye  # type: ignore[assignment]
         self.eye.start()
         self.pass_time(0.3)
 

@@ -1,0 +1,334 @@
+"""Real processes: a vehicle, a MAVProxy with our modules, and a client that speaks HTTP like any other.
+
+The vehicle is the embedded one; tests marked `sitl` run the same flights on ArduPilot's, started by its own
+sim_vehicle.py, where ARDUPILOT_HOME names a built copy.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import sysconfig
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import requests
+
+from tests.support.relay import Relay
+
+SCRIPTS = Path(sysconfig.get_path("scripts"))
+MAVPROXY = [sys.executable, str(SCRIPTS / "mavproxy.py")]
+HOME = "-35.363261,149.165230,584,353"
+SPEEDUP = 10
+PATIENCE = 30.0  # s for a process to show what it should
+
+
+def eventually(look: Callable[[], Any], timeout: float = PATIENCE, what: str = "it") -> Any:
+    """The first true value of `look`, called until then; other processes have no clock of ours."""
+    deadline = time.monotonic() + timeout
+    while True:
+        value = look()
+        if value:
+            return value
+        if time.monotonic() > deadline:
+            raise AssertionError(f"{what} did not happen within {timeout:g} s")
+        time.sleep(0.05)
+
+
+def free_port() -> int:
+    """A TCP port of the loopback that nobody has just now."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def free_instance() -> int:
+    """A SITL instance number whose ports nobody has just now; from 30, to leave the low ones to people.
+
+    Tests that run side by side (pytest-xdist) look in ranges of their own, so that they do not race.
+    """
+    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+    for instance in range(30 + 100 * worker, 130 + 100 * worker):
+        base = 5760 + 10 * instance
+        with contextlib.ExitStack() as probes:
+            try:
+                for port in (base, base + 2, base + 3):
+                    probes.enter_context(socket.socket()).bind(("127.0.0.1", port))
+            except OSError:
+                continue
+            return instance
+    raise AssertionError("no free SITL instance")
+
+
+class Process:
+    """A child process with its own process group, whose output goes to a file."""
+
+    def __init__(self, command: list[str], log: Path, cwd: Path, env: dict[str, str] | None = None) -> None:
+        self.log = log
+        with log.open("ab") as output:
+            self.popen = subprocess.Popen(
+                command,
+                stdin=subprocess.PIPE,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                cwd=cwd,
+                env={**os.environ, "PYTHONUNBUFFERED": "1", **(env or {})},
+                start_new_session=True,
+            )
+
+    @property
+    def pid(self) -> int:
+        return self.popen.pid
+
+    def output(self, since: int = 0) -> str:
+        """What it has written, from byte `since` on."""
+        return self.log.read_bytes()[since:].decode(errors="replace")
+
+    def mark(self) -> int:
+        """Where its output ends now."""
+        return self.log.stat().st_size
+
+    def type(self, line: str) -> None:
+        """Type a line at its prompt."""
+        assert self.popen.stdin is not None
+        self.popen.stdin.write(line.encode() + b"\n")
+        self.popen.stdin.flush()
+
+    def says(self, text: str, since: int = 0, timeout: float = PATIENCE) -> str:
+        """Wait until its output holds `text`; what it wrote since."""
+        eventually(lambda: self._has(text, since), timeout, f"{text!r} in {self.log.name}")
+        return self.output(since)
+
+    def _has(self, text: str, since: int) -> bool:
+        if text in self.output(since):
+            return True
+        assert self.popen.poll() is None, f"{self.log.name} ended: {self.output()[-2000:]}"
+        return False
+
+    def ask(self, line: str, answer: str, timeout: float = PATIENCE) -> str:
+        """Type a line and wait for `answer`; what was written meanwhile."""
+        mark = self.mark()
+        self.type(line)
+        return self.says(answer, mark, timeout)
+
+    def stop(self) -> None:
+        """End it, and all its children."""
+        assert self.popen.stdin is not None
+        with contextlib.suppress(BrokenPipeError):
+            self.popen.stdin.close()  # a MAVProxy that waits for a line heeds its end rather than a signal
+        for sign in (signal.SIGTERM, signal.SIGKILL):
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(self.popen.pid, sign)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self.popen.wait(10)
+
+
+class Control:
+    """The embedded vehicle's back door: its truth, what it received, and its faults."""
+
+    def __init__(self, port: int) -> None:
+        self._socket = socket.create_connection(("127.0.0.1", port), timeout=10)
+        self._lines = self._socket.makefile("rw", encoding="utf-8")
+
+    def ask(self, op: str, **arguments: Any) -> dict[str, Any]:
+        """One operation."""
+        self._lines.write(json.dumps({"op": op, **arguments}) + "\n")
+        self._lines.flush()
+        answer: dict[str, Any] = json.loads(self._lines.readline())
+        assert answer["ok"], answer
+        return answer
+
+    def fault(self, name: str, **arguments: Any) -> None:
+        """Make it misbehave."""
+        self.ask("fault", name=name, **arguments)
+
+    def close(self) -> None:
+        self._lines.close()
+        self._socket.close()
+
+
+class Rig:
+    """A vehicle and a MAVProxy that flies it."""
+
+    def __init__(self, directory: Path, port: int) -> None:
+        self.directory = directory
+        self.port = port
+        self.url = f"http://127.0.0.1:{port}"
+        self.processes: list[Process] = []
+        self.control: Control | None = None
+        self.is_ardupilot = False
+        self.mavproxy: Process
+
+    def get(self, path: str, timeout: float = 120, **params: Any) -> requests.Response:
+        return requests.get(self.url + path, params=params, timeout=timeout)
+
+    def post(self, path: str, timeout: float = 120, **body: Any) -> requests.Response:
+        return requests.post(self.url + path, json=body, timeout=timeout)
+
+    def ok(self, answer: requests.Response) -> dict[str, Any]:
+        """The body of an answer that must be a success."""
+        assert answer.status_code == 200, f"{answer.status_code} {answer.text}"
+        body: dict[str, Any] = answer.json()
+        return body
+
+    def ned(self) -> tuple[float, float, float]:
+        position = self.ok(self.get("/telemetry/ned"))["info"]["position"]
+        return position["x"], position["y"], position["z"]
+
+    def status(self) -> dict[str, Any]:
+        info: dict[str, Any] = self.ok(self.get("/telemetry/status"))["info"]
+        return info
+
+    def wait_until_up(self, timeout: float = PATIENCE) -> None:
+        """Wait until the API knows its vehicle."""
+
+        def up() -> bool:
+            with contextlib.suppress(requests.ConnectionError):
+                return requests.get(self.url + "/telemetry/status", timeout=5).status_code == 200
+            return False
+
+        eventually(up, timeout, "the API's knowing its vehicle")
+
+    def be_patient(self) -> None:
+        """Have it stay armed on the ground for longer than ArduPilot's 10 s, which are 1 s here."""
+        self.mavproxy.says("Received", timeout=60)  # the parameters, without which MAVProxy sets none
+        self.mavproxy.type("param set DISARM_DELAY 120")
+
+    def in_the_air(self, alt: float = 10) -> None:
+        """Get it to `alt` m above home, in GUIDED, whatever it was doing."""
+        status = self.status()
+        if status["armed"] and status["landed_state"] != "on_ground":
+            self.ok(self.get("/command/guided"))
+            x, y, _ = self.ned()
+            self.ok(self.post("/movement/go_to_ned_wait", x=x, y=y, z=-alt))
+            return
+        self.ok(self.get("/command/disarm"))  # armed and forgotten on the ground it may disarm at any moment
+        self._throttle(1000)
+        self.ok(self.get("/command/arm"))
+        self.ok(self.get("/command/takeoff", alt=alt))
+        self._throttle(1500)
+
+    def on_the_ground(self) -> None:
+        """Get it down and disarmed."""
+        self.ok(self.get("/command/land"))
+        self._throttle(1000)
+
+    def _throttle(self, pwm: int) -> None:
+        """Move the pilot's throttle: low to arm; in the middle to fly, so that LOITER holds the height."""
+        if self.control is not None:
+            self.control.fault("pilot_sticks", throttle=pwm)
+
+    def start(self, name: str, command: list[str], env: dict[str, str] | None = None) -> Process:
+        process = Process(command, self.directory / f"{name}.log", self.directory, env)
+        self.processes.append(process)
+        return process
+
+    def stop(self) -> None:
+        if self.control is not None:
+            self.control.close()
+        for process in reversed(self.processes):
+            process.stop()
+
+
+def mavproxy_command(instance: int, *arguments: str) -> list[str]:
+    """MAVProxy on a simulated vehicle, with a prompt on its stdin."""
+    return [*MAVPROXY, f"--master=tcp:127.0.0.1:{5760 + 10 * instance}", "--retries=20", *arguments]
+
+
+def load(port: int, **settings: Any) -> str:
+    """The option that loads our module on that port."""
+    return "--cmd=module load uavapi:" + json.dumps({"port": port, **settings}, separators=(",", ":"))
+
+
+def start_embedded(rig: Rig, *arguments: str, speedup: float = SPEEDUP) -> int:
+    """Start the embedded vehicle with its back door; the instance that it is."""
+    instance, control = free_instance(), free_port()
+    command = [sys.executable, "-m", "mavproxy_uavapi.sim", f"--instance={instance}", f"--home={HOME}"]
+    vehicle = rig.start("sim", [*command, f"--speedup={speedup:g}", f"--control={control}", "--seed=1", *arguments])
+    vehicle.says("listening on tcp")
+    vehicle.says("control on tcp")
+    rig.control = Control(control)
+    return instance
+
+
+def embedded(directory: Path, *arguments: str, speedup: float = SPEEDUP, **settings: Any) -> Rig:
+    """A rig with the embedded vehicle."""
+    rig = Rig(directory, free_port())
+    try:
+        instance = start_embedded(rig, *arguments, speedup=speedup)
+        rig.mavproxy = rig.start("mavproxy", mavproxy_command(instance, load(rig.port, **settings)))
+        rig.wait_until_up()
+        rig.be_patient()
+    except BaseException:
+        rig.stop()
+        raise
+    return rig
+
+
+def headless() -> dict[str, str]:
+    """The environment in which sim_vehicle.py opens no window, and finds our MAVProxy."""
+    env = {"PATH": f"{SCRIPTS}{os.pathsep}{os.environ['PATH']}"}
+    return env | dict.fromkeys(("DISPLAY", "TMUX", "STY", "SITL_RITW_TERMINAL"), "")
+
+
+def sim_vehicle(directory: Path, instance: int, *arguments: str, speedup: int = SPEEDUP) -> list[str]:
+    """ArduPilot's own launcher with its copter."""
+    script = Path(os.environ["ARDUPILOT_HOME"], "Tools", "autotest", "sim_vehicle.py")
+    command = [sys.executable, str(script), "-v", "ArduCopter", "-N", "-w", f"-I{instance}"]
+    return [*command, "--speedup", str(speedup), "-l", HOME, "--use-dir", str(directory), *arguments]
+
+
+def ardupilot(directory: Path, *, speedup: int = SPEEDUP, **settings: Any) -> Rig:
+    """A rig with ArduPilot's own copter, started as its users do: our module in sim_vehicle.py's MAVProxy."""
+    rig = Rig(directory, free_port())
+    config = directory / "uavapi.ini"
+    lines = [f"{name} = {value}\n" for name, value in {"port": rig.port, **settings}.items()]
+    config.write_text("[api]\n" + "".join(lines), encoding="utf-8")
+    module = f'--load-module=uavapi:{{"config":"{config}"}}'
+    command = sim_vehicle(directory, free_instance(), "-m", module, speedup=speedup)
+    try:
+        rig.mavproxy = rig.start("sim_vehicle", command, headless())
+        rig.wait_until_up(120)
+        rig.be_patient()
+    except BaseException:
+        rig.stop()
+        raise
+    return rig
+
+
+def ardupilot_with_faults(directory: Path, *, speedup: int = SPEEDUP, **settings: Any) -> Rig:
+    """A rig with ArduPilot's own copter behind a wire that records and misbehaves."""
+    rig, instance = Rig(directory, free_port()), free_instance()
+    command = sim_vehicle(directory, instance, "--no-mavproxy", speedup=speedup)
+    try:
+        rig.start("sim_vehicle", command, headless())
+        rig.control, rig.is_ardupilot = Relay(5760 + 10 * instance), True
+        master = f"--master=tcp:127.0.0.1:{rig.control.port}"
+        rig.mavproxy = rig.start("mavproxy", [*MAVPROXY, master, "--retries=20", load(rig.port, **settings)])
+        rig.wait_until_up(120)
+        rig.be_patient()
+    except BaseException:
+        rig.stop()
+        raise
+    return rig
+
+
+class Lan(NamedTuple):
+    """A network namespace with an address of its own, as another computer on the LAN has one.
+
+    Attributes:
+        here: our address on it.
+        network: both addresses.
+        inside: the words before a command that is to run on the other computer.
+    """
+
+    here: str
+    network: str
+    inside: tuple[str, ...]

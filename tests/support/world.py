@@ -1,0 +1,305 @@
+"""The whole house in virtual time: the real HTTP application, the host, and the embedded vehicle at its link.
+
+Nothing opens a socket and nothing waits: HTTP goes through transports in memory, MAVLink through its wire format,
+and the vehicle's clock and ours advance together on the time-travelling loop.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from aiohttp import web
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from mavproxy_gradys.http import GradysHandlers
+from mavproxy_gradys.service import Gradys
+from mavproxy_uavapi.core.errors import LinkLost
+from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.mavlink.link import Address
+from mavproxy_uavapi.core.vehicle.stream_requester import StreamRequester
+from mavproxy_uavapi.http.app import make_app
+from mavproxy_uavapi.http.call import Service
+from mavproxy_uavapi.http.connection import Connection
+from mavproxy_uavapi.settings import ApiModuleSettings
+from mavproxy_uavapi.sim import Options, Simulator
+from mavproxy_uavapi.sim.control import Control
+from mavproxy_uavapi.sim.mission import Item
+from tests.support.wire import CLIENT, Reply, Wire
+
+TICK = 0.02  # s; what is sent either way arrives with the next one
+STEPS = 2  # of the simulator, in each tick
+STREAMS_EVERY = 15.0  # s; MAVProxy asks for all streams so often
+STREAM_RATE = 4  # Hz, MAVProxy's default
+US = Address(255, 230)
+HOUSEKEEPING = {mavlink.MAV_CMD_SET_MESSAGE_INTERVAL}  # what is asked for whether anybody flies or not
+MODES = {"STABILIZE": 0, "ALT_HOLD": 2, "AUTO": 3, "GUIDED": 4, "LOITER": 5, "RTL": 6, "LAND": 9, "BRAKE": 17}
+# A vehicle whose landings and returns are quick; deadlines follow from the same parameters.
+PARAMETERS = {"LAND_SPEED": 100.0, "RTL_ALT": 0.0, "RTL_LOIT_TIME": 500.0}
+
+
+PLACE = (-35.363261, 149.165230)  # degrees: where the simulator stands
+LEGS = (0.002, 0.0, 0.002)  # degrees north: a mission of places that are far apart
+
+
+def item_at(lat: float, lon: float) -> Item:
+    """A waypoint 10 m above home."""
+    frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
+    return Item(mavlink.MAV_CMD_NAV_WAYPOINT, frame, 0, 0, 0, 0, round(lat * 1e7), round(lon * 1e7), 10.0)
+
+
+class Sent(NamedTuple):
+    """A message of ours, as it is on the wire, and when it went out (s)."""
+
+    at: float
+    message: Any
+
+
+class World:
+    """A vehicle, a host that flies it, and the API.
+
+    Attributes:
+        sent: what the host sent, oldest first; MAVProxy's own requests are not in it.
+        simulator: the vehicle.
+        uplink_until, cut_until: s; until then nothing reaches the vehicle, or nothing goes either way.
+        gradys: the module's own side.
+        tracker, flights: the module's own side, with a simulated camera; only in a world that was made with one.
+        screen: what was printed at the prompt since it was last asked for.
+        directory: for files.
+    """
+
+    tracker: Any
+    flights: Any
+
+    def __init__(self, loop: Any, mpstate: Any, settings: dict[str, Any]) -> None:
+        self.loop, self.seed = loop, 1
+        self.host = host = Host(mpstate, clock=loop.time, link=self, loop=loop)
+        self.screen: Callable[[], str] = str
+        self.directory = Path()
+        self.simulator = Simulator(Options(seed=self.seed, ready_after=1.0))
+        for name, value in PARAMETERS.items():
+            self.simulator.parameters.set(name, value)
+        self.control = Control(self.simulator)
+        self.sent: list[Sent] = []
+        self.uplink_until = self.cut_until = -math.inf
+        self.source = US
+        self._cable = self.simulator.open_link("test")
+        self._encoder = mavlink.MAVLink(None, *US)
+        self._parser = mavlink.MAVLink(None)
+        self._arriving: list[Any] = []
+        self.service = Service(host, ApiModuleSettings(settings, environ={}).snapshot())
+        self.gradys = Gradys(host)
+        for route in GradysHandlers(self.gradys).routes():
+            host.extensions[route.path] = route
+        self._runner = web.AppRunner(make_app(self.service), access_log=None, handler_cancellation=True)
+        self._tasks: list[asyncio.Task[None]] = []
+        self._streams: list[asyncio.Task[None]] = []
+        self._look: list[Callable[[], None]] = []
+        self._camera = contextlib.AsyncExitStack()
+
+    def mount_camera(self, settings: dict[str, Any]) -> None:
+        """Give it vision with a simulated camera, which looks from `go_live` on; needs OpenCV."""
+        from mavproxy_vision.http import VisionHandlers  # noqa: PLC0415
+        from mavproxy_vision.landing.flight_jobs import FlightJobs  # noqa: PLC0415
+        from mavproxy_vision.settings import ApiModuleSettings as VisionSettings  # noqa: PLC0415
+        from mavproxy_vision.tracking.stream_rates import TRUTH  # noqa: PLC0415
+        from mavproxy_vision.tracking.tracker import Tracker  # noqa: PLC0415
+        from tests.support.lockstep import Eye  # noqa: PLC0415
+
+        self.tracker = Tracker(self.host, VisionSettings({"source": "sim", **settings}).snapshot())
+        self.flights = FlightJobs(self.tracker, lambda: self.directory)
+        for route in VisionHandlers(self.tracker, self.flights).routes():
+            self.host.extensions[route.path] = route
+        eye = Eye(self)
+
+        def look() -> None:
+            self.tracker.listen()
+            self._camera.push_async_callback(self.tracker.close)
+            self._camera.enter_context(self.tracker.rates.at(TRUTH))
+            eye.start()
+
+        self._look.append(look)
+
+    # -- the vehicle before anybody looks -------------------------------------------------------------------
+
+    def by_hand(self, command: int, *parameters: float) -> None:
+        """A command of the pilot's, past the host and its link."""
+        message = mavlink.MAVLink_command_long_message(1, 1, command, 0, *parameters, *(0.0,) * (7 - len(parameters)))
+        self._deliver(message)
+        self.simulator.step()
+
+    def boot(self) -> None:
+        """Wait until it is ready to arm."""
+        self.simulator.run(2.0)
+
+    def armed(self) -> None:
+        """Armed on the ground, in GUIDED."""
+        self.boot()
+        self.by_hand(mavlink.MAV_CMD_DO_SET_MODE, 1, MODES["GUIDED"])
+        self.by_hand(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1)
+
+    def flying(self, mode: str = "GUIDED", height: float = 8.0) -> None:
+        """Hovering above home."""
+        self.armed()
+        self.by_hand(mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, height)
+        self.simulator.run(6.0 + height / 2)
+        assert abs(self.at[2] + height) < 0.3
+        if mode != "GUIDED":
+            self.by_hand(mavlink.MAV_CMD_DO_SET_MODE, 1, MODES[mode])
+
+    def on_mission(self) -> None:
+        """Flying a mission of two places, far apart."""
+        self.flying()
+        self.copter.mission.items[:] = [item_at(*PLACE), *(item_at(PLACE[0] + north, PLACE[1]) for north in LEGS)]
+        self.by_hand(mavlink.MAV_CMD_DO_SET_MODE, 1, MODES["AUTO"])
+        self.by_hand(mavlink.MAV_CMD_MISSION_START)
+
+    def stream(self, velocity: dict[str, float], every: float) -> None:
+        """Another client, which sends velocities every so many s, whatever is answered."""
+
+        async def streaming() -> None:
+            while True:
+                wire = await self.request("POST", "/movement/travel_at_ned", velocity)
+                await wire.reply
+                await asyncio.sleep(every)
+
+        self._streams.append(self.loop.create_task(streaming()))
+        self.loop.pass_time(1.0)
+
+    def end_streams(self) -> None:
+        """The other clients fall silent."""
+        for task in self._streams:
+            task.cancel()
+        self.loop.settle()
+
+    def go_live(self) -> None:
+        """Connect the host, and let it get to know the vehicle."""
+        self.simulator.received.clear()
+        self._cable.messages()
+        self.loop.run(self._runner.setup())
+        watch = StreamRequester(self.host.registry, 0)
+        self._tasks = [self.loop.create_task(self._run()), self.loop.create_task(watch.run())]
+        for look in self._look:
+            self.loop.call_soon(look)
+        self.loop.pass_time(1.5)
+
+    # -- time -----------------------------------------------------------------------------------------------
+
+    async def _run(self) -> None:
+        streams_at = self.loop.time()
+        while True:
+            if self.loop.time() >= streams_at:
+                streams_at += STREAMS_EVERY
+                self._deliver(mavlink.MAVLink_request_data_stream_message(1, 1, 0, STREAM_RATE, 1))
+            arriving, self._arriving = self._arriving, []
+            for message in arriving:
+                self._deliver(message)
+            for _ in range(STEPS):
+                self.simulator.step()
+            data = self._cable.drain()
+            if self.loop.time() >= self.cut_until and data:
+                for message in self._parser.parse_buffer(data) or []:
+                    self.host.bridge.feed(message)
+            self.host.bridge.turn()
+            await asyncio.sleep(TICK)
+
+    def _deliver(self, message: Any) -> None:
+        if self.loop.time() >= max(self.uplink_until, self.cut_until):
+            self.simulator.receive(self._cable, self._as_on_the_wire(message))
+
+    def _as_on_the_wire(self, message: Any) -> Any:
+        return mavlink.MAVLink(None).parse_buffer(message.pack(self._encoder))[0]
+
+    async def send(self, message: Any, system: int) -> None:
+        """See `core.mavlink.link.Link.send`; who is cancelled before it came to it has sent nothing."""
+        await asyncio.sleep(0)
+        if system != self.simulator.options.sysid:
+            raise LinkLost(f"there is no vehicle {system}")
+        self.sent.append(Sent(self.loop.time(), self._as_on_the_wire(message)))
+        self._arriving.append(message)
+
+    # -- clients --------------------------------------------------------------------------------------------
+
+    def begin(self, method: str, path: str, body: Any = None, kind: str = "application/json") -> Wire:
+        """A request in flight; `body` is bytes, or made JSON of."""
+        return self.loop.run(self.request(method, path, body, kind))
+
+    async def request(
+        self, method: str, path: str, body: Any = None, kind: str = "application/json", port: int = CLIENT
+    ) -> Wire:
+        """As `begin`, for clients that run in the loop, at a port of their own."""
+        wire = Wire(self.loop, Connection(self._runner.server), port)
+        content = b"" if body is None else body if isinstance(body, bytes) else json.dumps(body).encode()
+        head = [f"{method} {path} HTTP/1.1", "Host: localhost", "Connection: close"]
+        if body is not None:
+            head += [f"Content-Type: {kind}", f"Content-Length: {len(content)}"]
+        wire.ask("\r\n".join([*head, "", ""]).encode() + content)
+        return wire
+
+    def ask(self, method: str, path: str, body: Any = None, kind: str = "application/json") -> Reply:
+        """A request and its answer."""
+        return self.answer(self.begin(method, path, body, kind))
+
+    def answer(self, wire: Wire, within: float = 600.0) -> Reply:
+        """The answer of a request in flight, which must come within that many s."""
+        reply = self.loop.run(asyncio.wait_for(wire.reply, within))
+        assert reply is not None, "the server closed the connection without an answer"
+        return reply
+
+    def told(self, status: int, body: dict[str, Any]) -> Reply:
+        """What somebody has learnt just now, as an answer."""
+        return Reply(status, body, self.loop.time(), {}, b"")
+
+    # -- what happens to it ---------------------------------------------------------------------------------
+
+    def fault(self, name: str, **fields: Any) -> None:
+        """A fault of `sim.control`."""
+        answer = json.loads(self.control.handle_line(json.dumps({"op": "fault", "name": name, **fields})))
+        assert answer["ok"], answer
+
+    def reboot(self, dark: float) -> None:
+        """The autopilot starts anew, and says and hears nothing for `dark` s."""
+        self.cut_until = self.loop.time() + dark
+        self.simulator.reboot_soon()
+
+    # -- what is to be seen ---------------------------------------------------------------------------------
+
+    @property
+    def copter(self) -> Any:
+        """The vehicle's truth."""
+        return self.simulator.copter
+
+    @property
+    def at(self) -> tuple[float, float, float]:
+        """Where it truly is: m north, east, down."""
+        return tuple(self.copter.body.position)
+
+    def orders(self, since: float = -math.inf) -> list[Any]:
+        """What the host sent after `since` (s), but for its watch over the telemetry."""
+        return self.orders_of([sent for sent in self.sent if sent.at > since])
+
+    @staticmethod
+    def orders_of(sent: list[Sent]) -> list[Any]:
+        """The messages of these, but for the watch over the telemetry."""
+        return [m for _, m in sent if getattr(m, "command", None) not in HOUSEKEEPING]
+
+    def end_jobs(self) -> None:
+        """End the jobs in flight, and leave the vehicle as it is."""
+        callbacks, self.host.jobs.on_ended = self.host.jobs.on_ended, []
+        self.host.jobs.abort_remote("the test is over")
+        self.host.jobs.on_ended = callbacks
+
+    def close(self) -> None:
+        """End what is in flight."""
+        self.end_jobs()
+        for task in [*self._tasks, *self._streams]:
+            task.cancel()
+        self.loop.settle()
+        self.loop.run(self._camera.aclose())
+        self.loop.run(self._runner.cleanup())
+        self.service.host.audit.close()
