@@ -11,10 +11,6 @@ from mavproxy_vision.apriltag.tag_layout import FAMILIES, Tag, parse_tags
 from mavproxy_vision.camera.simulated import parse_placed
 from mavproxy_vision.settings import VisionModuleSettings
 
-FLOATS = [setting.name for setting in VisionModuleSettings.table() if setting.type is float]
-INTS = [setting.name for setting in VisionModuleSettings.table() if setting.type is int]
-NO_NUMBERS = ("nan", "inf", "-inf", "1e400", "-1e400", "", "1.2.3", "1_0", "0x10", "\u0662", True, None, [1], {})
-
 
 def refused(settings, name, value):
     """The sentence with which a value is refused, leaving all as it was."""
@@ -25,32 +21,6 @@ def refused(settings, name, value):
     sentence = str(refusal.value)
     assert "\n" not in sentence
     return sentence
-
-
-@pytest.mark.parametrize("name", FLOATS + INTS)
-def test_a_number_is_finite_and_in_its_range(name, capsys):
-    settings = VisionModuleSettings()
-    (low, high) = next(row.range for row in settings.table() if row.name == name)
-    for value in (*NO_NUMBERS, float("nan"), float("inf"), low - 1, high + 1, 10**400):
-        assert refused(settings, name, value).startswith(f"{name} = {value!r}: it takes a ")
-    for value in (low, str(high)):
-        settings.set(name, value)
-        assert getattr(settings.snapshot(), name) == float(value)
-    assert capsys.readouterr() == ("", "")  # the sentence is all that is said
-
-
-def test_a_whole_number_is_whole():
-    for value in ("640.5", 640.5, "6e2"):
-        assert "it takes a int" in refused(VisionModuleSettings(), "width", value)
-
-
-def test_words_for_yes_and_no():
-    settings = VisionModuleSettings()
-    for value, meant in (("Yes", True), ("0", False), (True, True), ("false", False), (1, True)):
-        settings.set("far", value)
-        assert settings.snapshot().far is meant
-    for value in ("maybe", "", None, 2):
-        assert "it takes a bool" in refused(settings, "far", value)
 
 
 @pytest.mark.parametrize("value", ["nan", "inf", "1e400", "-361", "0,0,1e9", "1,2", "1..2", "", ",,", "1,2,3,4", "x"])
