@@ -72,7 +72,7 @@ def test_config_and_set_tell_of_each_value_where_it_came_from(module: Any, capsy
         "sim_tags",
         "sim_latency",
     ]
-    assert said(module, capsys, "set", "spede") == "vision: no setting 'spede'; did you mean speed?"
+    assert said(module, capsys, "set", "spede") == "vision: no setting 'spede'; did you mean speed?\n"
 
 
 def test_loading_and_unloading_leaves_nothing_behind(mpstate: Any, descriptors: Any) -> None:
