@@ -13,8 +13,8 @@ from mavproxy_gradys.net.http_client import Client
 from mavproxy_gradys.push.pusher import Pusher
 from mavproxy_gradys.push.statistics import StationTally
 from mavproxy_gradys.settings import GradysSettings
-from mavproxy_gradys.tasks import begin, end
 from mavproxy_gradys.tracks.service import Tracking
+from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
 
 
@@ -34,7 +34,7 @@ class Gradys:
         self.tracks = Tracking(host)
         self.settings: GradysSettings | None = None
         self._pushers: list[Pusher] = []
-        self._tasks: list[asyncio.Task[None]] = []
+        self._tasks = HeldTasks()
         self._changing = asyncio.Lock()  # a start waits for the stop before it, which may take its time
 
     @property
@@ -55,7 +55,8 @@ class Gradys:
     def _start(self, settings: GradysSettings) -> None:
         pushers = [self._pusher(station, settings) for station in settings.gs]
         self.settings, self._pushers = settings, pushers
-        self._tasks = [begin(pusher.run(), f"the push to {pusher.station.url}") for pusher in pushers]
+        for pusher in pushers:
+            self._tasks.start(pusher.run(), f"the push to {pusher.station.url}")
         self.pipeline.start(settings)
 
     def _pusher(self, station: StationAddress, settings: GradysSettings) -> Pusher:
@@ -87,8 +88,7 @@ class Gradys:
 
     async def _stop(self, stop_pipeline: Callable[[], Awaitable[None]] | None = None) -> None:
         self.settings = None
-        tasks, self._tasks = self._tasks, []
-        await end(tasks)
+        await self._tasks.end()
         for pusher in self._pushers:  # also those that had not begun
             await pusher.close()
         await (stop_pipeline or self.pipeline.stop)()

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import asyncio
-import contextlib
-
+from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.vehicle.endings import Policy
 from mavproxy_uavapi.core.vehicle.stream_requester import StreamRequester
@@ -19,8 +17,7 @@ class Api:
     def __init__(self, host: Host) -> None:
         self.host = host
         self._server: ApiServer | None = None
-        self._freshness: asyncio.Task[None] | None = None
-        self._finding_scripts: asyncio.Task[None] | None = None
+        self._tasks = HeldTasks()
 
     @property
     def listening(self) -> bool:
@@ -44,8 +41,8 @@ class Api:
             raise
         self._server = server
         self.host.api_address = settings.host, settings.port
-        self._freshness = asyncio.create_task(StreamRequester(self.host.registry, settings.sysid).run())
-        self._finding_scripts = asyncio.create_task(server.service.scripts.start())
+        self._tasks.start(StreamRequester(self.host.registry, settings.sysid).run(), "the watch over the telemetry")
+        self._tasks.start(server.service.scripts.start(), "the search for running scripts")
 
     async def renew(self, settings: ApiSettings) -> None:
         """Take up settings that need no other listening (`ApiSettings.listens_as`): what is in flight goes on."""
@@ -67,13 +64,7 @@ class Api:
         if server is None:
             return
         self.host.api_address = None
-        if self._freshness is not None:
-            self._freshness.cancel()
-            await asyncio.gather(self._freshness, return_exceptions=True)
-        if self._finding_scripts is not None:
-            self._finding_scripts.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await self._finding_scripts
+        await self._tasks.end()
         await server.service.scripts.stop()
         await server.stop()
 

@@ -15,8 +15,8 @@ from mavproxy_gradys.forwarding.spool_thread import SpoolThread
 from mavproxy_gradys.net.schedule import Ticker
 from mavproxy_gradys.position import position_of
 from mavproxy_gradys.settings import GradysSettings
-from mavproxy_gradys.tasks import begin, end
 from mavproxy_uavapi.core.errors import Unavailable
+from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 
@@ -41,7 +41,7 @@ class ReadingPipeline:
         self._why_left = ""
         self._senders: list[Sender] = []
         self._samplers: list[Sampler] = []
-        self._tasks: list[asyncio.Task[None]] = []
+        self._tasks = HeldTasks()
 
     def start(self, settings: GradysSettings) -> None:
         """Sample and send, if there is a sink."""
@@ -51,26 +51,25 @@ class ReadingPipeline:
         for address in settings.sink:
             sender = Sender(address, self._kept(), self._host.clock)
             self._senders.append(sender)
-            self._tasks.append(begin(sender.run(settings), f"the delivery to {address}"))
+            self._tasks.start(sender.run(settings), f"the delivery to {address}")
         for quantity in settings.quantities if settings.sink else ():
             sampler = Sampler(quantity)
             self._samplers.append(sampler)
-            self._tasks.append(begin(self._sample(sampler, self._kept()), f"the sampling of {quantity.name}"))
+            self._tasks.start(self._sample(sampler, self._kept()), f"the sampling of {quantity.name}")
 
     async def stop(self) -> None:
         """End it, and close the spool; what the disk does not take is kept in memory until the next start."""
         self._settings = None
-        tasks, self._tasks = self._tasks, []
         self._samplers.clear()
         self._senders.clear()
         try:
             if self.spool_thread is not None:
                 await self.spool_thread.save()  # before the sinks' goodbyes, which may take long
-            await end(tasks)
+            await self._tasks.end()
         finally:
-            await self._end_keeper()
+            await self._end_thread()
 
-    async def _end_keeper(self) -> None:
+    async def _end_thread(self) -> None:
         spool_thread = self.spool_thread
         if spool_thread is None:
             return
@@ -92,7 +91,7 @@ class ReadingPipeline:
         spool_thread = self.spool_thread  # it is there when its end was not waited for
         count = len(self._left) if spool_thread is None else spool_thread.waiting
         why = (self._why_left if spool_thread is None else spool_thread.problem) or "they were not written in time"
-        return f"{count} reading{'' if count == 1 else 's'} are lost: {why}" if count else ""
+        return f"{count} {'reading is' if count == 1 else 'readings are'} lost: {why}" if count else ""
 
     def _kept(self, settings: GradysSettings | None = None) -> SpoolThread:
         """The spool's thread, started if need be."""

@@ -13,6 +13,7 @@ from typing import Any
 
 import cv2
 
+from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
@@ -72,7 +73,7 @@ class Tracker:
         )  # newer than the telemetry that tells where they were taken
         self._system = 0
         self._home_down: float | None = None
-        self._watching: asyncio.Task[None] | None = None
+        self._tasks = HeldTasks()
         self._truth_needed = contextlib.ExitStack()
         self._extra: set[int] = set()  # ids that `tags` does not name, but a flight
         self._changing = asyncio.Lock()
@@ -82,7 +83,7 @@ class Tracker:
     def listen(self) -> None:
         """Follow the vehicle's telemetry."""
         self.host.listeners.append(self._hear)
-        self._watching = asyncio.get_running_loop().create_task(self.rates.run(self.vehicle))
+        self._tasks.start(self.rates.run(self.vehicle), "the watch over the rates")
 
     async def start(self, settings: VisionSettings) -> None:
         """Look through the camera that the settings name; what was running ends.
@@ -118,10 +119,7 @@ class Tracker:
         """Give back everything."""
         if self._hear in self.host.listeners:
             self.host.listeners.remove(self._hear)
-        if self._watching is not None:
-            self._watching.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await self._watching
+        await self._tasks.end()
         await self.stop()
 
     def _make_worker(self, settings: VisionSettings) -> Worker:
