@@ -8,7 +8,7 @@ from mavproxy_uavapi.core.vehicle.endings import Policy
 from mavproxy_uavapi.core.vehicle.stream_requester import StreamRequester
 from mavproxy_uavapi.http.app import ApiServer
 from mavproxy_uavapi.http.call import Service
-from mavproxy_uavapi.settings import Settings
+from mavproxy_uavapi.settings import ApiSettings
 
 
 class Api:
@@ -24,7 +24,7 @@ class Api:
         """Whether the server is up."""
         return self._server is not None
 
-    async def start(self, settings: Settings) -> None:
+    async def start(self, settings: ApiSettings) -> None:
         """Listen as the settings say; does nothing when it listens already.
 
         Raises:
@@ -44,8 +44,8 @@ class Api:
         self._tasks.start(StreamRequester(self.host.registry, settings.sysid).run(), "the watch over the telemetry")
         self._tasks.start(server.service.scripts.start(), "the search for running scripts")
 
-    async def renew(self, settings: Settings) -> None:
-        """Take up settings that need no other listening (`Settings.listens_as`): what is in flight goes on."""
+    async def renew(self, settings: ApiSettings) -> None:
+        """Take up settings that need no other listening (`ApiSettings.listens_as`): what is in flight goes on."""
         if self._server is None:
             return
         self._take_up(settings)
@@ -53,7 +53,7 @@ class Api:
         service.settings = settings
         service.scripts.renew(settings)
 
-    def _take_up(self, settings: Settings) -> None:
+    def _take_up(self, settings: ApiSettings) -> None:
         self.host.link_watch.timeout = settings.link_timeout
         self.host.endings.on_disconnect = Policy.HOLD if settings.on_disconnect == "hold" else Policy.NOTHING
         self.host.endings.on_script_exit = Policy(settings.on_script_exit)

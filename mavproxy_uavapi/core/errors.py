@@ -14,6 +14,7 @@
     |  |- NotArmed             409 not_armed
     |  `- Aborted              409 aborted
     |- Invalid                 422 invalid        nothing was sent
+    |  `- SettingError         422 invalid        a setting that there is not, or a value that it does not take
     |- TooManyRequests         429 too_many_requests
     |- Rejected                500 rejected       the autopilot refused
     |- ToolFailed              500 tool_failed    a program that we started failed, or is not installed
@@ -146,6 +147,20 @@ class Invalid(UavApiError):
     def detail(self) -> list[dict[str, Any]]:
         """The list of problems."""
         return self.problems
+
+
+class SettingError(Invalid):
+    """A setting that does not exist, or a value that it does not take; the text is one clear line.
+
+    So for what else is written as settings are: the argument of a command, a line of a file. `loc` names it.
+    """
+
+    def __init__(self, sentence: str, *loc: str) -> None:
+        super().__init__(sentence, *loc)
+        self.loc = loc
+
+    def __str__(self) -> str:
+        return str(self.problems[0]["msg"])
 
 
 class TooManyRequests(UavApiError):

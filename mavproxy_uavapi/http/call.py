@@ -20,7 +20,7 @@ from mavproxy_uavapi.http.requests import Request, parse
 from mavproxy_uavapi.http.responses import envelope
 from mavproxy_uavapi.http.streaming import MOST_OPEN, Slots
 from mavproxy_uavapi.scripts.manager import Scripts
-from mavproxy_uavapi.settings import Settings
+from mavproxy_uavapi.settings import ApiSettings
 
 R = TypeVar("R", bound=Request)
 T = TypeVar("T")
@@ -44,7 +44,7 @@ class Service:
     """
 
     host: Host
-    settings: Settings
+    settings: ApiSettings
     scripts: Scripts = field(init=False)
     broadcast: TelemetryBroadcast = field(init=False)
     streams: Slots = field(default_factory=lambda: Slots(MOST_OPEN, "streams are open"))

@@ -9,7 +9,7 @@ from mavproxy_uavapi.core.errors import Invalid
 from mavproxy_vision.apriltag.tag_layout import FAMILIES, Tag
 from mavproxy_vision.landing.expanding_square import step_for
 from mavproxy_vision.landing.state_machine import Plan
-from mavproxy_vision.settings import Settings
+from mavproxy_vision.settings import VisionSettings
 
 FINAL = 1.3  # of the height at which the tag fills the view
 LOWEST_FINAL = 0.4  # m
@@ -17,7 +17,7 @@ HIGHEST_CLIP = 1.5  # m from which a tag would be landed on without being seen
 DEPENDABLE = 0.85  # of the detection range
 
 
-def tags_for(settings: Settings, number: int | None) -> dict[int, Tag]:
+def tags_for(settings: VisionSettings, number: int | None) -> dict[int, Tag]:
     """The tags that tell where the target is, the main one first; None is that of the settings.
 
     Raises:
@@ -32,7 +32,7 @@ def tags_for(settings: Settings, number: int | None) -> dict[int, Tag]:
     return {number: Tag(number, size)}
 
 
-def landable(settings: Settings, number: int | None) -> dict[int, Tag]:
+def landable(settings: VisionSettings, number: int | None) -> dict[int, Tag]:
     """As `tags_for`, of tags that can be seen from low enough to land on.
 
     Raises:
@@ -51,14 +51,16 @@ def landable(settings: Settings, number: int | None) -> dict[int, Tag]:
     return tags
 
 
-def clip_height(settings: Settings, tags: dict[int, Tag]) -> float:
+def clip_height(settings: VisionSettings, tags: dict[int, Tag]) -> float:
     """Metres above the target below which the smallest tag does not fit into the view."""
     forward, right, down = settings.camera_mount.offset
     smallest = min(tag.size for tag in tags.values())
     return settings.model.clip_height(smallest, math.hypot(forward, right)) + down
 
 
-def plan_for(settings: Settings, tags: dict[int, Tag], here: float | None, *, descend: bool, **changes: Any) -> Plan:
+def plan_for(
+    settings: VisionSettings, tags: dict[int, Tag], here: float | None, *, descend: bool, **changes: Any
+) -> Plan:
     """The plan of a landing, or of a search.
 
     Args:

@@ -27,7 +27,7 @@ from mavproxy_vision.camera.simulated import SimulatedCamera, parse_placed
 from mavproxy_vision.camera.source import Folder, Image, Posted, Source
 from mavproxy_vision.errors import NoCamera
 from mavproxy_vision.geometry.frames import Attitude, vector
-from mavproxy_vision.settings import Settings
+from mavproxy_vision.settings import VisionSettings
 from mavproxy_vision.tracking.capture_worker import Health, Worker
 from mavproxy_vision.tracking.ground_truth import Pose, Truth
 from mavproxy_vision.tracking.measurement import TargetMeasurer, Wanted
@@ -55,7 +55,7 @@ class Tracker:
         settings: the first snapshot.
     """
 
-    def __init__(self, host: Host, settings: Settings) -> None:
+    def __init__(self, host: Host, settings: VisionSettings) -> None:
         self.host, self.settings = host, settings
         self.history, self.clock, self.truth = History(), VehicleClock(), Truth()
         self.rates = Rates(host.clock)
@@ -85,11 +85,11 @@ class Tracker:
         self.host.listeners.append(self._hear)
         self._tasks.start(self.rates.run(self.vehicle), "the watch over the rates")
 
-    async def start(self, settings: Settings) -> None:
+    async def start(self, settings: VisionSettings) -> None:
         """Look through the camera that the settings name; what was running ends.
 
         Raises:
-            BadSetting: they make no sense together.
+            SettingError: they make no sense together.
             NoCamera: they name no camera.
         """
         async with self._changing:
@@ -122,14 +122,14 @@ class Tracker:
         await self._tasks.end()
         await self.stop()
 
-    def _make_worker(self, settings: Settings) -> Worker:
+    def _make_worker(self, settings: VisionSettings) -> Worker:
         cv2.setNumThreads(settings.threads)
         detector = Detector(settings.model, self.options(settings))
         source = make_source(settings, self._where, self.host.clock)
         worker = Worker(source, detector, lambda seen, image: self.deliver(worker, seen, image), self.host.clock)
         return worker
 
-    def options(self, settings: Settings) -> DetectorOptions:
+    def options(self, settings: VisionSettings) -> DetectorOptions:
         """How the detector is to look."""
         tags = settings.tag_list
         sizes = dict.fromkeys(self._extra, tags[0].size) | {tag.id: tag.size for tag in tags}
@@ -316,11 +316,11 @@ HEARD: dict[str, tuple[str, ...]] = {  # with the fields that must be finite
 }
 
 
-def make_source(settings: Settings, where: Any, clock: Callable[[], float]) -> Source:
+def make_source(settings: VisionSettings, where: Any, clock: Callable[[], float]) -> Source:
     """The source that the settings name.
 
     Raises:
-        BadSetting: one of its settings makes no sense.
+        SettingError: one of its settings makes no sense.
     """
     spec, latency = settings.source, settings.latency / 1000
     if spec == "sim":

@@ -14,7 +14,7 @@ import pytest
 from mavproxy_uavapi.core.errors import BadRequest, NotFound, NoVehicle, ToolFailed
 from mavproxy_uavapi.scripts import manager
 from mavproxy_uavapi.scripts.manager import Scripts, address
-from mavproxy_uavapi.settings import ModuleSettings
+from mavproxy_uavapi.settings import ApiModuleSettings
 
 PRINTS = b"import os, sys\nprint(os.environ['UAVAPI_URL'], os.environ['UAVAPI_TOKEN'], os.environ['UAVAPI_SYSID'])\n"
 SLEEPS = b"import time\nprint('up')\ntime.sleep(60)\n"
@@ -27,7 +27,7 @@ class NoRegistry:
 
 def settings(folder: Path, **given: Any) -> Any:
     defaults = {"scripts_path": str(folder / "scripts"), "script_logs": str(folder / "logs"), "sysid": 9}
-    return ModuleSettings({**defaults, **given}, environ={}).snapshot()
+    return ApiModuleSettings({**defaults, **given}, environ={}).snapshot()
 
 
 def scripts_in(folder: Path, **given: Any) -> Scripts:
