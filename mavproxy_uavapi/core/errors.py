@@ -33,6 +33,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+SOURCES = (["query"], ["body"])
+
 
 class UavApiError(Exception):
     """Base of all errors of this project: a sentence, a machine code and an HTTP status."""
@@ -132,7 +134,8 @@ class Aborted(Conflict):
 class Invalid(UavApiError):
     """A value of the wrong type or out of range; nothing was sent.
 
-    `problems` are `{"loc": [...], "msg": str, "type": str}`, as web clients of typed APIs know them.
+    `problems` are `{"loc": [...], "msg": str, "type": str}`, as web clients of typed APIs know them; `loc` is the
+    name of the value, and what leads to it. Where it came by HTTP, `came_by` puts query or body before it.
     """
 
     status, code = 422, "invalid"
@@ -141,7 +144,16 @@ class Invalid(UavApiError):
         if isinstance(problems, str):
             problems = [{"loc": list(loc), "msg": problems, "type": "value_error"}]
         self.problems = list(problems)
-        super().__init__("; ".join(f"{'.'.join(map(str, p['loc']))}: {p['msg']}" for p in self.problems))
+        super().__init__()
+
+    def __str__(self) -> str:
+        return "; ".join(": ".join(filter(None, (".".join(map(str, p["loc"])), p["msg"]))) for p in self.problems)
+
+    def came_by(self, source: str) -> None:
+        """Note by what part of a request the values came, unless that is known."""
+        for problem in self.problems:
+            if problem["loc"][:1] not in SOURCES:
+                problem["loc"] = [source, *problem["loc"]]
 
     @property
     def detail(self) -> list[dict[str, Any]]:

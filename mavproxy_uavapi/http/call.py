@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+import contextlib
+from collections.abc import Awaitable, Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, TypeVar, cast
 
@@ -123,7 +124,8 @@ class Call:
         is_async = self.is_async
 
         async def body(job: Job) -> str:
-            await verb(job)
+            with self.naming_source():
+                await verb(job)
             return result if isinstance(result, str) else result()
 
         jobs = self.service.host.jobs
@@ -163,6 +165,15 @@ class Call:
     def path(self) -> str:
         """The path without a trailing slash."""
         return self.request.path.rstrip("/")
+
+    @contextlib.contextmanager
+    def naming_source(self) -> Iterator[None]:
+        """What is refused as Invalid tells by what part of the request it came."""
+        try:
+            yield
+        except Invalid as error:
+            error.came_by("query" if self.request.method == "GET" else "body")
+            raise
 
     @property
     def client(self) -> str:

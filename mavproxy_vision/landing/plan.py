@@ -27,7 +27,7 @@ def tags_for(settings: VisionSettings, number: int | None) -> dict[int, Tag]:
     if number is None or number == tags[0].id:
         return {tag.id: tag for tag in tags}
     if number >= FAMILIES[settings.families[0]][1]:
-        raise Invalid(f"{settings.families[0]} has no id {number}", "body", "id")
+        raise Invalid(f"{settings.families[0]} has no id {number}", "id")
     size = next((tag.size for tag in tags if tag.id == number), tags[0].size)
     return {number: Tag(number, size)}
 
@@ -45,7 +45,6 @@ def landable(settings: VisionSettings, number: int | None) -> dict[int, Tag]:
         raise Invalid(
             f"tag {smallest.id} of {smallest.size:g} m is not in view below {clip:.1f} m: it takes a smaller one "
             "beside it (`tags`), or a lens that is nearer to the middle (`offset`)",
-            "body",
             "id",
         )
     return tags
