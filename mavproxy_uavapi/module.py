@@ -12,7 +12,7 @@ try:
     from mavproxy_uavapi.api import Api
 except ModuleNotFoundError as missing:  # MAVProxy prints the text of an ImportError as one line
     raise ImportError(f"uavapi needs {missing.name}: pip install mavproxy-uavapi") from missing
-from mavproxy_uavapi.console import address_of, report, vehicles
+from mavproxy_uavapi.console import report, vehicles
 from mavproxy_uavapi.core.background import BackgroundCommands
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.logs import Logs, print_above_prompt
@@ -108,11 +108,11 @@ class UavApiModule(SharedModule):
             async with self._changing:
                 return await self._listen(settings)
 
-        self._background.send(start, f"trying to listen on {address_of(settings)}")
+        self._background.send(start, f"trying to listen on {settings.url}")
 
     async def _listen(self, settings: ApiSettings) -> str:
         """Listen; what came of it. A disk may take its time, so a thread opens the logs."""
-        address = address_of(settings)
+        address = settings.url
         try:
             await self._open_logs(settings)
             await self.api.start(settings)

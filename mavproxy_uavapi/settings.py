@@ -10,7 +10,7 @@ from typing import Any
 
 from MAVProxy.modules.lib.mp_settings import MPSetting
 
-from mavproxy_uavapi.core.addresses import is_loopback
+from mavproxy_uavapi.core.addresses import is_loopback, local_url_of, url_of
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.ini_file import IniFile
 from mavproxy_uavapi.core.logs import components
@@ -105,6 +105,16 @@ class ApiSettings:
     log_path: str
     debug: frozenset[str]
     token: str
+
+    @property
+    def url(self) -> str:
+        """The API's own address."""
+        return url_of(self.host, self.port, tls=bool(self.certfile))
+
+    @property
+    def local_url(self) -> str:
+        """The URL by which this machine reaches the API."""
+        return local_url_of(self.host, self.port, tls=bool(self.certfile))
 
     @property
     def is_local(self) -> bool:

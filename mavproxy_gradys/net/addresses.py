@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from urllib.parse import SplitResult, urlsplit
 
 from mavproxy_gradys.net.resolver import Resolver
-from mavproxy_uavapi.core.addresses import is_loopback
+from mavproxy_uavapi.core.addresses import bracketed, is_loopback
 from mavproxy_uavapi.core.errors import SettingError
 
 PORTS = {"http": 80, "https": 443, "mqtt": 1883, "mqtts": 8883}
@@ -86,11 +86,6 @@ def split_url(text: str, schemes: tuple[str, ...]) -> tuple[SplitResult, int]:
     except UnicodeError as error:
         raise SettingError(f"{shown!r} is not an address: no host has such a name ({error})") from error
     return parts, PORTS[parts.scheme] if port is None else port
-
-
-def bracketed(host: str) -> str:
-    """A host as it stands in a URL: an IPv6 address in brackets, without its zone."""
-    return f"[{host.partition('%')[0]}]" if ":" in host else host
 
 
 async def own_address(names: Resolver, host: str, port: int) -> str:

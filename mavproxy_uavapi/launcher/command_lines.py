@@ -12,6 +12,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from mavproxy_uavapi.core.addresses import local_url_of
 from mavproxy_uavapi.core.settings import DEFAULT
 from mavproxy_uavapi.launcher.locations import HomePosition
 from mavproxy_uavapi.launcher.options import RunOptions
@@ -180,8 +181,7 @@ def sitl_binary(options: RunOptions) -> Path:
 
 def api_url(options: RunOptions) -> str:
     """Where to reach the API from this machine."""
-    host = {"0.0.0.0": "127.0.0.1", "::": "::1", "": "127.0.0.1"}.get(options.host, options.host)
-    return f"http://[{host}]:{options.port}" if ":" in host else f"http://{host}:{options.port}"
+    return local_url_of(options.host, options.port)
 
 
 def greeting(options: RunOptions, with_token: bool) -> str:

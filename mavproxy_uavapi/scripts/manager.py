@@ -208,7 +208,7 @@ class Scripts:
         return {
             **os.environ,
             "PYTHONUNBUFFERED": "1",  # so that the logs and the session show what it prints as it prints
-            "UAVAPI_URL": address(self._settings),
+            "UAVAPI_URL": self._settings.local_url,
             "UAVAPI_TOKEN": self._settings.token,
             "UAVAPI_SYSID": str(self.sysid),
         }
@@ -242,11 +242,3 @@ class Scripts:
         others = [other.script for other in self._watched.values() if other.sysid in (0, run.sysid)]
         done = await on_exit.after_death(self._host, run.sysid or self._settings.sysid, run, others)
         log.warning("%s died (status %s): %s", run.script, run.exit_status, done)
-
-
-def address(settings: ApiSettings) -> str:
-    """The URL by which this machine reaches the API."""
-    scheme = "https" if settings.certfile else "http"
-    everywhere = {"0.0.0.0": "127.0.0.1", "::": "::1"}
-    host = everywhere.get(settings.host, settings.host)
-    return f"{scheme}://[{host}]:{settings.port}" if ":" in host else f"{scheme}://{host}:{settings.port}"

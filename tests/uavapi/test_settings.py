@@ -115,3 +115,17 @@ def test_networks_that_may_run_scripts_are_networks() -> None:
     assert [str(network) for network in snapshot.allow_scripts_from] == ["10.0.0.0/8", "fd00::/8"]
     with pytest.raises(SettingError, match="allow_scripts_from: 'here' is no network"):
         ApiModuleSettings({"allow_scripts_from": "here"}, environ={})
+
+
+@pytest.mark.parametrize(
+    ("given", "url"),
+    [
+        ({}, "http://127.0.0.1:8000"),
+        ({"host": "0.0.0.0", "token": "t", "port": 81}, "http://127.0.0.1:81"),
+        ({"host": "::", "token": "t"}, "http://[::1]:8000"),
+        ({"host": "192.168.1.5", "token": "t"}, "http://192.168.1.5:8000"),
+        ({"certfile": "c", "keyfile": "k"}, "https://127.0.0.1:8000"),
+    ],
+)
+def test_address_is_one_that_this_machine_can_reach(given: dict[str, Any], url: str) -> None:
+    assert ApiModuleSettings(given, environ={}).snapshot().local_url == url
