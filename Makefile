@@ -17,7 +17,7 @@ demo: $(LEAN)
 	@$(BIN)/mavproxy-uavapi --simulated --module 'vision:{"source":"sim"}' $(ARGS)
 
 test: $(INSTALLED)
-	$(BIN)/python -m pytest -m "not sitl" -n 4 --dist loadfile --reruns 2 -rR $(ARGS)
+	$(BIN)/python -m pytest -m "not sitl" -n 4 --dist loadfile --no-loadscope-reorder --reruns 2 -rR $(ARGS)
 
 # Against ArduPilot's own simulation: make test-sitl ARDUPILOT_HOME=…
 test-sitl: $(INSTALLED)

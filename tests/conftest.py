@@ -185,6 +185,9 @@ def boards() -> Any:
     return boards
 
 
+LONGEST = ("end_to_end/test_hostile", "end_to_end/test_vision", "end_to_end/", "rules/")  # begun first, in this order
+
+
 def pytest_configure() -> None:
     """Heed what a run in the background (nohup, `&`) ignores: what our tests start would ignore it too."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -192,14 +195,16 @@ def pytest_configure() -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out what this machine has not got.
+    """Begin with what takes longest, and leave out what this machine has not got.
 
-    Without ArduPilot there is nothing that the tests marked `sitl` could run on. A bare machine lacks tmux, a
-    browser or a broker: what needs them is skipped there, but never in CI.
+    The files with real processes take minutes: begun last, one of them would run alone at the end. Without
+    ArduPilot there is nothing that the tests marked `sitl` could run on. A bare machine lacks tmux, a browser or a
+    broker: what needs them is skipped there, but never in CI.
     """
     if not os.environ.get("ARDUPILOT_HOME"):
         config.hook.pytest_deselected(items=[item for item in items if item.get_closest_marker("sitl")])
         items[:] = [item for item in items if not item.get_closest_marker("sitl")]
+    items.sort(key=lambda item: next((n for n, part in enumerate(LONGEST) if part in item.nodeid), len(LONGEST)))
     if os.environ.get("CI"):
         return
     for item in items:
