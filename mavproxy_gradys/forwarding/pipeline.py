@@ -68,9 +68,9 @@ class ReadingPipeline:
                 await self.spool_thread.save()  # before the sinks' goodbyes, which may take long
             await end(tasks)
         finally:
-            await self._end_keeper()
+            await self._end_thread()
 
-    async def _end_keeper(self) -> None:
+    async def _end_thread(self) -> None:
         spool_thread = self.spool_thread
         if spool_thread is None:
             return
@@ -92,7 +92,7 @@ class ReadingPipeline:
         spool_thread = self.spool_thread  # it is there when its end was not waited for
         count = len(self._left) if spool_thread is None else spool_thread.waiting
         why = (self._why_left if spool_thread is None else spool_thread.problem) or "they were not written in time"
-        return f"{count} reading{'' if count == 1 else 's'} are lost: {why}" if count else ""
+        return f"{count} {'reading is' if count == 1 else 'readings are'} lost: {why}" if count else ""
 
     def _kept(self, settings: Settings | None = None) -> SpoolThread:
         """The spool's thread, started if need be."""

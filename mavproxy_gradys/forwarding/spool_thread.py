@@ -56,6 +56,7 @@ class SpoolThread:
         self._stopping = asyncio.Event()
         self._closed = False
         self._outage = Outage(log, "the spool fails", "the spool works again")
+        self._takes_none = False  # the newest attempt to write failed
         self._defects = Defects("the spool")
         self._drops = Drops(log, clock)
         self._oldest_since: float | None = None
@@ -117,7 +118,7 @@ class SpoolThread:
 
     async def _write(self) -> None:
         with contextlib.suppress(NotStored):  # `problem` has it; the readings wait for the next time
-            await self._do(lambda spool: None, trim=True)
+            await self._trim()
         trimmed = self._clock()
         while not self._stopping.is_set():
             with contextlib.suppress(asyncio.TimeoutError):
@@ -126,8 +127,12 @@ class SpoolThread:
                 await self._commit()
                 if self._clock() - trimmed >= TRIM_EVERY:
                     trimmed = self._clock()
-                    await self._do(lambda spool: None, trim=True)
+                    await self._trim()
             self._drops.tell(self.dropped)
+
+    async def _trim(self) -> None:
+        # It may find nothing to delete, and shows nothing then; where no reading waits, that will do.
+        await self._do(lambda spool: None, trim=True, writes=not self._waiting)
 
     async def save(self) -> None:
         """Write what waits now, if the disk takes it."""
@@ -173,7 +178,8 @@ class SpoolThread:
     async def _batch(self, sink: str, cursor: SinkCursor, limit: int) -> list[Stored]:
         if cursor.unnoted:
             await self._note(sink, cursor, set())
-        found = await self._do(lambda spool: spool.batch(sink, cursor.after, limit + cursor.passed_over))
+        look = limit + cursor.passed_over
+        found = await self._do(lambda spool: spool.batch(sink, cursor.after, look), writes=False)
         return cursor.choose(found, limit)
 
     async def acknowledge(self, sink: str, batch: Sequence[Stored], numbers: set[int]) -> None:
@@ -199,28 +205,37 @@ class SpoolThread:
 
     # -- the other thread ---------------------------------------------------------------------------------
 
-    async def _do(self, work: Callable[[Spool], T], trim: bool = False) -> T:
+    async def _do(self, work: Callable[[Spool], T], *, trim: bool = False, writes: bool = True) -> T:
         """Do `work` on the spool in the other thread, opening it if need be.
 
+        Args:
+            work: what to do.
+            trim: whether to trim the spool afterwards.
+            writes: whether success shows that the disk takes readings: a full one can still be read.
+
         Raises:
-            NotStored: it failed; `problem` says why until something succeeds.
+            NotStored: it failed; `problem` says why until something succeeds, after a failed write a write.
         """
         if self._closed:
             raise NotStored("gradys is stopping")
         try:
-            result, self.problem = await asyncio.get_running_loop().run_in_executor(
-                self._thread, self._work, work, trim
-            )
+            result, problem = await asyncio.get_running_loop().run_in_executor(self._thread, self._work, work, trim)
         except NotStored as error:
-            self.problem = str(error)
-            self._outage.now(self.problem)
+            self._outage.now(self._note_problem(str(error), writes))
             raise
         except Exception as error:
             self._defects.tell(error)
-            self.problem = f"{type(error).__name__}: {error}"
-            raise NotStored(self.problem) from error
-        self._outage.now(self.problem)
+            raise NotStored(self._note_problem(f"{type(error).__name__}: {error}", writes)) from error
+        self._outage.now(self._note_problem(problem, writes))
         return result
+
+    def _note_problem(self, problem: str, writes: bool) -> str:
+        """What is wrong just now, after an attempt to write or to read that ended so."""
+        if not problem and not writes and self._takes_none:
+            return self.problem
+        self._takes_none = bool(problem) and (writes or self._takes_none)
+        self.problem = problem
+        return problem
 
     def _work(self, work: Callable[[Spool], T], trim: bool) -> tuple[T, str]:
         """The outcome, and what is wrong although it is done."""

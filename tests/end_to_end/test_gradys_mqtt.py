@@ -107,8 +107,11 @@ def test_readings_positions_and_the_last_will(rig, harness, tmp_path):
         numbers += rig.ok(rig.post("/gradys/readings", quantity="temperature", value=value))["seq"]
     harness.eventually(lambda: _sink(rig)["last_error"], 20, "the broker's being missed")
     subscriber.stop()
+    # No reading is retained: those that came before the subscription would be heard by nobody.
+    rig.mavproxy.popen.send_signal(signal.SIGSTOP)
     broker.start()
     subscriber = Subscriber(broker.port)
+    rig.mavproxy.popen.send_signal(signal.SIGCONT)
     rig.mavproxy.ask("gradys flush", "tried now")
     harness.eventually(lambda: len(subscriber.readings("fleet/10/temperature")) >= 50, 30, "all fifty")
     seen = list(dict.fromkeys(reading["seq"] for reading in subscriber.readings("fleet/10/temperature")))

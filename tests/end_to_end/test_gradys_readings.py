@@ -6,6 +6,7 @@ import contextlib
 import json
 import os
 import random
+import re
 import shutil
 import signal
 import subprocess
@@ -260,9 +261,16 @@ def test_a_full_disk_is_said_and_nothing_else_suffers(harness, rig, tmp_path):
         with contextlib.suppress(OSError), (disk / "filler").open("wb", buffering=0) as filler:
             while True:
                 filler.write(b"x")  # not even a sample fits any more
-        harness.eventually(lambda: report(rig)["spool"]["problem"], 10, "the problem")
+        before = report(rig)["quantities"][0]["taken"]
+
+        def samples_wait():
+            told = report(rig)
+            return told["quantities"][0]["taken"] >= before + 8 and told["spool"]["problem"]
+
+        harness.eventually(samples_wait, 20, "samples that the disk does not take")
         rig.mavproxy.ask("gradys status", "NOT KEPT just now")
-        assert "readings are lost" in rig.mavproxy.ask("module unload gradys", "Unloaded module gradys")
+        said = rig.mavproxy.ask("module unload gradys", "Unloaded module gradys")
+        assert re.search(r"\d+ readings are lost: .*full", said)
     finally:
         rig.mavproxy.ask("module unload gradys", "gradys")
         subprocess.run(["umount", str(disk)], check=False)

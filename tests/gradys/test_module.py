@@ -160,15 +160,16 @@ def kept(file: Path) -> int:
     return int(count)
 
 
+@pytest.mark.parametrize(("count", "lost"), [(1, "1 reading is lost: "), (12, "12 readings are lost: ")])
 def test_an_unload_says_how_many_readings_are_lost(
-    make: Any, capsys: Any, caplog: Any, full_disk: FullDisk, tmp_path: Path
+    make: Any, capsys: Any, caplog: Any, full_disk: FullDisk, tmp_path: Path, count: int, lost: str
 ) -> None:
     module = make()
-    put(module, 12)
+    put(module, count)
     module.unload()
-    assert "gradys: 12 readings are lost" in capsys.readouterr().out
+    assert f"gradys: {lost}" in capsys.readouterr().out
     (told,) = (record.message for record in caplog.records if "lost" in record.message)
-    assert told.startswith("12 readings are lost") and "disk is full" in told
+    assert told.startswith(lost) and "disk is full" in told
 
 
 def test_an_unload_writes_what_it_can_and_then_says_nothing(make: Any, capsys: Any, tmp_path: Path) -> None:

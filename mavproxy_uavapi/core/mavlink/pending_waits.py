@@ -6,7 +6,8 @@ Deadlines are the waiter's own (`core/vehicle/message_waiter.py`), which then di
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+import contextlib
+from collections.abc import Callable, Collection, Iterator
 from typing import Any, Generic, TypeVar
 
 T = TypeVar("T")
@@ -64,6 +65,15 @@ class PendingWaits:
     def discard(self, wait: Wait[Any]) -> None:
         """Forget a wait, settled or given up."""
         self._waits.pop(wait, None)
+
+    @contextlib.contextmanager
+    def registered(self, wait: Wait[Any]) -> Iterator[None]:
+        """Look at messages for `wait` while the context lasts; enter it before sending what the wait is for."""
+        self.add(wait)
+        try:
+            yield
+        finally:
+            self.discard(wait)
 
     def feed(self, system: int, name: str, message: Any) -> None:
         """Show a message of `system` to the waits that look at such."""

@@ -1,15 +1,15 @@
-"""Waiting for one vehicle's messages in asyncio: `host.pending` with deadlines and link loss."""
+"""Waiting for one vehicle's messages in asyncio: `PendingWaits` with deadlines and link loss."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Collection
-from types import TracebackType
+import contextlib
+from collections.abc import Callable, Collection, Iterator
 from typing import Any, Generic, TypeVar
 
 from pymavlink import mavutil
 
-from mavproxy_uavapi.core.errors import LinkLost, TimedOut
+from mavproxy_uavapi.core.errors import TimedOut
 from mavproxy_uavapi.core.mavlink.link import Address
 from mavproxy_uavapi.core.mavlink.pending_waits import PendingWaits, Wait
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
@@ -61,39 +61,50 @@ class MessageWaiter:
             return value
         return await self.message(names, lambda _: condition(), timeout, what)
 
-    def expecting(self, names: Collection[str], test: Callable[[Any], T | None]) -> ExpectedMessage[T]:
+    @contextlib.contextmanager
+    def expecting(self, names: Collection[str], test: Callable[[Any], T | None]) -> Iterator[ExpectedMessage[T]]:
         """A context that waits from its entering on: enter it, send, then await `within`."""
-        return ExpectedMessage(Wait(self.state.system, names, test), self._pending)
+        expected = ExpectedMessage(Wait(self.state.system, names, test))
+        with self._pending.registered(expected.wait):
+            yield expected
 
-    def acks(self, command: int, asker: Address, shown: Callable[[], bool] = lambda: False) -> Acks:
-        """A context that catches the acks of `command` to `asker`; enter it before sending.
+    @contextlib.contextmanager
+    def acks(
+        self, command: int, asker: Address, shown: Callable[[], bool] = lambda: False
+    ) -> Iterator[MessageExchange[int]]:
+        """A context that catches the acks of `command` to `asker`, as MAV_RESULT; enter it before sending.
 
         A heartbeat after which `shown` holds counts as an ack that accepts; what `shown` raises ends the wait.
         """
-        return Acks(command, self.state, asker, self._pending, shown)
 
-    def conversation(self, names: Collection[str], asker: Address) -> MessageExchange:
+        def result_of(message: Any) -> int | None:
+            if message.get_type() == "HEARTBEAT":
+                return mavlink.MAV_RESULT_ACCEPTED if shown() else None
+            return message.result if message.command == command else None
+
+        exchange = MessageExchange(self.state, asker, {"COMMAND_ACK", "HEARTBEAT"}, result_of)
+        with self._pending.registered(exchange.wait):
+            yield exchange
+
+    @contextlib.contextmanager
+    def exchange(self, names: Collection[str], asker: Address) -> Iterator[MessageExchange[Any]]:
         """A context that catches messages of these names to `asker`; enter it before sending."""
-        return MessageExchange(self.state, asker, self._pending, names)
+        exchange = MessageExchange(self.state, asker, names, lambda message: message)
+        with self._pending.registered(exchange.wait):
+            yield exchange
 
 
 class ExpectedMessage(Generic[T]):
-    """A registered wait, forgotten when its context is left."""
+    """A wait for one message.
 
-    def __init__(self, wait: Wait[T], pending: PendingWaits) -> None:
-        self._wait = wait
-        self._pending = pending
+    Attributes:
+        wait: to be registered while it is expected.
+    """
+
+    def __init__(self, wait: Wait[T]) -> None:
+        self.wait = wait
         self._done = asyncio.Event()
         wait.on_settled = self._done.set
-
-    def __enter__(self) -> ExpectedMessage[T]:
-        self._pending.add(self._wait)
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._pending.discard(self._wait)
 
     async def within(self, timeout: float, what: str) -> T:
         """The awaited value.
@@ -108,64 +119,8 @@ class ExpectedMessage(Generic[T]):
         try:
             await wait_with_timeout(timeout, self._done.wait())
         except asyncio.TimeoutError:
-            sentence = f"vehicle {self._wait.system} did not {what} within {timeout:.1f} s"
+            sentence = f"vehicle {self.wait.system} did not {what} within {timeout:.1f} s"
             raise TimedOut(sentence) from None
-        if self._wait.error is not None:
-            raise self._wait.error
-        return self._wait.value  # type: ignore[return-value]
-
-
-class Acks:
-    """The acks of one command, caught from entering to leaving the context.
-
-    They are queued: an IN_PROGRESS and the ack that follows it may arrive in one batch.
-    """
-
-    def __init__(
-        self, command: int, state: VehicleState, asker: Address, pending: PendingWaits, shown: Callable[[], bool]
-    ) -> None:
-        self._command = command
-        self._shown = shown
-        self._state = state
-        self._asker = asker
-        self._pending = pending
-        self._results: asyncio.Queue[int | None] = asyncio.Queue()
-        self._wait: Wait[int] = Wait(state.system, {"COMMAND_ACK", "HEARTBEAT"}, self._catch)
-        self._wait.on_settled = lambda: self._results.put_nowait(None)
-
-    def __enter__(self) -> Acks:
-        self._pending.add(self._wait)
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._pending.discard(self._wait)
-
-    def _catch(self, message: Any) -> None:
-        if message.get_type() == "HEARTBEAT":
-            if self._shown():
-                self._results.put_nowait(mavlink.MAV_RESULT_ACCEPTED)
-        elif message.command == self._command and self._is_to_us(message):
-            self._results.put_nowait(message.result)
-
-    def _is_to_us(self, message: Any) -> bool:
-        return (
-            message.get_srcComponent() == self._state.component
-            and message.target_system in (0, self._asker.system)
-            and message.target_component in (0, self._asker.component)
-        )
-
-    async def next(self, timeout: float) -> int | None:
-        """MAV_RESULT of the next ack; None when none came for `timeout` s.
-
-        Raises:
-            LinkLost: the vehicle's heartbeats stopped.
-        """
-        try:
-            result = await wait_with_timeout(timeout, self._results.get())
-        except asyncio.TimeoutError:
-            return None
-        if result is None:
-            raise self._wait.error or LinkLost(f"vehicle {self._state.system} is gone")
-        return result
+        if self.wait.error is not None:
+            raise self.wait.error
+        return self.wait.value  # type: ignore[return-value]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from typing import Any, TypeVar
 
 from pymavlink import mavutil
@@ -117,13 +118,15 @@ class Waypoints:
     def _address(self) -> Address:
         return Address(self._state.system, self._state.component)
 
-    def _talk(self, names: Sequence[str]) -> MessageExchange:
-        return self._waiting.conversation(names, self._link.source)
+    def _talk(self, names: Sequence[str]) -> AbstractContextManager[MessageExchange[Any]]:
+        return self._waiting.exchange(names, self._link.source)
 
     async def _send(self, message: Any) -> None:
         await self._link.send(message, self._state.system)
 
-    async def _asked(self, talk: MessageExchange, question: Any, test: Callable[[Any], T | None], what: str) -> T:
+    async def _asked(
+        self, talk: MessageExchange[Any], question: Any, test: Callable[[Any], T | None], what: str
+    ) -> T:
         """Ask until `test` of an answer is not None.
 
         Raises:
@@ -143,7 +146,7 @@ class Waypoints:
                     refusal = self._refusal(message, what)
         raise refusal or TimedOut(f"vehicle {self._state.system} did not {what}, asked {SENDINGS} times")
 
-    async def _ask_count(self, talk: MessageExchange) -> int:
+    async def _ask_count(self, talk: MessageExchange[Any]) -> int:
         question = mavlink.MAVLink_mission_request_list_message(*self._address, MISSION)
         return await self._asked(talk, question, _count_of, "tell how many mission items it has")
 
@@ -158,7 +161,7 @@ class Waypoints:
             )
         return (found[0], found[1:]) if found else (None, [])
 
-    async def _clear(self, talk: MessageExchange) -> None:
+    async def _clear(self, talk: MessageExchange[Any]) -> None:
         question = mavlink.MAVLink_mission_clear_all_message(*self._address, MISSION)
 
         def accepted(message: Any) -> bool | None:
@@ -191,7 +194,9 @@ class Waypoints:
         with self._talk(REQUESTS) as talk:
             await self._answer_requests(talk, items, progress)
 
-    async def _answer_requests(self, talk: MessageExchange, items: Sequence[MissionItem], progress: Progress) -> None:
+    async def _answer_requests(
+        self, talk: MessageExchange[Any], items: Sequence[MissionItem], progress: Progress
+    ) -> None:
         """Offer the items and give each as often as the vehicle asks for it, which knows what it lacks.
 
         Nothing is sent unasked but the offer: an item that comes twice is an error to an ArduPilot. When the
@@ -221,7 +226,7 @@ class Waypoints:
                 given.add(message.seq)
                 progress(len(given), len(items))
 
-    async def _next_request(self, talk: MessageExchange, timeout: float) -> Any | None:
+    async def _next_request(self, talk: MessageExchange[Any], timeout: float) -> Any | None:
         """The next message of an upload.
 
         Raises:

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from mavproxy_gradys.errors import NotStored
-from mavproxy_gradys.forwarding import spool_thread as keepers
+from mavproxy_gradys.forwarding import spool_thread as spool_threads
 from mavproxy_gradys.forwarding.readings import Reading
 from mavproxy_gradys.forwarding.spool import Spool
 from mavproxy_gradys.forwarding.spool_thread import SpoolThread
@@ -120,10 +120,42 @@ def test_a_full_disk_is_said_and_sampled_readings_wait_in_memory(
     assert [value if value == 0 else value[0] for value in taken(loop, spool_thread)] == [0, "1", "2", "3"]
 
 
+def test_full_disk_that_can_be_read_is_full_all_the_same(
+    loop: Any, spool_thread: SpoolThread, disk: Disk, caplog: pytest.LogCaptureFixture
+) -> None:
+    loop.run(spool_thread.keep([reading(0)]))
+    disk.fill()
+    spool_thread.put(reading("1" * 30_000))
+    loop.pass_time(1)
+    for _ in range(50):  # a sink that does not answer has the oldest read again and again
+        assert taken(loop, spool_thread) == [0]
+        assert "full" in spool_thread.problem
+        loop.pass_time(0.3)
+        assert "full" in spool_thread.problem
+    disk.make_room()
+    loop.pass_time(1)
+    assert spool_thread.problem == ""
+    said = [record.getMessage().partition(":")[0] for record in caplog.records]
+    assert said == ["the spool fails", "the spool works again"]
+
+
+def test_posted_reading_that_a_full_disk_refused_is_a_problem_for_a_while(
+    loop: Any, spool_thread: SpoolThread, disk: Disk
+) -> None:
+    loop.run(spool_thread.keep([reading(0)]))
+    disk.fill()
+    with pytest.raises(NotStored, match="full"):
+        loop.run(spool_thread.keep([reading("1" * 30_000)]))
+    assert taken(loop, spool_thread) == [0]
+    assert "full" in spool_thread.problem
+    loop.pass_time(spool_threads.TRIM_EVERY + 1)
+    assert spool_thread.problem == ""  # nothing waits to be kept
+
+
 def test_memory_is_bounded_and_what_it_drops_is_counted(
     loop: Any, spool_thread: SpoolThread, disk: Disk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(keepers, "HELD", 10)
+    monkeypatch.setattr(spool_threads, "HELD", 10)
     disk.fill()
     for value in range(25):
         spool_thread.put(reading(value))
@@ -309,7 +341,7 @@ def test_while_the_file_is_being_opened_it_says_so(loop: Any, disk: Disk) -> Non
 def test_the_log_tells_of_a_full_disk_once_and_of_drops_once_a_minute(
     loop: Any, spool_thread: SpoolThread, disk: Disk, monkeypatch: pytest.MonkeyPatch, caplog: Any
 ) -> None:
-    monkeypatch.setattr(keepers, "HELD", 10)
+    monkeypatch.setattr(spool_threads, "HELD", 10)
     with failing(monkeypatch, "append", sqlite3.OperationalError("database or disk is full")):
         for value in range(100):
             spool_thread.put(reading(value))
