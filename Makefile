@@ -41,7 +41,7 @@ $(LEAN): requirements/lean.txt
 	@$(PYTHON) -m venv $(if $(wildcard $(VENV)/pyvenv.cfg),--clear) $(VENV)
 	@echo "== 2/3 MAVProxy and what the modules need: requirements/lean.txt, about 150 MB to fetch the first time"
 	@$(PIP) $(LOCKED) requirements/lean.txt
-	@rm -r $(VENV)/lib/python3*/site-packages/MAVProxy/modules/mavproxy_cesium  # 114 MB that need tornado to start
+	@rm -rf $(VENV)/lib/python3*/site-packages/MAVProxy/modules/mavproxy_cesium  # 114 MB that need tornado to start
 	@touch $@
 
 $(MODULES): $(LEAN) pyproject.toml setup.py

@@ -22,7 +22,7 @@ from mavproxy_gradys.net.addresses import station
 from mavproxy_gradys.net.http_client import Client
 from mavproxy_gradys.push.pusher import Pusher
 from mavproxy_gradys.push.statistics import StationTally
-from mavproxy_gradys.settings import ModuleSettings
+from mavproxy_gradys.settings import GradysModuleSettings
 from mavproxy_uavapi.core.host import Host
 
 mavlink = mavutil.mavlink
@@ -49,7 +49,7 @@ def message(name: str, fields: dict[str, Any]) -> Any:
 async def measure(host: Host, push: bool) -> tuple[float, int]:
     """CPU seconds of SECONDS, and the updates that were acknowledged."""
     where = station(f"127.0.0.1:{PORT}")
-    settings = ModuleSettings({"period": PERIOD}).snapshot()
+    settings = GradysModuleSettings({"period": PERIOD}).snapshot()
     tally = StationTally(where.url, random.random)
     task = None
     if push:

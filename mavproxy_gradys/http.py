@@ -125,7 +125,7 @@ class GradysHandlers:
         at = now if given.time is None else given.time
         device = given.device or device_of(system)
         if given.quantity in self._gradys.pipeline.reserved and VEHICLE.fullmatch(device):
-            raise Invalid(f"{given.quantity} of {device} is told by the vehicle itself", "body", "quantity")
+            raise Invalid(f"{given.quantity} of {device} is told by the vehicle itself", "quantity")
         return Reading(device, system, given.quantity, given.representation, given.value, at)
 
     def _id(self, call: Call) -> str | None:

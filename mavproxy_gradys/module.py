@@ -12,23 +12,23 @@ try:
     from mavproxy_gradys import console
     from mavproxy_gradys.http import GradysHandlers
     from mavproxy_gradys.service import Gradys
-    from mavproxy_gradys.settings import ModuleSettings, Settings
+    from mavproxy_gradys.settings import GradysModuleSettings, GradysSettings
     from mavproxy_gradys.tracks.console import HELP as TRACK_HELP
     from mavproxy_gradys.tracks.console import TrackConsole
 except ModuleNotFoundError as missing:  # MAVProxy prints the text of an ImportError as one line
     raise ImportError(f"gradys needs {missing.name}: pip install mavproxy-uavapi") from missing
 from mavproxy_uavapi.core.background import BackgroundCommands
+from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.module import SharedModule, value_of
 from mavproxy_uavapi.core.remembered_settings import RememberedSettings
 from mavproxy_uavapi.core.timeout import wait_with_timeout
-from mavproxy_uavapi.settings import SettingError
 
 NAME = "gradys"
 log = logging.getLogger("gradys.spool")
 LONGEST_END = 3.0  # s that MAVProxy waits for it to end
 COMPLETION = "(GRADYSSETTING)"
 COMPLETIONS = [
-    "<status|stats|start|stop|flush|help>",
+    "<status|stats|start|stop|flush|config|help>",
     f"set {COMPLETION}",
     "track <record|fly> (FILENAME)",
     "track <stop|help>",
@@ -41,6 +41,7 @@ gradys stop              end that; unsent readings stay in the spool
 gradys flush             end all pauses after failures and try everything now
 gradys set               show the settings
 gradys set NAME VALUE    change one; it takes effect at once
+gradys config            the settings in force, and where each came from
 gradys set gs HOST:PORT  the ground station (several by comma)
 gradys set sink URL      where readings go: http(s)://HOST/PATH or mqtt(s)://HOST/fleet/{{sysid}}/{{quantity}}
 {TRACK_HELP}
@@ -52,7 +53,7 @@ class GradysModule(SharedModule):
 
     def __init__(self, mpstate: Any, given: dict[str, Any]) -> None:
         self.remembered = RememberedSettings(mpstate, NAME, given)
-        self.gradys_settings = ModuleSettings(self.remembered.given)
+        self.gradys_settings = GradysModuleSettings(self.remembered.given)
         actions: dict[str, Callable[[list[str]], None]] = {
             "status": lambda _: self._show(console.status),
             "stats": lambda _: self._show(console.stats),
@@ -60,11 +61,12 @@ class GradysModule(SharedModule):
             "stop": lambda _: self._stop(),
             "flush": lambda _: self._flush(),
             "set": self._set,
+            "config": lambda _: print("\n".join(self.gradys_settings.listing())),
             "track": self._tracks,
             "help": lambda _: print(HELP),
         }
         super().__init__(mpstate, NAME, "GrADyS ground station push", actions, COMPLETIONS)
-        self.add_completion_function(COMPLETION, self.gradys_settings.mp.completion)
+        self.add_completion_function(COMPLETION, lambda _: self.gradys_settings.names())
         self.gradys = Gradys(self.host)
         self._background = BackgroundCommands(self.host, NAME)
         self._lost = ""  # what the end found unwritten
@@ -107,7 +109,7 @@ class GradysModule(SharedModule):
 
     def command(self, args: list[str]) -> None:
         """The module's command at the prompt; most of it needs the asyncio thread."""
-        if self._begun or args[:1] in (["set"], ["help"]):
+        if self._begun or args[:1] in (["set"], ["config"], ["help"]):
             super().command(args)
         else:
             print("gradys: MAVProxy is still starting")
@@ -147,16 +149,11 @@ class GradysModule(SharedModule):
         self._track.command(args)
 
     def _set(self, args: list[str]) -> None:
-        if len(args) < 2:
-            names = args or sorted(self.gradys_settings.mp.list())
-            for name in names:
-                if name in self.gradys_settings.mp.list():
-                    print(f"{name:>20} {self.gradys_settings.shown(name)}")
-                else:
-                    print(f"gradys: no setting {name!r}")
-            return
         before = self.gradys_settings.snapshot()
         try:
+            if len(args) < 2:
+                print("\n".join(self.gradys_settings.listing(*args)))
+                return
             self.gradys_settings.set(args[0], value := value_of(args[1:]))
         except SettingError as error:
             print(f"gradys: {error}")
@@ -171,7 +168,7 @@ class GradysModule(SharedModule):
             self._background.send(restart, "taking up the setting")
 
 
-def told(settings: Settings) -> str:
+def told(settings: GradysSettings) -> str:
     """Which stations are told."""
     urls = ", ".join(station.url for station in settings.gs)
     return f"telling {urls}" if urls else "no ground station is set; `gradys set gs HOST:PORT`"

@@ -12,9 +12,9 @@ from mavproxy_gradys.net.addresses import StationAddress
 from mavproxy_gradys.net.http_client import Client
 from mavproxy_gradys.push.pusher import Pusher
 from mavproxy_gradys.push.statistics import StationTally
-from mavproxy_gradys.settings import Settings
-from mavproxy_gradys.tasks import begin, end
+from mavproxy_gradys.settings import GradysSettings
 from mavproxy_gradys.tracks.service import Tracking
+from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
 
 
@@ -32,9 +32,9 @@ class Gradys:
         self.stations: dict[str, StationTally] = {}
         self.pipeline = ReadingPipeline(host)
         self.tracks = Tracking(host)
-        self.settings: Settings | None = None
+        self.settings: GradysSettings | None = None
         self._pushers: list[Pusher] = []
-        self._tasks: list[asyncio.Task[None]] = []
+        self._tasks = HeldTasks()
         self._changing = asyncio.Lock()  # a start waits for the stop before it, which may take its time
 
     @property
@@ -42,7 +42,7 @@ class Gradys:
         """Whether it pushes and senses."""
         return self.settings is not None
 
-    async def start(self, settings: Settings) -> None:
+    async def start(self, settings: GradysSettings) -> None:
         """Push and sense as the settings say; does nothing when it does so already.
 
         Raises:
@@ -52,13 +52,14 @@ class Gradys:
             if not self.running:
                 self._start(settings)
 
-    def _start(self, settings: Settings) -> None:
+    def _start(self, settings: GradysSettings) -> None:
         pushers = [self._pusher(station, settings) for station in settings.gs]
         self.settings, self._pushers = settings, pushers
-        self._tasks = [begin(pusher.run(), f"the push to {pusher.station.url}") for pusher in pushers]
+        for pusher in pushers:
+            self._tasks.start(pusher.run(), f"the push to {pusher.station.url}")
         self.pipeline.start(settings)
 
-    def _pusher(self, station: StationAddress, settings: Settings) -> Pusher:
+    def _pusher(self, station: StationAddress, settings: GradysSettings) -> Pusher:
         client = Client(settings.timeout, settings.token, settings.ca_file)
         return Pusher(station, self.host, settings, self._tally(station), client)
 
@@ -72,7 +73,7 @@ class Gradys:
         async with self._changing:
             await self._stop()
 
-    async def restart(self, settings: Settings) -> bool:
+    async def restart(self, settings: GradysSettings) -> bool:
         """Take up other settings, if it runs; whether it does.
 
         Raises:
@@ -87,8 +88,7 @@ class Gradys:
 
     async def _stop(self, stop_pipeline: Callable[[], Awaitable[None]] | None = None) -> None:
         self.settings = None
-        tasks, self._tasks = self._tasks, []
-        await end(tasks)
+        await self._tasks.end()
         for pusher in self._pushers:  # also those that had not begun
             await pusher.close()
         await (stop_pipeline or self.pipeline.stop)()

@@ -1,30 +1,28 @@
-"""The module's settings: MPSettings at the prompt, an INI file -> one frozen snapshot handed inward."""
+"""The settings of the module `gradys`."""
 
 from __future__ import annotations
 
-import configparser
-import difflib
-import math
 import os
+from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from MAVProxy.modules.lib.mp_settings import MPSetting, MPSettings
+from MAVProxy.modules.lib.mp_settings import MPSetting
 
 from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.forwarding.readings import Quantity, parse_quantities
 from mavproxy_gradys.forwarding.sink_address import SinkAddress, sink_addresses
-from mavproxy_gradys.net.addresses import StationAddress, check_ip, stations
+from mavproxy_gradys.net.addresses import StationAddress, checked_ip, stations
 from mavproxy_gradys.net.http_client import tls_context
-from mavproxy_uavapi.settings import UNSET, SettingError
-
-SECTION = "gradys"
-SECRETS = {"token", "sink"}
+from mavproxy_uavapi.core.errors import SettingError
+from mavproxy_uavapi.core.ini_file import IniFile
+from mavproxy_uavapi.core.settings import ModuleSettings
+from mavproxy_uavapi.core.values import path_of
 
 
 @dataclass(frozen=True)
-class Settings:
+class GradysSettings:
     """A snapshot of the settings.
 
     Attributes:
@@ -62,131 +60,85 @@ def default_spool() -> str:
     return f"{state}/mavproxy-uavapi/gradys.db"
 
 
-def table() -> list[Any]:
-    """The settings with their types, defaults and ranges, as MAVProxy knows them."""
-    return [
-        MPSetting("gs", str, "", "ground stations, HOST:PORT by comma", tab="Gradys"),
-        MPSetting("ip", str, "", "HOST[:PORT] at which they reach our API; empty: found out"),
-        MPSetting("period", float, 1.0, "s between updates", range=(0.1, 3600)),
-        MPSetting("max_age", float, 5.0, "s after which a position is not told any more", range=(0.1, 3600)),
-        MPSetting("timeout", float, 3.0, "s for an answer", range=(0.1, 60)),
-        MPSetting("token", str, "", "bearer token for stations and HTTP sinks"),
-        MPSetting("ca_file", str, "", "certificates that TLS is checked by; empty: the system's"),
-        MPSetting(
-            "sink", str, "", "where readings go, by comma: http(s)://HOST/PATH[#ack=status], mqtt(s)://HOST/TOPIC"
-        ),
-        MPSetting("quantities", str, "position@1", "what is sampled while there is a sink"),
-        MPSetting("spool", str, default_spool(), "file that keeps readings until they are acknowledged"),
-        MPSetting("spool_mb", float, 64.0, "MB of readings kept; beyond it the oldest go", range=(0.1, 100_000)),
-        MPSetting("spool_hours", float, 72.0, "h after which readings are dropped", range=(0.01, 100_000)),
-    ]
-
-
-class ModuleSettings:
-    """The settings of the loaded module: validated, whichever way they come in."""
-
-    def __init__(self, given: dict[str, Any] | None = None) -> None:
-        """Take `given` settings; those of an INI file that it names as `config` yield to the others.
-
-        Raises:
-            SettingError: as `set` and `load`.
-        """
-        self.mp = MPSettings(table())
-        given = dict(given or {})
-        config = given.pop("config", None)
-        if config is not None:
-            self.load(Path(config).expanduser())
-        for name, value in given.items():
-            self.set(name, value)
-
-    def load(self, file: Path) -> None:
-        """Read an INI file: section [gradys] has the settings by their names, and [api] the station as gradys_gs.
-
-        Other sections belong to others.
-
-        Raises:
-            SettingError: it cannot be read, or [gradys] has a key or a value that means nothing.
-        """
-        parser = configparser.ConfigParser(interpolation=None)
-        try:
-            with file.open(encoding="utf-8") as stream:
-                parser.read_file(stream)
-        except OSError as error:
-            raise SettingError(f"{file}: {error.strerror}") from error
-        except (configparser.Error, UnicodeDecodeError) as error:
-            raise SettingError(f"{file}: {' '.join(str(error).split())}") from error
-        station = parser.get("api", "gradys_gs", fallback="")
-        if station not in UNSET:
-            self.set("gs", station)
-        if not parser.has_section(SECTION):
-            return
-        for name, value in parser[SECTION].items():
-            if name not in self.mp.list():
-                raise SettingError(f"{file}: no key {name!r} in [{SECTION}]")
-            if value not in UNSET:
-                self.set(name, value)
-
-    def set(self, name: str, value: Any) -> None:
-        """Set one.
-
-        Raises:
-            SettingError: unknown, of the wrong type, or out of range.
-        """
-        if name not in self.mp.list():
-            near = difflib.get_close_matches(name, self.mp.list(), n=1)
-            hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(self.mp.list())}"
-            raise SettingError(f"no setting {name!r}; {hint}")
-        if isinstance(value, str) and value in UNSET:
-            value = ""
-        check(name, value)
-        if not self.mp.set(name, value):
-            setting = self.mp.get_setting(name)
-            limits = f" from {setting.range[0]:g} to {setting.range[1]:g}" if setting.range else ""
-            raise SettingError(f"{name} = {value!r}: it takes a {setting.type.__name__}{limits}")
-
-    def snapshot(self) -> Settings:
-        """The settings as they are now."""
-        values = {name: self.mp.get(name) for name in self.mp.list()}
-        values["gs"] = tuple(stations(values["gs"]))
-        values["sink"] = tuple(sink_addresses(values["sink"]))
-        values["quantities"] = tuple(parse_quantities(values["quantities"]))
-        values["ca_file"] = os.path.expanduser(values["ca_file"])
-        values["spool"] = Path(values["spool"] or default_spool()).expanduser()
-        return Settings(**values)
-
-    def shown(self, name: str) -> str:
-        """A setting's value as the prompt may show it: no passwords."""
-        value = str(self.mp.get(name))
-        if name == "token":
-            return "(set)" if value else ""
-        return ",".join(map(str, sink_addresses(value))) if name == "sink" else value
-
-
-def check(name: str, value: Any) -> None:
-    """Refuse a value that could not work.
+def header_value(text: str) -> str:
+    """The text, if an HTTP header can hold it.
 
     Raises:
-        SettingError: with the reason.
+        SettingError: it cannot.
     """
-    text = str(value)
-    if name == "gs":
-        stations(text)
-    elif name == "ip":
-        check_ip(text)
-    elif name == "sink":
-        sink_addresses(text)
-    elif name == "quantities":
-        parse_quantities(text)
-    elif name == "spool" and not text.isprintable():
-        raise SettingError("spool: it takes a file's name in printable letters")
-    elif name == "token" and not (text.isascii() and (text.isprintable() or not text)):
-        raise SettingError("token: it takes printable ASCII")
-    elif name == "ca_file" and text:
-        try:
-            tls_context(str(Path(text).expanduser()))
-        except NotDelivered as error:
-            raise SettingError(str(error)) from error
-    elif text.strip().lower().lstrip("+-") in ("nan", "inf", "infinity") or (
-        isinstance(value, float) and not math.isfinite(value)
-    ):
-        raise SettingError(f"{name} = {value!r}: it takes a finite number")
+    if not (text.isascii() and (text.isprintable() or not text)):
+        raise SettingError("it takes printable ASCII")
+    return text
+
+
+def spool_path(text: str) -> Path:
+    """The spool's file; empty for the default.
+
+    Raises:
+        SettingError: no file is called so.
+    """
+    if not text.isprintable():
+        raise SettingError("it takes a file's name in printable letters")
+    return path_of(text or default_spool())
+
+
+class GradysModuleSettings(ModuleSettings[GradysSettings]):
+    """The settings of the loaded module; [api] of an INI file has the station, too, as `gradys_gs`."""
+
+    module = "gradys"
+    secrets = frozenset({"token", "sink"})
+    parsers = {
+        "gs": stations,
+        "ip": checked_ip,
+        "token": header_value,
+        "ca_file": lambda text: str(path_of(text)) if text else "",
+        "sink": sink_addresses,
+        "quantities": parse_quantities,
+        "spool": spool_path,
+    }
+
+    @staticmethod
+    def table() -> list[Any]:
+        return [
+            MPSetting("gs", str, "", "ground stations, HOST:PORT by comma", tab="Gradys"),
+            MPSetting("ip", str, "", "HOST[:PORT] at which they reach our API; empty: found out"),
+            MPSetting("period", float, 1.0, "s between updates", range=(0.1, 3600)),
+            MPSetting("max_age", float, 5.0, "s after which a position is not told any more", range=(0.1, 3600)),
+            MPSetting("timeout", float, 3.0, "s for an answer", range=(0.1, 60)),
+            MPSetting("token", str, "", "bearer token for stations and HTTP sinks"),
+            MPSetting("ca_file", str, "", "certificates that TLS is checked by; empty: the system's"),
+            MPSetting(
+                "sink", str, "", "where readings go, by comma: http(s)://HOST/PATH[#ack=status], mqtt(s)://HOST/TOPIC"
+            ),
+            MPSetting("quantities", str, "position@1", "what is sampled while there is a sink"),
+            MPSetting("spool", str, default_spool(), "file that keeps readings until they are acknowledged"),
+            MPSetting("spool_mb", float, 64.0, "MB of readings kept; beyond it the oldest go", range=(0.1, 100_000)),
+            MPSetting("spool_hours", float, 72.0, "h after which readings are dropped", range=(0.01, 100_000)),
+        ]
+
+    def make(self, values: Mapping[str, Any], origins: Mapping[str, str]) -> GradysSettings:
+        """The snapshot."""
+        return GradysSettings(**values)
+
+    def check(self, settings: GradysSettings, changed: Set[str]) -> None:
+        """Refuse certificates that TLS cannot be checked by.
+
+        Raises:
+            SettingError: the file is missing, or holds something else.
+        """
+        if "ca_file" in changed and settings.ca_file:
+            try:
+                tls_context(settings.ca_file)
+            except NotDelivered as error:
+                raise SettingError(str(error), "ca_file") from error
+
+    def settings_in(self, ini: IniFile) -> Iterator[tuple[str, str]]:
+        """The station of the original service's section, and our own section, which wins."""
+        station = ini.section("api").get("gradys_gs")
+        if station is not None:
+            yield "gs", station
+        yield from super().settings_in(ini)
+
+    def shown(self, name: str) -> str:
+        """As any setting; of the sinks, all but their passwords."""
+        return ",".join(map(str, self.snapshot().sink)) if name == "sink" else super().shown(name)

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import asyncio
-import contextlib
-
+from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.vehicle.endings import Policy
 from mavproxy_uavapi.core.vehicle.stream_requester import StreamRequester
 from mavproxy_uavapi.http.app import ApiServer
 from mavproxy_uavapi.http.call import Service
-from mavproxy_uavapi.settings import Settings
+from mavproxy_uavapi.settings import ApiSettings
 
 
 class Api:
@@ -19,15 +17,14 @@ class Api:
     def __init__(self, host: Host) -> None:
         self.host = host
         self._server: ApiServer | None = None
-        self._freshness: asyncio.Task[None] | None = None
-        self._finding_scripts: asyncio.Task[None] | None = None
+        self._tasks = HeldTasks()
 
     @property
     def listening(self) -> bool:
         """Whether the server is up."""
         return self._server is not None
 
-    async def start(self, settings: Settings) -> None:
+    async def start(self, settings: ApiSettings) -> None:
         """Listen as the settings say; does nothing when it listens already.
 
         Raises:
@@ -44,11 +41,11 @@ class Api:
             raise
         self._server = server
         self.host.api_address = settings.host, settings.port
-        self._freshness = asyncio.create_task(StreamRequester(self.host.registry, settings.sysid).run())
-        self._finding_scripts = asyncio.create_task(server.service.scripts.start())
+        self._tasks.start(StreamRequester(self.host.registry, settings.sysid).run(), "the watch over the telemetry")
+        self._tasks.start(server.service.scripts.start(), "the search for running scripts")
 
-    async def renew(self, settings: Settings) -> None:
-        """Take up settings that need no other listening (`Settings.listens_as`): what is in flight goes on."""
+    async def renew(self, settings: ApiSettings) -> None:
+        """Take up settings that need no other listening (`ApiSettings.listens_as`): what is in flight goes on."""
         if self._server is None:
             return
         self._take_up(settings)
@@ -56,7 +53,7 @@ class Api:
         service.settings = settings
         service.scripts.renew(settings)
 
-    def _take_up(self, settings: Settings) -> None:
+    def _take_up(self, settings: ApiSettings) -> None:
         self.host.link_watch.timeout = settings.link_timeout
         self.host.endings.on_disconnect = Policy.HOLD if settings.on_disconnect == "hold" else Policy.NOTHING
         self.host.endings.on_script_exit = Policy(settings.on_script_exit)
@@ -67,13 +64,7 @@ class Api:
         if server is None:
             return
         self.host.api_address = None
-        if self._freshness is not None:
-            self._freshness.cancel()
-            await asyncio.gather(self._freshness, return_exceptions=True)
-        if self._finding_scripts is not None:
-            self._finding_scripts.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await self._finding_scripts
+        await self._tasks.end()
         await server.service.scripts.stop()
         await server.stop()
 

@@ -6,12 +6,12 @@ from mavproxy_uavapi.api import Api
 from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.mavlink.flight_modes import kind_of, mode_name
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
-from mavproxy_uavapi.settings import Settings
+from mavproxy_uavapi.settings import ApiSettings
 
 
-def report(api: Api, settings: Settings) -> str:
+def report(api: Api, settings: ApiSettings) -> str:
     """A few lines: the address, the vehicle, the calls in flight."""
-    address = address_of(settings)
+    address = settings.url
     lines = [f"uavapi: {'listening on' if api.listening else 'not listening; it would be'} {address}"]
     try:
         lines.append(describe(api, api.host.registry.find(settings.sysid).state))
@@ -21,12 +21,6 @@ def report(api: Api, settings: Settings) -> str:
     lines.append(f"{len(running)} call{'' if len(running) == 1 else 's'} in flight")
     lines += [f"  {job.id}: {job.verb} {_progress(job.progress)}".rstrip() for job in running]
     return "\n".join(lines)
-
-
-def address_of(settings: Settings) -> str:
-    """The API's own address."""
-    host = f"[{settings.host}]" if ":" in settings.host else settings.host
-    return f"{'https' if settings.certfile else 'http'}://{host}:{settings.port}"
 
 
 def vehicles(api: Api) -> str:

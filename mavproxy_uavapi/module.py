@@ -12,12 +12,13 @@ try:
     from mavproxy_uavapi.api import Api
 except ModuleNotFoundError as missing:  # MAVProxy prints the text of an ImportError as one line
     raise ImportError(f"uavapi needs {missing.name}: pip install mavproxy-uavapi") from missing
-from mavproxy_uavapi.console import address_of, report, vehicles
+from mavproxy_uavapi.console import report, vehicles
 from mavproxy_uavapi.core.background import BackgroundCommands
+from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.logs import Logs, print_above_prompt
 from mavproxy_uavapi.core.module import SharedModule, value_of
 from mavproxy_uavapi.core.remembered_settings import RememberedSettings
-from mavproxy_uavapi.settings import SECRET, ModuleSettings, SettingError, Settings
+from mavproxy_uavapi.settings import ApiModuleSettings, ApiSettings
 
 NAME = "uavapi"
 COMPLETION = "(UAVAPISETTING)"
@@ -41,7 +42,7 @@ class UavApiModule(SharedModule):
 
     def __init__(self, mpstate: Any, given: dict[str, Any]) -> None:
         self.remembered = RememberedSettings(mpstate, NAME, given)
-        self.api_settings = ModuleSettings(self._given())
+        self.api_settings = ApiModuleSettings(self.remembered.given)
         self._wanted = True  # whether it is to listen; `uavapi stop` says no
         actions: dict[str, Callable[[list[str]], None]] = {
             "status": self._status,
@@ -61,16 +62,7 @@ class UavApiModule(SharedModule):
         self._background = BackgroundCommands(self.host, NAME)
         self._changing = asyncio.Lock()  # starts, stops and settings, in the order in which they were typed
         self.host.bridge.close_in_children(self.api.filenos)
-        self.remembered.keep(self._shown)
-
-    def _given(self) -> dict[str, Any]:
-        """The keywords and what was set at the prompt, and where `uavapi config` is to say that they came from."""
-        given = self.remembered.given
-        set_here = dict.fromkeys(self.remembered.changed, "uavapi set")
-        return {**given, "origins": {**given.get("origins", {}), **set_here}}
-
-    def _shown(self, name: str) -> object:
-        return "(set)" if name == SECRET else self.api_settings.mp.get(name)
+        self.remembered.keep(self.api_settings.shown)
 
     def begin(self) -> None:
         """Listen, unless a startup script said no."""
@@ -116,11 +108,11 @@ class UavApiModule(SharedModule):
             async with self._changing:
                 return await self._listen(settings)
 
-        self._background.send(start, f"trying to listen on {address_of(settings)}")
+        self._background.send(start, f"trying to listen on {settings.url}")
 
-    async def _listen(self, settings: Settings) -> str:
+    async def _listen(self, settings: ApiSettings) -> str:
         """Listen; what came of it. A disk may take its time, so a thread opens the logs."""
-        address = address_of(settings)
+        address = settings.url
         try:
             await self._open_logs(settings)
             await self.api.start(settings)
@@ -135,7 +127,7 @@ class UavApiModule(SharedModule):
             self._background.say("WARNING: allow_open is set: anybody who reaches this port can fly the vehicle")
         return f"listening on {address}"
 
-    async def _open_logs(self, settings: Settings) -> None:
+    async def _open_logs(self, settings: ApiSettings) -> None:
         told = settings.log_console, settings.debug, settings.log_path, settings.sysid
         await asyncio.to_thread(self.logs.open, *told)
 
@@ -172,13 +164,11 @@ class UavApiModule(SharedModule):
         self._background.send(stop, "stopping")
 
     def _set(self, args: list[str]) -> None:
-        if len(args) < 2:
-            wanted = args[0] if args else ""
-            found = [line for line in self.api_settings.listing() if line.startswith(wanted)]
-            print("\n".join(found) or f"uavapi: no setting {wanted!r}")
-            return
         before = self.api_settings.snapshot()
         try:
+            if len(args) < 2:
+                print("\n".join(self.api_settings.listing(*args)))
+                return
             self.api_settings.set(args[0], value := value_of(args[1:]))
         except SettingError as error:
             print(f"uavapi: {error}")
@@ -190,13 +180,13 @@ class UavApiModule(SharedModule):
         take_up = self._renew if after.listens_as(before) else self._restart
         self._background.send(lambda: take_up(after), "taking up the setting")
 
-    async def _restart(self, settings: Settings) -> str:
+    async def _restart(self, settings: ApiSettings) -> str:
         """Listen anew; what is in flight ends."""
         async with self._changing:
             await self.api.stop()
             return await self._listen(settings)
 
-    async def _renew(self, settings: Settings) -> str:
+    async def _renew(self, settings: ApiSettings) -> str:
         """Take up settings without ending what is in flight."""
         async with self._changing:
             await self.api.renew(settings)

@@ -1,23 +1,21 @@
-"""The module's settings: one table; defaults < INI file < environment < `module load` < `uavapi set`.
-
-MPSettings holds and validates the values at the prompt; inward goes one frozen snapshot.
-"""
+"""The settings of the module `uavapi`, and the sections of the INI file that it reads."""
 
 from __future__ import annotations
 
-import configparser
-import difflib
 import ipaddress
-import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-from MAVProxy.modules.lib.mp_settings import MPSetting, MPSettings
+from MAVProxy.modules.lib.mp_settings import MPSetting
 
+from mavproxy_uavapi.core.addresses import is_loopback, local_url_of, url_of
+from mavproxy_uavapi.core.errors import SettingError
+from mavproxy_uavapi.core.ini_file import IniFile
 from mavproxy_uavapi.core.logs import components
+from mavproxy_uavapi.core.settings import DEFAULT, ModuleSettings
+from mavproxy_uavapi.core.values import is_unset
 
 Network = ipaddress.IPv4Network | ipaddress.IPv6Network
 
@@ -42,23 +40,14 @@ NOT_OURS: dict[str, dict[str, str]] = {
     },
     "logs": {},
 }
-NEIGHBOURS = {"gradys", "vision"}  # sections of the other modules, in a file that serves all
 # What an API takes up by listening anew: its address, its vehicle, and who may call.
 ACCESS = ("token", "allow_from", "allow_scripts_from", "allow_open", "cors_origins")
 LISTENING = ("host", "port", "sysid", "certfile", "keyfile", *ACCESS)
-UNSET = {"", "None", "[]"}
-PREFIX = "UAVAPI_"  # of the environment variables
-DEFAULT = "default"  # where a value came from that nobody set
 ON_SCRIPT_EXIT = ("nothing", "hold", "land", "rtl")
-SECRET = "token"  # kept out of listings, logs and the process list
-
-
-class SettingError(ValueError):
-    """A setting that does not exist, or a value that it does not take; the text is one clear line."""
 
 
 @dataclass(frozen=True)
-class Settings:
+class ApiSettings:
     """A snapshot of the settings.
 
     Attributes:
@@ -118,11 +107,21 @@ class Settings:
     token: str
 
     @property
+    def url(self) -> str:
+        """The API's own address."""
+        return url_of(self.host, self.port, tls=bool(self.certfile))
+
+    @property
+    def local_url(self) -> str:
+        """The URL by which this machine reaches the API."""
+        return local_url_of(self.host, self.port, tls=bool(self.certfile))
+
+    @property
     def is_local(self) -> bool:
         """Whether only this machine can call."""
         return is_loopback(self.host)
 
-    def listens_as(self, other: Settings) -> bool:
+    def listens_as(self, other: ApiSettings) -> bool:
         """Whether an API that runs by the other ones can take these up as it runs."""
         return all(getattr(self, name) == getattr(other, name) for name in LISTENING)
 
@@ -135,222 +134,131 @@ class Settings:
         if not self.is_local and not (self.token or self.allow_from or self.allow_open):
             raise SettingError(
                 f"host = {self.host}: anybody on that network could fly the vehicle; set a token, or name the "
-                "networks that may call without one (allow_from), or set allow_open on purpose"
+                "networks that may call without one (allow_from), or set allow_open on purpose",
+                "host",
             )
         if bool(self.certfile) != bool(self.keyfile):
             raise SettingError("TLS needs both certfile and keyfile")
 
 
-def table() -> list[Any]:
-    """The settings with their types, defaults and ranges, as MAVProxy knows them."""
-    return [
-        MPSetting("host", str, "127.0.0.1", "address to listen on", tab="API"),
-        MPSetting("port", int, 8000, "TCP port to listen on", range=(1, 65535), increment=1),
-        MPSetting("sysid", int, 0, "vehicle to fly; 0 is MAVProxy's current one", range=(0, 255), increment=1),
-        MPSetting("link_timeout", float, 5.0, "s without heartbeat until the link is lost", range=(1, 60)),
-        MPSetting("max_age", float, 5.0, "s after which telemetry is stale", range=(0.1, 3600)),
-        MPSetting("on_disconnect", str, "continue", "when a client hangs up", choice=["continue", "hold"]),
-        MPSetting("allow_from", str, "", "networks that may call without a token", tab="Access"),
-        MPSetting("allow_scripts_from", str, "", "networks among these that may run scripts, too"),
-        MPSetting("allow_open", bool, False, "let anybody call without a token"),
-        MPSetting("cors_origins", str, "", "origins of web pages that may call"),
-        MPSetting("certfile", str, "", "TLS certificate (PEM)"),
-        MPSetting("keyfile", str, "", "TLS key (PEM)"),
-        MPSetting("max_jobs", int, 64, "verbs in flight at once", range=(1, 10000), tab="Limits"),
-        MPSetting("max_connections", int, 200, "connections open at once", range=(32, 900)),
-        MPSetting("max_rate", float, 500.0, "requests/s of one caller", range=(1, 100000)),
-        MPSetting("log_console", str, "", "components that log to the console", tab="Logs"),
-        MPSetting("log_path", str, "", "log file, or its folder"),
-        MPSetting("debug", str, "", "components that log in detail"),
-        MPSetting("scripts_path", str, "~/uav_scripts", "folder of the uploaded scripts", tab="Scripts"),
-        MPSetting("script_logs", str, "~/uav_scripts/logs", "folder of their logs"),
-        MPSetting("python_path", str, sys.executable, "what runs .py scripts"),
-        MPSetting("script_grace", float, 10.0, "s from Ctrl-C to the kill", range=(0, 3600)),
-        MPSetting("script_size", int, 1024, "kB of one script", range=(1, 100000)),
-        MPSetting("script_quota", int, 50, "MB of all scripts", range=(1, 100000)),
-        MPSetting("on_script_exit", str, "hold", "when a script dies in flight", choice=list(ON_SCRIPT_EXIT)),
-    ]
-
-
-class ModuleSettings:
-    """The settings of the loaded module: validated, whichever way they come in.
-
-    Args:
-        given: keywords of `module load`; `config` names an INI file, and `origins` tells by setting where the
-            launcher had the others from.
-        environ: the environment.
+def address(text: str) -> str:
+    """The text, if it is an address to listen on.
 
     Raises:
-        SettingError: as `set` and `load`.
+        SettingError: it is another host's name, or none.
     """
-
-    def __init__(self, given: Mapping[str, Any] | None = None, environ: Mapping[str, str] | None = None) -> None:
-        self.mp = MPSettings(table())
-        self.origins: dict[str, str] = {}
-        self.notes: list[str] = []
-        self._token = ""
-        given = dict(given or {})
-        config = given.pop("config", None)
-        self._told_origins: Mapping[str, str] = given.pop("origins", {})
-        if config is not None:
-            self.load(Path(str(config)).expanduser())
-        for name in self.names():
-            value = (os.environ if environ is None else environ).get(PREFIX + name.upper())
-            if value is not None:
-                self._take(name, value, "environment")
-        for name, value in given.items():
-            self._take(name, value, self._told_origins.get(name, "module load"))
-        self.snapshot().check()
-
-    def names(self) -> list[str]:
-        """All settings, the secret one too."""
-        return self.all_names()
-
-    @staticmethod
-    def all_names() -> list[str]:
-        """All settings, the secret one too."""
-        return [*(setting.name for setting in table()), SECRET]
-
-    def load(self, file: Path) -> None:
-        """Read an INI file: section [api] has the settings, by their names.
-
-        Raises:
-            SettingError: it cannot be read, or has a key or a value that means nothing.
-        """
-        parser = configparser.ConfigParser(interpolation=None)
+    if text != "localhost":
         try:
-            with file.open(encoding="utf-8") as stream:
-                parser.read_file(stream)
-        except OSError as error:
-            raise SettingError(f"{file}: {error.strerror}") from error
-        except (configparser.Error, UnicodeDecodeError) as error:
-            raise SettingError(f"{file}: {' '.join(str(error).split())}") from error
-        for section in parser.sections():
-            if section in NEIGHBOURS:
-                continue
-            if section not in NOT_OURS:
-                raise SettingError(f"{file}: no section [{section}]; there are {', '.join(NOT_OURS)}")
-            for name, value in parser[section].items():
-                self._take_key(file, section, name, value)
-
-    def _take_key(self, file: Path, section: str, name: str, value: str) -> None:
-        if value in UNSET:
-            return
-        why_not = NOT_OURS[section].get(name)
-        if why_not is not None:
-            self.notes.append(f"{file}: {name} is ignored here, {why_not}")
-        else:
-            if section == "simulated" or name not in self.names():
-                raise SettingError(f"{file}: no key {name!r} in [{section}]{self._hint(name)}")
-            self._take(name, value, self._told_origins.get(name, str(file)))
-
-    def set(self, name: str, value: Any) -> None:
-        """Set one at the prompt; a value that must not be leaves everything as it was.
-
-        Raises:
-            SettingError: unknown, of the wrong type, out of range, or against the others.
-        """
-        before = self._token if name == SECRET else self.mp.get(name) if name in self.mp.list() else None
-        origin = self.origins.get(name, DEFAULT)
-        self._take(name, value, "uavapi set")
-        try:
-            self.snapshot().check()
-        except SettingError:
-            self._take(name, before, origin)
-            raise
-
-    def _take(self, name: str, value: Any, origin: str) -> None:
-        if name == SECRET:
-            self._token = "" if str(value) in UNSET else str(value)
-        elif name not in self.mp.list():
-            raise SettingError(f"no setting {name!r}{self._hint(name)}")
-        else:
-            _parse(name, value)
-            # MPSettings would print lines of its own about a value that it does not take.
-            if not _is_taken(self.mp.get_setting(name), value) or not self.mp.set(name, value):
-                raise SettingError(f"{name} = {value!r}: {self._wanted(name)}")
-        self.origins[name] = origin
-
-    def _hint(self, name: str) -> str:
-        near = difflib.get_close_matches(name, self.names(), n=1)
-        return f"; did you mean {near[0]}?" if near else f"; there are {', '.join(self.names())}"
-
-    def _wanted(self, name: str) -> str:
-        setting = self.mp.get_setting(name)
-        if setting.choice:
-            return f"it is one of {', '.join(setting.choice)}"
-        limits = f" from {setting.range[0]} to {setting.range[1]}" if setting.range else ""
-        return f"it takes a {setting.type.__name__}{limits}"
-
-    def snapshot(self) -> Settings:
-        """The settings as they are now."""
-        values = {name: _parse(name, self.mp.get(name)) for name in self.mp.list()}
-        is_set = self.origins.get("max_rate", DEFAULT) != DEFAULT
-        return Settings(**values, local_rate=values["max_rate"] if is_set else 0.0, token=self._token)
-
-    def listing(self) -> list[str]:
-        """A line for each setting: its value and where that came from; the token is not shown."""
-        shown = {name: self.mp.get(name) for name in self.mp.list()}
-        shown[SECRET] = "(set)" if self._token else ""
-        return [f"{name:14} {shown[name]!s:24} {self.origins.get(name, DEFAULT)}" for name in self.names()]
-
-
-def _parse(name: str, value: Any) -> Any:
-    """The value as the snapshot has it.
-
-    Raises:
-        SettingError: it is no such thing.
-    """
-    if name == "host":
-        is_loopback(str(value))
-    if name in ("allow_from", "allow_scripts_from"):
-        return tuple(_network(name, word) for word in _words(value))
-    if name in ("log_console", "debug"):
-        try:
-            return components(str(value))
+            ipaddress.ip_address(text)
         except ValueError as error:
-            raise SettingError(f"{name}: {error}") from error
-    if name == "cors_origins":
-        return tuple(_words(value))
-    return value
+            raise SettingError(f"{text!r} is not an IP address") from error
+    return text
 
 
-def _is_taken(setting: Any, value: Any) -> bool:
-    """Whether an MPSetting takes `value`; NaN and None are in no range, whatever a comparison says."""
-    if setting.type is bool:
-        return str(value).lower() in ("1", "true", "yes", "0", "false", "no")
-    if setting.choice is not None:
-        return value in setting.choice
-    try:
-        number = setting.type(value)
-    except (TypeError, ValueError):
-        return False
-    if setting.range is None:
-        return value is not None
-    low, high = setting.range
-    return bool(low <= number <= high)
+def words(text: str) -> tuple[str, ...]:
+    """`[a, b]`, `a,b` or `a b` -> ("a", "b")."""
+    return tuple(word for word in text.strip("[]").replace(",", " ").split() if not is_unset(word))
 
 
-def _words(value: Any) -> list[str]:
-    return [word for word in str(value).strip("[]").replace(",", " ").split() if word not in UNSET]
+def networks(text: str) -> tuple[Network, ...]:
+    """The networks that a list names.
+
+    Raises:
+        SettingError: one of the words is no network.
+    """
+    return tuple(network(word) for word in words(text))
 
 
-def _network(name: str, text: str) -> Network:
+def network(text: str) -> Network:
+    """A network, or one address.
+
+    Raises:
+        SettingError: it is neither.
+    """
     try:
         return ipaddress.ip_network(text, strict=False)
     except ValueError as error:
-        raise SettingError(f"{name}: {text!r} is no network such as 192.168.1.0/24") from error
+        raise SettingError(f"{text!r} is no network such as 192.168.1.0/24") from error
 
 
-def is_loopback(host: str) -> bool:
-    """Whether an address is of this machine alone.
+def log_components(text: str) -> frozenset[str]:
+    """The log components that a list names.
 
     Raises:
-        SettingError: it is no IP address.
+        SettingError: there is no such one.
     """
-    if host == "localhost":
-        return True
     try:
-        return ipaddress.ip_address(host).is_loopback
+        return components(text)
     except ValueError as error:
-        raise SettingError(f"host = {host!r} is not an IP address") from error
+        raise SettingError(str(error)) from error
+
+
+class ApiModuleSettings(ModuleSettings[ApiSettings]):
+    """The settings of the loaded module; they stand in the original service's sections of an INI file."""
+
+    module = "uavapi"
+    secrets = frozenset({"token"})
+    parsers = {
+        "host": address,
+        "allow_from": networks,
+        "allow_scripts_from": networks,
+        "cors_origins": words,
+        "log_console": log_components,
+        "debug": log_components,
+    }
+
+    @staticmethod
+    def table() -> list[Any]:
+        return [
+            MPSetting("host", str, "127.0.0.1", "address to listen on", tab="API"),
+            MPSetting("port", int, 8000, "TCP port to listen on", range=(1, 65535), increment=1),
+            MPSetting("sysid", int, 0, "vehicle to fly; 0 is MAVProxy's current one", range=(0, 255), increment=1),
+            MPSetting("link_timeout", float, 5.0, "s without heartbeat until the link is lost", range=(1, 60)),
+            MPSetting("max_age", float, 5.0, "s after which telemetry is stale", range=(0.1, 3600)),
+            MPSetting("on_disconnect", str, "continue", "when a client hangs up", choice=["continue", "hold"]),
+            MPSetting("allow_from", str, "", "networks that may call without a token", tab="Access"),
+            MPSetting("allow_scripts_from", str, "", "networks among these that may run scripts, too"),
+            MPSetting("allow_open", bool, False, "let anybody call without a token"),
+            MPSetting("cors_origins", str, "", "origins of web pages that may call"),
+            MPSetting("certfile", str, "", "TLS certificate (PEM)"),
+            MPSetting("keyfile", str, "", "TLS key (PEM)"),
+            MPSetting("max_jobs", int, 64, "verbs in flight at once", range=(1, 10000), tab="Limits"),
+            MPSetting("max_connections", int, 200, "connections open at once", range=(32, 900)),
+            MPSetting("max_rate", float, 500.0, "requests/s of one caller", range=(1, 100000)),
+            MPSetting("log_console", str, "", "components that log to the console", tab="Logs"),
+            MPSetting("log_path", str, "", "log file, or its folder"),
+            MPSetting("debug", str, "", "components that log in detail"),
+            MPSetting("scripts_path", str, "~/uav_scripts", "folder of the uploaded scripts", tab="Scripts"),
+            MPSetting("script_logs", str, "~/uav_scripts/logs", "folder of their logs"),
+            MPSetting("python_path", str, sys.executable, "what runs .py scripts"),
+            MPSetting("script_grace", float, 10.0, "s from Ctrl-C to the kill", range=(0, 3600)),
+            MPSetting("script_size", int, 1024, "kB of one script", range=(1, 100000)),
+            MPSetting("script_quota", int, 50, "MB of all scripts", range=(1, 100000)),
+            MPSetting("on_script_exit", str, "hold", "when a script dies in flight", choice=list(ON_SCRIPT_EXIT)),
+            MPSetting("token", str, "", "what clients must send as a bearer token", tab="Access"),
+        ]
+
+    def make(self, values: Mapping[str, Any], origins: Mapping[str, str]) -> ApiSettings:
+        """The snapshot; a rate that somebody set is for this machine, too."""
+        is_set = origins.get("max_rate", DEFAULT) != DEFAULT
+        return ApiSettings(**values, local_rate=values["max_rate"] if is_set else 0.0)
+
+    def check(self, settings: ApiSettings, changed: Set[str]) -> None:
+        """As `ApiSettings.check`."""
+        settings.check()
+
+    def settings_in(self, ini: IniFile) -> Iterator[tuple[str, str]]:
+        """The keys of the original service's sections that are settings here; a note tells of each other one.
+
+        Raises:
+            SettingError: there is no such key.
+        """
+        for section, not_ours in NOT_OURS.items():
+            ours = [] if section == "simulated" else self.names()
+            for key, text in ini.section(section).items():
+                if key in ours:
+                    yield key, text
+                elif key not in not_ours:
+                    raise ini.no_key(section, key, [*ours, *not_ours])
+                elif not is_unset(text):
+                    self.notes.append(f"{ini.file}: {key} is ignored here, {not_ours[key]}")

@@ -12,6 +12,7 @@ HELP = """\
 vision status                      the camera, the tags in view, what is in flight
 vision start | stop                open or close the camera; stop ends a flight too, and the vehicle holds
 vision set [NAME [VALUE]]          show or change settings, such as: vision set source sim
+vision config                      the settings in force, and where each came from
 vision tags                        the tags in view
 vision land [ID] [METHOD]          land on the tag from here (velocity or landing_target)
 vision search [ID]                 fly an expanding square until the tag is in sight

@@ -5,10 +5,8 @@ UavApiError
 |  `- LandingFailed     not landed on the tag; `report` tells what was tried and what was done instead
 |- BadRequest (400 bad_request)
 |  `- BadImage          what was posted is no image
-|- Unavailable (503)
-|  `- NoCamera          503 no_camera: no source is set, or it gives no frames
-`- Invalid (422 invalid)
-   `- BadSetting        a setting that does not exist or a value that it does not take
+`- Unavailable (503)
+   `- NoCamera          503 no_camera: no source is set, or it gives no frames
 """
 
 from __future__ import annotations
@@ -16,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from mavproxy_uavapi.core.errors import Aborted, BadRequest, Invalid, Unavailable
+from mavproxy_uavapi.core.errors import Aborted, BadRequest, Unavailable
 
 
 class LandingFailed(Aborted):
@@ -49,10 +47,3 @@ class NoCamera(Unavailable):
     """No source is set, or it gives no frames."""
 
     code = "no_camera"
-
-
-class BadSetting(Invalid):
-    """A setting that does not exist, or a value that it does not take; the text is one clear line."""
-
-    def __str__(self) -> str:
-        return str(self.problems[0]["msg"])

@@ -2,7 +2,7 @@
 
 Raises:
     OSError: a file cannot be read or written.
-    BadSetting: the words or what is in the files make no sense.
+    SettingError: the words or what is in the files make no sense.
 """
 
 from __future__ import annotations
@@ -12,27 +12,27 @@ from typing import NoReturn
 
 import cv2
 
+from mavproxy_uavapi.core.errors import SettingError
+from mavproxy_uavapi.core.values import path_of
 from mavproxy_vision.apriltag.detection import FrameResult
 from mavproxy_vision.apriltag.overlay import annotated
 from mavproxy_vision.apriltag.tag_layout import Tag
 from mavproxy_vision.apriltag.tag_pdf import tag_pdf
 from mavproxy_vision.camera.calibration import Board, calibrate, save
 from mavproxy_vision.camera.source import Image
-from mavproxy_vision.errors import BadSetting
-from mavproxy_vision.paths import path_of
 
 
 class _Words(argparse.ArgumentParser):
     """A parser that neither prints nor exits: MAVProxy goes on."""
 
     def error(self, message: str) -> NoReturn:
-        raise BadSetting(f"tag FILE.pdf [--family 36h11] [--id 0] [--size 0.15]: {message}")
+        raise SettingError(f"tag FILE.pdf [--family 36h11] [--id 0] [--size 0.15]: {message}")
 
 
 def calibrated(args: list[str]) -> str:
     """`FOLDER BOARD [FILE]`: make a camera model of the folder's images."""
     if len(args) not in (2, 3):
-        raise BadSetting("calibrate FOLDER charuco:7x5:0.03:0.022|chessboard:9x6:0.025 [FILE]")
+        raise SettingError("calibrate FOLDER charuco:7x5:0.03:0.022|chessboard:9x6:0.025 [FILE]")
     file = path_of(args[2] if len(args) == 3 else "camera.json", "FILE")
     made = calibrate(path_of(args[0], "FOLDER"), Board.parse(args[1]))
     save(made.model, file)
@@ -43,7 +43,7 @@ def calibrated(args: list[str]) -> str:
 def snapshot(args: list[str], seen: FrameResult | None, image: Image | None) -> str:
     """`FILE`: write the newest frame, with its tags drawn in."""
     if len(args) != 1:
-        raise BadSetting("snapshot FILE.png")
+        raise SettingError("snapshot FILE.png")
     if seen is None or image is None:
         return "there is no frame yet"
     file = path_of(args[0], "FILE")
@@ -52,7 +52,7 @@ def snapshot(args: list[str], seen: FrameResult | None, image: Image | None) -> 
     except cv2.error:  # which kinds there are depends on how OpenCV was built
         good = False
     if not good:
-        raise BadSetting(f"{file.name}: OpenCV writes no {file.suffix} files; .png and .jpg it does")
+        raise SettingError(f"{file.name}: OpenCV writes no {file.suffix} files; .png and .jpg it does")
     file.write_bytes(data.tobytes())
     return f"wrote {file}"
 

@@ -15,23 +15,22 @@ if (_problem := opencv_install.problem()) is not None:
 import cv2
 
 from mavproxy_uavapi.core.background import BackgroundCommands
-from mavproxy_uavapi.core.errors import UavApiError
+from mavproxy_uavapi.core.errors import SettingError, UavApiError
 from mavproxy_uavapi.core.module import SharedModule, value_of
 from mavproxy_uavapi.core.remembered_settings import RememberedSettings
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.http.extension import NED_REACH
 from mavproxy_vision import console, file_commands
-from mavproxy_vision.errors import BadSetting
 from mavproxy_vision.http import VisionHandlers
 from mavproxy_vision.landing.flight_jobs import FlightJobs, FlightTask
 from mavproxy_vision.landing.mission import MissionPlan
-from mavproxy_vision.settings import METHODS, ModuleSettings
+from mavproxy_vision.settings import METHODS, VisionModuleSettings
 from mavproxy_vision.tracking.tracker import Tracker
 
 NAME = "vision"
 COMPLETION = "(VISIONSETTING)"
 COMPLETIONS = [
-    "<status|start|stop|tags|land|search|mission|abort|help>",
+    "<status|start|stop|config|tags|land|search|mission|abort|help>",
     f"set {COMPLETION}",
     "<calibrate|snapshot|tag> (FILENAME)",
 ]
@@ -47,12 +46,13 @@ class VisionModule(SharedModule):
 
     def __init__(self, mpstate: Any, given: dict[str, Any]) -> None:
         self.remembered = RememberedSettings(mpstate, NAME, given)
-        self.vision_settings = ModuleSettings(self.remembered.given)
+        self.vision_settings = VisionModuleSettings(self.remembered.given)
         actions: dict[str, Callable[[list[str]], None]] = {
             "status": lambda _: self._tell(lambda: console.report(self.tracker, self.flights)),
             "start": lambda _: self._start(),
             "stop": lambda _: self._stop(),
             "set": self._set,
+            "config": lambda _: self._list(),
             "tags": lambda _: self._tell(lambda: console.tags(self.tracker)),
             "land": self._land,
             "search": self._search,
@@ -64,13 +64,13 @@ class VisionModule(SharedModule):
             "help": lambda _: print(console.HELP),
         }
         super().__init__(mpstate, NAME, "AprilTags, search and precise landing", actions, COMPLETIONS)
-        self.add_completion_function(COMPLETION, self.vision_settings.mp.completion)
+        self.add_completion_function(COMPLETION, lambda _: self.vision_settings.names())
         self.tracker = Tracker(self.host, self.vision_settings.snapshot())
         self.flights = FlightJobs(self.tracker, self._directory)
         self._background = BackgroundCommands(self.host, NAME)
         self._pages = VisionHandlers(self.tracker, self.flights)
         self._routes = {route.path: route for route in self._pages.routes()}
-        self.remembered.keep(self.vision_settings.mp.get)
+        self.remembered.keep(self.vision_settings.shown)
 
     # -- life ------------------------------------------------------------------------------------------------
 
@@ -163,7 +163,7 @@ class VisionModule(SharedModule):
 
     def _set(self, args: list[str]) -> None:
         if len(args) < 2:
-            self.vision_settings.mp.show_pattern(args[0] if args else "*")
+            self._list(*args)
             return
         before = self.vision_settings.snapshot()
         reopens = args[0] in RESTARTS or args[0].startswith("sim_")
@@ -172,7 +172,7 @@ class VisionModule(SharedModule):
             return
         try:
             self.vision_settings.set(args[0], value := value_of(args[1:]))
-        except BadSetting as error:
+        except SettingError as error:
             print(f"vision: {error}")
             return
         self.remembered.change(args[0], value)
@@ -185,6 +185,12 @@ class VisionModule(SharedModule):
             self._stop()
         else:
             self.host.bridge.call_soon(setattr, self.tracker, "settings", after)
+
+    def _list(self, wanted: str = "") -> None:
+        try:
+            print("\n".join(self.vision_settings.listing(wanted)))
+        except SettingError as error:
+            print(f"vision: {error}")
 
     def _flying(self) -> bool:
         async def flying() -> bool:
@@ -304,7 +310,7 @@ def init(mpstate: Any, **kwargs: Any) -> VisionModule:
     """
     try:
         module = VisionModule(mpstate, kwargs)
-    except BadSetting as error:
+    except SettingError as error:
         raise ImportError(f"vision: {error}") from error
     if (overlap := opencv_install.overlap()) is not None:
         print(f"vision: {overlap}")

@@ -24,7 +24,7 @@ from mavproxy_gradys.forwarding.readings import POSITION, STATUS, Reading, Store
 from mavproxy_gradys.net.addresses import split_url
 from mavproxy_gradys.net.http_client import tls_context
 from mavproxy_gradys.net.resolver import Resolver
-from mavproxy_gradys.tasks import begin
+from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 KEEP_ALIVE = 15  # s; the broker gives a silent connection up after one and a half of it
@@ -51,6 +51,7 @@ class MqttSink:
         self._clients: dict[str, aiomqtt.Client] = {}  # by status topic
         self._names = Resolver()
         self._connecting: defaultdict[str, asyncio.Lock] = defaultdict(asyncio.Lock)
+        self._tasks = HeldTasks()
         self._leaving: dict[str, asyncio.Task[None]] = {}  # attempts that were given up, by status topic
 
     async def send(self, batch: Sequence[Stored]) -> set[int]:
@@ -131,7 +132,9 @@ class MqttSink:
             await self._within(asyncio.shield(connecting))
             await client.publish(status, ONLINE, qos=1, retain=True)
         except BaseException:
-            leaving = self._leaving[status] = begin(leave(client, connecting), f"the leaving of {self._port}")
+            leaving = self._leaving[status] = self._tasks.start(
+                leave(client, connecting), f"the leaving of {self._port}"
+            )
             leaving.add_done_callback(lambda _: self._leaving.pop(status))
             raise
         return client

@@ -14,9 +14,9 @@ from mavproxy_gradys.forwarding.spool import Spool
 from mavproxy_gradys.forwarding.spool_thread import SpoolThread
 from mavproxy_gradys.net.schedule import Ticker
 from mavproxy_gradys.position import position_of
-from mavproxy_gradys.settings import Settings
-from mavproxy_gradys.tasks import begin, end
+from mavproxy_gradys.settings import GradysSettings
 from mavproxy_uavapi.core.errors import Unavailable
+from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 
@@ -34,16 +34,16 @@ class ReadingPipeline:
     def __init__(self, host: Host, wall: Callable[[], float] = time.time) -> None:
         self._host = host
         self._wall = wall
-        self._settings: Settings | None = None
+        self._settings: GradysSettings | None = None
         self.spool_thread: SpoolThread | None = None
-        self._settings_before: Settings | None = None  # of the last start
+        self._settings_before: GradysSettings | None = None  # of the last start
         self._left: list[Reading] = []  # what the disk did not take before the last stop
         self._why_left = ""
         self._senders: list[Sender] = []
         self._samplers: list[Sampler] = []
-        self._tasks: list[asyncio.Task[None]] = []
+        self._tasks = HeldTasks()
 
-    def start(self, settings: Settings) -> None:
+    def start(self, settings: GradysSettings) -> None:
         """Sample and send, if there is a sink."""
         self._settings = self._settings_before = settings
         if settings.sink or self._left:
@@ -51,22 +51,21 @@ class ReadingPipeline:
         for address in settings.sink:
             sender = Sender(address, self._kept(), self._host.clock)
             self._senders.append(sender)
-            self._tasks.append(begin(sender.run(settings), f"the delivery to {address}"))
+            self._tasks.start(sender.run(settings), f"the delivery to {address}")
         for quantity in settings.quantities if settings.sink else ():
             sampler = Sampler(quantity)
             self._samplers.append(sampler)
-            self._tasks.append(begin(self._sample(sampler, self._kept()), f"the sampling of {quantity.name}"))
+            self._tasks.start(self._sample(sampler, self._kept()), f"the sampling of {quantity.name}")
 
     async def stop(self) -> None:
         """End it, and close the spool; what the disk does not take is kept in memory until the next start."""
         self._settings = None
-        tasks, self._tasks = self._tasks, []
         self._samplers.clear()
         self._senders.clear()
         try:
             if self.spool_thread is not None:
                 await self.spool_thread.save()  # before the sinks' goodbyes, which may take long
-            await end(tasks)
+            await self._tasks.end()
         finally:
             await self._end_thread()
 
@@ -94,7 +93,7 @@ class ReadingPipeline:
         why = (self._why_left if spool_thread is None else spool_thread.problem) or "they were not written in time"
         return f"{count} {'reading is' if count == 1 else 'readings are'} lost: {why}" if count else ""
 
-    def _kept(self, settings: Settings | None = None) -> SpoolThread:
+    def _kept(self, settings: GradysSettings | None = None) -> SpoolThread:
         """The spool's thread, started if need be."""
         settings = settings or self._settings
         if settings is None:

@@ -16,8 +16,8 @@ import re
 from dataclasses import dataclass, field
 from typing import Any
 
+from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.mavlink.vehicle_state import Received, VehicleState
-from mavproxy_uavapi.settings import SettingError
 
 POSITION = "position"
 STATUS = "status"  # the MQTT sink's word on whether a vehicle is online
@@ -105,7 +105,7 @@ def device_of(system: int) -> str:
     return f"uav-{system}"
 
 
-def parse_quantities(text: str) -> list[Quantity]:
+def parse_quantities(text: str) -> tuple[Quantity, ...]:
     """The quantities of a list by comma, semicolon or white space (not within brackets).
 
     Raises:
@@ -116,8 +116,8 @@ def parse_quantities(text: str) -> list[Quantity]:
     names = [quantity.name for quantity in found]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
-        raise SettingError(f"quantities: {', '.join(twice)} is there twice")
-    return found
+        raise SettingError(f"{', '.join(twice)} is there twice")
+    return tuple(found)
 
 
 def parse_quantity(text: str) -> Quantity:
@@ -128,20 +128,20 @@ def parse_quantity(text: str) -> Quantity:
     """
     match = GRAMMAR.fullmatch(text)
     if match is None:
-        raise SettingError(f"quantities: {text!r} is not NAME=MESSAGE.field*SCALE+OFFSET@PERIOD[REPRESENTATION]")
+        raise SettingError(f"{text!r} is not NAME=MESSAGE.field*SCALE+OFFSET@PERIOD[REPRESENTATION]")
     given = match.groupdict()
     try:
         numbers = [float(given[name] or default) for name, default in (("scale", 1), ("offset", 0), ("period", 1))]
     except ValueError as error:
-        raise SettingError(f"quantities: {text!r}: {error}") from error
+        raise SettingError(f"{text!r}: {error}") from error
     scale, offset, period = numbers
     if not math.isfinite(scale) or not math.isfinite(offset):
-        raise SettingError(f"quantities: {text!r}: scale and offset are finite numbers")
+        raise SettingError(f"{text!r}: scale and offset are finite numbers")
     if not SHORTEST_PERIOD <= period <= LONGEST_PERIOD:
-        raise SettingError(f"quantities: {text!r}: a period is {SHORTEST_PERIOD:g} to {LONGEST_PERIOD:g} s")
+        raise SettingError(f"{text!r}: a period is {SHORTEST_PERIOD:g} to {LONGEST_PERIOD:g} s")
     if given["message"] is None:
         if given["name"] != POSITION:
-            raise SettingError(f"quantities: {text!r} names no message; {POSITION} alone is built in")
+            raise SettingError(f"{text!r} names no message; {POSITION} alone is built in")
         return Quantity(POSITION, period=period, representation=POSITION_REPRESENTATION)
     instance = "" if given["instance"] is None else f"[{given['instance']}]"
     index = None if given["index"] is None else int(given["index"])

@@ -16,7 +16,7 @@ from mavproxy_gradys.forwarding.spool_thread import SpoolThread
 from mavproxy_gradys.net.outage_log import Defects, Outage
 from mavproxy_gradys.net.round_trips import RoundTrips
 from mavproxy_gradys.net.schedule import LONGEST_OF_SINKS, Backoff
-from mavproxy_gradys.settings import Settings
+from mavproxy_gradys.settings import GradysSettings
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 BATCH = 200  # readings
@@ -62,7 +62,7 @@ class Sender:
         self._defects = Defects(f"the delivery to {address}")
         self._hurry = asyncio.Event()
 
-    async def run(self, settings: Settings) -> None:
+    async def run(self, settings: GradysSettings) -> None:
         """Send, until cancelled."""
         sink: Sink | None = None
         try:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from urllib.parse import unquote
 
 from mavproxy_gradys.net.addresses import PORTS, masked, split_url
-from mavproxy_uavapi.settings import SettingError
+from mavproxy_uavapi.core.errors import SettingError
 
 SCHEMES = tuple(PORTS)
 STATUS_COUNTS = "ack=status"  # the one option there is
@@ -40,14 +40,14 @@ class SinkAddress:
         return f"{parts.hostname}:{port} {hashlib.sha256(whole.encode()).hexdigest()[:16]}"
 
 
-def sink_addresses(text: str) -> list[SinkAddress]:
+def sink_addresses(text: str) -> tuple[SinkAddress, ...]:
     """The sinks of a list by comma.
 
     Raises:
         SettingError: one is no URL of a scheme that we know, no topic, or has an option that there is not.
     """
     found = [sink_address(part.strip()) for part in text.split(",") if part.strip()]
-    return list({sink.name: sink for sink in found}.values())
+    return tuple({sink.name: sink for sink in found}.values())
 
 
 def sink_address(text: str) -> SinkAddress:

@@ -10,7 +10,7 @@ from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.forwarding.readings import Stored
 from mavproxy_gradys.forwarding.sink_address import STATUS_COUNTS, SinkAddress
 from mavproxy_gradys.net.http_client import JSON, Client, Poster
-from mavproxy_gradys.settings import Settings
+from mavproxy_gradys.settings import GradysSettings
 
 
 class Sink(Protocol):
@@ -27,7 +27,7 @@ class Sink(Protocol):
         """Say good-bye."""
 
 
-def make_sink(address: SinkAddress, settings: Settings) -> Sink:
+def make_sink(address: SinkAddress, settings: GradysSettings) -> Sink:
     """The sink for an address.
 
     Raises:

@@ -18,7 +18,7 @@ from mavproxy_gradys.forwarding.sink_cursor import SinkCursor
 from mavproxy_gradys.forwarding.spool import Spool, uptime
 from mavproxy_gradys.forwarding.spool_rows import is_storable
 from mavproxy_gradys.net.outage_log import Defects, Drops, Outage
-from mavproxy_gradys.tasks import begin
+from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 T = TypeVar("T")
@@ -52,6 +52,7 @@ class SpoolThread:
         self._waiting: deque[Reading] = deque()
         self._in_hand = 0  # readings that the other thread is writing
         self._cursors: dict[str, SinkCursor] = {}
+        self._tasks = HeldTasks()
         self._writer: asyncio.Task[None] | None = None
         self._stopping = asyncio.Event()
         self._closed = False
@@ -69,7 +70,7 @@ class SpoolThread:
         """Begin to open the spool for these sinks; until it is open `problem` says why, and it is tried again."""
         self._cursors = {sink: SinkCursor() for sink in sinks}
         self.problem = "it is being opened"
-        self._writer = begin(self._write(), "the spool")
+        self._writer = self._tasks.start(self._write(), "the spool")
 
     async def stop(self) -> None:
         """Keep what still waits, and close the file; what the disk does not take is `left`."""

@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 from mavproxy_gradys.forwarding.sink_address import sink_address
 from mavproxy_gradys.forwarding.transaction import Transaction
-from mavproxy_uavapi.settings import SettingError
+from mavproxy_uavapi.core.errors import SettingError
 
 VERSION = 3  # PRAGMA user_version
 USABLE = 2  # files of this version are as good; the steps from there can wait for room on the disk

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import ipaddress
 import re
 import socket
 from dataclasses import dataclass
 from urllib.parse import SplitResult, urlsplit
 
 from mavproxy_gradys.net.resolver import Resolver
-from mavproxy_uavapi.settings import SettingError
+from mavproxy_uavapi.core.addresses import bracketed, is_loopback
+from mavproxy_uavapi.core.errors import SettingError
 
 PORTS = {"http": 80, "https": 443, "mqtt": 1883, "mqtts": 8883}
 
@@ -34,14 +34,14 @@ class StationAddress:
         return f"{self.url}/update-info/"
 
 
-def stations(text: str) -> list[StationAddress]:
+def stations(text: str) -> tuple[StationAddress, ...]:
     """The stations of a list by comma: HOST:PORT, [IPV6]:PORT, or http(s)://HOST:PORT.
 
     Raises:
         SettingError: one of them cannot be read.
     """
     found = [station(part.strip()) for part in text.split(",") if part.strip()]
-    return list(dict.fromkeys(found))
+    return tuple(dict.fromkeys(found))
 
 
 def station(text: str) -> StationAddress:
@@ -52,7 +52,7 @@ def station(text: str) -> StationAddress:
     """
     parts, port = split_url(text if "://" in text else f"http://{text}", ("http", "https"))
     if parts.path not in ("", "/") or parts.query or parts.fragment or parts.username:
-        raise SettingError(f"gs = {text!r}: it takes HOST:PORT, or http(s)://HOST:PORT")
+        raise SettingError(f"{text!r}: it takes HOST:PORT, or http(s)://HOST:PORT")
     host = parts.hostname or ""
     shown = f":{port}" if parts.port is not None else ""
     return StationAddress(f"{parts.scheme}://{bracketed(host)}{shown}", host, port)
@@ -88,11 +88,6 @@ def split_url(text: str, schemes: tuple[str, ...]) -> tuple[SplitResult, int]:
     return parts, PORTS[parts.scheme] if port is None else port
 
 
-def bracketed(host: str) -> str:
-    """A host as it stands in a URL: an IPv6 address in brackets, without its zone."""
-    return f"[{host.partition('%')[0]}]" if ":" in host else host
-
-
 async def own_address(names: Resolver, host: str, port: int) -> str:
     """Our address on the interface that reaches `host`; nothing is sent.
 
@@ -126,8 +121,8 @@ def has_port(name: str) -> bool:
     return name.rpartition("]")[2].rpartition(":")[2].isdigit() and ":" in name.rpartition("]")[2]
 
 
-def check_ip(given: str) -> None:
-    """Refuse an `ip` that a station could not call.
+def checked_ip(given: str) -> str:
+    """The same `ip`, if a station can call it; empty for none.
 
     Raises:
         SettingError: it has a path, a space, or no host.
@@ -135,10 +130,11 @@ def check_ip(given: str) -> None:
     name = given.partition("://")[2] if "://" in given else given
     name = name.rstrip("/")
     if not given:
-        return
+        return given
     split_url(f"http://{name}", ("http",))
     if "/" in name:
-        raise SettingError(f"ip = {given!r}: it takes HOST or HOST:PORT")
+        raise SettingError(f"{given!r}: it takes HOST or HOST:PORT")
+    return given
 
 
 def api_note(api: tuple[str, int] | None, host: str) -> str:
@@ -153,13 +149,3 @@ def api_note(api: tuple[str, int] | None, host: str) -> str:
     if is_loopback(api[0]) and not is_loopback(host):
         return f"the API listens on {api[0]} only: the station cannot command the vehicles"
     return ""
-
-
-def is_loopback(host: str) -> bool:
-    """Whether that is this machine talking to itself."""
-    if host == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host.partition("%")[0]).is_loopback
-    except ValueError:
-        return False

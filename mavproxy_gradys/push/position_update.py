@@ -1,6 +1,6 @@
 """State -> the fields of the form that the ground station takes. Pure: the clock is an argument.
 
-Field names, order and units are the ground station's (http-contract, "The Gradys ground station"): lat and
+Field names, order and units are those of the GrADyS ground station (its POST /update-info/): lat and
 lng in degrees, alt in m above home, speeds in m/s, heading in degrees. The station answers 500 to a field that
 is no number, and passes NaN on as invalid JSON: what is unknown is left out, and without a position nothing is
 said at all.

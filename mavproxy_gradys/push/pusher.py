@@ -15,7 +15,7 @@ from mavproxy_gradys.net.schedule import Ticker
 from mavproxy_gradys.position import Position, position_of
 from mavproxy_gradys.push import position_update
 from mavproxy_gradys.push.statistics import StationTally, VehicleTally
-from mavproxy_gradys.settings import Settings
+from mavproxy_gradys.settings import GradysSettings
 from mavproxy_uavapi.core.errors import Unavailable
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
@@ -38,7 +38,7 @@ class Pusher:
     """
 
     def __init__(
-        self, station: StationAddress, host: Host, settings: Settings, tally: StationTally, poster: Poster
+        self, station: StationAddress, host: Host, settings: GradysSettings, tally: StationTally, poster: Poster
     ) -> None:
         self.station = station
         self.tally = tally

@@ -141,9 +141,7 @@ def flight_of(
     for number, place in enumerate(places, 1):
         metres = away(vehicle, place)
         if not metres <= reach:
-            raise Invalid(
-                f"waypoint {number} of the track is {metres:.0f} m away; `reach` is {reach:g} m", "body", "track"
-            )
+            raise Invalid(f"waypoint {number} of the track is {metres:.0f} m away; `reach` is {reach:g} m", "track")
     return TrackFlight(vehicle, places, transit)
 
 

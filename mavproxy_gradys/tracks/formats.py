@@ -106,7 +106,7 @@ def parse(text: str) -> list[GpsReading]:
         if line.strip() and not line.lstrip().startswith("#"):
             found.append(parse_line(line.strip(), number))
     if not found:
-        raise Invalid("the track holds no reading", "body", "track")
+        raise Invalid("the track holds no reading", "track")
     return found
 
 
@@ -117,13 +117,13 @@ def parse_line(line: str, number: int) -> GpsReading:
         Invalid: it is none, or at no place on Earth; the text has the line's `number`.
     """
     if len(line) > LONGEST_LINE:
-        raise Invalid(f"line {number} is longer than {LONGEST_LINE} characters: {line[:60]!r}", "body", "track")
+        raise Invalid(f"line {number} is longer than {LONGEST_LINE} characters: {line[:60]!r}", "track")
     try:
         reading = GpsReading(**(_of_text(line) or _of_tuple(line)))
     except (TypeError, ValueError) as error:
-        raise Invalid(f"line {number} is no GPS_RAW_INT reading: {line[:60]!r}", "body", "track") from error
+        raise Invalid(f"line {number} is no GPS_RAW_INT reading: {line[:60]!r}", "track") from error
     if abs(reading.lat) > 90e7 or abs(reading.lon) > 180e7:
-        raise Invalid(f"line {number} is no place on Earth: {line[:60]!r}", "body", "track")
+        raise Invalid(f"line {number} is no place on Earth: {line[:60]!r}", "track")
     return reading
 
 
@@ -170,15 +170,15 @@ def waypoints(track: Sequence[GpsReading], ground: float | None = None) -> list[
     """
     fixed = [reading for reading in track if reading.fix_type >= FIX_3D]
     if not fixed:
-        raise Invalid("the track holds no reading with a 3D fix", "body", "track")
+        raise Invalid("the track holds no reading with a 3D fix", "track")
     level = min(reading.alt for reading in fixed) / 1e3 if ground is None else ground
     places = [TrackWaypoint(r.lat / 1e7, r.lon / 1e7, round(max(r.alt / 1e3 - level, LOWEST), 3)) for r in fixed]
     if not all(place.alt <= HIGHEST for place in places):
         highest = max(place.alt for place in places)
-        raise Invalid(f"the track leads {highest:.0f} m above its ground; {HIGHEST:g} are the most", "body", "track")
+        raise Invalid(f"the track leads {highest:.0f} m above its ground; {HIGHEST:g} are the most", "track")
     found = list(thinned(places))
     if len(found) > MOST_WAYPOINTS:
-        raise Invalid(f"the track leads through {len(found)} places; {MOST_WAYPOINTS} are the most", "body", "track")
+        raise Invalid(f"the track leads through {len(found)} places; {MOST_WAYPOINTS} are the most", "track")
     return found
 
 

@@ -11,8 +11,8 @@ from typing import Any
 
 from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.net.schedule import Ticker
-from mavproxy_gradys.tasks import begin, end
 from mavproxy_gradys.tracks.formats import GPX, GPX_HEAD, GPX_TAIL, GpsReading
+from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 
@@ -44,7 +44,7 @@ class Recorder:
         self.problem = ""
         self._host, self._style = host, style
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="gradys-track")
-        self._task: asyncio.Task[None] | None = None
+        self._tasks = HeldTasks()
         self._newest: GpsReading | None = None
         self._replacing: asyncio.Task[None] | None = None
         self._recorded_at = -1.0
@@ -61,7 +61,7 @@ class Recorder:
         except OSError as error:
             self._thread.shutdown(wait=False)
             raise NotStored(f"{self.file}: {error.strerror}") from error
-        self._task = begin(self._record(), f"the recording of {self.file}")
+        self._tasks.start(self._record(), f"the recording of {self.file}")
         if self.latest is not None:
             self._host.listeners.append(self._heard)
 
@@ -69,8 +69,7 @@ class Recorder:
         """End it; what was heard last is in its file."""
         if self._heard in self._host.listeners:
             self._host.listeners.remove(self._heard)
-        if self._task is not None:
-            await end([self._task])
+        await self._tasks.end()
         if self._replacing is not None:
             await self._replacing
         self._thread.shutdown(wait=False)

@@ -7,9 +7,10 @@ from collections.abc import Callable, Coroutine
 from typing import Any
 
 from mavproxy_uavapi.core.errors import UavApiError
+from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
 
-Errand = Callable[[], Coroutine[Any, Any, str]]
+Command = Callable[[], Coroutine[Any, Any, str]]
 SLOW = 2.0  # s after which a line says that it still goes on
 
 
@@ -24,16 +25,16 @@ class BackgroundCommands:
     def __init__(self, host: Host, name: str) -> None:
         self._host = host
         self._name = name
-        self._tasks: set[asyncio.Task[None]] = set()
+        self._tasks = HeldTasks()
 
-    def send(self, errand: Errand, doing: str = "") -> None:
+    def send(self, command: Command, doing: str = "") -> None:
         """Begin one; what it returns or raises is printed. Main loop only.
 
         Args:
-            errand: what to do; its result is a line, or nothing.
+            command: what to do; its result is a line, or nothing.
             doing: what to call it when it takes long; empty for what may.
         """
-        self._host.bridge.call_soon(self._begin, errand, doing)
+        self._host.bridge.call_soon(self._begin, command, doing)
 
     def say(self, text: str) -> None:
         """Print a line; an empty one is none. Any thread."""
@@ -42,21 +43,16 @@ class BackgroundCommands:
 
     async def close(self) -> None:
         """Cancel those under way, and wait until they have cleaned up. Asyncio thread only."""
-        tasks = list(self._tasks)
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        await self._tasks.end()
 
-    def _begin(self, errand: Errand, doing: str) -> None:
-        task = asyncio.get_running_loop().create_task(self._run(errand, doing))
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+    def _begin(self, command: Command, doing: str) -> None:
+        self._tasks.start(self._run(command, doing), f"what {self._name} did for the prompt")
 
-    async def _run(self, errand: Errand, doing: str) -> None:
+    async def _run(self, command: Command, doing: str) -> None:
         loop = asyncio.get_running_loop()
         slow = loop.call_later(SLOW, self.say, f"still {doing}; a line tells when that is done") if doing else None
         try:
-            self.say(await errand())
+            self.say(await command())
         except UavApiError as error:
             self.say(str(error))
         except Exception as error:  # noqa: BLE001  whoever waits at the prompt is told of a defect too

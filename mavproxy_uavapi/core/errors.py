@@ -14,6 +14,7 @@
     |  |- NotArmed             409 not_armed
     |  `- Aborted              409 aborted
     |- Invalid                 422 invalid        nothing was sent
+    |  `- SettingError         422 invalid        a setting that there is not, or a value that it does not take
     |- TooManyRequests         429 too_many_requests
     |- Rejected                500 rejected       the autopilot refused
     |- ToolFailed              500 tool_failed    a program that we started failed, or is not installed
@@ -31,6 +32,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any
+
+SOURCES = (["query"], ["body"])
 
 
 class UavApiError(Exception):
@@ -131,7 +134,8 @@ class Aborted(Conflict):
 class Invalid(UavApiError):
     """A value of the wrong type or out of range; nothing was sent.
 
-    `problems` are `{"loc": [...], "msg": str, "type": str}`, as web clients of typed APIs know them.
+    `problems` are `{"loc": [...], "msg": str, "type": str}`, as web clients of typed APIs know them; `loc` is the
+    name of the value, and what leads to it. Where it came by HTTP, `came_by` puts query or body before it.
     """
 
     status, code = 422, "invalid"
@@ -140,12 +144,35 @@ class Invalid(UavApiError):
         if isinstance(problems, str):
             problems = [{"loc": list(loc), "msg": problems, "type": "value_error"}]
         self.problems = list(problems)
-        super().__init__("; ".join(f"{'.'.join(map(str, p['loc']))}: {p['msg']}" for p in self.problems))
+        super().__init__()
+
+    def __str__(self) -> str:
+        return "; ".join(": ".join(filter(None, (".".join(map(str, p["loc"])), p["msg"]))) for p in self.problems)
+
+    def came_by(self, source: str) -> None:
+        """Note by what part of a request the values came, unless that is known."""
+        for problem in self.problems:
+            if problem["loc"][:1] not in SOURCES:
+                problem["loc"] = [source, *problem["loc"]]
 
     @property
     def detail(self) -> list[dict[str, Any]]:
         """The list of problems."""
         return self.problems
+
+
+class SettingError(Invalid):
+    """A setting that does not exist, or a value that it does not take; the text is one clear line.
+
+    So for what else is written as settings are: the argument of a command, a line of a file. `loc` names it.
+    """
+
+    def __init__(self, sentence: str, *loc: str) -> None:
+        super().__init__(sentence, *loc)
+        self.loc = loc
+
+    def __str__(self) -> str:
+        return str(self.problems[0]["msg"])
 
 
 class TooManyRequests(UavApiError):

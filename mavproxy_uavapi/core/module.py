@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import logging
 from collections.abc import Callable
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 from MAVProxy.modules.lib import mp_module
 
 from mavproxy_uavapi.core import host as hosts
+from mavproxy_uavapi.core.text import nearest
 
 log = logging.getLogger("uavapi.api")
 
@@ -91,6 +91,4 @@ class SharedModule(mp_module.MPModule):  # type: ignore[misc]
         if action is not None:
             action(args[1:])
             return
-        near = difflib.get_close_matches(word, self._actions, n=1)
-        hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(self._actions)}"
-        print(f"{self.name}: no command {word!r}; {hint}")
+        print(f"{self.name}: no command {word!r}; {nearest(word, self._actions)}")

@@ -29,12 +29,13 @@ class RememberedSettings:
         before = None if keywords else self._all.get(module)
         self.keywords = dict(keywords) if before is None else before.keywords
         self.changed: dict[str, Any] = {} if before is None else before.changed
-        self.taken_over = before is not None and bool(self.given)
+        self.taken_over = before is not None and bool(self.keywords or self.changed)
 
     @property
     def given(self) -> dict[str, Any]:
-        """Keywords and changes as one, the latter winning."""
-        return {**self.keywords, **self.changed}
+        """Keywords and changes as one, the latter winning; `origins` tells which these are."""
+        origins = {**self.keywords.get("origins", {}), **dict.fromkeys(self.changed, f"{self._module} set")}
+        return {**self.keywords, **self.changed, "origins": origins}
 
     def keep(self, shown: Callable[[str], object]) -> None:
         """Remember this from now on, and print what was taken over. Not called when the module refuses it.

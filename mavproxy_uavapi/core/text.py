@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import difflib
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 LONGEST = 200  # characters of a text that the trail keeps
@@ -15,6 +16,13 @@ def escaped(text: str) -> str:
     if text.isprintable():
         return text
     return "".join(one if one.isprintable() else one.encode("unicode_escape").decode() for one in text)
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """The end of an error about a word that nobody knows: the nearest one that is known, or else all of them."""
+    names = list(known)
+    near = difflib.get_close_matches(word.lower(), names, n=1)
+    return f"did you mean {near[0]}?" if near else f"there are {', '.join(names)}"
 
 
 def cut(value: Any) -> Any:

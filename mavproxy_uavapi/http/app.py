@@ -94,7 +94,8 @@ async def _answer(request: web.Request) -> web.StreamResponse:
     await invite(request)
     params = await parameters(request, route.model, body=request.method == "POST" and not route.raw)
     call = Call(request.app[SERVICE], request, params)
-    answer = await (audited(call, route.action) if route.commands and route.trail else route.action(call))
+    with call.naming_source():
+        answer = await (audited(call, route.action) if route.commands and route.trail else route.action(call))
     return answer if isinstance(answer, web.StreamResponse) else success(answer)
 
 

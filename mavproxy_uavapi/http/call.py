@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+import contextlib
+from collections.abc import Awaitable, Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, TypeVar, cast
 
@@ -20,7 +21,7 @@ from mavproxy_uavapi.http.requests import Request, parse
 from mavproxy_uavapi.http.responses import envelope
 from mavproxy_uavapi.http.streaming import MOST_OPEN, Slots
 from mavproxy_uavapi.scripts.manager import Scripts
-from mavproxy_uavapi.settings import Settings
+from mavproxy_uavapi.settings import ApiSettings
 
 R = TypeVar("R", bound=Request)
 T = TypeVar("T")
@@ -44,7 +45,7 @@ class Service:
     """
 
     host: Host
-    settings: Settings
+    settings: ApiSettings
     scripts: Scripts = field(init=False)
     broadcast: TelemetryBroadcast = field(init=False)
     streams: Slots = field(default_factory=lambda: Slots(MOST_OPEN, "streams are open"))
@@ -123,7 +124,8 @@ class Call:
         is_async = self.is_async
 
         async def body(job: Job) -> str:
-            await verb(job)
+            with self.naming_source():
+                await verb(job)
             return result if isinstance(result, str) else result()
 
         jobs = self.service.host.jobs
@@ -163,6 +165,15 @@ class Call:
     def path(self) -> str:
         """The path without a trailing slash."""
         return self.request.path.rstrip("/")
+
+    @contextlib.contextmanager
+    def naming_source(self) -> Iterator[None]:
+        """What is refused as Invalid tells by what part of the request it came."""
+        try:
+            yield
+        except Invalid as error:
+            error.came_by("query" if self.request.method == "GET" else "body")
+            raise
 
     @property
     def client(self) -> str:

@@ -26,7 +26,7 @@ from mavproxy_uavapi.http.connection import Connection
 from mavproxy_uavapi.http.log_throttle import LogThrottle
 from mavproxy_uavapi.http.rate_limits import STRANGERS, STRANGERS_RATE
 from mavproxy_uavapi.http.responses import REFUSED, Handler, failure
-from mavproxy_uavapi.settings import Settings
+from mavproxy_uavapi.settings import ApiSettings
 
 log = logging.getLogger("uavapi.http.door")
 OURSELVES = {"same-origin", "none"}  # Sec-Fetch-Site of our own page, and of an address typed by hand
@@ -124,7 +124,7 @@ def _names_us(host: str, own: str) -> bool:
     return True
 
 
-def check_caller(remote: str | None, headers: Mapping[str, str], settings: Settings) -> Caller:
+def check_caller(remote: str | None, headers: Mapping[str, str], settings: ApiSettings) -> Caller:
     """Let in who has the token, or comes from a network that needs none; who that is.
 
     What a proxy passed on comes from an address that is not the caller's: the address opens nothing then.
@@ -156,7 +156,7 @@ def has_token(authorization: str | None, token: str) -> bool:
     return bool(token) and scheme.lower() == "bearer" and hmac.compare_digest(given_bytes, token.encode())
 
 
-def admitted(request: web.Request, settings: Settings) -> Caller:
+def admitted(request: web.Request, settings: ApiSettings) -> Caller:
     """Who calls, if he may, and commands for no page of another site.
 
     Raises:

@@ -1,4 +1,4 @@
-"""MAVLink message -> what an answer says of it. Pure. Units and frames as http-contract: m, m/s, degrees."""
+"""MAVLink message -> what an answer says of it. Pure. Units: m, m/s, degrees; frames: docs/api.md."""
 
 from __future__ import annotations
 

@@ -12,9 +12,11 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from mavproxy_uavapi.core.addresses import local_url_of
+from mavproxy_uavapi.core.settings import DEFAULT
 from mavproxy_uavapi.launcher.locations import HomePosition
 from mavproxy_uavapi.launcher.options import RunOptions
-from mavproxy_uavapi.settings import DEFAULT, ModuleSettings
+from mavproxy_uavapi.settings import ApiModuleSettings
 
 # What makes run_in_terminal_window.sh put the vehicle into a window, a tmux server or a screen that is not
 # our child. Without them it runs in the background, where we can end it.
@@ -64,21 +66,38 @@ def master(options: RunOptions, instance: int | None) -> str:
 
 
 def module_loads(options: RunOptions, config: Path | None) -> list[str]:
-    """One `module load` command per module."""
+    """One `module load` command per module; keywords that the user gave one of ours (`--module NAME:{…}`) win."""
     settings: dict[str, object] = {"host": options.host, "port": options.port, "sysid": options.sysid}
-    names = ModuleSettings.all_names()
+    names = ApiModuleSettings.names()
     settings["origins"] = {
         **dict.fromkeys(settings, DEFAULT),
         **{name: origin for name, origin in options.origins.items() if name in names},
     }
     if config is not None:
         settings["config"] = str(config)
-    loads = [module_load("uavapi", settings)]
-    gradys = {"config": options.gradys_config, "gs": options.gradys_gs}
-    given = {name: value for name, value in gradys.items() if value is not None}
-    if given:
-        loads.append(module_load("gradys", given))
-    return loads + [f"module load {name}" for name in options.module if not (given and name == "gradys")]
+    given = {"uavapi": settings, "gradys": gradys_keywords(options)}
+    if options.vision_config is not None:
+        given["vision"] = {"config": options.vision_config}
+    others = []
+    for module in options.module:
+        name, _, keywords = module.partition(":")
+        if given.get(name):
+            given[name].update(json.loads(keywords or "{}"))
+        else:
+            others.append(f"module load {module}")
+    return [module_load(name, keywords) for name, keywords in given.items() if keywords] + others
+
+
+def gradys_keywords(options: RunOptions) -> dict[str, object]:
+    """What the module `gradys` is loaded with; nothing where the user set nothing of it."""
+    keywords: dict[str, object] = {}
+    if options.gradys_config is not None:
+        keywords["config"] = options.gradys_config
+    if options.gradys_gs is not None:
+        keywords["gs"] = options.gradys_gs
+        if "gradys_gs" in options.origins:
+            keywords["origins"] = {"gs": options.origins["gradys_gs"]}
+    return keywords
 
 
 def module_load(name: str, settings: Mapping[str, object]) -> str:
@@ -162,8 +181,7 @@ def sitl_binary(options: RunOptions) -> Path:
 
 def api_url(options: RunOptions) -> str:
     """Where to reach the API from this machine."""
-    host = {"0.0.0.0": "127.0.0.1", "::": "::1", "": "127.0.0.1"}.get(options.host, options.host)
-    return f"http://[{host}]:{options.port}" if ":" in host else f"http://{host}:{options.port}"
+    return local_url_of(options.host, options.port)
 
 
 def greeting(options: RunOptions, with_token: bool) -> str:

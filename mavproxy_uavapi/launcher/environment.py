@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import mavproxy_uavapi
+from mavproxy_uavapi.core.settings import CONFIG_VARIABLE
 from mavproxy_uavapi.launcher.command_lines import WINDOW_VARIABLES
 from mavproxy_uavapi.launcher.errors import LaunchError
 from mavproxy_uavapi.launcher.options import VARIABLES
@@ -55,7 +56,8 @@ def for_mavproxy(environ: Mapping[str, str]) -> dict[str, str]:
 
     The module would take them from its environment, over what the command line said.
     """
-    return {name: value for name, value in for_python(environ).items() if name not in VARIABLES}
+    ours = {*VARIABLES, CONFIG_VARIABLE}
+    return {name: value for name, value in for_python(environ).items() if name not in ours}
 
 
 def for_sim_vehicle(environ: Mapping[str, str], run_dir: Path) -> dict[str, str]:

@@ -7,7 +7,6 @@ line wins over the file, and a missing file or a misspelt key is an error.
 from __future__ import annotations
 
 import argparse
-import configparser
 import os
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -15,9 +14,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn
 
+from mavproxy_uavapi.core.errors import SettingError
+from mavproxy_uavapi.core.ini_file import IniFile
+from mavproxy_uavapi.core.settings import CONFIG_VARIABLE, ENVIRONMENT
+from mavproxy_uavapi.core.values import boolean, is_unset
 from mavproxy_uavapi.launcher import values
 from mavproxy_uavapi.launcher.errors import OptionError
-from mavproxy_uavapi.settings import ModuleSettings, SettingError
+from mavproxy_uavapi.settings import ApiModuleSettings
+from mavproxy_vision import opencv_install
 
 
 @dataclass(frozen=True)
@@ -26,7 +30,7 @@ class RunOptions:
 
     Attributes:
         further: settings of the `uavapi` module that the file has and the command line does not know.
-        gradys_config: the file, where it has a section for the module `gradys`, which reads it itself.
+        vision_config, gradys_config: the file, where it has a section for that module, which reads it itself.
         origins: where each option came from: the file's name, "environment" or "command line"; none for a default.
 
     The others are the rows of TABLE.
@@ -53,6 +57,7 @@ class RunOptions:
     script_logs: str | None = None
     module: tuple[str, ...] = ()
     further: tuple[tuple[str, str], ...] = ()
+    vision_config: str | None = None
     gradys_config: str | None = None
     origins: Mapping[str, str] = field(default_factory=dict, compare=False)
     mavproxy_args: tuple[str, ...] = ()
@@ -70,7 +75,7 @@ class Row:
     @property
     def is_switch(self) -> bool:
         """Whether the bare flag means true."""
-        return self.convert is values.boolean
+        return self.convert is boolean
 
     @property
     def is_list(self) -> bool:
@@ -101,21 +106,19 @@ TABLE = (
     Row("scripts_path", "api", path, "directory of uploaded scripts"),
     Row("python_path", "api", path, "Python that runs uploaded scripts"),
     Row("vehicle", "api", values.one_of("copter", "plane", "rover"), "what ArduPilot simulates (copter)"),
-    Row("simulated", "simulated", values.boolean, "start a simulated vehicle too"),
+    Row("simulated", "simulated", boolean, "start a simulated vehicle too"),
     Row("ardupilot_path", "simulated", path, "ArduPilot to simulate with; else the embedded vehicle"),
     Row("location", "simulated", str.strip, "home: a name or lat,lon,alt,heading in deg, m AMSL (AbraDF)"),
     Row("gs_connection", "simulated", values.words, "addresses to forward MAVLink to (MAVProxy's --out)"),
     Row("speedup", "simulated", values.factor, "how many times faster than the clock to simulate (1)"),
-    Row("headless", "simulated", values.boolean, "no MAVProxy prompt; so too where stdin is not a terminal"),
+    Row("headless", "simulated", boolean, "no MAVProxy prompt; so too where stdin is not a terminal"),
     Row("log_console", "logs", values.components, f"components that log to the console: {_NAMES}"),
     Row("log_path", "logs", path, "log file, beside which telemetry logs go, or the directory for both"),
     Row("debug", "logs", values.components, "components that log in detail"),
     Row("script_logs", "logs", path, "directory for the output of uploaded scripts"),
 )
-PREFIX = "UAVAPI_"  # of the environment variables
-VARIABLES = {PREFIX + row.name.upper(): row for row in TABLE}
-SECTIONS = frozenset(row.section for row in TABLE)
-GRADYS = "gradys"  # a module that has a section of its own
+VARIABLES = {f"UAVAPI_{row.name.upper()}": row for row in TABLE}
+SECTIONS = ("api", "simulated", "logs")  # of the INI file; the others are modules'
 
 
 class _Parser(argparse.ArgumentParser):
@@ -132,7 +135,9 @@ def build_parser() -> argparse.ArgumentParser:
         allow_abbrev=False,
         argument_default=argparse.SUPPRESS,
     )
-    parser.add_argument("--config", metavar="FILE", help="INI file with sections [api], [simulated], [logs]")
+    parser.add_argument(
+        "--config", metavar="FILE", help="INI file with sections [api], [simulated], [logs], [vision], [gradys]"
+    )
     parser.add_argument("--module", action="append", metavar="NAME", help="a further module; repeatable")
     for row in TABLE:
         flags = dict.fromkeys((f"--{row.name}", f"--{row.name.replace('_', '-')}"))
@@ -148,24 +153,27 @@ def build_parser() -> argparse.ArgumentParser:
 def parse(argv: Sequence[str], environ: Mapping[str, str] | None = None) -> RunOptions:
     """Read the arguments, the environment (`UAVAPI_PORT` …) and the file; the former win over the latter.
 
+    Where no argument names the file, `UAVAPI_CONFIG` may.
+
     Raises:
         OptionError: a wrong option, value, file or combination; its text is one line.
     """
     arguments = list(argv)
     cut = arguments.index("--") if "--" in arguments else len(arguments)
     given = vars(build_parser().parse_args(_southern(arguments[:cut])))
-    config = given.pop("config", None)
-    merged = read_ini(Path(config).expanduser()) if config is not None else {}
-    origins = dict.fromkeys([*merged, *dict(merged.get("further", ()))], str(config))
-    from_environment = read_environment(os.environ if environ is None else environ)
+    environ = os.environ if environ is None else environ
+    config = given.pop("config", None) or environ.get(CONFIG_VARIABLE, "")
+    merged = {} if is_unset(config) else read_ini(Path(path(config)), environ)
+    origins = dict.fromkeys([*merged, *dict(merged.get("further", ()))], config)
+    from_environment = read_environment(environ)
     merged.update(from_environment)
-    origins.update(dict.fromkeys(from_environment, "environment"))
+    origins.update(dict.fromkeys(from_environment, ENVIRONMENT))
     merged["module"] = tuple(name for text in given.pop("module", ()) for name in _read_module(text))
     for row in TABLE:
         if row.name in given:
             raw = given[row.name]
             text = " ".join(raw) if isinstance(raw, list) else raw
-            if values.is_unset(text):
+            if is_unset(text):
                 merged.pop(row.name, None)
             else:
                 merged[row.name] = row.read(text, f"--{row.name}")
@@ -202,53 +210,57 @@ def read_environment(environ: Mapping[str, str]) -> dict[str, Any]:
     return {
         row.name: row.read(environ[variable], variable)
         for variable, row in VARIABLES.items()
-        if not values.is_unset(environ.get(variable, ""))
+        if not is_unset(environ.get(variable, ""))
     }
 
 
-def read_ini(file: Path) -> dict[str, Any]:
-    """The values of an INI file, by option name. A key may stand in any of the sections, as it always could.
+def read_ini(file: Path, environ: Mapping[str, str]) -> dict[str, Any]:
+    """The values of an INI file, by option name. A key may stand in any of our sections, as it always could.
 
-    A section [simulated] means a simulated vehicle unless it says `simulated = false`.
+    A section [simulated] means a simulated vehicle unless it says `simulated = false`. The modules' sections are
+    checked here already, with what `environ` adds to them.
 
     Raises:
-        OptionError: the file is missing or unreadable, a section or key is unknown, a value is wrong.
+        OptionError: the file is missing or unreadable, a section or key is unknown, a value is wrong, or a section is
+            there whose module cannot be imported.
     """
-    # No interpolation: a `%` in a path is a `%`.
-    parser = configparser.ConfigParser(interpolation=None)
     try:
-        with file.open(encoding="utf-8") as stream:
-            parser.read_file(stream)
-    except OSError as error:
-        raise OptionError(f"--config {file}: {error.strerror}") from error
-    except (configparser.Error, UnicodeDecodeError) as error:
-        raise OptionError(f"--config {file}: {' '.join(str(error).split())}") from error
-    found: dict[str, Any] = {}
-    if parser.has_section("simulated"):
-        found["simulated"] = True
-    if parser.has_section(GRADYS):
-        found["gradys_config"] = str(file.absolute())
-        parser.remove_section(GRADYS)
-    for section in parser.sections():
-        if section not in SECTIONS:
-            raise OptionError(f"--config {file}: unknown section [{section}]")
-        found.update(_read_section(file, section, parser[section]))
-    further = _modules_own(file, parser)
-    return {**found, "further": further} if further else found
+        ini = IniFile(file)
+        found: dict[str, Any] = {"simulated": True} if "simulated" in ini.sections else {}
+        for section in SECTIONS:
+            found.update(_read_section(ini, section))
+        further = _modules_own(ini)
+    except SettingError as error:
+        raise OptionError(f"--config {error}") from error
+    if further:
+        found["further"] = further
+    return {**found, **_modules_configs(ini, environ)}
 
 
-def _read_section(file: Path, section: str, texts: Mapping[str, str]) -> dict[str, Any]:
-    rows = {row.name: row for row in TABLE}
+def _modules_configs(ini: IniFile, environ: Mapping[str, str]) -> dict[str, str]:
+    """The file by option name, for each module that has a section in it."""
     found = {}
-    for key, text in texts.items():
-        if key in ModuleSettings.all_names() and key not in rows and section != "simulated":
-            continue
-        if key == "udp" and (values.is_unset(text) or not _read_udp(file, text)):
+    for name, check_module in MODULES.items():
+        if name in ini.sections:
+            try:
+                check_module({"config": str(ini.file)}, environ)
+            except SettingError as error:
+                raise OptionError(str(error)) from error
+            found[f"{name}_config"] = str(ini.file.absolute())
+    return found
+
+
+def _read_section(ini: IniFile, section: str) -> dict[str, Any]:
+    rows = {row.name: row for row in TABLE}
+    further = [] if section == "simulated" else [name for name in ApiModuleSettings.names() if name not in rows]
+    found = {}
+    for key, text in ini.section(section).items():
+        if key in further or (key == "udp" and not _read_udp(ini.file, text)):
             continue
         if key not in rows:
-            raise OptionError(f"--config {file}: unknown key {key!r} in [{section}]")
-        if not values.is_unset(text):
-            found[key] = rows[key].read(text, f"--config {file}: {key} in [{section}]")
+            raise ini.no_key(section, key, [*rows, *further])
+        if not is_unset(text):
+            found[key] = rows[key].read(text, f"--config {ini.file}: {key} in [{section}]")
     return found
 
 
@@ -258,29 +270,51 @@ def _read_udp(file: Path, text: str) -> bool:
     Raises:
         OptionError: it is on, or no switch.
     """
-    if Row("udp", "api", values.boolean, "").read(text, f"--config {file}: udp"):
+    if not is_unset(text) and Row("udp", "api", boolean, "").read(text, f"--config {file}: udp"):
         raise OptionError(f"--config {file}: udp: there is no HTTP/3 here; certfile and keyfile switch to TLS")
     return False
 
 
-def _modules_own(file: Path, parser: configparser.ConfigParser) -> tuple[tuple[str, str], ...]:
+def _modules_own(ini: IniFile) -> tuple[tuple[str, str], ...]:
     """The keys that are the `uavapi` module's alone, as they are written; it checks them here already.
 
     Raises:
-        OptionError: a value is wrong.
+        SettingError: a value is wrong.
     """
     rows = {row.name for row in TABLE}
     own = [
         (key, text)
-        for section in parser.sections()
-        for key, text in parser[section].items()
-        if key not in rows and key in ModuleSettings.all_names() and not values.is_unset(text)
+        for section in SECTIONS
+        for key, text in ini.section(section).items()
+        if key not in rows and key in ApiModuleSettings.names() and not is_unset(text)
     ]
     try:
-        ModuleSettings(dict(own), environ={"UAVAPI_ALLOW_OPEN": "true"})
+        ApiModuleSettings(dict(own), environ={"UAVAPI_ALLOW_OPEN": "true"})
     except SettingError as error:
-        raise OptionError(f"--config {file}: {error}") from error
+        raise SettingError(f"{ini.file}: {error}") from error
     return tuple(own)
+
+
+def _check_vision(given: Mapping[str, Any], environ: Mapping[str, str]) -> None:
+    problem = opencv_install.problem()
+    if problem is not None:
+        raise SettingError(f"{given['config']}: [vision]: {problem}")
+    from mavproxy_vision.settings import VisionModuleSettings  # noqa: PLC0415  it imports OpenCV
+
+    VisionModuleSettings(given, environ)
+
+
+def _check_gradys(given: Mapping[str, Any], environ: Mapping[str, str]) -> None:
+    from mavproxy_gradys.settings import GradysModuleSettings  # noqa: PLC0415  others need not wait
+
+    GradysModuleSettings(given, environ)
+
+
+# The modules that read their section of the file themselves.
+MODULES: Mapping[str, Callable[[Mapping[str, Any], Mapping[str, str]], None]] = {
+    "vision": _check_vision,
+    "gradys": _check_gradys,
+}
 
 
 def check(options: RunOptions) -> None:

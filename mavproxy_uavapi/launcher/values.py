@@ -2,34 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from collections.abc import Callable
 
 from mavproxy_uavapi.core import logs
 
-TRUE = frozenset({"true", "yes", "on", "1"})
-FALSE = frozenset({"false", "no", "off", "0"})
-UNSET = frozenset({"", "none", "[]"})
-
 # The names that may be written, those of the original service too, and the components that they stand for.
 LOG_COMPONENTS = {**{name: name for name in logs.COMPONENTS}, **logs.ALIASES}
 _MODULE = re.compile(r"[A-Za-z_]\w*(:\{[^;\s]*\})?")
-
-
-def is_unset(text: str) -> bool:
-    """Whether the text stands for "not given": nothing, `None` or `[]`."""
-    return text.strip().lower() in UNSET
-
-
-def boolean(text: str) -> bool:
-    """`true`, `yes`, `on`, `1` and their opposites, in any case; anything else is an error, not a guess."""
-    lowered = text.strip().lower()
-    if lowered in TRUE:
-        return True
-    if lowered in FALSE:
-        return False
-    raise ValueError("expected true or false")
 
 
 def port(text: str) -> int:
@@ -87,6 +69,8 @@ def modules(text: str) -> tuple[str, ...]:
     # MAVProxy splits a command line at `;` and at white space: nothing may slip in behind a name.
     if not names or not all(_MODULE.fullmatch(name) for name in names):
         raise ValueError('expected NAME or NAME:{"key":value} without spaces')
+    for name in names:
+        json.loads(name.partition(":")[2] or "{}")
     return names
 
 

@@ -17,7 +17,7 @@ from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.scripts import clients, names, on_exit, runner, runs, tmux
 from mavproxy_uavapi.scripts.runs import Run
 from mavproxy_uavapi.scripts.store import ScriptStore
-from mavproxy_uavapi.settings import Settings
+from mavproxy_uavapi.settings import ApiSettings
 
 log = logging.getLogger("uavapi.script")
 
@@ -34,14 +34,14 @@ class Scripts:
         settings: the snapshot in force.
     """
 
-    def __init__(self, host: Host, settings: Settings) -> None:
+    def __init__(self, host: Host, settings: ApiSettings) -> None:
         self._host = host
         self.renew(settings)
         self._watched: dict[str, Run] = {}
         self._watches: dict[str, asyncio.Task[None]] = {}
         self._launching = asyncio.Lock()
 
-    def renew(self, settings: Settings) -> None:
+    def renew(self, settings: ApiSettings) -> None:
         """Take up other settings. Scripts that run go on as they were started."""
         self._settings = settings
         self.store = ScriptStore(
@@ -208,7 +208,7 @@ class Scripts:
         return {
             **os.environ,
             "PYTHONUNBUFFERED": "1",  # so that the logs and the session show what it prints as it prints
-            "UAVAPI_URL": address(self._settings),
+            "UAVAPI_URL": self._settings.local_url,
             "UAVAPI_TOKEN": self._settings.token,
             "UAVAPI_SYSID": str(self.sysid),
         }
@@ -242,11 +242,3 @@ class Scripts:
         others = [other.script for other in self._watched.values() if other.sysid in (0, run.sysid)]
         done = await on_exit.after_death(self._host, run.sysid or self._settings.sysid, run, others)
         log.warning("%s died (status %s): %s", run.script, run.exit_status, done)
-
-
-def address(settings: Settings) -> str:
-    """The URL by which this machine reaches the API."""
-    scheme = "https" if settings.certfile else "http"
-    everywhere = {"0.0.0.0": "127.0.0.1", "::": "::1"}
-    host = everywhere.get(settings.host, settings.host)
-    return f"{scheme}://[{host}]:{settings.port}" if ":" in host else f"{scheme}://{host}:{settings.port}"

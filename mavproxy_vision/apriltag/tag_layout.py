@@ -11,7 +11,7 @@ import math
 import re
 from dataclasses import dataclass
 
-from mavproxy_vision.errors import BadSetting
+from mavproxy_uavapi.core.errors import SettingError
 
 # Family -> cells along the black square, and how many ids it has.
 FAMILIES = {"36h11": (8, 587), "25h9": (7, 35), "16h5": (6, 30), "36h10": (8, 2320)}
@@ -36,50 +36,50 @@ def parse_tags(text: str, family: str | None = None) -> tuple[Tag, ...]:
     """Read a list of tags, whose ids `family` must have.
 
     Raises:
-        BadSetting: it is no such list.
+        SettingError: it is no such list.
     """
     found = []
     for word in re.split(r"[\s;]+", text.strip()):
         match = PATTERN.fullmatch(word)
         if match is None:
-            raise BadSetting(f"tags: {word!r} is not ID:SIZE or ID:SIZE@RIGHT,UP, in m", "tags")
+            raise SettingError(f"tags: {word!r} is not ID:SIZE or ID:SIZE@RIGHT,UP, in m", "tags")
         tag = Tag(int(match[1]), float(match[2]), float(match[3] or 0), float(match[4] or 0))
         require_size("tags", tag.size)
         if max(abs(tag.right), abs(tag.up)) > REACH:
-            raise BadSetting(f"tags: {word!r} lies farther than {REACH:g} m from the target", "tags")
+            raise SettingError(f"tags: {word!r} lies farther than {REACH:g} m from the target", "tags")
         if family is not None:
             require_id("tags", family, tag.id)
         found.append(tag)
     if len({tag.id for tag in found}) != len(found):
-        raise BadSetting("tags: an id twice", "tags")
+        raise SettingError("tags: an id twice", "tags")
     return tuple(found)
 
 
 def require_size(setting: str, size: float) -> None:
-    """Raises BadSetting unless a tag may have this size (m)."""
+    """Raises SettingError unless a tag may have this size (m)."""
     if not SIZES[0] <= size <= SIZES[1]:
-        raise BadSetting(f"{setting}: a size of {size:g} m; tags have {SIZES[0]:g} to {SIZES[1]:g} m", setting)
+        raise SettingError(f"{setting}: a size of {size:g} m; tags have {SIZES[0]:g} to {SIZES[1]:g} m", setting)
 
 
 def require_id(setting: str, family: str, number: int) -> None:
-    """Raises BadSetting unless the family has this id."""
+    """Raises SettingError unless the family has this id."""
     count = FAMILIES[family][1]
     if not 0 <= number < count:
-        raise BadSetting(f"{setting}: {family} has no id {number}, only 0 to {count - 1}", setting)
+        raise SettingError(f"{setting}: {family} has no id {number}, only 0 to {count - 1}", setting)
 
 
 def parse_families(text: str) -> tuple[str, ...]:
     """Read family names, separated by commas or spaces.
 
     Raises:
-        BadSetting: one of them is unknown.
+        SettingError: one of them is unknown.
     """
     names = tuple(name.lower().removeprefix("tag") for name in re.split(r"[\s,;]+", text.strip()) if name)
     for name in names:
         if name not in FAMILIES:
-            raise BadSetting(f"family: {name!r} is none of {', '.join(FAMILIES)}", "family")
+            raise SettingError(f"family: {name!r} is none of {', '.join(FAMILIES)}", "family")
     if not names:
-        raise BadSetting(f"family: one or several of {', '.join(FAMILIES)}", "family")
+        raise SettingError(f"family: one or several of {', '.join(FAMILIES)}", "family")
     return names
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_vision.apriltag.families import marker_image
 from mavproxy_vision.apriltag.tag_layout import FAMILIES, require_id, require_size
-from mavproxy_vision.errors import BadSetting
 
 POINTS_PER_METRE = 72 / 0.0254
 PAPER = {"A4": (0.210, 0.297), "A3": (0.297, 0.420), "A2": (0.420, 0.594), "A1": (0.594, 0.841), "A0": (0.841, 1.189)}
@@ -15,10 +15,10 @@ def tag_pdf(family: str, number: int, size: float) -> bytes:
     """A PDF page with the tag, whose black square has a side of `size` m, on the smallest paper that holds it.
 
     Raises:
-        BadSetting: no such tag, or no paper holds it.
+        SettingError: no such tag, or no paper holds it.
     """
     if family not in FAMILIES:
-        raise BadSetting(f"family {family!r} is none of {', '.join(FAMILIES)}", "family")
+        raise SettingError(f"family {family!r} is none of {', '.join(FAMILIES)}", "family")
     require_id("id", family, number)
     require_size("size", size)
     cells = FAMILIES[family][0]
@@ -26,7 +26,7 @@ def tag_pdf(family: str, number: int, size: float) -> bytes:
     for name, (width, height) in PAPER.items():
         if whole + 2 * MARGIN <= width:
             return _page(family, number, size, (name, width, height))
-    raise BadSetting(f"a tag of {size:g} m needs {whole:.2f} m with its border: wider than A0", "size")
+    raise SettingError(f"a tag of {size:g} m needs {whole:.2f} m with its border: wider than A0", "size")
 
 
 def _page(family: str, number: int, size: float, paper: tuple[str, float, float]) -> bytes:

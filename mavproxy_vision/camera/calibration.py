@@ -11,9 +11,10 @@ from typing import Any
 import cv2
 import numpy as np
 
+from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_vision.apriltag.tag_layout import NUMBER
 from mavproxy_vision.camera.source import IMAGES, Image, decode_any
-from mavproxy_vision.errors import BadImage, BadSetting
+from mavproxy_vision.errors import BadImage
 from mavproxy_vision.geometry.camera_model import CameraModel
 
 FEWEST_VIEWS = 5
@@ -47,11 +48,11 @@ class Board:
         """Read `charuco:COLUMNSxROWS:SQUARE[:MARKER]` or `chessboard:COLUMNSxROWS:SQUARE`.
 
         Raises:
-            BadSetting: it is neither, or there can be no such board.
+            SettingError: it is neither, or there can be no such board.
         """
         match = BOARD.fullmatch(text)
         if match is None:
-            raise BadSetting(f"board {text!r} is not charuco:7x5:0.03:0.022 or chessboard:9x6:0.025", "board")
+            raise SettingError(f"board {text!r} is not charuco:7x5:0.03:0.022 or chessboard:9x6:0.025", "board")
         square = float(match[4])
         marker = float(match[5] or 0.75 * square)
         board = cls(match[1], int(match[2]), int(match[3]), square, marker)
@@ -59,16 +60,16 @@ class Board:
         return board
 
     def check(self) -> None:
-        """Raises BadSetting unless there can be such a board."""
+        """Raises SettingError unless there can be such a board."""
         fewest = FEWEST_SQUARES[self.kind]
         if not fewest <= min(self.columns, self.rows) <= max(self.columns, self.rows) <= MOST_SQUARES:
-            raise BadSetting(f"a {self.kind} has {fewest} to {MOST_SQUARES} squares each way", "board")
+            raise SettingError(f"a {self.kind} has {fewest} to {MOST_SQUARES} squares each way", "board")
         if not (SQUARES[0] <= self.square <= SQUARES[1] and 0 < self.marker < self.square):
-            raise BadSetting(
+            raise SettingError(
                 f"a board's squares have {SQUARES[0]:g} to {SQUARES[1]:g} m, and its markers less than that", "board"
             )
         if self.kind == "charuco" and self.columns * self.rows // 2 > MARKERS:
-            raise BadSetting(f"a ChArUco board has at most {2 * MARKERS} squares", "board")
+            raise SettingError(f"a ChArUco board has at most {2 * MARKERS} squares", "board")
 
     @property
     def charuco(self) -> Any:
@@ -107,11 +108,11 @@ def calibrate(folder: Path, board: Board) -> Calibration:
     """Make a camera model of the images of a folder.
 
     Raises:
-        BadSetting: no such folder, or too few of its images show the board, or they make no camera.
+        SettingError: no such folder, or too few of its images show the board, or they make no camera.
         OSError: the folder cannot be read.
     """
     if not folder.is_dir():
-        raise BadSetting(f"{folder} is not a folder", "folder")
+        raise SettingError(f"{folder} is not a folder", "folder")
     on_boards, in_images, size = [], [], None
     for file in sorted(folder.iterdir()):
         image = _image(file) if file.suffix.lower() in IMAGES else None
@@ -119,12 +120,12 @@ def calibrate(folder: Path, board: Board) -> Calibration:
         if image is None or points is None:
             continue
         if size not in (None, image.shape[::-1]):
-            raise BadSetting(f"{file.name} has another size than the images before", "folder")
+            raise SettingError(f"{file.name} has another size than the images before", "folder")
         size = image.shape[::-1]
         on_boards.append(points[0])
         in_images.append(points[1])
     if size is None or len(on_boards) < FEWEST_VIEWS:
-        raise BadSetting(f"{len(on_boards)} images in {folder} show the board; {FEWEST_VIEWS} are needed", "folder")
+        raise SettingError(f"{len(on_boards)} images in {folder} show the board; {FEWEST_VIEWS} are needed", "folder")
     return _fitted(on_boards, in_images, (int(size[0]), int(size[1])))
 
 
@@ -140,7 +141,7 @@ def _fitted(on_boards: list[Any], in_images: list[Any], size: tuple[int, int]) -
     try:
         error, matrix, coefficients, _, _ = cv2.calibrateCamera(on_boards, in_images, size, None, None)
     except cv2.error as failed:
-        raise BadSetting(f"the images make no camera: {failed.err}", "folder") from failed
+        raise SettingError(f"the images make no camera: {failed.err}", "folder") from failed
     model = CameraModel(
         *size,
         float(matrix[0, 0]),
@@ -151,7 +152,7 @@ def _fitted(on_boards: list[Any], in_images: list[Any], size: tuple[int, int]) -
     )
     why_not = nonsense(model)
     if why_not:
-        raise BadSetting(
+        raise SettingError(
             f"the images make no camera: {why_not}; they should show the board from many sides", "folder"
         )
     return Calibration(model, len(on_boards), float(error))
@@ -170,19 +171,19 @@ def load(file: Path) -> CameraModel:
     """Read a model.
 
     Raises:
-        BadSetting: there is none, or it makes no sense.
+        SettingError: there is none, or it makes no sense.
     """
     try:
         if file.exists() and not file.is_file():
-            raise BadSetting(f"{file} is not a file", "calibration")
+            raise SettingError(f"{file} is not a file", "calibration")
         model = _model(json.loads(file.read_text(encoding="utf-8")))
     except OSError as error:
-        raise BadSetting(f"{file}: {error.strerror}", "calibration") from error
+        raise SettingError(f"{file}: {error.strerror}", "calibration") from error
     except (ValueError, RecursionError) as error:
-        raise BadSetting(f"{file} is no calibration: {error}", "calibration") from error
+        raise SettingError(f"{file} is no calibration: {error}", "calibration") from error
     why_not = nonsense(model)
     if why_not:
-        raise BadSetting(f"{file} is no calibration: {why_not}", "calibration")
+        raise SettingError(f"{file} is no calibration: {why_not}", "calibration")
     return model
 
 

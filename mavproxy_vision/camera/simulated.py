@@ -8,10 +8,10 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_vision.apriltag.tag_layout import FAMILIES, ID, NUMBER, require_id, require_size
 from mavproxy_vision.camera.renderer import PlacedTag, Renderer
 from mavproxy_vision.camera.source import Frame
-from mavproxy_vision.errors import BadSetting
 from mavproxy_vision.geometry.frames import Attitude, Vector
 
 SHORTEST = 0.01  # s of latency: what is drawn must have been heard of
@@ -103,7 +103,7 @@ def parse_placed(text: str, family: str) -> tuple[PlacedTag, ...]:
     """Read `[FAMILY:]ID:SIZE@NORTH,EAST[,HEADING]`, separated by spaces or semicolons; empty is no tag.
 
     Raises:
-        BadSetting: it is no such list.
+        SettingError: it is no such list.
     """
     found = []
     for word in re.split(r"[\s;]+", text.strip()):
@@ -111,11 +111,11 @@ def parse_placed(text: str, family: str) -> tuple[PlacedTag, ...]:
             continue
         match = PATTERN.fullmatch(word)
         if match is None or (match[1] or family) not in FAMILIES:
-            raise BadSetting(f"sim_tags: {word!r} is not ID:SIZE@NORTH,EAST or …,HEADING", "sim_tags")
+            raise SettingError(f"sim_tags: {word!r} is not ID:SIZE@NORTH,EAST or …,HEADING", "sim_tags")
         tag = PlacedTag(match[1] or family, int(match[2]), *(float(part or 0) for part in match.groups()[2:]))
         require_id("sim_tags", tag.family, tag.id)
         require_size("sim_tags", tag.size)
         if not (max(abs(tag.north), abs(tag.east)) <= FARTHEST and abs(tag.heading) <= 360):
-            raise BadSetting(f"sim_tags: {word!r} lies too far away, or heads beyond 360 degrees", "sim_tags")
+            raise SettingError(f"sim_tags: {word!r} lies too far away, or heads beyond 360 degrees", "sim_tags")
         found.append(tag)
     return tuple(found)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import Awaitable, Callable, Coroutine
+from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
 
 import cv2
 
 from mavproxy_uavapi.core.errors import Aborted, NotSupported, UavApiError
+from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle.copter import Copter
 from mavproxy_uavapi.core.vehicle.endings import FIXED
@@ -119,7 +120,7 @@ class FlightJobs:
         self._unfinished: set[TagFlight] = set()  # of these, those that took over
         self._plnd: dict[int, PrecisionLanding] = {}
         self._tidying: set[PrecisionLanding] = set()
-        self._tasks: set[asyncio.Task[None]] = set()
+        self._tasks = HeldTasks()
         self._unloaded = False
         tracker.host.last_words.append(self.last_words)
 
@@ -181,7 +182,7 @@ class FlightJobs:
         if plnd is not None and not any(one.plnd is plnd for one in self._unfinished):
             plnd.in_use = False
             if plnd.before and plnd not in self._tidying:
-                self._do(self._tidy(plnd))
+                self._tasks.start(self._tidy(plnd), "the return of parameters")
         self._leave_host()
 
     async def keep(self, track: FlightLog, report: Report) -> None:
@@ -209,12 +210,6 @@ class FlightJobs:
         return self._flight.phase if self._flight is not None else "over"
 
     # -- parameters that are still to be given back ----------------------------------------------------------
-
-    def _do(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
-        """Run it beside what else there is, held until it is done: the loop itself holds no task."""
-        self._tasks.add(task := asyncio.get_running_loop().create_task(work))
-        task.add_done_callback(self._tasks.discard)
-        return task
 
     async def _tidy(self, plnd: PrecisionLanding) -> None:
         """Give parameters back as soon as the vehicle hears us, and no flight needs them."""
@@ -245,7 +240,7 @@ class FlightJobs:
 
         jobs = self.tracker.host.jobs
         job = jobs.begin(copter, path, request, body, client=CONSOLE, outlives_client=True)
-        self._do(self._tell_end(job, tell))
+        self._tasks.start(self._tell_end(job, tell), "a flight from the prompt")
         return job
 
     async def _tell_end(self, job: Job, tell: Callable[[str], None]) -> None:

@@ -45,7 +45,7 @@ class MissionPlan:
         if self.lat is not None and self.lon is not None:
             return self.lat, self.lon
         if self.north is None or self.east is None:
-            raise Invalid("a mission needs north and east, or lat and long", "body")
+            raise Invalid("a mission needs north and east, or lat and long")
         lat, lon = home
         there = lon + self.east / (METRES_PER_DEGREE * math.cos(math.radians(lat)))
         return lat + self.north / METRES_PER_DEGREE, (there + 180.0) % 360.0 - 180.0

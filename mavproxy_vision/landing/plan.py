@@ -9,7 +9,7 @@ from mavproxy_uavapi.core.errors import Invalid
 from mavproxy_vision.apriltag.tag_layout import FAMILIES, Tag
 from mavproxy_vision.landing.expanding_square import step_for
 from mavproxy_vision.landing.state_machine import Plan
-from mavproxy_vision.settings import Settings
+from mavproxy_vision.settings import VisionSettings
 
 FINAL = 1.3  # of the height at which the tag fills the view
 LOWEST_FINAL = 0.4  # m
@@ -17,7 +17,7 @@ HIGHEST_CLIP = 1.5  # m from which a tag would be landed on without being seen
 DEPENDABLE = 0.85  # of the detection range
 
 
-def tags_for(settings: Settings, number: int | None) -> dict[int, Tag]:
+def tags_for(settings: VisionSettings, number: int | None) -> dict[int, Tag]:
     """The tags that tell where the target is, the main one first; None is that of the settings.
 
     Raises:
@@ -27,12 +27,12 @@ def tags_for(settings: Settings, number: int | None) -> dict[int, Tag]:
     if number is None or number == tags[0].id:
         return {tag.id: tag for tag in tags}
     if number >= FAMILIES[settings.families[0]][1]:
-        raise Invalid(f"{settings.families[0]} has no id {number}", "body", "id")
+        raise Invalid(f"{settings.families[0]} has no id {number}", "id")
     size = next((tag.size for tag in tags if tag.id == number), tags[0].size)
     return {number: Tag(number, size)}
 
 
-def landable(settings: Settings, number: int | None) -> dict[int, Tag]:
+def landable(settings: VisionSettings, number: int | None) -> dict[int, Tag]:
     """As `tags_for`, of tags that can be seen from low enough to land on.
 
     Raises:
@@ -45,20 +45,21 @@ def landable(settings: Settings, number: int | None) -> dict[int, Tag]:
         raise Invalid(
             f"tag {smallest.id} of {smallest.size:g} m is not in view below {clip:.1f} m: it takes a smaller one "
             "beside it (`tags`), or a lens that is nearer to the middle (`offset`)",
-            "body",
             "id",
         )
     return tags
 
 
-def clip_height(settings: Settings, tags: dict[int, Tag]) -> float:
+def clip_height(settings: VisionSettings, tags: dict[int, Tag]) -> float:
     """Metres above the target below which the smallest tag does not fit into the view."""
     forward, right, down = settings.camera_mount.offset
     smallest = min(tag.size for tag in tags.values())
     return settings.model.clip_height(smallest, math.hypot(forward, right)) + down
 
 
-def plan_for(settings: Settings, tags: dict[int, Tag], here: float | None, *, descend: bool, **changes: Any) -> Plan:
+def plan_for(
+    settings: VisionSettings, tags: dict[int, Tag], here: float | None, *, descend: bool, **changes: Any
+) -> Plan:
     """The plan of a landing, or of a search.
 
     Args:

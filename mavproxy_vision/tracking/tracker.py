@@ -13,6 +13,7 @@ from typing import Any
 
 import cv2
 
+from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
@@ -26,7 +27,7 @@ from mavproxy_vision.camera.simulated import SimulatedCamera, parse_placed
 from mavproxy_vision.camera.source import Folder, Image, Posted, Source
 from mavproxy_vision.errors import NoCamera
 from mavproxy_vision.geometry.frames import Attitude, vector
-from mavproxy_vision.settings import Settings
+from mavproxy_vision.settings import VisionSettings
 from mavproxy_vision.tracking.capture_worker import Health, Worker
 from mavproxy_vision.tracking.ground_truth import Pose, Truth
 from mavproxy_vision.tracking.measurement import TargetMeasurer, Wanted
@@ -35,7 +36,7 @@ from mavproxy_vision.tracking.stream_rates import TRUTH, Rates
 from mavproxy_vision.tracking.target_filter import Target
 
 FRESH = 1.0  # s; older detections are not shown as what is in view
-SOON = 0.06  # s of the vehicle's clock that telemetry is carried on to a frame; one farther ahead waits for it
+SOON = 0.06  # s of the vehicle's clock: the longest extrapolation of telemetry to a frame; a later frame waits
 
 
 class Tracker:
@@ -54,7 +55,7 @@ class Tracker:
         settings: the first snapshot.
     """
 
-    def __init__(self, host: Host, settings: Settings) -> None:
+    def __init__(self, host: Host, settings: VisionSettings) -> None:
         self.host, self.settings = host, settings
         self.history, self.clock, self.truth = History(), VehicleClock(), Truth()
         self.rates = Rates(host.clock)
@@ -72,7 +73,7 @@ class Tracker:
         )  # newer than the telemetry that tells where they were taken
         self._system = 0
         self._home_down: float | None = None
-        self._watching: asyncio.Task[None] | None = None
+        self._tasks = HeldTasks()
         self._truth_needed = contextlib.ExitStack()
         self._extra: set[int] = set()  # ids that `tags` does not name, but a flight
         self._changing = asyncio.Lock()
@@ -82,13 +83,13 @@ class Tracker:
     def listen(self) -> None:
         """Follow the vehicle's telemetry."""
         self.host.listeners.append(self._hear)
-        self._watching = asyncio.get_running_loop().create_task(self.rates.run(self.vehicle))
+        self._tasks.start(self.rates.run(self.vehicle), "the watch over the rates")
 
-    async def start(self, settings: Settings) -> None:
+    async def start(self, settings: VisionSettings) -> None:
         """Look through the camera that the settings name; what was running ends.
 
         Raises:
-            BadSetting: they make no sense together.
+            SettingError: they make no sense together.
             NoCamera: they name no camera.
         """
         async with self._changing:
@@ -118,20 +119,17 @@ class Tracker:
         """Give back everything."""
         if self._hear in self.host.listeners:
             self.host.listeners.remove(self._hear)
-        if self._watching is not None:
-            self._watching.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await self._watching
+        await self._tasks.end()
         await self.stop()
 
-    def _make_worker(self, settings: Settings) -> Worker:
+    def _make_worker(self, settings: VisionSettings) -> Worker:
         cv2.setNumThreads(settings.threads)
         detector = Detector(settings.model, self.options(settings))
         source = make_source(settings, self._where, self.host.clock)
         worker = Worker(source, detector, lambda seen, image: self.deliver(worker, seen, image), self.host.clock)
         return worker
 
-    def options(self, settings: Settings) -> DetectorOptions:
+    def options(self, settings: VisionSettings) -> DetectorOptions:
         """How the detector is to look."""
         tags = settings.tag_list
         sizes = dict.fromkeys(self._extra, tags[0].size) | {tag.id: tag.size for tag in tags}
@@ -310,7 +308,7 @@ class Tracker:
         return self.seen
 
 
-HEARD: dict[str, tuple[str, ...]] = {  # with the fields that a faulty estimator may make no numbers of
+HEARD: dict[str, tuple[str, ...]] = {  # with the fields that must be finite
     "ATTITUDE": ("roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed"),
     "LOCAL_POSITION_NED": ("x", "y", "z", "vx", "vy", "vz"),
     "GLOBAL_POSITION_INT": (),
@@ -318,11 +316,11 @@ HEARD: dict[str, tuple[str, ...]] = {  # with the fields that a faulty estimator
 }
 
 
-def make_source(settings: Settings, where: Any, clock: Callable[[], float]) -> Source:
+def make_source(settings: VisionSettings, where: Any, clock: Callable[[], float]) -> Source:
     """The source that the settings name.
 
     Raises:
-        BadSetting: one of its settings makes no sense.
+        SettingError: one of its settings makes no sense.
     """
     spec, latency = settings.source, settings.latency / 1000
     if spec == "sim":

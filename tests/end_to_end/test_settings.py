@@ -185,3 +185,51 @@ def test_log_file_has_them_all_with_time_component_and_level(rig):
     )
     assert all(form.fullmatch(line) for line in lines)
     assert any("/command/takeoff(alt=6): ok after" in line for line in lines)
+
+
+ALL_THREE = """
+[api]
+port = {port}
+sysid = 1
+gradys_gs = 127.0.0.1:9
+
+[vision]
+source = http
+tags = 0:0.4
+speed = 2
+
+[gradys]
+period = 3
+spool = {folder}/spool.db
+token = s3cret
+"""
+
+
+def test_one_file_that_the_environment_names_configures_all_three_modules(harness, tmp_path):
+    pytest.importorskip("cv2")
+    rig = harness.Rig(tmp_path, harness.free_port())
+    file = tmp_path / "uav.ini"
+    file.write_text(ALL_THREE.format(port=rig.port, folder=tmp_path), encoding="utf-8")
+    try:
+        command = harness.mavproxy_command(harness.start_embedded(rig), "--load-module=uavapi,vision,gradys")
+        given = {"UAVAPI_CONFIG": str(file), "VISION_SPEED": "3", "GRADYS_PERIOD": "4"}
+        rig.mavproxy = rig.start("mavproxy", command, given)
+        rig.wait_until_up()
+        rig.mavproxy.says("gradys: telling http://127.0.0.1:9")
+        rig.mavproxy.says("vision: looking for 36h11 through http")
+        rows = rig.mavproxy.ask("vision config", "sim_occlusion") + rig.mavproxy.ask("gradys config", "spool_hours")
+        words = [line.rpartition("> ")[2].split() for line in rows.splitlines()]  # the prompt may stand before one
+        told = {row[0]: row[1:] for row in words if len(row) > 2}
+        assert told["tags"] == ["0:0.4", str(file)]
+        assert told["speed"] == ["3.0", "environment"]
+        assert told["fps"] == ["20.0", "default"]
+        assert told["gs"] == ["127.0.0.1:9", str(file)]
+        assert told["period"] == ["4.0", "environment"]
+        assert told["token"] == ["(set)", str(file)]
+        assert "s3cret" not in rig.mavproxy.output()
+        file.write_text(file.read_text(encoding="utf-8").replace("tags =", "tgas ="), encoding="utf-8")
+        said = rig.mavproxy.ask("module reload vision", "Failed to load module")
+        assert "no key 'tgas' in [vision]; did you mean tags?" in said
+        assert rig.get("/gradys/status").status_code == 200  # the others live on
+    finally:
+        rig.stop()

@@ -14,7 +14,7 @@ import pytest
 from pymavlink import mavutil
 
 from mavproxy_gradys.errors import NotDelivered
-from mavproxy_gradys.settings import ModuleSettings, Settings
+from mavproxy_gradys.settings import GradysModuleSettings, GradysSettings
 from mavproxy_uavapi.core.host import Host
 
 mavlink = mavutil.mavlink
@@ -143,10 +143,10 @@ def down() -> NotDelivered:
 
 
 @pytest.fixture
-def settings(tmp_path: Path) -> Callable[..., Settings]:
+def settings(tmp_path: Path) -> Callable[..., GradysSettings]:
     """A snapshot: `settings(gs="127.0.0.1:1")`."""
 
-    def make(**given: Any) -> Settings:
-        return ModuleSettings({"spool": str(tmp_path / "spool.db"), **given}).snapshot()
+    def make(**given: Any) -> GradysSettings:
+        return GradysModuleSettings({"spool": str(tmp_path / "spool.db"), **given}).snapshot()
 
     return make

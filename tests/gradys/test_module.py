@@ -56,7 +56,27 @@ def test_before_the_first_idle_task_it_says_that_mavproxy_is_starting(mpstate: A
     assert "still starting" in capsys.readouterr().out
     module.command(["set", "gs", "10.0.0.5:8000"])
     module.command(["set", "gs"])
-    assert "gs 10.0.0.5:8000" in capsys.readouterr().out
+    assert capsys.readouterr().out.split() == ["gs", "10.0.0.5:8000", "gradys", "set"]
+    module.unload()
+
+
+def test_config_tells_of_each_value_where_it_came_from_and_no_secret(mpstate: Any, capsys: Any) -> None:
+    module = gradys.init(mpstate, token="s3cret", sink="mqtt://me:pass@broker/x")
+    module.command(["set", "period", "2"])
+    capsys.readouterr()
+    module.command(["config"])
+    lines = capsys.readouterr().out
+    assert [line.split()[0] for line in lines.splitlines()] == module.gradys_settings.names()
+    rows = {line.split()[0]: line.split()[1:] for line in lines.splitlines()}
+    assert rows["period"] == ["2.0", "gradys", "set"]
+    assert rows["timeout"] == ["3.0", "default"]
+    assert rows["token"] == ["(set)", "module", "load"]
+    assert rows["sink"] == ["mqtt://me:***@broker/x", "module", "load"]
+    assert "s3cret" not in lines and "pass" not in lines
+    module.command(["set"])
+    assert capsys.readouterr().out == lines
+    module.command(["set", "perod"])
+    assert capsys.readouterr().out == "gradys: no setting 'perod'; did you mean period?\n"
     module.unload()
 
 

@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from mavproxy_gradys.settings import ModuleSettings
-from mavproxy_uavapi.settings import SettingError
+from mavproxy_gradys.settings import GradysModuleSettings
+from mavproxy_uavapi.core.errors import SettingError
 
 
 def test_an_ini_file_of_the_original_service_names_the_station(tmp_path: Path) -> None:
@@ -15,7 +15,7 @@ def test_an_ini_file_of_the_original_service_names_the_station(tmp_path: Path) -
         "[api]\nport = 8000\ngradys_gs = 10.0.0.5:8000\n[logs]\ndebug = []\n"
         "[gradys]\nperiod = 2\nquantities = position@1\n  alt=GLOBAL_POSITION_INT.relative_alt*0.001@1[m]\n"
     )
-    settings = ModuleSettings({"config": str(ini), "period": 3}).snapshot()
+    settings = GradysModuleSettings({"config": str(ini), "period": 3}).snapshot()
     assert [station.url for station in settings.gs] == ["http://10.0.0.5:8000"]
     assert settings.period == 3.0
     assert [quantity.name for quantity in settings.quantities] == ["position", "alt"]
@@ -26,7 +26,7 @@ def test_an_ini_file_that_means_nothing_is_refused(tmp_path: Path, text: str) ->
     ini = tmp_path / "uav.ini"
     ini.write_text(text)
     with pytest.raises(SettingError):
-        ModuleSettings({"config": str(ini)})
+        GradysModuleSettings({"config": str(ini)})
 
 
 @pytest.mark.parametrize(
@@ -39,24 +39,24 @@ def test_an_ini_file_that_means_nothing_is_refused(tmp_path: Path, text: str) ->
 )  # fmt: skip
 def test_what_cannot_work_is_refused(name: str, value: Any) -> None:
     with pytest.raises(SettingError):
-        ModuleSettings({name: value})
+        GradysModuleSettings({name: value})
 
 
 def test_a_sinks_option_is_no_comment_of_an_ini_file(tmp_path: Path) -> None:
     ini = tmp_path / "uav.ini"
     ini.write_text("[gradys]\nsink = http://h/r#ack=status, mqtt://b/t\n")
-    settings = ModuleSettings({"config": str(ini)})
+    settings = GradysModuleSettings({"config": str(ini)})
     assert [sink.status_counts for sink in settings.snapshot().sink] == [True, False]
     assert settings.shown("sink") == "http://h/r#ack=status,mqtt://b/t"
 
 
 def test_none_unsets() -> None:
-    settings = ModuleSettings({"gs": "a:1"})
+    settings = GradysModuleSettings({"gs": "a:1"})
     settings.set("gs", "None")
     assert settings.snapshot().gs == ()
 
 
 def test_passwords_are_not_shown() -> None:
-    settings = ModuleSettings({"token": "s3cret", "sink": "mqtt://me:pass@broker/x"})
+    settings = GradysModuleSettings({"token": "s3cret", "sink": "mqtt://me:pass@broker/x"})
     assert settings.shown("token") == "(set)"
     assert settings.shown("sink") == "mqtt://me:***@broker/x"

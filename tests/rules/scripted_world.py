@@ -27,7 +27,7 @@ from mavproxy_uavapi.http.app import make_app
 from mavproxy_uavapi.http.call import Service
 from mavproxy_uavapi.http.connection import Connection
 from mavproxy_uavapi.scripts import on_exit
-from mavproxy_uavapi.settings import ModuleSettings
+from mavproxy_uavapi.settings import ApiModuleSettings
 from tests.support.drone import Drone, mavlink
 from tests.support.mavproxy import mavproxy_state
 from tests.support.messages import message_of
@@ -128,7 +128,7 @@ class ScriptedWorld:
         self.wires: list[Any] = []
         self.streams: dict[int, asyncio.Task[None]] = {}
         self._watch_jobs()
-        self.service = Service(self.host, ModuleSettings(SETTINGS, environ={}).snapshot())
+        self.service = Service(self.host, ApiModuleSettings(SETTINGS, environ={}).snapshot())
         endings = self.host.endings
         endings.on_disconnect, endings.on_script_exit = Policy(on_disconnect), Policy(on_script_exit)
         self._runner = web.AppRunner(make_app(self.service), access_log=None, handler_cancellation=True)

@@ -30,7 +30,7 @@ from mavproxy_vision.apriltag.detection import FrameResult
 from mavproxy_vision.apriltag.detector import Detector
 from mavproxy_vision.camera.source import Frame
 from mavproxy_vision.landing.flight_jobs import FlightJobs
-from mavproxy_vision.settings import ModuleSettings
+from mavproxy_vision.settings import VisionModuleSettings
 from mavproxy_vision.tracking.capture_worker import Health, Watch
 from mavproxy_vision.tracking.stream_rates import TRUTH
 from mavproxy_vision.tracking.tracker import Tracker, make_source
@@ -174,7 +174,7 @@ class Lockstep:
         self.each_step: list[Callable[[], None]] = []
         self.burst = 0.0  # s from one hearing of the vehicle to the next: a machine that is too busy
         self._heard_at = 0.0
-        self.settings = ModuleSettings({"source": "sim", **settings})
+        self.settings = VisionModuleSettings({"source": "sim", **settings})
         self.directory = Path(tempfile.mkdtemp())
         self.tracker = Tracker(self.host, self.settings.snapshot())
         self.flights = FlightJobs(self.tracker, lambda: self.directory)

@@ -26,7 +26,7 @@ from mavproxy_uavapi.core.vehicle.stream_requester import StreamRequester
 from mavproxy_uavapi.http.app import make_app
 from mavproxy_uavapi.http.call import Service
 from mavproxy_uavapi.http.connection import Connection
-from mavproxy_uavapi.settings import ModuleSettings
+from mavproxy_uavapi.settings import ApiModuleSettings
 from mavproxy_uavapi.sim import Options, Simulator
 from mavproxy_uavapi.sim.control import Control
 from mavproxy_uavapi.sim.mission import Item
@@ -92,7 +92,7 @@ class World:
         self._encoder = mavlink.MAVLink(None, *US)
         self._parser = mavlink.MAVLink(None)
         self._arriving: list[Any] = []
-        self.service = Service(host, ModuleSettings(settings, environ={}).snapshot())
+        self.service = Service(host, ApiModuleSettings(settings, environ={}).snapshot())
         self.gradys = Gradys(host)
         for route in GradysHandlers(self.gradys).routes():
             host.extensions[route.path] = route
@@ -106,7 +106,7 @@ class World:
         """Give it vision with a simulated camera, which looks from `go_live` on; needs OpenCV."""
         from mavproxy_vision.http import VisionHandlers  # noqa: PLC0415
         from mavproxy_vision.landing.flight_jobs import FlightJobs  # noqa: PLC0415
-        from mavproxy_vision.settings import ModuleSettings as VisionSettings  # noqa: PLC0415
+        from mavproxy_vision.settings import ApiModuleSettings as VisionSettings  # noqa: PLC0415
         from mavproxy_vision.tracking.stream_rates import TRUTH  # noqa: PLC0415
         from mavproxy_vision.tracking.tracker import Tracker  # noqa: PLC0415
         from tests.support.lockstep import Eye  # noqa: PLC0415

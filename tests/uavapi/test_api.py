@@ -8,14 +8,14 @@ import pytest
 from aiohttp import ClientSession
 
 from mavproxy_uavapi.api import Api
-from mavproxy_uavapi.settings import ModuleSettings
+from mavproxy_uavapi.settings import ApiModuleSettings
 
 
 @pytest.fixture
 def settings() -> Any:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
-        return ModuleSettings({"port": probe.getsockname()[1], "link_timeout": 9.0}).snapshot()
+        return ApiModuleSettings({"port": probe.getsockname()[1], "link_timeout": 9.0}).snapshot()
 
 
 @pytest.fixture

@@ -8,10 +8,10 @@ from pymavlink import mavutil
 from mavproxy_uavapi.api import Api
 from mavproxy_uavapi.console import report, vehicles
 from mavproxy_uavapi.core.vehicle.messages import NedTarget
-from mavproxy_uavapi.settings import ModuleSettings
+from mavproxy_uavapi.settings import ApiModuleSettings
 
 mavlink = mavutil.mavlink
-SETTINGS = ModuleSettings().snapshot()
+SETTINGS = ApiModuleSettings().snapshot()
 
 
 @pytest.fixture
@@ -60,8 +60,10 @@ def test_lost_link_and_lost_packets_are_told(loop: Any, api: Api, drone: Any) ->
 def test_report_is_of_the_vehicle_of_the_settings(api: Api, make_drone: Any) -> None:
     make_drone(1)
     make_drone(2)
-    assert "vehicle 2:" in report(api, ModuleSettings({"sysid": 2}).snapshot())
-    assert "no vehicle 9 on the link yet; heard so far: 1, 2" in report(api, ModuleSettings({"sysid": 9}).snapshot())
+    assert "vehicle 2:" in report(api, ApiModuleSettings({"sysid": 2}).snapshot())
+    assert "no vehicle 9 on the link yet; heard so far: 1, 2" in report(
+        api, ApiModuleSettings({"sysid": 9}).snapshot()
+    )
 
 
 def test_vehicles_are_a_line_each(loop: Any, host: Any, api: Api, make_drone: Any, msg: Any) -> None:

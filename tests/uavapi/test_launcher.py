@@ -16,6 +16,7 @@ import termios
 import textwrap
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -32,6 +33,7 @@ from mavproxy_uavapi.launcher import (
 )
 from mavproxy_uavapi.launcher.errors import LaunchError, OptionError
 from mavproxy_uavapi.launcher.options import RunOptions, parse
+from mavproxy_vision import opencv_install
 
 ROOT = Path(cli.__file__).resolve().parents[2]
 
@@ -55,7 +57,7 @@ def ini(tmp_path, text):
 
 
 def test_the_table_and_the_options_name_the_same_things():
-    others = {"module", "mavproxy_args", "further", "gradys_config", "origins"}
+    others = {"module", "mavproxy_args", "further", "vision_config", "gradys_config", "origins"}
     assert {row.name for row in options.TABLE} | others == {field.name for field in dataclasses.fields(RunOptions)}
 
 
@@ -137,8 +139,8 @@ def test_simulated_section_may_say_no(tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("[api]\nprot=8001\n", "unknown key 'prot' in [api]"),
-        ("[apl]\nport=8001\n", "unknown section [apl]"),
+        ("[api]\nprot=8001\n", "no key 'prot' in [api]; did you mean port?"),
+        ("[apl]\nport=8001\n", "no section [apl]; did you mean api?"),
         ("[api]\nport=80o1\n", "port in [api]: expected a whole number from 1 to 65535, got '80o1'"),
         ("[simulated]\nheadless=maybe\n", "expected true or false"),
         ("port=8001\n", "no section headers"),
@@ -672,6 +674,7 @@ def test_module_is_told_where_each_setting_came_from(tmp_path: Path) -> None:
 
 def test_environment_that_was_read_does_not_come_back_over_the_command_line() -> None:
     given = {"UAVAPI_SCRIPTS_PATH": "/e", "UAVAPI_PORT": "1", "UAVAPI_SCRIPT_GRACE": "20", "UAVAPI_TOKEN": "t"}
+    given["UAVAPI_CONFIG"] = "/e/uav.ini"
     passed = environment.for_mavproxy(given)
     assert {name for name in passed if name.startswith("UAVAPI_")} == {"UAVAPI_SCRIPT_GRACE", "UAVAPI_TOKEN"}
 
@@ -681,8 +684,69 @@ def test_section_of_the_module_gradys_is_its_own_to_read(tmp_path: Path) -> None
     file.write_text("[api]\ngradys_gs = 10.0.2.5:8000\n[gradys]\nperiod = 2\n", encoding="utf-8")
     read = parse(["--config", str(file), "--module", "gradys,vision"], environ={})
     loads = command_lines.module_loads(read, None)
-    assert as_mavproxy_reads(loads[1]) == ("gradys", {"config": str(file), "gs": "10.0.2.5:8000"})
+    keywords = {"config": str(file), "gs": "10.0.2.5:8000", "origins": {"gs": str(file)}}
+    assert as_mavproxy_reads(loads[1]) == ("gradys", keywords)
     assert loads[2:] == ["module load vision"]
+
+
+def test_one_file_configures_all_three_modules(tmp_path: Path) -> None:
+    pytest.importorskip("cv2")
+    file = tmp_path / "uav.ini"
+    file.write_text("[api]\nport = 8005\n[vision]\nspeed = 2\n[gradys]\nperiod = 2\n", encoding="utf-8")
+    by_argument = parse(["--config", str(file)], environ={})
+    assert parse([], environ={"UAVAPI_CONFIG": str(file)}) == by_argument
+    loads = [as_mavproxy_reads(load) for load in command_lines.module_loads(by_argument, None)]
+    assert [name for name, _ in loads] == ["uavapi", "gradys", "vision"]
+    assert loads[1][1] == loads[2][1] == {"config": str(file)}
+
+
+def test_keywords_of_a_module_go_with_its_section_and_load_it_once(tmp_path: Path) -> None:
+    file = tmp_path / "uav.ini"
+    file.write_text("[gradys]\nperiod = 2\n", encoding="utf-8")
+    read = parse(["--config", str(file), "--module", 'gradys:{"period":3}', "--module", 'map:{"a":1}'], environ={})
+    loads = command_lines.module_loads(read, None)
+    assert as_mavproxy_reads(loads[1]) == ("gradys", {"config": str(file), "period": 3})
+    assert loads[2:] == ['module load map:{"a":1}']
+    with pytest.raises(OptionError, match="--module"):
+        parse(["--module", "gradys:{period}"], environ={})
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[vison]\nspeed = 2\n", "no section [vison]; did you mean vision?"),
+        ("[vision]\nspede = 2\n", "no key 'spede' in [vision]; did you mean speed?"),
+        ("[vision]\nspeed = nan\n", "speed = 'nan': it takes a float from 0.1 to 10"),
+        ("[vision]\ntags = 0:0.3.0\n", "tags: '0:0.3.0' is not ID:SIZE"),
+        ("[gradys]\nperoid = 2\n", "no key 'peroid' in [gradys]; did you mean period?"),
+        ("[gradys]\nsink = mqtt://me:s3cret@b/a?b\n", "sink: mqtt://me:***@b/a?***: a topic holds none of + # ?"),
+    ],
+)
+def test_sections_of_the_modules_are_checked_before_anything_starts(tmp_path, text, said):
+    if "[vision]" in text:
+        pytest.importorskip("cv2")
+    file = tmp_path / "uav.ini"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(OptionError) as caught:
+        parse(["--config", str(file)], environ={})
+    assert f"{file}: {said}" in str(caught.value)
+    assert "s3cret" not in str(caught.value)
+
+
+def test_environment_of_a_module_is_checked_with_its_section(tmp_path: Path) -> None:
+    file = tmp_path / "uav.ini"
+    file.write_text("[gradys]\nperiod = 2\n", encoding="utf-8")
+    with pytest.raises(OptionError, match="^GRADYS_PERIOD: period = 'x': it takes a float"):
+        parse(["--config", str(file)], environ={"GRADYS_PERIOD": "x"})
+
+
+def test_section_vision_without_opencv_is_one_clear_line(tmp_path: Path, monkeypatch: Any) -> None:
+    file = tmp_path / "uav.ini"
+    file.write_text("[vision]\nspeed = 2\n", encoding="utf-8")
+    monkeypatch.setattr(opencv_install, "problem", lambda: "vision needs OpenCV 4.10 or newer, but there is none")
+    with pytest.raises(OptionError) as caught:
+        parse(["--config", str(file)], environ={})
+    assert str(caught.value) == f"{file}: [vision]: vision needs OpenCV 4.10 or newer, but there is none"
 
 
 def test_http3_of_the_original_service_may_be_off_only(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 import pytest
 
+from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_vision import file_commands
 from mavproxy_vision.apriltag.detection import FrameResult
 from mavproxy_vision.apriltag.overlay import annotated, jpeg
@@ -23,10 +24,10 @@ from mavproxy_vision.camera.calibration import Board, calibrate, load, save
 from mavproxy_vision.camera.image_size import size_of
 from mavproxy_vision.camera.opencv_capture import Capture
 from mavproxy_vision.camera.source import Folder, Frame, Posted, decode, decode_any, grey
-from mavproxy_vision.errors import BadImage, BadSetting, NoCamera
+from mavproxy_vision.errors import BadImage, NoCamera
 from mavproxy_vision.geometry.camera_model import CameraModel
 from mavproxy_vision.landing.flight_log import SIDE, FlightLog
-from mavproxy_vision.settings import ModuleSettings
+from mavproxy_vision.settings import VisionModuleSettings
 from mavproxy_vision.tracking.capture_worker import Watch, Worker
 from mavproxy_vision.tracking.tracker import Tracker
 
@@ -348,7 +349,7 @@ def test_calibration_from_rendered_chessboards(tmp_path, boards):
     assert made.model.fy == pytest.approx(605, rel=0.01)
     save(made.model, tmp_path / "camera.json")
     assert load(tmp_path / "camera.json") == made.model
-    assert ModuleSettings({"calibration": str(tmp_path / "camera.json")}).snapshot().model == made.model
+    assert VisionModuleSettings({"calibration": str(tmp_path / "camera.json")}).snapshot().model == made.model
 
 
 def calibration(**changed):
@@ -393,7 +394,7 @@ def test_a_calibration_may_have_as_many_coefficients_as_opencv_takes(tmp_path, c
 def test_a_calibration_that_makes_no_sense_is_refused(tmp_path, changed, why):
     file = tmp_path / "camera.json"
     file.write_text(json.dumps(calibration(**changed)), encoding="utf-8")
-    with pytest.raises(BadSetting, match=f"is no calibration: .*{why}"):
+    with pytest.raises(SettingError, match=f"is no calibration: .*{why}"):
         load(file)
 
 
@@ -401,7 +402,7 @@ def test_a_calibration_that_makes_no_sense_is_refused(tmp_path, changed, why):
 def test_a_file_that_is_no_calibration_is_refused(tmp_path, text):
     file = tmp_path / "camera.json"
     file.write_bytes(text if isinstance(text, bytes) else text.encode())
-    with pytest.raises(BadSetting, match="is no calibration"):
+    with pytest.raises(SettingError, match="is no calibration"):
         load(file)
 
 
@@ -411,7 +412,7 @@ def test_what_is_no_file_is_no_calibration(tmp_path):
         (tmp_path, "not a file"),
         (Path("/dev/zero"), "not a"),
     ):
-        with pytest.raises(BadSetting, match=why):
+        with pytest.raises(SettingError, match=why):
             load(file)
 
 
@@ -433,7 +434,7 @@ def test_what_is_no_file_is_no_calibration(tmp_path):
     ],
 )
 def test_a_board_that_cannot_be_is_refused(tmp_path, board, why):
-    with pytest.raises(BadSetting, match=why):
+    with pytest.raises(SettingError, match=why):
         file_commands.calibrated([str(tmp_path), board])
 
 
@@ -447,9 +448,9 @@ def test_any_other_board_is_looked_for(board):
 def test_a_folder_without_boards_makes_no_camera(tmp_path):
     (tmp_path / "0.png").write_bytes(png_header(40_000, 40_000))
     (tmp_path / "1.png").write_bytes(b"nonsense")
-    with pytest.raises(BadSetting, match="0 images"):
+    with pytest.raises(SettingError, match="0 images"):
         calibrate(tmp_path, Board.parse("charuco:7x5:0.03:0.022"))
-    with pytest.raises(BadSetting, match="not a folder"):
+    with pytest.raises(SettingError, match="not a folder"):
         calibrate(tmp_path / "none", Board.parse("charuco:7x5:0.03:0.022"))
 
 
@@ -458,7 +459,7 @@ def test_images_that_determine_no_camera_are_told(tmp_path):
     flat = np.pad(squares, 40, constant_values=230).astype(np.uint8)
     for index in range(5):
         cv2.imwrite(str(tmp_path / f"{index}.png"), flat)
-    with pytest.raises(BadSetting, match="the images make no camera: "):
+    with pytest.raises(SettingError, match="the images make no camera: "):
         calibrate(tmp_path, Board.parse("chessboard:10x7:0.03"))
 
 
@@ -510,7 +511,7 @@ def test_tags_that_cannot_be_printed():
         ("36h11", 0, 0),
         ("36h11", 0, 1),
     ):
-        with pytest.raises(BadSetting):
+        with pytest.raises(SettingError):
             tag_pdf(family, number, size)
     assert b"A0" in tag_pdf("36h11", 0, 0.6)
 
@@ -539,7 +540,7 @@ def test_the_prompts_file_commands(tmp_path):
         lambda: file_commands.calibrated(["~nobody_xyz", "charuco:7x5:0.03"]),
         lambda: file_commands.calibrated([str(tmp_path), "charuco:7x5:0.03", "~nobody_xyz/camera.json"]),
     ):
-        with pytest.raises(BadSetting) as refusal:
+        with pytest.raises(SettingError) as refusal:
             call()
         assert "\n" not in str(refusal.value)
     assert sorted(file.name for file in tmp_path.iterdir()) == ["a.png", "t.pdf"]

@@ -62,6 +62,19 @@ def test_commands_before_the_first_turn_say_so(module: Any, capsys: Any) -> None
         assert "main loop" in said(module, capsys, *words)
 
 
+def test_config_and_set_tell_of_each_value_where_it_came_from(module: Any, capsys: Any) -> None:
+    lines = said(module, capsys, "config").splitlines()
+    assert [line.split()[0] for line in lines] == module.vision_settings.names()
+    assert said(module, capsys, "set").splitlines() == lines
+    module.command(["set", "speed", "2"])
+    assert said(module, capsys, "set", "speed").split() == ["speed", "2.0", "vision", "set"]
+    assert [line.split()[0] for line in said(module, capsys, "set", "sim_[tl]*").splitlines()] == [
+        "sim_tags",
+        "sim_latency",
+    ]
+    assert said(module, capsys, "set", "spede") == "vision: no setting 'spede'; did you mean speed?\n"
+
+
 def test_loading_and_unloading_leaves_nothing_behind(mpstate: Any, descriptors: Any) -> None:
     threads, before = threading.active_count(), descriptors()
     for _ in range(20):

@@ -56,5 +56,5 @@ def mode_number(vehicle_type: int, name: str) -> int:
     """
     numbers: dict[str, int] = mavutil.mode_mapping_byname(vehicle_type) or {}
     if name.upper() not in numbers:
-        raise Invalid(f"no mode {name!r}; there are {', '.join(sorted(numbers))}", "query", "mode")
+        raise Invalid(f"no mode {name!r}; there are {', '.join(sorted(numbers))}", "mode")
     return numbers[name.upper()]

@@ -106,7 +106,7 @@ class BaseVehicle:
     def has_position(self) -> bool:
         """Whether its estimator has an absolute horizontal position, by EKF_STATUS_REPORT.
 
-        An autopilot that sends no such report is taken at its pre-arm word. The pre-arm bit alone is not
+        Without that report the pre-arm bit decides. The pre-arm bit alone is not
         enough: in STABILIZE ArduCopter sets it 20 s before its position is good for GUIDED.
         """
         flags = self.state.recent_field("EKF_STATUS_REPORT", "flags")

@@ -82,7 +82,7 @@ class Copter(GuidedVehicle):
                 {"EXTENDED_SYS_STATE"},
                 lambda: True if self.state.landed is False else None,
                 max(LIFT_OFF_TIMEOUT, LIFT_OFF_TIMEOUT / ratio),
-                "acknowledge the takeoff, nor lift off",
+                "acknowledge the takeoff, and did not leave the ground",
             )
 
     async def land(self, job: Job, timeout: float | None = None) -> None:

@@ -86,7 +86,7 @@ class GuidedVehicle(Vehicle):
         self.require_guided_flight()
         north, east, up = self._leg_to(target)
         if self.height + up < FLOOR - TOLERANCE:
-            raise Invalid(f"the target lies {-(self.height + up):.1f} m below home", "body")
+            raise Invalid(f"the target lies {-(self.height + up):.1f} m below home")
         self.authority.take(job, Rank.MOVEMENT)
         yaw = messages.towards(north, east) if look_at_target else NO_YAW
         await self._take_up(job, target, yaw)

@@ -158,11 +158,9 @@ def checked(messages: Sequence[Any]) -> list[MissionItem]:
         Invalid: with one entry for each problem.
     """
     if not 0 < len(messages) <= MOST_ITEMS:
-        raise Invalid(f"a mission has 1 to {MOST_ITEMS} items besides home, not {len(messages)}", "body", "items")
+        raise Invalid(f"a mission has 1 to {MOST_ITEMS} items besides home, not {len(messages)}", "items")
     found = [(seq, _problem(message)) for seq, message in enumerate(messages, 1)]
-    problems = [
-        {"loc": ["body", "items", seq], "msg": problem, "type": "value_error"} for seq, problem in found if problem
-    ]
+    problems = [{"loc": ["items", seq], "msg": problem, "type": "value_error"} for seq, problem in found if problem]
     if problems:
         raise Invalid(problems)
     return [from_message(message) for message in messages]
@@ -215,7 +213,7 @@ def _loaded(items: Iterable[Any], convert: Any) -> list[Any]:
             command, frame, autocontinue, numbers = convert(item)
             loader.add(mavlink.MAVLink_mission_item_message(0, 0, seq, frame, command, 0, autocontinue, *numbers))
         except (TypeError, ValueError, KeyError, OverflowError) as error:
-            raise Invalid(f"{type(error).__name__}: {error}", "body", "items", str(seq)) from error
+            raise Invalid(f"{type(error).__name__}: {error}", "items", str(seq)) from error
     return list(loader.wpoints)
 
 

@@ -48,7 +48,7 @@ def test_mode_without_a_name_is_told_by_its_number() -> None:
 def test_plane_has_no_land_mode() -> None:
     with pytest.raises(Invalid, match="no mode 'LAND'; there are .*AUTO") as caught:
         mode_number(PLANE, "LAND")
-    assert caught.value.problems[0]["loc"] == ["query", "mode"]
+    assert caught.value.problems[0]["loc"] == ["mode"]
 
 
 @pytest.mark.parametrize(

@@ -124,7 +124,7 @@ def test_takeoff_whose_ack_is_lost_is_known_by_its_lifting_off(armed: Any, copte
 def test_takeoff_without_ack_and_lift_off_is_a_timeout(loop: Any, armed: Any, copter: Any, pilotage: Any) -> None:
     armed.answers[TAKEOFF] = [None]
     started = loop.time()
-    with pytest.raises(TimedOut, match="acknowledge the takeoff, nor lift off"):
+    with pytest.raises(TimedOut, match="acknowledge the takeoff, and did not leave the ground"):
         pilotage.do(copter.takeoff, 30.0)
     assert loop.time() - started < 10.0
     assert len(armed.commands(TAKEOFF)) == 1

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from mavproxy_gradys.forwarding.readings import Quantity, Sampler, parse_quantities, parse_quantity
-from mavproxy_uavapi.settings import SettingError
+from mavproxy_uavapi.core.errors import SettingError
 
 ALT = parse_quantity("alt=GLOBAL_POSITION_INT.relative_alt*0.001@1[m]")
 
@@ -24,7 +24,7 @@ def test_a_list_by_comma_semicolon_or_space() -> None:
         "position@1, alt=GLOBAL_POSITION_INT.relative_alt*0.001[m, above home];v=SYS_STATUS.load hdg=VFR_HUD.heading"
     )
     assert [quantity.name for quantity in parse_quantities(text)] == ["position", "alt", "v", "hdg"]
-    assert parse_quantities("") == []
+    assert parse_quantities("") == ()
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from mavproxy_gradys.forwarding.sink_address import sink_address, sink_addresses
-from mavproxy_uavapi.settings import SettingError
+from mavproxy_uavapi.core.errors import SettingError
 
 
 @pytest.mark.parametrize(

@@ -4,9 +4,9 @@ from typing import Any
 
 import pytest
 
-from mavproxy_gradys.net.addresses import api_note, check_ip, ip_field, own_address, station, stations
+from mavproxy_gradys.net.addresses import api_note, checked_ip, ip_field, own_address, station, stations
 from mavproxy_gradys.net.resolver import Resolver
-from mavproxy_uavapi.settings import SettingError
+from mavproxy_uavapi.core.errors import SettingError
 
 
 @pytest.mark.parametrize(
@@ -48,7 +48,7 @@ def test_what_is_no_station_is_refused(text: str) -> None:
 
 def test_several_stations_are_told_once_each() -> None:
     assert [s.host for s in stations("a:1, b:1,,a:1")] == ["a", "b"]
-    assert stations("") == []
+    assert stations("") == ()
 
 
 @pytest.mark.parametrize(
@@ -71,7 +71,7 @@ def test_ip_has_no_scheme_and_ends_in_a_slash(given: str, own: str, api: Any, fi
 def test_ip_that_no_station_could_call_is_refused() -> None:
     for text in ("a b", "x/y", "http://", "x:many"):
         with pytest.raises(SettingError):
-            check_ip(text)
+            checked_ip(text)
 
 
 def test_the_note_says_when_the_station_cannot_command_us() -> None:

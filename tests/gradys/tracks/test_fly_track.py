@@ -20,7 +20,7 @@ from mavproxy_uavapi.http.auditing import audited
 from mavproxy_uavapi.http.call import Call, Service
 from mavproxy_uavapi.http.jobs import list_jobs
 from mavproxy_uavapi.http.requests import Empty
-from mavproxy_uavapi.settings import ModuleSettings
+from mavproxy_uavapi.settings import ApiModuleSettings
 
 LINE = "(1, -158400810, -479266420, 584090, 0, 65535, 0, 0, 3, 10)\n"
 LONG = LINE + "# a comment\n" * 10_000
@@ -36,7 +36,7 @@ def service(host: Any, teller: Any, monkeypatch: pytest.MonkeyPatch) -> Service:
     monkeypatch.setattr(asyncio, "to_thread", at_once)
     teller.tell("heartbeat", armed=True, mode="GUIDED", system_status=4)
     teller.tell("extended_sys_state", landed_state=2)
-    return Service(host, ModuleSettings(environ={}).snapshot())
+    return Service(host, ApiModuleSettings(environ={}).snapshot())
 
 
 def call_of(service: Service, text: str = LONG, **query: str) -> Call:

@@ -13,7 +13,7 @@ from aiohttp.test_utils import TestClient, TestServer
 
 from mavproxy_uavapi.http.app import make_app
 from mavproxy_uavapi.http.call import Service
-from mavproxy_uavapi.settings import ModuleSettings
+from mavproxy_uavapi.settings import ApiModuleSettings
 
 SOCKET_PATIENCE = 0.002  # real s that the sockets get before the clock jumps
 
@@ -67,7 +67,7 @@ class Api:
 @pytest.fixture
 def service(host: Any) -> Service:
     """What the handlers work with."""
-    return Service(host, ModuleSettings(environ={}).snapshot())
+    return Service(host, ApiModuleSettings(environ={}).snapshot())
 
 
 @pytest.fixture

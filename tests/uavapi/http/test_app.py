@@ -15,7 +15,7 @@ from aiohttp.test_utils import TestClient, TestServer
 from mavproxy_uavapi.http.app import MAX_BODY, ApiServer, listening_socket, make_app
 from mavproxy_uavapi.http.requests import Servo
 from mavproxy_uavapi.http.route import Route
-from mavproxy_uavapi.settings import ModuleSettings
+from mavproxy_uavapi.settings import ApiModuleSettings
 
 
 @pytest.fixture
@@ -28,7 +28,7 @@ def free_port() -> int:
 @pytest.fixture
 def server(loop: Any, service: Any, free_port: int) -> Any:
     loop.patience = 0.002
-    service.settings = ModuleSettings({"port": free_port}).snapshot()
+    service.settings = ApiModuleSettings({"port": free_port}).snapshot()
     server = ApiServer(service)
     yield server
     loop.run(server.stop())
@@ -149,7 +149,7 @@ def test_port_that_is_taken_is_an_os_error_and_leaks_nothing(
 
 def test_port_can_be_bound_again_at_once(loop: Any, service: Any, free_port: int, drone: Any) -> None:
     loop.patience = 0.002
-    service.settings = ModuleSettings({"port": free_port}).snapshot()
+    service.settings = ApiModuleSettings({"port": free_port}).snapshot()
     for _ in range(3):
         server = ApiServer(service)
         loop.run(server.start())

@@ -8,7 +8,7 @@ import pytest
 from mavproxy_uavapi.http.call import BODY_TIMEOUT, Call, in_time
 from mavproxy_uavapi.http.requests import Blocking, Empty, Servo
 from mavproxy_uavapi.http.route import POST, Route
-from mavproxy_uavapi.settings import ModuleSettings
+from mavproxy_uavapi.settings import ApiModuleSettings
 
 
 def test_parameters_are_those_of_the_routes_model(service: Any) -> None:
@@ -21,7 +21,7 @@ def test_parameters_are_those_of_the_routes_model(service: Any) -> None:
 def test_vehicle_is_the_one_of_the_settings(make_drone: Any, service: Any) -> None:
     make_drone(1)
     make_drone(2)
-    service.settings = ModuleSettings({"sysid": 2}).snapshot()
+    service.settings = ApiModuleSettings({"sysid": 2}).snapshot()
     call = Call(service, None, Empty())  # type: ignore[arg-type]
     assert call.vehicle.state.system == call.seen.state.system == 2
     assert call.answer("done")["id"] == "2"
@@ -61,7 +61,7 @@ URGENT = ["/command/land", "/command/rtl", "/command/brake", "/command/disarm?fo
 def test_no_limit_of_jobs_keeps_a_vehicle_from_being_stopped(
     flying: Any, service: Any, api: Any, loop: Any, path: str
 ) -> None:
-    service.settings = ModuleSettings({"max_jobs": 1}, environ={}).snapshot()
+    service.settings = ApiModuleSettings({"max_jobs": 1}, environ={}).snapshot()
     waiting = api.begin("POST", "/movement/go_to_ned_wait", json={"x": 500, "y": 0, "z": -20})
     api.until(service.host.jobs.running)
     assert api.get("/command/set_ground_speed?new_v=5").body["code"] == "too_many_requests"

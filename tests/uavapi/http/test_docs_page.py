@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.http import docs_page
-from mavproxy_uavapi.settings import ModuleSettings
+from mavproxy_uavapi.settings import ApiModuleSettings
 
 FILE_PATIENCE = 2.0  # real s that the executor gets with its files before the clock jumps
 
@@ -60,7 +60,7 @@ def test_without_the_package_the_page_says_what_to_install(
 
 
 def test_documentation_needs_no_token_but_everything_else_does(api: Any, service: Any) -> None:
-    service.settings = ModuleSettings({"token": "t"}, environ={}).snapshot()
+    service.settings = ApiModuleSettings({"token": "t"}, environ={}).snapshot()
     assert api.get("/openapi.json").status == 200
     assert api.get("/docs/nothing").status == 404
     assert api.get("/docsx").status == 401

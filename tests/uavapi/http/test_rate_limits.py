@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.http.rate_limits import BURST, CLIENTS_KEPT, Bucket
-from mavproxy_uavapi.settings import ModuleSettings
+from mavproxy_uavapi.settings import ApiModuleSettings
 
 
 def test_bucket_gives_a_burst_then_the_rate() -> None:
@@ -26,7 +26,7 @@ def test_bucket_remembers_so_many_callers_and_no_more() -> None:
 
 def test_loopback_has_no_limit_until_one_is_set(flying: Any, api: Any, service: Any) -> None:
     assert {api.get("/jobs").status for _ in range(1200)} == {200}
-    service.settings = ModuleSettings({"max_rate": 10}, environ={}).snapshot()
+    service.settings = ApiModuleSettings({"max_rate": 10}, environ={}).snapshot()
     statuses = [api.get("/jobs").status for _ in range(40)]
     assert statuses[:20] == [200] * 20 and 429 in statuses
 
@@ -45,7 +45,7 @@ STOPS = [
 def test_what_stops_a_vehicle_is_refused_for_no_rate(
     flying: Any, api: Any, loop: Any, service: Any, method: str, path: str
 ) -> None:
-    service.settings = ModuleSettings({"max_rate": 1}, environ={}).snapshot()
+    service.settings = ApiModuleSettings({"max_rate": 1}, environ={}).snapshot()
     while api.get("/jobs").status != 429:
         pass
     answers = [loop.run(api.ask(method, path, headers={"Prefer": "respond-async"})) for _ in range(5)]

@@ -16,7 +16,7 @@ from mavproxy_uavapi.http.caller import CALLER, Caller
 from mavproxy_uavapi.http.scripts import _scripts
 from mavproxy_uavapi.scripts import runs
 from mavproxy_uavapi.scripts.manager import Scripts
-from mavproxy_uavapi.settings import ModuleSettings
+from mavproxy_uavapi.settings import ApiModuleSettings
 
 SOCKET_PATIENCE = 0.2
 FILE_PATIENCE = 2.0  # real s that the executor gets with its files before the clock jumps
@@ -29,7 +29,7 @@ def configured(api: Any, loop: Any, service: Any, tmp_path: Path) -> Any:
 
     def configure(**given: Any) -> Any:
         folders = {"scripts_path": str(tmp_path / "scripts"), "script_logs": str(tmp_path / "logs")}
-        service.settings = ModuleSettings({**folders, **given}, environ={}).snapshot()
+        service.settings = ApiModuleSettings({**folders, **given}, environ={}).snapshot()
         service.scripts = Scripts(service.host, service.settings)
         return service.scripts
 

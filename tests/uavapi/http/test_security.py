@@ -6,7 +6,7 @@ import pytest
 
 from mavproxy_uavapi.core.errors import Forbidden, Unauthorized
 from mavproxy_uavapi.http.security import check_caller, check_origin, check_page, has_token, is_our_name
-from mavproxy_uavapi.settings import ModuleSettings
+from mavproxy_uavapi.settings import ApiModuleSettings
 
 HOST = {"Host": "127.0.0.1:8000"}
 
@@ -155,7 +155,7 @@ def test_picture_of_a_foreign_page_commands_nothing_and_may_read_what_it_cannot_
 
 
 def test_token_or_a_referer_of_ours_lets_a_browser_command(flying: Any, api: Any, service: Any) -> None:
-    service.settings = ModuleSettings({"token": "t"}, environ={}).snapshot()
+    service.settings = ApiModuleSettings({"token": "t"}, environ={}).snapshot()
     headers = {**CHROMIUM, "Accept": "*/*", "Authorization": "Bearer t"}
     assert api.get("/command/brake", headers=headers).status == 200
 
@@ -175,7 +175,7 @@ def test_what_is_no_token_is_none(given: str | None) -> None:
 
 
 def settings(**given: Any) -> Any:
-    return ModuleSettings(given, environ={}).snapshot()
+    return ApiModuleSettings(given, environ={}).snapshot()
 
 
 def test_what_a_proxy_passes_on_needs_the_token_wherever_the_proxy_is() -> None:

@@ -28,7 +28,7 @@ from mavproxy_uavapi.http.listener import SHARE
 from mavproxy_uavapi.http.routes import ROUTES
 from mavproxy_uavapi.http.streaming import MOST_OPEN
 from mavproxy_uavapi.scripts.manager import Scripts
-from mavproxy_uavapi.settings import ModuleSettings
+from mavproxy_uavapi.settings import ApiModuleSettings
 
 TOKEN = "a-long-and-secret-word"
 OWNER = f"Authorization: Bearer {TOKEN}\r\n"
@@ -135,7 +135,7 @@ def port(loop: Any, service: Any, tmp_path: Path) -> Iterator[Port]:
         probe.bind(("127.0.0.1", 0))
         free = int(probe.getsockname()[1])
     given = {"port": free, "token": TOKEN, "scripts_path": str(tmp_path / "scripts")}
-    service.settings = ModuleSettings(given, environ={}).snapshot()
+    service.settings = ApiModuleSettings(given, environ={}).snapshot()
     service.scripts = Scripts(service.host, service.settings)
     server = ApiServer(service)
     loop.run(server.start())
@@ -271,7 +271,7 @@ def test_tls_handshake_that_stops_half_way_is_given_up_and_holds_up_nobody(
         probe.bind(("127.0.0.1", 0))
         free = int(probe.getsockname()[1])
     given = {"port": free, "certfile": cert, "keyfile": key}
-    service.settings = ModuleSettings(given, environ={}).snapshot()
+    service.settings = ApiModuleSettings(given, environ={}).snapshot()
     server = ApiServer(service)
     port = Port(loop, server, free)
 

@@ -13,8 +13,8 @@ import pytest
 
 from mavproxy_uavapi.core.errors import BadRequest, NotFound, NoVehicle, ToolFailed
 from mavproxy_uavapi.scripts import manager
-from mavproxy_uavapi.scripts.manager import Scripts, address
-from mavproxy_uavapi.settings import ModuleSettings
+from mavproxy_uavapi.scripts.manager import Scripts
+from mavproxy_uavapi.settings import ApiModuleSettings
 
 PRINTS = b"import os, sys\nprint(os.environ['UAVAPI_URL'], os.environ['UAVAPI_TOKEN'], os.environ['UAVAPI_SYSID'])\n"
 SLEEPS = b"import time\nprint('up')\ntime.sleep(60)\n"
@@ -27,7 +27,7 @@ class NoRegistry:
 
 def settings(folder: Path, **given: Any) -> Any:
     defaults = {"scripts_path": str(folder / "scripts"), "script_logs": str(folder / "logs"), "sysid": 9}
-    return ModuleSettings({**defaults, **given}, environ={}).snapshot()
+    return ApiModuleSettings({**defaults, **given}, environ={}).snapshot()
 
 
 def scripts_in(folder: Path, **given: Any) -> Scripts:
@@ -171,20 +171,6 @@ def test_deaths_are_acted_upon_and_other_ends_are_not(tmp_path: Path, monkeypatc
     monkeypatch.setattr(manager.on_exit, "after_death", after_death)
     flown(tmp_path, story, on_script_exit="rtl")
     assert acted == [(9, "bad.py", []), (9, "bad.py", ["stopped.py"])]
-
-
-@pytest.mark.parametrize(
-    ("given", "url"),
-    [
-        ({}, "http://127.0.0.1:8000"),
-        ({"host": "0.0.0.0", "token": "t", "port": 81}, "http://127.0.0.1:81"),
-        ({"host": "::", "token": "t"}, "http://[::1]:8000"),
-        ({"host": "192.168.1.5", "token": "t"}, "http://192.168.1.5:8000"),
-        ({"certfile": "c", "keyfile": "k"}, "https://127.0.0.1:8000"),
-    ],
-)
-def test_address_is_one_that_this_machine_can_reach(tmp_path: Path, given: dict[str, Any], url: str) -> None:
-    assert address(settings(tmp_path, **given)) == url
 
 
 def test_scripts_run_by_the_python_that_we_run_by(tmp_path: Path) -> None:

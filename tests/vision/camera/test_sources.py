@@ -15,7 +15,7 @@ from mavproxy_vision.camera.gstreamer import Pipeline, launch_command
 from mavproxy_vision.camera.opencv_capture import COMPARED, Capture, StreamClock
 from mavproxy_vision.errors import NoCamera
 from mavproxy_vision.geometry.camera_model import CameraModel
-from mavproxy_vision.settings import ModuleSettings
+from mavproxy_vision.settings import VisionModuleSettings
 from mavproxy_vision.tracking.tracker import make_source
 
 BALL = "videotestsrc is-live=true pattern={} ! video/x-raw,width=320,height=240,framerate=30/1"
@@ -185,7 +185,7 @@ def camera(monkeypatch, spec, settings=None, clock=time.monotonic, **given):
     given = {"get": lambda _: 0.0, "release": lambda: None, **given}
     device = SimpleNamespace(isOpened=lambda: True, set=asked.__setitem__, **given)
     monkeypatch.setattr(cv2, "VideoCapture", lambda *_: device)
-    source = make_source(ModuleSettings({"source": spec, **(settings or {})}).snapshot(), lambda _: None, clock)
+    source = make_source(VisionModuleSettings({"source": spec, **(settings or {})}).snapshot(), lambda _: None, clock)
     source.open()
     return source, asked
 
@@ -224,7 +224,7 @@ def test_an_absurd_camera_is_no_camera(spec):
     ],
 )
 def test_a_source_is_told_by_its_spelling(spec, kind):
-    settings = ModuleSettings({"source": spec}).snapshot()
+    settings = VisionModuleSettings({"source": spec}).snapshot()
     assert isinstance(make_source(settings, lambda _: None, time.monotonic), kind)
 
 

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_vision.apriltag.tag_layout import Tag, parse_families, parse_tags, target_from
-from mavproxy_vision.errors import BadSetting
 from mavproxy_vision.geometry.camera_model import CameraModel
 from mavproxy_vision.geometry.frames import Attitude, Mount, heading_frame, limited, vector
 
@@ -85,14 +85,14 @@ def test_a_scaled_model_sees_the_same_ray_in_the_same_place():
 def test_tag_lists():
     assert parse_tags("0:0.30 1:0.06@0.25,-0.1") == (Tag(0, 0.3), Tag(1, 0.06, 0.25, -0.1))
     for bad in ("", "0", "0:", "0:0.3@1", "0:-1", "0:0.3 0:0.2", "x:1"):
-        with pytest.raises(BadSetting):
+        with pytest.raises(SettingError):
             parse_tags(bad)
 
 
 def test_families():
     assert parse_families("tag36h11, 16H5") == ("36h11", "16h5")
     for bad in ("", "4x4"):
-        with pytest.raises(BadSetting):
+        with pytest.raises(SettingError):
             parse_families(bad)
 
 

@@ -1,0 +1,69 @@
+"""Text that a person writes -> a value. Pure, but for `path_of`, which asks who has which home."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+from mavproxy_uavapi.core.errors import SettingError
+
+TRUE = frozenset({"true", "yes", "on", "1"})
+FALSE = frozenset({"false", "no", "off", "0"})
+UNSET = frozenset({"", "none", "[]"})
+NUMBER = r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"  # float() takes all that this matches
+WHOLE = r"[-+]?[0-9]{1,9}"
+
+
+def is_unset(text: str) -> bool:
+    """Whether the text stands for "not given": nothing, `None` or `[]`."""
+    return text.strip().lower() in UNSET
+
+
+def boolean(text: str) -> bool:
+    """`true`, `yes`, `on`, `1` and their opposites, in any case; anything else is an error, not a guess.
+
+    Raises:
+        ValueError: it is none of them.
+    """
+    lowered = text.strip().lower()
+    if lowered not in TRUE | FALSE:
+        raise ValueError("expected true or false")
+    return lowered in TRUE
+
+
+def converted(kind: type, value: object) -> Any:
+    """A text, a number or a truth value as a str, bool, int or float.
+
+    Raises:
+        ValueError: it is no such thing. NaN and infinity are no numbers, 1.0 is no whole number, and True is neither.
+    """
+    if not isinstance(value, str | int | float):
+        raise ValueError(f"expected a {kind.__name__}")
+    text = str(value)
+    if kind is str:
+        return "" if is_unset(text) else text
+    if kind is bool:
+        return boolean(text)
+    if not re.fullmatch(WHOLE if kind is int else NUMBER, text.strip()):
+        raise ValueError(f"expected a {kind.__name__}")
+    number = kind(text)
+    if not math.isfinite(number):  # 1e400
+        raise ValueError("expected a finite number")
+    return number
+
+
+def path_of(text: str, name: str = "") -> Path:
+    """The path, with `~` and `~somebody` expanded; errors begin with `name`, the setting's or the argument's.
+
+    Raises:
+        SettingError: nobody has that name, or no file can.
+    """
+    place, loc = (f"{name}: ", [name]) if name else ("", [])
+    if "\0" in text:
+        raise SettingError(f"{place}no path can hold a zero byte", *loc)
+    try:
+        return Path(text).expanduser()
+    except RuntimeError as error:  # pathlib's word for it
+        raise SettingError(f"{place}{text!r}: nobody here has that name, or has a home", *loc) from error
