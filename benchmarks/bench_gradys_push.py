@@ -73,7 +73,7 @@ async def compare() -> tuple[float, float, int]:
     """CPU seconds without and with the push, and the updates."""
     settings = SimpleNamespace(target_system=1, target_component=1, source_system=255, source_component=230)
     host = Host(SimpleNamespace(select_extra={}, settings=settings, master=lambda _=None: None))
-    host._watch_link = lambda state: None  # type: ignore[method-assign]
+    host.link_watch.watch = lambda state: None  # type: ignore[method-assign]
     idle, _ = await measure(host, push=False)
     busy, updates = await measure(host, push=True)
     return idle, busy, updates

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +17,7 @@ from mavproxy_gradys.net.http_client import tls_context
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.ini_file import IniFile
 from mavproxy_uavapi.core.settings import ModuleSettings
+from mavproxy_uavapi.core.state_directory import state_directory
 from mavproxy_uavapi.core.values import path_of
 
 
@@ -55,9 +55,8 @@ class GradysSettings:
 
 
 def default_spool() -> str:
-    """Where readings are kept when nothing else is said: the user's state directory (XDG base directories)."""
-    state = os.environ.get("XDG_STATE_HOME") or "~/.local/state"
-    return f"{state}/mavproxy-uavapi/gradys.db"
+    """Where readings are kept when nothing else is said."""
+    return str(state_directory() / "gradys.db")
 
 
 def header_value(text: str) -> str:

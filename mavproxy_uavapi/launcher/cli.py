@@ -10,6 +10,7 @@ import termios
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 
+from mavproxy_uavapi.core.state_directory import state_directory
 from mavproxy_uavapi.launcher import command_lines, directories, instances
 from mavproxy_uavapi.launcher.errors import LaunchError, OptionError
 from mavproxy_uavapi.launcher.locations import HomePosition, resolve
@@ -68,7 +69,7 @@ def launch(options: RunOptions) -> int:
     with ExitStack() as stack:
         instance = None
         if options.simulated:
-            locks = directories.state_root()
+            locks = state_directory()
             locks.mkdir(parents=True, exist_ok=True, mode=0o700)
             first = FIRST_SITL_INSTANCE if options.ardupilot_path is not None else 0
             instance = stack.enter_context(instances.reserved(locks, first))

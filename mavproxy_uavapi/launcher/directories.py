@@ -2,18 +2,11 @@
 
 from __future__ import annotations
 
-import os
 import time
 from pathlib import Path
 
+from mavproxy_uavapi.core.state_directory import state_directory
 from mavproxy_uavapi.launcher.options import RunOptions
-
-
-def state_root() -> Path:
-    """`$XDG_STATE_HOME/mavproxy-uavapi`, by default under `~/.local/state`."""
-    named = os.environ.get("XDG_STATE_HOME")
-    base = Path(named) if named and os.path.isabs(named) else Path.home() / ".local" / "state"
-    return base / "mavproxy-uavapi"
 
 
 def split_log_path(log_path: str | None, sysid: int) -> tuple[Path, str | None]:
@@ -23,7 +16,7 @@ def split_log_path(log_path: str | None, sysid: int) -> tuple[Path, str | None]:
     for the directory of both.
     """
     if log_path is None:
-        return state_root(), None
+        return state_directory(), None
     given = Path(log_path).expanduser().absolute()
     if given.suffix and not given.is_dir() or given.is_file():
         return given.parent, str(given)

@@ -79,7 +79,7 @@ class Teller:
 @pytest.fixture
 def teller(host: Host, msg: Any, loop: Any) -> Teller:
     """Vehicle 10, which has told all once; on the bench loop, whose link watch it must not start."""
-    host._watch_link = lambda state: None  # type: ignore[method-assign]
+    host.link_watch.watch = lambda state: None  # type: ignore[method-assign]
     vehicle = Teller(host, msg)
     vehicle.tell_all()
     return vehicle

@@ -292,7 +292,7 @@ class ScriptedWorld:
         self.drone.power_off()
         self.loop.run(self._runner.cleanup())
         self.host.audit.close()
-        for timer in self.host._link_timers.values():
+        for timer in self.host.link_watch._timers.values():
             timer.cancel()
         tasks = asyncio.all_tasks(self.loop)
         for task in tasks:

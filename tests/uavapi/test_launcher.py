@@ -20,6 +20,7 @@ from typing import Any
 
 import pytest
 
+from mavproxy_uavapi.core.state_directory import state_directory
 from mavproxy_uavapi.launcher import (
     cli,
     command_lines,
@@ -342,15 +343,15 @@ def test_mavproxy_beside_this_python_comes_before_path(tmp_path, monkeypatch):
 
 
 def test_run_directories_never_collide_and_are_private(tmp_path):
-    first = directories.new_run(directories.state_root(), RunOptions())
-    second = directories.new_run(directories.state_root(), RunOptions())
+    first = directories.new_run(state_directory(), RunOptions())
+    second = directories.new_run(state_directory(), RunOptions())
     assert first != second
     assert first.parent == second.parent == tmp_path / "state" / "mavproxy-uavapi" / "uav10"
     assert first.stat().st_mode & 0o777 == 0o700
 
 
 def test_log_path_may_be_a_file_or_a_directory(tmp_path):
-    assert directories.split_log_path(None, 1) == (directories.state_root(), None)
+    assert directories.split_log_path(None, 1) == (state_directory(), None)
     assert directories.split_log_path(f"{tmp_path}/a/uav.log", 1) == (tmp_path / "a", f"{tmp_path}/a/uav.log")
     assert directories.split_log_path(f"{tmp_path}/a", 1) == (tmp_path / "a", f"{tmp_path}/a/uav_1.log")
 

@@ -154,7 +154,7 @@ def test_stop_interrupts_a_movement_and_lets_none_begin(stopped: Any) -> None:
     with pytest.raises(Paused, match="/moving ended"):
         authority.require(stopped.moving)
     authority.shown(stopped.stopping)
-    with pytest.raises(Paused, match="/movement/resume"):
+    with pytest.raises(Paused, match="`resume`"):
         authority.admit(Rank.MOVEMENT)
     authority.admit(Rank.MOVEMENT, stopped_too=True)
 

@@ -43,7 +43,7 @@ def test_a_lost_link_is_said_before_anything_else(teller: Any, loop: Any) -> Non
 
 
 def test_a_vehicle_that_never_told_its_position_has_none(host: Any, msg: Any, loop: Any) -> None:
-    host._watch_link = lambda state: None
+    host.link_watch.watch = lambda state: None
     host._receive(msg("heartbeat", 3))
     with pytest.raises(Stale, match="not told its position"):
         position_of(host.fleet.vehicles[3], loop.time(), max_age=5, link_timeout=5, has_position=True)
