@@ -1,65 +1,74 @@
-# make demo · make test · make lint · make bench; each builds the virtual environment when it has to. There is one:
-# demo takes the lean set (requirements/lean.txt); the others add the tests' tools and the linters to it (dev.txt),
-# and change no version in it.
+# `make help` lists the targets. Each builds the virtual environment when it has to. There is one: demo takes the lean
+# set (requirements/lean.txt); the others add the tests' tools and the linters to it (dev.txt), and change no version.
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 LEAN := $(VENV)/.lean
+MODULES := $(VENV)/.modules
 INSTALLED := $(VENV)/.installed
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 # Compiling all of pymavlink's dialects takes longer than the rest; what is imported is compiled then.
 LOCKED := install --no-compile --no-deps --require-hashes --only-binary :all: -r
 
-.PHONY: demo test test-sitl lint bench soak lock clean
+.PHONY: demo test test-sitl lint format bench soak lock clean help
 
-demo: $(LEAN)
+demo: $(MODULES)  ## fly a simulated copter: MAVProxy with uavapi and vision; ARGS go to mavproxy-uavapi
 	@echo "== a simulated copter, and MAVProxy with the API; Ctrl-C ends both"
 	@$(BIN)/mavproxy-uavapi --simulated --module 'vision:{"source":"sim"}' $(ARGS)
 
-test: $(INSTALLED)
+test: $(INSTALLED)  ## run the tests; ARGS="-k name" picks some
 	$(BIN)/python -m pytest -m "not sitl" -n 4 --dist loadfile --no-loadscope-reorder --reruns 2 -rR $(ARGS)
 
-# Against ArduPilot's own simulation: make test-sitl ARDUPILOT_HOME=…
-test-sitl: $(INSTALLED)
+test-sitl: $(INSTALLED)  ## run the tests that need ArduPilot's SITL, built in ARDUPILOT_HOME
 	@test -n "$(ARDUPILOT_HOME)" || { echo "set ARDUPILOT_HOME to a built copy of ArduPilot"; exit 2; }
 	ARDUPILOT_HOME=$(ARDUPILOT_HOME) $(BIN)/python -m pytest -m sitl $(ARGS)
 
-lint: $(INSTALLED)
+lint: $(INSTALLED)  ## check style and types: ruff, mypy
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
-bench: $(INSTALLED)
+format: $(INSTALLED)  ## mend what ruff can mend, then lay out the code
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+bench: $(INSTALLED)  ## run the benchmarks that need no SITL
 	for benchmark in $(filter-out %_sitl.py,$(wildcard benchmarks/bench_*.py)); do $(BIN)/python $$benchmark || exit 1; done
 
 # What is there of an older one goes: pip would leave what is no longer asked for.
-$(LEAN): requirements/lean.txt setup.py
+$(LEAN): requirements/lean.txt
 	@echo "== 1/3 a virtual environment: $(VENV), of $$($(PYTHON) --version)"
 	@$(PYTHON) -m venv $(if $(wildcard $(VENV)/pyvenv.cfg),--clear) $(VENV)
 	@echo "== 2/3 MAVProxy and what the modules need: requirements/lean.txt, about 150 MB to fetch the first time"
 	@$(PIP) $(LOCKED) requirements/lean.txt
 	@rm -rf $(VENV)/lib/python3*/site-packages/MAVProxy/modules/mavproxy_cesium  # 114 MB that need tornado to start
+	@touch $@
+
+$(MODULES): $(LEAN) pyproject.toml setup.py
 	@echo "== 3/3 the modules themselves"
 	@$(PIP) install --quiet --no-deps --no-build-isolation -e .
 	@touch $@
 
-$(INSTALLED): $(LEAN) requirements/dev.txt
+$(INSTALLED): $(MODULES) requirements/dev.txt
 	@echo "== the tests' tools and the linters: requirements/dev.txt"
 	@$(PIP) $(LOCKED) requirements/dev.txt
 	@touch $@
 
-# The newest versions that go together on Python 3.10 to 3.13, x86_64 and aarch64, after setup.py and lean.in.
+# The newest versions that go together on Python 3.10 to 3.13, x86_64 and aarch64, after pyproject.toml and lean.in.
 COMPILE := UV_PYTHON_DOWNLOADS=never build/lock/bin/uv pip compile --quiet --upgrade --universal --python-version 3.10 \
 	--generate-hashes --custom-compile-command "make lock" --excludes requirements/without.in
-lock:
+lock:  ## renew the locked versions in requirements/
 	$(PYTHON) -m venv build/lock
 	build/lock/bin/python -m pip install --quiet --disable-pip-version-check "uv>=0.13"
-	$(COMPILE) -o requirements/lean.txt --extra vision --extra mqtt setup.py requirements/lean.in
-	$(COMPILE) -o requirements/dev.txt --extra dev --constraint requirements/lean.txt setup.py requirements/lean.in
+	$(COMPILE) -o requirements/lean.txt --extra vision --extra mqtt pyproject.toml requirements/lean.in
+	$(COMPILE) -o requirements/dev.txt --extra dev --constraint requirements/lean.txt pyproject.toml requirements/lean.in
 
-soak: $(INSTALLED)
+soak: $(INSTALLED)  ## run random clients and faults for MINUTES (10); nothing may be left over
 	$(BIN)/python benchmarks/soak.py --minutes $(or $(MINUTES),10)
 	$(BIN)/python benchmarks/soak_strangers.py --minutes $(or $(MINUTES),10)
 
-clean:
+clean:  ## remove the virtual environment and what was built
 	rm -rf $(VENV) build dist *.egg-info
+
+help:  ## list the targets
+	@sed -n 's/^\([a-z-]*\):.*  ## /\1\t/p' $(MAKEFILE_LIST) | expand -t 12

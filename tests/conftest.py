@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import os
-import runpy
 import shutil
 import signal
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,6 +15,7 @@ from typing import Any
 os.environ["MAVLINK20"] = "1"  # before pymavlink is imported anywhere
 
 import pytest
+from packaging.requirements import Requirement
 
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
@@ -23,6 +24,11 @@ from tests.support.fake_link import FakeLink
 from tests.support.mavproxy import MainLoop, mavproxy_state
 from tests.support.messages import message_of
 from tests.support.virtual_time import TimeTravellingLoop
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 
 @pytest.fixture
@@ -165,15 +171,21 @@ def descriptors() -> Callable[[], int]:
 
 
 @pytest.fixture
-def setup_py() -> dict[str, Any]:
-    """What setup.py gives to setuptools."""
-    import setuptools
+def asked_for() -> dict[str, list[Requirement]]:
+    """What pyproject.toml asks for: by extra, with what an extra takes from others; under "" without any extra."""
+    with (Path(__file__).parents[1] / "pyproject.toml").open("rb") as file:
+        project = tomllib.load(file)["project"]
+    extras = project["optional-dependencies"]
 
-    with pytest.MonkeyPatch.context() as patch:
-        given: dict[str, Any] = {}
-        patch.setattr(setuptools, "setup", given.update)
-        runpy.run_path(str(Path(__file__).parents[1] / "setup.py"))
-    return given
+    def asked(extra: str) -> Iterator[Requirement]:
+        for line in map(Requirement, extras[extra]):
+            if line.name == project["name"]:
+                for other in sorted(line.extras):
+                    yield from asked(other)
+            else:
+                yield line
+
+    return {"": [*map(Requirement, project["dependencies"])], **{extra: [*asked(extra)] for extra in extras}}
 
 
 @pytest.fixture

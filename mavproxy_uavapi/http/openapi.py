@@ -9,11 +9,11 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from pydantic.json_schema import models_json_schema
 
+from mavproxy_uavapi import __version__
 from mavproxy_uavapi.core import errors
 from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.http import examples, requests
@@ -153,7 +153,7 @@ def document(routes: Sequence[Route]) -> dict[str, Any]:
     used = {tag_of(route) for route in routes}
     return {
         "openapi": "3.1.0",
-        "info": {"title": "mavproxy-uavapi", "version": _version(), "description": ABOUT},
+        "info": {"title": "mavproxy-uavapi", "version": __version__, "description": ABOUT},
         "servers": [{"url": "/"}],
         "security": [{}, {"token": []}],
         "tags": [
@@ -323,10 +323,3 @@ def _name(model: type[requests.Request]) -> str:
 
 def _order(tag: str) -> tuple[int, str]:
     return (list(TAGS).index(tag) if tag in TAGS else len(TAGS) - 2, tag)
-
-
-def _version() -> str:
-    try:
-        return version("mavproxy-uavapi")
-    except PackageNotFoundError:  # run from a folder that was not installed
-        return "unknown"

@@ -106,12 +106,12 @@ class World:
         """Give it vision with a simulated camera, which looks from `go_live` on; needs OpenCV."""
         from mavproxy_vision.http import VisionHandlers  # noqa: PLC0415
         from mavproxy_vision.landing.flight_jobs import FlightJobs  # noqa: PLC0415
-        from mavproxy_vision.settings import ApiModuleSettings as VisionSettings  # noqa: PLC0415
+        from mavproxy_vision.settings import VisionModuleSettings  # noqa: PLC0415
         from mavproxy_vision.tracking.stream_rates import TRUTH  # noqa: PLC0415
         from mavproxy_vision.tracking.tracker import Tracker  # noqa: PLC0415
         from tests.support.lockstep import Eye  # noqa: PLC0415
 
-        self.tracker = Tracker(self.host, VisionSettings({"source": "sim", **settings}).snapshot())
+        self.tracker = Tracker(self.host, VisionModuleSettings({"source": "sim", **settings}).snapshot())
         self.flights = FlightJobs(self.tracker, lambda: self.directory)
         for route in VisionHandlers(self.tracker, self.flights).routes():
             self.host.extensions[route.path] = route

@@ -1,0 +1,181 @@
+"""CONTRIBUTING.md and docs/architecture.md name what exists: files, classes and their members, make targets."""
+
+from __future__ import annotations
+
+import ast
+import builtins
+import re
+import subprocess
+from collections.abc import Container, Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PAGES = ("CONTRIBUTING.md", "docs/architecture.md")
+PACKAGES = ("mavproxy_uavapi", "mavproxy_vision", "mavproxy_gradys")
+WALK_LINES = 30
+FENCE = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+SPAN = re.compile(r"`([^`]+)`")
+FILE = re.compile(r"\.?[\w-]+(/[\w.-]*)+|[\w-]+\.(?:py|md|toml)")
+CLASS = re.compile(r"[A-Z][A-Z\d]*[a-z]\w*")
+NAME = re.compile(r"(_?[A-Za-z]\w*(?:\.\w+)*)(?:\(\))?")
+
+
+def text_of(page: str) -> str:
+    return (ROOT / page).read_text(encoding="utf-8")
+
+
+def spans(page: str) -> list[str]:
+    """What stands between backticks, but for blocks of code; one that goes over a line's end is one."""
+    return [" ".join(span.split()) for span in SPAN.findall(FENCE.sub("", text_of(page)))]
+
+
+class Code:
+    """The names of the packages and the tests.
+
+    Attributes:
+        names: all that is defined, imported or assigned, parameters too; texts, which may be a setting, a message or
+            a thread; the folders.
+        members: by class, what it defines.
+        files: by file, what it defines.
+    """
+
+    def __init__(self) -> None:
+        self.names: set[str] = set()
+        self.members: dict[str, set[str]] = {}
+        self.files: dict[Path, set[str]] = {}
+        for folder in (*PACKAGES, "tests"):
+            for path in (ROOT / folder).rglob("*"):
+                if path.is_dir():
+                    self.names.add(path.name)
+                elif path.suffix == ".py" and path != Path(__file__):
+                    self.files[path] = self._read(ast.parse(path.read_text(encoding="utf-8")))
+                    self.names |= self.files[path]
+
+    def _read(self, node: ast.AST) -> set[str]:
+        found: set[str] = set()
+        for child in ast.iter_child_nodes(node):
+            inner = self._read(child)
+            if isinstance(child, ast.ClassDef):
+                self.members.setdefault(child.name, set()).update(inner)
+            found |= inner | set(_bound(child))
+        return found
+
+
+def _bound(node: ast.AST) -> Iterator[str]:
+    """What this node alone defines, imports, assigns, or says."""
+    if isinstance(node, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+        yield node.name
+    elif isinstance(node, ast.alias):
+        yield (node.asname or node.name).rpartition(".")[2]
+    elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+        yield node.id
+    elif isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store):
+        yield node.attr
+    elif isinstance(node, ast.arg):
+        yield node.arg
+    elif isinstance(node, ast.Constant) and isinstance(node.value, str) and len(node.value) < 40:
+        yield node.value
+
+
+@cache
+def code() -> Code:
+    return Code()
+
+
+def new_names() -> set[str]:
+    """What the walks make."""
+    return set(re.findall(r"\b[a-z]\w+", "".join(FENCE.findall(text_of("CONTRIBUTING.md")))))
+
+
+def targets() -> set[str]:
+    (phony,) = re.findall(r"^\.PHONY: (.*)$", text_of("Makefile"), re.MULTILINE)
+    return set(phony.split())
+
+
+def why_wrong(span: str) -> str | None:
+    """What a span names that does not exist; None where it names nothing, or all is there."""
+    if target := re.match(r"make ([\w-]+)", span):
+        return None if target[1] in targets() else "no such target"
+    if FILE.fullmatch(span):
+        return None if (ROOT / span).exists() else "no such file"
+    if (found := NAME.fullmatch(span)) is None:
+        return None
+    name, _, member = found[1].partition(".")
+    if member:
+        known: Container[str] = code().members.get(name, ())
+    else:
+        known = code().members if CLASS.fullmatch(name) else code().names | new_names()
+    return None if (member or name) in known else "no such name"
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_a_page_names_what_exists(page: str) -> None:
+    assert {span: wrong for span in spans(page) if (wrong := why_wrong(span))} == {}
+
+
+@pytest.mark.parametrize(
+    "span",
+    [
+        "make tea",
+        "mavproxy_uavapi/core/hangar.py",
+        "hangar.py",
+        "Hangar",
+        "Bridge.fly",
+        "Nobody.feed",
+        "brew_tea()",
+    ],
+)
+def test_what_does_not_exist_is_found_out(span: str) -> None:
+    assert why_wrong(span)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_links_lead_somewhere(page: str) -> None:
+    links = re.findall(r"\]\(([^)#]+)", text_of(page))
+    assert links
+    assert [link for link in links if not (ROOT / page).parent.joinpath(link).exists()] == []
+
+
+@pytest.mark.parametrize("walk", FENCE.findall(text_of("CONTRIBUTING.md")))
+def test_the_code_of_a_walk_stands_on_what_exists(walk: str) -> None:
+    places = re.findall(r"^# (new file: )?([\w/]+\.py)(?:, in (\w+))?", walk, re.MULTILINE)
+    assert places
+    for new, place, holder in places:
+        assert (ROOT / place).exists() is (not new), place
+        assert (ROOT / place).parent.is_dir(), place
+        assert not holder or holder in code().files[ROOT / place], holder
+    known = code().names | set(dir(builtins)) | set(re.findall(r"(?:class|def) (\w+)", walk))
+    bare = re.sub(r'""".*?"""|"[^"\n]*"|#.*', "", walk, flags=re.DOTALL)
+    assert {name for name in re.findall(r"\b[A-Z]\w+", bare) if name not in known} == set()
+
+
+def test_walks_are_short() -> None:
+    walks = text_of("CONTRIBUTING.md").partition("\n## Walks\n")[2].partition("\n## ")[0].split("\n### ")[1:]
+    lengths = {walk.splitlines()[0]: len(walk.strip().splitlines()) for walk in walks}
+    assert len(lengths) == 5
+    assert {name: lines for name, lines in lengths.items() if lines > WALK_LINES} == {}
+
+
+def test_the_drawing_names_what_exists() -> None:
+    drawing = text_of("docs/architecture.svg")
+    words = {word for text in re.findall(r">([^<>]+)</text>", drawing) for word in re.findall(r"[\w./]+", text)}
+    files = {word for word in words if word.endswith(".py")}
+    classes = {word for word in words if re.match(r"[A-Z]\w*[a-z][A-Z]\w*", word)} - {"MAVProxy", "NaN"}
+    assert files and all((ROOT / "mavproxy_uavapi" / file).exists() for file in files)
+    assert {"MainLoopQueue", "FlightEndings"} <= classes
+    assert {word: wrong for word in classes if (wrong := why_wrong(word))} == {}
+
+
+def test_make_help_tells_of_each_target() -> None:
+    done = subprocess.run(["make", "help"], cwd=ROOT, check=True, capture_output=True, text=True)
+    assert {line.split()[0] for line in done.stdout.splitlines()} == targets()
+    assert all(len(line.split()) > 2 for line in done.stdout.splitlines())
+
+
+def test_ci_runs_the_pythons_that_the_project_is_for() -> None:
+    (matrix,) = re.findall(r"^ +python: \[(.*)\]$", text_of(".github/workflows/ci.yml"), re.MULTILINE)
+    promised = re.findall(r"Python :: (3\.\d+)", text_of("pyproject.toml"))
+    assert re.findall(r'"([\d.]+)"', matrix) == promised
