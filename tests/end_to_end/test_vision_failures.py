@@ -1,7 +1,8 @@
 """What goes wrong with the tag, the camera, the link or the pilot in a landing: each with the action expected.
 
-A real MAVProxy, somebody else's camera (`poster`) that posts its frames, and both vehicles. The controls, which show
-that these tests can fail, are the landings of the same camera with nothing wrong.
+A real MAVProxy, and somebody else's camera (`poster`) that posts its frames. On ArduPilot all of them fly; on the
+embedded vehicle most do so in lock step, in tests/vision/landing/test_failures.py. The control, which shows that
+these tests can fail, is the landing of the same camera with nothing wrong.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import requests
 SPEEDUP = 2
 SET_MESSAGE_INTERVAL, REQUEST_MESSAGE = 511, 512
 NOTHING_MORE = 2.0  # s in which nothing more may be sent
+in_lock_step = pytest.mark.sitl  # here on ArduPilot only
 
 
 @pytest.fixture(scope="module", params=["embedded", pytest.param("ardupilot", marks=pytest.mark.sitl)])
@@ -143,6 +145,7 @@ def test_control_it_lands_on_the_tag(scene: Scene) -> None:
     assert "descending the last metre" in body["info"]["phases"]
 
 
+@in_lock_step
 def test_a_small_tag_beside_the_large_one_takes_over_low_down(scene: Scene) -> None:
     small, large = scene.tag(number=1, size=0.08), scene.tag(east=-0.85, size=0.5)
     scene.settings(tags="1:0.08 0:0.5@-0.35,0")
@@ -151,6 +154,7 @@ def test_a_small_tag_beside_the_large_one_takes_over_low_down(scene: Scene) -> N
     assert scene.off(small) < 0.25
 
 
+@in_lock_step
 def test_wrong_id_is_not_landed_on(scene: Scene) -> None:
     body = scene.land(scene.camera(scene.tag(number=1)))
     assert "no tag in sight" in reason(body)
@@ -158,18 +162,21 @@ def test_wrong_id_is_not_landed_on(scene: Scene) -> None:
     assert scene.holds()
 
 
+@in_lock_step
 def test_two_equal_tags_are_refused_and_the_vehicle_holds(scene: Scene) -> None:
     body = scene.land(scene.camera(scene.tag(), scene.tag(north=-0.6, east=0.5)))
     assert "two tags" in reason(body)
     assert scene.holds()
 
 
+@in_lock_step
 def test_a_wrong_tag_size_is_refused_with_the_reason(scene: Scene) -> None:
     scene.settings(tags="0:0.42")
     assert "by its size" in reason(scene.land(scene.camera()))
     assert scene.holds()
 
 
+@in_lock_step
 @pytest.mark.parametrize("turned", [90, 180])
 def test_a_camera_turned_from_what_mount_says_is_noticed(scene: Scene, turned: float) -> None:
     scene.settings(attempts=5, leash=15)  # it flies away from the tag until it is sure
@@ -178,6 +185,7 @@ def test_a_camera_turned_from_what_mount_says_is_noticed(scene: Scene, turned: f
     assert scene.holds()
 
 
+@in_lock_step
 def test_a_tag_lost_high_up_is_held_for_then_climbed_for_then_given_up(scene: Scene) -> None:
     camera = scene.camera()
     lost: list[float] = []
@@ -196,6 +204,7 @@ def test_a_tag_lost_high_up_is_held_for_then_climbed_for_then_given_up(scene: Sc
     assert -scene.rig.ned()[2] > 3.2
 
 
+@in_lock_step
 @pytest.mark.parametrize("height", [0.95, 0.4])
 def test_a_tag_lost_low_down_is_landed_on_straight(scene: Scene, height: float) -> None:
     tag = scene.tag()
@@ -207,6 +216,7 @@ def test_a_tag_lost_low_down_is_landed_on_straight(scene: Scene, height: float) 
     assert "climbing to the last fix" not in body["info"]["phases"]
 
 
+@in_lock_step
 def test_what_lies_over_the_tag_is_waited_out(scene: Scene) -> None:
     tag = scene.tag()
     camera = scene.camera(tag)
@@ -224,6 +234,7 @@ def test_what_lies_over_the_tag_is_waited_out(scene: Scene) -> None:
     assert scene.off(tag) < 0.3
 
 
+@in_lock_step
 def test_a_frozen_camera_ends_the_landing(scene: Scene) -> None:
     scene.settings(on_failure="rtl", attempts=5)
     camera = scene.camera()
@@ -266,6 +277,7 @@ def test_the_pilots_hand_ends_a_landing_and_nothing_more_is_sent(scene: Scene) -
     assert not scene.flown_by(mark)
 
 
+@in_lock_step
 def test_a_battery_failsafe_has_its_way(scene: Scene) -> None:
     for name, value in (("BATT_FS_LOW_ACT", 1), ("BATT_LOW_TIMER", 1)):  # LAND: with RTL it climbs away first
         scene.rig.mavproxy.type(f"param set {name} {value}")
