@@ -27,7 +27,8 @@ SCRIPTS = Path(sysconfig.get_path("scripts"))
 MAVPROXY = [sys.executable, str(SCRIPTS / "mavproxy.py")]
 HOME = "-35.363261,149.165230,584,353"
 SPEEDUP = 10
-PATIENCE = 30.0  # s for a process to show what it should
+STREAM_RATE = 2  # Hz of the vehicle's clock, which is 20 of ours: MAVProxy spends its time on messages
+PATIENCE = 60.0  # s for a process to show what it should
 
 
 def eventually(look: Callable[[], Any], timeout: float = PATIENCE, what: str = "it") -> Any:
@@ -239,7 +240,8 @@ class Rig:
 
 def mavproxy_command(instance: int, *arguments: str) -> list[str]:
     """MAVProxy on a simulated vehicle, with a prompt on its stdin."""
-    return [*MAVPROXY, f"--master=tcp:127.0.0.1:{5760 + 10 * instance}", "--retries=20", *arguments]
+    master = f"--master=tcp:127.0.0.1:{5760 + 10 * instance}"
+    return [*MAVPROXY, master, "--retries=20", f"--streamrate={STREAM_RATE}", *arguments]
 
 
 def load(port: int, **settings: Any) -> str:
