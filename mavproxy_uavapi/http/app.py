@@ -45,8 +45,19 @@ def make_app(service: Service) -> web.Application:
         for method in route.methods:
             for path in (route.path, route.path + "/"):
                 app.router.add_route(method, path, _handler(route), expect_handler=_no_answer_yet)
-    app.router.add_route("*", r"/{path:[\s\S]*}", _extension, expect_handler=_no_answer_yet)
+    app.router.register_resource(rest := EveryPath("/{path}"))
+    rest.add_route("*", _extension, expect_handler=_no_answer_yet)
     return app
+
+
+class EveryPath(web.DynamicResource):
+    """What no other route has, also what does not begin with a slash (`OPTIONS *`).
+
+    What no route has would be answered by aiohttp itself, and its own answer to `Expect` comes before the door.
+    """
+
+    def _match(self, path: str) -> dict[str, str] | None:
+        return {"path": path}
 
 
 def guarded(handler: Handler) -> Handler:
@@ -103,8 +114,8 @@ _behind_the_door = guarded(_answer)
 
 
 def is_ours(record: logging.LogRecord) -> bool:
-    """Whether a line of aiohttp's is about us, rather than about a client that speaks no HTTP: it has its 400."""
-    return record.exc_info is None or not isinstance(record.exc_info[1], HttpProcessingError)
+    """Whether a line of aiohttp's is about us, rather than about a client that speaks no HTTP, or has gone."""
+    return record.exc_info is None or not isinstance(record.exc_info[1], HttpProcessingError | ConnectionError)
 
 
 log.addFilter(is_ours)

@@ -345,6 +345,17 @@ def test_unknown_expectation_is_417(flying: Any, port: Port) -> None:
     assert (answer.status, answer.body["code"]) == (417, "bad_request")
 
 
+@pytest.mark.parametrize(("who", "status"), [("X-Token: none", 401), (OWNER, 404)], ids=["stranger", "owner"])
+@pytest.mark.parametrize("expected", ["100-continue", "\xff"])
+@pytest.mark.parametrize("path", ["*", "/no/such"])
+def test_expectation_on_a_path_of_nobodys_is_answered_behind_the_door(
+    flying: Any, port: Port, caplog: pytest.LogCaptureFixture, path: str, expected: str, who: str, status: int
+) -> None:
+    answer = port.run(lambda: port.ask("OPTIONS", path, who, f"Expect: {expected}"))
+    assert answer.status == status
+    assert [record for record in caplog.records if record.exc_info] == []
+
+
 @pytest.mark.parametrize(("who", "status"), [("", 401), (OWNER, 415)], ids=["stranger", "owner"])
 @pytest.mark.parametrize("path", ["/movement/drive", "/mission/upload-script", "/mission/waypoints", "/no/such"])
 def test_compressed_body_is_refused_without_inflating_it(
