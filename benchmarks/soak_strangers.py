@@ -199,6 +199,7 @@ class Owner:
         self._kept: Client | None = None
         self.delays: dict[str, list[float]] = {"kept connection": [], "new connection": []}
         self.answers: list[float] = []
+        self.reset = 0  # new connections that were closed before they were read
         self.gaps: list[float] = []
 
     async def run(self, seconds: float) -> None:
@@ -232,13 +233,24 @@ class Owner:
         self._notes.fail(f"{path} was answered, and nothing was sent")
 
     async def _ask(self, path: str, new: bool, body: Any = None) -> None:
-        """One request, which must succeed."""
+        """One request, which must succeed.
+
+        A new connection may be closed before its token was read: strangers at the same address open a thousand a
+        second, and whoever has said nothing yet makes room. It is opened again, as HTTP clients do, and counted.
+        """
         client = self._kept
         before = time.monotonic()
-        if new or client is None:
-            client = Client(self._port, f"Authorization: Bearer {TOKEN}\r\n")
-            await client.open()
-        status, answer = await client.ask(path, body)
+        for last in (False, False, True):
+            if new or client is None:
+                client = Client(self._port, f"Authorization: Bearer {TOKEN}\r\n")
+                await client.open()
+            try:
+                status, answer = await client.ask(path, body)
+                break
+            except ConnectionError:
+                if not new or last:
+                    raise
+                self.reset += 1
         self.answers.append(time.monotonic() - before)
         if new:
             client.close()
@@ -277,6 +289,7 @@ def measure(made: Any, tap: Any, seconds: float, notes: Notes) -> None:
         rows.append([f"{who}: answers", str(len(owner.answers)), *milliseconds(owner.answers)])
         rows.append([f"{who}: gaps between setpoints", str(len(owner.gaps)), *milliseconds(owner.gaps)])
     print(table(["ms", "count", "50 %", "99 %", "most"], rows))
+    print(f"  new connections of the owner that strangers pushed out before they were read: {beset.reset}")
     if (late := percentile(sum(beset.delays.values(), []), 0.99)) > STOP_WITHIN:
         notes.fail(f"stops were on the wire within {1000 * late:.0f} ms")
     if max(beset.gaps) > INTERVAL + LATE_ALLOWED:
