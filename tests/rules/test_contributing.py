@@ -170,7 +170,9 @@ def test_the_drawing_names_what_exists() -> None:
 
 
 def test_make_help_tells_of_each_target() -> None:
-    done = subprocess.run(["make", "help"], cwd=ROOT, check=True, capture_output=True, text=True)
+    done = subprocess.run(
+        ["make", "--no-print-directory", "help"], cwd=ROOT, check=True, capture_output=True, text=True
+    )
     assert {line.split()[0] for line in done.stdout.splitlines()} == targets()
     assert all(len(line.split()) > 2 for line in done.stdout.splitlines())
 
