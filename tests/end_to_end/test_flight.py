@@ -108,6 +108,7 @@ def test_travel_for_a_duration_goes_that_far_and_stops(rig):
     x, y, z = rig.ned()
     rig.ok(rig.get("/command/set_sim_speedup", sim_factor=1))  # at 10 a busy machine's tenth of a second is 3 m
     try:
+        time.sleep(3.0)  # until the vehicle's new pace is known, by which `duration` runs
         rig.ok(rig.post("/movement/travel_at_ned", vx=3.0, vy=0.0, vz=0.0, duration=5))
         time.sleep(2.0)
         assert near(rig.ned(), (x + 15, y, z), 5.0)
