@@ -25,6 +25,8 @@ def unread(embedded_rig: Any) -> Iterator[list[socket.socket]]:
             client.connect(("127.0.0.1", embedded_rig.port))
             client.sendall(b"GET /telemetry/stream HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
             opened.append(client)
+        # Each has its place before anybody else asks for one; the rest is not read.
+        assert {client.recv(15) for client in opened} == {b"HTTP/1.1 200 OK"}
         yield opened
 
 
