@@ -54,6 +54,7 @@ class EveryPath(web.DynamicResource):
     """What no other route has, also what does not begin with a slash (`OPTIONS *`).
 
     What no route has would be answered by aiohttp itself, and its own answer to `Expect` comes before the door.
+    An empty path, which only CONNECT has, is aiohttp's all the same.
     """
 
     def _match(self, path: str) -> dict[str, str] | None:
