@@ -1,4 +1,4 @@
-"""The aiohttp application, and the server that listens for it."""
+"""What answers every request, and the server that listens for them."""
 
 from __future__ import annotations
 
@@ -15,103 +15,76 @@ from aiohttp.http_exceptions import HttpProcessingError
 from mavproxy_uavapi.core.errors import NotFound
 from mavproxy_uavapi.http.auditing import audited
 from mavproxy_uavapi.http.bodies import invite
-from mavproxy_uavapi.http.call import ROUTE, SERVICE, Call, Service, parameters
+from mavproxy_uavapi.http.call import SERVICE, Call, Service, parameters
 from mavproxy_uavapi.http.connection import IDLE_TIMEOUT, LINGER, headers_are_here
-from mavproxy_uavapi.http.docs_page import TABLE
+from mavproxy_uavapi.http.cors import TRUSTED, name_the_trusted
+from mavproxy_uavapi.http.error_answers import errors_as_answers
 from mavproxy_uavapi.http.listener import Listener, listening_socket
-from mavproxy_uavapi.http.log_throttle import LogThrottle
-from mavproxy_uavapi.http.rate_limits import BUCKET, STRANGERS, Bucket, at_a_bearable_rate, yield_to_main_loop
-from mavproxy_uavapi.http.responses import REFUSED, Handler, errors_as_answers, success
-from mavproxy_uavapi.http.route import Route
+from mavproxy_uavapi.http.rate_limits import at_a_bearable_rate, yield_to_main_loop
+from mavproxy_uavapi.http.responses import Handler, success
+from mavproxy_uavapi.http.router import MATCH, Router
 from mavproxy_uavapi.http.routes import ROUTES
-from mavproxy_uavapi.http.security import THROTTLE, door, name_the_trusted
+from mavproxy_uavapi.http.security import door
 
 log = logging.getLogger("uavapi.http.server")
-MAX_BODY = 1024 * 1024  # bytes
 MIDDLEWARES = (headers_are_here, errors_as_answers, door, at_a_bearable_rate, yield_to_main_loop)
 SHUTDOWN_TIMEOUT = 1.0  # s for answers that are being written when we stop
 
 
-def make_app(service: Service) -> web.Application:
-    """The application with every route, each with and without a trailing slash."""
-    app = web.Application(client_max_size=MAX_BODY)
-    app[SERVICE] = service
-    app[TABLE] = ROUTES
-    app[BUCKET], app[STRANGERS] = Bucket(), Bucket()
-    app[THROTTLE] = LogThrottle(service.host.clock, log.warning)
-    app[REFUSED] = service.host.audit.refused
-    app.on_response_prepare.append(name_the_trusted)
-    for route in ROUTES:
-        for method in route.methods:
-            for path in (route.path, route.path + "/"):
-                app.router.add_route(method, path, _handler(route), expect_handler=_no_answer_yet)
-    app.router.register_resource(rest := EveryPath("/{path}"))
-    rest.add_route("*", _extension, expect_handler=_no_answer_yet)
-    return app
+def make_handler(service: Service) -> Handler:
+    """What answers every request."""
+    router = Router(ROUTES, service.host.extensions)
 
-
-class EveryPath(web.DynamicResource):
-    """What no other route has, also what does not begin with a slash (`OPTIONS *`).
-
-    What no route has would be answered by aiohttp itself, and its own answer to `Expect` comes before the door.
-    An empty path, which only CONNECT has, is aiohttp's all the same.
-    """
-
-    def _match(self, path: str) -> dict[str, str] | None:
-        return {"path": path}
-
-
-def guarded(handler: Handler) -> Handler:
-    """`handler` behind the middlewares, the first of them outermost.
-
-    They are not given to the application: aiohttp would keep what it makes of them in a cache of the process, and
-    with it the application of every reload.
-    """
-    for middleware in reversed(MIDDLEWARES):
-        handler = functools.partial(middleware, handler=handler)
-    return handler
-
-
-def _handler(route: Route) -> Handler:
-    async def handle(request: web.Request) -> web.StreamResponse:
-        request[ROUTE] = route
-        return await _behind_the_door(request)
+    async def handle(request: web.BaseRequest) -> web.StreamResponse:
+        request[SERVICE] = service
+        request[MATCH] = router.find(request.method, request.path)
+        origin = request.headers.get("Origin")
+        if origin in service.settings.cors_origins:
+            request[TRUSTED] = origin
+        response = await _behind_the_door(request)
+        if not response.prepared:
+            name_the_trusted(request, response)
+        return response
 
     return handle
 
 
-async def _extension(request: web.Request) -> web.StreamResponse:
-    """A path that another module serves, which may be loaded and unloaded while we listen."""
-    request[ROUTE] = request.app[SERVICE].host.extensions.get(request.path.rstrip("/"))
-    return await _behind_the_door(request)
+async def make_server(service: Service) -> web.Server:
+    """aiohttp's server, without an address yet."""
+    return web.Server(
+        make_handler(service),
+        # A handler is cancelled when its client hangs up: that is how a verb learns that nobody awaits it.
+        handler_cancellation=True,
+        access_log=None,
+        logger=log,
+        keepalive_timeout=IDLE_TIMEOUT,
+        lingering_time=LINGER,
+        auto_decompress=False,  # what is compressed is refused, and thrown away as it is
+    )
 
 
-async def _no_answer_yet(_request: web.Request) -> None:
-    """An `Expect: 100-continue` is answered behind the door (`invite`): nobody else is asked for his body."""
-
-
-def methods_of(path: str) -> set[str]:
-    """What may be asked of a path of ours: the methods of all routes that match it."""
-    return {method for route in ROUTES if route.matches(path) for method in route.methods}
-
-
-async def _answer(request: web.Request) -> web.StreamResponse:
-    path = request.path.rstrip("/")
-    route: Route | None = request[ROUTE]
-    allowed = methods_of(path) if route is None else set(route.methods)
-    if route is None and not allowed:
+async def _answer(request: web.BaseRequest) -> web.StreamResponse:
+    match = request[MATCH]
+    if not match.allowed:
         raise NotFound("no such path")
-    if route is None or request.method not in allowed:
-        raise web.HTTPMethodNotAllowed(request.method, allowed)
+    route = match.route
+    if route is None:
+        raise web.HTTPMethodNotAllowed(request.method, match.allowed)
     await invite(request)
     params = await parameters(request, route.model, body=request.method == "POST" and not route.raw)
-    call = Call(request.app[SERVICE], request, params)
+    call = Call(request[SERVICE], request, params, match.names)
     with call.naming_source():
         answer = await (audited(call, route.action) if route.commands and route.trail else route.action(call))
     return answer if isinstance(answer, web.StreamResponse) else success(answer)
 
 
-_behind_the_door = guarded(_answer)
+def _guarded(handler: Handler) -> Handler:
+    for middleware in reversed(MIDDLEWARES):
+        handler = functools.partial(middleware, handler=handler)
+    return handler
+
+
+_behind_the_door = _guarded(_answer)
 
 
 def is_ours(record: logging.LogRecord) -> bool:
@@ -127,17 +100,7 @@ class ApiServer:
 
     def __init__(self, service: Service) -> None:
         self.service = service
-        # A handler is cancelled when its client hangs up: that is how a verb learns that nobody awaits it.
-        self._runner = web.AppRunner(
-            make_app(service),
-            access_log=None,
-            logger=log,
-            handler_cancellation=True,
-            shutdown_timeout=SHUTDOWN_TIMEOUT,
-            keepalive_timeout=IDLE_TIMEOUT,
-            lingering_time=LINGER,
-            auto_decompress=False,  # what is compressed is refused, and thrown away as it is
-        )
+        self._runner: web.ServerRunner | None = None
         self._socket: socket.socket | None = None
         self._listener: Listener | None = None
 
@@ -149,18 +112,20 @@ class ApiServer:
         """
         settings = self.service.settings
         tls = tls_context(settings.certfile, settings.keyfile) if settings.certfile else None
+        server: Any = await make_server(self.service)
+        self._runner = web.ServerRunner(server, shutdown_timeout=SHUTDOWN_TIMEOUT)
         await self._runner.setup()
         self._socket = listening_socket(settings.host, settings.port)
-        factory: Any = self._runner.server
-        throttle = self._runner.app[THROTTLE]
-        self._listener = Listener(self._socket, factory, tls, lambda: self.service.settings.max_connections, throttle)
+        most, throttle = (lambda: self.service.settings.max_connections), self.service.throttle
+        self._listener = Listener(self._socket, server, tls, most, throttle)
 
     async def stop(self) -> None:
         """End the verbs in flight, answer their clients, and close the port."""
         self.service.host.jobs.abort_remote("the API is stopping")
         if self._listener is not None:
             self._listener.close_port()
-        await self._runner.cleanup()
+        if self._runner is not None:
+            await self._runner.cleanup()
         if self._listener is not None:
             self._listener.stop()
         if self._socket is not None:

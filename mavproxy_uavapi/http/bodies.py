@@ -9,7 +9,7 @@ from mavproxy_uavapi.core.errors import BadRequest
 CONTINUE = b"HTTP/1.1 100 Continue\r\n\r\n"
 
 
-async def invite(request: web.Request) -> None:
+async def invite(request: web.BaseRequest) -> None:
     """Refuse a body that is compressed: a small one may hold a very large one. Send for one that waits to be asked.
 
     Raises:

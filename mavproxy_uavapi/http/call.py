@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Awaitable, Callable, Iterator
+import logging
+from collections.abc import Awaitable, Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, TypeVar, cast
 
@@ -17,12 +18,15 @@ from mavproxy_uavapi.core.vehicle.copter import Copter
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.http.broadcast import TelemetryBroadcast
+from mavproxy_uavapi.http.bucket import Bucket
+from mavproxy_uavapi.http.log_throttle import LogThrottle
 from mavproxy_uavapi.http.requests import Request, parse
 from mavproxy_uavapi.http.responses import envelope
 from mavproxy_uavapi.http.streaming import MOST_OPEN, Slots
 from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.settings import ApiSettings
 
+log = logging.getLogger("uavapi.http.server")
 R = TypeVar("R", bound=Request)
 T = TypeVar("T")
 Answer = dict[str, Any] | web.StreamResponse
@@ -42,6 +46,9 @@ class Service:
         scripts: the mission scripts.
         broadcast: the telemetry, for those who listen.
         streams: the slots of answers that go on, of all kinds.
+        callers: how often those have asked whom the door let in.
+        strangers: how often those whom it did not.
+        throttle: for lines of the log that a stranger can cause.
     """
 
     host: Host
@@ -49,23 +56,31 @@ class Service:
     scripts: Scripts = field(init=False)
     broadcast: TelemetryBroadcast = field(init=False)
     streams: Slots = field(default_factory=lambda: Slots(MOST_OPEN, "streams are open"))
+    callers: Bucket = field(default_factory=Bucket)
+    strangers: Bucket = field(default_factory=Bucket)
+    throttle: LogThrottle = field(init=False)
 
     def __post_init__(self) -> None:
         self.scripts = Scripts(self.host, self.settings)
         self.broadcast = TelemetryBroadcast(self.host.listeners)
+        self.throttle = LogThrottle(self.host.clock, log.warning)
 
 
 class Call:
     """One request: its service, and its parameters, validated by the route's model.
 
     Attributes:
+        names: what stands in the place of each `{name}` of the route's path.
         job: what the call has begun, or joined.
         remembered: what stands for the parameters in the job and in the trail: themselves, unless they are long.
     """
 
-    def __init__(self, service: Service, request: web.Request, params: Request) -> None:
+    def __init__(
+        self, service: Service, request: web.BaseRequest, params: Request, names: Mapping[str, str] | None = None
+    ) -> None:
         self.service = service
         self.request = request
+        self.names = names or {}
         self._params = self.remembered = params
         self.job: Job | None = None
 
@@ -204,8 +219,7 @@ class Call:
 
 
 BODY_TIMEOUT = 10.0  # s from the headers to the end of the body
-SERVICE = web.AppKey("service", Service)
-ROUTE: web.RequestKey[Any] = web.RequestKey("route", object)  # the Route that a request matches, or None
+SERVICE = web.RequestKey("service", Service)
 
 
 async def in_time(body: Awaitable[T]) -> T:
@@ -222,11 +236,11 @@ async def in_time(body: Awaitable[T]) -> T:
         raise BadRequest("the client hung up before its body had arrived") from error
 
 
-async def _body(request: web.Request, form: bool) -> Any:
+async def _body(request: web.BaseRequest, form: bool) -> Any:
     return dict(await request.post()) if form else await request.json()
 
 
-async def parameters(request: web.Request, model: type[Request], body: bool) -> Request:
+async def parameters(request: web.BaseRequest, model: type[Request], body: bool) -> Request:
     """The request's parameters: the query's, and where the route takes a body, the body's over them.
 
     Raises:

@@ -61,7 +61,7 @@ class Connection(asyncio.Protocol):
         self._thrown_away = 0
 
     @classmethod
-    def of(cls, request: web.Request) -> Connection | None:
+    def of(cls, request: web.BaseRequest) -> Connection | None:
         """The wrapper of a request's connection; None under a server that is not ours."""
         return cls._of.get(request.protocol)
 
@@ -168,8 +168,7 @@ class Connection(asyncio.Protocol):
             self._on_lost(self)
 
 
-@web.middleware
-async def headers_are_here(request: web.Request, handler: Handler) -> web.StreamResponse:
+async def headers_are_here(request: web.BaseRequest, handler: Handler) -> web.StreamResponse:
     """Tell the connection that a request has begun, and when it is answered; close it on a body that nobody read."""
     connection = Connection.of(request)
     if connection is not None:

@@ -5,16 +5,12 @@ from __future__ import annotations
 import asyncio
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 from aiohttp import web
 
 from mavproxy_uavapi.core.errors import NotFound
 from mavproxy_uavapi.http.call import Call
-from mavproxy_uavapi.http.openapi import document
-from mavproxy_uavapi.http.route import Route
 
-TABLE: web.AppKey[list[Route]] = web.AppKey("table", list)
 PACKAGE = "swagger_ui"
 ASSETS = {
     "swagger-ui.css": "text/css",
@@ -66,11 +62,6 @@ window.ui = SwaggerUIBundle({
 """
 
 
-async def specification(call: Call) -> dict[str, Any]:
-    """The description of this API, OpenAPI 3.1; with the routes of the other modules that are loaded."""
-    return document([*call.request.app[TABLE], *call.service.host.extensions.values()])
-
-
 async def page(_call: Call) -> web.StreamResponse:
     """The documentation as a page, from which each endpoint can be tried."""
     if await asyncio.to_thread(_folder) is None:
@@ -80,7 +71,7 @@ async def page(_call: Call) -> web.StreamResponse:
 
 async def asset(call: Call) -> web.StreamResponse:
     """A file of the documentation page."""
-    name = call.request.match_info["file"]
+    name = call.names["file"]
     if name == START:
         return web.Response(text=SCRIPT, content_type="text/javascript", charset="utf-8", headers=HEADERS)
     kind = ASSETS.get(name)

@@ -23,7 +23,9 @@ def any_name(name: str) -> str:
     return name
 
 
-async def file_of(request: web.Request, limit: int, checked: Callable[[str], str] = any_name) -> tuple[str, bytes]:
+async def file_of(
+    request: web.BaseRequest, limit: int, checked: Callable[[str], str] = any_name
+) -> tuple[str, bytes]:
     """Name and contents of the form's field `file`.
 
     Args:
@@ -54,7 +56,7 @@ async def file_of(request: web.Request, limit: int, checked: Callable[[str], str
     raise BadRequest(f"the form has {MOST_PARTS} parts before its file")
 
 
-async def _body(request: web.Request, limit: int) -> bytes:
+async def _body(request: web.BaseRequest, limit: int) -> bytes:
     """The whole form."""
     try:
         return await in_time(request.clone(client_max_size=limit + WRAPPING).read())

@@ -33,9 +33,9 @@ def error_of(job: Job) -> dict[str, Any]:
 
 
 def _job(call: Call) -> Job:
-    job = call.service.host.jobs.get(call.request.match_info["id"])
+    job = call.service.host.jobs.get(call.names["id"])
     if job is None:
-        raise NotFound(f"there is no job {call.request.match_info['id']}")
+        raise NotFound(f"there is no job {call.names['id']}")
     return job
 
 

@@ -1,28 +1,17 @@
-"""Answers: the envelope that clients know, and errors by the one tree of `errors.py`."""
+"""Answers: the envelope that clients know, and what an error becomes."""
 
 from __future__ import annotations
 
 import json
-import logging
 import math
 from collections.abc import Awaitable, Callable, Mapping
 from typing import Any
 
 from aiohttp import web
 
-from mavproxy_uavapi.core.errors import (
-    BadRequest,
-    NotFound,
-    TooManyRequests,
-    UavApiError,
-    Unauthorized,
-    without_frames,
-)
+from mavproxy_uavapi.core.errors import TooManyRequests, UavApiError, Unauthorized
 
-log = logging.getLogger("uavapi.http")
-Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
-REFUSED: web.AppKey[Callable[[str, str], None]] = web.AppKey("refused")  # called with address and code
-REFUSALS = (401, 403, 429)  # statuses of a caller that is turned away
+Handler = Callable[[web.BaseRequest], Awaitable[web.StreamResponse]]
 
 
 def envelope(system: int, result: str, **members: Any) -> dict[str, Any]:
@@ -60,32 +49,3 @@ def failure(error: UavApiError) -> web.Response:
     if isinstance(error, TooManyRequests):
         response.headers["Retry-After"] = str(error.retry_after)
     return response
-
-
-def of_http_exception(error: web.HTTPException) -> web.Response:
-    """What aiohttp itself refuses (no such path, wrong method, too large a body), in our words."""
-    ours: UavApiError
-    if error.status == 404:
-        ours = NotFound("no such path")
-        return failure(ours)
-    ours = BadRequest(error.reason)
-    response = web.json_response({"detail": ours.detail, "code": ours.code}, status=error.status, dumps=dumps)
-    if "Allow" in error.headers:
-        response.headers["Allow"] = error.headers["Allow"]
-    return response
-
-
-@web.middleware
-async def errors_as_answers(request: web.Request, handler: Handler) -> web.StreamResponse:
-    """The one place where errors become answers."""
-    try:
-        return await handler(request)
-    except UavApiError as error:
-        if error.status in REFUSALS and not error.in_trail:
-            request.app[REFUSED](request.remote or "unknown", error.code)
-        return failure(without_frames(error))
-    except web.HTTPException as error:
-        return of_http_exception(error) if error.status >= 400 else error
-    except Exception as error:
-        log.exception("defect in the answer to %s %s", request.method, request.path)
-        return failure(UavApiError(f"a defect of this program: {error!r}"))

@@ -30,7 +30,7 @@ class Route:
         """Whether it does something; what can only be read with GET does not."""
         return self.methods != ("GET",)
 
-    def matches(self, path: str) -> bool:
-        """Whether `path` is this one, with something in the place of each `{name}`."""
-        pattern = re.sub(r"\\{\w+\\}", "[^/]+", re.escape(self.path))
-        return re.fullmatch(pattern, path) is not None
+    @property
+    def pattern(self) -> re.Pattern[str]:
+        """What matches a path that is this one, with something in the place of each `{name}`."""
+        return re.compile(re.sub(r"\\{(\w+)\\}", r"(?P<\1>[^/]+)", re.escape(self.path)))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from mavproxy_uavapi.http import (
     command,
     docs_page,
@@ -15,7 +17,15 @@ from mavproxy_uavapi.http import (
     stream,
     telemetry,
 )
+from mavproxy_uavapi.http.call import Call
+from mavproxy_uavapi.http.openapi import document
 from mavproxy_uavapi.http.route import EITHER, POST, Route
+
+
+async def specification(call: Call) -> dict[str, Any]:
+    """The description of this API, OpenAPI 3.1; with the routes of the other modules that are loaded."""
+    return document([*ROUTES, *call.service.host.extensions.values()])
+
 
 COMMAND = [
     Route("/command/arm", command.arm, requests.Blocking, EITHER, job=True),
@@ -96,7 +106,7 @@ PERIPHERICAL = [
 ]
 
 DOCS = [
-    Route("/openapi.json", docs_page.specification, requests.Empty),
+    Route("/openapi.json", specification, requests.Empty),
     Route("/docs", docs_page.page, requests.Empty),
     Route("/docs/{file}", docs_page.asset, requests.Empty),
 ]

@@ -108,7 +108,7 @@ def _scripts(call: Call) -> Scripts:
 
 
 def _script_of(call: Call) -> str:
-    return names.resolved(call.request.match_info["name"])
+    return names.resolved(call.names["name"])
 
 
 def _answer(call: Call, kind: int | None, **members: Any) -> dict[str, Any]:

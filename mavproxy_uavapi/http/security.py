@@ -20,12 +20,12 @@ from urllib.parse import urlsplit
 from aiohttp import web
 
 from mavproxy_uavapi.core.errors import Forbidden, TooManyRequests, UavApiError, Unauthorized, without_frames
-from mavproxy_uavapi.http.call import ROUTE, SERVICE
+from mavproxy_uavapi.http.call import SERVICE
 from mavproxy_uavapi.http.caller import CALLER, Caller, address_of, group_of
 from mavproxy_uavapi.http.connection import Connection
-from mavproxy_uavapi.http.log_throttle import LogThrottle
-from mavproxy_uavapi.http.rate_limits import STRANGERS, STRANGERS_RATE
-from mavproxy_uavapi.http.responses import REFUSED, Handler, failure
+from mavproxy_uavapi.http.cors import TRUSTED
+from mavproxy_uavapi.http.responses import Handler, failure
+from mavproxy_uavapi.http.router import MATCH
 from mavproxy_uavapi.settings import ApiSettings
 
 log = logging.getLogger("uavapi.http.door")
@@ -33,14 +33,8 @@ OURSELVES = {"same-origin", "none"}  # Sec-Fetch-Site of our own page, and of an
 # What a browser accepts for a page, a picture, a style, a script, a film; programs ask for JSON or for anything.
 BROWSERS_WANT = ("text/html", "application/xhtml", "image/", "text/css", "javascript", "video/", "audio/")
 PROXIES_SAY = ("Forwarded", "X-Forwarded-For", "X-Real-IP", "Via")
+STRANGERS_RATE = 10.0  # requests/s of one address that the door does not let in
 REFUSED_LATE = 1.0  # s that the answer waits when its address was refused too often
-CORS_HEADERS = {
-    "Access-Control-Allow-Methods": "GET, POST, DELETE",
-    "Access-Control-Allow-Headers": "Authorization, Content-Type, Prefer",
-    "Access-Control-Expose-Headers": "Location",
-    "Vary": "Origin",
-}
-THROTTLE = web.AppKey("throttle", LogThrottle)
 
 
 def check_origin(headers: Mapping[str, str], trusted: tuple[str, ...] = ()) -> None:
@@ -156,30 +150,28 @@ def has_token(authorization: str | None, token: str) -> bool:
     return bool(token) and scheme.lower() == "bearer" and hmac.compare_digest(given_bytes, token.encode())
 
 
-def admitted(request: web.Request, settings: ApiSettings) -> Caller:
+def admitted(request: web.BaseRequest, settings: ApiSettings) -> Caller:
     """Who calls, if he may, and commands for no page of another site.
 
     Raises:
         Unauthorized, Forbidden: nobody, and why.
     """
     caller = check_caller(request.remote, request.headers, settings)
-    route = request.get(ROUTE)
+    route = request[MATCH].route
     # No page of another site has the token, nor may it send that header.
     if route is not None and route.commands and not caller.has_token:
         check_page(request.headers, settings.cors_origins)
     return caller
 
 
-@web.middleware
-async def door(request: web.Request, handler: Handler) -> web.StreamResponse:
+async def door(request: web.BaseRequest, handler: Handler) -> web.StreamResponse:
     """All checks, for every request, before anything else of it is looked at; the answer to a trusted preflight."""
-    settings = request.app[SERVICE].settings
+    settings = request[SERVICE].settings
     connection = Connection.of(request)
     try:
         check_origin(request.headers, settings.cors_origins)
-        origin = request.headers.get("Origin", "")
-        if origin in settings.cors_origins and request.method == "OPTIONS":
-            return web.Response(status=204, headers={"Access-Control-Allow-Origin": origin, **CORS_HEADERS})
+        if TRUSTED in request and request.method == "OPTIONS":
+            return web.Response(status=204)
         caller = admitted(request, settings)
     except Unauthorized as error:
         # A browser has no token before it has the page that asks for one; the page tells nothing of the vehicle.
@@ -194,35 +186,28 @@ async def door(request: web.Request, handler: Handler) -> web.StreamResponse:
     return await handler(request)
 
 
-async def _refused(request: web.Request, connection: Connection | None, error: UavApiError) -> web.StreamResponse:
+async def _refused(request: web.BaseRequest, connection: Connection | None, error: UavApiError) -> web.StreamResponse:
     """The answer to whom the door does not let in; late, where that happens often. The connection ends with it."""
-    app, group = request.app, group_of(address_of(request.remote))
-    app[THROTTLE].tell(error.code, f"a request of {group} was refused: {ascii(str(error))[1:-1]}")
+    service, group = request[SERVICE], group_of(address_of(request.remote))
+    service.throttle.tell(error.code, f"a request of {group} was refused: {ascii(str(error))[1:-1]}")
     if connection is not None:
         connection.judged(False)
     wait = _wait_of_stranger(request)
     if wait:
         error = TooManyRequests(f"more than {STRANGERS_RATE:g} refused requests a second", math.ceil(wait))
         await asyncio.sleep(REFUSED_LATE)
-    app[REFUSED](request.remote or "unknown", error.code)
+    service.host.audit.refused(request.remote or "unknown", error.code)
     response = failure(without_frames(error))
     response.force_close()
     return response
 
 
-def _wait_of_stranger(request: web.Request) -> float:
+def _wait_of_stranger(request: web.BaseRequest) -> float:
     """Count a request that the door does not let in; 0, or the seconds to wait when there were too many."""
-    group = group_of(address_of(request.remote))
-    return request.app[STRANGERS].take(group, STRANGERS_RATE, request.app[SERVICE].host.clock())
+    service, group = request[SERVICE], group_of(address_of(request.remote))
+    return service.strangers.take(group, STRANGERS_RATE, service.host.clock())
 
 
 def is_documentation(path: str) -> bool:
     """Whether a path is the documentation's, which needs no token."""
     return path.rstrip("/") in ("/docs", "/openapi.json") or path.startswith("/docs/")
-
-
-async def name_the_trusted(request: web.Request, response: web.StreamResponse) -> None:
-    """Before an answer goes out: tell the browser that a trusted page may read it."""
-    origin = request.headers.get("Origin", "")
-    if origin in request.app[SERVICE].settings.cors_origins:
-        response.headers.update({"Access-Control-Allow-Origin": origin, **CORS_HEADERS})

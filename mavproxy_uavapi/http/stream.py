@@ -40,7 +40,7 @@ def _subscription(call: Call) -> Subscription:
     return Subscription(names, wanted.sysid, wanted.rate)
 
 
-async def _websocket(request: web.Request, subscription: Subscription) -> web.StreamResponse:
+async def _websocket(request: web.BaseRequest, subscription: Subscription) -> web.StreamResponse:
     # Compressed, each message would have to be encoded for each client anew.
     socket = web.WebSocketResponse(compress=False, max_msg_size=MOST_SAID)
     limit_kernel(request.transport)
@@ -58,7 +58,7 @@ async def _websocket(request: web.Request, subscription: Subscription) -> web.St
     return socket
 
 
-async def _send_all(socket: web.WebSocketResponse, request: web.Request, subscription: Subscription) -> None:
+async def _send_all(socket: web.WebSocketResponse, request: web.BaseRequest, subscription: Subscription) -> None:
     transport = request.transport
     try:
         while transport is not None and not socket.closed:
@@ -76,7 +76,7 @@ async def _send_all(socket: web.WebSocketResponse, request: web.Request, subscri
         await socket.close(code=WSCloseCode.POLICY_VIOLATION, message=WHY.encode(), drain=False)
 
 
-async def _events(request: web.Request, subscription: Subscription) -> web.StreamResponse:
+async def _events(request: web.BaseRequest, subscription: Subscription) -> web.StreamResponse:
     response = EventStream()
     with suppress(ConnectionError):  # the client has gone, or reads no more: that is how a stream ends
         await response.prepare(request)

@@ -14,6 +14,7 @@ from aiohttp import web
 from aiohttp.abc import AbstractStreamWriter
 
 from mavproxy_uavapi.core.errors import TooManyRequests
+from mavproxy_uavapi.http.cors import name_the_trusted
 
 log = logging.getLogger("uavapi.http")
 
@@ -81,6 +82,7 @@ class StreamingResponse(web.StreamResponse):
         """Send the headers."""
         self._transport = request.transport
         limit_kernel(self._transport)
+        name_the_trusted(request, self)
         return await super().prepare(request)
 
     async def write(self, data: bytes | bytearray | memoryview) -> None:

@@ -136,7 +136,7 @@ async def status(call: Call) -> dict[str, Any]:
 
 async def message(call: Call) -> dict[str, Any]:
     """Any MAVLink message: its fields as MAVLink has them, how many came, and how often (Hz)."""
-    name = call.request.match_info["name"].upper()
+    name = call.names["name"].upper()
     if name.partition("[")[0] not in MESSAGE_IDS:
         raise NotFound(f"there is no MAVLink message {name}")
     state = call.seen.state

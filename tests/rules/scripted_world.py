@@ -23,7 +23,7 @@ from mavproxy_uavapi.core.mavlink.link import Address, require_finite
 from mavproxy_uavapi.core.vehicle.endings import Policy
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.stream_requester import StreamRequester
-from mavproxy_uavapi.http.app import make_app
+from mavproxy_uavapi.http.app import make_server
 from mavproxy_uavapi.http.call import Service
 from mavproxy_uavapi.http.connection import Connection
 from mavproxy_uavapi.scripts import on_exit
@@ -131,7 +131,7 @@ class ScriptedWorld:
         self.service = Service(self.host, ApiModuleSettings(SETTINGS, environ={}).snapshot())
         endings = self.host.endings
         endings.on_disconnect, endings.on_script_exit = Policy(on_disconnect), Policy(on_script_exit)
-        self._runner = web.AppRunner(make_app(self.service), access_log=None, handler_cancellation=True)
+        self._runner = web.ServerRunner(self.loop.run(make_server(self.service)))
         self.loop.run(self._runner.setup())
         self.drone.power_on()
         self._watch = self.loop.create_task(StreamRequester(self.host.registry, 0).run())

@@ -23,7 +23,7 @@ from mavproxy_uavapi.core.errors import LinkLost
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.mavlink.link import Address
 from mavproxy_uavapi.core.vehicle.stream_requester import StreamRequester
-from mavproxy_uavapi.http.app import make_app
+from mavproxy_uavapi.http.app import make_server
 from mavproxy_uavapi.http.call import Service
 from mavproxy_uavapi.http.connection import Connection
 from mavproxy_uavapi.settings import ApiModuleSettings
@@ -96,7 +96,7 @@ class World:
         self.gradys = Gradys(host)
         for route in GradysHandlers(self.gradys).routes():
             host.extensions[route.path] = route
-        self._runner = web.AppRunner(make_app(self.service), access_log=None, handler_cancellation=True)
+        self._runner = web.ServerRunner(self.loop.run(make_server(self.service)))
         self._tasks: list[asyncio.Task[None]] = []
         self._streams: list[asyncio.Task[None]] = []
         self._look: list[Callable[[], None]] = []

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 from aiohttp import TCPConnector, web
-from aiohttp.test_utils import TestClient, TestServer
+from aiohttp.test_utils import RawTestServer, TestClient
 
-from mavproxy_uavapi.http.app import make_app
+from mavproxy_uavapi.http.app import make_handler
 from mavproxy_uavapi.http.call import Service
 from mavproxy_uavapi.settings import ApiModuleSettings
 
@@ -26,7 +26,7 @@ class Api:
         self.client: TestClient[Any, Any]
 
     async def start(self) -> None:
-        server = TestServer(make_app(self.service))
+        server = RawTestServer(make_handler(self.service))
         await server.start_server(access_log=None)
         self.client = TestClient(server, connector=TCPConnector(limit=0))
 
@@ -83,12 +83,13 @@ def api(loop: Any, service: Service) -> Iterator[Api]:
 
 
 @pytest.fixture
-def raising(loop: Any) -> Any:
+def raising(loop: Any, service: Service) -> Any:
     """The answer of an application that raises this."""
-    from mavproxy_uavapi.http.responses import REFUSED, errors_as_answers
+    from mavproxy_uavapi.http.call import SERVICE
+    from mavproxy_uavapi.http.error_answers import errors_as_answers
 
     def raising(error: BaseException) -> Any:
-        async def handler(_request: web.Request) -> web.StreamResponse:
+        async def handler(_request: web.BaseRequest) -> web.StreamResponse:
             raise error
 
         async def ask() -> Any:
@@ -96,9 +97,9 @@ def raising(loop: Any) -> Any:
 
             from aiohttp.test_utils import make_mocked_request
 
-            app = web.Application()
-            app[REFUSED] = lambda _client, _code: None
-            response = await errors_as_answers(make_mocked_request("GET", "/x", app=app), handler)
+            request = make_mocked_request("GET", "/x")
+            request[SERVICE] = service
+            response = await errors_as_answers(request, handler)
             return SimpleNamespace(
                 status=response.status, body=json.loads(response.text or "null"), headers=response.headers
             )

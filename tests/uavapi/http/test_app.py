@@ -9,13 +9,16 @@ import weakref
 from typing import Any
 
 import pytest
-from aiohttp import ClientSession, web
-from aiohttp.test_utils import TestClient, TestServer
+from aiohttp import ClientSession
+from aiohttp.test_utils import RawTestServer, TestClient
 
-from mavproxy_uavapi.http.app import MAX_BODY, ApiServer, listening_socket, make_app
+from mavproxy_uavapi.http.app import ApiServer, listening_socket, make_handler
 from mavproxy_uavapi.http.requests import Servo
+from mavproxy_uavapi.http.responses import Handler
 from mavproxy_uavapi.http.route import Route
 from mavproxy_uavapi.settings import ApiModuleSettings
+
+MAX_BODY = 1024 * 1024  # bytes
 
 
 @pytest.fixture
@@ -208,14 +211,14 @@ def test_listening_socket_of_a_foreign_address_is_an_os_error() -> None:
         listening_socket("192.0.2.1", 0)
 
 
-def test_application_that_has_served_is_forgotten(loop: Any, service: Any) -> None:
+def test_handler_that_has_served_is_forgotten(loop: Any, service: Any) -> None:
     loop.patience = 0.002
 
-    async def served() -> weakref.ref[web.Application]:
-        app = make_app(service)
-        async with TestClient(TestServer(app)) as client:
+    async def served() -> weakref.ref[Handler]:
+        handler = make_handler(service)
+        async with TestClient(RawTestServer(handler)) as client:
             assert (await client.get("/telemetry/gps")).status == 503
-        return weakref.ref(app)
+        return weakref.ref(handler)
 
     forgotten = loop.run(served())
     gc.collect()

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.http.rate_limits import BURST, CLIENTS_KEPT, Bucket
+from mavproxy_uavapi.http.bucket import BURST, CLIENTS_KEPT, Bucket
 from mavproxy_uavapi.settings import ApiModuleSettings
 
 

@@ -347,11 +347,18 @@ def test_unknown_expectation_is_417(flying: Any, port: Port) -> None:
 
 @pytest.mark.parametrize(("who", "status"), [("X-Token: none", 401), (OWNER, 404)], ids=["stranger", "owner"])
 @pytest.mark.parametrize("expected", ["100-continue", "\xff"])
-@pytest.mark.parametrize("path", ["*", "/no/such"])
+@pytest.mark.parametrize(("method", "path"), [("OPTIONS", "*"), ("OPTIONS", "/no/such"), ("CONNECT", "127.0.0.1:80")])
 def test_expectation_on_a_path_of_nobodys_is_answered_behind_the_door(
-    flying: Any, port: Port, caplog: pytest.LogCaptureFixture, path: str, expected: str, who: str, status: int
+    flying: Any,
+    port: Port,
+    caplog: pytest.LogCaptureFixture,
+    method: str,
+    path: str,
+    expected: str,
+    who: str,
+    status: int,
 ) -> None:
-    answer = port.run(lambda: port.ask("OPTIONS", path, who, f"Expect: {expected}"))
+    answer = port.run(lambda: port.ask(method, path, who, f"Expect: {expected}"))
     assert answer.status == status
     assert [record for record in caplog.records if record.exc_info] == []
 

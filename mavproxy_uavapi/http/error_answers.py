@@ -1,0 +1,42 @@
+"""The one place where errors become answers."""
+
+from __future__ import annotations
+
+import logging
+
+from aiohttp import web
+
+from mavproxy_uavapi.core.errors import BadRequest, NotFound, UavApiError, without_frames
+from mavproxy_uavapi.http.call import SERVICE
+from mavproxy_uavapi.http.responses import Handler, dumps, failure
+
+log = logging.getLogger("uavapi.http")
+REFUSALS = (401, 403, 429)  # statuses of a caller that is turned away
+
+
+def of_http_exception(error: web.HTTPException) -> web.Response:
+    """What aiohttp itself refuses (no such path, wrong method, too large a body), in our words."""
+    ours: UavApiError
+    if error.status == 404:
+        ours = NotFound("no such path")
+        return failure(ours)
+    ours = BadRequest(error.reason)
+    response = web.json_response({"detail": ours.detail, "code": ours.code}, status=error.status, dumps=dumps)
+    if "Allow" in error.headers:
+        response.headers["Allow"] = error.headers["Allow"]
+    return response
+
+
+async def errors_as_answers(request: web.BaseRequest, handler: Handler) -> web.StreamResponse:
+    """The one place where errors become answers."""
+    try:
+        return await handler(request)
+    except UavApiError as error:
+        if error.status in REFUSALS and not error.in_trail:
+            request[SERVICE].host.audit.refused(request.remote or "unknown", error.code)
+        return failure(without_frames(error))
+    except web.HTTPException as error:
+        return of_http_exception(error) if error.status >= 400 else error
+    except Exception as error:
+        log.exception("defect in the answer to %s %s", request.method, request.path)
+        return failure(UavApiError(f"a defect of this program: {error!r}"))
