@@ -13,6 +13,7 @@ def report(api: Api, settings: ApiSettings) -> str:
     """A few lines: the address, the vehicle, the calls in flight."""
     address = settings.url
     lines = [f"uavapi: {'listening on' if api.listening else 'not listening; it would be'} {address}"]
+    lines += [f"port {port}: vehicle {system}" for port, system in settings.ports.items()]
     try:
         lines.append(describe(api, api.host.registry.find(settings.sysid).state))
     except UavApiError as error:

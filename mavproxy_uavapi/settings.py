@@ -42,7 +42,7 @@ NOT_OURS: dict[str, dict[str, str]] = {
 }
 # What an API takes up by listening anew: its address, its vehicle, and who may call.
 ACCESS = ("token", "allow_from", "allow_scripts_from", "allow_open", "cors_origins")
-LISTENING = ("host", "port", "sysid", "certfile", "keyfile", *ACCESS)
+LISTENING = ("host", "port", "sysid", "ports", "certfile", "keyfile", *ACCESS)
 ON_SCRIPT_EXIT = ("nothing", "hold", "land", "rtl")
 
 
@@ -54,6 +54,7 @@ class ApiSettings:
         host: address to listen on.
         port: TCP port to listen on.
         sysid: system id of the vehicle that the API flies; 0 is MAVProxy's current one.
+        ports: further TCP ports, and the system id of the vehicle that is at the root of each.
         link_timeout: s without a heartbeat after which a vehicle counts as lost.
         max_age: s after which telemetry is no longer served.
         on_disconnect: what the vehicle does when the client of a waiting verb hangs up: continue or hold.
@@ -81,6 +82,7 @@ class ApiSettings:
     host: str
     port: int
     sysid: int
+    ports: Mapping[int, int]
     link_timeout: float
     max_age: float
     on_disconnect: str
@@ -115,6 +117,11 @@ class ApiSettings:
     def local_url(self) -> str:
         """The URL by which this machine reaches the API."""
         return local_url_of(self.host, self.port, tls=bool(self.certfile))
+
+    @property
+    def listening(self) -> Mapping[int, int]:
+        """All TCP ports, and the system id of the vehicle at the root of each; 0 for that of `sysid`."""
+        return {self.port: 0, **self.ports}
 
     @property
     def is_local(self) -> bool:
@@ -160,6 +167,23 @@ def words(text: str) -> tuple[str, ...]:
     return tuple(word for word in text.strip("[]").replace(",", " ").split() if not is_unset(word))
 
 
+def ports(text: str) -> Mapping[int, int]:
+    """`8001:1,8002:2` -> {8001: 1, 8002: 2}: TCP ports, and the system id of the vehicle at each.
+
+    Raises:
+        SettingError: it is written otherwise, or a number is out of range.
+    """
+    systems: dict[int, int] = {}
+    for word in words(text):
+        port, _, system = word.partition(":")
+        if not (port.isdecimal() and system.isdecimal() and 0 < int(port) < 65536 and 0 < int(system) < 256):
+            raise SettingError(f"{word!r} is no port and system id such as 8001:2")
+        if int(port) in systems:
+            raise SettingError(f"port {port} is there twice")
+        systems[int(port)] = int(system)
+    return systems
+
+
 def networks(text: str) -> tuple[Network, ...]:
     """The networks that a list names.
 
@@ -200,6 +224,7 @@ class ApiModuleSettings(ModuleSettings[ApiSettings]):
     secrets = frozenset({"token"})
     parsers = {
         "host": address,
+        "ports": ports,
         "allow_from": networks,
         "allow_scripts_from": networks,
         "cors_origins": words,
@@ -213,6 +238,7 @@ class ApiModuleSettings(ModuleSettings[ApiSettings]):
             MPSetting("host", str, "127.0.0.1", "address to listen on", tab="API"),
             MPSetting("port", int, 8000, "TCP port to listen on", range=(1, 65535), increment=1),
             MPSetting("sysid", int, 0, "vehicle to fly; 0 is MAVProxy's current one", range=(0, 255), increment=1),
+            MPSetting("ports", str, "", "further ports, a vehicle at each: 8001:1,8002:2"),
             MPSetting("link_timeout", float, 5.0, "s without heartbeat until the link is lost", range=(1, 60)),
             MPSetting("max_age", float, 5.0, "s after which telemetry is stale", range=(0.1, 3600)),
             MPSetting("on_disconnect", str, "continue", "when a client hangs up", choice=["continue", "hold"]),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import functools
 import logging
 import socket
@@ -31,9 +32,14 @@ MIDDLEWARES = (headers_are_here, errors_as_answers, door, at_a_bearable_rate, yi
 SHUTDOWN_TIMEOUT = 1.0  # s for answers that are being written when we stop
 
 
-def make_handler(service: Service) -> Handler:
-    """What answers every request."""
-    router = Router(ROUTES, service.host.extensions)
+def make_handler(service: Service, system: int = 0) -> Handler:
+    """What answers every request.
+
+    Args:
+        service: what the handlers work with.
+        system: the system id that paths mean which name none; 0 for the settings' one.
+    """
+    router = Router(ROUTES, service.host.extensions, system)
 
     async def handle(request: web.BaseRequest) -> web.StreamResponse:
         request[SERVICE] = service
@@ -49,10 +55,10 @@ def make_handler(service: Service) -> Handler:
     return handle
 
 
-async def make_server(service: Service) -> web.Server:
-    """aiohttp's server, without an address yet."""
+async def make_server(service: Service, system: int = 0) -> web.Server:
+    """aiohttp's server, without an address yet; arguments as for `make_handler`."""
     return web.Server(
-        make_handler(service),
+        make_handler(service, system),
         # A handler is cancelled when its client hangs up: that is how a verb learns that nobody awaits it.
         handler_cancellation=True,
         access_log=None,
@@ -72,7 +78,7 @@ async def _answer(request: web.BaseRequest) -> web.StreamResponse:
         raise web.HTTPMethodNotAllowed(request.method, match.allowed)
     await invite(request)
     params = await parameters(request, route.model, body=request.method == "POST" and not route.raw)
-    call = Call(request[SERVICE], request, params, match.names)
+    call = Call(request[SERVICE], request, params, path=match.path, system=match.system, names=match.names)
     with call.naming_source():
         answer = await (audited(call, route.action) if route.commands and route.trail else route.action(call))
     return answer if isinstance(answer, web.StreamResponse) else success(answer)
@@ -100,39 +106,40 @@ class ApiServer:
 
     def __init__(self, service: Service) -> None:
         self.service = service
-        self._runner: web.ServerRunner | None = None
-        self._socket: socket.socket | None = None
+        self._runners: list[web.ServerRunner] = []
+        self._sockets: list[socket.socket] = []
         self._listener: Listener | None = None
 
     async def start(self) -> None:
-        """Listen.
+        """Listen, on each port of the settings.
 
         Raises:
-            OSError: the port is taken, there is no such address, or the TLS files cannot be read.
+            OSError: a port is taken, there is no such address, or the TLS files cannot be read.
         """
         settings = self.service.settings
         tls = tls_context(settings.certfile, settings.keyfile) if settings.certfile else None
-        server: Any = await make_server(self.service)
-        self._runner = web.ServerRunner(server, shutdown_timeout=SHUTDOWN_TIMEOUT)
-        await self._runner.setup()
-        self._socket = listening_socket(settings.host, settings.port)
+        servers: dict[socket.socket, Any] = {}
+        for port, system in settings.listening.items():
+            self._sockets.append(listening_socket(settings.host, port))
+            server = servers[self._sockets[-1]] = await make_server(self.service, system)
+            self._runners.append(web.ServerRunner(server, shutdown_timeout=SHUTDOWN_TIMEOUT))
+            await self._runners[-1].setup()
         most, throttle = (lambda: self.service.settings.max_connections), self.service.throttle
-        self._listener = Listener(self._socket, server, tls, most, throttle)
+        self._listener = Listener(servers, tls, most, throttle)
 
     async def stop(self) -> None:
-        """End the verbs in flight, answer their clients, and close the port."""
+        """End the verbs in flight, answer their clients, and close the ports."""
         self.service.host.jobs.abort_remote("the API is stopping")
         if self._listener is not None:
-            self._listener.close_port()
-        if self._runner is not None:
-            await self._runner.cleanup()
+            self._listener.close_ports()
+        await asyncio.gather(*(runner.cleanup() for runner in self._runners))
         if self._listener is not None:
             self._listener.stop()
-        if self._socket is not None:
-            self._socket.close()
+        for listening in self._sockets:
+            listening.close()
 
     def filenos(self) -> list[int]:
-        """Descriptors of the port and of every connection."""
+        """Descriptors of the ports and of every connection."""
         return [] if self._listener is None else self._listener.filenos()
 
 

@@ -70,16 +70,27 @@ class Call:
     """One request: its service, and its parameters, validated by the route's model.
 
     Attributes:
+        path: the route's path, without the prefix of a vehicle.
+        named_system: the system id that the path, or the port, names; 0 for none.
         names: what stands in the place of each `{name}` of the route's path.
         job: what the call has begun, or joined.
         remembered: what stands for the parameters in the job and in the trail: themselves, unless they are long.
     """
 
     def __init__(
-        self, service: Service, request: web.BaseRequest, params: Request, names: Mapping[str, str] | None = None
+        self,
+        service: Service,
+        request: web.BaseRequest,
+        params: Request,
+        *,
+        path: str = "",
+        system: int = 0,
+        names: Mapping[str, str] | None = None,
     ) -> None:
         self.service = service
         self.request = request
+        self.path = path
+        self.named_system = system
         self.names = names or {}
         self._params = self.remembered = params
         self.job: Job | None = None
@@ -90,14 +101,19 @@ class Call:
         return self._params
 
     @property
+    def system(self) -> int:
+        """The system id that is meant; 0 for MAVProxy's current vehicle."""
+        return self.named_system or self.service.settings.sysid
+
+    @property
     def seen(self) -> Vehicle:
         """The vehicle, whether its link is alive or not."""
-        return self.service.host.registry.find(self.service.settings.sysid)
+        return self.service.host.registry.find(self.system)
 
     @property
     def vehicle(self) -> Vehicle:
         """The vehicle, with a link that is alive: it can be commanded."""
-        return self.service.host.registry.commandable(self.service.settings.sysid)
+        return self.service.host.registry.commandable(self.system)
 
     @property
     def copter(self) -> Copter:
@@ -144,8 +160,9 @@ class Call:
             return result if isinstance(result, str) else result()
 
         jobs = self.service.host.jobs
-        if len(jobs.running()) >= self.service.settings.max_jobs and not urgent:
-            raise TooManyRequests(f"{len(jobs.running())} verbs are in flight already (max_jobs)")
+        in_flight = sum(job.vehicle is vehicle for job in jobs.running())
+        if in_flight >= self.service.settings.max_jobs and not urgent:
+            raise TooManyRequests(f"{in_flight} verbs are in flight already (max_jobs)")
         job = jobs.begin(
             vehicle,
             self.path,
@@ -175,11 +192,6 @@ class Call:
     def asked(self) -> dict[str, Any]:
         """The parameters that were given, or have a default; or what stands for them."""
         return self.remembered.model_dump(exclude_none=True)
-
-    @property
-    def path(self) -> str:
-        """The path without a trailing slash."""
-        return self.request.path.rstrip("/")
 
     @contextlib.contextmanager
     def naming_source(self) -> Iterator[None]:

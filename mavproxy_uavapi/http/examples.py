@@ -71,7 +71,30 @@ REQUESTS: Mapping[type[requests.Request], Mapping[str, Any]] = {
     requests.StreamFilter: {"names": "ATTITUDE,GPS_RAW_INT", "rate": 2},
 }
 
+VEHICLE = {
+    "id": 1,
+    "type": "copter",
+    "mode": "GUIDED",
+    "armed": True,
+    "landed_state": "in_air",
+    "link": {"alive": True, "heartbeat_age_s": 0.4, "packet_loss": 0.0},
+    "ekf_ok": True,
+    "gps_fix": 6,
+    "battery_remaining": 87,
+    "ready_to_arm": True,
+    "why_not": [],
+    "position": {
+        "position": {"lat": -35.363, "lon": 149.1653, "alt": 604.2, "relative_alt": 20.0},
+        "velocity": {"vx": 4.9, "vy": 0.1, "vz": 0.0},
+        "heading": 90.1,
+        "age_s": 0.12,
+    },
+    "current": True,
+    "commanded_by": {"job": "7", "verb": "/movement/go_to_ned_wait", "client": "127.0.0.1"},
+}
+
 PATH_PARAMETERS = {
+    "sysid": {"/vehicles/{sysid}": "1"},
     "name": {"/telemetry/message/{name}": "ATTITUDE", "/mission/scripts/{name}": "square.py"},
     "id": {"/jobs/{id}": "7"},
     "file": {"/docs/{file}": "swagger-ui.css"},
@@ -220,6 +243,8 @@ MEMBERS: Mapping[str, Mapping[str, Any]] = {
 
 # Bodies that are not the usual envelope.
 BODIES: Mapping[str, Mapping[str, Any]] = {
+    "/vehicles": {"vehicles": [VEHICLE]},
+    "/vehicles/{sysid}": VEHICLE,
     "/jobs": {"jobs": [JOB]},
     "GET /jobs/{id}": JOB,
     "DELETE /jobs/{id}": {**JOB, "state": "aborted", "error": ABORTED},

@@ -34,15 +34,20 @@ def error_of(job: Job) -> dict[str, Any]:
 
 def _job(call: Call) -> Job:
     job = call.service.host.jobs.get(call.names["id"])
-    if job is None:
+    if job is None or not _is_meant(call, job):
         raise NotFound(f"there is no job {call.names['id']}")
     return job
 
 
+def _is_meant(call: Call, job: Job) -> bool:
+    """Whether the path, if it names a vehicle, names this job's."""
+    return call.named_system in (0, job.vehicle.state.system)
+
+
 async def list_jobs(call: Call) -> dict[str, Any]:
-    """All jobs that are running, and the last ones that ended."""
+    """All jobs that are running, and the last ones that ended; under /vehicles/{sysid} those of that vehicle."""
     host = call.service.host
-    return {"jobs": [describe(job, host.clock()) for job in host.jobs.all()]}
+    return {"jobs": [describe(job, host.clock()) for job in host.jobs.all() if _is_meant(call, job)]}
 
 
 async def show_job(call: Call) -> dict[str, Any]:

@@ -6,7 +6,7 @@ import asyncio
 import resource
 import socket
 import ssl
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from mavproxy_uavapi.http.caller import address_of, group_of
@@ -92,13 +92,12 @@ def lowest(near: socket.socket) -> socket.socket:
 
 
 class Listener:
-    """A listening socket whose connections become aiohttp's; all methods belong to the asyncio thread.
+    """Listening sockets whose connections become aiohttp's; all methods belong to the asyncio thread.
 
     asyncio's own server accepts whatever comes, and writes a traceback for each that there is no descriptor for.
 
     Args:
-        listening: bound.
-        factory: makes aiohttp's protocols.
+        ports: bound sockets, and what makes aiohttp's protocols for each; the limits are for all of them together.
         tls: None for plain HTTP.
         most: tells how many connections there may be.
         throttle: takes what is to be told.
@@ -106,42 +105,41 @@ class Listener:
 
     def __init__(
         self,
-        listening: socket.socket,
-        factory: Callable[[], Any],
+        ports: Mapping[socket.socket, Callable[[], Any]],
         tls: ssl.SSLContext | None,
         most: Callable[[], int],
         throttle: LogThrottle,
     ) -> None:
-        self._listening = listening
-        self._factory = factory
+        self._ports = dict(ports)
         self._tls = tls
         self._most = most
         self._throttle = throttle
         self._loop = asyncio.get_running_loop()
         self._connections: dict[Connection, socket.socket] = {}  # oldest first
         self._handshakes: set[asyncio.Task[None]] = set()
-        self._resuming: asyncio.TimerHandle | None = None
-        listening.listen(BACKLOG)
-        self._resume()
+        self._resuming: dict[socket.socket, asyncio.TimerHandle] = {}
+        for port in self._ports:
+            port.listen(BACKLOG)
+            self._resume(port)
 
-    def _resume(self) -> None:
-        self._resuming = None
-        self._loop.add_reader(self._listening, self._accept)
+    def _resume(self, port: socket.socket) -> None:
+        self._resuming.pop(port, None)
+        self._loop.add_reader(port, self._accept, port)
 
-    def _accept(self) -> None:
+    def _accept(self, port: socket.socket) -> None:
         for _ in range(AT_ONCE):
             try:
-                near, peer = self._listening.accept()
+                near, peer = port.accept()
             except (BlockingIOError, InterruptedError, ConnectionAbortedError):
                 return
             except OSError as error:
                 self._throttle.tell("accept", f"no connection can be accepted: {error.strerror}")
-                self._loop.remove_reader(self._listening)
-                self._resuming = self._loop.call_later(AFTER_FAILURE, self._resume)
+                self._loop.remove_reader(port)
+                self._resuming[port] = self._loop.call_later(AFTER_FAILURE, self._resume, port)
                 return
-            self._take(near, peer[0])
+            self._take(near, peer[0], self._ports[port])
 
-    def _take(self, near: socket.socket, remote: str) -> None:
+    def _take(self, near: socket.socket, remote: str, factory: Callable[[], Any]) -> None:
         """Serve a connection, or close it."""
         address = address_of(remote)
         group, is_local = group_of(address), address is not None and address.is_loopback
@@ -161,7 +159,7 @@ class Listener:
             near.close()
             return
         near.setblocking(False)
-        connection = Connection(self._factory, near, group, self._forget)
+        connection = Connection(factory, near, group, self._forget)
         self._connections[connection] = near
         connection.await_first_byte(self._begin)
 
@@ -184,16 +182,17 @@ class Listener:
             connection.abandon()
 
     def filenos(self) -> list[int]:
-        """Descriptors of the port and of every connection."""
-        return [one.fileno() for one in (self._listening, *self._connections.values())]
+        """Descriptors of the ports and of every connection."""
+        return [one.fileno() for one in (*self._ports, *self._connections.values())]
 
-    def close_port(self) -> None:
+    def close_ports(self) -> None:
         """Accept no more."""
-        if self._resuming is not None:
-            self._resuming.cancel()
-        if self._listening.fileno() >= 0:
-            self._loop.remove_reader(self._listening)
-            self._listening.close()
+        for resuming in self._resuming.values():
+            resuming.cancel()
+        for port in self._ports:
+            if port.fileno() >= 0:
+                self._loop.remove_reader(port)
+                port.close()
 
     def stop(self) -> None:
         """End every connection that aiohttp has not ended."""

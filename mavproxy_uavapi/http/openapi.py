@@ -31,6 +31,8 @@ TAGS = {
     "telemetry": "What the vehicle last told, with its age.",
     "jobs": "The verbs in flight, and the last ones that ended.",
     "mission": "Scripts, each in a tmux session of its own; and the mission that the autopilot itself flies.",
+    "vehicles": "Which vehicles there are. `/vehicles/{sysid}` before any path means that vehicle; without it the "
+    "setting `sysid` says which, or MAVProxy's current one is meant.",
     "peripherical": "Servos and cameras.",
     "docs": "This documentation.",
 }
@@ -47,6 +49,7 @@ BY_TAG: Mapping[str, tuple[type[UavApiError], ...]] = {
     "telemetry": (*OF_A_VEHICLE, errors.Stale, errors.NotFound),
     "jobs": (errors.NotFound, errors.Busy),
     "mission": OF_A_SCRIPT,
+    "vehicles": (errors.NotFound,),
     "docs": (errors.NotFound,),
 }
 BY_PATH: Mapping[str, tuple[type[UavApiError], ...]] = {

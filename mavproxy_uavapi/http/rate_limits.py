@@ -26,9 +26,15 @@ async def yield_to_main_loop(request: web.BaseRequest, handler: Handler) -> web.
 
     What commands does not wait: it is short, and a vehicle is to hear of it at once.
     """
-    if request.method == "GET" and not request.path.startswith(COMMANDS):
+    if request.method == "GET" and not request[MATCH].path.startswith(COMMANDS):
         await request[SERVICE].host.bridge.wait_for_main_loop()
     return await handler(request)
+
+
+def _whose(caller: Caller, request: web.BaseRequest) -> str:
+    """What is counted together: the requests of one caller about one vehicle. What was not heard is no vehicle."""
+    system = request[MATCH].system
+    return f"{caller.group} {system if system in request[SERVICE].host.fleet.vehicles else 0}"
 
 
 async def at_a_bearable_rate(request: web.BaseRequest, handler: Handler) -> web.StreamResponse:
@@ -39,7 +45,7 @@ async def at_a_bearable_rate(request: web.BaseRequest, handler: Handler) -> web.
         return await handler(request)
     rate = service.settings.local_rate if caller.is_local else service.settings.max_rate
     if rate:
-        wait = service.callers.take(caller.group, rate, service.host.clock())
+        wait = service.callers.take(_whose(caller, request), rate, service.host.clock())
         if wait:
             raise TooManyRequests(f"more than {rate:g} requests a second", math.ceil(wait))
     return await handler(request)

@@ -10,17 +10,24 @@ from aiohttp import web
 
 from mavproxy_uavapi.http.route import Route
 
+OF_A_VEHICLE = re.compile(r"/vehicles/(?P<system>[1-9][0-9]{0,2})(?P<path>/.+)")  # before any path
+LARGEST_SYSTEM = 255
+
 
 @dataclass(frozen=True)
 class Match:
     """What there is at a path.
 
     Attributes:
+        path: the path without the vehicle's prefix, and without a slash at its end.
+        system: the system id of the vehicle that the request names; 0 where it names none.
         route: the one for the request's method; None where there is none.
         allowed: the methods that the path has.
         names: what stands in the place of each `{name}` of the route's path.
     """
 
+    path: str
+    system: int = 0
     route: Route | None = None
     allowed: frozenset[str] = frozenset()
     names: Mapping[str, str] = field(default_factory=dict)
@@ -34,10 +41,12 @@ class Router:
     Args:
         routes: those that are always there.
         extensions: by path, those of other modules, which come and go.
+        system: the system id that paths mean which name none; 0 for no certain one.
     """
 
-    def __init__(self, routes: Iterable[Route], extensions: Mapping[str, Route]) -> None:
+    def __init__(self, routes: Iterable[Route], extensions: Mapping[str, Route], system: int = 0) -> None:
         self._extensions = extensions
+        self._system = system
         self._by_path: dict[str, list[Route]] = {}
         self._by_pattern: dict[re.Pattern[str], list[Route]] = {}
         for route in routes:
@@ -48,10 +57,13 @@ class Router:
 
     def find(self, method: str, path: str) -> Match:
         """The route of a request; a slash at the end of its path makes no difference."""
-        path = path.rstrip("/")
+        path, system = path.rstrip("/"), self._system
+        named = OF_A_VEHICLE.fullmatch(path)
+        if named is not None and int(named["system"]) <= LARGEST_SYSTEM:
+            path, system = named["path"], int(named["system"])
         routes, names = self._at(path)
-        allowed = frozenset(method for route in routes for method in route.methods)
-        return Match(next((route for route in routes if method in route.methods), None), allowed, names)
+        route = next((route for route in routes if method in route.methods), None)
+        return Match(path, system, route, frozenset(method for route in routes for method in route.methods), names)
 
     def _at(self, path: str) -> tuple[list[Route], dict[str, str]]:
         """All that is at a path, and its names."""

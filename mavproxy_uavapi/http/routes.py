@@ -16,6 +16,7 @@ from mavproxy_uavapi.http import (
     scripts,
     stream,
     telemetry,
+    vehicles,
 )
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.openapi import document
@@ -105,10 +106,15 @@ PERIPHERICAL = [
     Route("/peripherical/servo_output", peripherical.servo_output, requests.Servo, POST, job=True),
 ]
 
+VEHICLES = [
+    Route("/vehicles", vehicles.list_vehicles, requests.Empty),
+    Route("/vehicles/{sysid}", vehicles.show_vehicle, requests.Empty),
+]
+
 DOCS = [
     Route("/openapi.json", specification, requests.Empty),
     Route("/docs", docs_page.page, requests.Empty),
     Route("/docs/{file}", docs_page.asset, requests.Empty),
 ]
 
-ROUTES = [*COMMAND, *MOVEMENT, *TELEMETRY, *JOBS, *MISSION, *PERIPHERICAL, *DOCS]
+ROUTES = [*COMMAND, *MOVEMENT, *TELEMETRY, *JOBS, *MISSION, *PERIPHERICAL, *VEHICLES, *DOCS]

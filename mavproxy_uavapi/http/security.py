@@ -175,7 +175,7 @@ async def door(request: web.BaseRequest, handler: Handler) -> web.StreamResponse
         caller = admitted(request, settings)
     except Unauthorized as error:
         # A browser has no token before it has the page that asks for one; the page tells nothing of the vehicle.
-        if not is_documentation(request.path) or _wait_of_stranger(request):
+        if not is_documentation(request[MATCH].path) or _wait_of_stranger(request):
             return await _refused(request, connection, error)
         return await handler(request)
     except Forbidden as error:

@@ -37,7 +37,7 @@ async def stream(call: Call) -> web.StreamResponse:
 def _subscription(call: Call) -> Subscription:
     wanted = call.params(StreamFilter)
     names = frozenset(name.strip().upper() for name in wanted.names.split(",") if name.strip())
-    return Subscription(names, wanted.sysid, wanted.rate)
+    return Subscription(names, wanted.sysid or call.named_system or None, wanted.rate)
 
 
 async def _websocket(request: web.BaseRequest, subscription: Subscription) -> web.StreamResponse:

@@ -99,6 +99,20 @@ def test_what_is_listened_on_and_who_may_call_needs_listening_anew() -> None:
     assert not settings.snapshot().listens_as(before)
 
 
+def test_ports_name_the_vehicle_at_each() -> None:
+    settings = ApiModuleSettings({"ports": "8001:1, 8002:2"}, environ={}).snapshot()
+    assert settings.listening == {8000: 0, 8001: 1, 8002: 2}
+    assert ApiModuleSettings({"ports": "8000:7"}, environ={}).snapshot().listening == {8000: 7}
+
+
+@pytest.mark.parametrize(
+    "text", ["8001", "8001:", ":1", "8001:0", "8001:256", "70000:1", "0:1", "8001:1,8001:2", "a:b"]
+)
+def test_ports_that_mean_nothing_are_refused(text: str) -> None:
+    with pytest.raises(SettingError):
+        ApiModuleSettings({"ports": text}, environ={}).snapshot()
+
+
 def test_rate_that_is_set_is_for_this_machine_too() -> None:
     settings = ApiModuleSettings(environ={})
     assert (settings.snapshot().max_rate, settings.snapshot().local_rate) == (500.0, 0.0)

@@ -203,7 +203,41 @@ def test_descriptors_are_those_of_the_port_and_of_every_connection(
     assert len(server.filenos()) == 1
     found = loop.run(count())
     assert len(set(found)) == 2
-    assert server._socket.fileno() in found
+    assert server._sockets[0].fileno() in found
+
+
+def test_each_vehicle_has_a_port_of_its_own(loop: Any, service: Any, make_drone: Any, free_port: int) -> None:
+    async def ids(ports: list[int]) -> list[str]:
+        async with ClientSession() as session:
+            answers = [await session.get(f"http://127.0.0.1:{port}/telemetry/gps") for port in ports]
+            return [(await answer.json())["id"] for answer in answers]
+
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        other_port = int(probe.getsockname()[1])
+    make_drone(1)
+    make_drone(2)
+    loop.patience = 0.002
+    service.settings = ApiModuleSettings({"port": free_port, "ports": f"{other_port}:2"}).snapshot()
+    server = ApiServer(service)
+    loop.run(server.start())
+    assert loop.run(ids([free_port, other_port])) == ["1", "2"]
+    assert len(server.filenos()) == 2
+    loop.run(server.stop())
+
+
+def test_a_port_that_is_taken_closes_those_before_it(loop: Any, service: Any, free_port: int, drone: Any) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        ports = f"{taken.getsockname()[1]}:2"
+        service.settings = ApiModuleSettings({"port": free_port, "ports": ports}).snapshot()
+        server = ApiServer(service)
+        with pytest.raises(OSError, match="in use"):
+            loop.run(server.start())
+        loop.run(server.stop())
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", free_port))
 
 
 def test_listening_socket_of_a_foreign_address_is_an_os_error() -> None:

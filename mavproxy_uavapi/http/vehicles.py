@@ -1,0 +1,50 @@
+"""/vehicles: every vehicle that was heard, and who commands it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mavproxy_uavapi.core.errors import NotFound
+from mavproxy_uavapi.core.vehicle.readiness import status
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+from mavproxy_uavapi.http.call import Call
+from mavproxy_uavapi.http.telemetry_views import gps
+
+
+async def list_vehicles(call: Call) -> dict[str, Any]:
+    """Every vehicle that was heard; `/vehicles/{sysid}` before any other path means that vehicle."""
+    registry = call.service.host.registry
+    return {
+        "vehicles": [describe(call, registry.find(system)) for system in sorted(call.service.host.fleet.vehicles)]
+    }
+
+
+async def show_vehicle(call: Call) -> dict[str, Any]:
+    """One vehicle."""
+    system = call.names["sysid"]
+    if not system.isascii() or not system.isdigit() or int(system) not in call.service.host.fleet.vehicles:
+        raise NotFound(f"no vehicle {system} was heard")
+    return describe(call, call.service.host.registry.find(int(system)))
+
+
+def describe(call: Call, vehicle: Vehicle) -> dict[str, Any]:
+    """A vehicle as an answer shows it."""
+    host, state = call.service.host, vehicle.state
+    now = host.clock()
+    info = status(vehicle, host.link_watch.is_alive(state), now)
+    received = state.newest("GLOBAL_POSITION_INT")
+    position = None if received is None else {**gps(received.message), "age_s": round(now - received.at, 3)}
+    return {
+        "id": state.system,
+        "type": info.pop("vehicle_type"),
+        **info,
+        "position": position,
+        "current": state.system == host.registry.resolve(),
+        "commanded_by": _commander(vehicle),
+    }
+
+
+def _commander(vehicle: Vehicle) -> dict[str, Any] | None:
+    """The job that flies the vehicle; None where none does."""
+    job = vehicle.authority.flies
+    return None if job is None else {"job": job.id, "verb": job.verb, "client": job.client}
