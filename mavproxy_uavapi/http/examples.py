@@ -83,12 +83,10 @@ VEHICLE = {
     "battery_remaining": 87,
     "ready_to_arm": True,
     "why_not": [],
-    "position": {
-        "position": {"lat": -35.363, "lon": 149.1653, "alt": 604.2, "relative_alt": 20.0},
-        "velocity": {"vx": 4.9, "vy": 0.1, "vz": 0.0},
-        "heading": 90.1,
-        "age_s": 0.12,
-    },
+    "position": {"lat": -35.363, "lon": 149.1653, "alt": 604.2, "relative_alt": 20.0},
+    "velocity": {"vx": 4.9, "vy": 0.1, "vz": 0.0},
+    "heading": 90.1,
+    "age_s": 0.12,
     "current": True,
     "commanded_by": {"job": "7", "verb": "/movement/go_to_ned_wait", "client": "127.0.0.1"},
 }

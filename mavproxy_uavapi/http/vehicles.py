@@ -32,16 +32,22 @@ def describe(call: Call, vehicle: Vehicle) -> dict[str, Any]:
     host, state = call.service.host, vehicle.state
     now = host.clock()
     info = status(vehicle, host.link_watch.is_alive(state), now)
-    received = state.newest("GLOBAL_POSITION_INT")
-    position = None if received is None else {**gps(received.message), "age_s": round(now - received.at, 3)}
     return {
         "id": state.system,
         "type": info.pop("vehicle_type"),
         **info,
-        "position": position,
+        **_position(vehicle, now),
         "current": state.system == host.registry.resolve(),
         "commanded_by": _commander(vehicle),
     }
+
+
+def _position(vehicle: Vehicle, now: float) -> dict[str, Any]:
+    """Position, velocity and heading as `/telemetry/gps` has them, and their age (s); None for what was never told."""
+    received = vehicle.state.newest("GLOBAL_POSITION_INT")
+    if received is None:
+        return {"position": None, "velocity": None, "heading": None, "age_s": None}
+    return {**gps(received.message), "age_s": round(now - received.at, 3)}
 
 
 def _commander(vehicle: Vehicle) -> dict[str, Any] | None:

@@ -13,7 +13,8 @@ from contextlib import ExitStack, contextmanager
 from mavproxy_uavapi.core.state_directory import state_directory
 from mavproxy_uavapi.launcher import command_lines, directories, instances
 from mavproxy_uavapi.launcher.errors import LaunchError, OptionError
-from mavproxy_uavapi.launcher.locations import HomePosition, resolve
+from mavproxy_uavapi.launcher.fleet import SimulatedVehicle, fleet, kinds
+from mavproxy_uavapi.launcher.locations import resolve
 from mavproxy_uavapi.launcher.options import RunOptions, parse
 from mavproxy_uavapi.launcher.supervisor import Supervisor
 
@@ -45,9 +46,10 @@ def prepare(options: RunOptions) -> RunOptions:
         script = command_lines.sim_vehicle(options.ardupilot_path)
         if not script.is_file():
             raise OptionError(f"--ardupilot_path: there is no {script}")
-        binary = command_lines.sitl_binary(options)
-        if not binary.is_file():
-            raise OptionError(f"--ardupilot_path: {binary} is missing, build it first")
+        for kind in dict.fromkeys(kinds(options)):
+            binary = command_lines.sitl_binary(options.ardupilot_path, kind)
+            if not binary.is_file():
+                raise OptionError(f"--ardupilot_path: {binary} is missing, build it first")
     if not instances.is_free(options.port, options.host):
         raise LaunchError(f"--port: {options.host}:{options.port} is taken by another program")
     return dataclasses.replace(options, headless=options.headless or not has_terminal())
@@ -59,23 +61,22 @@ def has_terminal() -> bool:
 
 
 def launch(options: RunOptions) -> int:
-    """Give the run its directory and its simulated vehicle a number, and supervise it to its end."""
+    """Give the run its directory and each simulated vehicle a number, and supervise it to its end."""
     root, log_file = directories.split_log_path(options.log_path, options.sysid)
     options = dataclasses.replace(options, log_path=log_file)
-    home: HomePosition | None = None
-    if options.simulated:
-        home = resolve(options.location, options.ardupilot_path)
+    home = resolve(options.location, options.ardupilot_path) if options.simulated else None
     run_dir = directories.new_run(root, options)
     with ExitStack() as stack:
-        instance = None
-        if options.simulated:
+        vehicles: list[SimulatedVehicle] = []
+        if home is not None:
             locks = state_directory()
             locks.mkdir(parents=True, exist_ok=True, mode=0o700)
             first = FIRST_SITL_INSTANCE if options.ardupilot_path is not None else 0
-            instance = stack.enter_context(instances.reserved(locks, first))
+            numbers = [stack.enter_context(instances.reserved(locks, first)) for _ in kinds(options)]
+            vehicles = fleet(options, home, numbers)
         if not options.headless:
             stack.enter_context(terminal_kept())
-        return asyncio.run(Supervisor(options, run_dir, instance, home).run())
+        return asyncio.run(Supervisor(options, run_dir, vehicles).run())
 
 
 @contextmanager

@@ -14,21 +14,26 @@ from pathlib import Path
 
 from mavproxy_uavapi.core.addresses import local_url_of
 from mavproxy_uavapi.core.settings import DEFAULT
-from mavproxy_uavapi.launcher.locations import HomePosition
+from mavproxy_uavapi.launcher.fleet import SimulatedVehicle, kinds
 from mavproxy_uavapi.launcher.options import RunOptions
 from mavproxy_uavapi.settings import ApiModuleSettings
 
 # What makes run_in_terminal_window.sh put the vehicle into a window, a tmux server or a screen that is not
 # our child. Without them it runs in the background, where we can end it.
 WINDOW_VARIABLES = ("DISPLAY", "SITL_RITW_TERMINAL", "TMUX", "STY", "ZELLIJ")
-ARDUPILOT_VEHICLES = {"copter": "ArduCopter", "plane": "ArduPlane", "rover": "Rover"}
+ARDUPILOT_VEHICLES = {"copter": "ArduCopter", "plane": "ArduPlane", "quadplane": "ArduPlane", "rover": "Rover"}
+BINARIES = {"copter": "arducopter", "plane": "arduplane", "quadplane": "arduplane", "rover": "ardurover"}
 
 # SITL opens its port only after reading its parameters; MAVProxy tries once a second.
 SITL_RETRIES = 30
 
 
 def mavproxy_command(
-    options: RunOptions, program: Sequence[str], run_dir: Path, instance: int | None, config: Path | None
+    options: RunOptions,
+    program: Sequence[str],
+    run_dir: Path,
+    vehicles: Sequence[SimulatedVehicle],
+    config: Path | None,
 ) -> list[str]:
     """MAVProxy's command line.
 
@@ -36,18 +41,18 @@ def mavproxy_command(
         options: what the user asked for; `headless` already says whether there is a prompt.
         program: how MAVProxy itself is started.
         run_dir: where its telemetry log and parameters go.
-        instance: the number of the simulated vehicle; None for a real one.
+        vehicles: the simulated ones; none for a real one.
         config: the file with those settings of the API that have no keyword argument.
     """
     command = [
         *program,
-        f"--master={master(options, instance)}",
+        *(f"--master={link}" for link in masters(options, vehicles)),
         f"--target-system={options.sysid}",
         f"--logfile={run_dir / 'mav.tlog'}",
     ]
-    if instance is not None and options.ardupilot_path is not None:
+    if vehicles and options.ardupilot_path is not None:
         # As sim_vehicle.py does it: `rc` at the prompt reaches SITL on this port.
-        command += [f"--retries={SITL_RETRIES}", f"--sitl=127.0.0.1:{5501 + 10 * instance}"]
+        command += [f"--retries={SITL_RETRIES}", f"--sitl=127.0.0.1:{5501 + 10 * vehicles[0].instance}"]
     if options.headless:
         # Otherwise MAVProxy quits as soon as its stdin ends.
         command.append("--daemon")
@@ -56,13 +61,13 @@ def mavproxy_command(
     return command + list(options.mavproxy_args)
 
 
-def master(options: RunOptions, instance: int | None) -> str:
-    """The link to the vehicle in MAVProxy's notation."""
-    if instance is not None:
-        return f"tcp:127.0.0.1:{5760 + 10 * instance}"
+def masters(options: RunOptions, vehicles: Sequence[SimulatedVehicle]) -> list[str]:
+    """The links to the vehicles in MAVProxy's notation."""
+    if vehicles:
+        return [f"tcp:127.0.0.1:{5760 + 10 * vehicle.instance}" for vehicle in vehicles]
     if options.connection_type == "usb":
-        return options.uav_connection
-    return f"{options.connection_type}:{options.uav_connection}"
+        return [options.uav_connection]
+    return [f"{options.connection_type}:{options.uav_connection}"]
 
 
 def module_loads(options: RunOptions, config: Path | None) -> list[str]:
@@ -132,22 +137,21 @@ def _ini_text(value: str | tuple[str, ...]) -> str:
     return f"[{', '.join(value)}]" if isinstance(value, tuple) else value
 
 
-def embedded_command(options: RunOptions, instance: int, home: HomePosition) -> list[str]:
+def embedded_command(options: RunOptions, vehicle: SimulatedVehicle) -> list[str]:
     """The embedded vehicle's command line."""
     return [
         sys.executable,
         "-m",
         "mavproxy_uavapi.sim",
-        f"--instance={instance}",
-        f"--sysid={options.sysid}",
+        *([] if vehicle.kind == "copter" else [f"--vehicle={vehicle.kind}"]),
+        f"--instance={vehicle.instance}",
+        f"--sysid={vehicle.sysid}",
         f"--speedup={options.speedup:g}",
-        f"--home={home}",
+        f"--home={vehicle.home}",
     ]
 
 
-def sim_vehicle_command(
-    options: RunOptions, python: str, instance: int, home: HomePosition, use_dir: Path
-) -> list[str]:
+def sim_vehicle_command(options: RunOptions, python: str, vehicle: SimulatedVehicle, use_dir: Path) -> list[str]:
     """The command line of ArduPilot's sim_vehicle.py, for the vehicle alone.
 
     MAVProxy is ours to start (`--no-mavproxy`): it keeps the terminal, and its arguments need not survive
@@ -157,11 +161,12 @@ def sim_vehicle_command(
     return [
         python,
         str(sim_vehicle(options.ardupilot_path)),
-        "--vehicle=" + ARDUPILOT_VEHICLES[options.vehicle],
-        f"--instance={instance}",
-        f"--sysid={options.sysid}",
+        f"--vehicle={ARDUPILOT_VEHICLES[vehicle.kind]}",
+        *(["--frame=quadplane"] if vehicle.kind == "quadplane" else []),
+        f"--instance={vehicle.instance}",
+        f"--sysid={vehicle.sysid}",
         f"--speedup={options.speedup:.0f}",
-        f"--custom-location={home}",
+        f"--custom-location={vehicle.home}",
         f"--use-dir={use_dir}",
         "--no-rebuild",
         "--no-mavproxy",
@@ -173,10 +178,9 @@ def sim_vehicle(ardupilot_path: str) -> Path:
     return Path(ardupilot_path, "Tools", "autotest", "sim_vehicle.py")
 
 
-def sitl_binary(options: RunOptions) -> Path:
-    """The vehicle that sim_vehicle.py will start."""
-    assert options.ardupilot_path is not None
-    return Path(options.ardupilot_path, "build", "sitl", "bin", "ardu" + options.vehicle)
+def sitl_binary(ardupilot_path: str, kind: str) -> Path:
+    """The vehicle that sim_vehicle.py starts for a type."""
+    return Path(ardupilot_path, "build", "sitl", "bin", BINARIES[kind])
 
 
 def api_url(options: RunOptions) -> str:
@@ -187,6 +191,10 @@ def api_url(options: RunOptions) -> str:
 def greeting(options: RunOptions, with_token: bool) -> str:
     """What is printed once the API answers: its address and, with a simulated vehicle, three lines to try."""
     url = api_url(options)
+    count = len(kinds(options))
+    if count > 1:
+        last = options.sysid + count - 1
+        return f"API of vehicles {options.sysid} to {last}: {url}\n  curl {url}/vehicles"
     lines = [f"API of vehicle {options.sysid}: {url}"]
     if options.simulated:
         curl = 'curl -H "Authorization: Bearer $UAVAPI_TOKEN"' if with_token else "curl"

@@ -45,6 +45,9 @@ class RunOptions:
     scripts_path: str | None = None
     python_path: str | None = None
     vehicle: str = "copter"
+    count: int = 1
+    vehicles: tuple[tuple[str, int], ...] = ()
+    spacing: float = 5.0
     simulated: bool = False
     ardupilot_path: str | None = None
     location: str = "AbraDF"
@@ -95,6 +98,7 @@ def path(text: str) -> str:
     return os.path.expanduser(text.strip())
 
 
+HIGHEST_SYSTEM = 255
 _NAMES = ", ".join(name for name in values.LOG_COMPONENTS)
 TABLE = (
     Row("port", "api", values.port, "TCP port of the HTTP API (8000)"),
@@ -105,8 +109,16 @@ TABLE = (
     Row("gradys_gs", "api", values.host_port, "HOST:PORT of a Gradys ground station to report to"),
     Row("scripts_path", "api", path, "directory of uploaded scripts"),
     Row("python_path", "api", path, "Python that runs uploaded scripts"),
-    Row("vehicle", "api", values.one_of("copter", "plane", "rover"), "what ArduPilot simulates (copter)"),
+    Row("vehicle", "api", values.one_of(*values.VEHICLES), "type of the simulated vehicle (copter)"),
     Row("simulated", "simulated", boolean, "start a simulated vehicle too"),
+    Row("count", "simulated", values.count, "how many vehicles to simulate (1), with system ids from sysid on"),
+    Row(
+        "vehicles",
+        "simulated",
+        values.vehicles,
+        "their types and numbers, instead of vehicle and count: copter:8,rover:2",
+    ),
+    Row("spacing", "simulated", values.distance, "m from one to the next, in a row to the east (5)"),
     Row("ardupilot_path", "simulated", path, "ArduPilot to simulate with; else the embedded vehicle"),
     Row("location", "simulated", str.strip, "home: a name or lat,lon,alt,heading in deg, m AMSL (AbraDF)"),
     Row("gs_connection", "simulated", values.words, "addresses to forward MAVLink to (MAVProxy's --out)"),
@@ -321,10 +333,14 @@ def check(options: RunOptions) -> None:
     """Refuse combinations that cannot work, before anything starts."""
     if not options.simulated:
         _check_connection(options.connection_type, options.uav_connection)
-    elif options.ardupilot_path is None and options.vehicle != "copter":
-        raise OptionError(f"--vehicle {options.vehicle} needs --ardupilot_path: the embedded one is a copter")
+    elif options.sysid + _number_of_vehicles(options) - 1 > HIGHEST_SYSTEM:
+        raise OptionError(f"--count: system ids end at {HIGHEST_SYSTEM}, and these begin at {options.sysid}")
     elif options.ardupilot_path is not None and options.speedup != int(options.speedup):
         raise OptionError(f"--speedup: ArduPilot takes whole numbers only, got {options.speedup:g}")
+
+
+def _number_of_vehicles(options: RunOptions) -> int:
+    return sum(number for _, number in options.vehicles) or options.count
 
 
 def _check_connection(kind: str, connection: str) -> None:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from mavproxy_uavapi.launcher import command_lines, environment, processes
 from mavproxy_uavapi.launcher.errors import LaunchError
-from mavproxy_uavapi.launcher.locations import HomePosition
+from mavproxy_uavapi.launcher.fleet import SimulatedVehicle
 from mavproxy_uavapi.launcher.options import RunOptions
 from mavproxy_uavapi.launcher.probe import answers
 
@@ -40,17 +40,16 @@ _DEBUG_HINT = " Use 'set moddebug"
 
 
 class Supervisor:
-    """One run: a MAVProxy, perhaps a vehicle, and the watchdog."""
+    """One run: a MAVProxy, the simulated vehicles if any, and the watchdog."""
 
-    def __init__(self, options: RunOptions, run_dir: Path, instance: int | None, home: HomePosition | None) -> None:
+    def __init__(self, options: RunOptions, run_dir: Path, vehicles: Sequence[SimulatedVehicle]) -> None:
         self.options = options
         self.run_dir = run_dir
-        self.instance = instance
-        self.home = home
+        self.simulated = vehicles
         self.tag = uuid.uuid4().hex
         self.sessions: set[int] = set()
         self.watchdog: Process | None = None
-        self.vehicle: Process | None = None
+        self.vehicles: dict[Process, SimulatedVehicle] = {}  # those that run
         self.mavproxy: Process | None = None
         self.came_up = False
         self.interrupted_at = -INSIST_S
@@ -106,13 +105,11 @@ class Supervisor:
 
     async def _work(self) -> int:
         await self._start_watchdog()
-        if self.instance is not None:
-            await self._start_vehicle(self.instance)
+        for vehicle in self.simulated:
+            await self._start_vehicle(vehicle)
         await self._start_mavproxy()
         assert self.mavproxy is not None
-        ends = {asyncio.create_task(self.mavproxy.wait())}
-        if self.vehicle is not None:
-            ends.add(asyncio.create_task(self.vehicle.wait()))
+        ends = {asyncio.create_task(self.mavproxy.wait()), asyncio.create_task(self._all_vehicles_ended())}
         announced = asyncio.create_task(self._announce())
         waiting = ends | {announced}
         try:
@@ -133,26 +130,43 @@ class Supervisor:
             start_new_session=True,
         )
 
-    async def _start_vehicle(self, instance: int) -> None:
-        assert self.home is not None
+    async def _start_vehicle(self, vehicle: SimulatedVehicle) -> None:
+        log = self._log_of(vehicle)
         if self.options.ardupilot_path is None:
-            command = command_lines.embedded_command(self.options, instance, self.home)
-            self.vehicle = await self._start(command, environment.for_python(os.environ), "vehicle.log")
-            await self._vehicle_ready()
+            command = command_lines.embedded_command(self.options, vehicle)
+            process = await self._start(command, environment.for_python(os.environ), log.name)
+            self.vehicles[process] = vehicle
+            await self._vehicle_ready(process, log)
         else:
             env = environment.for_sim_vehicle(os.environ, self.run_dir)
             command = command_lines.sim_vehicle_command(
-                self.options, environment.ardupilot_python(), instance, self.home, self.run_dir / "vehicle"
+                self.options, environment.ardupilot_python(), vehicle, self.run_dir / log.stem
             )
-            self.vehicle = await self._start(command, env, "vehicle.log")
+            self.vehicles[await self._start(command, env, log.name)] = vehicle
 
-    async def _vehicle_ready(self) -> None:
+    def _log_of(self, vehicle: SimulatedVehicle) -> Path:
+        return self.run_dir / ("vehicle.log" if len(self.simulated) == 1 else f"vehicle-{vehicle.sysid}.log")
+
+    async def _all_vehicles_ended(self) -> None:
+        """Wait until no simulated vehicle is left; tell of each that ends while others go on."""
+        if not self.vehicles:
+            await asyncio.Event().wait()
+
+        async def ended(process: Process) -> Process:
+            await process.wait()
+            return process
+
+        for end in asyncio.as_completed([ended(process) for process in self.vehicles]):
+            vehicle = self.vehicles.pop(await end)
+            if self.vehicles:
+                log = self._log_of(vehicle)
+                complain(f"vehicle {vehicle.sysid} ended, the others go on: {last_line(log)} (log: {log})")
+
+    async def _vehicle_ready(self, process: Process, log: Path) -> None:
         """Wait for the line that the embedded vehicle prints once its port is open."""
-        assert self.vehicle is not None
-        log = self.run_dir / "vehicle.log"
         deadline = asyncio.get_running_loop().time() + VEHICLE_START_S
-        while _READY not in log.read_bytes():
-            if self.vehicle.returncode is not None:
+        while not has_said(log, _READY):
+            if process.returncode is not None:
                 raise LaunchError(f"the vehicle did not start: {last_line(log)} (log: {log})")
             if asyncio.get_running_loop().time() > deadline:
                 raise LaunchError(f"the vehicle was not ready within {VEHICLE_START_S:.0f} s (log: {log})")
@@ -165,7 +179,7 @@ class Supervisor:
             config = self.run_dir / "uavapi.ini"
             config.write_text(text, encoding="utf-8")
         command = command_lines.mavproxy_command(
-            self.options, environment.mavproxy_program(), self.run_dir, self.instance, config
+            self.options, environment.mavproxy_program(), self.run_dir, self.simulated, config
         )
         # With components logging to the console the console is where MAVProxy's output belongs.
         to_file = self.options.headless and not self.options.log_console
@@ -248,7 +262,7 @@ class Supervisor:
         status = self.mavproxy.returncode
         log = self.run_dir / "mavproxy.log"
         if status is None:
-            vehicle_log = self.run_dir / "vehicle.log"
+            vehicle_log = self._log_of(self.simulated[-1])
             raise LaunchError(f"the simulated vehicle ended: {last_line(vehicle_log)} (log: {vehicle_log})")
         if status < 0:
             complain(f"MAVProxy died of signal {-status} (log: {self._where()})")
@@ -267,14 +281,15 @@ class Supervisor:
         self.stop.set()
         if self.mavproxy is not None:
             await self._end_mavproxy(self.mavproxy)
-        if self.vehicle is not None:
-            await asyncio.to_thread(processes.end_members, self.tag, {self.vehicle.pid}, VEHICLE_GRACE_S)
+        if self.vehicles:
+            pids = {process.pid for process in self.vehicles}
+            await asyncio.to_thread(processes.end_members, self.tag, pids, VEHICLE_GRACE_S)
         # The log writer and the windows of MAVProxy, should it have died before them.
         gone = await asyncio.to_thread(processes.end_members, self.tag, self.sessions, STRAY_GRACE_S)
         if not gone:
             left = ", ".join(map(str, processes.members(self.tag, self.sessions)))
             complain(f"these processes would not end: {left}")
-        for process in (self.mavproxy, self.vehicle, self.watchdog):
+        for process in (self.mavproxy, *self.vehicles, self.watchdog):
             if process is not None:
                 if process.stdin is not None:
                     process.stdin.close()
@@ -302,6 +317,11 @@ class Supervisor:
 def complain(problem: str) -> None:
     """One line to stderr, below whatever MAVProxy's prompt shows."""
     print(f"\nmavproxy-uavapi: {problem}", file=sys.stderr)
+
+
+def has_said(log: Path, words: bytes) -> bool:
+    """Whether the log has them."""
+    return words in log.read_bytes()
 
 
 def last_line(log: Path) -> str:

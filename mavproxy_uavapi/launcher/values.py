@@ -11,6 +11,7 @@ from mavproxy_uavapi.core import logs
 
 # The names that may be written, those of the original service too, and the components that they stand for.
 LOG_COMPONENTS = {**{name: name for name in logs.COMPONENTS}, **logs.ALIASES}
+VEHICLES = ("copter", "plane", "quadplane", "rover")
 _MODULE = re.compile(r"[A-Za-z_]\w*(:\{[^;\s]*\})?")
 
 
@@ -28,6 +29,28 @@ def _integer(text: str, low: int, high: int) -> int:
     if not text.strip().isascii() or not text.strip().isdigit() or not low <= int(text) <= high:
         raise ValueError(f"expected a whole number from {low} to {high}")
     return int(text)
+
+
+def count(text: str) -> int:
+    """How many vehicles, 1 to 255."""
+    return _integer(text, 1, 255)
+
+
+def vehicles(text: str) -> tuple[tuple[str, int], ...]:
+    """`copter:8,rover:2` -> (("copter", 8), ("rover", 2)); a type alone is one vehicle."""
+    types = [word.partition(":") for word in words(text)]
+    return tuple((one_of(*VEHICLES)(kind), count(number) if colon else 1) for kind, colon, number in types)
+
+
+def distance(text: str) -> float:
+    """A finite number from 0 on (m)."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not (math.isfinite(number) and number >= 0):
+        raise ValueError("expected a number of metres")
+    return number
 
 
 def factor(text: str) -> float:

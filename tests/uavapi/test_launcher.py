@@ -21,6 +21,7 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.core.state_directory import state_directory
+from mavproxy_uavapi.core.vehicle.geodesy import offset
 from mavproxy_uavapi.launcher import (
     cli,
     command_lines,
@@ -33,6 +34,7 @@ from mavproxy_uavapi.launcher import (
     processes,
 )
 from mavproxy_uavapi.launcher.errors import LaunchError, OptionError
+from mavproxy_uavapi.launcher.fleet import SimulatedVehicle, fleet, kinds
 from mavproxy_uavapi.launcher.options import RunOptions, parse
 from mavproxy_vision import opencv_install
 
@@ -170,7 +172,10 @@ def test_wrong_file_is_one_line(tmp_path, capsys, text, said):
         (["--log_console", "ENGINE"], "--log_console: expected some of COPTER"),
         (["--gradys_gs", "10.0.2.5"], "--gradys_gs: expected HOST:PORT"),
         (["--module", "x;reboot"], "--module: expected NAME"),
-        (["--simulated", "--vehicle", "plane"], "--vehicle plane needs --ardupilot_path"),
+        (["--simulated", "--vehicle", "boat"], "--vehicle: expected copter, plane, quadplane or rover"),
+        (["--simulated", "--vehicles", "copter:0"], "--vehicles: expected a whole number from 1 to 255"),
+        (["--simulated", "--spacing", "-1"], "--spacing: expected a number of metres"),
+        (["--simulated", "--count", "250"], "--count: system ids end at 255, and these begin at 10"),
         (["--simulated", "--ardupilot_path", "/nonexistent"], "there is no /nonexistent/Tools"),
         (["--simulated", "--ardupilot_path", "/nonexistent", "--speedup", "1.5"], "whole numbers only"),
         (["--simulated", "--location", "Nowhere"], "unknown name 'Nowhere'"),
@@ -240,7 +245,7 @@ def test_module_settings_survive_mavproxys_splitting():
 
 def test_mavproxy_command_for_a_real_vehicle():
     given = RunOptions(port=8001, sysid=3, gradys_gs="10.0.2.5:8000", module=("vision",), mavproxy_args=("--map",))
-    line = command_lines.mavproxy_command(given, ["mavproxy.py"], Path("/run"), None, None)
+    line = command_lines.mavproxy_command(given, ["mavproxy.py"], Path("/run"), [], None)
     assert line[:4] == [
         *("mavproxy.py", "--master=udpin:127.0.0.1:17171", "--target-system=3", "--logfile=/run/mav.tlog")
     ]
@@ -255,35 +260,70 @@ def test_mavproxy_command_for_a_real_vehicle():
 
 
 @pytest.mark.parametrize(
-    ("given", "instance", "expected"),
+    ("given", "expected"),
     [
-        (RunOptions(connection_type="udpout"), None, "udpout:127.0.0.1:17171"),
-        (RunOptions(connection_type="tcp", uav_connection="10.0.0.1:5760"), None, "tcp:10.0.0.1:5760"),
-        (RunOptions(connection_type="usb", uav_connection="/dev/ttyACM0,57600"), None, "/dev/ttyACM0,57600"),
-        (RunOptions(simulated=True), 2, "tcp:127.0.0.1:5780"),
+        (RunOptions(connection_type="udpout"), "udpout:127.0.0.1:17171"),
+        (RunOptions(connection_type="tcp", uav_connection="10.0.0.1:5760"), "tcp:10.0.0.1:5760"),
+        (RunOptions(connection_type="usb", uav_connection="/dev/ttyACM0,57600"), "/dev/ttyACM0,57600"),
     ],
 )
-def test_link_to_the_vehicle(given, instance, expected):
-    assert command_lines.master(given, instance) == expected
+def test_link_to_the_vehicle(given, expected):
+    assert command_lines.masters(given, []) == [expected]
+
+
+def simulated(*instances, kind="copter", sysid=10):
+    home = locations.BUILT_IN["AbraDF"]
+    return [SimulatedVehicle(kind, sysid + number, instance, home) for number, instance in enumerate(instances)]
+
+
+def test_each_simulated_vehicle_has_a_link():
+    given = RunOptions(simulated=True, count=2)
+    assert command_lines.masters(given, simulated(2, 5)) == ["tcp:127.0.0.1:5780", "tcp:127.0.0.1:5810"]
+
+
+def test_fleet_has_types_system_ids_and_homes_in_a_row():
+    given = RunOptions(simulated=True, sysid=3, vehicles=(("copter", 2), ("rover", 1)), spacing=10.0)
+    home = locations.BUILT_IN["CMAC"]
+    vehicles = fleet(given, home, [0, 4, 7])
+    assert [(one.kind, one.sysid, one.instance) for one in vehicles] == [
+        ("copter", 3, 0),
+        ("copter", 4, 4),
+        ("rover", 5, 7),
+    ]
+    assert vehicles[0].home == home
+    north, east = offset(home.lat, home.lon, vehicles[2].home.lat, vehicles[2].home.lon)
+    assert (north, east) == pytest.approx((0.0, 20.0), abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["--count", "3", "--vehicle", "rover"], ["rover"] * 3),
+        (["--vehicles", "copter:2,plane"], ["copter", "copter", "plane"]),
+        ([], ["copter"]),
+    ],
+)
+def test_types_of_the_simulated_vehicles(arguments, expected):
+    assert kinds(parse(["--simulated", *arguments], {})) == expected
 
 
 def test_headless_mavproxy_is_a_daemon_and_forwards():
     given = RunOptions(headless=True, simulated=True, gs_connection=("1.1.1.1:1",))
-    line = command_lines.mavproxy_command(given, [], Path("/run"), 0, None)
+    line = command_lines.mavproxy_command(given, [], Path("/run"), simulated(0), None)
     assert "--daemon" in line
     assert "--out=1.1.1.1:1" in line
     assert not any(word.startswith("--sitl") for word in line)
 
 
 def test_vehicle_commands():
-    home = locations.BUILT_IN["AbraDF"]
-    embedded = command_lines.embedded_command(RunOptions(speedup=2.5), 3, home)
+    embedded = command_lines.embedded_command(RunOptions(speedup=2.5), *simulated(3))
     assert embedded[1:] == [
         *("-m", "mavproxy_uavapi.sim", "--instance=3", "--sysid=10", "--speedup=2.5"),
         "--home=-15.8400810,-47.9266420,1042,30",
     ]
-    given = RunOptions(ardupilot_path="/ap", vehicle="plane", speedup=5.0, sysid=7)
-    sitl = command_lines.sim_vehicle_command(given, "python3", 1, home, Path("/run/vehicle"))
+    given = RunOptions(ardupilot_path="/ap", speedup=5.0)
+    plane = simulated(1, kind="plane", sysid=7)[0]
+    sitl = command_lines.sim_vehicle_command(given, "python3", plane, Path("/run/vehicle"))
     assert sitl[:2] == ["python3", "/ap/Tools/autotest/sim_vehicle.py"]
     assert {"--vehicle=ArduPlane", "--instance=1", "--sysid=7", "--speedup=5", "--no-mavproxy"} < set(sitl)
 
@@ -299,8 +339,8 @@ def test_token_is_on_no_command_line_and_in_no_greeting(monkeypatch):
     monkeypatch.setenv("UAVAPI_TOKEN", "very-secret")
     given = RunOptions(simulated=True, host="0.0.0.0", scripts_path="/s")
     lines = [
-        *command_lines.mavproxy_command(given, ["m"], Path("/run"), 0, Path("/run/uavapi.ini")),
-        *command_lines.embedded_command(given, 0, locations.BUILT_IN["CMAC"]),
+        *command_lines.mavproxy_command(given, ["m"], Path("/run"), simulated(0), Path("/run/uavapi.ini")),
+        *command_lines.embedded_command(given, *simulated(0)),
         command_lines.greeting(given, with_token=True),
         command_lines.settings_file(given) or "",
     ]

@@ -25,7 +25,7 @@ def test_each_vehicle_is_listed_with_its_state(two: Any, api: Any, loop: Any) ->
     second = answer["vehicles"][1]
     assert second["mode"] == "GUIDED"
     assert second["link"]["alive"]
-    assert second["position"]["position"]["relative_alt"] == pytest.approx(20.0)
+    assert second["position"]["relative_alt"] == pytest.approx(20.0)
     assert second["commanded_by"] is None
 
 
