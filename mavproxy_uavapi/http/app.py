@@ -78,7 +78,7 @@ async def _answer(request: web.BaseRequest) -> web.StreamResponse:
         raise web.HTTPMethodNotAllowed(request.method, match.allowed)
     await invite(request)
     params = await parameters(request, route.model, body=request.method == "POST" and not route.raw)
-    call = Call(request[SERVICE], request, params, path=match.path, system=match.system, names=match.names)
+    call = Call(request[SERVICE], request, params, match)
     with call.naming_source():
         answer = await (audited(call, route.action) if route.commands and route.trail else route.action(call))
     return answer if isinstance(answer, web.StreamResponse) else success(answer)

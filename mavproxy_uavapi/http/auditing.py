@@ -7,7 +7,9 @@ import asyncio
 from mavproxy_uavapi.core.audit import Entry, utc_now
 from mavproxy_uavapi.core.errors import NoVehicle, UavApiError
 from mavproxy_uavapi.core.sent_messages import SentNames, noting_sent
-from mavproxy_uavapi.http.call import Action, Answer, Call
+from mavproxy_uavapi.http.call import Call
+from mavproxy_uavapi.http.responses import Answer
+from mavproxy_uavapi.http.route import Action
 
 GONE = "the client hung up"
 
@@ -17,7 +19,7 @@ async def audited(call: Call, action: Action) -> Answer:
     with noting_sent() as sent:
         trace = Trace(call, sent)
         try:
-            answer = await action(call)
+            answer: Answer = await action(call)
         except UavApiError as error:
             trace.leave(error.code, str(error))
             error.in_trail = True

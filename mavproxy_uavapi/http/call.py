@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-from collections.abc import Awaitable, Callable, Iterator, Mapping
+from collections.abc import Awaitable, Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, TypeVar, cast
 
@@ -21,7 +21,8 @@ from mavproxy_uavapi.http.broadcast import TelemetryBroadcast
 from mavproxy_uavapi.http.bucket import Bucket
 from mavproxy_uavapi.http.log_throttle import LogThrottle
 from mavproxy_uavapi.http.requests import Request, parse
-from mavproxy_uavapi.http.responses import envelope
+from mavproxy_uavapi.http.responses import Answer, envelope
+from mavproxy_uavapi.http.router import NOWHERE, Match
 from mavproxy_uavapi.http.streaming import MOST_OPEN, Slots
 from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.settings import ApiSettings
@@ -29,8 +30,6 @@ from mavproxy_uavapi.settings import ApiSettings
 log = logging.getLogger("uavapi.http.server")
 R = TypeVar("R", bound=Request)
 T = TypeVar("T")
-Answer = dict[str, Any] | web.StreamResponse
-Action = Callable[["Call"], Awaitable[Answer]]
 
 WAITS = {"true", "1", "yes"}  # values of the query's `wait`
 HURRIES = {"false", "0", "no"}
@@ -77,21 +76,13 @@ class Call:
         remembered: what stands for the parameters in the job and in the trail: themselves, unless they are long.
     """
 
-    def __init__(
-        self,
-        service: Service,
-        request: web.BaseRequest,
-        params: Request,
-        *,
-        path: str = "",
-        system: int = 0,
-        names: Mapping[str, str] | None = None,
-    ) -> None:
+    def __init__(self, service: Service, request: web.BaseRequest, params: Request, match: Match = NOWHERE) -> None:
         self.service = service
         self.request = request
-        self.path = path
-        self.named_system = system
-        self.names = names or {}
+        self.path = match.path
+        self.named_system = match.system
+        self.names = match.names
+        self._verb = "" if match.route is None else match.route.verb
         self._params = self.remembered = params
         self.job: Job | None = None
 
@@ -112,8 +103,15 @@ class Call:
 
     @property
     def vehicle(self) -> Vehicle:
-        """The vehicle, with a link that is alive: it can be commanded."""
-        return self.service.host.registry.commandable(self.system)
+        """The vehicle, with a link that is alive: it can be commanded.
+
+        Raises:
+            NotSupported: its type does not have the route's verb.
+        """
+        vehicle = self.service.host.registry.commandable(self.system)
+        if self._verb and not vehicle.has(self._verb):
+            raise NotSupported(f"a {vehicle.kind} does not have {self.path}")
+        return vehicle
 
     @property
     def copter(self) -> Copter:

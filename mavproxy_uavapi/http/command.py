@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from mavproxy_uavapi.core.vehicle.jobs import Job
-from mavproxy_uavapi.http.call import Answer, Call
-from mavproxy_uavapi.http.requests import Blocking, Disarm, ModeName, NewSpeed, SimFactor, Takeoff
+from mavproxy_uavapi.http.call import Call
+from mavproxy_uavapi.http.requests import Blocking, Disarm, LandAt, ModeName, NewSpeed, Reverse, SimFactor, Takeoff
+from mavproxy_uavapi.http.responses import Answer
+
+LANDED = {"plane": "Landed successfully"}  # by the type of vehicle, as its clients know it
+RETURNED = {"copter": "Landed at home successfully"}
 
 
 async def arm(call: Call) -> Answer:
@@ -23,32 +27,51 @@ async def disarm(call: Call) -> Answer:
 
 async def takeoff(call: Call) -> Answer:
     """Take off to an altitude above home."""
-    copter, p = call.copter, call.params(Takeoff)
+    vehicle, p = call.vehicle, call.params(Takeoff)
     result = f"Takeoff successful! Vehicle at {p.alt} meters"
-    return await call.fly(copter, lambda job: copter.takeoff(job, p.alt, p.timeout), result)
+    return await call.fly(vehicle, lambda job: vehicle.takeoff(job, p.alt, vtol=p.vtol, timeout=p.timeout), result)
 
 
 async def land(call: Call) -> Answer:
-    """Land here and disarm."""
-    copter, p = call.copter, call.params(Blocking)
-    result = "Landed at home successfully"
-    return await call.fly(copter, lambda job: copter.land(job, p.timeout), result, outlives_client=True, urgent=True)
+    """Land and disarm: a copter or QuadPlane where it is, another plane by its mission's landing."""
+    vehicle, p = call.vehicle, call.params(Blocking)
+    result = LANDED.get(vehicle.kind, "Landed at home successfully")
+    return await call.fly(
+        vehicle, lambda job: vehicle.land(job, p.timeout), result, outlives_client=True, urgent=True
+    )
+
+
+async def land_at(call: Call) -> Answer:
+    """Begin to land a plane at a place, by a mission that takes the place of its own; answers when it flies that."""
+    vehicle, p = call.vehicle, call.params(LandAt)
+    return await call.fly(
+        vehicle,
+        lambda job: vehicle.land_at(job, p.lat, p.long, p.alt, vtol=p.vtol),
+        f"Landing mission started for coord ({p.lat}, {p.long})",
+        outlives_client=True,
+        urgent=True,
+    )
 
 
 async def rtl(call: Call) -> Answer:
-    """Return to launch, land there and disarm."""
-    copter, p = call.copter, call.params(Blocking)
-    result = "Landed at home successfully"
-    return await call.fly(copter, lambda job: copter.rtl(job, p.timeout), result, outlives_client=True, urgent=True)
+    """Return to launch: a copter lands there and disarms, a plane circles there, a rover stops there."""
+    vehicle, p = call.vehicle, call.params(Blocking)
+    result = RETURNED.get(vehicle.kind, "Returned to launch")
+    return await call.fly(vehicle, lambda job: vehicle.rtl(job, p.timeout), result, outlives_client=True, urgent=True)
 
 
 async def brake(call: Call) -> Answer:
-    """Stop at once, in BRAKE mode."""
-    copter = call.copter
-    result = "Copter braking. Use /command/guided to enable movement commands again"
-    return await call.fly(
-        copter, lambda job: copter.set_mode(job, "BRAKE"), result, outlives_client=True, urgent=True
-    )
+    """Stop at once: a copter in BRAKE mode, a plane by circling in LOITER, a rover in HOLD."""
+    vehicle = call.vehicle
+    result = f"{vehicle.kind.capitalize()} braking. Use /command/guided to enable movement commands again"
+    return await call.fly(vehicle, vehicle.brake, result, outlives_client=True, urgent=True)
+
+
+async def set_reverse(call: Call) -> Answer:
+    """Drive a rover backwards from now on, or forwards again."""
+    vehicle, p = call.vehicle, call.params(Reverse)
+    result = f"Driving {'backwards' if p.reverse else 'forwards'}"
+    return await call.fly(vehicle, lambda job: vehicle.set_reverse(job, p.reverse), result)
 
 
 async def guided(call: Call) -> Answer:

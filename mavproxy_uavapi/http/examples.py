@@ -55,6 +55,8 @@ QGC WPL 110
 
 REQUESTS: Mapping[type[requests.Request], Mapping[str, Any]] = {
     requests.Takeoff: {"alt": 10},
+    requests.LandAt: {"lat": -35.3629, "long": 149.1652},
+    requests.Reverse: {"reverse": True},
     requests.ModeName: {"mode": "LOITER"},
     requests.NewSpeed: {"new_v": 5},
     requests.SimFactor: {"sim_factor": 5},
@@ -108,6 +110,8 @@ RESULTS: Mapping[str, str] = {
     "/command/brake": "Copter braking. Use /command/guided to enable movement commands again",
     "/command/guided": "Copter in GUIDED mode",
     "/command/set_mode": "Mode LOITER",
+    "/command/land_at": "Landing mission started for coord (-35.3629, 149.1652)",
+    "/command/set_reverse": "Driving backwards",
     "/command/set_air_speed": "Air speed set to 5m/s",
     "/command/set_ground_speed": "Ground speed set to 5m/s",
     "/command/set_climb_speed": "Climb speed set to 5m/s",

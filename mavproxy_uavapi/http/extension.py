@@ -5,9 +5,9 @@ A module puts its routes into `Host.extensions`, by path; the API serves them wh
     host.extensions["/vision/land"] = Route("/vision/land", land, LandRequest, EITHER, job=True)
 """
 
-from mavproxy_uavapi.http.call import Answer, Call, in_time
+from mavproxy_uavapi.http.call import Call, in_time
 from mavproxy_uavapi.http.requests import NED_REACH, Blocking, Empty, Number, Request, Written
-from mavproxy_uavapi.http.responses import envelope
+from mavproxy_uavapi.http.responses import Answer, envelope
 from mavproxy_uavapi.http.route import EITHER, POST, Route
 from mavproxy_uavapi.http.streaming import Slots, StreamingResponse
 

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
 
-from mavproxy_uavapi.core.vehicle.copter import Copter
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.messages import GlobalTarget, NedTarget, VelocityTarget
-from mavproxy_uavapi.http.call import Answer, Call
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import BodyOffset, GpsTarget, Heading, NedPlace, NedVelocity, YawRate
+from mavproxy_uavapi.http.responses import Answer
+
+STOPPED = {"plane": "Plane is loitering"}
 
 
 async def go_to_gps(call: Call) -> Answer:
@@ -22,10 +25,10 @@ async def go_to_gps_wait(call: Call) -> Answer:
 
 
 async def _go_to_gps(call: Call, wait: bool) -> Answer:
-    copter, p = call.copter, call.params(GpsTarget)
+    vehicle, p = call.vehicle, call.params(GpsTarget)
     place = f"coord ({p.lat}, {p.long}, {p.alt})"
-    verb = _going(copter, lambda: GlobalTarget(p.lat, p.long, p.alt), p, wait)
-    return await call.fly(copter, verb, f"Arrived at {place}" if wait else f"Going to {place}")
+    verb = _going(vehicle, lambda: GlobalTarget(p.lat, p.long, p.alt), p, wait)
+    return await call.fly(vehicle, verb, f"Arrived at {place}" if wait else f"Going to {place}")
 
 
 async def go_to_ned(call: Call) -> Answer:
@@ -39,20 +42,20 @@ async def go_to_ned_wait(call: Call) -> Answer:
 
 
 async def _go_to_ned(call: Call, wait: bool) -> Answer:
-    copter, p = call.copter, call.params(NedPlace)
+    vehicle, p = call.vehicle, call.params(NedPlace)
     place = f"NED coord ({p.x}, {p.y}, {p.z})"
-    verb = _going(copter, lambda: NedTarget(p.x, p.y, p.z), p, wait)
-    return await call.fly(copter, verb, f"Arrived at {place}" if wait else f"Going to {place}")
+    verb = _going(vehicle, lambda: NedTarget(p.x, p.y, p.z), p, wait)
+    return await call.fly(vehicle, verb, f"Arrived at {place}" if wait else f"Going to {place}")
 
 
 def _going(
-    copter: Copter, aim: Callable[[], NedTarget | GlobalTarget], p: GpsTarget | NedPlace | BodyOffset, wait: bool
+    vehicle: Vehicle, aim: Callable[[], NedTarget | GlobalTarget], p: GpsTarget | NedPlace | BodyOffset, wait: bool
 ) -> Callable[[Job], Awaitable[None]]:
     """The verb that goes to what `aim` gives once the job begins: a joined request must not move a target."""
 
     async def verb(job: Job) -> None:
-        copter.require_guided_flight()
-        await copter.go_to(
+        vehicle.require_guided_flight()
+        await vehicle.go_to(
             job, aim(), look_at_target=p.look_at_target, wait=wait, tolerance=p.tolerance, timeout=p.timeout
         )
 
@@ -70,8 +73,8 @@ async def drive_wait(call: Call) -> Answer:
 
 
 async def _drive(call: Call, wait: bool) -> Answer:
-    copter, p = call.copter, call.params(NedPlace)
-    return await _drive_to(call, copter, lambda: copter.ned_from_here(p.x, p.y, p.z), p, wait)
+    vehicle, p = call.vehicle, call.params(NedPlace)
+    return await _drive_to(call, vehicle, lambda: vehicle.ned_from_here(p.x, p.y, p.z), p, wait)
 
 
 async def drive_body(call: Call) -> Answer:
@@ -85,13 +88,14 @@ async def drive_body_wait(call: Call) -> Answer:
 
 
 async def _drive_body(call: Call, wait: bool) -> Answer:
-    copter, p = call.copter, call.params(BodyOffset)
-    return await _drive_to(call, copter, lambda: copter.body_from_here(p.front, p.right, p.down), p, wait)
+    vehicle, p = call.vehicle, call.params(BodyOffset)
+    return await _drive_to(call, vehicle, lambda: vehicle.body_from_here(p.front, p.right, p.down), p, wait)
 
 
 async def _drive_to(
-    call: Call, copter: Copter, aim: Callable[[], NedTarget], p: NedPlace | BodyOffset, wait: bool
+    call: Call, vehicle: Vehicle, aim: Callable[[], NedTarget], p: NedPlace | BodyOffset, wait: bool
 ) -> Answer:
+    kind = vehicle.kind.capitalize()
     aimed_at: list[NedTarget] = []
 
     def aim_once() -> NedTarget:
@@ -100,43 +104,47 @@ async def _drive_to(
 
     def result() -> str:
         if not wait:
-            return "Copter is driving"
+            return f"{kind} is driving"
         target = aimed_at[-1]
-        return f"Copter arrived at ({target.x}, {target.y}, {target.z})"
+        return f"{kind} arrived at ({target.x}, {target.y}, {target.z})"
 
-    return await call.fly(copter, _going(copter, aim_once, p, wait), result)
+    return await call.fly(vehicle, _going(vehicle, aim_once, p, wait), result)
 
 
 async def travel_at_ned(call: Call) -> Answer:
     """Fly at an NED velocity until the autopilot drops it, or for a duration."""
-    copter, p = call.copter, call.params(NedVelocity)
+    vehicle, p = call.vehicle, call.params(NedVelocity)
     velocity = VelocityTarget(p.vx, p.vy, p.vz)
 
     async def verb(job: Job) -> None:
-        await copter.travel(job, velocity, look_at_target=p.look_at_target, duration=p.duration)
+        await vehicle.travel(job, velocity, look_at_target=p.look_at_target, duration=p.duration)
 
-    return await call.fly(copter, verb, f"Travelling at NED velocity ({p.vx}, {p.vy}, {p.vz})")
+    return await call.fly(vehicle, verb, f"Travelling at NED velocity ({p.vx}, {p.vy}, {p.vz})")
 
 
 async def set_heading(call: Call) -> Answer:
     """Turn to a heading, the shorter way round."""
-    copter, heading = call.copter, call.params(Heading).heading
-    return await call.fly(copter, lambda job: copter.set_heading(job, heading), f"Heading set to {heading} degrees")
+    vehicle, heading = call.vehicle, call.params(Heading).heading
+    return await call.fly(vehicle, lambda job: vehicle.set_heading(job, heading), f"Heading set to {heading} degrees")
 
 
 async def set_yaw_rate(call: Call) -> Answer:
     """Turn at a rate."""
-    copter, rate = call.copter, call.params(YawRate).yaw_rate
-    return await call.fly(copter, lambda job: copter.set_yaw_rate(job, rate), f"Yaw rate set to {rate} deg/s")
+    vehicle, rate = call.vehicle, call.params(YawRate).yaw_rate
+    return await call.fly(vehicle, lambda job: vehicle.set_yaw_rate(job, rate), f"Yaw rate set to {rate} deg/s")
 
 
 async def stop(call: Call) -> Answer:
-    """Hold the vehicle still until it is resumed; a movement under way waits, no other begins."""
-    copter = call.copter
-    return await call.fly(copter, copter.stop, "Copter has stopped", outlives_client=True, urgent=True)
+    """Hold a copter still until it is resumed; a movement under way waits, no other begins.
+
+    A plane circles in LOITER and a rover stops in HOLD: their movement ends.
+    """
+    vehicle = call.vehicle
+    result = STOPPED.get(vehicle.kind, f"{vehicle.kind.capitalize()} has stopped")
+    return await call.fly(vehicle, vehicle.stop, result, outlives_client=True, urgent=True)
 
 
 async def resume(call: Call) -> Answer:
     """Continue the guided movement."""
-    copter = call.copter
-    return await call.fly(copter, copter.resume, "Copter has resumed")
+    vehicle = call.vehicle
+    return await call.fly(vehicle, vehicle.resume, f"{vehicle.kind.capitalize()} has resumed")

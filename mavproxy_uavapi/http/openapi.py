@@ -16,6 +16,7 @@ from pydantic.json_schema import models_json_schema
 from mavproxy_uavapi import __version__
 from mavproxy_uavapi.core import errors
 from mavproxy_uavapi.core.errors import UavApiError
+from mavproxy_uavapi.core.vehicle.registry import CLASSES
 from mavproxy_uavapi.http import examples, requests
 from mavproxy_uavapi.http.route import Route
 
@@ -182,6 +183,10 @@ def operation(route: Route, method: str) -> dict[str, Any]:
         "parameters": _path_parameters(route),
         "responses": {"200": _success(route, method), **_failures(errors_of(route))},
     }
+    if route.verb:
+        types = [kind for kind, vehicle in CLASSES.items() if vehicle.has(route.verb)]
+        told["x-vehicle-types"] = types
+        told["description"] = f"{told['description']}\n\nOf: {', '.join(types)}.".strip()
     if route.job:
         told["parameters"] += HURRY
         told["responses"]["202"] = ACCEPTED

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from mavproxy_uavapi.http.call import Answer, Call
+from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import Servo
+from mavproxy_uavapi.http.responses import Answer
 
 
 async def servo_output(call: Call) -> Answer:

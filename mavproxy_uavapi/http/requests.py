@@ -76,9 +76,25 @@ class Disarm(Request):
 
 
 class Takeoff(Blocking):
-    """`alt`: m above home."""
+    """`alt`: m above home. A plane climbs with the pitch of its parameter TKOFF_LVL_PITCH."""
 
     alt: Annotated[Number, Field(gt=0, le=500, description="m above home"), NotNothing] = 15
+    vtol: Annotated[bool, Field(description="vertically (a QuadPlane)")] = False
+
+
+class LandAt(Request):
+    """A place to land at: degrees, and m above home; `vtol` vertically, where the plane can."""
+
+    lat: Annotated[Number, Field(ge=-90, le=90, description="degrees")]
+    long: Annotated[Number, Field(ge=-180, le=180, description="degrees")]
+    alt: Annotated[Number, Field(ge=-1000, le=10_000, description="m above home")] = 0
+    vtol: Annotated[bool, Field(description="vertically (a QuadPlane)")] = False
+
+
+class Reverse(Request):
+    """`reverse`: backwards, or forwards again."""
+
+    reverse: Annotated[bool, Field(description="backwards")] = True
 
 
 class ModeName(Request):

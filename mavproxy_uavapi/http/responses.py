@@ -11,6 +11,7 @@ from aiohttp import web
 
 from mavproxy_uavapi.core.errors import TooManyRequests, UavApiError, Unauthorized
 
+Answer = dict[str, Any] | web.StreamResponse  # of an action: a body, or the whole response
 Handler = Callable[[web.BaseRequest], Awaitable[web.StreamResponse]]
 
 

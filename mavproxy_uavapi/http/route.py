@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
+from typing import Any
 
-from mavproxy_uavapi.http.call import Action
 from mavproxy_uavapi.http.requests import Request
+from mavproxy_uavapi.http.responses import Answer
 
+Action = Callable[[Any], Awaitable[Answer]]  # takes a Call
 EITHER = ("GET", "POST")
 POST = ("POST",)
 
@@ -23,6 +26,7 @@ class Route:
     raw: bool = False  # whether the action itself reads the body, which holds no parameters
     job: bool = False  # whether the action runs as a job, which a client need not wait for
     stops: bool = False  # whether it stops a vehicle: no limit refuses it
+    verb: str = ""  # the method of a vehicle that it calls, where not every type of vehicle has that
     trail: bool = True  # whether a call that commands is audited; one that comes many times a second would flush it
 
     @property

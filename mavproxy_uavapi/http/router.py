@@ -79,3 +79,4 @@ class Router:
 
 
 MATCH = web.RequestKey("match", Match)
+NOWHERE = Match("")

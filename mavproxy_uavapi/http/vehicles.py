@@ -43,7 +43,7 @@ def describe(call: Call, vehicle: Vehicle) -> dict[str, Any]:
 
 
 def _position(vehicle: Vehicle, now: float) -> dict[str, Any]:
-    """Position, velocity and heading as `/telemetry/gps` has them, and their age (s); None for what was never told."""
+    """Position, velocity and heading as `/telemetry/gps` has them, and their age (s); None before it told them."""
     received = vehicle.state.newest("GLOBAL_POSITION_INT")
     if received is None:
         return {"position": None, "velocity": None, "heading": None, "age_s": None}

@@ -48,6 +48,11 @@ def mode_name(vehicle_type: int, number: int | None) -> str:
     return names.get(number, f"MODE{number}")
 
 
+def mode_names(vehicle_type: int) -> set[str]:
+    """The names of such a vehicle's modes."""
+    return set(mavutil.mode_mapping_byname(vehicle_type) or {})
+
+
 def mode_number(vehicle_type: int, name: str) -> int:
     """The custom mode of that name, in any case of letters.
 

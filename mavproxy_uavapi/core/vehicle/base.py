@@ -194,13 +194,16 @@ class BaseVehicle:
 
         return check
 
-    async def switch_to(self, job: Job, mode: str, *needs: Callable[[], None]) -> None:
+    async def switch_to(
+        self, job: Job, mode: str, *needs: Callable[[], None], command: messages.Command | None = None
+    ) -> None:
         """Switch the flight mode for `job` and wait until a heartbeat shows it.
 
         Args:
             job: who commands.
             mode: the mode's name.
             needs: what must hold each time before it is sent; they raise where it does not.
+            command: what switches it; None for DO_SET_MODE.
 
         Raises:
             Invalid: no such mode.
@@ -230,7 +233,8 @@ class BaseVehicle:
 
         check = self.commanding(job, switched_by_nobody_else, *needs, noted)
         try:
-            await self.commands.send_until_shown(messages.set_mode(number), check, shown, f"show mode {mode.upper()}")
+            switch = command or messages.set_mode(number)
+            await self.commands.send_until_shown(switch, check, shown, f"show mode {mode.upper()}")
         except Rejected:
             self._modes_asked.pop(number, None)
             raise

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+from typing import Any
 
-from mavproxy_uavapi.core.errors import Busy, ModeChanged, NotArmed, Rejected, TimedOut
+from mavproxy_uavapi.core.errors import Busy, ModeChanged, Rejected, TimedOut
 from mavproxy_uavapi.core.mavlink.flight_modes import MISSION_MODES, flies_mission
 from mavproxy_uavapi.core.vehicle import messages, time_limits
 from mavproxy_uavapi.core.vehicle.authority import Rank
-from mavproxy_uavapi.core.vehicle.guided import ARRIVAL_SPEED, GUIDED, GuidedVehicle
+from mavproxy_uavapi.core.vehicle.guided import ARRIVAL_SPEED, GUIDED
 from mavproxy_uavapi.core.vehicle.jobs import Job
-from mavproxy_uavapi.core.vehicle.messages import VelocityTarget
-from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
+from mavproxy_uavapi.core.vehicle.messages import NO_YAW, VelocityTarget
+from mavproxy_uavapi.core.vehicle.turning import TurningVehicle
 
 TAKEOFF_SHARE = 0.05  # of the altitude, between TAKEOFF_TOLERANCE's two ends
 TAKEOFF_TOLERANCE = (0.3, 1.0)  # m
@@ -20,12 +21,19 @@ OVER_WITHIN = 3.0  # s at its altitude in which the autopilot should call a take
 LIFT_OFF_TIMEOUT = 5.0  # s in which an unacknowledged takeoff must show
 SLOWED_DOWN = 0.3  # s in which a pause on the ground takes the motors from full throttle
 STOP_TIMEOUT = 20.0  # s from full speed to rest
-HOME_RADIUS = 10.0  # m; closer than this a vehicle on the ground is at home
 SPEED_MODES = {"GUIDED", "RTL", *MISSION_MODES}  # others refuse DO_CHANGE_SPEED
 
 
-class Copter(GuidedVehicle):
+class Copter(TurningVehicle):
     """A multicopter or helicopter."""
+
+    holding_mode = "BRAKE"
+
+    def last_word(self) -> Any:
+        """A zero velocity in GUIDED, else BRAKE."""
+        if self.mode == self.next_mode == GUIDED:
+            return VelocityTarget(0, 0, 0).to(self.address, NO_YAW)
+        return super().last_word()
 
     @property
     def takes_speeds(self) -> bool:
@@ -34,10 +42,10 @@ class Copter(GuidedVehicle):
 
     # -- up and down --------------------------------------------------------------------------------------
 
-    async def takeoff(self, job: Job, alt: float, timeout: float | None = None) -> None:
+    async def takeoff(self, job: Job, alt: float, *, vtol: bool = False, timeout: float | None = None) -> None:
         """Climb to `alt` m above home from the ground, armed and in GUIDED; done within tolerance of it.
 
-        The tolerance is 5 % of `alt`, at least 0.3 m and at most 1 m.
+        The tolerance is 5 % of `alt`, at least 0.3 m and at most 1 m. It is vertical whatever `vtol` says.
         """
         self.require_armed()
         self.require_mode(GUIDED)
@@ -56,7 +64,7 @@ class Copter(GuidedVehicle):
 
         def reached() -> bool | None:
             nonlocal near_since
-            self._report_leg(job, abs(alt - self.height))
+            self.report_leg(job, abs(alt - self.height))
             climb = self.state.field("GLOBAL_POSITION_INT", "vz") or 0
             slow = abs(climb) / 100.0 <= 2 * ARRIVAL_SPEED
             if not (abs(alt - self.height) <= tolerance and slow):
@@ -96,7 +104,7 @@ class Copter(GuidedVehicle):
         await self.switch_to(job, "LAND")
         limits = await self.limits()
         expected = time_limits.landing_time(limits, self.height)
-        await self._flown_home(job, "LAND", limits, self.allowed(expected, timeout))
+        await self.landed_in(job, "LAND", self.allowed(expected, timeout))
 
     async def rtl(self, job: Job, timeout: float | None = None) -> None:
         """Return to launch; done when the vehicle has landed there and disarmed.
@@ -109,44 +117,16 @@ class Copter(GuidedVehicle):
             ModeChanged: somebody armed it while its home was asked for.
         """
         self.authority.take(job, Rank.STOP)
-        distance = self.distance_home()
-        if self.state.armed is False:
-            if distance is None:
-                await self.home()
-                if self.state.armed is not False:
-                    raise ModeChanged(f"the vehicle was armed meanwhile, in {self.mode}: whoever armed it has it")
-                self.fresh("GLOBAL_POSITION_INT")
-                distance = self.distance_home() or 0.0
-            if distance > HOME_RADIUS:
-                raise NotArmed(f"the vehicle is disarmed, {distance:.0f} m from home")
+        if await self.is_done_at_home():
             return
         await self.switch_to(job, "RTL")
         limits = await self.limits()
         expected = time_limits.return_time(limits, self.distance_home() or 0.0, self.height)
-        await self._flown_home(job, "RTL", limits, self.allowed(expected, timeout))
+        await self.landed_in(job, "RTL", self.allowed(expected, timeout))
 
-    async def _flown_home(self, job: Job, mode: str, limits: time_limits.FlightLimits, timeout: float) -> None:
-        """Wait until it has landed and disarmed in that mode; motors that stop in flight are no landing."""
-        landing = Touchdown(limits)
-
-        def landed() -> bool | None:
-            self._report(job)
-            landing.sinks_at((self.state.field("GLOBAL_POSITION_INT", "vz") or 0) / 100.0)
-            if self.state.armed is not False or self.mode != mode:
-                self.held_by(mode)
-                return None
-            if landing.fell:
-                raise NotArmed("the vehicle was disarmed in flight, and fell")
-            return landing.is_over(self.clock(), self.state.age("GLOBAL_POSITION_INT", self.clock()))
-
-        names = {"HEARTBEAT", "GLOBAL_POSITION_INT"}
-        await self.waiting.until(names, landed, timeout, f"land and disarm in {mode}")
-
-    def _report(self, job: Job) -> None:
-        job.progress = {"altitude": self.height}
-        distance = self.distance_home()
-        if distance is not None:
-            job.progress["distance_to_go"] = distance
+    async def come_down(self, job: Job) -> None:
+        """Land where it is."""
+        await self.land(job)
 
     # -- stopping -----------------------------------------------------------------------------------------
 
@@ -182,8 +162,8 @@ class Copter(GuidedVehicle):
             if mode == GUIDED:
                 self.authority.end_pause()
                 raise
-            await self.switch_to(job, "BRAKE")
-            mode = "BRAKE"
+            await self.switch_to(job, self.holding_mode)
+            mode = self.holding_mode
         names = {"LOCAL_POSITION_NED"}
         await self.flown(mode, names, lambda: self.stands_still or None, STOP_TIMEOUT, "stop")
         self.authority.shown(job)
@@ -211,7 +191,7 @@ class Copter(GuidedVehicle):
         """
         self.authority.take(job, Rank.STOP)
         if not self.mode == self.next_mode == GUIDED:
-            await self.switch_to(job, "BRAKE")
+            await self.switch_to(job, self.holding_mode)
         elif self.state.landed and not self.authority.paused:
             await self._hold_down(job)
         else:

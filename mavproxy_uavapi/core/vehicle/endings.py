@@ -12,11 +12,9 @@ from enum import Enum
 from typing import Any
 
 from mavproxy_uavapi.core.errors import LinkLost, ModeChanged, NotArmed, Paused
-from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission, mode_number
+from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission
 from mavproxy_uavapi.core.vehicle.authority import Rank
-from mavproxy_uavapi.core.vehicle.copter import Copter
 from mavproxy_uavapi.core.vehicle.jobs import Ending, Job, JobBook
-from mavproxy_uavapi.core.vehicle.messages import NO_YAW, VelocityTarget, set_mode
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 log = logging.getLogger("uavapi.copter")
@@ -59,8 +57,8 @@ WHAT_FOLLOWS: Mapping[Situation, Mapping[Policy, str | None]] = {
     Situation.LAND: {**NOTHING, Policy.HOLD: HOLD},
     Situation.RTL: {**NOTHING, Policy.HOLD: HOLD, Policy.LAND: LAND},
 }
-HOLDING_MODES = {"plane": "LOITER", "rover": "HOLD"}  # of what does not hover
-RETURNS = {"RTL", "SMART_RTL"}
+LANDINGS = {"LAND", "QLAND"}
+RETURNS = {"RTL", "SMART_RTL", "QRTL"}
 # A pilot has it, whoever stopped it, or the autopilot's own failsafe.
 HAS_ANOTHER_MASTER = (ModeChanged, NotArmed, Paused, LinkLost)
 FIXED: Mapping[Ending, Policy] = {
@@ -87,8 +85,8 @@ def situation(vehicle: Vehicle, modes: Collection[str] = ()) -> Situation:
         return Situation.PAUSED if vehicle.authority.paused else Situation.GUIDED
     if mode not in modes:
         return Situation.PILOTED
-    if mode == "LAND" or mode in RETURNS:
-        flown = Situation.LAND if mode == "LAND" else Situation.RTL
+    if mode in LANDINGS | RETURNS:
+        flown = Situation.LAND if mode in LANDINGS else Situation.RTL
         return Situation.IDLE if state.landed else flown
     return Situation.MISSION if flies_mission(mode) else Situation.PILOTED
 
@@ -142,11 +140,7 @@ class FlightEndings:
         found = []
         for job in self._closing.values():
             if job.running:
-                number = mode_number(job.vehicle.state.vehicle_type, "BRAKE")
-                rest = VelocityTarget(0, 0, 0).to(job.vehicle.address, NO_YAW)
-                guided = job.vehicle.mode == job.vehicle.next_mode == "GUIDED"
-                message = rest if guided else set_mode(number).to(job.vehicle.address, 0)
-                found.append((message, job.vehicle.state.system))
+                found.append((job.vehicle.last_word(), job.vehicle.state.system))
         return found
 
     def see_to(
@@ -178,7 +172,5 @@ class FlightEndings:
 
 
 def _verb(vehicle: Vehicle, action: str) -> Callable[[Job], Awaitable[None]]:
-    if isinstance(vehicle, Copter):
-        return {HOLD: vehicle.hold, LAND: vehicle.land, RTL: vehicle.rtl}[action]
-    mode = HOLDING_MODES.get(vehicle.kind, "RTL") if action == HOLD else "RTL"
-    return lambda job: vehicle.set_mode(job, mode)
+    returns = vehicle.rtl if vehicle.has("rtl") else vehicle.come_down
+    return {HOLD: vehicle.hold, LAND: vehicle.come_down, RTL: returns}[action]

@@ -17,6 +17,13 @@ def offset(from_lat: float, from_lon: float, to_lat: float, to_lon: float) -> tu
     return north, east
 
 
+def moved(lat: float, lon: float, north: float, east: float) -> tuple[float, float]:
+    """The place (degrees) so many metres north and east of one."""
+    to_lat = lat + north / METRES_PER_DEGREE
+    to_lon = lon + east / (METRES_PER_DEGREE * max(math.cos(math.radians((lat + to_lat) / 2)), 1e-6))
+    return to_lat, (to_lon + 180.0) % 360.0 - 180.0
+
+
 def rotate(front: float, right: float, heading: float) -> tuple[float, float]:
     """North and east of a body-frame offset, for a `heading` in rad clockwise from north."""
     north = front * math.cos(heading) - right * math.sin(heading)

@@ -72,6 +72,28 @@ class Command:
         return mavlink.MAVLink_command_long_message(*address, self.number, confirmation, *params)
 
 
+@dataclass(frozen=True)
+class PlaceCommand(Command):
+    """A MAV_CMD whose last three parameters are a place, which goes as COMMAND_INT.
+
+    Attributes:
+        lat, lon: degrees.
+        alt: m above home.
+    """
+
+    lat: float = 0.0
+    lon: float = 0.0
+    alt: float = 0.0
+
+    def to(self, address: Address, confirmation: int) -> Any:
+        """COMMAND_INT to `address`, in the relative-altitude frame; it has no `confirmation`."""
+        del confirmation
+        params = (*self.params, *(0.0,) * (4 - len(self.params)))
+        place = round(self.lat * 1e7), round(self.lon * 1e7), self.alt
+        frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
+        return mavlink.MAVLink_command_int_message(*address, frame, self.number, 0, 0, *params, *place)
+
+
 def set_mode(number: int) -> Command:
     """Switch to custom mode `number`."""
     return Command(mavlink.MAV_CMD_DO_SET_MODE, (mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, number))
@@ -104,6 +126,29 @@ def takeoff(alt: float, pitch: float = 0.0) -> Command:
 def change_speed(kind: str, speed: float) -> Command:
     """Set the `kind` of speed (air, ground, climb, descent) to `speed` m/s; throttle unchanged."""
     return Command(mavlink.MAV_CMD_DO_CHANGE_SPEED, (SPEED_TYPES[kind], speed, -1), proven_by_ack=True)
+
+
+def reposition(place: GlobalTarget) -> Command:
+    """Go to a place, for planes; taken in GUIDED only, since it does not ask for a change of mode."""
+    speed_unchanged, change_no_mode = -1.0, 0.0
+    return PlaceCommand(
+        mavlink.MAV_CMD_DO_REPOSITION,
+        (speed_unchanged, change_no_mode),
+        proven_by_ack=True,
+        lat=place.lat,
+        lon=place.lon,
+        alt=place.alt,
+    )
+
+
+def start_landing() -> Command:
+    """Fly the landing sequence of the mission (DO_LAND_START), for planes; it changes the mode to AUTO."""
+    return Command(mavlink.MAV_CMD_DO_LAND_START)
+
+
+def set_reverse(reverse: bool) -> Command:
+    """Drive backwards, or forwards again, for rovers."""
+    return Command(mavlink.MAV_CMD_DO_SET_REVERSE, (1 if reverse else 0,), proven_by_ack=True)
 
 
 def set_home_here() -> Command:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from pymavlink import mavutil
@@ -50,11 +50,20 @@ async def fly(vehicle: Vehicle, job: Job, until_complete: bool = False, timeout:
         raise Busy("the vehicle has no mission; POST one to /mission/waypoints")
     _require_startable(vehicle)  # the pilot may have switched it meanwhile
     vehicle.authority.take(job, Rank.ARM)
+    await begin(vehicle, job, lambda: _require_startable(vehicle))
+    if until_complete:
+        await _flown_to_its_end(vehicle, job, items, timeout or LONGEST)
+
+
+async def begin(vehicle: Vehicle, job: Job, startable: Callable[[], None]) -> None:
+    """Fly the mission from its first item, in AUTO, for a job that commands; done when it runs.
+
+    Args:
+        vehicle: which.
+        job: who commands.
+        startable: what must hold until it is in AUTO; raises where it does not.
+    """
     vehicle.waypoints.changed_at = vehicle.clock()
-
-    def startable() -> None:
-        _require_startable(vehicle)
-
     await vehicle.commands.send(messages.set_mission_current(1), vehicle.commanding(job, startable))
     job.modes |= MISSION_MODES  # also where the vehicle is in AUTO already
     if vehicle.mode != AUTO:
@@ -69,8 +78,6 @@ async def fly(vehicle: Vehicle, job: Job, until_complete: bool = False, timeout:
 
     await vehicle.waiting.until({"HEARTBEAT", "MISSION_CURRENT"}, runs, START_TIMEOUT, "begin its mission")
     vehicle.authority.shown(job)
-    if until_complete:
-        await _flown_to_its_end(vehicle, job, items, timeout or LONGEST)
 
 
 def _held(vehicle: Vehicle) -> None:

@@ -11,9 +11,11 @@ from mavproxy_uavapi.core.mavlink.link_watch import LinkWatch
 from mavproxy_uavapi.core.mavlink.pending_waits import PendingWaits
 from mavproxy_uavapi.core.mavlink.vehicle_state import Fleet
 from mavproxy_uavapi.core.vehicle.copter import Copter
+from mavproxy_uavapi.core.vehicle.plane import Plane
+from mavproxy_uavapi.core.vehicle.rover import Rover
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
-CLASSES: dict[str, type[Vehicle]] = {"copter": Copter}
+CLASSES: dict[str, type[Vehicle]] = {"copter": Copter, "plane": Plane, "rover": Rover, "other": Vehicle}
 
 
 class VehicleRegistry:
@@ -57,7 +59,7 @@ class VehicleRegistry:
             others = f"; heard so far: {', '.join(map(str, heard))}" if heard else ""
             raise NoVehicle(f"no vehicle {wanted or ''} on the link yet".replace("  ", " ") + others)
         state = heard[wanted]
-        make = CLASSES.get(kind_of(state.vehicle_type), Vehicle)
+        make = CLASSES[kind_of(state.vehicle_type)]
         vehicle = self._vehicles.get(wanted)
         if type(vehicle) is not make:  # the first time, or the autopilot came back with other firmware
             vehicle = self._vehicles[wanted] = make(state, self._link, self._pending, self._clock)

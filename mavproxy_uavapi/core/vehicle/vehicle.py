@@ -5,17 +5,21 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from mavproxy_uavapi.core.errors import Busy, ModeChanged, NotFound, NotSupported, Rejected
-from mavproxy_uavapi.core.mavlink.flight_modes import mode_number
+from mavproxy_uavapi.core.errors import Busy, ModeChanged, NotArmed, NotFound, NotSupported, Rejected
+from mavproxy_uavapi.core.mavlink.flight_modes import mode_names, mode_number
 from mavproxy_uavapi.core.vehicle import arming, messages
 from mavproxy_uavapi.core.vehicle.authority import Rank
-from mavproxy_uavapi.core.vehicle.base import HEARTBEAT_TIMEOUT, BaseVehicle
+from mavproxy_uavapi.core.vehicle.base import HEARTBEAT_TIMEOUT
 from mavproxy_uavapi.core.vehicle.jobs import Job
+from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
+from mavproxy_uavapi.core.vehicle.verbs import Verbs
 
 STOPPING_MODES = {"LAND", "RTL", "SMART_RTL", "BRAKE", "QLAND", "QRTL", "HOLD"}
+HOLDING_MODES = ("LOITER", "HOLD", "POSHOLD", "ALT_HOLD", "STOP", "RTL")  # what comes first in a vehicle's mode map
+HOME_RADIUS = 10.0  # m; closer than this a vehicle on the ground is at home
 
 
-class Vehicle(BaseVehicle):
+class Vehicle(Verbs):
     """One vehicle, and the verbs that all types have.
 
     Verbs raise errors of `errors.py`: `Rejected` when the autopilot refuses, `TimedOut`, `LinkLost`,
@@ -57,8 +61,78 @@ class Vehicle(BaseVehicle):
     async def set_mode(self, job: Job, mode: str) -> None:
         """Switch to any mode of the vehicle's type. What stops it goes before what does not."""
         mode_number(self.state.vehicle_type, mode)
-        self.authority.take(job, Rank.STOP if mode.upper() in STOPPING_MODES else Rank.ARM)
+        stops = mode.upper() in STOPPING_MODES | {self.holding_mode}
+        self.authority.take(job, Rank.STOP if stops else Rank.ARM)
         await self.switch_to(job, mode)
+
+    # -- stopping -----------------------------------------------------------------------------------------
+
+    @property
+    def holding_mode(self) -> str:
+        """The mode in which a vehicle of its type stays where it is, by itself."""
+        names = mode_names(self.state.vehicle_type)
+        return next((mode for mode in HOLDING_MODES if mode in names), self.mode)
+
+    async def hold(self, job: Job) -> None:
+        """Stop and stay, however it moves for us."""
+        self.authority.take(job, Rank.STOP)
+        if not self.mode == self.next_mode == self.holding_mode:
+            await self.switch_to(job, self.holding_mode)
+
+    async def come_down(self, job: Job) -> None:
+        """Land where nobody flies it any more; by whatever the type has."""
+        await self.set_mode(job, "RTL" if "RTL" in mode_names(self.state.vehicle_type) else self.holding_mode)
+
+    def last_word(self) -> Any:
+        """The one message that makes it hold, when nobody can see to it any more."""
+        return messages.set_mode(mode_number(self.state.vehicle_type, self.holding_mode)).to(self.address, 0)
+
+    # -- home ---------------------------------------------------------------------------------------------
+
+    async def is_done_at_home(self) -> bool:
+        """Whether it is disarmed, so that there is nothing to return: at home it is done.
+
+        Raises:
+            NotArmed: it is disarmed elsewhere.
+            NotFound: it is disarmed, and has no home yet.
+            ModeChanged: somebody armed it while its home was asked for.
+        """
+        if self.state.armed is not False:
+            return False
+        distance = self.distance_home()
+        if distance is None:
+            await self.home()
+            if self.state.armed is not False:
+                raise ModeChanged(f"the vehicle was armed meanwhile, in {self.mode}: whoever armed it has it")
+            self.fresh("GLOBAL_POSITION_INT")
+            distance = self.distance_home() or 0.0
+        if distance > HOME_RADIUS:
+            raise NotArmed(f"the vehicle is disarmed, {distance:.0f} m from home")
+        return True
+
+    async def landed_in(self, job: Job, mode: str, timeout: float) -> None:
+        """Wait until it has landed and disarmed in that mode; motors that stop in flight are no landing."""
+        landing = Touchdown(await self.limits())
+
+        def landed() -> bool | None:
+            self.report_home(job)
+            landing.sinks_at((self.state.field("GLOBAL_POSITION_INT", "vz") or 0) / 100.0)
+            if self.state.armed is not False or self.mode != mode:
+                self.held_by(mode)
+                return None
+            if landing.fell:
+                raise NotArmed("the vehicle was disarmed in flight, and fell")
+            return landing.is_over(self.clock(), self.state.age("GLOBAL_POSITION_INT", self.clock()))
+
+        names = {"HEARTBEAT", "GLOBAL_POSITION_INT"}
+        await self.waiting.until(names, landed, timeout, f"land and disarm in {mode}")
+
+    def report_home(self, job: Job) -> None:
+        """Have the job tell the altitude and the way home."""
+        job.progress = {"altitude": self.height}
+        distance = self.distance_home()
+        if distance is not None:
+            job.progress["distance_to_go"] = distance
 
     async def set_speed(self, job: Job, kind: str, speed: float) -> bool:
         """Set the `kind` of speed (air, ground, climb, descent) to `speed` m/s; the ack is the proof.

@@ -20,6 +20,7 @@ from mavproxy_uavapi.http.auditing import audited
 from mavproxy_uavapi.http.call import Call, Service
 from mavproxy_uavapi.http.jobs import list_jobs
 from mavproxy_uavapi.http.requests import Empty
+from mavproxy_uavapi.http.router import Match
 from mavproxy_uavapi.settings import ApiModuleSettings
 
 LINE = "(1, -158400810, -479266420, 584090, 0, 65535, 0, 0, 3, 10)\n"
@@ -43,7 +44,7 @@ def call_of(service: Service, text: str = LONG, **query: str) -> Call:
     request: Any = SimpleNamespace(
         path="/mission/fly-track", remote="10.0.0.9", headers={}, query=query, transport=None
     )
-    return Call(service, request, TrackRequest(track=text))
+    return Call(service, request, TrackRequest(track=text), Match("/mission/fly-track"))
 
 
 def asked(service: Service, call: Call) -> Any:

@@ -78,7 +78,7 @@ def test_bounds_are_those_that_clients_know(
 
 
 def test_defaults_are_those_of_the_contract() -> None:
-    assert parse(requests.Takeoff, "query", {}).model_dump() == {"timeout": None, "alt": 15}
+    assert parse(requests.Takeoff, "query", {}).model_dump() == {"timeout": None, "alt": 15, "vtol": False}
     assert parse(requests.Disarm, "query", {}).model_dump() == {"force": False}
     target = parse(requests.NedPlace, "body", {"x": 1, "y": 2, "z": 3})
     assert (target.look_at_target, target.tolerance, target.timeout) == (False, 1.0, None)  # type: ignore[attr-defined]

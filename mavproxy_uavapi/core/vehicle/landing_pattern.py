@@ -1,0 +1,51 @@
+"""A plane's landing as a mission: the sequence that DO_LAND_START begins. Pure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from pymavlink import mavutil
+
+from mavproxy_uavapi.core.vehicle.geodesy import moved, offset
+from mavproxy_uavapi.core.vehicle.messages import GlobalTarget
+from mavproxy_uavapi.core.vehicle.mission_files import MissionItem
+
+mavlink = mavutil.mavlink
+
+APPROACH = 400.0  # m from the place of a landing at which its descent begins
+APPROACH_HEIGHT = 40.0  # m above that place: a slope of 10 %, as ArduPilot's documentation advises
+NEAR = 50.0  # m; from nearer than that the direction of the approach is no matter
+
+
+def is_in(items: Iterable[MissionItem]) -> bool:
+    """Whether a mission has a landing sequence."""
+    return any(item.command == mavlink.MAV_CMD_DO_LAND_START for item in items)
+
+
+def pattern(place: GlobalTarget, here: tuple[float, float], *, vtol: bool) -> list[MissionItem]:
+    """A landing at `place`: straight in from `here`, or from north where that is too near.
+
+    Args:
+        place: where it touches down; m above home.
+        here: latitude and longitude of the vehicle, degrees.
+        vtol: whether it lands vertically.
+    """
+    if vtol:
+        return [_item(mavlink.MAV_CMD_NAV_VTOL_LAND, place)]
+    north, east = offset(place.lat, place.lon, *here)
+    distance = math.hypot(north, east)
+    if distance < NEAR:
+        north, east, distance = 1.0, 0.0, 1.0
+    scale = APPROACH / distance
+    approach = GlobalTarget(*moved(place.lat, place.lon, north * scale, east * scale), place.alt + APPROACH_HEIGHT)
+    return [
+        _item(mavlink.MAV_CMD_DO_LAND_START, GlobalTarget(0.0, 0.0, 0.0)),
+        _item(mavlink.MAV_CMD_NAV_LOITER_TO_ALT, approach),
+        _item(mavlink.MAV_CMD_NAV_LAND, place),
+    ]
+
+
+def _item(command: int, place: GlobalTarget) -> MissionItem:
+    lat, lon, frame = round(place.lat * 1e7), round(place.lon * 1e7), mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
+    return MissionItem(command, frame, (0.0, 0.0, 0.0, 0.0), lat, lon, place.alt)

@@ -1,0 +1,227 @@
+"""The verbs of a plane: it cannot stand still in the air, so it circles where it is to stay.
+
+ArduPlane has no LAND mode: a landing is a sequence of its mission (DO_LAND_START), or QLAND of a QuadPlane. It takes
+off in TAKEOFF, and goes to positions in GUIDED by DO_REPOSITION only.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mavproxy_uavapi.core.errors import Busy, Invalid, Stale
+from mavproxy_uavapi.core.vehicle import landing_pattern, messages, mission_flight, time_limits
+from mavproxy_uavapi.core.vehicle.authority import Rank
+from mavproxy_uavapi.core.vehicle.geodesy import moved
+from mavproxy_uavapi.core.vehicle.guided import GUIDED, TOLERANCE, GuidedVehicle
+from mavproxy_uavapi.core.vehicle.jobs import Job
+from mavproxy_uavapi.core.vehicle.messages import GlobalTarget, NedTarget
+from mavproxy_uavapi.core.vehicle.time_limits import FlightLimits
+
+AUTO, TAKEOFF, RTL, QLAND = "AUTO", "TAKEOFF", "RTL", "QLAND"
+RADIUS = 60.0  # m; WP_LOITER_RAD until the vehicle has told its own
+CIRCLING = 1.5  # radii from the middle of a circle in which a plane that flies it is found, wind and entry included
+HEIGHT_TOLERANCE = 10.0  # m
+LOWEST_HANDOVER = 15.0  # m above home; TAKEOFF's own climb is not interrupted below that
+# Quantities and their defaults: cruise airspeed, climb and sink rates, m/s.
+CRUISE = (("AIRSPEED_CRUISE", "TRIM_ARSPD_CM"), 12.0)
+CLIMB, SINK = (("TECS_CLMB_MAX",), 5.0), (("TECS_SINK_MAX",), 5.0)
+HEADWIND = 0.5  # share of the airspeed that is left over ground, for deadlines
+CIRCLES = 60.0  # s for circles at both ends of a way, for deadlines
+LANDING = 300.0  # s for a landing pattern and the disarming after it, for deadlines
+
+
+class Plane(GuidedVehicle):
+    """A fixed-wing plane or QuadPlane."""
+
+    holding_mode = "LOITER"
+
+    async def limits(self) -> FlightLimits:
+        """Its speeds, for deadlines; asked for where they are not known."""
+        told = await self.parameters.read([CRUISE[0], CLIMB[0], SINK[0]])
+        cruise = told.get("AIRSPEED_CRUISE") or told.get("TRIM_ARSPD_CM", 100 * CRUISE[1]) / 100
+        climb, sink = told.get(*CLIMB[0], CLIMB[1]), told.get(*SINK[0], SINK[1])
+        return time_limits.limits(
+            {"WP_SPD": HEADWIND * cruise, "WP_SPD_UP": climb / 2, "WP_SPD_DN": sink / 2, "LAND_SPD_MS": sink},
+            self.speeds.in_force,
+        )
+
+    async def _radius(self) -> float:
+        """Metres, of its circles."""
+        told = await self.parameters.read([("WP_LOITER_RAD",)])
+        return abs(told.get("WP_LOITER_RAD", RADIUS)) or RADIUS
+
+    async def is_vtol(self) -> bool:
+        """Whether it takes off and lands vertically, too."""
+        return bool((await self.parameters.read([("Q_ENABLE",)])).get("Q_ENABLE"))
+
+    # -- up and down --------------------------------------------------------------------------------------
+
+    async def takeoff(self, job: Job, alt: float, *, vtol: bool = False, timeout: float | None = None) -> None:
+        """Take off to `alt` m above home; done when it circles there in GUIDED, within 10 m of it.
+
+        It climbs in TAKEOFF, by its own parameters TKOFF_…; with `vtol` a QuadPlane climbs in GUIDED, and hovers.
+        """
+        self.require_armed()
+        self.require_mode(GUIDED)
+        if self.state.landed is False:
+            raise Busy("the vehicle is flying already")
+        self.authority.take(job, Rank.ARM)
+        allowed = self.allowed(CIRCLES + time_limits.leg_time(await self.limits(), 0.0, alt), timeout)
+        if vtol:
+            await self.commands.send(messages.takeoff(alt), self.commanding(job, self.flying))
+        else:
+            await self.switch_to(job, TAKEOFF)
+            handover = max(alt - HEIGHT_TOLERANCE, LOWEST_HANDOVER)
+
+            def has_climbed() -> bool | None:
+                self.report_leg(job, abs(alt - self.height))
+                over = self.state.landed is False and not self.is_taking_off
+                return True if self.height >= LOWEST_HANDOVER and (over or self.height >= handover) else None
+
+            names = {"GLOBAL_POSITION_INT", "EXTENDED_SYS_STATE"}
+            await self.flown(TAKEOFF, names, has_climbed, allowed, f"climb in {TAKEOFF}")
+            await self.switch_to(job, GUIDED)
+            here = self.fresh("GLOBAL_POSITION_INT")
+            await self._reposition(job, GlobalTarget(here.lat / 1e7, here.lon / 1e7, alt))
+
+        def reached() -> bool | None:
+            self.report_leg(job, abs(alt - self.height))
+            return True if abs(alt - self.height) <= HEIGHT_TOLERANCE and self.state.landed is False else None
+
+        await self.flown(GUIDED, {"GLOBAL_POSITION_INT"}, reached, allowed, f"reach {alt:g} m")
+        self.authority.shown(job)
+
+    async def land(self, job: Job, timeout: float | None = None) -> None:
+        """Land and disarm: a QuadPlane where it is, another by its mission's landing sequence.
+
+        Raises:
+            Busy: the mission has no landing sequence; `land_at` makes one.
+        """
+        if self.state.armed is False:
+            self.authority.take(job, Rank.STOP)  # an arm that waits ends
+            return
+        vertical = await self.is_vtol()
+        if not vertical and not landing_pattern.is_in((await self.waypoints.download())[1]):
+            raise Busy("the vehicle's mission has no landing sequence (DO_LAND_START); `land_at` makes one")
+        self.authority.take(job, Rank.STOP)
+        mode = QLAND if vertical else AUTO
+        await self.switch_to(job, mode, command=None if vertical else messages.start_landing())
+        await self.landed_in(job, mode, self.allowed(LANDING, timeout))
+
+    async def land_at(self, job: Job, lat: float, lon: float, alt: float = 0.0, *, vtol: bool = False) -> None:
+        """Begin to land at a place; done when it flies the landing. Its mission is replaced by that landing.
+
+        Raises:
+            NotArmed, Busy: it does not fly.
+            Rejected, TimedOut: the mission was not taken; then the old one is there again, and the mode is as it was.
+        """
+        self.require_armed()
+        if self.state.landed:
+            raise Busy("the vehicle is on the ground")
+        here = self.fresh("GLOBAL_POSITION_INT")
+        place = GlobalTarget(lat, lon, alt)
+        items = landing_pattern.pattern(place, (here.lat / 1e7, here.lon / 1e7), vtol=vtol)
+        self.authority.take(job, Rank.STOP)
+        if self.mode == AUTO:  # a mission in flight is not changed
+            await self.switch_to(job, self.holding_mode)
+        mode = self.mode
+        await self.waypoints.upload(items, check=self.commanding(job, lambda: self.held_by(mode)))
+        await mission_flight.begin(self, job, lambda: self.held_by(mode) if self.mode != AUTO else None)
+
+    async def come_down(self, job: Job) -> None:
+        """Land where it can; without a landing sequence it returns, and circles at home."""
+        try:
+            await self.land(job)
+        except Busy:
+            await self.rtl(job)
+
+    async def rtl(self, job: Job, timeout: float | None = None) -> None:
+        """Return to launch; done when it circles there, or has landed where its parameters say so."""
+        self.authority.take(job, Rank.STOP)
+        if await self.is_done_at_home():
+            return
+        await self.switch_to(job, RTL)
+        near = CIRCLING * await self._radius()
+        distance = self.distance_home() or 0.0
+        expected = CIRCLES + time_limits.leg_time(await self.limits(), distance, 0.0)
+
+        def at_home() -> bool | None:
+            self.report_home(job)
+            if self.state.armed is False and self.mode == RTL:
+                return True
+            distance = self.distance_home()
+            return True if distance is not None and distance <= near else None
+
+        def guarded() -> bool | None:
+            done = at_home()
+            if done is None:
+                self.held_by(RTL)
+            return done
+
+        names = {"HEARTBEAT", "GLOBAL_POSITION_INT"}
+        await self.waiting.until(names, guarded, self.allowed(expected, timeout), "return home")
+
+    # -- going and staying --------------------------------------------------------------------------------
+
+    async def stop(self, job: Job) -> None:
+        """Circle here, in LOITER; the movement under way ends.
+
+        Raises:
+            NotArmed: there is nothing to stop.
+        """
+        if self.authority.on_its_way and not self.state.armed:
+            self.authority.take(job, Rank.STOP)  # an arm that waits ends
+        self.require_armed()
+        await self.hold(job)
+
+    async def go_to(
+        self,
+        job: Job,
+        target: NedTarget | GlobalTarget,
+        *,
+        look_at_target: bool = False,
+        wait: bool = False,
+        tolerance: float = TOLERANCE,
+        timeout: float | None = None,
+    ) -> None:
+        """Fly to a position, and circle there; with `wait`, done when it circles there.
+
+        It is there within one and a half radii of its circles (WP_LOITER_RAD) and 10 m of altitude, or `tolerance`
+        if that is more. It always looks where it goes.
+        """
+        self.require_guided_flight()
+        radius = await self._radius()
+        place = self._global(target)
+        if place.alt < 0:
+            raise Invalid(f"the target lies {-place.alt:.1f} m below home")
+        self.authority.take(job, Rank.MOVEMENT)
+        await self._reposition(job, place)
+        if not wait:
+            return
+        north, east, up = self.leg_to(place)
+        expected = CIRCLES + time_limits.leg_time(await self.limits(), math.hypot(north, east), up)
+
+        def arrived() -> bool | None:
+            try:
+                north, east, up = self.leg_to(place)
+            except Stale:
+                return None  # a gap in the telemetry
+            self.report_leg(job, math.hypot(north, east))
+            self.require_own_target()
+            near = math.hypot(north, east) <= max(tolerance, CIRCLING * radius)
+            return True if near and abs(up) <= max(tolerance, HEIGHT_TOLERANCE) else None
+
+        names = {"GLOBAL_POSITION_INT"}
+        await self.flown(GUIDED, names, arrived, self.allowed(expected, timeout), "arrive")
+
+    def _global(self, target: NedTarget | GlobalTarget) -> GlobalTarget:
+        """The same place in degrees and m above home: ArduPlane takes no other."""
+        if isinstance(target, GlobalTarget):
+            return target
+        north, east, up = self.leg_to(target)
+        here = self.fresh("GLOBAL_POSITION_INT")
+        return GlobalTarget(*moved(here.lat / 1e7, here.lon / 1e7, north, east), here.relative_alt / 1000.0 + up)
+
+    async def _reposition(self, job: Job, place: GlobalTarget) -> None:
+        await self.commands.send(messages.reposition(place), self.commanding(job, self.flying))
+        self.sent(place)

@@ -1,0 +1,115 @@
+"""The verbs of a rover or boat: it moves in two dimensions, and stops where it is told to."""
+
+from __future__ import annotations
+
+from mavproxy_uavapi.core.errors import Busy
+from mavproxy_uavapi.core.vehicle import messages, time_limits
+from mavproxy_uavapi.core.vehicle.authority import Rank
+from mavproxy_uavapi.core.vehicle.guided import GUIDED, TOLERANCE
+from mavproxy_uavapi.core.vehicle.jobs import Job
+from mavproxy_uavapi.core.vehicle.messages import GlobalTarget, NedTarget, Target
+from mavproxy_uavapi.core.vehicle.time_limits import FlightLimits
+from mavproxy_uavapi.core.vehicle.travelling import TravellingVehicle
+
+RADIUS = 2.0  # m; WP_RADIUS until the vehicle has told its own
+SPEED = 2.0  # m/s; CRUISE_SPEED until it has told its own
+AT_HOME = 2.0  # waypoint radii from home in which a rover that returned has stopped
+STOP_TIMEOUT = 20.0  # s from full speed to rest
+
+
+class Rover(TravellingVehicle):
+    """A ground rover or boat. Altitudes mean nothing to it."""
+
+    holding_mode = "HOLD"
+
+    def require_guided_flight(self) -> None:
+        """Raises NotArmed or ModeChanged unless it is armed in GUIDED."""
+        self.require_armed()
+        self.require_mode(GUIDED)
+
+    def leg_to(self, target: NedTarget | GlobalTarget) -> tuple[float, float, float]:
+        """Metres north and east from here to `target`; it lies as high."""
+        north, east, _ = super().leg_to(target)
+        return north, east, 0.0
+
+    @property
+    def standstill(self) -> Target:
+        """The place where it is: a velocity of 0 has a direction for a rover, and it might turn."""
+        return self.ned_from_here(0, 0, 0)
+
+    async def limits(self) -> FlightLimits:
+        """Its speed, for deadlines; asked for where it is not known."""
+        told = await self.parameters.read([("WP_SPEED",), ("CRUISE_SPEED",)])
+        cruise = told.get("WP_SPEED") or told.get("CRUISE_SPEED") or SPEED
+        return time_limits.limits({"WP_SPD": cruise, "WP_ACC": 1.0}, self.speeds.in_force)
+
+    async def _radius(self) -> float:
+        """Metres from a waypoint at which the autopilot calls it reached, and stops."""
+        return (await self.parameters.read([("WP_RADIUS",)])).get("WP_RADIUS", RADIUS)
+
+    async def go_to(
+        self,
+        job: Job,
+        target: NedTarget | GlobalTarget,
+        *,
+        look_at_target: bool = False,
+        wait: bool = False,
+        tolerance: float = TOLERANCE,
+        timeout: float | None = None,
+    ) -> None:
+        """Drive to a position; with `wait`, done when it has stopped there.
+
+        It is there within `tolerance` m, or its parameter WP_RADIUS if that is more. It always looks where it goes.
+        """
+        self.require_guided_flight()
+        there = max(tolerance, await self._radius()) if wait else tolerance
+        await super().go_to(job, target, wait=wait, tolerance=there, timeout=timeout)
+
+    async def rtl(self, job: Job, timeout: float | None = None) -> None:
+        """Return to launch; done when it has stopped there. Disarmed at home there is nothing to do."""
+        self.authority.take(job, Rank.STOP)
+        if await self.is_done_at_home():
+            return
+        await self.switch_to(job, "RTL")
+        near = AT_HOME * await self._radius()
+        expected = time_limits.leg_time(await self.limits(), self.distance_home() or 0.0, 0.0)
+
+        def at_home() -> bool | None:
+            self.report_home(job)
+            distance = self.distance_home()
+            return True if distance is not None and distance <= near and self.stands_still else None
+
+        names = {"GLOBAL_POSITION_INT", "LOCAL_POSITION_NED"}
+        await self.flown("RTL", names, at_home, self.allowed(expected, timeout), "stop at home")
+
+    async def stop(self, job: Job) -> None:
+        """Stop in HOLD; done when telemetry shows that it stands still.
+
+        Raises:
+            NotArmed: there is nothing to stop.
+        """
+        if self.authority.on_its_way and not self.state.armed:
+            self.authority.take(job, Rank.STOP)  # an arm that waits ends
+        self.require_armed()
+        await self.hold(job)
+        await self.flown(
+            self.holding_mode, {"LOCAL_POSITION_NED"}, lambda: self.stands_still or None, STOP_TIMEOUT, "stop"
+        )
+        self.authority.shown(job)
+
+    async def come_down(self, job: Job) -> None:
+        """Stop where it is."""
+        await self.hold(job)
+
+    async def set_reverse(self, job: Job, reverse: bool) -> None:
+        """Drive backwards from now on, or forwards again; a change of mode ends it.
+
+        Raises:
+            Busy: the autopilot would forget it: it is in no mode that drives by itself.
+        """
+        self.require_armed()
+        if self.mode == self.holding_mode:
+            raise Busy(f"the vehicle is in {self.mode}, and forgets it with the next mode; `guided` first")
+        self.authority.accompany(job, "reverse")
+        mode = self.mode
+        await self.commands.send(messages.set_reverse(reverse), self.commanding(job, lambda: self.held_by(mode)))

@@ -1,0 +1,90 @@
+"""Moving at a velocity in GUIDED, and coming to rest there."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+
+from mavproxy_uavapi.core.errors import Stale, TimedOut
+from mavproxy_uavapi.core.vehicle import messages
+from mavproxy_uavapi.core.vehicle.authority import Rank
+from mavproxy_uavapi.core.vehicle.guided import ARRIVAL_SPEED, GuidedVehicle
+from mavproxy_uavapi.core.vehicle.jobs import Job
+from mavproxy_uavapi.core.vehicle.messages import NO_YAW, NedTarget, Target, VelocityTarget
+
+RESENDS_PER_TIMEOUT = 3  # velocity setpoints sent in each GUID_TIMEOUT
+REST_PERIOD = 0.3  # s between two setpoints of a standstill
+REST_SHOWN = 1.0  # s
+REST_TIMEOUT = 10.0  # s
+
+
+class TravellingVehicle(GuidedVehicle):
+    """A vehicle that takes velocities in GUIDED, and can stand still there."""
+
+    @property
+    def standstill(self) -> Target:
+        """The setpoint that stops it."""
+        return VelocityTarget(0, 0, 0)
+
+    async def travel(
+        self,
+        job: Job,
+        velocity: VelocityTarget,
+        *,
+        look_at_target: bool = False,
+        duration: float | None = None,
+    ) -> None:
+        """Fly at a velocity: one setpoint, which the autopilot drops after GUID_TIMEOUT.
+
+        With `duration` (s of the vehicle's clock) the setpoint is repeated for so long, then a stop is sent.
+        """
+        self.require_guided_flight()
+        self.authority.take(job, Rank.MOVEMENT)
+        yaw = messages.towards(velocity.vx, velocity.vy) if look_at_target else NO_YAW
+        job.steers = duration is not None
+        await self.take_up(job, velocity, yaw)
+        if duration is None:
+            return
+        period = (await self.limits()).guided_timeout / RESENDS_PER_TIMEOUT
+        remaining = duration
+        while remaining > 0:
+            stretch = min(period, remaining)
+            await self._travelled(stretch)
+            remaining = round(remaining - stretch, 6)  # what is left of a float is no setpoint
+            await self.send_setpoint(job, velocity if remaining > 0 else self.standstill, yaw)
+
+    async def _travelled(self, seconds: float) -> None:
+        """Let `seconds` of the vehicle's clock pass while it stays armed and in GUIDED."""
+        clock = self.state.time_ratio
+        over = clock.boot_time(self.clock()) + seconds
+        while (left := over - clock.boot_time(self.clock())) > 0:
+            self.flying()
+            with contextlib.suppress(TimedOut):  # the time has passed, unless the vehicle's clock ran slower
+                await self.waiting.message({"HEARTBEAT"}, lambda beat: beat, max(left / clock.ratio, 0.01), "beat")
+
+    async def rest(self, job: Job) -> None:
+        """Stop by setpoints in GUIDED, sent until telemetry shows that it stands still.
+
+        A setpoint may be lost and a climb begins slowly: so it must be shown for a while.
+
+        Raises:
+            TimedOut: it goes on moving.
+        """
+        deadline = self.clock() + REST_TIMEOUT
+        still_since = self.clock()
+        while self.clock() - still_since < REST_SHOWN:
+            if self.clock() > deadline:
+                raise TimedOut(f"vehicle {self.state.system} does not stop within {REST_TIMEOUT:g} s")
+            await self.send_setpoint(job, self.standstill)
+            self.authority.shown(job)  # a newer movement replaces it as it replaced the one before
+            await asyncio.sleep(REST_PERIOD)
+            if not self.stands_still:
+                still_since = self.clock()
+
+    @property
+    def stands_still(self) -> bool:
+        """Whether fresh telemetry shows that it hardly moves."""
+        try:
+            return self.speed_by(NedTarget(0, 0, 0)) <= ARRIVAL_SPEED
+        except Stale:
+            return False

@@ -1,0 +1,61 @@
+"""Turning on the spot in GUIDED."""
+
+from __future__ import annotations
+
+import math
+
+from mavproxy_uavapi.core.vehicle import messages, setpoint_in_force
+from mavproxy_uavapi.core.vehicle.authority import YAW
+from mavproxy_uavapi.core.vehicle.guided import GUIDED
+from mavproxy_uavapi.core.vehicle.jobs import Job
+from mavproxy_uavapi.core.vehicle.messages import Yaw
+from mavproxy_uavapi.core.vehicle.travelling import TravellingVehicle
+
+HEADING_TOLERANCE = 3.0  # degrees
+RATE_TOLERANCE = 2.0, 0.2  # deg/s, and a share of the rate
+SLOWEST_TURN = 10.0  # deg/s: a vehicle that turns slower than this does not turn
+
+
+class TurningVehicle(TravellingVehicle):
+    """A vehicle that turns on the spot."""
+
+    async def set_heading(self, job: Job, heading: float, timeout: float | None = None) -> None:
+        """Turn to `heading` degrees clockwise from north, the shorter way round; done when the attitude shows it.
+
+        A movement goes on.
+        """
+        self.require_armed()
+        self.require_mode(GUIDED)
+        self.authority.accompany(job, YAW)
+        await self.commands.send(messages.yaw_to(heading), self.commanding(job, self.flying))
+
+        def turned() -> bool | None:
+            yaw = math.degrees(self.fresh("ATTITUDE").yaw)
+            left = abs((heading - yaw + 180.0) % 360.0 - 180.0)
+            job.progress = {"degrees_to_go": round(left, 1)}
+            return True if left <= HEADING_TOLERANCE else None
+
+        if not self.state.landed:  # on the ground it turns when it has taken off
+            allowed = self.allowed(180.0 / SLOWEST_TURN, timeout)
+            await self.flown(GUIDED, {"ATTITUDE"}, turned, allowed, f"turn to {heading:g} degrees")
+
+    async def set_yaw_rate(self, job: Job, rate: float, timeout: float | None = None) -> None:
+        """Turn at `rate` deg/s, clockwise positive; done when the attitude shows it. A movement goes on.
+
+        ArduCopter takes a yaw rate only with a setpoint: so the one that it flies is repeated, or the place where it
+        is, where it does not say what it flies.
+        """
+        self.require_guided_flight()
+        self.require_no_takeoff()
+        self.authority.accompany(job, YAW)
+        target = await setpoint_in_force.ask(self.state, self.waiting, self.link)
+        self.require_no_takeoff()
+        await self.send_setpoint(job, target or self.ned_from_here(0, 0, 0), Yaw(rate=math.radians(rate)))
+        least, share = RATE_TOLERANCE
+
+        def turns() -> bool | None:
+            shown = math.degrees(self.fresh("ATTITUDE").yawspeed)
+            return True if abs(shown - rate) <= max(least, share * abs(rate)) else None
+
+        allowed = self.allowed(abs(rate) / SLOWEST_TURN, timeout)
+        await self.flown(GUIDED, {"ATTITUDE"}, turns, allowed, f"turn at {rate:g} deg/s")
