@@ -142,7 +142,7 @@ class VisionModule(SharedModule[VisionSettings]):
 
         async def started() -> str:
             await self.tracker.start(settings)
-            return f"looking for {settings.family} through {settings.source}"
+            return f"looking for {settings.family} through {settings.shown_source}"
 
         if self._awake():
             self._background.send(started, "opening the camera")

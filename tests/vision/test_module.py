@@ -112,6 +112,17 @@ def test_a_running_camera_ends_with_the_module(mpstate: Any, main_loop: Any) -> 
     assert threading.active_count() == threads
 
 
+def test_a_sources_password_is_never_shown(running: Any, main_loop: Any, capsys: Any) -> None:
+    begun = said_later(running, capsys, main_loop, "set", "source", "rtsp://pilot:s3cret@127.0.0.1:1/cam")
+    assert begun == "vision: looking for 36h11 through rtsp://pilot:***@127.0.0.1:1/cam"
+    main_loop.until(lambda: running.tracker.health.error)
+    for word in ("status", "config", "set"):
+        text = said(running, capsys, word)
+        assert "rtsp://pilot:***@127.0.0.1:1/cam" in text
+        assert "s3cret" not in text
+    assert "s3cret" not in str(running.tracker.health.error)
+
+
 def test_routes_come_and_go(running: Any) -> None:
     host = running.host
     assert "/vision/status" in host.extensions
