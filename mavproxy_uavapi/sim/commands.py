@@ -13,7 +13,6 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from . import arming
 from .copter import SimulatedCopter
 from .frames import AMSL_FRAMES, GLOBAL_FRAMES, HIGHEST_ALTITUDE, global_target, valid_location
 from .geodesy import Location
@@ -30,6 +29,9 @@ DENIED: int = mavlink.MAV_RESULT_DENIED
 FAILED: int = mavlink.MAV_RESULT_FAILED
 BUSY: int = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
 UNSUPPORTED: int = mavlink.MAV_RESULT_UNSUPPORTED
+FORCE_ARM = 2989.0
+FORCE_ARM_OR_DISARM = 21196.0
+"""Values of param2 of MAV_CMD_COMPONENT_ARM_DISARM that skip checks."""
 FORCE_REBOOT = 20190226
 NO_SPEED_KIND = 4
 """The end of the enumeration SPEED_TYPE, which ArduCopter denies; it fails to change what lies beyond."""
@@ -141,10 +143,10 @@ class Commands:
         del link
         copter = self._copter
         if command.param1 == 1:
-            forced = command.param2 in (arming.FORCE, arming.FORCE_ARM)
+            forced = command.param2 in (FORCE_ARM, FORCE_ARM_OR_DISARM)
             return ACCEPTED if copter.arm(forced=forced) else FAILED
         if command.param1 == 0:
-            return ACCEPTED if copter.disarm(forced=command.param2 == arming.FORCE) else FAILED
+            return ACCEPTED if copter.disarm(forced=command.param2 == FORCE_ARM_OR_DISARM) else FAILED
         return UNSUPPORTED
 
     def _run_prearm_checks(self, command: CommandInt, link: PeerLink) -> int:

@@ -74,10 +74,6 @@ class PositionController:
         self.acceleration = [0.0, 0.0, 0.0]
         self._integral = [0.0, 0.0, 0.0]
 
-    def hold_altitude_from(self, position: Ned, velocity: Ned) -> None:
-        """Take the vertical state as it is, keep the horizontal one."""
-        self.position[2], self.velocity[2], self.acceleration[2] = position.down, velocity.down, 0.0
-
     def follow_horizontally(self, position: Ned, velocity: Ned) -> None:
         """Take the horizontal state as it is: nobody commands it (manual flight, ground)."""
         self.position[:2], self.velocity[:2] = position[:2], velocity[:2]

@@ -15,7 +15,6 @@ from .landing import descend
 MINIMUM_ALTITUDE = 0.3
 """RTL_ALT_MIN of ArduCopter, metres above home."""
 MINIMUM_CONE_SLOPE = 0.5
-FINAL_ALTITUDE_TOLERANCE = 0.2
 
 
 class Stage(Enum):
