@@ -208,11 +208,13 @@ class GuidedVehicle(Vehicle):
     async def _travelled(self, seconds: float) -> None:
         """Let `seconds` of the vehicle's clock pass while it stays armed and in GUIDED."""
         clock = self.state.time_ratio
-        over = clock.boot_time(self.clock()) + seconds
-        while (left := over - clock.boot_time(self.clock())) > 0:
+        ends_at = clock.boot_time(self.clock()) + seconds
+        while (remaining := ends_at - clock.boot_time(self.clock())) > 0:
             self.flying()
             with contextlib.suppress(TimedOut):  # the time has passed, unless the vehicle's clock ran slower
-                await self.waiting.message({"HEARTBEAT"}, lambda beat: beat, max(left / clock.ratio, 0.01), "beat")
+                await self.waiting.message(
+                    {"HEARTBEAT"}, lambda beat: beat, max(remaining / clock.ratio, 0.01), "beat"
+                )
 
     # -- yaw ----------------------------------------------------------------------------------------------
 
@@ -228,9 +230,9 @@ class GuidedVehicle(Vehicle):
 
         def turned() -> bool | None:
             yaw = math.degrees(self.fresh("ATTITUDE").yaw)
-            left = abs((heading - yaw + 180.0) % 360.0 - 180.0)
-            job.progress = {"degrees_to_go": round(left, 1)}
-            return True if left <= HEADING_TOLERANCE else None
+            degrees_to_go = abs((heading - yaw + 180.0) % 360.0 - 180.0)
+            job.progress = {"degrees_to_go": round(degrees_to_go, 1)}
+            return True if degrees_to_go <= HEADING_TOLERANCE else None
 
         if not self.state.landed:  # on the ground it turns when it has taken off
             allowed = self.allowed(180.0 / SLOWEST_TURN, timeout)

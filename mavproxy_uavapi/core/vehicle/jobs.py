@@ -106,8 +106,8 @@ class Job:
             self._limit = self._loop.call_later(timeout, self._overdue, timeout)
 
     def _overdue(self, timeout: float) -> None:
-        left = self.progress.get("distance_to_go")
-        to_go = "" if left is None else f": {left:.1f} m to go"
+        distance = self.progress.get("distance_to_go")
+        to_go = "" if distance is None else f": {distance:.1f} m to go"
         self.abort(TimedOut(f"{self.verb} was not done within {timeout:g} s{to_go}"), Ending.FAILED)
 
     async def _run(self, body: Callable[[Job], Awaitable[str]]) -> None:
