@@ -1,4 +1,4 @@
-"""May the vehicle arm, and if not, why: the checks in ArduCopter's order with its texts."""
+"""Whether the vehicle may arm, and why not: ArduCopter's checks, in its order and with its texts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""MAV_CMD to MAV_RESULT: one handler for each command that ArduCopter takes from the ground.
+"""Commands: one handler for each MAV_CMD that ArduCopter takes from a ground station; each gives a MAV_RESULT.
 
 COMMAND_LONG and COMMAND_INT meet here in one shape, as in ArduPilot; commands not in the table are
 MAV_RESULT_UNSUPPORTED.
@@ -34,7 +34,7 @@ FORCE_ARM_OR_DISARM = 21196.0
 """Values of param2 of MAV_CMD_COMPONENT_ARM_DISARM that skip checks."""
 FORCE_REBOOT = 20190226
 NO_SPEED_KIND = 4
-"""The end of the enumeration SPEED_TYPE, which ArduCopter denies; it fails to change what lies beyond."""
+"""The end of the enumeration SPEED_TYPE: ArduCopter answers DENIED to it, and FAILED to larger values."""
 FASTEST_INTERVAL = 0.003
 """Seconds; ArduPilot refuses more than 0.8 of SCHED_LOOP_RATE. More than 100 Hz is not sent here."""
 LONGEST_INTERVAL = 60.0
@@ -66,8 +66,8 @@ class CommandInt:
 def from_message(message: Any) -> CommandInt | None:
     """COMMAND_LONG or COMMAND_INT as a Command; None for a COMMAND_LONG that ArduPilot takes as INT only.
 
-    A parameter that is not a finite number stands for "not given" and reads as 0; z is left as it is, for an
-    altitude must not become 0 by mistake.
+    A parameter that is not a finite number means "not given" and reads as 0. z stays as it is, because an altitude
+    must not become 0 by mistake.
     """
     sender = (message.get_srcSystem(), message.get_srcComponent())
     parameters = (
@@ -206,7 +206,7 @@ class Commands:
             return DENIED
         if not copter.set_mode(Auto.number):
             return FAILED
-        # Without this a vehicle on the ground waits for the pilot to raise the throttle.
+        # Otherwise a vehicle on the ground waits until the pilot raises the throttle.
         copter.auto_armed = copter.armed
         return ACCEPTED
 
@@ -298,13 +298,13 @@ class Commands:
         return ACCEPTED
 
     def _request_message(self, command: CommandInt, link: PeerLink) -> int:
-        wanted = int(command.param1)
-        if wanted == mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
+        message_id = int(command.param1)
+        if message_id == mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
             return self._send_interval(int(command.param2), link)
-        name = self._name_of(wanted)
+        name = self._name_of(message_id)
         if name is None:
             return FAILED
-        # Like most messages in ArduPilot it waits its turn, so the acknowledgement comes first.
+        # As in ArduPilot the message waits its turn, so the acknowledgement comes first.
         self._transmitter.send_soon(link, name)
         return ACCEPTED
 
