@@ -19,17 +19,16 @@ except ModuleNotFoundError as missing:  # MAVProxy prints the text of an ImportE
     raise ImportError(f"gradys needs {missing.name}: pip install mavproxy-uavapi") from missing
 from mavproxy_uavapi.core.background import BackgroundCommands
 from mavproxy_uavapi.core.errors import SettingError
-from mavproxy_uavapi.core.module import SharedModule, value_of
+from mavproxy_uavapi.core.module import SharedModule
 from mavproxy_uavapi.core.remembered_settings import RememberedSettings
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 NAME = "gradys"
 log = logging.getLogger("gradys.spool")
 LONGEST_END = 3.0  # s that MAVProxy waits for it to end
-COMPLETION = "(GRADYSSETTING)"
 COMPLETIONS = [
     "<status|stats|start|stop|flush|config|help>",
-    f"set {COMPLETION}",
+    "set (GRADYSSETTING)",
     "track <record|fly> (FILENAME)",
     "track <stop|help>",
 ]
@@ -48,31 +47,30 @@ gradys set sink URL      where readings go: http(s)://HOST/PATH or mqtt(s)://HOS
 gradys help              this"""
 
 
-class GradysModule(SharedModule):
+class GradysModule(SharedModule[GradysSettings]):
     """`module load gradys`."""
 
     def __init__(self, mpstate: Any, given: dict[str, Any]) -> None:
-        self.remembered = RememberedSettings(mpstate, NAME, given)
-        self.gradys_settings = GradysModuleSettings(self.remembered.given)
+        remembered = RememberedSettings(mpstate, NAME, given)
+        settings = GradysModuleSettings(remembered.given)
         actions: dict[str, Callable[[list[str]], None]] = {
             "status": lambda _: self._show(console.status),
             "stats": lambda _: self._show(console.stats),
             "start": lambda _: self._start(),
             "stop": lambda _: self._stop(),
             "flush": lambda _: self._flush(),
-            "set": self._set,
-            "config": lambda _: print("\n".join(self.gradys_settings.listing())),
             "track": self._tracks,
             "help": lambda _: print(HELP),
         }
-        super().__init__(mpstate, NAME, "GrADyS ground station push", actions, COMPLETIONS)
-        self.add_completion_function(COMPLETION, lambda _: self.gradys_settings.names())
+        super().__init__(
+            mpstate, "GrADyS ground station push", settings, remembered, actions=actions, completions=COMPLETIONS
+        )
         self.gradys = Gradys(self.host)
         self._background = BackgroundCommands(self.host, NAME)
         self._lost = ""  # what the end found unwritten
         self._track = TrackConsole(self.host, self.gradys.tracks)
         self._routes = GradysHandlers(self.gradys).routes()
-        self.remembered.keep(self.gradys_settings.shown)
+        self.remembered.keep(self.module_settings.shown)
 
     def begin(self) -> None:
         """Push and sense."""
@@ -100,7 +98,6 @@ class GradysModule(SharedModule):
 
     def unload(self) -> None:
         """Give back what is ours alone, then the rest; say what is lost."""
-        self.mpstate.completion_functions.pop(COMPLETION, None)
         try:
             super().unload()
         finally:
@@ -123,7 +120,7 @@ class GradysModule(SharedModule):
         print(tell(self.host.bridge.run(report())))
 
     def _start(self) -> None:
-        settings = self.gradys_settings.snapshot()
+        settings = self.module_settings.snapshot()
 
         async def start() -> str:
             await self.gradys.start(settings)
@@ -148,24 +145,13 @@ class GradysModule(SharedModule):
     def _tracks(self, args: list[str]) -> None:
         self._track.command(args)
 
-    def _set(self, args: list[str]) -> None:
-        before = self.gradys_settings.snapshot()
-        try:
-            if len(args) < 2:
-                print("\n".join(self.gradys_settings.listing(*args)))
-                return
-            self.gradys_settings.set(args[0], value := value_of(args[1:]))
-        except SettingError as error:
-            print(f"gradys: {error}")
-            return
-        self.remembered.change(args[0], value)
-        settings = self.gradys_settings.snapshot()
+    def use_settings(self, name: str, before: GradysSettings, after: GradysSettings) -> None:
+        """Push and sense with them."""
 
         async def restart() -> str:
-            return told(settings) if await self.gradys.restart(settings) else ""
+            return told(after) if await self.gradys.restart(after) else ""
 
-        if settings != before and self._begun:
-            self._background.send(restart, "taking up the setting")
+        self._background.send(restart, "taking up the setting")
 
 
 def told(settings: GradysSettings) -> str:

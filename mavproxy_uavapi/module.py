@@ -16,13 +16,12 @@ from mavproxy_uavapi.console import report, vehicles
 from mavproxy_uavapi.core.background import BackgroundCommands
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.logs import Logs, print_above_prompt
-from mavproxy_uavapi.core.module import SharedModule, value_of
+from mavproxy_uavapi.core.module import SharedModule
 from mavproxy_uavapi.core.remembered_settings import RememberedSettings
 from mavproxy_uavapi.settings import ApiModuleSettings, ApiSettings
 
 NAME = "uavapi"
-COMPLETION = "(UAVAPISETTING)"
-COMPLETIONS = ["<status|start|stop|vehicles|config|log|help>", f"set {COMPLETION}", "fly (FILENAME)"]
+COMPLETIONS = ["<status|start|stop|vehicles|config|log|help>", "set (UAVAPISETTING)", "fly (FILENAME)"]
 LOG_SHOWN = 20  # entries
 HELP = """\
 uavapi status            what it listens on, the vehicle that it flies, and the calls in flight
@@ -37,36 +36,40 @@ uavapi fly FILE          fly a recorded track with the API's vehicle, `sysid` (m
 uavapi help              this"""
 
 
-class UavApiModule(SharedModule):
+class UavApiModule(SharedModule[ApiSettings]):
     """`module load uavapi`."""
 
     def __init__(self, mpstate: Any, given: dict[str, Any]) -> None:
-        self.remembered = RememberedSettings(mpstate, NAME, given)
-        self.api_settings = ApiModuleSettings(self.remembered.given)
+        remembered = RememberedSettings(mpstate, NAME, given)
+        settings = ApiModuleSettings(remembered.given)
         self._wanted = True  # whether it is to listen; `uavapi stop` says no
         actions: dict[str, Callable[[list[str]], None]] = {
             "status": self._status,
             "start": lambda _: self._start(),
             "stop": lambda _: self._stop(),
-            "set": self._set,
-            "config": lambda _: print("\n".join(self.api_settings.listing())),
             "log": self._log,
             "vehicles": lambda _: self._tell(vehicles),
             "fly": self._fly,
             "help": lambda _: print(HELP),
         }
-        super().__init__(mpstate, NAME, "HTTP API to fly and watch vehicles", actions, COMPLETIONS)
-        self.add_completion_function(COMPLETION, lambda _: self.api_settings.names())
+        super().__init__(
+            mpstate,
+            "HTTP API to fly and watch vehicles",
+            settings,
+            remembered,
+            actions=actions,
+            completions=COMPLETIONS,
+        )
         self.logs = Logs(lambda text: self.host.bridge.post(lambda: print_above_prompt(text, self.mpstate.rl.prompt)))
         self.api = Api(self.host)
         self._background = BackgroundCommands(self.host, NAME)
         self._changing = asyncio.Lock()  # starts, stops and settings, in the order in which they were typed
         self.host.bridge.close_in_children(self.api.filenos)
-        self.remembered.keep(self.api_settings.shown)
+        self.remembered.keep(self.module_settings.shown)
 
     def begin(self) -> None:
         """Listen, unless a startup script said no."""
-        for note in self.api_settings.notes:
+        for note in self.module_settings.notes:
             print(f"uavapi: {note}")
         if self._wanted:
             self._start()
@@ -78,7 +81,6 @@ class UavApiModule(SharedModule):
 
     def unload(self) -> None:
         """Give back what is ours alone, then the rest."""
-        self.mpstate.completion_functions.pop(COMPLETION, None)
         try:
             super().unload()
         finally:
@@ -86,7 +88,7 @@ class UavApiModule(SharedModule):
             self.logs.close()
 
     def _status(self, _args: list[str]) -> None:
-        settings = self.api_settings.snapshot()
+        settings = self.module_settings.snapshot()
         self._tell(lambda api: report(api, settings))
 
     def _tell(self, tell: Callable[[Api], str]) -> None:
@@ -102,7 +104,7 @@ class UavApiModule(SharedModule):
         if not self._begun:
             print("uavapi: it listens once MAVProxy's main loop runs")
             return
-        settings = self.api_settings.snapshot()
+        settings = self.module_settings.snapshot()
 
         async def start() -> str:
             async with self._changing:
@@ -137,7 +139,7 @@ class UavApiModule(SharedModule):
         if fly is None:
             print("uavapi: fly needs the module that knows tracks: `module load gradys`")
         else:
-            fly(["--sysid", str(self.api_settings.snapshot().sysid), *args])
+            fly(["--sysid", str(self.module_settings.snapshot().sysid), *args])
 
     def _log(self, args: list[str]) -> None:
         try:
@@ -163,22 +165,11 @@ class UavApiModule(SharedModule):
 
         self._background.send(stop, "stopping")
 
-    def _set(self, args: list[str]) -> None:
-        before = self.api_settings.snapshot()
-        try:
-            if len(args) < 2:
-                print("\n".join(self.api_settings.listing(*args)))
-                return
-            self.api_settings.set(args[0], value := value_of(args[1:]))
-        except SettingError as error:
-            print(f"uavapi: {error}")
-            return
-        self.remembered.change(args[0], value)
-        after = self.api_settings.snapshot()
-        if after == before or not self._begun or not self._wanted:
-            return
-        take_up = self._renew if after.listens_as(before) else self._restart
-        self._background.send(lambda: take_up(after), "taking up the setting")
+    def use_settings(self, name: str, before: ApiSettings, after: ApiSettings) -> None:
+        """Listen anew where address or door change; else calls in flight go on."""
+        if self._wanted:
+            take_up = self._renew if after.listens_as(before) else self._restart
+            self._background.send(lambda: take_up(after), "taking up the setting")
 
     async def _restart(self, settings: ApiSettings) -> str:
         """Listen anew; what is in flight ends."""

@@ -29,7 +29,7 @@ def status(tracker: Tracker, flights: FlightJobs) -> dict[str, Any]:
     health, settings = tracker.health, tracker.settings
     seen = tracker.fresh_seen
     told: dict[str, Any] = {
-        "source": settings.source or None,
+        "source": settings.shown_source or None,
         "camera": health.state,
         "error": health.error or None,
         "rate": round(health.rate, 1),
@@ -104,7 +104,9 @@ def caption(tracker: Tracker, flights: FlightJobs) -> list[str]:
     """What is written into the annotated frame."""
     state = tracker.health.state
     lines = [
-        f"{tracker.settings.source}: {tracker.health.rate:.0f} frames/s" if state == "ok" else f"camera: {state}"
+        f"{tracker.settings.shown_source}: {tracker.health.rate:.0f} frames/s"
+        if state == "ok"
+        else f"camera: {state}"
     ]
     if flights.running and flights.report is not None:
         flight = flights.report

@@ -16,7 +16,7 @@ import cv2
 
 from mavproxy_uavapi.core.background import BackgroundCommands
 from mavproxy_uavapi.core.errors import SettingError, UavApiError
-from mavproxy_uavapi.core.module import SharedModule, value_of
+from mavproxy_uavapi.core.module import SharedModule
 from mavproxy_uavapi.core.remembered_settings import RememberedSettings
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.http.extension import NED_REACH
@@ -24,14 +24,13 @@ from mavproxy_vision import console, file_commands
 from mavproxy_vision.http import VisionHandlers
 from mavproxy_vision.landing.flight_jobs import FlightJobs, FlightTask
 from mavproxy_vision.landing.mission import MissionPlan
-from mavproxy_vision.settings import METHODS, VisionModuleSettings
+from mavproxy_vision.settings import METHODS, VisionModuleSettings, VisionSettings
 from mavproxy_vision.tracking.tracker import Tracker
 
 NAME = "vision"
-COMPLETION = "(VISIONSETTING)"
 COMPLETIONS = [
     "<status|start|stop|config|tags|land|search|mission|abort|help>",
-    f"set {COMPLETION}",
+    "set (VISIONSETTING)",
     "<calibrate|snapshot|tag> (FILENAME)",
 ]
 MISSION = ("5", "8", "-5")  # m: altitude, north, east; the seed's
@@ -41,18 +40,16 @@ RESTARTS = {  # settings that the camera must be opened anew for
 }  # fmt: skip
 
 
-class VisionModule(SharedModule):
+class VisionModule(SharedModule[VisionSettings]):
     """`module load vision`."""
 
     def __init__(self, mpstate: Any, given: dict[str, Any]) -> None:
-        self.remembered = RememberedSettings(mpstate, NAME, given)
-        self.vision_settings = VisionModuleSettings(self.remembered.given)
+        remembered = RememberedSettings(mpstate, NAME, given)
+        settings = VisionModuleSettings(remembered.given)
         actions: dict[str, Callable[[list[str]], None]] = {
             "status": lambda _: self._tell(lambda: console.report(self.tracker, self.flights)),
             "start": lambda _: self._start(),
             "stop": lambda _: self._stop(),
-            "set": self._set,
-            "config": lambda _: self._list(),
             "tags": lambda _: self._tell(lambda: console.tags(self.tracker)),
             "land": self._land,
             "search": self._search,
@@ -63,14 +60,20 @@ class VisionModule(SharedModule):
             "tag": self._tag,
             "help": lambda _: print(console.HELP),
         }
-        super().__init__(mpstate, NAME, "AprilTags, search and precise landing", actions, COMPLETIONS)
-        self.add_completion_function(COMPLETION, lambda _: self.vision_settings.names())
-        self.tracker = Tracker(self.host, self.vision_settings.snapshot())
+        super().__init__(
+            mpstate,
+            "AprilTags, search and precise landing",
+            settings,
+            remembered,
+            actions=actions,
+            completions=COMPLETIONS,
+        )
+        self.tracker = Tracker(self.host, self.module_settings.snapshot())
         self.flights = FlightJobs(self.tracker, self._directory)
         self._background = BackgroundCommands(self.host, NAME)
         self._pages = VisionHandlers(self.tracker, self.flights)
         self._routes = {route.path: route for route in self._pages.routes()}
-        self.remembered.keep(self.vision_settings.shown)
+        self.remembered.keep(self.module_settings.shown)
 
     # -- life ------------------------------------------------------------------------------------------------
 
@@ -79,7 +82,7 @@ class VisionModule(SharedModule):
         self.host.extensions.update(self._routes)
         self.host.newest_frame = self._pages.newest_frame
         self.host.bridge.call_soon(self.tracker.listen)
-        if self.vision_settings.snapshot().source:
+        if self.module_settings.snapshot().source:
             self._start()
 
     async def end(self) -> None:
@@ -89,7 +92,6 @@ class VisionModule(SharedModule):
 
     def unload(self) -> None:
         """Make the vehicle hold, then give everything back."""
-        self.mpstate.completion_functions.pop(COMPLETION, None)
         for path in self._routes:
             self.host.extensions.pop(path, None)
         self.host.newest_frame = None
@@ -111,7 +113,7 @@ class VisionModule(SharedModule):
 
     def _directory(self) -> Path:
         """Where files go."""
-        chosen = self.vision_settings.snapshot().directory
+        chosen = self.module_settings.snapshot().directory
         if chosen:
             return Path(chosen).expanduser()
         return Path(getattr(self.mpstate.status, "logdir", None) or ".")
@@ -136,11 +138,11 @@ class VisionModule(SharedModule):
         print(self._run(told()) if self._begun else tell())
 
     def _start(self) -> None:
-        settings = self.vision_settings.snapshot()
+        settings = self.module_settings.snapshot()
 
         async def started() -> str:
             await self.tracker.start(settings)
-            return f"looking for {settings.family} through {settings.source}"
+            return f"looking for {settings.family} through {settings.shown_source}"
 
         if self._awake():
             self._background.send(started, "opening the camera")
@@ -161,36 +163,23 @@ class VisionModule(SharedModule):
         if self._awake() and not self._run(stopped()) and not quiet:
             print("vision: nothing is in flight")
 
-    def _set(self, args: list[str]) -> None:
-        if len(args) < 2:
-            self._list(*args)
-            return
-        before = self.vision_settings.snapshot()
-        reopens = args[0] in RESTARTS or args[0].startswith("sim_")
-        if reopens and self._flying():
-            print(f"vision: {args[0]} is not changed in flight (`vision abort` ends it)")
-            return
-        try:
-            self.vision_settings.set(args[0], value := value_of(args[1:]))
-        except SettingError as error:
-            print(f"vision: {error}")
-            return
-        self.remembered.change(args[0], value)
-        after = self.vision_settings.snapshot()
-        if after == before or not self._begun:
-            return
-        if reopens and after.source:
+    def check_change(self, name: str) -> None:
+        """Refuse in flight what the camera must be opened anew for.
+
+        Raises:
+            SettingError: that is so.
+        """
+        if reopens_camera(name) and self._flying():
+            raise SettingError(f"{name} is not changed in flight (`vision abort` ends it)", name)
+
+    def use_settings(self, name: str, before: VisionSettings, after: VisionSettings) -> None:
+        """Open the camera anew, close it, or go on with the new settings."""
+        if reopens_camera(name) and after.source:
             self._start()
         elif before.source and not after.source:
             self._stop()
         else:
             self.host.bridge.call_soon(setattr, self.tracker, "settings", after)
-
-    def _list(self, wanted: str = "") -> None:
-        try:
-            print("\n".join(self.vision_settings.listing(wanted)))
-        except SettingError as error:
-            print(f"vision: {error}")
 
     def _flying(self) -> bool:
         async def flying() -> bool:
@@ -201,7 +190,7 @@ class VisionModule(SharedModule):
     # -- flying ----------------------------------------------------------------------------------------------
 
     def _land(self, args: list[str]) -> None:
-        method = next((word for word in args if word in METHODS), self.vision_settings.snapshot().method)
+        method = next((word for word in args if word in METHODS), self.module_settings.snapshot().method)
         numbers = [word for word in args if word not in METHODS]
         number = self._id(numbers)
         if number is not False:
@@ -244,7 +233,7 @@ class VisionModule(SharedModule):
         number = None if tag in ("", "none") else self._id([tag])
         if number is False:
             return
-        method = self.vision_settings.snapshot().method
+        method = self.module_settings.snapshot().method
         request = {"alt": alt, "north": north, "east": east, "id": number, "tag": tag != "none", "method": method}
         self._fly("/vision/mission", request, self._errand)
 
@@ -278,7 +267,7 @@ class VisionModule(SharedModule):
         self._in_background(lambda: file_commands.snapshot(args, self.tracker.seen, self.tracker.image))
 
     def _tag(self, args: list[str]) -> None:
-        settings = self.vision_settings.snapshot()
+        settings = self.module_settings.snapshot()
         self._in_background(lambda: file_commands.tag(args, settings.families[0], settings.tag_list[0]))
 
     def _in_background(self, work: Callable[[], str]) -> None:
@@ -299,6 +288,11 @@ class VisionModule(SharedModule):
             self.host.bridge.post(lambda: print(f"vision: {text}"))
 
         self.host.bridge.loop.call_soon_threadsafe(self.host.bridge.loop.run_in_executor, None, done)
+
+
+def reopens_camera(name: str) -> bool:
+    """Whether the camera must be opened anew when that setting changes."""
+    return name in RESTARTS or name.startswith("sim_")
 
 
 def init(mpstate: Any, **kwargs: Any) -> VisionModule:

@@ -17,6 +17,7 @@ from mavproxy_vision.apriltag.tag_layout import FAMILIES, Tag, parse_families, p
 from mavproxy_vision.camera.calibration import load
 from mavproxy_vision.camera.renderer import Look
 from mavproxy_vision.camera.simulated import Timing, parse_placed
+from mavproxy_vision.camera.source import masked_source
 from mavproxy_vision.geometry.camera_model import CameraModel
 from mavproxy_vision.geometry.frames import Mount
 
@@ -62,6 +63,11 @@ class VisionSettings:
     sim_blur: float
     sim_exposure: float
     sim_occlusion: float
+
+    @property
+    def shown_source(self) -> str:
+        """The source without its passwords."""
+        return masked_source(self.source)
 
     @property
     def families(self) -> tuple[str, ...]:
@@ -186,3 +192,8 @@ class VisionModuleSettings(ModuleSettings[VisionSettings]):
         for names, look in CHECKS:
             if not names.isdisjoint(changed):
                 look(settings)
+
+    def shown(self, name: str) -> str:
+        """As any setting; of the source, all but its passwords."""
+        text = super().shown(name)
+        return masked_source(text) if name == "source" else text

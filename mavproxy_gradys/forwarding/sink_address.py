@@ -6,7 +6,8 @@ import hashlib
 from dataclasses import dataclass
 from urllib.parse import unquote
 
-from mavproxy_gradys.net.addresses import PORTS, masked, split_url
+from mavproxy_gradys.net.addresses import PORTS, split_url
+from mavproxy_uavapi.core.addresses import masked
 from mavproxy_uavapi.core.errors import SettingError
 
 SCHEMES = tuple(PORTS)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import re
 import socket
 from dataclasses import dataclass
 from urllib.parse import SplitResult, urlsplit
 
 from mavproxy_gradys.net.resolver import Resolver
-from mavproxy_uavapi.core.addresses import bracketed, is_loopback
+from mavproxy_uavapi.core.addresses import bracketed, is_loopback, masked
 from mavproxy_uavapi.core.errors import SettingError
 
 PORTS = {"http": 80, "https": 443, "mqtt": 1883, "mqtts": 8883}
@@ -56,11 +55,6 @@ def station(text: str) -> StationAddress:
     host = parts.hostname or ""
     shown = f":{port}" if parts.port is not None else ""
     return StationAddress(f"{parts.scheme}://{bracketed(host)}{shown}", host, port)
-
-
-def masked(url: str) -> str:
-    """A URL as it may be shown: without its password, and without what a query may hold of the kind."""
-    return re.sub(r"\?[^#]*", "?***", re.sub(r"(://[^:/?#@]*):.*@", r"\1:***@", url))
 
 
 def split_url(text: str, schemes: tuple[str, ...]) -> tuple[SplitResult, int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ipaddress
+import re
 
 EVERYWHERE = {"0.0.0.0": "127.0.0.1", "::": "::1", "": "127.0.0.1"}  # listened on: how this machine reaches it
 
@@ -30,3 +31,8 @@ def url_of(host: str, port: int, *, tls: bool = False) -> str:
 def local_url_of(host: str, port: int, *, tls: bool = False) -> str:
     """The URL by which this machine reaches a server that listens there."""
     return url_of(EVERYWHERE.get(host, host), port, tls=tls)
+
+
+def masked(url: str) -> str:
+    """A URL as it may be shown: without the password before its host, and without its query, which may hold one."""
+    return re.sub(r"\?[^#]*", "?***", re.sub(r"(?s)(://[^:/?#@]*):.*@", r"\1:***@", url))

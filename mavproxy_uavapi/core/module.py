@@ -1,19 +1,23 @@
-"""What our three MAVProxy modules have in common: the hooks, the console command, the share in the host."""
+"""What our three MAVProxy modules have in common: hooks, console command, settings, the share in the host."""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from MAVProxy.modules.lib import mp_module
 
 from mavproxy_uavapi.core import host as hosts
+from mavproxy_uavapi.core.errors import SettingError
+from mavproxy_uavapi.core.remembered_settings import RememberedSettings
+from mavproxy_uavapi.core.settings import ModuleSettings
 from mavproxy_uavapi.core.text import nearest
 
 log = logging.getLogger("uavapi.api")
 
 Action = Callable[[list[str]], None]
+Snapshot = TypeVar("Snapshot")
 
 
 def value_of(words: list[str]) -> str:
@@ -22,26 +26,40 @@ def value_of(words: list[str]) -> str:
     return text[1:-1] if len(text) > 1 and text[0] == text[-1] and text[0] in "'\"" else text
 
 
-class SharedModule(mp_module.MPModule):  # type: ignore[misc]
-    """A MAVProxy module that shares the host.
+class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
+    """A MAVProxy module that shares the host and has settings.
 
     Args:
         mpstate: MAVProxy's state.
-        name: the module's name, which is its console command too.
         description: one line for `module list` and `help`.
-        actions: what each word after the command does.
-        completions: rules for tab completion.
+        settings: validates and holds the settings; the name of their module is this module's name and its console
+            command.
+        remembered: what outlives an unload.
+        actions: what each word after the command does; `set` and `config` are added.
+        completions: rules for tab completion; `(NAMESETTING)` in one, in capitals, stands for any setting.
     """
 
     def __init__(
-        self, mpstate: Any, name: str, description: str, actions: dict[str, Action], completions: list[str]
+        self,
+        mpstate: Any,
+        description: str,
+        settings: ModuleSettings[Snapshot],
+        remembered: RememberedSettings,
+        *,
+        actions: dict[str, Action],
+        completions: list[str],
     ) -> None:
+        name = settings.module
         super().__init__(mpstate, name, description, multi_vehicle=True)
-        self._actions = actions
+        self.module_settings = settings
+        self.remembered = remembered
+        self._actions: dict[str, Action] = {**actions, "set": self._set, "config": lambda _: self._list_settings()}
+        self._setting_completion = f"({name.upper()}SETTING)"
         self._begun = False
         self._told_failure = ""
         self.host = hosts.join(mpstate, self)
         self.add_command(name, self.command, description, completions)
+        self.add_completion_function(self._setting_completion, lambda _: settings.names())
 
     def begin(self) -> None:
         """Called once, in the first idle task: whatever opens a socket waits until then. It must not block.
@@ -51,6 +69,16 @@ class SharedModule(mp_module.MPModule):  # type: ignore[misc]
 
     async def end(self) -> None:
         """Called in the asyncio thread when the module is unloaded."""
+
+    def check_change(self, name: str) -> None:
+        """Refuse to change a setting now.
+
+        Raises:
+            SettingError: with the reason.
+        """
+
+    def use_settings(self, name: str, before: Snapshot, after: Snapshot) -> None:
+        """Called when the setting `name` was changed at the prompt, once the main loop runs. It must not block."""
 
     def mavlink_packet(self, packet: Any) -> None:
         """A message arrived, from any vehicle."""
@@ -78,6 +106,7 @@ class SharedModule(mp_module.MPModule):  # type: ignore[misc]
         """Give back all that was taken. Runs in another thread than the main loop, which waits for it."""
         super().unload()
         self.remove_command(self.name)
+        self.mpstate.completion_functions.pop(self._setting_completion, None)
         try:
             if self.host.bridge.running:
                 self.host.bridge.run(self.end())
@@ -92,3 +121,27 @@ class SharedModule(mp_module.MPModule):  # type: ignore[misc]
             action(args[1:])
             return
         print(f"{self.name}: no command {word!r}; {nearest(word, self._actions)}")
+
+    def _set(self, args: list[str]) -> None:
+        """`NAME set [SETTING [VALUE]]`: list the settings, or change one."""
+        if len(args) < 2:
+            self._list_settings(*args)
+            return
+        name, value = args[0], value_of(args[1:])
+        before = self.module_settings.snapshot()
+        try:
+            self.check_change(name)
+            self.module_settings.set(name, value)
+        except SettingError as error:
+            print(f"{self.name}: {error}")
+            return
+        self.remembered.change(name, value)
+        after = self.module_settings.snapshot()
+        if after != before and self._begun:
+            self.use_settings(name, before, after)
+
+    def _list_settings(self, wanted: str = "") -> None:
+        try:
+            print("\n".join(self.module_settings.listing(wanted)))
+        except SettingError as error:
+            print(f"{self.name}: {error}")

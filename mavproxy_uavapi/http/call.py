@@ -167,24 +167,25 @@ class Call:
             params.model_dump(),
             body,
             client=self.client,
-            outlives_client=outlives_client or is_async,
+            outlives_client=outlives_client,
             timeout=getattr(params, "timeout", None),
         )
+        script = None
         if is_async or (outlives_client and not urgent):  # else it ends with its client, or stops the vehicle
             self.job = job
-            job.script = await self.service.scripts.session_of(self.peer)
+            script = await job.go_on_for(self.service.scripts.session_of(self.peer))
         if is_async:
             return self.accepted(job)
-        return self.answer(await self.outcome(job))
+        return self.answer(await self.outcome(job, script))
 
-    async def outcome(self, job: Job) -> str:
-        """Await a job for the client.
+    async def outcome(self, job: Job, script: str | None = None) -> str:
+        """Await a job for the client, which `script` is if it is the session of one.
 
         Raises:
             UavApiError: what the job failed with.
         """
         self.job = job
-        return await job.outcome()
+        return await job.outcome(script)
 
     @property
     def asked(self) -> dict[str, Any]:

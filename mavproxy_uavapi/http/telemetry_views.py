@@ -12,7 +12,6 @@ mavlink = mavutil.mavlink
 
 UINT16_MAX = 65535
 INT16_MAX = 32767
-INT32_MAX = 2147483647
 UINT8_MAX = 255
 
 # "Not known" as MAVLink's message definitions spell it, for the messages that an ArduPilot vehicle sends.

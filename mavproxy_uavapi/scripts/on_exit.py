@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from mavproxy_uavapi.core.errors import Aborted, UavApiError
+from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.host import Host
-from mavproxy_uavapi.core.vehicle.jobs import Ending, Job
+from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.scripts.runs import Run
 
@@ -14,7 +14,7 @@ GOES_ON = {"/command/land", "/command/rtl", "/mission/waypoints"}
 
 
 async def after_death(host: Host, sysid: int, run: Run, others: list[str]) -> str:
-    """End the script's own jobs, and do what is set if nobody else flies the vehicle.
+    """End the jobs that only this script asked for, and do what is set if nobody else flies the vehicle.
 
     Args:
         host: the vehicles and the jobs.
@@ -28,7 +28,7 @@ async def after_death(host: Host, sysid: int, run: Run, others: list[str]) -> st
     closing = None
     for job in host.jobs.running():
         if job.script == run.session and job.verb not in GOES_ON:
-            job.abort(Aborted(f"{job.verb}: its script died"), Ending.SCRIPT_GONE)
+            job.end_with_script()
             closing = host.endings.closing(job) or closing
     if closing is None:
         try:

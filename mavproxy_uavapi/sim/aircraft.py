@@ -62,7 +62,7 @@ class Aircraft:
         self._detector = LandDetector()
         mission.reset()
 
-    # What the ground is told.
+    # What the ground station is told.
 
     def tell(self, event: Event) -> None:
         """Queue an event for the ground."""
@@ -76,14 +76,14 @@ class Aircraft:
 
     @property
     def home_offset(self) -> Ned:
-        """Home in NED metres from the EKF origin; the origin itself before home is set."""
+        """Home in NED metres from the EKF origin; before home is set, the origin."""
         if self.home is None or self.estimator.origin is None:
             return Ned(0.0, 0.0, 0.0)
         return to_ned(self.estimator.origin, self.home)
 
     @property
     def home_altitude(self) -> float:
-        """Metres AMSL of home; of the start before home is set."""
+        """Altitude of home in metres AMSL; before home is set, that of the start."""
         return (self.home or self.estimator.start).altitude
 
     @property
@@ -108,7 +108,7 @@ class Aircraft:
 
     @property
     def maybe_landed(self) -> bool:
-        """Whether the land detector has its first suspicion."""
+        """Whether the land detector assumes a landing that it has not confirmed yet."""
         return self.landed or self._detector.suspects
 
     @property
@@ -150,18 +150,18 @@ class Aircraft:
             lean=math.radians(max(1000, min(8000, parameters["ANGLE_MAX"])) / 100),
         )
 
-    # What the ground or the flight code can do.
+    # What the ground station or the flight code can do.
 
     def change_limit(self, kind: Speed, speed: float) -> None:
         """Set a speed limit in m/s until the mode or its submode resets them."""
         self.position.limits.change(kind, speed)
 
     def relax(self) -> None:
-        """Bring all targets to where the vehicle is."""
+        """Set all targets to where the vehicle is."""
         self.position.start_at(self.estimator.position, self.estimator.velocity)
 
     def lift_off(self) -> None:
-        """The vehicle leaves the ground now."""
+        """Note that the vehicle leaves the ground now."""
         self.landed = False
         self.auto_armed = True
         self._detector.restart()
@@ -172,7 +172,7 @@ class Aircraft:
         self.yaw.fix(math.radians(angle), math.radians(speed), direction, relative, self.body.yaw)
 
     def set_servo(self, channel: int, pulse: int) -> bool:
-        """Drive a free servo output; says so when it is not free."""
+        """Drive a free servo output; a STATUSTEXT says when it is not free."""
         if self.servos.set(channel, pulse):
             return True
         self.say(mavlink.MAV_SEVERITY_INFO, f"ServoRelayEvent: Channel {channel} is already in use")
@@ -190,11 +190,11 @@ class Aircraft:
         return True
 
     def set_home_here(self, *, lock: bool) -> bool:
-        """Make the present place home; False without a position."""
+        """Make the present position home; False without a position."""
         return self.estimator.ready and self.set_home(self.estimator.location, lock=lock)
 
     def arm_motors(self) -> None:
-        """Arm without asking any check; home moves here unless the ground has set it."""
+        """Arm without any check; home moves here unless the ground station has set it."""
         self.say(mavlink.MAV_SEVERITY_INFO, "Arming motors")
         self.yaw.armed_yaw = self.body.yaw
         if self.home is not None and not self._home_locked:

@@ -1,13 +1,10 @@
-"""May the vehicle arm, and if not, why: the checks in ArduCopter's order with its texts."""
+"""Whether the vehicle may arm, and why not: ArduCopter's checks, in its order and with its texts."""
 
 from __future__ import annotations
 
 from .aircraft import Aircraft
 from .modes import Mode
 
-FORCE_ARM = 2989.0
-FORCE = 21196.0
-"""The magic in param2 of MAV_CMD_COMPONENT_ARM_DISARM that skips checks (the other one only arms)."""
 REPORT_INTERVAL = 30.0
 """Seconds between reports of what keeps a disarmed vehicle from arming."""
 

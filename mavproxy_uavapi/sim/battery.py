@@ -1,6 +1,6 @@
 """A lithium pack like SITL's: 12.6 V full, sagging under load, counted in mAh against BATT_CAPACITY.
 
-As in SITL its voltage falls with the charge only where SIM_BATT_CAP_AH says how much it holds; by default it never
+As in SITL the voltage falls with the charge only if SIM_BATT_CAP_AH gives a capacity. By default the battery never
 becomes empty.
 """
 

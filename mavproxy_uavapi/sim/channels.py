@@ -5,7 +5,7 @@ from __future__ import annotations
 from .parameters import ParameterStore
 
 NEUTRAL = (1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800)
-"""What SITL's radio sends before anybody touches it: sticks centred, throttle down, mode switch on 6."""
+"""What SITL's radio sends at first: sticks centred, throttle down, mode switch on 6."""
 OVERRIDE_TIMEOUT = 3.0
 """RC_OVERRIDE_TIME, seconds that an RC_CHANNELS_OVERRIDE lasts."""
 MODE_SWITCH_EDGES = (1231, 1361, 1491, 1621, 1750)

@@ -1,4 +1,4 @@
-"""MAV_CMD to MAV_RESULT: one handler for each command that ArduCopter takes from the ground.
+"""Commands: one handler for each MAV_CMD that ArduCopter takes from a ground station; each gives a MAV_RESULT.
 
 COMMAND_LONG and COMMAND_INT meet here in one shape, as in ArduPilot; commands not in the table are
 MAV_RESULT_UNSUPPORTED.
@@ -13,7 +13,6 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from . import arming
 from .copter import SimulatedCopter
 from .frames import AMSL_FRAMES, GLOBAL_FRAMES, HIGHEST_ALTITUDE, global_target, valid_location
 from .geodesy import Location
@@ -30,9 +29,12 @@ DENIED: int = mavlink.MAV_RESULT_DENIED
 FAILED: int = mavlink.MAV_RESULT_FAILED
 BUSY: int = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
 UNSUPPORTED: int = mavlink.MAV_RESULT_UNSUPPORTED
+FORCE_ARM = 2989.0
+FORCE_ARM_OR_DISARM = 21196.0
+"""Values of param2 of MAV_CMD_COMPONENT_ARM_DISARM that skip checks."""
 FORCE_REBOOT = 20190226
 NO_SPEED_KIND = 4
-"""The end of the enumeration SPEED_TYPE, which ArduCopter denies; it fails to change what lies beyond."""
+"""The end of the enumeration SPEED_TYPE: ArduCopter answers DENIED to it, and FAILED to larger values."""
 FASTEST_INTERVAL = 0.003
 """Seconds; ArduPilot refuses more than 0.8 of SCHED_LOOP_RATE. More than 100 Hz is not sent here."""
 LONGEST_INTERVAL = 60.0
@@ -64,8 +66,8 @@ class CommandInt:
 def from_message(message: Any) -> CommandInt | None:
     """COMMAND_LONG or COMMAND_INT as a Command; None for a COMMAND_LONG that ArduPilot takes as INT only.
 
-    A parameter that is not a finite number stands for "not given" and reads as 0; z is left as it is, for an
-    altitude must not become 0 by mistake.
+    A parameter that is not a finite number means "not given" and reads as 0. z stays as it is, because an altitude
+    must not become 0 by mistake.
     """
     sender = (message.get_srcSystem(), message.get_srcComponent())
     parameters = (
@@ -141,10 +143,10 @@ class Commands:
         del link
         copter = self._copter
         if command.param1 == 1:
-            forced = command.param2 in (arming.FORCE, arming.FORCE_ARM)
+            forced = command.param2 in (FORCE_ARM, FORCE_ARM_OR_DISARM)
             return ACCEPTED if copter.arm(forced=forced) else FAILED
         if command.param1 == 0:
-            return ACCEPTED if copter.disarm(forced=command.param2 == arming.FORCE) else FAILED
+            return ACCEPTED if copter.disarm(forced=command.param2 == FORCE_ARM_OR_DISARM) else FAILED
         return UNSUPPORTED
 
     def _run_prearm_checks(self, command: CommandInt, link: PeerLink) -> int:
@@ -204,7 +206,7 @@ class Commands:
             return DENIED
         if not copter.set_mode(Auto.number):
             return FAILED
-        # Without this a vehicle on the ground waits for the pilot to raise the throttle.
+        # Otherwise a vehicle on the ground waits until the pilot raises the throttle.
         copter.auto_armed = copter.armed
         return ACCEPTED
 
@@ -296,13 +298,13 @@ class Commands:
         return ACCEPTED
 
     def _request_message(self, command: CommandInt, link: PeerLink) -> int:
-        wanted = int(command.param1)
-        if wanted == mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
+        message_id = int(command.param1)
+        if message_id == mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
             return self._send_interval(int(command.param2), link)
-        name = self._name_of(wanted)
+        name = self._name_of(message_id)
         if name is None:
             return FAILED
-        # Like most messages in ArduPilot it waits its turn, so the acknowledgement comes first.
+        # As in ArduPilot the message waits its turn, so the acknowledgement comes first.
         self._transmitter.send_soon(link, name)
         return ACCEPTED
 

@@ -18,7 +18,7 @@ from .physics import Body
 ALIGNED_SHARE = 0.4
 """Share of the time until ready after which attitude is known but position is not, as with a cold GPS."""
 NOISE_TIME_CONSTANT = 20.0
-"""Seconds in which the GPS error forgets where it was."""
+"""Correlation time of the GPS error, seconds."""
 
 READY_FLAGS = (
     mavlink.EKF_ATTITUDE
@@ -89,7 +89,7 @@ class Estimator:
         self.velocity = body.velocity
 
     def _wander(self, dt: float) -> None:
-        """First-order Gauss-Markov: stays noise (1 sigma) large, changes slowly. Height wanders half as far."""
+        """First-order Gauss-Markov: 1 sigma is `noise`, and it changes slowly. Height wanders half as far."""
         keep = math.exp(-dt / NOISE_TIME_CONSTANT)
         spread = self.noise * math.sqrt(1 - keep * keep)
         for axis, share in enumerate((1.0, 1.0, 0.5)):

@@ -1,4 +1,4 @@
-"""What the flight code wants told to the ground, without knowing how."""
+"""What the flight code reports to the ground station, whatever the link."""
 
 from __future__ import annotations
 

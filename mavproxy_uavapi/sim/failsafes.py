@@ -18,7 +18,7 @@ ONLY_WARN, DO_LAND = 0, 1
 
 
 class WatchedVehicle(Protocol):
-    """What the failsafes see of the vehicle that they watch, and what they can make it do."""
+    """What the failsafes need of the vehicle: what they watch, and what they can make it do."""
 
     now: float
     armed: bool

@@ -1,4 +1,4 @@
-"""Misbehaviour on command: everything that a test wants to go wrong, decided in one place.
+"""Faults on command: the one place that decides what goes wrong for a test.
 
 Names of faults and their fields are those of the control line protocol (`control`). Times are simulated
 seconds. The simulator asks here before it sends, receives and acknowledges.
@@ -32,7 +32,7 @@ def _known(name: str) -> str:
 
 @dataclass
 class CommandFault:
-    """A fault that concerns commands: command id or ALL_COMMANDS, how often it still happens.
+    """A fault of commands: command id or ALL_COMMANDS, and how often it still happens.
 
     `drop` concerns messages of any name; command narrows it to some commands.
     """
@@ -72,7 +72,7 @@ class Faults:
         self.clear()
 
     def clear(self) -> None:
-        """Everything works again."""
+        """End all faults."""
         self._mute_until = self._deaf_until = -math.inf
         self.gps_frozen_until = -math.inf
         self._spoilt: dict[str, tuple[float, tuple[str, ...]]] = {}
@@ -86,17 +86,17 @@ class Faults:
             self._deaf_until = now + seconds
 
     def freeze_gps(self, now: float, seconds: float) -> None:
-        """Report the present position for seconds, whatever the vehicle does."""
+        """Keep reporting the present position for seconds, wherever the vehicle goes."""
         self.gps_frozen_until = now + seconds
 
     def spoil(self, name: str, fields: Sequence[str], now: float, seconds: float) -> None:
         """Send NaN in float fields of the telemetry message NAME for seconds; without fields in all of them."""
         kind = mavlink.mavlink_map[_NUMBERS[_known(name)]]
         floats = [field for field, of in zip(kind.fieldnames, kind.fieldtypes, strict=True) if of in FLOATS]
-        wanted = tuple(fields) or tuple(floats)
-        if not wanted or not set(wanted) <= set(floats):
+        chosen = tuple(fields) or tuple(floats)
+        if not chosen or not set(chosen) <= set(floats):
             raise FaultError(f"{name} has the float fields {floats}")
-        self._spoilt[name] = now + seconds, wanted
+        self._spoilt[name] = now + seconds, chosen
 
     def spoilt(self, message: Any, now: float) -> Any:
         """The message as it is to be sent now."""
@@ -140,29 +140,29 @@ class Faults:
 
     def refusal(self, command: int) -> CommandFault | None:
         """The fault that refuses this command instead of doing it, if any."""
-        return self._taken("refuse", command)
+        return self._take_fault("refuse", command)
 
     def acks(self, command: int, result: int, now: float) -> list[PlannedAck]:
         """What is sent as acknowledgement of a command that ended with result."""
         planned = []
-        foreign = self._taken("foreign_ack", command)
+        foreign = self._take_fault("foreign_ack", command)
         if foreign is not None:
             planned.append(PlannedAck(now, foreign.result, (foreign.system, foreign.component)))
         at = now
-        progress = self._taken("in_progress", command)
+        progress = self._take_fault("in_progress", command)
         if progress is not None:
             # As often as a long command reports: twice a second.
             reports = max(1, int(progress.seconds / 0.5))
             planned += [PlannedAck(now + 0.5 * report, mavlink.MAV_RESULT_IN_PROGRESS) for report in range(reports)]
             at += progress.seconds
-        delay = self._taken("delay_acks", command)
+        delay = self._take_fault("delay_acks", command)
         if delay is not None:
             at += delay.seconds
-        if self._taken("lose_acks", command) is None:
+        if self._take_fault("lose_acks", command) is None:
             planned.append(PlannedAck(at, result))
         return planned
 
-    def _taken(self, kind: str, command: int) -> CommandFault | None:
+    def _take_fault(self, kind: str, command: int) -> CommandFault | None:
         for fault in self._command[kind]:
             if fault.take(command):
                 return fault

@@ -1,4 +1,4 @@
-"""Has the vehicle landed? It stands still although the controller pushes it down."""
+"""Land detector: the vehicle has landed when it stands still although the controller pushes it down."""
 
 from __future__ import annotations
 

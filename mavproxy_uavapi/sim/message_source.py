@@ -18,7 +18,7 @@ class MessageSource:
         self._frozen: tuple[float, Ned, Ned, Location] | None = None
 
     def freeze_position(self, frozen: bool) -> None:
-        """Keep reporting the present position and fix time, as a GPS that has hung does."""
+        """Keep reporting the present position and fix time, as a frozen GPS does."""
         if not frozen:
             self._frozen = None
         elif self._frozen is None:

@@ -66,7 +66,7 @@ def home_item(home: Location) -> Item:
 
 
 class State(Enum):
-    """Where the mission stands; STOPPED is one that was left and can be resumed."""
+    """State of the mission; a STOPPED one was left and can be resumed."""
 
     NOT_STARTED = auto()
     RUNNING = auto()
@@ -90,7 +90,7 @@ class Mission:
         self.state = State.NOT_STARTED
         self.current = 0
         self.changes = 0
-        """Grows with each change of the items, so that a running mission notices."""
+        """Grows with each change of the items, so that a running mission notices it."""
         self.jumps_left: dict[int, int] = {}
 
     @property
@@ -112,14 +112,14 @@ class Mission:
             self.items = [home]
 
     def replace(self, items: list[Item]) -> None:
-        """A complete upload takes the place of the old list."""
+        """Replace the list by a complete upload."""
         self.items = items
         self.changes += 1
         if self.current >= len(items):
             self.reset()
 
     def clear(self) -> bool:
-        """Forget everything; refused (False) while the mission runs, as ArduPilot does."""
+        """Forget everything; refused (False) while the mission runs, as in ArduPilot."""
         if self.state is State.RUNNING:
             return False
         self.items = []
@@ -128,7 +128,7 @@ class Mission:
         return True
 
     def reset(self) -> None:
-        """Back to the start."""
+        """Go back to the start."""
         self.current = 0
         self.state = State.NOT_STARTED
         self.jumps_left = {}

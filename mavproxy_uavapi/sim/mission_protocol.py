@@ -75,7 +75,7 @@ class MissionProtocol:
         return True
 
     def step(self) -> None:
-        """Ask again for an item that does not come; give up in the end."""
+        """Ask again for an item that does not come, and give up in the end."""
         upload, now = self._upload, self.copter.now
         if upload is None:
             return
@@ -124,8 +124,8 @@ class MissionProtocol:
             self._store(message.mission_type, [])
             self._ack(link, message, mavlink.MAV_MISSION_ACCEPTED)
         else:
-            kept = self.items(message.mission_type)[: message.count]
-            self._begin(Upload(link, _sender(message), message.mission_type, 0, message.count - 1, kept))
+            former = self.items(message.mission_type)[: message.count]
+            self._begin(Upload(link, _sender(message), message.mission_type, 0, message.count - 1, former))
 
     def _partial(self, link: PeerLink, message: Any) -> None:
         if self._busy(link, message):
@@ -178,7 +178,7 @@ class MissionProtocol:
         if item.command == mavlink.MAV_CMD_CONDITION_YAW:
             copter.fix_yaw(item.param1, item.param2, int(item.param3), item.param4 > 0)
             return True
-        # Items that are not for a place have the mission frame; ArduCopter reads heights in it as AMSL.
+        # Items without a location have the mission frame; ArduCopter reads heights in it as AMSL.
         frame = mavlink.MAV_FRAME_GLOBAL if item.frame == mavlink.MAV_FRAME_MISSION else item.frame
         target = global_target(copter, frame, item.x, item.y, item.z)
         if item.command != mavlink.MAV_CMD_NAV_WAYPOINT or target is None:
@@ -205,7 +205,7 @@ class MissionProtocol:
             self.copter.say(mavlink.MAV_SEVERITY_INFO, "Flight plan received")
 
     def _abandon(self, upload: Upload) -> None:
-        """An upload that ends early leaves what had come so far, and cuts the old list: so does ArduPilot."""
+        """An upload that ends early keeps the items that came, and cuts the old list, as in ArduPilot."""
         self._upload = None
         self._store(upload.kind, upload.items)
 
@@ -252,7 +252,7 @@ def _refusal(message: Any) -> int | None:
     if message.command not in SUPPORTED:
         return int(mavlink.MAV_MISSION_UNSUPPORTED)
     scale = 1e7 if message.get_type() == "MISSION_ITEM_INT" else 1.0
-    # Written so that NaN fails, too.
+    # NaN must fail too.
     if not abs(message.x) <= 90 * scale:
         return int(mavlink.MAV_MISSION_INVALID_PARAM5_X)
     if not abs(message.y) <= 180 * scale:
@@ -264,7 +264,7 @@ def _refusal(message: Any) -> int | None:
 
 def _as_item(message: Any) -> Item:
     scale = 1 if message.get_type() == "MISSION_ITEM_INT" else 10_000_000
-    # NaN stands for "not given", mostly in the yaw of a waypoint.
+    # NaN means "not given", mostly in the yaw of a waypoint.
     param1, param2, param3, param4 = (
         value if math.isfinite(value) else 0.0
         for value in (message.param1, message.param2, message.param3, message.param4)

@@ -14,9 +14,9 @@ from .options import Wind
 
 GRAVITY = 9.80665
 DRAG = 0.1
-"""Deceleration per airspeed, 1/s: at 10 m/s a lean of about six degrees, as SITL's quad."""
+"""Deceleration per airspeed, 1/s: at 10 m/s a lean of about six degrees, as SITL's quadcopter."""
 THRUST_LAG = 0.1
-"""Time constant in seconds in which thrust and lean follow what is asked for."""
+"""Time constant of thrust and lean, seconds."""
 YAW_ACCELERATION = math.radians(270)
 """ATC_ACCEL_Y_MAX of a default quad, rad/s/s."""
 
@@ -109,7 +109,7 @@ class Body:
         self.roll, self.pitch = roll, pitch
 
     def _rest(self) -> None:
-        """The ground takes all motion; the airframe stands level on it."""
+        """The ground stops all motion; the airframe stands level on it."""
         self.down = 0.0
         self.velocity_north = self.velocity_east = self.velocity_down = 0.0
         self.roll = self.pitch = self.roll_rate = self.pitch_rate = self.yaw_rate = 0.0

@@ -74,10 +74,6 @@ class PositionController:
         self.acceleration = [0.0, 0.0, 0.0]
         self._integral = [0.0, 0.0, 0.0]
 
-    def hold_altitude_from(self, position: Ned, velocity: Ned) -> None:
-        """Take the vertical state as it is, keep the horizontal one."""
-        self.position[2], self.velocity[2], self.acceleration[2] = position.down, velocity.down, 0.0
-
     def follow_horizontally(self, position: Ned, velocity: Ned) -> None:
         """Take the horizontal state as it is: nobody commands it (manual flight, ground)."""
         self.position[:2], self.velocity[:2] = position[:2], velocity[:2]
@@ -168,18 +164,18 @@ class PositionController:
 
     def thrust(self, position: Ned, velocity: Ned, dt: float) -> Ned:
         """Acceleration (m/s/s beyond weight) that keeps the vehicle, now at position, on the trajectory."""
-        wanted = [0.0, 0.0, 0.0]
+        acceleration = [0.0, 0.0, 0.0]
         for axis in range(3):
             gain = VELOCITY_P_Z if axis == 2 else VELOCITY_P_XY
             reference = self.velocity[axis] + POSITION_P * (self.position[axis] - position[axis])
             error = reference - velocity[axis]
             integral = self._integral[axis] + INTEGRATOR * error * dt
             self._integral[axis] = max(-INTEGRATOR_LIMIT, min(INTEGRATOR_LIMIT, integral))
-            # The drag of the own desired speed is known beforehand; the integrator is left with the wind.
+            # The drag at the desired speed is known; the integrator has to correct the wind only.
             known = self.acceleration[axis] + DRAG * self.velocity[axis]
-            wanted[axis] = known + gain * error + self._integral[axis]
-        north, east = shaping.limit_length(wanted[0], wanted[1], GRAVITY * math.tan(self.limits.lean))
-        return Ned(north, east, max(-GRAVITY, min(0.9 * GRAVITY, wanted[2])))
+            acceleration[axis] = known + gain * error + self._integral[axis]
+        north, east = shaping.limit_length(acceleration[0], acceleration[1], GRAVITY * math.tan(self.limits.lean))
+        return Ned(north, east, max(-GRAVITY, min(0.9 * GRAVITY, acceleration[2])))
 
 
 def _stopping_distance(speed: float, acceleration: float) -> float:

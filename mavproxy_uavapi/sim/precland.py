@@ -2,7 +2,7 @@
 
 Only what ArduCopter does with `position_valid` and a companion computer (PLND_TYPE 1). As there the type is
 read at boot, a target that is not renewed is dropped after two seconds, and PLND_STRICT says what happens then:
-0 and 1 descend where it is, 2 hovers.
+0 and 1 let the vehicle descend where it is, 2 lets it hover.
 """
 
 from __future__ import annotations
@@ -59,12 +59,12 @@ class PrecisionLander:
         self._heard = now
 
     def acquired(self, now: float) -> bool:
-        """Whether there is a target that was heard of lately."""
+        """Whether a target was reported lately."""
         enabled = bool(self._parameters["PLND_ENABLED"]) and self._listens
         return enabled and now - self._heard <= TIMEOUT
 
     def target(self, now: float) -> Ned | None:
-        """Where to land, at the vehicle's own height; None when nobody says."""
+        """Where to land, at the vehicle's own height; None without a target."""
         if not self.acquired(now) or self._target is None:
             return None
         return Ned(*self._target, self._estimator.position.down)

@@ -16,7 +16,7 @@ from .link import PeerLink
 from .simulator import STEP, Simulator
 
 BACKLOG_LIMIT = 1 << 20
-"""Bytes that may wait for a slow TCP peer; more and it is cut off."""
+"""Bytes that may wait for a slow TCP peer; a peer with more is disconnected."""
 LONGEST_WAIT = 0.05
 LONGEST_BURST = 0.05
 """Wall seconds of simulation at a stretch before the sockets get their turn."""
@@ -210,6 +210,6 @@ class Server:
                     peer.sock.sendall(answer.encode() + b"\n")
                 return
         except OSError:
-            pass  # The peer has gone; it is closed below like one that says goodbye.
+            pass  # The peer has gone; it is closed below like one that disconnects.
         self._selector.unregister(peer.sock)
         peer.sock.close()

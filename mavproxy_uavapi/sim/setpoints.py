@@ -1,7 +1,7 @@
 """SET_POSITION_TARGET_LOCAL_NED and _GLOBAL_INT to GUIDED's setpoints, as ArduCopter reads them.
 
 A mask counts for a group of three: as soon as one axis of position, velocity or acceleration is ignored,
-the whole group is. What makes no sense stops the vehicle.
+the whole group is. A setpoint that cannot be used stops the vehicle.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ BODY_FRAMES = (mavlink.MAV_FRAME_BODY_NED, mavlink.MAV_FRAME_BODY_OFFSET_NED)
 OFFSET_FRAMES = (*BODY_FRAMES, mavlink.MAV_FRAME_LOCAL_OFFSET_NED)
 LOCAL_FRAMES = (mavlink.MAV_FRAME_LOCAL_NED, *OFFSET_FRAMES)
 HIGHEST_SPEED = 1000.0
-"""m/s; a faster velocity counts as nonsense."""
+"""m/s; a faster velocity cannot be used."""
 
 
 class InvalidSetpoint(Exception):

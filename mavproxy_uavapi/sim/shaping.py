@@ -38,8 +38,8 @@ def approach_1d(error: float, speed_up: float, speed_down: float, acceleration: 
 
 def accelerate_1d(error: float, current: float, limit: float, jerk: float, dt: float) -> float:
     """Next acceleration, given a speed error (m/s) and the current acceleration (m/s/s)."""
-    wanted = min(square_root_speed(abs(error), VELOCITY_GAIN, BRAKING_SHARE * jerk), limit)
-    change = ACCELERATION_GAIN * ((wanted if error > 0 else -wanted) - current)
+    magnitude = min(square_root_speed(abs(error), VELOCITY_GAIN, BRAKING_SHARE * jerk), limit)
+    change = ACCELERATION_GAIN * ((magnitude if error > 0 else -magnitude) - current)
     return current + max(-jerk, min(jerk, change)) * dt
 
 
@@ -48,8 +48,8 @@ def accelerate_2d(
 ) -> tuple[float, float]:
     """The same for the horizontal plane: limits hold for the length of the vectors."""
     size = math.hypot(*error)
-    wanted = min(square_root_speed(size, VELOCITY_GAIN, BRAKING_SHARE * jerk), limit)
-    scale = wanted / size if size > 1e-9 else 0.0
+    magnitude = min(square_root_speed(size, VELOCITY_GAIN, BRAKING_SHARE * jerk), limit)
+    scale = magnitude / size if size > 1e-9 else 0.0
     change_n = ACCELERATION_GAIN * (error[0] * scale - current[0])
     change_e = ACCELERATION_GAIN * (error[1] * scale - current[1])
     change = math.hypot(change_n, change_e)

@@ -90,7 +90,7 @@ class Simulator:
         self._boot(Mission())
 
     def _boot(self, mission: Mission) -> None:
-        """Start from nothing: time zero, disarmed, where the vehicle began. Parameters and mission stay."""
+        """Boot: time zero, disarmed, where the vehicle began. Parameters and mission stay."""
         self._boots += 1
         self.copter = SimulatedCopter(self.options, self.parameters, mission, self.options.seed + self._boots - 1)
         self.telemetry = Telemetry(self.copter, self._epoch)
@@ -108,8 +108,8 @@ class Simulator:
     @property
     def speedup(self) -> float:
         """Simulated seconds that should pass in a wall second (SIM_SPEEDUP); always positive."""
-        wanted = self.parameters["SIM_SPEEDUP"]
-        return wanted if wanted > 0 else 1.0
+        speedup = self.parameters["SIM_SPEEDUP"]
+        return speedup if speedup > 0 else 1.0
 
     # Links.
 

@@ -1,4 +1,4 @@
-"""What the vehicle says: messages to its links, at once or later, as far as the faults let them through."""
+"""Sends the vehicle's messages to its links, at once or later, unless a fault loses them."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Transmitter:
             self.send(link, name)
 
     def tell(self, event: Event) -> None:
-        """Queue what the flight code wants told for all links."""
+        """Queue what the flight code reports, for all links."""
         if isinstance(event, Broadcast):
             self.broadcast(event.name)
             return

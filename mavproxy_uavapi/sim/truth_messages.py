@@ -12,7 +12,7 @@ from .message_source import MessageSource
 
 
 class TruthMessages(MessageSource):
-    """What no real vehicle knows of itself."""
+    """The true state, which no real vehicle knows."""
 
     def _build_sim_state(self) -> Any:
         copter = self.copter

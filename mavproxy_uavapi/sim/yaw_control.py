@@ -1,4 +1,4 @@
-"""Where the nose points while an automatic mode flies: ArduCopter's auto yaw.
+"""Heading in the automatic modes: ArduCopter's auto yaw.
 
 Angles in radians from true north, clockwise positive; rates in rad/s.
 """
@@ -44,7 +44,7 @@ class AutoYaw:
         self.roi: tuple[float, float] | None = None
 
     def hold(self) -> None:
-        """Keep the nose where it is."""
+        """Keep the present heading."""
         self.mode = YawMode.HOLD
 
     def by_parameter(self, behaviour: int, returning: bool) -> None:
@@ -87,12 +87,12 @@ class AutoYaw:
             self.by_parameter(behaviour, returning=False)
 
     def stop_turning(self) -> None:
-        """A rate whose setpoints have stopped coming must not turn the vehicle for ever."""
+        """Stop turning: the setpoints with a yaw rate have stopped coming."""
         if self.mode in (YawMode.RATE, YawMode.ANGLE_RATE):
             self.hold()
 
     def look_at(self, north: float, east: float) -> None:
-        """Point the nose at a region of interest, metres from the EKF origin."""
+        """Point at a region of interest, metres from the EKF origin."""
         self.roi, self.mode = (north, east), YawMode.ROI
 
     def reached(self, yaw: float) -> bool:

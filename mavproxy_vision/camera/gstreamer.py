@@ -14,7 +14,7 @@ from typing import IO, Any
 
 import numpy as np
 
-from mavproxy_vision.camera.source import Frame
+from mavproxy_vision.camera.source import Frame, masked_source
 from mavproxy_vision.errors import NoCamera
 
 LAUNCH = "gst-launch-1.0"
@@ -113,7 +113,7 @@ class Pipeline:
         self._said.seek(0)
         lines = [line.strip() for line in self._said.read().decode(errors="replace").splitlines()]
         told = [line for line in lines if line.startswith(("ERROR", "WARNING"))] or lines[-1:]
-        return told[0] if told else "the pipeline ended"
+        return masked_source(told[0]) if told else "the pipeline ended"
 
     def close(self) -> None:
         """End the program."""

@@ -15,7 +15,7 @@ os.environ.setdefault("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT", "1")  # s that a read
 
 import cv2  # noqa: E402
 
-from mavproxy_vision.camera.source import Frame, grey  # noqa: E402
+from mavproxy_vision.camera.source import Frame, grey, masked_source  # noqa: E402
 from mavproxy_vision.errors import NoCamera  # noqa: E402
 
 BEHIND = 1.0  # s; a driver's time stamp that is farther from now is on another clock
@@ -70,6 +70,7 @@ class Capture:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._spec, self._latency, self._size, self._rate, self._clock = spec, latency, size, rate, clock
+        self._shown = masked_source(spec)
         self._capture: Any = None
         self._is_file, self._is_stream = os.path.isfile(spec), "://" in spec  # pathlib's raises on a long URL
         self._is_stamped = spec.partition("://")[0].lower() in STAMPED
@@ -88,7 +89,7 @@ class Capture:
         self._capture = self._opened()
         if not self._capture.isOpened():
             self.close()
-            raise NoCamera(f"cannot open {self._spec!r}")
+            raise NoCamera(f"cannot open {self._shown!r}")
         if self._is_stream:
             self._skip_backlog()
         elif not self._is_file:
@@ -128,11 +129,11 @@ class Capture:
         try:
             good, image = self._capture.read()
         except cv2.error as error:
-            raise NoCamera(f"{self._spec}: {error.err}") from error
+            raise NoCamera(f"{self._shown}: {error.err}") from error
         now = self._clock()
         if not good:
             if self._is_gone():
-                raise NoCamera(f"{self._spec} is gone")
+                raise NoCamera(f"{self._shown} is gone")
             time.sleep(0.02)  # a dead camera answers at once: do not spin
             return None
         if self._is_stream and now - asked > 0.9 * SILENCE / 1000:

@@ -7,6 +7,7 @@ A source is opened, read and closed by one thread, the worker's.
 from __future__ import annotations
 
 import queue
+import re
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,6 +18,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from mavproxy_uavapi.core.addresses import masked
 from mavproxy_vision.camera.image_size import size_of, why_costly
 from mavproxy_vision.errors import BadImage, NoCamera
 
@@ -25,6 +27,7 @@ Image = NDArray[np.uint8]
 IMAGES = {".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".pgm"}
 POSTED_KEPT = 2  # posted frames that wait
 MOST_PIXELS = 40_000_000  # of a posted frame
+PIPELINE_PASSWORD = re.compile(r"\b((?:user|proxy)-pw\s*=\s*)(\"[^\"]*\"|'[^']*'|\S+)")  # of GStreamer's elements
 
 
 @dataclass(frozen=True)
@@ -63,6 +66,11 @@ class Source(Protocol):
 
     def close(self) -> None:
         """Let go."""
+
+
+def masked_source(spec: str) -> str:
+    """The setting `source` as it may be shown: without the passwords of a URL or a pipeline."""
+    return PIPELINE_PASSWORD.sub(r"\1***", masked(spec) if "://" in spec else spec)
 
 
 def grey(image: Any) -> Image:

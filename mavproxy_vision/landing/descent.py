@@ -97,7 +97,7 @@ class PrecisionDescent(Descent):
         while tracker.host.clock() - began < max(HEARD / max(state.time_ratio.ratio, 0.1), 1.0):
             await self._tell(landing)
             await flight.send(REST)
-            if any("Target Found" in text for text in state.said_since(began - 30.0)):
+            if any("Target Found" in text for text in state.statustexts_since(began - 30.0)):
                 return
             await flight.pause()
         # It says so once only for a target that it did not lose meanwhile: go on, and see whether it follows.

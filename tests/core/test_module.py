@@ -1,28 +1,59 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from MAVProxy.modules.lib.mp_settings import MPSetting
 
 from mavproxy_uavapi.core import host as hosts
+from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.module import SharedModule, value_of
+from mavproxy_uavapi.core.remembered_settings import RememberedSettings
+from mavproxy_uavapi.core.settings import ModuleSettings
 
 
-class Demo(SharedModule):
-    def __init__(self, mpstate: Any, name: str = "demo") -> None:
+class DemoSettings(ModuleSettings[Any]):
+    module = "demo"
+
+    @staticmethod
+    def table() -> list[Any]:
+        return [MPSetting("rate", int, 4, "", range=(1, 10)), MPSetting("name", str, "")]
+
+    def make(self, values: Any, origins: Any) -> Any:
+        return SimpleNamespace(**values)
+
+
+class OtherSettings(DemoSettings):
+    module = "other"
+
+
+class Demo(SharedModule[Any]):
+    def __init__(self, mpstate: Any, settings: type[DemoSettings] = DemoSettings) -> None:
         self.done: list[Any] = []
+        self.refused = ""
+        remembered = RememberedSettings(mpstate, settings.module, {})
         actions = {
             "status": lambda args: self.done.append(("status", args)),
             "go": self.done.append,
         }
-        super().__init__(mpstate, name, "a demo", actions, ["<status|go>"])
+        super().__init__(
+            mpstate, "a demo", settings({}, {}), remembered, actions=actions, completions=["<status|go>"]
+        )
 
     def begin(self) -> None:
         self.done.append(("begun", self.host.bridge.running))
 
     async def end(self) -> None:
         self.done.append("ended")
+
+    def check_change(self, name: str) -> None:
+        if name == self.refused:
+            raise SettingError(f"{name} is not changed now", name)
+
+    def use_settings(self, name: str, before: Any, after: Any) -> None:
+        self.done.append((name, before.rate, after.rate))
 
 
 @pytest.fixture
@@ -57,9 +88,54 @@ def test_unknown_word_is_answered_with_the_nearest(demo: Demo, capsys: Any) -> N
     demo.command(["statsu"])
     demo.command(["xyz"])
     assert capsys.readouterr().out == (
-        "demo: no command 'statsu'; did you mean status?\ndemo: no command 'xyz'; there are status, go\n"
+        "demo: no command 'statsu'; did you mean status?\ndemo: no command 'xyz'; there are status, go, set, config\n"
     )
     assert demo.done == []
+
+
+def test_settings_are_completed(demo: Demo, mpstate: Any) -> None:
+    assert mpstate.completion_functions["(DEMOSETTING)"]("") == ["rate", "name"]
+
+
+@pytest.mark.parametrize("words", [["config"], ["set"], ["set", "r"]])
+def test_config_and_set_without_a_value_list_the_settings(demo: Demo, capsys: Any, words: list[str]) -> None:
+    demo.command(words)
+    assert capsys.readouterr().out.splitlines()[0].split() == ["rate", "4", "default"]
+
+
+def test_setting_is_used_once_the_main_loop_runs_and_remembered_at_once(demo: Demo, main_loop: Any) -> None:
+    demo.command(["set", "rate", "5"])
+    assert demo.done == []
+    main_loop.turn()
+    demo.command(["set", "rate", '"6"'])
+    assert demo.done[1:] == [("rate", 5, 6)]
+    assert demo.remembered.changed == {"rate": "6"}
+
+
+def test_setting_that_stays_as_it_was_is_not_used(demo: Demo, main_loop: Any) -> None:
+    main_loop.turn()
+    demo.command(["set", "rate", "4"])
+    assert demo.done == [("begun", True)]
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        (["rate", "11"], "demo: rate = '11': it takes a int from 1 to 10"),
+        (["rat", "5"], "demo: no setting 'rat'; did you mean rate?"),
+        (["xyz"], "demo: no setting 'xyz'; there are rate, name"),
+        (["name", "a"], "demo: name is not changed now"),
+    ],
+)
+def test_change_that_is_refused_changes_nothing(
+    demo: Demo, main_loop: Any, capsys: Any, words: list[str], line: str
+) -> None:
+    demo.refused = "name"
+    main_loop.turn()
+    demo.command(["set", *words])
+    assert capsys.readouterr().out == f"{line}\n"
+    assert (demo.module_settings.snapshot().rate, demo.remembered.changed) == (4, {})
+    assert demo.done == [("begun", True)]
 
 
 def test_packets_reach_the_fleet(demo: Demo, main_loop: Any, msg: Any) -> None:
@@ -74,6 +150,7 @@ def test_unload_ends_it_and_gives_all_back(demo: Demo, mpstate: Any, main_loop: 
     assert demo.done[-1] == "ended"
     assert mpstate.command_map == {}
     assert mpstate.completions == {}
+    assert list(mpstate.completion_functions) == ["(OTHER)"]
     assert mpstate.select_extra == {}
     assert not hasattr(mpstate, hosts.ATTRIBUTE)
 
@@ -96,7 +173,7 @@ def test_host_is_given_back_even_when_the_end_fails(demo: Demo, mpstate: Any, ma
 
 
 def test_second_module_goes_on_when_the_first_is_unloaded(demo: Demo, mpstate: Any, main_loop: Any, msg: Any) -> None:
-    other = Demo(mpstate, "other")
+    other = Demo(mpstate, OtherSettings)
     main_loop.modules.append(other)
     main_loop.turn()
     demo.unload()

@@ -66,7 +66,7 @@ def test_config_tells_of_each_value_where_it_came_from_and_no_secret(mpstate: An
     capsys.readouterr()
     module.command(["config"])
     lines = capsys.readouterr().out
-    assert [line.split()[0] for line in lines.splitlines()] == module.gradys_settings.names()
+    assert [line.split()[0] for line in lines.splitlines()] == module.module_settings.names()
     rows = {line.split()[0]: line.split()[1:] for line in lines.splitlines()}
     assert rows["period"] == ["2.0", "gradys", "set"]
     assert rows["timeout"] == ["3.0", "default"]
@@ -251,7 +251,7 @@ def test_settings_outlive_a_reload_and_no_password_is_shown(mpstate: Any, tmp_pa
     told = capsys.readouterr().out
     assert "sink=mqtt://me:***@127.0.0.1/fleet, token=(set), gs=127.0.0.1:9" in told
     assert "secret" not in told and "hidden" not in told
-    settings = again.gradys_settings.snapshot()
+    settings = again.module_settings.snapshot()
     assert ([sink.url for sink in settings.sink], settings.token, settings.gs[0].url) == (
         [sink],
         "hidden",

@@ -15,6 +15,7 @@ import sys
 import termios
 import textwrap
 import time
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -187,6 +188,13 @@ def test_wrong_option_is_one_line_and_status_2(capsys, words, said):
     message = capsys.readouterr().err
     assert said in message
     assert message.count("\n") == 1
+
+
+def test_version_is_the_packages(capsys):
+    with pytest.raises(SystemExit) as end:
+        main(["--version"])
+    assert end.value.code == 0
+    assert capsys.readouterr().out == f"mavproxy-uavapi {metadata.version('mavproxy-uavapi')}\n"
 
 
 def test_both_spellings_lists_modules_and_the_rest():

@@ -394,9 +394,9 @@ def test_settings_of_the_load_and_of_the_prompt_outlive_a_reload(
         "(keywords at `module load` replace all that)\n"
         f"uavapi: listening on http://127.0.0.1:{port}\n"
     )
-    settings = module.api_settings.snapshot()
+    settings = module.module_settings.snapshot()
     assert (settings.sysid, settings.token) == (7, "secret")
-    origins = module.api_settings.origins
+    origins = module.module_settings.origins
     assert (origins["port"], origins["sysid"]) == ("uavapi set", "module load")
 
 
@@ -405,7 +405,7 @@ def test_settings_that_are_only_good_together_outlive_a_reload(loader: Loader, c
     for line in ("set host 0.0.0.0", "set token secret", "set allow_open false"):
         module.command(line.split())
     loader.unload(module)
-    settings = loader.load().api_settings.snapshot()
+    settings = loader.load().module_settings.snapshot()
     assert (settings.host, settings.token, settings.allow_open) == ("0.0.0.0", "secret", False)
 
 
@@ -416,7 +416,7 @@ def test_file_of_the_first_load_is_read_anew_and_yields_to_the_prompt(loader: Lo
     module.command(["set", "port", "8002"])
     loader.unload(module)
     file.write_text("[api]\nsysid = 3\nport = 8003\n")
-    settings = loader.load().api_settings.snapshot()
+    settings = loader.load().module_settings.snapshot()
     assert (settings.sysid, settings.port) == (3, 8002)
 
 

@@ -64,7 +64,7 @@ def test_commands_before_the_first_turn_say_so(module: Any, capsys: Any) -> None
 
 def test_config_and_set_tell_of_each_value_where_it_came_from(module: Any, capsys: Any) -> None:
     lines = said(module, capsys, "config").splitlines()
-    assert [line.split()[0] for line in lines] == module.vision_settings.names()
+    assert [line.split()[0] for line in lines] == module.module_settings.names()
     assert said(module, capsys, "set").splitlines() == lines
     module.command(["set", "speed", "2"])
     assert said(module, capsys, "set", "speed").split() == ["speed", "2.0", "vision", "set"]
@@ -112,6 +112,17 @@ def test_a_running_camera_ends_with_the_module(mpstate: Any, main_loop: Any) -> 
     assert threading.active_count() == threads
 
 
+def test_a_sources_password_is_never_shown(running: Any, main_loop: Any, capsys: Any) -> None:
+    begun = said_later(running, capsys, main_loop, "set", "source", "rtsp://pilot:s3cret@127.0.0.1:1/cam")
+    assert begun == "vision: looking for 36h11 through rtsp://pilot:***@127.0.0.1:1/cam"
+    main_loop.until(lambda: running.tracker.health.error)
+    for word in ("status", "config", "set"):
+        text = said(running, capsys, word)
+        assert "rtsp://pilot:***@127.0.0.1:1/cam" in text
+        assert "s3cret" not in text
+    assert "s3cret" not in str(running.tracker.health.error)
+
+
 def test_routes_come_and_go(running: Any) -> None:
     host = running.host
     assert "/vision/status" in host.extensions
@@ -131,7 +142,7 @@ def test_bad_words_are_explained(running: Any, capsys: Any, main_loop: Any) -> N
     assert "did you mean" in said(running, capsys, "set", "famly", "16h5")
     assert "none of" in said(running, capsys, "set", "family", "4x4")
     assert "not ID:SIZE" in said(running, capsys, "set", "tags", "0")
-    assert running.vision_settings.snapshot().tags == "0:0.30"
+    assert running.module_settings.snapshot().tags == "0:0.30"
     assert "one of velocity, landing_target" in said(running, capsys, "set", "method", "magic")
     assert said_later(running, capsys, main_loop, "start") == "vision: no camera is set: " + SOURCES
 
@@ -178,6 +189,6 @@ def test_settings_outlive_a_reload(mpstate: Any, capsys: Any) -> None:
     first.unload()
     again = vision.init(mpstate)
     assert "vision: as before: fps=15.0, family=16h5, tags=0:0.4 1:0.1 (" in capsys.readouterr().out
-    settings = again.vision_settings.snapshot()
+    settings = again.module_settings.snapshot()
     assert (settings.fps, settings.family, settings.tags) == (15.0, "16h5", "0:0.4 1:0.1")
     again.unload()

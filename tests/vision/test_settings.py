@@ -146,3 +146,21 @@ def test_bad_settings_at_loading_are_refused_too():
     ):
         with pytest.raises(SettingError):
             VisionModuleSettings(given)
+
+
+@pytest.mark.parametrize(
+    ("source", "shown"),
+    [
+        ("camera:0", "camera:0"),
+        ("what?/0.mp4", "what?/0.mp4"),
+        ("rtsp://pilot:s3cret@host/stream", "rtsp://pilot:***@host/stream"),
+        ("rtspsrc location=rtsp://pilot:s3cret@host/ ! x", "rtspsrc location=rtsp://pilot:***@host/ ! x"),
+        ("rtspsrc user-id=pilot user-pw=s3cret ! x", "rtspsrc user-id=pilot user-pw=*** ! x"),
+        ('souphttpsrc proxy-pw = "s3 cret" ! x', "souphttpsrc proxy-pw = *** ! x"),
+    ],
+)
+def test_source_is_shown_without_its_passwords(source, shown):
+    settings = VisionModuleSettings({"source": source})
+    assert settings.shown("source") == settings.snapshot().shown_source == shown
+    assert settings.listing("source")[0].split(maxsplit=1)[1].startswith(shown)
+    assert settings.snapshot().source == source

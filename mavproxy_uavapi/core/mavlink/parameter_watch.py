@@ -23,11 +23,11 @@ class ParameterWatch:
         if now < self._next:
             return {}
         self._next = now + PERIOD
-        found = {}
+        changed = {}
         for key, table in tables.items():
-            seen = self._seen.get(key, {})
-            if table == seen:
+            before = self._seen.get(key, {})
+            if table == before:
                 continue
-            found[key] = {name: float(value) for name, value in table.items() if seen.get(name) != value}
+            changed[key] = {name: float(value) for name, value in table.items() if before.get(name) != value}
             self._seen[key] = dict(table)
-        return {key: values for key, values in found.items() if values}
+        return {key: values for key, values in changed.items() if values}

@@ -128,8 +128,8 @@ class VehicleState:
         """The newest message of that name; the autopilot's own before another component's."""
         if name in self.messages:
             return self.messages[name]
-        found = [received for (_, n), received in self.others.items() if n == name]
-        return max(found, key=lambda received: received.at, default=None)
+        candidates = [received for (_, n), received in self.others.items() if n == name]
+        return max(candidates, key=lambda received: received.at, default=None)
 
     def field(self, name: str, attribute: str) -> Any:
         """One field of the autopilot's newest message of that name; None when there is none yet."""
@@ -151,9 +151,9 @@ class VehicleState:
         received = self.messages.get(name)
         return None if received is None else now - received.at
 
-    def said_since(self, at: float) -> list[str]:
+    def statustexts_since(self, at: float) -> list[str]:
         """What the autopilot said since `at` (s), oldest first."""
-        return [said.text for said in self.statustexts if said.at >= at]
+        return [text.text for text in self.statustexts if text.at >= at]
 
     @property
     def landed(self) -> bool | None:
@@ -171,12 +171,12 @@ class VehicleState:
             return None
         if not self.armed:
             return True
-        told = self.messages.get("EXTENDED_SYS_STATE")
-        if told is not None and told.message.landed_state:
+        received = self.messages.get("EXTENDED_SYS_STATE")
+        if received is not None and received.message.landed_state:
             in_doubt = self.system_status in FAILING
-            behind = self.heartbeat_at - told.at
+            behind = self.heartbeat_at - received.at
             if in_doubt or behind <= (RECENT if kind == "plane" else 0.0):
-                return bool(told.message.landed_state == mavlink.MAV_LANDED_STATE_ON_GROUND)
+                return bool(received.message.landed_state == mavlink.MAV_LANDED_STATE_ON_GROUND)
         return bool(self.system_status not in {mavlink.MAV_STATE_ACTIVE} | FAILING)
 
     @property
@@ -212,8 +212,8 @@ class VehicleState:
 
         What that one told so far counts; what the former one told moves to `others`.
         """
-        told = {(self.component, name): received for name, received in self.messages.items() if "[" not in name}
-        others = {**self.others, **told}
+        former = {(self.component, name): received for name, received in self.messages.items() if "[" not in name}
+        others = {**self.others, **former}
         own = {name: others.pop((c, name)) for c, name in list(others) if c == component}
         fresh = VehicleState(self.system, component, vehicle_type, now, messages=own, others=others)
         vars(self).update(vars(fresh))  # in place: whoever flies or watches the vehicle holds this object

@@ -85,11 +85,11 @@ async def _get_ready(
 
 
 async def _why_not_ready(vehicle: BaseVehicle, waited: float) -> Rejected:
-    asked = vehicle.clock()
+    asked_at = vehicle.clock()
     with contextlib.suppress(Rejected, TimedOut):  # the texts that it makes the autopilot say are what counts
         await vehicle.commands.send(messages.check_prearm())
     with contextlib.suppress(TimedOut):
         await vehicle.waiting.message({"STATUSTEXT"}, lambda _: None, 1.0, "fall silent")  # it has several reasons
-    said = vehicle.state.said_since(asked)
-    because = "; ".join(said) or "it does not say why"
-    return Rejected(f"not ready to arm after {waited:.0f} s: {because}", statustext=said)
+    texts = vehicle.state.statustexts_since(asked_at)
+    because = "; ".join(texts) or "it does not say why"
+    return Rejected(f"not ready to arm after {waited:.0f} s: {because}", statustext=texts)

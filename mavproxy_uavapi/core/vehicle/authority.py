@@ -92,9 +92,9 @@ class CommandAuthority:
             Busy: a verb of a higher rank has not shown its effect yet.
             Paused: `stop` holds the vehicle; rank MOVEMENT only.
         """
-        one = self.commander
-        if one is not None and self.on_its_way and rank < self._rank:
-            raise Busy(f"{one.verb} is on its way; try again when the vehicle shows it")
+        commander = self.commander
+        if commander is not None and self.on_its_way and rank < self._rank:
+            raise Busy(f"{commander.verb} is on its way; try again when the vehicle shows it")
         if rank is Rank.MOVEMENT and self.paused and not stopped_too:
             raise Paused("the vehicle is stopped; `resume` or `guided` ends that")
 

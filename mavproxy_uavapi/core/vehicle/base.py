@@ -84,14 +84,14 @@ class BaseVehicle:
     def _on_its_way(self) -> list[int]:
         """The modes that we asked for of late and that it has not shown since, the last one last."""
         now = self.clock()
-        asked = [(mode, at) for mode, at in self._modes_asked.items() if now - at <= HEARTBEAT_TIMEOUT]
+        requests = [(mode, at) for mode, at in self._modes_asked.items() if now - at <= HEARTBEAT_TIMEOUT]
         for changed_at, mode in self.state.mode_changes:
-            answered = [at for wanted, at in asked if wanted == mode and at <= changed_at]
+            answered = [at for requested, at in requests if requested == mode and at <= changed_at]
             if answered:
-                asked = [(wanted, at) for wanted, at in asked if at > answered[-1]]
+                requests = [(requested, at) for requested, at in requests if at > answered[-1]]
             else:  # somebody else's switch: what we asked for before it has come to nothing
-                asked = [(wanted, at) for wanted, at in asked if at >= changed_at]
-        return [mode for mode, _ in asked]
+                requests = [(requested, at) for requested, at in requests if at >= changed_at]
+        return [mode for mode, _ in requests]
 
     @property
     def is_ready_to_arm(self) -> bool:
@@ -139,8 +139,8 @@ class BaseVehicle:
         """
         age = self.state.age(name, self.clock())
         if age is None or age > FRESH:
-            told = "never told" if age is None else f"told {age:.1f} s ago"
-            raise Stale(f"vehicle {self.state.system} does not tell where it is ({name}: {told})")
+            age_text = "never told" if age is None else f"told {age:.1f} s ago"
+            raise Stale(f"vehicle {self.state.system} does not tell where it is ({name}: {age_text})")
         message = self.state.messages[name].message
         if not is_finite(message):
             raise Stale(f"vehicle {self.state.system} does not tell where it is ({name}: not a number)")
@@ -166,7 +166,7 @@ class BaseVehicle:
             raise ModeChanged(f"the vehicle left {mode}: it is in {self.mode} now, and whoever switched it has it")
 
     async def flown(
-        self, mode: str, names: Iterable[str], done: Callable[[], T | None], timeout: float, what: str
+        self, mode: str, names: Iterable[str], done: Callable[[], T | None], timeout: float, action: str
     ) -> T:
         """Wait until `done` holds while the vehicle stays armed and in `mode`.
 
@@ -175,14 +175,14 @@ class BaseVehicle:
             names: messages after which `done` is looked at; heartbeats always are.
             done: looks at the state.
             timeout: in s.
-            what: ends the sentence "vehicle 1 did not …".
+            action: ends the sentence "vehicle 1 did not …".
         """
 
         def guarded() -> T | None:
             self.held_by(mode)
             return done()
 
-        return await self.waiting.until({"HEARTBEAT", *names}, guarded, timeout, what)
+        return await self.waiting.until({"HEARTBEAT", *names}, guarded, timeout, action)
 
     def commanding(self, job: Job, *needs: Callable[[], None]) -> Callable[[], None]:
         """What is asked before each message of `job`: whether it still commands, and what else it needs."""
@@ -255,22 +255,22 @@ class BaseVehicle:
             Rejected: it has no such message.
             TimedOut, LinkLost.
         """
-        asking = self._requests.get(name)
-        if asking is None:
-            asking = asyncio.get_running_loop().create_task(self._request(name))
-            self._requests[name] = asking
-            asking.add_done_callback(lambda task: self._requested(name, task))
-        return await asyncio.shield(asking)
+        task = self._requests.get(name)
+        if task is None:
+            task = asyncio.get_running_loop().create_task(self._request(name))
+            self._requests[name] = task
+            task.add_done_callback(lambda done: self._requested(name, done))
+        return await asyncio.shield(task)
 
-    def _requested(self, name: str, asking: asyncio.Task[Any]) -> None:
+    def _requested(self, name: str, task: asyncio.Task[Any]) -> None:
         del self._requests[name]
-        if not asking.cancelled():
-            asking.exception()  # whoever asked may have gone, and asyncio would call it unheeded
+        if not task.cancelled():
+            task.exception()  # whoever asked may have gone, and asyncio would call it unheeded
 
     async def _request(self, name: str) -> Any:
         def from_autopilot(message: Any) -> Any:
             return message if message.get_srcComponent() == self.state.component else None
 
-        with self.waiting.expecting({name}, from_autopilot) as told:
+        with self.waiting.expecting({name}, from_autopilot) as expected:
             await self.commands.send(messages.request_message(messages.MESSAGE_IDS[name]))
-            return await told.within(HEARTBEAT_TIMEOUT, f"tell {name}")
+            return await expected.within(HEARTBEAT_TIMEOUT, f"tell {name}")

@@ -93,7 +93,7 @@ class CommandSender:
                     return
 
     async def send_until_shown(
-        self, command: Command, check: Callable[[], None], shown: Callable[[], bool], what: str
+        self, command: Command, check: Callable[[], None], shown: Callable[[], bool], action: str
     ) -> None:
         """Send `command` until a heartbeat shows that it was done.
 
@@ -102,7 +102,7 @@ class CommandSender:
         Args:
             command: what to send.
             check, shown: as for `send`.
-            what: ends the sentence "vehicle 1 did not …".
+            action: ends the sentence "vehicle 1 did not …".
 
         Raises:
             Rejected, TimedOut, LinkLost: as `send`; and whatever `check` and `shown` raise.
@@ -110,9 +110,9 @@ class CommandSender:
         for seconds in SHOWN_WITHIN:
             await self.send(command, check, shown=shown)
             with contextlib.suppress(TimedOut):
-                await self._waiting.until({"HEARTBEAT"}, lambda: shown() or None, seconds, what)
+                await self._waiting.until({"HEARTBEAT"}, lambda: shown() or None, seconds, action)
                 return
-        raise TimedOut(f"vehicle {self._state.system} did not {what} within {sum(SHOWN_WITHIN):.1f} s")
+        raise TimedOut(f"vehicle {self._state.system} did not {action} within {sum(SHOWN_WITHIN):.1f} s")
 
     def _outstanding(self, number: int) -> deque[Sending]:
         """The sendings of that command whose ack may still come, oldest first."""
@@ -161,12 +161,12 @@ class CommandSender:
     async def _refusal(self, command: Command, result: int, started: float) -> Rejected:
         with contextlib.suppress(TimedOut):  # ArduPilot queues its texts, so that they may come after the ack
             await self._waiting.until(
-                {"STATUSTEXT"}, lambda: self._state.said_since(started) or None, LAST_WORDS, "say why"
+                {"STATUSTEXT"}, lambda: self._state.statustexts_since(started) or None, LAST_WORDS, "say why"
             )
-        said = self._state.said_since(started)
+        texts = self._state.statustexts_since(started)
         ack = result_name(result)
-        because = f": {'; '.join(said)}" if said else ""
-        return Rejected(f"the vehicle refused {command.name} ({ack}){because}", ack, said)
+        because = f": {'; '.join(texts)}" if texts else ""
+        return Rejected(f"the vehicle refused {command.name} ({ack}){because}", ack, texts)
 
 
 def result_name(result: int) -> str:

@@ -174,8 +174,8 @@ class Copter(TurningVehicle):
         if not flies_mission(self.mode):
             self.require_mode(GUIDED)
         self.authority.accompany(job, "resume", stopped_too=True)
-        one = self.authority.interrupted
-        if one is not None and one.steers and not one.running and self.mode == GUIDED:
+        interrupted = self.authority.interrupted
+        if interrupted is not None and interrupted.steers and not interrupted.running and self.mode == GUIDED:
             await self.send_setpoint(job, VelocityTarget(0, 0, 0))  # nobody sends what it flew by any more
         await self._continue(job)
 

@@ -129,7 +129,8 @@ class FlightEndings:
         if isinstance(vehicle, Vehicle) and job in (vehicle.authority.commander, vehicle.authority.interrupted):
             closing = self.see_to(vehicle, self.policy(job), f"after {job.verb}", job.client, job.modes)
             if closing is not None:
-                self._closing = {n: one for n, one in self._closing.items() if one.running} | {job.id: closing}
+                running = {number: follower for number, follower in self._closing.items() if follower.running}
+                self._closing = running | {job.id: closing}
 
     def what_follows(self, vehicle: Vehicle, policy: Policy, modes: Collection[str] = ()) -> str | None:
         """What the vehicle would be told now, as `see_to`; None for nothing."""
@@ -137,11 +138,11 @@ class FlightEndings:
 
     def last_words(self) -> list[tuple[Any, int]]:
         """What must be sent before nobody can send any more: messages, and the systems that they go to."""
-        found = []
+        last_words = []
         for job in self._closing.values():
             if job.running:
-                found.append((job.vehicle.last_word(), job.vehicle.state.system))
-        return found
+                last_words.append((job.vehicle.last_word(), job.vehicle.state.system))
+        return last_words
 
     def see_to(
         self, vehicle: Vehicle, policy: Policy, why: str, client: str, modes: Collection[str] = ()

@@ -45,7 +45,7 @@ class Job:
         ending: why it ended; None while it runs.
         steers: whether the vehicle is flown by what the job goes on sending, so that it must not go on without it.
         modes: names of the flight modes that it switched to: in any other the vehicle is somebody else's.
-        script: the session of the script that asked for it; None where none did, or it ends with its client anyhow.
+        script: the session of a script that the job goes on for; None for no script.
         outlives_client: whether it goes on when its client hangs up (land, rtl).
         stage: of a verb that is made of others, which one it is at: its name and numbers.
         progress: what it last said of itself, such as distance_to_go (m) and altitude (m above home).
@@ -78,7 +78,9 @@ class Job:
         self._task: asyncio.Task[None] | None = None
         self._limit: asyncio.TimerHandle | None = None
         self._finished = asyncio.Event()
-        self._clients = 0
+        self._clients: list[str | None] = []  # those that wait: the session of a script, None for anybody else
+        self._sessions_sought = 0
+        self._goes_on_for_others = False  # than a script
         self._when_ended: list[Callable[[], None]] = []
 
     @property
@@ -104,8 +106,8 @@ class Job:
             self._limit = self._loop.call_later(timeout, self._overdue, timeout)
 
     def _overdue(self, timeout: float) -> None:
-        left = self.progress.get("distance_to_go")
-        to_go = "" if left is None else f": {left:.1f} m to go"
+        distance = self.progress.get("distance_to_go")
+        to_go = "" if distance is None else f": {distance:.1f} m to go"
         self.abort(TimedOut(f"{self.verb} was not done within {timeout:g} s{to_go}"), Ending.FAILED)
 
     async def _run(self, body: Callable[[Job], Awaitable[str]]) -> None:
@@ -149,18 +151,54 @@ class Job:
         """Have `callback` called when the outcome of a running job is known."""
         self._when_ended.append(callback)
 
-    async def outcome(self) -> str:
-        """Await its result for a client; when the last client hangs up, the job ends too.
+    async def go_on_for(self, session: Awaitable[str | None]) -> str | None:
+        """Have the job go on without its clients: while a script lives, or to its end if no script asks for that.
+
+        Args:
+            session: finds the session of the script that asks; None for anybody else. The job goes on meanwhile.
+
+        Returns:
+            What `session` found.
+        """
+        self._sessions_sought += 1
+        script = None
+        try:
+            script = await session
+        finally:
+            self._sessions_sought -= 1
+            if script is None:
+                self._goes_on_for_others = True
+            else:
+                self.script = script
+        return script
+
+    def end_with_script(self) -> None:
+        """End the job because its script died. It goes on if somebody else asked for the same, or waits for it."""
+        others_wait = any(client != self.script for client in self._clients)
+        if not (others_wait or self._goes_on_for_others or self._sessions_sought):
+            self.abort(Aborted(f"{self.verb}: its script died"), Ending.SCRIPT_GONE)
+        self.script = None
+
+    @property
+    def _needs_client(self) -> bool:
+        others = self._goes_on_for_others or self._sessions_sought > 0
+        return not (self.outlives_client or self.script is not None or others)
+
+    async def outcome(self, script: str | None = None) -> str:
+        """Await its result for a client. When the last client hangs up, the job ends unless it goes on for somebody.
+
+        Args:
+            script: the client's session, if it is a script that the job goes on for.
 
         Raises:
             UavApiError: what the job failed with.
         """
-        self._clients += 1
+        self._clients.append(script)
         try:
             await self._finished.wait()
         finally:
-            self._clients -= 1
-            if self.running and not self._clients and not self.outlives_client:
+            self._clients.remove(script)
+            if self.running and not self._clients and self._needs_client:
                 self.abort(Aborted(f"{self.verb}: its client hung up"), Ending.CLIENT_GONE)
         if self.error is not None:
             raise self.error

@@ -34,15 +34,15 @@ class MessageExchange(Generic[T]):
         self._state = state
         self._asker = asker
         self._read = read
-        self._said: asyncio.Queue[T | None] = asyncio.Queue()
+        self._values: asyncio.Queue[T | None] = asyncio.Queue()
         self.wait: Wait[Any] = Wait(state.system, names, self._catch)
-        self.wait.on_settled = lambda: self._said.put_nowait(None)
+        self.wait.on_settled = lambda: self._values.put_nowait(None)
 
     def _catch(self, message: Any) -> None:
         if message.get_srcComponent() == self._state.component and self._is_to_us(message):
-            said = self._read(message)
-            if said is not None:
-                self._said.put_nowait(said)
+            value = self._read(message)
+            if value is not None:
+                self._values.put_nowait(value)
 
     def _is_to_us(self, message: Any) -> bool:
         """Whether its target is us, or everybody; a message without a target is for everybody."""
@@ -56,9 +56,9 @@ class MessageExchange(Generic[T]):
             LinkLost: the vehicle's heartbeats stopped; and whatever `read` raises.
         """
         try:
-            said = await wait_with_timeout(timeout, self._said.get())
+            value = await wait_with_timeout(timeout, self._values.get())
         except asyncio.TimeoutError:
             return None
-        if said is None:
+        if value is None:
             raise self.wait.error or LinkLost(f"vehicle {self._state.system} is gone")
-        return said
+        return value

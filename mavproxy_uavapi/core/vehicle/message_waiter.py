@@ -34,23 +34,27 @@ class MessageWaiter:
         self.clock = clock
         self._pending = pending
 
-    async def message(self, names: Collection[str], test: Callable[[Any], T | None], timeout: float, what: str) -> T:
+    async def message(
+        self, names: Collection[str], test: Callable[[Any], T | None], timeout: float, action: str
+    ) -> T:
         """Wait until `test` of a message of one of these names is not None.
 
         Args:
             names: message names; empty means every message of the vehicle.
             test: may raise to end the wait.
             timeout: in s.
-            what: ends the sentence "vehicle 1 did not …" of a timeout.
+            action: ends the sentence "vehicle 1 did not …" of a timeout.
 
         Raises:
             TimedOut: nothing in time.
             LinkLost: the vehicle's heartbeats stopped.
         """
         with self.expecting(names, test) as expected:
-            return await expected.within(timeout, what)
+            return await expected.within(timeout, action)
 
-    async def until(self, names: Collection[str], condition: Callable[[], T | None], timeout: float, what: str) -> T:
+    async def until(
+        self, names: Collection[str], condition: Callable[[], T | None], timeout: float, action: str
+    ) -> T:
         """Wait until `condition` of the state, looked at now and after each message of these names, holds.
 
         Raises:
@@ -59,7 +63,7 @@ class MessageWaiter:
         value = condition()
         if value is not None:
             return value
-        return await self.message(names, lambda _: condition(), timeout, what)
+        return await self.message(names, lambda _: condition(), timeout, action)
 
     @contextlib.contextmanager
     def expecting(self, names: Collection[str], test: Callable[[Any], T | None]) -> Iterator[ExpectedMessage[T]]:
@@ -106,12 +110,12 @@ class ExpectedMessage(Generic[T]):
         self._done = asyncio.Event()
         wait.on_settled = self._done.set
 
-    async def within(self, timeout: float, what: str) -> T:
+    async def within(self, timeout: float, action: str) -> T:
         """The awaited value.
 
         Args:
             timeout: in s.
-            what: ends the sentence "vehicle 1 did not …".
+            action: ends the sentence "vehicle 1 did not …".
 
         Raises:
             TimedOut, LinkLost: as `MessageWaiter.message`; and whatever the test raises.
@@ -119,7 +123,7 @@ class ExpectedMessage(Generic[T]):
         try:
             await wait_with_timeout(timeout, self._done.wait())
         except asyncio.TimeoutError:
-            sentence = f"vehicle {self.wait.system} did not {what} within {timeout:.1f} s"
+            sentence = f"vehicle {self.wait.system} did not {action} within {timeout:.1f} s"
             raise TimedOut(sentence) from None
         if self.wait.error is not None:
             raise self.wait.error

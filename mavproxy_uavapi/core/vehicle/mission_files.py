@@ -77,13 +77,13 @@ class MissionItem:
 
     def report(self, seq: int) -> dict[str, Any]:
         """What clients see, and may post again."""
-        told: dict[str, Any] = {"seq": seq, "command": self.name, "frame": _frame_name(self.frame)}
-        told |= {f"param{number}": value for number, value in enumerate(self.params, 1)}
+        report: dict[str, Any] = {"seq": seq, "command": self.name, "frame": _frame_name(self.frame)}
+        report |= {f"param{number}": value for number, value in enumerate(self.params, 1)}
         if self.has_location:
-            told |= {"lat": self.x / DEGREES, "long": self.y / DEGREES, "alt": self.z}
+            report |= {"lat": self.x / DEGREES, "long": self.y / DEGREES, "alt": self.z}
         else:
-            told |= {"param5": self.x, "param6": self.y, "param7": self.z}
-        return {**told, "autocontinue": self.autocontinue}
+            report |= {"param5": self.x, "param6": self.y, "param7": self.z}
+        return {**report, "autocontinue": self.autocontinue}
 
 
 HOME = MissionItem(mavlink.MAV_CMD_NAV_WAYPOINT, mavlink.MAV_FRAME_GLOBAL, (0.0, 0.0, 0.0, 0.0), 0, 0, 0.0)
@@ -105,17 +105,17 @@ def read(text: str) -> list[MissionItem]:
     if text.lstrip("\ufeff").startswith("QGC WPL"):
         return checked(_from_wpl(text.lstrip("\ufeff")))
     try:
-        given = json.loads(text)
+        mission = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise BadRequest(f"a mission is a QGC WPL 110 file, a .plan file, or JSON: {error}") from error
-    if isinstance(given, dict) and isinstance(given.get("mission"), dict):
-        given = _flattened(given["mission"].get("items"))
-        return checked(_loaded(given, _from_plan_item))
-    if isinstance(given, dict):
-        given = given.get("items")
-    if not isinstance(given, list):
+    if isinstance(mission, dict) and isinstance(mission.get("mission"), dict):
+        mission = _flattened(mission["mission"].get("items"))
+        return checked(_loaded(mission, _from_plan_item))
+    if isinstance(mission, dict):
+        mission = mission.get("items")
+    if not isinstance(mission, list):
         raise BadRequest('JSON of a mission is {"items": [...]}, or a .plan file')
-    return checked(_loaded(given, _from_json_item))
+    return checked(_loaded(mission, _from_json_item))
 
 
 def from_message(message: Any) -> MissionItem:
@@ -127,27 +127,27 @@ def from_message(message: Any) -> MissionItem:
     return MissionItem(message.command, message.frame, params, x, y, message.z, bool(message.autocontinue))
 
 
-def difference(wanted: Sequence[MissionItem], found: Sequence[MissionItem]) -> str | None:
+def difference(sent: Sequence[MissionItem], read_back: Sequence[MissionItem]) -> str | None:
     """How a mission that was read back differs from what was sent, in words; None where it does not.
 
     Command, place and altitude are looked at: of the parameters each autopilot keeps what it needs.
     """
-    if len(wanted) != len(found):
-        return f"it has {len(found)} items, not {len(wanted)}"
-    for seq, (one, other) in enumerate(zip(wanted, found, strict=True), 1):
-        if one.command != other.command:
-            return f"item {seq} is {other.name}, not {one.name}"
-        if one.has_location and not _same_place(one, other):
-            return f"item {seq} ({one.name}) is at another place"
+    if len(sent) != len(read_back):
+        return f"it has {len(read_back)} items, not {len(sent)}"
+    for seq, (expected, actual) in enumerate(zip(sent, read_back, strict=True), 1):
+        if expected.command != actual.command:
+            return f"item {seq} is {actual.name}, not {expected.name}"
+        if expected.has_location and not _same_place(expected, actual):
+            return f"item {seq} ({expected.name}) is at another place"
     return None
 
 
-def _same_place(one: MissionItem, other: MissionItem) -> bool:
+def _same_place(a: MissionItem, b: MissionItem) -> bool:
     return (
-        SAME_FRAMES.get(one.frame, one.frame) == SAME_FRAMES.get(other.frame, other.frame)
-        and abs(one.x - other.x) <= PLACE_TOLERANCE
-        and abs(one.y - other.y) <= PLACE_TOLERANCE
-        and abs(one.z - other.z) <= ALTITUDE_TOLERANCE
+        SAME_FRAMES.get(a.frame, a.frame) == SAME_FRAMES.get(b.frame, b.frame)
+        and abs(a.x - b.x) <= PLACE_TOLERANCE
+        and abs(a.y - b.y) <= PLACE_TOLERANCE
+        and abs(a.z - b.z) <= ALTITUDE_TOLERANCE
     )
 
 
@@ -159,8 +159,10 @@ def checked(messages: Sequence[Any]) -> list[MissionItem]:
     """
     if not 0 < len(messages) <= MOST_ITEMS:
         raise Invalid(f"a mission has 1 to {MOST_ITEMS} items besides home, not {len(messages)}", "items")
-    found = [(seq, _problem(message)) for seq, message in enumerate(messages, 1)]
-    problems = [{"loc": ["items", seq], "msg": problem, "type": "value_error"} for seq, problem in found if problem]
+    numbered = [(seq, _problem(message)) for seq, message in enumerate(messages, 1)]
+    problems = [
+        {"loc": ["items", seq], "msg": problem, "type": "value_error"} for seq, problem in numbered if problem
+    ]
     if problems:
         raise Invalid(problems)
     return [from_message(message) for message in messages]
@@ -225,16 +227,16 @@ def _flattened(items: Any) -> list[Any]:
     """
     if not isinstance(items, list):
         raise BadRequest("the .plan file has no mission items")
-    found: list[Any] = []
+    simple: list[Any] = []
     for item in items:
         if not isinstance(item, dict) or item.get("type") != "ComplexItem":
-            found.append(item)
+            simple.append(item)
             continue
         transects = item.get("TransectStyleComplexItem")
         if not isinstance(transects, dict) or not isinstance(transects.get("Items"), list):
             raise BadRequest(f"the .plan file has a {item.get('complexItemType')}, which this API cannot fly")
-        found += _flattened(transects["Items"])
-    return found
+        simple += _flattened(transects["Items"])
+    return simple
 
 
 def _from_plan_item(item: Mapping[str, Any]) -> tuple[int, int, int, list[float]]:
@@ -253,26 +255,26 @@ def _from_json_item(item: Mapping[str, Any]) -> tuple[int, int, int, list[float]
     return _command(item["command"]), _int(frame), int(bool(item.get("autocontinue", True))), numbers
 
 
-def _command(given: Any) -> int:
+def _command(command: Any) -> int:
     """A MAV_CMD by its number or its name, with or without the prefix."""
-    if not isinstance(given, str):
-        return _int(given)
-    number = getattr(mavlink, f"MAV_CMD_{given.upper().removeprefix('MAV_CMD_')}", None)
+    if not isinstance(command, str):
+        return _int(command)
+    number = getattr(mavlink, f"MAV_CMD_{command.upper().removeprefix('MAV_CMD_')}", None)
     if number is None:
-        raise ValueError(f"there is no command {given!r}")
+        raise ValueError(f"there is no command {command!r}")
     return int(number)
 
 
-def _int(given: Any) -> int:
-    if isinstance(given, bool) or not isinstance(given, int):
-        raise ValueError(f"{given!r} is no whole number")
-    return given
+def _int(value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise ValueError(f"{value!r} is no whole number")
+    return value
 
 
-def _float(given: Any) -> float:
-    if isinstance(given, bool) or not isinstance(given, int | float):
-        raise ValueError(f"{given!r} is no number")
-    return float(given)
+def _float(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError(f"{value!r} is no number")
+    return float(value)
 
 
 def _whole(value: float) -> int:

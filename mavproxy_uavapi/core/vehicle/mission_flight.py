@@ -124,18 +124,18 @@ async def _flown_to_its_end(vehicle: Vehicle, job: Job, items: Sequence[MissionI
 
 def _is_complete(vehicle: Vehicle) -> bool:
     """By MISSION_CURRENT's state; an older autopilot tells none, and has then reached the last item."""
-    told = progress(vehicle)
-    if told["state"] == "unknown":
-        return bool(told["total"] and told["last_reached"] == told["total"])
-    return bool(told["state"] == "complete")
+    mission = progress(vehicle)
+    if mission["state"] == "unknown":
+        return bool(mission["total"] and mission["last_reached"] == mission["total"])
+    return bool(mission["state"] == "complete")
 
 
 def _report(vehicle: Vehicle, job: Job) -> None:
     try:
-        told = progress(vehicle)
+        mission = progress(vehicle)
     except Stale:  # nothing to report yet
         return
-    numbers = {"item": told["current"], "items": told["total"], "distance_to_go": told["distance_m"]}
+    numbers = {"item": mission["current"], "items": mission["total"], "distance_to_go": mission["distance_m"]}
     job.progress = {name: value for name, value in numbers.items() if value is not None}
 
 

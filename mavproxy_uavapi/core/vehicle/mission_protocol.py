@@ -80,7 +80,7 @@ class Waypoints:
             TimedOut, LinkLost.
         """
 
-        def told(done: int, of: int) -> None:
+        def checked_progress(done: int, of: int) -> None:
             check()
             progress(done, of)
 
@@ -89,7 +89,7 @@ class Waypoints:
             check()
             self.changed_at = self._waiting.clock()
             try:
-                await self._put(items, told)
+                await self._put(items, checked_progress)
             except (Rejected, TimedOut, LinkLost, Busy) as error:
                 raise _with(error, await self._undo(old, error)) from error
 
@@ -108,9 +108,9 @@ class Waypoints:
             self.changed_at = self._waiting.clock()
             with self._talk(ANSWERS) as talk:
                 await self._clear(talk)
-                left = await self._ask_count(talk) - 1
-            if left > 0:
-                raise Rejected(f"the vehicle accepted the clearing, but its mission has {left} items still")
+                remaining = await self._ask_count(talk) - 1
+            if remaining > 0:
+                raise Rejected(f"the vehicle accepted the clearing, but its mission has {remaining} items still")
 
     # -- the protocol -------------------------------------------------------------------------------------
 
@@ -124,8 +124,8 @@ class Waypoints:
     async def _send(self, message: Any) -> None:
         await self._link.send(message, self._state.system)
 
-    async def _asked(
-        self, talk: MessageExchange[Any], question: Any, test: Callable[[Any], T | None], what: str
+    async def _ask(
+        self, talk: MessageExchange[Any], question: Any, test: Callable[[Any], T | None], action: str
     ) -> T:
         """Ask until `test` of an answer is not None.
 
@@ -143,23 +143,23 @@ class Waypoints:
                 if value is not None:
                     return value
                 if message.get_type() == "MISSION_ACK" and message.type != mavlink.MAV_MISSION_ACCEPTED:
-                    refusal = self._refusal(message, what)
-        raise refusal or TimedOut(f"vehicle {self._state.system} did not {what}, asked {SENDINGS} times")
+                    refusal = self._refusal(message, action)
+        raise refusal or TimedOut(f"vehicle {self._state.system} did not {action}, asked {SENDINGS} times")
 
     async def _ask_count(self, talk: MessageExchange[Any]) -> int:
         question = mavlink.MAVLink_mission_request_list_message(*self._address, MISSION)
-        return await self._asked(talk, question, _count_of, "tell how many mission items it has")
+        return await self._ask(talk, question, _count_of, "tell how many mission items it has")
 
     async def _download(self) -> tuple[MissionItem | None, list[MissionItem]]:
         with self._talk(ANSWERS) as talk:
-            found = []
+            items = []
             for seq in range(await self._ask_count(talk)):
                 question = mavlink.MAVLink_mission_request_int_message(*self._address, seq, MISSION)
-                found.append(await self._asked(talk, question, _item_number(seq), f"tell mission item {seq}"))
+                items.append(await self._ask(talk, question, _item_number(seq), f"tell mission item {seq}"))
             await self._send(
                 mavlink.MAVLink_mission_ack_message(*self._address, mavlink.MAV_MISSION_ACCEPTED, MISSION)
             )
-        return (found[0], found[1:]) if found else (None, [])
+        return (items[0], items[1:]) if items else (None, [])
 
     async def _clear(self, talk: MessageExchange[Any]) -> None:
         question = mavlink.MAVLink_mission_clear_all_message(*self._address, MISSION)
@@ -171,7 +171,7 @@ class Waypoints:
                 raise self._refusal(message, "clear its mission")
             return True
 
-        await self._asked(talk, question, accepted, "clear its mission")
+        await self._ask(talk, question, accepted, "clear its mission")
 
     async def _put(self, items: Sequence[MissionItem], progress: Progress) -> None:
         """Upload and read back; once more where the transfer itself failed.
@@ -185,8 +185,8 @@ class Waypoints:
             if isinstance(error, Rejected) and error.ack != CANCELLED:
                 raise
             await self._hand_over([HOME, *items], progress)
-        _, found = await self._download()
-        differs = difference(items, found)
+        _, read_back = await self._download()
+        differs = difference(items, read_back)
         if differs is not None:
             raise Rejected(f"the mission was read back otherwise than it was sent: {differs}")
 
@@ -202,29 +202,31 @@ class Waypoints:
         Nothing is sent unasked but the offer: an item that comes twice is an error to an ArduPilot. When the
         acknowledgement of the last one is lost, the read-back tells.
         """
-        given: set[int] = set()
+        handed_over: set[int] = set()
         offers = 0
         while True:
-            if not given:
+            if not handed_over:
                 if offers == SENDINGS:
                     raise TimedOut(f"vehicle {self._state.system} did not take the mission up, {offers} offers")
                 await self._send(mavlink.MAVLink_mission_count_message(*self._address, len(items), MISSION))
                 offers += 1
-            message = await self._next_request(talk, ASKING_TIMEOUT if given else ANSWER_TIMEOUT)
-            all_given = len(given) == len(items)
-            if message is None and all_given:
+            message = await self._next_request(talk, ASKING_TIMEOUT if handed_over else ANSWER_TIMEOUT)
+            complete = len(handed_over) == len(items)
+            if message is None and complete:
                 return
-            if message is None and given:
-                raise TimedOut(f"vehicle {self._state.system} asked for {len(given)} of {len(items)} items only")
+            if message is None and handed_over:
+                raise TimedOut(
+                    f"vehicle {self._state.system} asked for {len(handed_over)} of {len(items)} items only"
+                )
             if message is None:
                 continue
             if message.get_type() == "MISSION_ACK":
-                if all_given and message.type == mavlink.MAV_MISSION_ACCEPTED:
+                if complete and message.type == mavlink.MAV_MISSION_ACCEPTED:
                     return
             elif message.seq < len(items):
                 await self._send(items[message.seq].to(self._address, message.seq))
-                given.add(message.seq)
-                progress(len(given), len(items))
+                handed_over.add(message.seq)
+                progress(len(handed_over), len(items))
 
     async def _next_request(self, talk: MessageExchange[Any], timeout: float) -> Any | None:
         """The next message of an upload.
@@ -247,23 +249,23 @@ class Waypoints:
         if isinstance(error, LinkLost):
             return "; its mission may be incomplete now, because the link is lost"
         try:
-            _, found = await self._download()
-            if found == list(old):
+            _, present = await self._download()
+            if present == list(old):
                 return "; its old mission is unchanged"
             if old:
                 await self._put(old, lambda done, of: None)
             else:
                 with self._talk(ANSWERS) as talk:
                     await self._clear(talk)
-        except (Rejected, TimedOut, LinkLost) as again:
-            return f"; its mission is incomplete now, and the old one could not be put back: {again}"
+        except (Rejected, TimedOut, LinkLost) as failure:
+            return f"; its mission is incomplete now, and the old one could not be put back: {failure}"
         return f"; its old mission ({len(old)} items) was put back" if old else "; it has no mission, as before"
 
-    def _refusal(self, message: Any, what: str) -> Rejected:
+    def _refusal(self, message: Any, action: str) -> Rejected:
         entry = mavlink.enums["MAV_MISSION_RESULT"].get(message.type)
         name = entry.name if entry else f"MAV_MISSION_RESULT_{message.type}"
-        said = self._state.said_since(self.changed_at) if self.changed_at else []
-        return Rejected(f"vehicle {self._state.system} refused to {what} ({name})", name, said)
+        texts = self._state.statustexts_since(self.changed_at) if self.changed_at else []
+        return Rejected(f"vehicle {self._state.system} refused to {action} ({name})", name, texts)
 
 
 def _count_of(message: Any) -> int | None:

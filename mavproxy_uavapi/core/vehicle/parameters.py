@@ -24,9 +24,9 @@ class Parameters:
         self._state = state
         self._link = link
         self._waiting = waiting
-        self._asked: dict[tuple[int, str], int] = {}  # times, by boot and name
+        self._requests: dict[tuple[int, str], int] = {}  # times, by boot and name
 
-    async def read(self, wanted: Iterable[Names]) -> dict[str, float]:
+    async def read(self, quantities: Iterable[Names]) -> dict[str, float]:
         """Values by name, of those that the vehicle has.
 
         ArduPilot does not answer for a name that it does not have: such are asked for twice in a boot, since a
@@ -35,21 +35,21 @@ class Parameters:
         Args:
             wanted: one entry for each quantity.
         """
-        wanted = list(wanted)
+        quantities = list(quantities)
         known = self._state.parameters
-        missing = [names for names in wanted if not known.keys() & set(names)]
-        asked = [name for names in missing for name in names if self._count(name) < ASKINGS]
-        if asked:
+        missing = [names for names in quantities if not known.keys() & set(names)]
+        requested = [name for names in missing for name in names if self._count(name) < ASKINGS]
+        if requested:
             with self._waiting.expecting(
                 {"PARAM_VALUE"}, lambda _: all(known.keys() & set(names) for names in missing) or None
-            ) as told:
-                for name in asked:
-                    self._asked[self._state.reboots, name] = self._count(name) + 1
+            ) as answers:
+                for name in requested:
+                    self._requests[self._state.reboots, name] = self._count(name) + 1
                     address = Address(self._state.system, self._state.component)
                     await self._link.send(messages.read_parameter(address, name), self._state.system)
                 with contextlib.suppress(TimedOut):
-                    await told.within(TIMEOUT, f"tell {', '.join(asked)}")
-        return {name: known[name] for names in wanted for name in names if name in known}
+                    await answers.within(TIMEOUT, f"tell {', '.join(requested)}")
+        return {name: known[name] for names in quantities for name in names if name in known}
 
     def _count(self, name: str) -> int:
-        return self._asked.get((self._state.reboots, name), 0)
+        return self._requests.get((self._state.reboots, name), 0)

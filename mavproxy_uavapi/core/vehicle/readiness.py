@@ -44,9 +44,9 @@ def status(vehicle: Vehicle, link_alive: bool, now: float) -> dict[str, Any]:
 
 def landed_state(vehicle: Vehicle) -> str:
     """`on_ground` (a rover or boat: always), `in_air`, `takeoff`, `landing`, or `unknown`."""
-    told = vehicle.state.recent_field("EXTENDED_SYS_STATE", "landed_state")
-    if told:
-        name: str = mavlink.enums["MAV_LANDED_STATE"][told].name
+    number = vehicle.state.recent_field("EXTENDED_SYS_STATE", "landed_state")
+    if number:
+        name: str = mavlink.enums["MAV_LANDED_STATE"][number].name
         return name.removeprefix("MAV_LANDED_STATE_").lower()
     if vehicle.state.landed is None:
         return "unknown"
@@ -66,8 +66,8 @@ def why_not(vehicle: Vehicle, link_alive: bool, now: float) -> list[str]:
     if (state.recent_field("GPS_RAW_INT", "fix_type") or 0) < mavlink.GPS_FIX_TYPE_3D_FIX:
         reasons.append("no 3D GPS fix")
     if not vehicle.is_ready_to_arm:
-        said = [text for text in state.said_since(now - TEXT_AGE) if text.startswith(ABOUT_ARMING)]
-        reasons.extend(dict.fromkeys(said) or ["pre-arm checks do not pass"])
+        texts = [text for text in state.statustexts_since(now - TEXT_AGE) if text.startswith(ABOUT_ARMING)]
+        reasons.extend(dict.fromkeys(texts) or ["pre-arm checks do not pass"])
     return reasons
 
 

@@ -54,15 +54,15 @@ class VehicleRegistry:
             NoVehicle: none such was heard yet.
         """
         heard = self._fleet.vehicles
-        wanted = self.resolve(system)
-        if wanted not in heard:
+        system_id = self.resolve(system)
+        if system_id not in heard:
             others = f"; heard so far: {', '.join(map(str, heard))}" if heard else ""
-            raise NoVehicle(f"no vehicle {wanted or ''} on the link yet".replace("  ", " ") + others)
-        state = heard[wanted]
+            raise NoVehicle(f"no vehicle {system_id or ''} on the link yet".replace("  ", " ") + others)
+        state = heard[system_id]
         make = CLASSES[kind_of(state.vehicle_type)]
-        vehicle = self._vehicles.get(wanted)
+        vehicle = self._vehicles.get(system_id)
         if type(vehicle) is not make:  # the first time, or the autopilot came back with other firmware
-            vehicle = self._vehicles[wanted] = make(state, self._link, self._pending, self._clock)
+            vehicle = self._vehicles[system_id] = make(state, self._link, self._pending, self._clock)
         return vehicle
 
     def commandable(self, system: int = 0) -> Vehicle:

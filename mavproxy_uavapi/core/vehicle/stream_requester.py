@@ -17,7 +17,7 @@ from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 LOOK_EVERY = 2.0  # s
-PATIENCE = 3.0  # s without a message before it is asked for
+MISSING_AFTER = 3.0  # s without a message before it is asked for
 ASK_AGAIN = 30.0  # s, after the first few askings have not helped
 FIRST_ASKINGS = 3
 
@@ -46,15 +46,15 @@ class StreamRequester:
     """
 
     def __init__(self, registry: VehicleRegistry, system: int) -> None:
-        self._hangar = registry
+        self._registry = registry
         self._system = system
-        self._asked: defaultdict[tuple[int, int, str], list[float]] = defaultdict(list)
+        self._asked_at: defaultdict[tuple[int, int, str], list[float]] = defaultdict(list)
 
     async def run(self) -> None:
         """Look every few seconds, until cancelled."""
         while True:
             with contextlib.suppress(UavApiError):  # no vehicle, or its link is lost: nobody to ask just now
-                await self.look(self._hangar.commandable(self._system))
+                await self.look(self._registry.commandable(self._system))
             await asyncio.sleep(LOOK_EVERY)
 
     async def look(self, vehicle: Vehicle) -> None:
@@ -65,20 +65,20 @@ class StreamRequester:
         """
         for name in self.missing(vehicle):
             key = (vehicle.state.system, vehicle.state.reboots, name)
-            self._asked[key].append(vehicle.clock())
+            self._asked_at[key].append(vehicle.clock())
             await vehicle.commands.send(set_interval(MESSAGE_IDS[name], WANTED[name]))
 
     def missing(self, vehicle: Vehicle) -> list[str]:
         """The wanted messages that do not come and that it is time to ask for."""
         now = vehicle.clock()
-        found = []
+        missing = []
         guided = vehicle.state.armed and vehicle.mode == "GUIDED"
         for name in [name for name in WANTED if guided or name not in IN_GUIDED]:
             age = vehicle.state.age(name, now)
-            if age is not None and age < PATIENCE:
+            if age is not None and age < MISSING_AFTER:
                 continue
-            asked = self._asked[(vehicle.state.system, vehicle.state.reboots, name)]
-            pause = LOOK_EVERY if len(asked) < FIRST_ASKINGS else ASK_AGAIN
-            if not asked or now - asked[-1] >= pause:
-                found.append(name)
-        return found
+            asked_at = self._asked_at[(vehicle.state.system, vehicle.state.reboots, name)]
+            pause = LOOK_EVERY if len(asked_at) < FIRST_ASKINGS else ASK_AGAIN
+            if not asked_at or now - asked_at[-1] >= pause:
+                missing.append(name)
+        return missing

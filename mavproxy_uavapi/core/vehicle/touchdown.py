@@ -5,7 +5,7 @@ from __future__ import annotations
 from mavproxy_uavapi.core.vehicle.time_limits import FlightLimits
 
 STANDING = 1.0  # m/s; what sinks faster than this after its disarming does not stand
-PATIENCE = 2.0  # s in which a position must come after the disarming, if positions come at all
+POSITION_TIMEOUT = 2.0  # s in which a position must come after the disarming, if positions come at all
 
 
 class Touchdown:
@@ -34,4 +34,4 @@ class Touchdown:
         told_since = age is not None and now - age > self._disarmed_at
         if told_since:
             return True if abs(self._sinking) <= STANDING else None
-        return True if now - self._disarmed_at >= PATIENCE else None
+        return True if now - self._disarmed_at >= POSITION_TIMEOUT else None

@@ -56,11 +56,13 @@ class TravellingVehicle(GuidedVehicle):
     async def _travelled(self, seconds: float) -> None:
         """Let `seconds` of the vehicle's clock pass while it stays armed and in GUIDED."""
         clock = self.state.time_ratio
-        over = clock.boot_time(self.clock()) + seconds
-        while (left := over - clock.boot_time(self.clock())) > 0:
+        ends_at = clock.boot_time(self.clock()) + seconds
+        while (remaining := ends_at - clock.boot_time(self.clock())) > 0:
             self.flying()
             with contextlib.suppress(TimedOut):  # the time has passed, unless the vehicle's clock ran slower
-                await self.waiting.message({"HEARTBEAT"}, lambda beat: beat, max(left / clock.ratio, 0.01), "beat")
+                await self.waiting.message(
+                    {"HEARTBEAT"}, lambda beat: beat, max(remaining / clock.ratio, 0.01), "beat"
+                )
 
     async def rest(self, job: Job) -> None:
         """Stop by setpoints in GUIDED, sent until telemetry shows that it stands still.

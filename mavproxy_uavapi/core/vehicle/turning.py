@@ -31,9 +31,9 @@ class TurningVehicle(TravellingVehicle):
 
         def turned() -> bool | None:
             yaw = math.degrees(self.fresh("ATTITUDE").yaw)
-            left = abs((heading - yaw + 180.0) % 360.0 - 180.0)
-            job.progress = {"degrees_to_go": round(left, 1)}
-            return True if left <= HEADING_TOLERANCE else None
+            degrees_to_go = abs((heading - yaw + 180.0) % 360.0 - 180.0)
+            job.progress = {"degrees_to_go": round(degrees_to_go, 1)}
+            return True if degrees_to_go <= HEADING_TOLERANCE else None
 
         if not self.state.landed:  # on the ground it turns when it has taken off
             allowed = self.allowed(180.0 / SLOWEST_TURN, timeout)

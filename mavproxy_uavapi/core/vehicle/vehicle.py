@@ -196,9 +196,9 @@ class Vehicle(Verbs):
             raise NotSupported("the vehicle is not a simulation: it has no parameter SIM_SPEEDUP")
 
         def read_back(message: Any) -> float | None:
-            told = message.param_id == name and math.isclose(message.param_value, factor, rel_tol=1e-5)
-            return factor if told else None
+            is_set = message.param_id == name and math.isclose(message.param_value, factor, rel_tol=1e-5)
+            return factor if is_set else None
 
-        with self.waiting.expecting({"PARAM_VALUE"}, read_back) as told:
+        with self.waiting.expecting({"PARAM_VALUE"}, read_back) as confirmation:
             await self.link.send(messages.set_parameter(self.address, name, factor), self.state.system)
-            await told.within(HEARTBEAT_TIMEOUT, f"take {name} = {factor:g}")
+            await confirmation.within(HEARTBEAT_TIMEOUT, f"take {name} = {factor:g}")

@@ -20,7 +20,7 @@ from .rtl import Rtl
 from .takeoff import TakeoffClimb
 
 LONGEST_CHAIN = 100
-"""Items that are stepped through at once; a jump loop without a waypoint ends here."""
+"""Most items that one step runs through; a jump loop without a waypoint ends here."""
 NAMES = {
     mavlink.MAV_CMD_NAV_WAYPOINT: "WP",
     mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT: "SplineWP",
@@ -127,7 +127,7 @@ class Auto(Mode):
         self._run_from(max(mission.current, 1))
 
     def jump_to(self, seq: int) -> None:
-        """The ground chose another current item while the mission runs."""
+        """Take up another current item, which the ground station chose while the mission runs."""
         self.aircraft.mission.state = State.RUNNING
         self._run_from(max(seq, 1))
 
@@ -153,7 +153,7 @@ class Auto(Mode):
             if item.command in NAVIGATION:
                 self._begin(seq, item)
                 return
-            # What follows a condition waits for it, while the next leg is already being flown.
+            # What follows a condition waits for it; the next leg is flown meanwhile.
             if item.command in CONDITION or self._alongside:
                 if not self._alongside:
                     self._start_condition(item)
@@ -164,11 +164,11 @@ class Auto(Mode):
         self._complete()
 
     def _jump(self, seq: int, item: Item) -> int:
-        left = self.aircraft.mission.jumps_left.setdefault(seq, int(item.param2))
-        if left == 0:
+        jumps_left = self.aircraft.mission.jumps_left.setdefault(seq, int(item.param2))
+        if jumps_left == 0:
             return seq + 1
-        if left > 0:
-            self.aircraft.mission.jumps_left[seq] = left - 1
+        if jumps_left > 0:
+            self.aircraft.mission.jumps_left[seq] = jumps_left - 1
         return int(item.param1)
 
     def _announce(self, seq: int, item: Item) -> None:
@@ -201,7 +201,7 @@ class Auto(Mode):
         self.submode = AutoSubmode.WAYPOINT
         target = item_target(aircraft, item)
         if item.command == mavlink.MAV_CMD_NAV_LAND:
-            # The way to a landing place is flown at the present altitude.
+            # The vehicle flies to a landing place at its present altitude.
             target = Ned(target.north, target.east, aircraft.estimator.position.down)
         self._target = target
         if aircraft.yaw.roi is None:
@@ -253,7 +253,7 @@ class Auto(Mode):
         return True
 
     def _flown_through(self, item: Item) -> bool:
-        """A waypoint without a delay before another waypoint need not be stopped at."""
+        """Whether the vehicle need not stop: a waypoint without a delay, before another waypoint."""
         items, following = self.aircraft.mission.items, self.aircraft.mission.current + 1
         waypoints = (mavlink.MAV_CMD_NAV_WAYPOINT, mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT)
         if item.command not in waypoints or item.param1 > 0 or following >= len(items):
@@ -302,7 +302,7 @@ class Auto(Mode):
             aircraft.yaw.roi = None
 
     def _complete(self) -> None:
-        """Nothing left: hold the position in the air, disarm on the ground."""
+        """No items are left: hold the position in the air, disarm on the ground."""
         aircraft = self.aircraft
         aircraft.mission.state = State.COMPLETE
         self.submode = AutoSubmode.HOLD

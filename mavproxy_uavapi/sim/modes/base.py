@@ -29,7 +29,7 @@ class Mode:
         raise NotImplementedError
 
     def leave(self) -> None:
-        """Another mode takes over."""
+        """Called when another mode takes over."""
 
     def step(self, dt: float) -> Demand:
         """One control step of dt seconds."""

@@ -1,4 +1,4 @@
-"""GUIDED: the companion computer or the ground says where to go, and the vehicle goes there."""
+"""GUIDED: the vehicle flies where a companion computer or a ground station tells it to."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Guided(Mode):
         return True
 
     def stop(self) -> None:
-        """Brake and hold: on entry, and what ArduCopter does with a setpoint that makes no sense."""
+        """Brake and hold: on entry, and after a setpoint that ArduCopter cannot use."""
         self._start(GuidedSubmode.VELOCITY)
         self.velocity_target = self.acceleration_target = ZERO
         self.paused = False
@@ -119,7 +119,7 @@ class Guided(Mode):
         return self.fly(dt)
 
     def _expire(self) -> None:
-        """Nobody has renewed the setpoint: stop moving and turning. A position stays the target."""
+        """The setpoint was not renewed in time: stop moving and turning. A position stays the target."""
         self.aircraft.yaw.stop_turning()
         self.velocity_target = self.acceleration_target = ZERO
 
@@ -139,7 +139,7 @@ class Guided(Mode):
             control.climb_at(self.velocity_target.down, dt)
 
     def set_speed(self, kind: Speed, speed: float) -> bool:
-        """As in ArduCopter a new speed up brings back the default speed down, and the other way round."""
+        """As in ArduCopter, a new climb speed resets the descent speed, and the other way round."""
         limits, default = self.aircraft.position.limits, self.aircraft.default_limits()
         if kind is not Speed.HORIZONTAL:
             limits.speed_up, limits.speed_down = default.speed_up, default.speed_down

@@ -15,7 +15,6 @@ from .landing import descend
 MINIMUM_ALTITUDE = 0.3
 """RTL_ALT_MIN of ArduCopter, metres above home."""
 MINIMUM_CONE_SLOPE = 0.5
-FINAL_ALTITUDE_TOLERANCE = 0.2
 
 
 class Stage(Enum):
@@ -79,11 +78,11 @@ class Rtl(Mode):
         distance = math.hypot(home.north - start.north, home.east - start.east)
         altitude = aircraft.altitude
         lowest = max(MINIMUM_ALTITUDE, altitude + max(0.0, aircraft.parameters["RTL_CLIMB_MIN"] / 100))
-        wanted = max(aircraft.parameters["RTL_ALT"] / 100, lowest)
+        return_altitude = max(aircraft.parameters["RTL_ALT"] / 100, lowest)
         slope = aircraft.parameters["RTL_CONE_SLOPE"]
         if slope >= MINIMUM_CONE_SLOPE:
-            wanted = min(wanted, max(distance * slope, lowest))
-        self._return_down = home.down - max(wanted, altitude)
+            return_altitude = min(return_altitude, max(distance * slope, lowest))
+        self._return_down = home.down - max(return_altitude, altitude)
         self._target = Ned(start.north, start.east, self._return_down)
         self._planned = True
         aircraft.yaw.hold()

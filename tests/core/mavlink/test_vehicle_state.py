@@ -105,7 +105,7 @@ def test_state_that_becomes_the_autopilots_keeps_nothing_of_the_other_as_its_own
     assert (state.field("VFR_HUD", "alt"), state.field("ATTITUDE", "yaw")) == (5.0, 1.0)
     assert state.others[191, "ATTITUDE"].message.yaw == 3.0
     assert (191, "BATTERY_STATUS") in state.others
-    assert (state.parameters, state.said_since(0.0), state.reboots) == ({}, [], 0)
+    assert (state.parameters, state.statustexts_since(0.0), state.reboots) == ({}, [], 0)
 
 
 def test_second_autopilot_never_takes_over_from_the_first_even_when_that_is_silent(fleet: Fleet, hear: Any) -> None:
@@ -157,7 +157,7 @@ def test_other_components_do_not_disturb_their_vehicle(state: VehicleState, hear
     assert state.landed is True
     assert state.age("ATTITUDE", 2.0) is None
     assert state.parameters == {}
-    assert state.said_since(0.0) == []
+    assert state.statustexts_since(0.0) == []
     assert state.others[component, "ATTITUDE"].message.yaw == 3.0
 
 
@@ -253,12 +253,12 @@ def test_plane_is_where_extended_sys_state_says_until_that_is_old(hear: Any, veh
 def test_status_text_in_chunks_is_one_text(state: VehicleState, hear: Any) -> None:
     hear("statustext", at=3.0, text="a" * 50, id=7, chunk_seq=0)
     hear("statustext", at=3.0, text="another", id=0)
-    assert state.said_since(0.0) == ["another"]
+    assert state.statustexts_since(0.0) == ["another"]
     hear("statustext", at=3.1, text="b" * 50, id=7, chunk_seq=1)
     hear("statustext", at=3.2, text="end", id=7, chunk_seq=2)
-    assert state.said_since(0.0) == ["another", "a" * 50 + "b" * 50 + "end"]
+    assert state.statustexts_since(0.0) == ["another", "a" * 50 + "b" * 50 + "end"]
     hear("statustext", at=3.3, text="again", id=7, chunk_seq=0)
-    assert state.said_since(3.3) == ["again"]
+    assert state.statustexts_since(3.3) == ["again"]
 
 
 @pytest.mark.parametrize(
@@ -269,27 +269,27 @@ def test_lost_chunk_leaves_one_gap(state: VehicleState, hear: Any, lost: tuple[i
         if number not in lost:
             hear("statustext", text=letter * (50 if letter != "d" else 3), id=7, chunk_seq=number)
     expected = "".join(letter if letter == "…" else letter * (50 if letter != "d" else 3) for letter in text)
-    assert state.said_since(0.0) == [expected]
+    assert state.statustexts_since(0.0) == [expected]
 
 
 def test_text_whose_last_chunk_is_lost_is_told_after_a_while(state: VehicleState, hear: Any) -> None:
     hear("statustext", at=3.0, text="a" * 50, id=7, chunk_seq=0)
     hear("attitude", at=3.0 + CHUNK_TIMEOUT - 0.1)
-    assert state.said_since(0.0) == []
+    assert state.statustexts_since(0.0) == []
     hear("attitude", at=3.1 + CHUNK_TIMEOUT)
-    assert state.said_since(0.0) == ["a" * 50]
+    assert state.statustexts_since(0.0) == ["a" * 50]
 
 
 def test_chunk_that_comes_twice_is_told_once(state: VehicleState, hear: Any) -> None:
     for number, text in ((0, "a" * 50), (0, "a" * 50), (1, "end")):
         hear("statustext", text=text, id=7, chunk_seq=number)
-    assert state.said_since(0.0) == ["a" * 50 + "end"]
+    assert state.statustexts_since(0.0) == ["a" * 50 + "end"]
 
 
 def test_said_since_begins_with_its_moment(state: VehicleState, hear: Any) -> None:
     for at, text in ((1.0, "one"), (2.0, "two"), (3.0, "three")):
         hear("statustext", at=at, text=text)
-    assert state.said_since(2.0) == ["two", "three"]
+    assert state.statustexts_since(2.0) == ["two", "three"]
 
 
 def test_old_status_texts_are_forgotten(state: VehicleState, hear: Any) -> None:

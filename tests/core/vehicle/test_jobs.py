@@ -8,7 +8,7 @@ import pytest
 from mavproxy_uavapi.core.errors import Aborted, NotArmed, Superseded, TimedOut, UavApiError
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle.authority import CommandAuthority, Rank
-from mavproxy_uavapi.core.vehicle.jobs import FINISHED_KEPT, Job, JobBook
+from mavproxy_uavapi.core.vehicle.jobs import FINISHED_KEPT, Ending, Job, JobBook
 
 
 class Bench:
@@ -44,10 +44,16 @@ class Bench:
             self.loop.settle()
         return job
 
-    def client(self, job: Job) -> asyncio.Task[str]:
-        task = self.loop.create_task(job.outcome())
+    def client(self, job: Job, script: str | None = None) -> asyncio.Task[str]:
+        task = self.loop.create_task(job.outcome(script))
         self.loop.settle()
         return task
+
+    def go_on_for(self, job: Job, script: str | None) -> None:
+        async def session() -> str | None:
+            return script
+
+        self.loop.run(job.go_on_for(session()))
 
 
 @pytest.fixture
@@ -162,6 +168,68 @@ def test_landing_outlives_its_client(bench: Bench) -> None:
     bench.go.set()
     bench.loop.settle()
     assert job.result == "/land done"
+
+
+def test_job_that_goes_on_for_somebody_outlives_the_client_who_began_it(bench: Bench) -> None:
+    job = bench.begin()
+    client = bench.client(job)
+    bench.go_on_for(job, None)
+    client.cancel()
+    bench.loop.settle()
+    assert job.running
+
+
+def test_job_goes_on_while_it_is_not_known_who_asks(bench: Bench) -> None:
+    job = bench.begin()
+    session: asyncio.Future[str | None] = bench.loop.create_future()
+    asks = bench.loop.create_task(job.go_on_for(session))
+    bench.loop.settle()
+    bench.client(job).cancel()
+    bench.loop.settle()
+    assert job.running
+    asks.cancel()  # it hung up before that was known
+    bench.loop.settle()
+    bench.client(job).cancel()
+    bench.loop.settle()
+    assert job.running
+
+
+def test_job_ends_with_the_script_that_alone_asked_for_it(bench: Bench) -> None:
+    job = bench.begin()
+    bench.go_on_for(job, "a")
+    bench.client(job, "a")
+    job.end_with_script()
+    assert (job.ending, str(job.error)) == (Ending.SCRIPT_GONE, "/a: its script died")
+
+
+@pytest.mark.parametrize("first", [None, "a"])
+def test_job_that_somebody_else_asked_for_goes_on_without_the_script(bench: Bench, first: str | None) -> None:
+    job = bench.begin()
+    for asker in (None, "a") if first is None else ("a", None):
+        bench.go_on_for(job, asker)
+    assert job.script == "a"
+    job.end_with_script()
+    assert (job.running, job.script) == (True, None)
+
+
+def test_job_that_somebody_waits_for_ends_with_that_client_once_the_script_is_dead(bench: Bench) -> None:
+    job = bench.begin()
+    client = bench.client(job)
+    bench.go_on_for(job, "a")
+    job.end_with_script()
+    assert job.running
+    client.cancel()
+    bench.loop.settle()
+    assert job.ending is Ending.CLIENT_GONE
+
+
+def test_job_of_two_scripts_ends_with_the_one_that_asked_last(bench: Bench) -> None:
+    job = bench.begin()
+    bench.go_on_for(job, "a")
+    bench.go_on_for(job, "b")
+    assert job.script == "b"
+    job.end_with_script()
+    assert job.ending is Ending.SCRIPT_GONE
 
 
 def test_verb_that_is_refused_does_not_take_the_command(bench: Bench) -> None:

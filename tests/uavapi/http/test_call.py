@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import asyncio
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -8,6 +9,8 @@ import pytest
 from mavproxy_uavapi.http.call import BODY_TIMEOUT, Call, in_time
 from mavproxy_uavapi.http.requests import Blocking, Empty, Servo
 from mavproxy_uavapi.http.route import POST, Route
+from mavproxy_uavapi.scripts.on_exit import after_death
+from mavproxy_uavapi.scripts.runs import Run
 from mavproxy_uavapi.settings import ApiModuleSettings
 
 
@@ -67,3 +70,50 @@ def test_no_limit_of_jobs_keeps_a_vehicle_from_being_stopped(
     assert api.get("/command/set_ground_speed?new_v=5").body["code"] == "too_many_requests"
     assert loop.run(api.ask("GET", path, headers={"Prefer": "respond-async"})).status == 202
     waiting.cancel()
+
+
+GO = {"x": 500, "y": 0, "z": -20}
+SESSION = "UAV_API_1_a"
+
+
+@pytest.mark.parametrize("waits", [True, False], ids=["waits", "does not wait"])
+@pytest.mark.parametrize("script_first", [True, False], ids=["script first", "human first"])
+def test_dead_script_does_not_end_what_a_human_asked_for_too(
+    flying: Any, service: Any, api: Any, loop: Any, waits: bool, script_first: bool
+) -> None:
+    asking = [None]
+
+    async def session_of(_peer: Any) -> str | None:
+        return asking[0]
+
+    def ask(asker: str | None, path: str) -> asyncio.Task[Any]:
+        asking[0] = asker
+        task = api.begin("POST", f"/movement/go_to_ned_wait{path}", json=GO)
+        loop.pass_time(0.3)
+        return task
+
+    service.scripts.session_of = session_of
+    human = "" if waits else "?wait=false"
+    askers = [(SESSION, "?wait=false"), (None, human)]
+    tasks = [ask(*asker) for asker in (askers if script_first else askers[::-1])]
+    [job] = service.host.jobs.running()
+    run = Run(Path("r"), "a.py", [], SESSION, 1, 8000, 0.0, Path("o"), Path("e"), 1.0)
+    done = loop.run(after_death(service.host, 1, run, []))
+    assert done == "left alone: /movement/go_to_ned_wait flies the vehicle"
+    assert job.running
+    for task in tasks:
+        task.cancel()
+    loop.pass_time(0.3)
+    assert job.running is not waits  # whoever waits ends it by hanging up
+
+
+def test_client_that_does_not_wait_keeps_the_job_of_one_that_does(
+    flying: Any, service: Any, api: Any, loop: Any
+) -> None:
+    waiting = api.begin("POST", "/movement/go_to_ned_wait", json=GO)
+    api.until(service.host.jobs.running)
+    assert api.post("/movement/go_to_ned_wait?wait=false", GO).status == 202
+    waiting.cancel()
+    loop.pass_time(0.3)
+    [job] = service.host.jobs.running()
+    assert job.running

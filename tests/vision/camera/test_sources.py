@@ -51,6 +51,12 @@ def test_a_stream_that_nobody_serves_is_no_camera(capfd):
     assert capfd.readouterr() == ("", "")  # the pilot's prompt stays readable
 
 
+def test_an_error_does_not_show_a_password():
+    with pytest.raises(NoCamera) as error:
+        Capture("rtsp://pilot:s3cret@127.0.0.1:1/none", 0.0, (64, 48), 25.0).open()
+    assert str(error.value) == "cannot open 'rtsp://pilot:***@127.0.0.1:1/none'"
+
+
 def test_a_pipeline_ends_in_grey_frames_of_our_size():
     command = launch_command("v4l2src device=/dev/video0 ! videoflip method=clockwise ! appsink drop=true", (66, 48))
     assert command[:7] == [
