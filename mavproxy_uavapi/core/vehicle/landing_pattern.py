@@ -1,4 +1,7 @@
-"""A plane's landing as a mission: the sequence that DO_LAND_START begins. Pure."""
+"""A plane's landing as a mission. Pure.
+
+It has no DO_LAND_START: with that item ArduPlane refuses to arm again, unless RTL_AUTOLAND allows it.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +22,7 @@ NEAR = 50.0  # m; from nearer than that the direction of the approach is no matt
 
 
 def is_in(items: Iterable[MissionItem]) -> bool:
-    """Whether a mission has a landing sequence."""
+    """Whether a mission has a landing sequence, which DO_LAND_START begins."""
     return any(item.command == mavlink.MAV_CMD_DO_LAND_START for item in items)
 
 
@@ -40,7 +43,6 @@ def pattern(place: GlobalTarget, here: tuple[float, float], *, vtol: bool) -> li
     scale = APPROACH / distance
     approach = GlobalTarget(*moved(place.lat, place.lon, north * scale, east * scale), place.alt + APPROACH_HEIGHT)
     return [
-        _item(mavlink.MAV_CMD_DO_LAND_START, GlobalTarget(0.0, 0.0, 0.0)),
         _item(mavlink.MAV_CMD_NAV_LOITER_TO_ALT, approach),
         _item(mavlink.MAV_CMD_NAV_LAND, place),
     ]

@@ -21,6 +21,7 @@ AUTO, TAKEOFF, RTL, QLAND = "AUTO", "TAKEOFF", "RTL", "QLAND"
 RADIUS = 60.0  # m; WP_LOITER_RAD until the vehicle has told its own
 CIRCLING = 1.5  # radii from the middle of a circle in which a plane that flies it is found, wind and entry included
 HEIGHT_TOLERANCE = 10.0  # m
+LEVEL = 2.0  # m/s; a plane that climbs or sinks slower than this has done so
 LOWEST_HANDOVER = 15.0  # m above home; TAKEOFF's own climb is not interrupted below that
 # Quantities and their defaults: cruise airspeed, climb and sink rates, m/s.
 CRUISE = (("AIRSPEED_CRUISE", "TRIM_ARSPD_CM"), 12.0)
@@ -54,6 +55,14 @@ class Plane(GuidedVehicle):
         """Whether it takes off and lands vertically, too."""
         return bool((await self.parameters.read([("Q_ENABLE",)])).get("Q_ENABLE"))
 
+    async def arm(self, job: Job, timeout: float | None = None) -> None:
+        """As for every vehicle; its mission is back at the first item: ArduPlane does not arm at a landing's item."""
+        current = self.state.field("MISSION_CURRENT", "seq") or 0
+        if self.state.armed is False and current > 1:
+            self.authority.take(job, Rank.ARM)
+            await self.commands.send(messages.set_mission_current(1), self.commanding(job))
+        await super().arm(job, timeout)
+
     # -- up and down --------------------------------------------------------------------------------------
 
     async def takeoff(self, job: Job, alt: float, *, vtol: bool = False, timeout: float | None = None) -> None:
@@ -86,7 +95,9 @@ class Plane(GuidedVehicle):
 
         def reached() -> bool | None:
             self.report_leg(job, abs(alt - self.height))
-            return True if abs(alt - self.height) <= HEIGHT_TOLERANCE and self.state.landed is False else None
+            climb = (self.state.field("GLOBAL_POSITION_INT", "vz") or 0) / 100.0
+            level = abs(alt - self.height) <= HEIGHT_TOLERANCE and abs(climb) <= LEVEL
+            return True if level and self.state.landed is False else None
 
         await self.flown(GUIDED, {"GLOBAL_POSITION_INT"}, reached, allowed, f"reach {alt:g} m")
         self.authority.shown(job)
