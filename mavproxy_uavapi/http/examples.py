@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from mavproxy_uavapi.http import requests
+from mavproxy_uavapi.http.fleet import FleetRequest
 from mavproxy_uavapi.http.telemetry_views import SENSORS
 
 PLACE = {"lat": -35.3629, "long": 149.1652, "alt": 20}
@@ -57,6 +58,7 @@ REQUESTS: Mapping[type[requests.Request], Mapping[str, Any]] = {
     requests.Takeoff: {"alt": 10},
     requests.LandAt: {"lat": -35.3629, "long": 149.1652},
     requests.Reverse: {"reverse": True},
+    FleetRequest: {"vehicles": [1], "each": {"1": {}}, "all_or_none": False},
     requests.ModeName: {"mode": "LOITER"},
     requests.NewSpeed: {"new_v": 5},
     requests.SimFactor: {"sim_factor": 5},

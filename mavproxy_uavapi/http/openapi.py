@@ -34,6 +34,7 @@ TAGS = {
     "mission": "Scripts, each in a tmux session of its own; and the mission that the autopilot itself flies.",
     "vehicles": "Which vehicles there are. `/vehicles/{sysid}` before any path means that vehicle; without it the "
     "setting `sysid` says which, or MAVProxy's current one is meant.",
+    "fleet": "One verb for several vehicles, with an answer of each.",
     "peripherical": "Servos and cameras.",
     "docs": "This documentation.",
 }
@@ -51,6 +52,7 @@ BY_TAG: Mapping[str, tuple[type[UavApiError], ...]] = {
     "jobs": (errors.NotFound, errors.Busy),
     "mission": OF_A_SCRIPT,
     "vehicles": (errors.NotFound,),
+    "fleet": (),
     "docs": (errors.NotFound,),
 }
 BY_PATH: Mapping[str, tuple[type[UavApiError], ...]] = {
@@ -187,6 +189,9 @@ def operation(route: Route, method: str) -> dict[str, Any]:
         types = [kind for kind, vehicle in CLASSES.items() if vehicle.has(route.verb)]
         told["x-vehicle-types"] = types
         told["description"] = f"{told['description']}\n\nOf: {', '.join(types)}.".strip()
+    if tag_of(route) == "fleet":
+        told["parameters"] += HURRY
+        told["responses"]["207"] = {**told["responses"]["200"], "description": "Not every vehicle has done it."}
     if route.job:
         told["parameters"] += HURRY
         told["responses"]["202"] = ACCEPTED

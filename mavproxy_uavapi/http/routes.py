@@ -19,6 +19,7 @@ from mavproxy_uavapi.http import (
     vehicles,
 )
 from mavproxy_uavapi.http.call import Call
+from mavproxy_uavapi.http.fleet import fleet_routes
 from mavproxy_uavapi.http.openapi import document
 from mavproxy_uavapi.http.route import EITHER, POST, Route
 
@@ -108,6 +109,8 @@ PERIPHERICAL = [
     Route("/peripherical/servo_output", peripherical.servo_output, requests.Servo, POST, job=True),
 ]
 
+FLEET = fleet_routes([*COMMAND, *MOVEMENT])
+
 VEHICLES = [
     Route("/vehicles", vehicles.list_vehicles, requests.Empty),
     Route("/vehicles/{sysid}", vehicles.show_vehicle, requests.Empty),
@@ -119,4 +122,4 @@ DOCS = [
     Route("/docs/{file}", docs_page.asset, requests.Empty),
 ]
 
-ROUTES = [*COMMAND, *MOVEMENT, *TELEMETRY, *JOBS, *MISSION, *PERIPHERICAL, *VEHICLES, *DOCS]
+ROUTES = [*COMMAND, *MOVEMENT, *TELEMETRY, *JOBS, *MISSION, *PERIPHERICAL, *VEHICLES, *FLEET, *DOCS]

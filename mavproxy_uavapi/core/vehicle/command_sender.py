@@ -22,6 +22,7 @@ from mavproxy_uavapi.core.mavlink.link import Address, Link
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle.message_waiter import MessageWaiter
 from mavproxy_uavapi.core.vehicle.messages import Command
+from mavproxy_uavapi.core.vehicle.start_gate import pass_gate
 
 mavlink = mavutil.mavlink
 
@@ -35,6 +36,7 @@ RETRY_PAUSE = 1.0  # s before a patient command is asked again
 SHOWN_WITHIN = (2.0, 1.5, 1.5)  # s after each acknowledgement in which a heartbeat must show what was done
 LATE_ACK = 10.0  # s after a sending in which its ack may still come
 LAST_WORDS = 0.5  # s that a refusal's STATUSTEXT may come after its ack
+QUESTIONS = {mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAV_CMD_RUN_PREARM_CHECKS}  # they change nothing
 WORTH_ASKING_AGAIN = {mavlink.MAV_RESULT_TEMPORARILY_REJECTED, mavlink.MAV_RESULT_FAILED}
 
 
@@ -135,6 +137,8 @@ class CommandSender:
         give_up_at = self._waiting.clock() + IN_PROGRESS_LIMIT
         silences = 0
         for confirmation in itertools.count():
+            if command.number not in QUESTIONS:
+                await pass_gate()
             check()
             with self._waiting.acks(command.number, self._link.source, shown) as acks:
                 await self._link.send(command.to(address, confirmation), self._state.system)

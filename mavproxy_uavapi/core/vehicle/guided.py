@@ -14,6 +14,7 @@ from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_uavapi.core.vehicle.geodesy import offset
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.messages import NO_YAW, GlobalTarget, NedTarget, Target, VelocityTarget, Yaw
+from mavproxy_uavapi.core.vehicle.start_gate import pass_gate
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 GUIDED = "GUIDED"
@@ -145,6 +146,7 @@ class GuidedVehicle(Vehicle):
         Raises:
             Superseded, Paused, NotArmed, ModeChanged: somebody else has it; nothing is sent.
         """
+        await pass_gate()
         self.commanding(job, self.flying)()
         await self.link.send(target.to(self.address, yaw), self.state.system)
         self.sent(target)

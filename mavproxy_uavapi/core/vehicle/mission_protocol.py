@@ -20,6 +20,7 @@ from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle.message_exchange import MessageExchange
 from mavproxy_uavapi.core.vehicle.message_waiter import MessageWaiter
 from mavproxy_uavapi.core.vehicle.mission_files import HOME, MissionItem, difference, from_message
+from mavproxy_uavapi.core.vehicle.start_gate import pass_gate
 
 T = TypeVar("T")
 mavlink = mavutil.mavlink
@@ -86,6 +87,7 @@ class Waypoints:
 
         async with self._lock:
             _, old = await self._download()
+            await pass_gate()
             check()
             self.changed_at = self._waiting.clock()
             try:

@@ -1,0 +1,92 @@
+"""Several verbs that begin together or not at all: each waits before its first message until all of them can send.
+
+By then each has passed its own checks. A verb finds its place at a gate in the context of its task.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextvars
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from mavproxy_uavapi.core.errors import Aborted, UavApiError
+
+
+class StartGate:
+    """Opens when every verb has come, and for none of them once one has failed.
+
+    Args:
+        count: how many verbs there are.
+    """
+
+    def __init__(self, count: int) -> None:
+        self._missing = count
+        self._decided = asyncio.Event()
+        self._failure: str | None = None
+
+    @contextmanager
+    def place(self, name: str) -> Iterator[None]:
+        """A verb's place: what runs in this context, and tasks that begin in it, wait at the gate.
+
+        Args:
+            name: of the verb's vehicle, for the others' error.
+        """
+        place = _Place(self)
+        token = _place.set(place)
+        try:
+            yield
+        except UavApiError as error:
+            place.come(f"{name}: {error}")
+            raise
+        finally:
+            place.come()  # done without a message, or its client hung up
+            _place.reset(token)
+
+    def came(self, failure: str | None) -> None:
+        """One verb has come, or failed before it could."""
+        if self._decided.is_set():
+            return
+        self._missing -= 1
+        self._failure = failure
+        if failure is not None or not self._missing:
+            self._decided.set()
+
+    async def passed(self) -> None:
+        """Wait until it is decided.
+
+        Raises:
+            Aborted: one verb has failed.
+        """
+        await self._decided.wait()
+        if self._failure is not None:
+            raise Aborted(f"nothing was sent: {self._failure}")
+
+
+class _Place:
+    def __init__(self, gate: StartGate) -> None:
+        self._gate = gate
+        self._has_come = False
+
+    def come(self, failure: str | None = None) -> None:
+        if not self._has_come:
+            self._has_come = True
+            self._gate.came(failure)
+
+    async def passed(self) -> None:
+        self.come()
+        await self._gate.passed()
+
+
+_place: contextvars.ContextVar[_Place | None] = contextvars.ContextVar("place", default=None)
+
+
+async def pass_gate() -> None:
+    """Wait for the others, where the present verb has a place at a gate; to be called before what it checks to send.
+
+    Raises:
+        Aborted: another verb of the gate has failed.
+    """
+    place = _place.get()
+    if place is not None:
+        await place.passed()

@@ -1,0 +1,94 @@
+"""/fleet: one verb for several vehicles, with an answer of each."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Any, Literal
+
+from aiohttp import web
+from pydantic import ConfigDict, Field
+
+from mavproxy_uavapi.core.errors import Invalid, UavApiError, without_frames
+from mavproxy_uavapi.core.vehicle.start_gate import StartGate
+from mavproxy_uavapi.http.auditing import audited
+from mavproxy_uavapi.http.call import Call
+from mavproxy_uavapi.http.requests import Request, parse
+from mavproxy_uavapi.http.responses import dumps
+from mavproxy_uavapi.http.route import POST, Route
+from mavproxy_uavapi.http.router import Match
+
+MULTI_STATUS = 207
+System = Annotated[int, Field(ge=1, le=255)]
+
+
+class FleetRequest(Request):
+    """The vehicles by system id, or all; the verb's own parameters; and in `each` what is different for one vehicle.
+
+    With `all_or_none` nothing is sent before every vehicle has passed the checks of its verb; where one does not,
+    nothing is sent to any.
+    """
+
+    model_config = ConfigDict(extra="allow", allow_inf_nan=False)
+    vehicles: Annotated[list[System] | Literal["all"], Field(description="system ids, or all")] = "all"
+    each: Annotated[dict[str, dict[str, Any]], Field(description="by system id: other values for one vehicle")] = {}
+    all_or_none: Annotated[bool, Field(description="nothing is sent unless every vehicle can")] = False
+
+
+def fleet_routes(routes: Iterable[Route]) -> list[Route]:
+    """A route /fleet/… for each verb of the vehicles."""
+    return [_fleet_route(route) for route in routes if route.job]
+
+
+def _fleet_route(route: Route) -> Route:
+    name = route.path.rpartition("/")[2]
+
+    async def action(call: Call) -> web.StreamResponse:
+        return await _command(call, route)
+
+    action.__doc__ = f"""`{route.path}` for several vehicles at once; answers when it has ended for all.
+
+    200 when it was done by every vehicle, else 207; `vehicles` has the answer of each.
+    """
+    # Each vehicle's own call is in the trail.
+    return Route(f"/fleet/{name}", action, FleetRequest, POST, stops=route.stops, trail=False)
+
+
+async def _command(call: Call, route: Route) -> web.StreamResponse:
+    """Call `route` for each vehicle."""
+    p = call.params(FleetRequest)
+    if p.all_or_none and call.is_async:
+        raise Invalid("who does not wait cannot learn whether all or none began", "all_or_none")
+    heard = call.service.host.fleet.vehicles
+    systems = sorted(heard) if p.vehicles == "all" else list(dict.fromkeys(p.vehicles))
+    common = p.model_extra or {}
+    params = {system: parse(route.model, "body", {**common, **p.each.get(str(system), {})}) for system in systems}
+    gate = StartGate(len(systems)) if p.all_or_none else None
+    answers = await asyncio.gather(*(_answer(call, route, system, params[system], gate) for system in systems))
+    done = all(answer["status"] in (200, 202) for answer in answers)
+    count = sum(answer["status"] in (200, 202) for answer in answers)
+    body = {
+        "device": "fleet",
+        "result": f"{route.path} was {'done' if done else 'not done'} by all: {count} of {len(systems)} vehicles",
+        "vehicles": dict(zip(map(str, systems), answers, strict=True)),
+    }
+    return web.json_response(body, status=200 if done else MULTI_STATUS, dumps=dumps)
+
+
+async def _answer(
+    call: Call, route: Route, system: int, params: Request, gate: StartGate | None
+) -> Mapping[str, Any]:
+    """One vehicle's answer: its status and body."""
+    path = f"/fleet/{route.path.rpartition('/')[2]}"
+    one = Call(call.service, call.request, params, Match(path, system, route))
+    try:
+        with contextlib.nullcontext() if gate is None else gate.place(f"vehicle {system}"):
+            answer = await audited(one, route.action)
+    except UavApiError as error:
+        without_frames(error)
+        return {"status": error.status, "detail": error.detail, "code": error.code, **error.extras()}
+    if isinstance(answer, web.StreamResponse):  # 202
+        assert one.job is not None
+        return {"status": answer.status, "job": one.job.id}
+    return {"status": 200, "result": answer["result"]}

@@ -1,0 +1,139 @@
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from pymavlink import mavutil
+
+mavlink = mavutil.mavlink
+
+
+@pytest.fixture
+def three(make_drone: Any, loop: Any) -> list[Any]:
+    """Three copters in flight."""
+    drones = [make_drone(system) for system in (1, 2, 3)]
+    for drone in drones:
+        drone.fly()
+    loop.settle()
+    return drones
+
+
+def commands(drone: Any) -> list[int]:
+    return [message.command for message in drone.got if message.get_type() == "COMMAND_LONG"]
+
+
+def test_one_verb_for_all_with_an_answer_of_each(three: Any, api: Any) -> None:
+    answer = api.post("/fleet/land", {})
+    assert answer.status == 200
+    assert {key: row["status"] for key, row in answer.body["vehicles"].items()} == {"1": 200, "2": 200, "3": 200}
+    assert [drone.mode for drone in three] == ["LAND"] * 3
+    assert not any(drone.armed for drone in three)
+
+
+def test_verb_for_some_leaves_the_others_alone(three: Any, api: Any) -> None:
+    answer = api.post("/fleet/brake", {"vehicles": [1, 3]})
+    assert answer.status == 200
+    assert [drone.mode for drone in three] == ["BRAKE", "GUIDED", "BRAKE"]
+    assert set(answer.body["vehicles"]) == {"1", "3"}
+
+
+def test_what_one_cannot_do_is_in_its_answer_and_the_others_do_it(three: Any, api: Any) -> None:
+    three[1].pilot("LOITER")
+    api.loop.settle()
+    answer = api.post("/fleet/go_to_gps", {"vehicles": "all", "lat": -35.0, "long": 149.0, "alt": 30})
+    assert answer.status == 207
+    rows = answer.body["vehicles"]
+    assert (rows["1"]["status"], rows["3"]["status"]) == (200, 200)
+    assert (rows["2"]["status"], rows["2"]["code"]) == (409, "mode_changed")
+    assert "2 of 3" in answer.body["result"]
+
+
+def test_each_has_values_of_its_own(three: Any, api: Any) -> None:
+    body = {"x": 0, "y": 0, "z": -20, "each": {"2": {"x": 40}, "3": {"x": 60, "z": -30}}}
+    assert api.post("/fleet/go_to_ned", body).status == 200
+    targets = [next(m for m in drone.got if m.get_type() == "SET_POSITION_TARGET_LOCAL_NED") for drone in three]
+    assert [(target.x, target.z) for target in targets] == [(0, -20), (40, -20), (60, -30)]
+
+
+def test_a_wrong_value_for_one_is_422_and_nothing_is_sent(three: Any, api: Any) -> None:
+    answer = api.post("/fleet/go_to_ned", {"x": 0, "y": 0, "z": -20, "each": {"2": {"x": "far"}}})
+    assert (answer.status, answer.body["code"]) == (422, "invalid")
+    assert [drone.orders() for drone in three] == [[], [], []]
+
+
+def test_all_or_none_sends_nothing_when_one_cannot(three: Any, api: Any) -> None:
+    three[2].pilot("LOITER")
+    api.loop.settle()
+    body = {"lat": -35.0, "long": 149.0, "alt": 30, "all_or_none": True}
+    answer = api.post("/fleet/go_to_gps", body)
+    rows = answer.body["vehicles"]
+    assert answer.status == 207
+    assert rows["3"]["code"] == "mode_changed"
+    assert {rows["1"]["code"], rows["2"]["code"]} == {"aborted"}
+    assert "nothing was sent: vehicle 3" in rows["1"]["detail"]
+    assert [drone.orders() for drone in three] == [[], [], []]
+    api.loop.pass_time(5.0)
+    assert [drone.orders() for drone in three] == [[], [], []]
+
+
+def test_all_or_none_begins_together_when_all_can(make_drone: Any, api: Any, loop: Any) -> None:
+    """The second is ready to arm later: the first waits for it, disarmed."""
+    first, second = make_drone(1), make_drone(2)
+    second.ready = False
+    loop.settle()
+    flight = api.begin("POST", "/fleet/arm", json={"all_or_none": True})
+    loop.pass_time(10.0)
+    assert first.orders() == second.orders() == []
+    second.ready = True
+    answer = loop.run_until_complete(flight)
+    assert answer.status == 200, answer.body
+    assert first.armed
+    assert second.armed
+
+
+def test_who_waits_at_the_gate_still_heeds_the_pilot(make_drone: Any, api: Any, loop: Any) -> None:
+    first, second = make_drone(1), make_drone(2)
+    second.ready = False
+    loop.settle()
+    flight = api.begin("POST", "/fleet/arm", json={"all_or_none": True})
+    loop.pass_time(5.0)
+    first.pilot("LOITER")
+    second.ready = True
+    answer = loop.run_until_complete(flight)
+    assert answer.body["vehicles"]["1"]["code"] == "mode_changed"
+    assert not first.armed
+
+
+def test_all_or_none_needs_somebody_who_waits(three: Any, api: Any) -> None:
+    answer = api.post("/fleet/brake?wait=false", {"all_or_none": True})
+    assert (answer.status, answer.body["code"]) == (422, "invalid")
+
+
+def test_without_waiting_there_is_a_job_of_each(three: Any, api: Any) -> None:
+    answer = api.post("/fleet/land?wait=false", {})
+    rows = answer.body["vehicles"]
+    assert {row["status"] for row in rows.values()} == {202}
+    jobs = {job["job"]: job["verb"] for job in api.get("/jobs").body["jobs"]}
+    assert {jobs[row["job"]] for row in rows.values()} == {"/fleet/land"}
+
+
+def test_what_is_not_there_has_an_answer_too(three: Any, api: Any) -> None:
+    rows = api.post("/fleet/brake", {"vehicles": [2, 9]}).body["vehicles"]
+    assert rows["2"]["status"] == 200
+    assert (rows["9"]["status"], rows["9"]["code"]) == (503, "no_vehicle")
+
+
+def test_each_vehicles_call_is_in_the_trail(three: Any, api: Any, host: Any) -> None:
+    api.post("/fleet/brake", {"vehicles": [1, 2]})
+    assert [(entry.verb, entry.system, entry.outcome) for entry in host.audit.entries] == [
+        ("/fleet/brake", 1, "ok"),
+        ("/fleet/brake", 2, "ok"),
+    ]
+
+
+def test_stopping_all_is_refused_by_no_limit(three: Any, api: Any, service: Any) -> None:
+    from mavproxy_uavapi.settings import ApiModuleSettings
+
+    service.settings = ApiModuleSettings({"max_rate": 1, "max_jobs": 1}, environ={}).snapshot()
+    for _ in range(10):
+        assert api.post("/fleet/rtl?wait=false", {}).status == 200
