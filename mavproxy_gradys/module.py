@@ -50,9 +50,9 @@ gradys help              this"""
 class GradysModule(SharedModule[GradysSettings]):
     """`module load gradys`."""
 
-    def __init__(self, mpstate: Any, given: dict[str, Any]) -> None:
-        remembered = RememberedSettings(mpstate, NAME, given)
-        settings = GradysModuleSettings(remembered.given)
+    def __init__(self, mpstate: Any, keywords: dict[str, Any]) -> None:
+        remembered = RememberedSettings(mpstate, NAME, keywords)
+        settings = GradysModuleSettings(remembered.combined)
         actions: dict[str, Callable[[list[str]], None]] = {
             "status": lambda _: self._show(console.status),
             "stats": lambda _: self._show(console.stats),

@@ -39,9 +39,9 @@ uavapi help              this"""
 class UavApiModule(SharedModule[ApiSettings]):
     """`module load uavapi`."""
 
-    def __init__(self, mpstate: Any, given: dict[str, Any]) -> None:
-        remembered = RememberedSettings(mpstate, NAME, given)
-        settings = ApiModuleSettings(remembered.given)
+    def __init__(self, mpstate: Any, keywords: dict[str, Any]) -> None:
+        remembered = RememberedSettings(mpstate, NAME, keywords)
+        settings = ApiModuleSettings(remembered.combined)
         self._wanted = True  # whether it is to listen; `uavapi stop` says no
         actions: dict[str, Callable[[list[str]], None]] = {
             "status": self._status,

@@ -43,9 +43,9 @@ RESTARTS = {  # settings that the camera must be opened anew for
 class VisionModule(SharedModule[VisionSettings]):
     """`module load vision`."""
 
-    def __init__(self, mpstate: Any, given: dict[str, Any]) -> None:
-        remembered = RememberedSettings(mpstate, NAME, given)
-        settings = VisionModuleSettings(remembered.given)
+    def __init__(self, mpstate: Any, keywords: dict[str, Any]) -> None:
+        remembered = RememberedSettings(mpstate, NAME, keywords)
+        settings = VisionModuleSettings(remembered.combined)
         actions: dict[str, Callable[[list[str]], None]] = {
             "status": lambda _: self._tell(lambda: console.report(self.tracker, self.flights)),
             "start": lambda _: self._start(),

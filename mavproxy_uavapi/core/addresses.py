@@ -5,11 +5,15 @@ from __future__ import annotations
 import ipaddress
 import re
 
-EVERYWHERE = {"0.0.0.0": "127.0.0.1", "::": "::1", "": "127.0.0.1"}  # listened on: how this machine reaches it
+EVERYWHERE = {
+    "0.0.0.0": "127.0.0.1",
+    "::": "::1",
+    "": "127.0.0.1",
+}  # address to listen on -> address by which this machine reaches it
 
 
 def is_loopback(host: str) -> bool:
-    """Whether that is this machine talking to itself: localhost, or a loopback address, with a zone or not."""
+    """Whether the host is this machine by its loopback: localhost, or a loopback address, with a zone or not."""
     if host == "localhost":
         return True
     try:
@@ -19,17 +23,17 @@ def is_loopback(host: str) -> bool:
 
 
 def bracketed(host: str) -> str:
-    """A host as it stands in a URL: an IPv6 address in brackets, without its zone."""
+    """A host as a URL has it: an IPv6 address in brackets, without its zone."""
     return f"[{host.partition('%')[0]}]" if ":" in host else host
 
 
 def url_of(host: str, port: int, *, tls: bool = False) -> str:
-    """The URL of a server that listens there."""
+    """The URL of a server that listens on that address."""
     return f"{'https' if tls else 'http'}://{bracketed(host)}:{port}"
 
 
 def local_url_of(host: str, port: int, *, tls: bool = False) -> str:
-    """The URL by which this machine reaches a server that listens there."""
+    """The URL by which this machine reaches a server that listens on that address."""
     return url_of(EVERYWHERE.get(host, host), port, tls=tls)
 
 

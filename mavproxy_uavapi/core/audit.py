@@ -1,4 +1,4 @@
-"""The audit trail: every command that was asked for, by whom, what reached the vehicle, and how it ended."""
+"""The audit trail: every command, who asked for it, what reached the vehicle, and how it ended."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ FILE = "uavapi-audit.jsonl"
 FILE_BYTES = 10_000_000
 OLDER_FILES = 4
 WAITING = 1000  # lines that wait for a slow disk
-COUNTED_FOR = 60.0  # s for which refusals are counted before the trail tells of them
-MOST_ADDRESSES = 50  # whose refusals are counted apart; the others' are counted together
+COUNTED_FOR = 60.0  # s for which refusals are counted before the trail has an entry for them
+MOST_ADDRESSES = 50  # with refusals counted apart; those of others are counted together
 OTHERS = "other addresses"
 
 
@@ -34,12 +34,12 @@ class Entry:
 
     Attributes:
         time: when it was answered, UTC, ISO 8601.
-        client: its address, `console`, or the script for which it was done.
+        client: its address, `console`, or the script in whose name it was done.
         verb: its path.
         request: its validated parameters.
         system: the vehicle's system id; 0 when there was none.
-        outcome: `ok`, or the error's code.
-        detail: the result, or the error's sentence.
+        outcome: `ok`, or the code of the error.
+        detail: the result, or the sentence of the error.
         seconds: from request to answer.
         sent: names of the messages that reached the link for it, as `SentNames` has them.
     """
@@ -55,11 +55,11 @@ class Entry:
     sent: tuple[str, ...]
 
     def __str__(self) -> str:
-        given = ", ".join(f"{name}={value}" for name, value in self.request.items() if value is not None)
-        return escaped(f"{self.time} {self.client} {self.verb}({given}): {self.outcome} after {self.seconds:.1f} s")
+        texts = ", ".join(f"{name}={value}" for name, value in self.request.items() if value is not None)
+        return escaped(f"{self.time} {self.client} {self.verb}({texts}): {self.outcome} after {self.seconds:.1f} s")
 
     def cut(self) -> Entry:
-        """The same, with long values cut."""
+        """The entry with long values cut."""
         words = {name: cut(getattr(self, name)) for name in ("client", "verb", "request", "detail")}
         return replace(self, **words)
 
@@ -82,7 +82,7 @@ class Refusals:
         self._counts.setdefault(client, Counter())[code] += 1
 
     def take(self) -> dict[str, dict[str, int]]:
-        """By address and code what was counted since the last time."""
+        """The counts since the last call, by address and code."""
         counts, self._counts = self._counts, {}
         return {client: dict(codes) for client, codes in counts.items()}
 
@@ -94,7 +94,7 @@ class Audit:
         directory: where the files go; None to keep none (MAVProxy's --no-state).
 
     Attributes:
-        file: the newest file; the older ones are beside it, with .1 to .4 added.
+        file: the newest file; older ones beside it end in .1 to .4.
         entries: the last ones, oldest first.
     """
 
@@ -103,7 +103,7 @@ class Audit:
         self.entries: deque[Entry] = deque(maxlen=KEPT)
         self._refusals = Refusals()
         self._telling: asyncio.TimerHandle | None = None
-        # A disk may stall, the asyncio loop must not: one thread writes, in order.
+        # A disk may stall; the asyncio loop must not. So one thread writes, in order.
         self._writer = ThreadPoolExecutor(1, "uavapi-audit")
         self._room = threading.BoundedSemaphore(WAITING)
         self._lost = 0
@@ -117,7 +117,7 @@ class Audit:
         self._write(asdict(entry))
 
     def refused(self, client: str, code: str) -> None:
-        """Count a request that was refused before it became a command; the trail tells of it within a minute.
+        """Count a request that was refused before it became a command; the trail has an entry for it within a minute.
 
         Args:
             client: its address.

@@ -1,4 +1,4 @@
-"""What the prompt asks for and MAVProxy does not wait for: done in the asyncio thread, printed when it is done."""
+"""Commands of the prompt that MAVProxy does not wait for; the asyncio thread runs them and prints the result."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
 
 Command = Callable[[], Coroutine[Any, Any, str]]
-SLOW = 2.0  # s after which a line says that it still goes on
+SLOW = 2.0  # s after which a line says that it still runs
 
 
 class BackgroundCommands:
     """Runs them side by side.
 
     Args:
-        host: the way into the asyncio thread and back.
-        name: of the module; at the head of each line.
+        host: connects the main loop and the asyncio thread.
+        name: the module's name, which begins each line.
     """
 
     def __init__(self, host: Host, name: str) -> None:
@@ -28,16 +28,16 @@ class BackgroundCommands:
         self._tasks = HeldTasks()
 
     def send(self, command: Command, doing: str = "") -> None:
-        """Begin one; what it returns or raises is printed. Main loop only.
+        """Begin a command; its result or error is printed. Main loop only.
 
         Args:
-            command: what to do; its result is a line, or nothing.
-            doing: what to call it when it takes long; empty for what may.
+            command: returns the line to print, or an empty text.
+            doing: what it does, for a line if it takes long; empty for no line.
         """
         self._host.bridge.call_soon(self._begin, command, doing)
 
     def say(self, text: str) -> None:
-        """Print a line; an empty one is none. Any thread."""
+        """Print a line, unless it is empty. Any thread."""
         if text:
             self._host.bridge.post(lambda: print(f"{self._name}: {text}"))
 
@@ -55,7 +55,7 @@ class BackgroundCommands:
             self.say(await command())
         except UavApiError as error:
             self.say(str(error))
-        except Exception as error:  # noqa: BLE001  whoever waits at the prompt is told of a defect too
+        except Exception as error:  # noqa: BLE001  the pilot at the prompt learns of a defect, too
             loop.call_exception_handler({"message": f"{self._name}: a defect", "exception": error})
             self.say(f"a defect ended this: {error!r}")
         finally:

@@ -9,12 +9,12 @@
     |- Conflict                409 (one of its children)
     |  |- Superseded           409 superseded     a newer command took over
     |  |- ModeChanged          409 mode_changed   the pilot or a failsafe has the vehicle
-    |  |- Busy                 409 busy           the state forbids it just now
+    |  |- Busy                 409 busy           the state forbids it now
     |  |- Paused               409 paused         `stop` holds the vehicle
     |  |- NotArmed             409 not_armed
     |  `- Aborted              409 aborted
     |- Invalid                 422 invalid        nothing was sent
-    |  `- SettingError         422 invalid        a setting that there is not, or a value that it does not take
+    |  `- SettingError         422 invalid        an unknown setting, or a value that it refuses
     |- TooManyRequests         429 too_many_requests
     |- Rejected                500 rejected       the autopilot refused
     |- ToolFailed              500 tool_failed    a program that we started failed, or is not installed
@@ -24,8 +24,8 @@
     |  `- Stale                503 stale
     `- TimedOut                504 timeout
 
-An error's text is a sentence that a pilot understands. `http/responses.py` turns any of them into an
-answer; nothing else knows about statuses.
+An error's text is a sentence that a pilot understands. `http/responses.py` turns any of them into an answer; nothing
+else uses the statuses.
 """
 
 from __future__ import annotations
@@ -54,13 +54,13 @@ class UavApiError(Exception):
 
 
 def without_frames(error: UavApiError) -> UavApiError:
-    """The same error without traceback and causes: a job keeps its error, and those every object on their way."""
+    """The same error without traceback and causes, which would keep many objects alive while a job keeps it."""
     error.__cause__ = error.__context__ = None
     return error.with_traceback(None)
 
 
 class BadRequest(UavApiError):
-    """The request's body or an argument of it makes no sense."""
+    """The request's body or one of its arguments cannot be used."""
 
     status, code = 400, "bad_request"
 
@@ -90,7 +90,7 @@ class NotSupported(NotFound):
 
 
 class Conflict(UavApiError):
-    """The state of the vehicle, or another commander, stands against it."""
+    """The state of the vehicle, or another commander, forbids it."""
 
     status, code = 409, "conflict"
 
@@ -102,13 +102,13 @@ class Superseded(Conflict):
 
 
 class ModeChanged(Conflict):
-    """The vehicle left the mode that the verb needs; whoever did that has it now."""
+    """The vehicle left the mode that the verb needs; whoever switched it has it now."""
 
     code = "mode_changed"
 
 
 class Busy(Conflict):
-    """The vehicle's state forbids it just now."""
+    """The vehicle's state forbids it now."""
 
     code = "busy"
 
@@ -135,7 +135,7 @@ class Invalid(UavApiError):
     """A value of the wrong type or out of range; nothing was sent.
 
     `problems` are `{"loc": [...], "msg": str, "type": str}`, as web clients of typed APIs know them; `loc` is the
-    name of the value, and what leads to it. Where it came by HTTP, `came_by` puts query or body before it.
+    path to the value. For a value that came by HTTP, `came_by` puts query or body before it.
     """
 
     status, code = 422, "invalid"
@@ -150,7 +150,7 @@ class Invalid(UavApiError):
         return "; ".join(": ".join(filter(None, (".".join(map(str, p["loc"])), p["msg"]))) for p in self.problems)
 
     def came_by(self, source: str) -> None:
-        """Note by what part of a request the values came, unless that is known."""
+        """Note which part of a request had the values, unless that is known."""
         for problem in self.problems:
             if problem["loc"][:1] not in SOURCES:
                 problem["loc"] = [source, *problem["loc"]]
@@ -162,9 +162,9 @@ class Invalid(UavApiError):
 
 
 class SettingError(Invalid):
-    """A setting that does not exist, or a value that it does not take; the text is one clear line.
+    """An unknown setting, or a value that it refuses; the text is one clear line.
 
-    So for what else is written as settings are: the argument of a command, a line of a file. `loc` names it.
+    Also for the argument of a command or a line of a file. `loc` names it.
     """
 
     def __init__(self, sentence: str, *loc: str) -> None:
@@ -176,7 +176,7 @@ class SettingError(Invalid):
 
 
 class TooManyRequests(UavApiError):
-    """More requests, or more verbs in flight, than one client or all of them may have.
+    """More requests, or more verbs in flight, than one client or all clients may have.
 
     `retry_after` is in s.
     """
@@ -219,7 +219,7 @@ class ToolFailed(UavApiError):
 
 
 class Unavailable(UavApiError):
-    """There is nobody to ask, or nothing fresh to tell."""
+    """There is no vehicle to ask, or no fresh data."""
 
     status, code = 503, "unavailable"
 
@@ -248,7 +248,7 @@ class Stale(Unavailable):
 
 
 class TimedOut(UavApiError):
-    """No acknowledgement, or not arrived in time."""
+    """No acknowledgement, or no arrival, in time."""
 
     status, code = 504, "timeout"
 

@@ -1,4 +1,4 @@
-"""Tasks beside what else there is: held until they are done, because asyncio itself holds a task weakly."""
+"""Background tasks, held until they are done: asyncio itself holds only weak references."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 
 class HeldTasks:
-    """Tasks of one owner. When a defect ends one, the loop's exception handler is told at once."""
+    """The tasks of one owner. When a defect ends one, the loop's exception handler is called at once."""
 
     def __init__(self) -> None:
         self._tasks: set[asyncio.Task[None]] = set()
@@ -33,8 +33,8 @@ class HeldTasks:
             task.get_loop().call_exception_handler(context)
 
     async def end(self) -> None:
-        """Cancel those that are left, and wait until they have cleaned up."""
-        left = list(self._tasks)
-        for task in left:
+        """Cancel the unfinished ones, and wait until they have cleaned up."""
+        unfinished = list(self._tasks)
+        for task in unfinished:
             task.cancel()
-        await asyncio.gather(*left, return_exceptions=True)
+        await asyncio.gather(*unfinished, return_exceptions=True)

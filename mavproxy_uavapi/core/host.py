@@ -25,9 +25,9 @@ ATTRIBUTE = "uavapi_host"  # on MAVProxy's state, so that a module loaded anew f
 
 
 class Host:
-    """The shared half of our modules: bridge, link, fleet, waits, the vehicles and the jobs that fly them.
+    """What our modules share: bridge, link, fleet, waits, the vehicles and the jobs that fly them.
 
-    Everything but `bridge` belongs to the asyncio thread.
+    Everything except `bridge` belongs to the asyncio thread.
 
     Attributes:
         audit: the trail of commands.
@@ -41,7 +41,7 @@ class Host:
     Args:
         mpstate: MAVProxy's state.
         clock: monotonic seconds.
-        link: the way out, in place of MAVProxy's own.
+        link: sends messages, in place of MAVProxy's links.
         loop: an asyncio loop that somebody else runs, in place of the host's own thread.
     """
 
@@ -78,12 +78,12 @@ class Host:
     # -- MAVProxy's main loop ---------------------------------------------------------------------------
 
     def feed(self, member: Any, message: Any) -> None:
-        """Hand a message over; of several loaded modules only the first one's counts."""
+        """Hand a message over; of several loaded modules only the first one does."""
         if self.members[:1] == [member]:
             self.bridge.feed(message)
 
     def idle(self, member: Any) -> None:
-        """MAVProxy's idle task: start at the first one, then send what is to be sent."""
+        """MAVProxy's idle task: start at the first call, then send what is queued."""
         if self.members[:1] != [member]:
             return
         if not self.bridge.running:
@@ -96,24 +96,24 @@ class Host:
         self.bridge.turn()
 
     def end(self) -> None:
-        """Say the last words, and end the asyncio thread.
+        """Send the last words, and end the asyncio thread.
 
-        MAVProxy's main loop waits for us, or has ended: nobody else sends. So this thread does, here only.
+        MAVProxy's main loop waits for us, or has ended, and sends nothing. So this thread sends, only here.
         """
 
-        async def said() -> list[tuple[Any, int]]:
+        async def collect() -> list[tuple[Any, int]]:
             return [word for words in self.last_words for word in words()]
 
         if self.bridge.running:
-            for message, system in self.bridge.run(said()):
-                with contextlib.suppress(LinkLost):  # nobody hears us anyhow
+            for message, system in self.bridge.run(collect()):
+                with contextlib.suppress(LinkLost):  # there is nobody to hear us
                     self._mavproxy_link.write(message, system)
         self.bridge.stop()
 
     def _tell_parameters(self) -> None:
-        """Hand over what MAVProxy has learnt of parameters, in order with the messages: a later PARAM_VALUE wins.
+        """Hand over the parameters that MAVProxy has learnt, in order with the messages: a later PARAM_VALUE wins.
 
-        With `--continue` MAVProxy's tables hold a file of an earlier session: those are not the vehicle's word.
+        With `--continue` MAVProxy's tables hold a file of an earlier session, not the vehicle's own values.
         """
         if self._mpstate.continue_mode:
             return
@@ -134,7 +134,7 @@ class Host:
             listener(state, message, now)
 
     def _leave_trace(self, job: Job) -> None:
-        """Leave a trace of a job that ended, unless the HTTP call that began it does."""
+        """Write a job that ended to the trail, unless the HTTP call that began it does."""
         if job.sent is None or job.ended_at is None:
             return
         entry = Entry(

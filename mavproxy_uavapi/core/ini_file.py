@@ -1,4 +1,4 @@
-"""The INI file: one serves all three modules and the launcher, each of which reads its sections."""
+"""The INI file: one for all three modules and the launcher. Each reads its own sections."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ class IniFile:
     """A file that was read: texts by section and key.
 
     Args:
-        file: its path, which errors begin with.
+        file: its path; errors begin with it.
 
     Raises:
-        SettingError: it is missing, cannot be read, or has a section that nobody knows.
+        SettingError: it is missing, cannot be read, or has an unknown section.
     """
 
     def __init__(self, file: Path) -> None:
@@ -45,5 +45,5 @@ class IniFile:
         return self.sections.get(name, {})
 
     def no_key(self, section: str, key: str, known: Iterable[str]) -> SettingError:
-        """The error for a key that the section does not have; it names the nearest of those that are known."""
+        """The error for a key that the section does not have; it names the nearest known one."""
         return SettingError(f"{self.file}: no key {key!r} in [{section}]; {nearest(key, known)}", key)

@@ -1,4 +1,4 @@
-"""Logs by component: what goes to MAVProxy's console, what to the file, and in which detail.
+"""Logs by component: which of them go to MAVProxy's console and to the file, and in which detail.
 
 The components are those of the original service: COPTER (alias VEHICLE), API, GRADYS_GS, SCRIPT. Warnings and
 errors always show in the console.
@@ -19,10 +19,10 @@ from mavproxy_uavapi.core.text import escaped
 
 try:
     import readline
-except ImportError:  # a Python without it has no line to put back either
+except ImportError:  # without it there is no typed line to restore
     readline = None  # type: ignore[assignment]
 
-# Component -> the loggers that speak for it.
+# Component -> its loggers.
 COMPONENTS = {
     "COPTER": ("uavapi.copter",),
     "API": ("uavapi.http", "uavapi.audit"),
@@ -37,7 +37,7 @@ FORMAT = "%(asctime)s %(component)s %(levelname)s %(message)s"
 
 
 def component_of(logger: str) -> str:
-    """The component that a logger speaks for; API for what belongs to none."""
+    """The component of a logger; API for a logger of none."""
     for component, names in COMPONENTS.items():
         if any(logger == name or logger.startswith(name + ".") for name in names):
             return component
@@ -59,16 +59,16 @@ def components(text: str) -> frozenset[str]:
 
 
 class _Named(logging.Filter):
-    """Gives each record its component; with `wanted`, lets only those and warnings pass."""
+    """Gives each record its component. With `shown`, only those components and warnings pass."""
 
-    def __init__(self, wanted: frozenset[str] | None = None) -> None:
+    def __init__(self, shown: frozenset[str] | None = None) -> None:
         super().__init__()
-        self._wanted = wanted
+        self._components = shown
 
     def filter(self, record: logging.LogRecord) -> bool:
         component = component_of(record.name)
         record.__dict__["component"] = component
-        return self._wanted is None or record.levelno >= logging.WARNING or component in self._wanted
+        return self._components is None or record.levelno >= logging.WARNING or component in self._components
 
 
 class _Console(logging.Handler):
@@ -83,7 +83,7 @@ class _Console(logging.Handler):
 
 
 class _Formatter(logging.Formatter):
-    """One line for each record, whatever a client put into it; a traceback keeps its own lines."""
+    """Makes one line of each record, whatever a client put into it; a traceback keeps its lines."""
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802  logging's own name
         return escaped(super().formatMessage(record))
@@ -93,7 +93,7 @@ class _Formatter(logging.Formatter):
 
 
 class Logs:
-    """The handlers that are in force, from `open` to `close`.
+    """The handlers in force, from `open` to `close`.
 
     Args:
         say: puts a line on MAVProxy's console; callable from any thread.
@@ -105,7 +105,7 @@ class Logs:
         self._listener: logging.handlers.QueueListener | None = None
 
     def open(self, console: frozenset[str], debug: frozenset[str], path: str, system: int) -> None:
-        """Take up logging.
+        """Begin to log.
 
         Args:
             console: components that log to the console too.
@@ -114,14 +114,14 @@ class Logs:
             system: the vehicle's system id.
 
         Raises:
-            OSError: the file cannot be written; what was in force stays so.
+            OSError: the file cannot be written; the handlers stay as they were.
         """
         file = self._file(path, system) if path else None
         self.close()
-        shown = _Console(self._say)
-        shown.addFilter(_Named(console))
-        shown.setFormatter(_Formatter("%(component)s: %(message)s"))
-        self._handlers = [shown]
+        console_handler = _Console(self._say)
+        console_handler.addFilter(_Named(console))
+        console_handler.setFormatter(_Formatter("%(component)s: %(message)s"))
+        self._handlers = [console_handler]
         if file is not None:
             self._handlers.append(self._to_file(file))
         for root in ROOTS:
@@ -138,7 +138,7 @@ class Logs:
         return RotatingFile(log_file(path, system), FILE_BYTES, FILES_KEPT, lambda text: self._say(f"API: {text}"))
 
     def _to_file(self, writer: logging.Handler) -> logging.Handler:
-        """A handler that only queues; a thread of its own writes, so that no disk holds anybody up."""
+        """A handler that only queues; a thread of its own writes, so that a slow disk delays nobody."""
         writer.setFormatter(logging.Formatter(FORMAT))
         records: queue.SimpleQueue[logging.LogRecord] = queue.SimpleQueue()
         handler = logging.handlers.QueueHandler(records)
@@ -149,7 +149,7 @@ class Logs:
         return handler
 
     def close(self) -> None:
-        """Write what is left, and let go."""
+        """Write what is queued, and remove the handlers."""
         for root in ROOTS:
             logger = logging.getLogger(root)
             for handler in self._handlers:
@@ -164,17 +164,17 @@ class Logs:
 
 
 def log_file(path: str, system: int) -> Path:
-    """The log file that `path` means: itself, or `uav_<system>.log` in it when it is a folder."""
-    given = Path(path).expanduser()
-    if given.is_dir() or not (given.suffix or given.exists()):
-        given.mkdir(parents=True, exist_ok=True)
-        return given / f"uav_{system}.log"
-    given.parent.mkdir(parents=True, exist_ok=True)
-    return given
+    """The log file for `path`: the path itself, or `uav_<system>.log` in it if it is a folder."""
+    location = Path(path).expanduser()
+    if location.is_dir() or not (location.suffix or location.exists()):
+        location.mkdir(parents=True, exist_ok=True)
+        return location / f"uav_{system}.log"
+    location.parent.mkdir(parents=True, exist_ok=True)
+    return location
 
 
 def print_above_prompt(text: str, prompt: str) -> None:
-    """Print a line and put back the prompt with what is being typed at it. Main loop only.
+    """Print a line and restore the prompt with what is being typed. Main loop only.
 
     MAVProxy's own prints leave the cursor behind the text; in a terminal a line of ours does not.
     """

@@ -21,7 +21,7 @@ Snapshot = TypeVar("Snapshot")
 
 
 def value_of(words: list[str]) -> str:
-    """The value that was typed: MAVProxy leaves the quotation marks where they are, and an empty pair is nothing."""
+    """The typed value without quotation marks around it, which MAVProxy leaves there; an empty pair means nothing."""
     text = " ".join(words)
     return text[1:-1] if len(text) > 1 and text[0] == text[-1] and text[0] in "'\"" else text
 
@@ -62,7 +62,7 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
         self.add_completion_function(self._setting_completion, lambda _: settings.names())
 
     def begin(self) -> None:
-        """Called once, in the first idle task: whatever opens a socket waits until then. It must not block.
+        """Called once, in the first idle task: open sockets here, not earlier. It must not block.
 
         MAVProxy loads the modules of its command line before it forks, and a child would keep the socket.
         """
@@ -85,17 +85,17 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
         self.host.feed(self, packet)
 
     def idle_task(self) -> None:
-        """MAVProxy calls this several hundred times a second, and keeps to itself what it raises."""
+        """MAVProxy calls this several hundred times a second, and hides what it raises."""
         try:
             self.host.idle(self)
             if not self._begun:
                 self._begun = True
                 self.begin()
-        except Exception as error:  # noqa: BLE001  nobody else would tell of it
+        except Exception as error:  # noqa: BLE001  nobody else reports it
             self._tell_failure(error)
 
     def _tell_failure(self, error: Exception) -> None:
-        """Say why an idle task failed: once, though it may do so several hundred times a second."""
+        """Print why an idle task failed: once, not several hundred times a second."""
         failure = f"{type(error).__name__}: {error}"
         if failure != self._told_failure:
             self._told_failure = failure
@@ -103,7 +103,7 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
             log.debug("idle task of %s", self.name, exc_info=error)
 
     def unload(self) -> None:
-        """Give back all that was taken. Runs in another thread than the main loop, which waits for it."""
+        """Give everything back. Runs in another thread than the main loop, which waits for it."""
         super().unload()
         self.remove_command(self.name)
         self.mpstate.completion_functions.pop(self._setting_completion, None)
@@ -140,8 +140,8 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
         if after != before and self._begun:
             self.use_settings(name, before, after)
 
-    def _list_settings(self, wanted: str = "") -> None:
+    def _list_settings(self, pattern: str = "") -> None:
         try:
-            print("\n".join(self.module_settings.listing(wanted)))
+            print("\n".join(self.module_settings.listing(pattern)))
         except SettingError as error:
             print(f"{self.name}: {error}")

@@ -1,4 +1,4 @@
-"""The settings of a module that outlive it: MAVProxy reloads by unloading, then loading without a keyword."""
+"""The settings that outlive a module: MAVProxy reloads it by an unload and a load without keywords."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ UNSHOWN = {"origins"}  # keywords that are no settings
 
 
 class RememberedSettings:
-    """What one of our modules was given: the keywords of `module load`, and what was set at the prompt since.
+    """The keywords of one module's `module load`, and what was set at the prompt since.
 
-    A load without keywords takes over what the one before it was given; a load with any begins anew. An INI file that
+    A load without keywords takes over those of the load before; a load with keywords begins anew. The INI file that
     the keyword `config` names is read again.
 
     Args:
@@ -32,22 +32,22 @@ class RememberedSettings:
         self.taken_over = before is not None and bool(self.keywords or self.changed)
 
     @property
-    def given(self) -> dict[str, Any]:
-        """Keywords and changes as one, the latter winning; `origins` tells which these are."""
+    def combined(self) -> dict[str, Any]:
+        """Keywords and changes together; changes win, and `origins` says which these are."""
         origins = {**self.keywords.get("origins", {}), **dict.fromkeys(self.changed, f"{self._module} set")}
         return {**self.keywords, **self.changed, "origins": origins}
 
     def keep(self, shown: Callable[[str], object]) -> None:
-        """Remember this from now on, and print what was taken over. Not called when the module refuses it.
+        """Remember this from now on, and print what was taken over. Not called if the module refuses them.
 
         Args:
-            shown: gives a setting's value as the prompt may show it.
+            shown: gives the value of a setting as the prompt may show it.
         """
         self._all[self._module] = self
         if self.taken_over:
-            pairs = [f"{n}={v if n == 'config' else shown(n)}" for n, v in self.given.items() if n not in UNSHOWN]
+            pairs = [f"{n}={v if n == 'config' else shown(n)}" for n, v in self.combined.items() if n not in UNSHOWN]
             print(f"{self._module}: as before: {', '.join(pairs)} (keywords at `module load` replace all that)")
 
     def change(self, name: str, value: Any) -> None:
-        """A setting was set at the prompt."""
+        """Note that a setting was set at the prompt."""
         self.changed[name] = value

@@ -1,4 +1,4 @@
-"""A log file that rotates, and outlives a disk that takes no more."""
+"""A log file that rotates, and goes on after a full disk."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-PRIVATE, PUBLIC = 0o600, 0o666  # modes; the umask takes from them
+PRIVATE, PUBLIC = 0o600, 0o666  # modes, less the umask
 
 
 class RotatingFile(logging.handlers.RotatingFileHandler):
-    """The file. That it cannot be written is told once, and tried again with each line.
+    """The file. A failure is reported once; each line tries again.
 
     Args:
-        file: where.
-        size: bytes after which it is renamed, and a new one begun.
-        older: renamed ones that are kept.
-        tell: called with one line when it cannot be written.
-        private: whether its owner alone may read it.
-        delay: whether it is opened with the first line; else at once.
+        file: its path.
+        size: bytes after which it is renamed, and a new one begins.
+        older: number of renamed files that are kept.
+        tell: called with one line when the file cannot be written.
+        private: whether only its owner may read it.
+        delay: whether it is opened with the first line, not at once.
 
     Raises:
         OSError: it cannot be opened.
@@ -60,7 +60,7 @@ class RotatingFile(logging.handlers.RotatingFileHandler):
         self._failed = self._failing
 
     def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802  logging's own name
-        """Tell, once, and let go of what the disk did not take: the next line begins anew."""
+        """Report once, and drop what the disk did not take: the next line opens the file anew."""
         self._failing = True
         if not self._failed:
             self._tell(f"cannot write {self.baseFilename}: {sys.exc_info()[1]}")

@@ -1,4 +1,4 @@
-"""Which messages went out to vehicles for which command: the audit trail tells."""
+"""Which messages were sent for which command, for the audit trail."""
 
 from __future__ import annotations
 
@@ -6,24 +6,24 @@ import contextvars
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-MANY = 3  # of a name in a row are counted
-MOST_RUNS = 40  # of one name each, that are told of a command
+MANY = 3  # messages of one name in a row are counted
+MOST_RUNS = 40  # of one name each, that the trail has of a command
 
 
 class SentNames:
-    """Names of messages, in the order in which they were sent; bounded, however long a command goes on.
+    """Names of messages, in the order in which they were sent; bounded, however long a command takes.
 
     Attributes:
-        told: whether the trail has them: what is sent later on belongs to no command of its own.
+        in_trail: whether the trail has them; messages sent later are noted for no command.
     """
 
     def __init__(self) -> None:
         self._runs: list[tuple[str, int]] = []
         self._more = 0
-        self.told = False
+        self.in_trail = False
 
     def add(self, name: str) -> None:
-        """Note one that goes out."""
+        """Note a message that is sent."""
         if self._runs and self._runs[-1][0] == name and not self._more:
             self._runs[-1] = name, self._runs[-1][1] + 1
         elif len(self._runs) < MOST_RUNS:
@@ -32,15 +32,15 @@ class SentNames:
             self._more += 1
 
     def tell(self) -> tuple[str, ...]:
-        """The names; one that comes thrice or more in a row is there once, with its number: `NAME x240`."""
-        self.told = True
+        """The names; three or more of one name in a row appear once, with their number: `NAME x240`."""
+        self.in_trail = True
         names = [
             text for name, count in self._runs for text in ([name] * count if count < MANY else [f"{name} x{count}"])
         ]
         return (*names, f"and {self._more} more") if self._more else tuple(names)
 
 
-# Of the present command; a task of it inherits the same.
+# Of the present command; its tasks inherit it.
 _sent: contextvars.ContextVar[SentNames | None] = contextvars.ContextVar("sent", default=None)
 
 
@@ -66,7 +66,7 @@ def noting_sent() -> Iterator[SentNames]:
 def noting_sent_if_nobody_does() -> Iterator[SentNames | None]:
     """As `noting_sent`; None within an HTTP call, which notes them itself."""
     sent = _sent.get()
-    if sent is not None and not sent.told:
+    if sent is not None and not sent.in_trail:
         yield None
     else:
         with noting_sent() as names:

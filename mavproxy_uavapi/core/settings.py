@@ -1,4 +1,4 @@
-"""The settings of our MAVProxy modules: one base for all three, one snapshot handed inward.
+"""The settings of our MAVProxy modules: one base for all three, and a snapshot for the code that uses them.
 
 Defaults < INI file < environment < keywords of `module load` < `set` at the prompt.
 """
@@ -18,7 +18,7 @@ from mavproxy_uavapi.core.text import escaped, nearest
 from mavproxy_uavapi.core.values import converted, is_unset, path_of
 
 CONFIG_VARIABLE = "UAVAPI_CONFIG"  # names the INI file where no keyword `config` does
-DEFAULT = "default"  # where a value came from that nobody set
+DEFAULT = "default"  # the origin of a value that nobody set
 ENVIRONMENT = "environment"
 KEYWORD = "module load"
 
@@ -30,8 +30,8 @@ class Change:
     """A value for a setting.
 
     Attributes:
-        origin: where it comes from, as the listing tells it.
-        place: what an error about it begins with.
+        origin: where it comes from, as the listing shows it.
+        place: the beginning of an error about it.
     """
 
     name: str
@@ -41,42 +41,42 @@ class Change:
 
 
 class ModuleSettings(ABC, Generic[Snapshot]):
-    """The settings of a loaded module: validated, whichever way they come in.
+    """The settings of a loaded module, validated wherever they come from.
 
-    MPSettings would hold them, too; but it takes NaN, and prints lines of its own about what it does not take.
+    MPSettings is not used: it accepts NaN, and prints its own lines about values that it refuses.
 
     Attributes:
-        module: its name, which begins its environment variables; the INI file's section is called so, too.
-        secrets: settings of which errors and listings do not show the value.
-        parsers: for a setting that is written as text, what makes the snapshot's value of it; raises SettingError.
-        notes: what is to be told of the INI file, a line each.
+        module: its name, also of the INI file's section; in capitals it begins the environment variables.
+        secrets: settings whose values errors and listings do not show.
+        parsers: make the snapshot's value of a setting that is written as text; they raise SettingError.
+        notes: remarks about the INI file for the prompt, a line each.
         origins: where the value of each setting came from that somebody set.
 
     Args:
-        given: keywords of `module load`. `config` names an INI file, and `origins` tells by setting where the
-            launcher had the others from.
+        keywords: of `module load`. `config` names an INI file, and `origins` says by setting where the launcher
+            has the others from.
         environ: the environment; None for this process's.
 
     Raises:
-        SettingError: a setting that does not exist, or a value that it does not take, alone or beside the others.
+        SettingError: an unknown setting, or a value that is refused, alone or together with the others.
     """
 
     module: ClassVar[str]
     secrets: ClassVar[Set[str]] = frozenset()
     parsers: ClassVar[Mapping[str, Callable[[str], Any]]] = {}
 
-    def __init__(self, given: Mapping[str, Any] | None = None, environ: Mapping[str, str] | None = None) -> None:
-        keywords = dict(given or {})
+    def __init__(self, keywords: Mapping[str, Any] | None = None, environ: Mapping[str, str] | None = None) -> None:
+        given_settings = dict(keywords or {})
         environ = os.environ if environ is None else environ
-        self._told_origins: Mapping[str, str] = keywords.pop("origins", {})
-        config = keywords.pop("config", environ.get(CONFIG_VARIABLE, ""))
+        self._given_origins: Mapping[str, str] = given_settings.pop("origins", {})
+        config = given_settings.pop("config", environ.get(CONFIG_VARIABLE, ""))
         self.notes: list[str] = []
         self.origins: dict[str, str] = {}
         self._rows = {row.name: row for row in self.table()}
         self._values = {name: row.default for name, row in self._rows.items()}
         changes = [] if is_unset(str(config)) else list(self._of_file(IniFile(path_of(str(config), "config"))))
         changes += self._of_environment(environ)
-        changes += [Change(n, value, self._told_origins.get(n, KEYWORD)) for n, value in keywords.items()]
+        changes += [Change(n, value, self._given_origins.get(n, KEYWORD)) for n, value in given_settings.items()]
         self._take(changes)
 
     @staticmethod
@@ -86,20 +86,20 @@ class ModuleSettings(ABC, Generic[Snapshot]):
 
     @abstractmethod
     def make(self, values: Mapping[str, Any], origins: Mapping[str, str]) -> Snapshot:
-        """The snapshot of these values, which have been through their parsers."""
+        """The snapshot of these values, which the parsers have converted."""
 
     def check(self, settings: Snapshot, changed: Set[str]) -> None:
-        """Refuse values that do not go together, or that something outside stands against.
+        """Refuse values that do not fit together, or that this machine cannot use.
 
         Raises:
             SettingError: with the reason; its place is the setting.
         """
 
     def settings_in(self, ini: IniFile) -> Iterator[tuple[str, str]]:
-        """What the file sets: names and texts.
+        """The names and texts that the file sets.
 
         Raises:
-            SettingError: it has a key that there is not.
+            SettingError: it has an unknown key.
         """
         for key, text in ini.section(self.module).items():
             if key not in self._rows:
@@ -112,10 +112,10 @@ class ModuleSettings(ABC, Generic[Snapshot]):
         return [row.name for row in cls.table()]
 
     def set(self, name: str, value: Any) -> None:
-        """Set one at the prompt; a value that is refused leaves everything as it was.
+        """Set one at the prompt; a refused value changes nothing.
 
         Raises:
-            SettingError: unknown, of the wrong type, out of range, not to be understood, or against the others.
+            SettingError: unknown, of the wrong type, out of range, unreadable, or in conflict with the others.
         """
         self._take([Change(name, value, f"{self.module} set")])
 
@@ -130,28 +130,28 @@ class ModuleSettings(ABC, Generic[Snapshot]):
             return "(set)" if value else ""
         return escaped(str(value))
 
-    def listing(self, wanted: str = "") -> list[str]:
+    def listing(self, pattern: str = "") -> list[str]:
         """A line for each setting: its value, and where that came from.
 
         Args:
-            wanted: a name, the beginning of some, or a pattern such as `sim_*`.
+            pattern: a name, the beginning of names, or a pattern such as `sim_*`.
 
         Raises:
-            SettingError: there is none such.
+            SettingError: no setting matches.
         """
-        if wanted in self._rows:
-            found = [wanted]
+        if pattern in self._rows:
+            names = [pattern]
         else:
-            found = [n for n in self._rows if n.startswith(wanted) or fnmatch.fnmatchcase(n, wanted)]
-        if not found:
-            raise self._unknown(wanted)
+            names = [n for n in self._rows if n.startswith(pattern) or fnmatch.fnmatchcase(n, pattern)]
+        if not names:
+            raise self._unknown(pattern)
         width = max(map(len, self._rows))
-        return [f"{name:{width}} {self.shown(name):24} {self.origins.get(name, DEFAULT)}" for name in found]
+        return [f"{name:{width}} {self.shown(name):24} {self.origins.get(name, DEFAULT)}" for name in names]
 
     def _of_file(self, ini: IniFile) -> Iterator[Change]:
         for name, text in self.settings_in(ini):
             if not is_unset(text):
-                yield Change(name, text, self._told_origins.get(name, str(ini.file)), f"{ini.file}: ")
+                yield Change(name, text, self._given_origins.get(name, str(ini.file)), f"{ini.file}: ")
 
     def _of_environment(self, environ: Mapping[str, str]) -> Iterator[Change]:
         for name in self._rows:
@@ -160,7 +160,7 @@ class ModuleSettings(ABC, Generic[Snapshot]):
                 yield Change(name, environ[variable], ENVIRONMENT, f"{variable}: ")
 
     def _take(self, changes: list[Change]) -> None:
-        """Take all or none; of two changes of one setting the later counts, but both must be possible."""
+        """Take all or none. Of two changes of one setting the later one counts, but both must be valid."""
         last = {change.name: change for change in changes}
         values, origins = dict(self._values), dict(self.origins)
         for change in changes:
@@ -177,7 +177,7 @@ class ModuleSettings(ABC, Generic[Snapshot]):
         self._values, self.origins = values, origins
 
     def _checked(self, name: str, value: Any) -> Any:
-        """The value as the setting's type has it, if the setting takes it."""
+        """The value in the setting's type, if the setting accepts it."""
         row = self._rows.get(name)
         if row is None:
             raise self._unknown(name)
@@ -204,6 +204,6 @@ class ModuleSettings(ABC, Generic[Snapshot]):
 
     def _not_taken(self, row: Any, value: Any) -> SettingError:
         limits = f" from {row.range[0]} to {row.range[1]}" if row.range else ""
-        wanted = f"is one of {', '.join(row.choice)}" if row.choice else f"takes a {row.type.__name__}{limits}"
+        expected = f"is one of {', '.join(row.choice)}" if row.choice else f"takes a {row.type.__name__}{limits}"
         shown = "…" if row.name in self.secrets else repr(value)
-        return SettingError(f"{row.name} = {shown}: it {wanted}", row.name)
+        return SettingError(f"{row.name} = {shown}: it {expected}", row.name)

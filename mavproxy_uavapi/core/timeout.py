@@ -10,16 +10,16 @@ T = TypeVar("T")
 
 
 async def wait_with_timeout(seconds: float | None, awaited: Awaitable[T]) -> T:
-    """What `awaited` gives, in at most so many seconds; for ever with None.
+    """The result of `awaited`, within that many seconds; None means no limit.
 
-    Not `asyncio.wait_for`: up to Python 3.11 that swallows a cancellation which comes in the turn of the loop in
-    which what it waits for has come, and a flight that was stopped then flies on.
+    Unlike `asyncio.wait_for` it never loses a cancellation. Up to Python 3.11 that one does, if the cancellation
+    comes in the same turn of the loop as the result: a flight that was stopped would fly on then.
 
     Raises:
         asyncio.TimeoutError: it took longer; `awaited` is cancelled.
     """
     task = asyncio.ensure_future(awaited)
-    task.add_done_callback(_heed)  # whoever is cancelled meanwhile does not ask how it ended
+    task.add_done_callback(_retrieve_exception)  # a caller that is cancelled meanwhile does not ask for the exception
     try:
         done, _ = await asyncio.wait({task}, timeout=seconds)
     finally:
@@ -30,7 +30,7 @@ async def wait_with_timeout(seconds: float | None, awaited: Awaitable[T]) -> T:
     return task.result()
 
 
-def _heed(task: asyncio.Future[Any]) -> None:
-    """Have asyncio not complain of an error that nobody asked for."""
+def _retrieve_exception(task: asyncio.Future[Any]) -> None:
+    """Retrieve the exception, so that asyncio does not report it as never retrieved."""
     if not task.cancelled():
         task.exception()

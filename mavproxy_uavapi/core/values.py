@@ -1,4 +1,4 @@
-"""Text that a person writes -> a value. Pure, but for `path_of`, which asks who has which home."""
+"""Converts text that a person writes to a value. Pure, except `path_of`, which looks up home folders."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from mavproxy_uavapi.core.errors import SettingError
 TRUE = frozenset({"true", "yes", "on", "1"})
 FALSE = frozenset({"false", "no", "off", "0"})
 UNSET = frozenset({"", "none", "[]"})
-NUMBER = r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"  # float() takes all that this matches
+NUMBER = r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"  # float() accepts everything that this matches
 WHOLE = r"[-+]?[0-9]{1,9}"
 
 
@@ -22,7 +22,7 @@ def is_unset(text: str) -> bool:
 
 
 def boolean(text: str) -> bool:
-    """`true`, `yes`, `on`, `1` and their opposites, in any case; anything else is an error, not a guess.
+    """`true`, `yes`, `on`, `1` and their opposites, in any case; anything else is an error.
 
     Raises:
         ValueError: it is none of them.
@@ -37,7 +37,7 @@ def converted(kind: type, value: object) -> Any:
     """A text, a number or a truth value as a str, bool, int or float.
 
     Raises:
-        ValueError: it is no such thing. NaN and infinity are no numbers, 1.0 is no whole number, and True is neither.
+        ValueError: it cannot be converted. NaN and infinity are not numbers, 1.0 is not whole, and True is neither.
     """
     if not isinstance(value, str | int | float):
         raise ValueError(f"expected a {kind.__name__}")
@@ -58,12 +58,12 @@ def path_of(text: str, name: str = "") -> Path:
     """The path, with `~` and `~somebody` expanded; errors begin with `name`, the setting's or the argument's.
 
     Raises:
-        SettingError: nobody has that name, or no file can.
+        SettingError: no user has that name, or no path can be written so.
     """
     place, loc = (f"{name}: ", [name]) if name else ("", [])
     if "\0" in text:
         raise SettingError(f"{place}no path can hold a zero byte", *loc)
     try:
         return Path(text).expanduser()
-    except RuntimeError as error:  # pathlib's word for it
+    except RuntimeError as error:  # as pathlib reports it
         raise SettingError(f"{place}{text!r}: nobody here has that name, or has a home", *loc) from error

@@ -3,9 +3,9 @@
 Two queues, one each way. In: the main loop hands over what it received (`feed`), all of one turn at a time; out:
 the asyncio side hands calls to the main loop (`on_main`), which is the only thread that sends.
 
-Python runs one thread at a time. A vehicle's messages come in bursts, each of which MAVProxy parses, logs and
-forwards. Meanwhile we do not wake the asyncio loop, and new requests wait (`wait_for_main_loop`). What is to be sent
-does not wait: it goes out between two messages.
+Python runs one thread at a time. A vehicle's messages come in bursts, and MAVProxy parses, logs and forwards each
+message. Meanwhile we do not wake the asyncio loop, and new requests wait (`wait_for_main_loop`). Messages to send do
+not wait: they go out between two received ones.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Bridge:
         self._receive = receive
         self._inbox: deque[Any] = deque()
         self._delivering = False  # whether `_deliver` is on its way
-        self._busy = False  # whether the main loop is at messages
+        self._busy = False  # whether the main loop handles messages
         self._waited_for = False
         self._turn_ended = asyncio.Event()
         self._calls = MainLoopQueue()
@@ -73,21 +73,21 @@ class Bridge:
     def feed(self, message: Any) -> None:
         """Hand a received message over. Main loop only; never blocks, never raises.
 
-        What is to be sent does not wait for the end of a burst: it goes out between two of its messages.
+        Messages to send do not wait for the end of a burst: they go out between two of its messages.
         """
         self._busy = True
         self._inbox.append(message)
         self._calls.drain()
 
     def feed_call(self, call: Callable[[], None]) -> None:
-        """Have the asyncio side run `call` between the messages that were fed before and after. Main loop only."""
+        """Let the asyncio side run `call` between the messages fed before and after it. Main loop only."""
         self._inbox.append(call)
 
     def _hand_over(self) -> None:
-        """Wake the asyncio side for what was fed since the last turn, and for what has waited for its end."""
+        """Wake the asyncio side for what was fed since the last turn, and for those who wait for its end."""
         self._busy = False
         if self._inbox and not self._delivering:
-            self._delivering = True  # first: the other thread may be there before `call_soon` returns
+            self._delivering = True  # first, because the other thread may run before `call_soon` returns
             if not self._thread.call_soon(self._deliver):
                 self._inbox.clear()  # the loop has ended: nobody will read
         if self._waited_for:
@@ -95,7 +95,7 @@ class Bridge:
             self._thread.call_soon(self._turn_ended.set)
 
     async def wait_for_main_loop(self) -> None:
-        """Await the end of the main loop's turn, if it is at messages just now; LONGEST_WAIT s at most."""
+        """Await the end of the main loop's turn, if it handles messages now; LONGEST_WAIT s at most."""
         if not self._busy:
             return
         self._turn_ended.clear()
@@ -104,29 +104,29 @@ class Bridge:
             await wait_with_timeout(LONGEST_WAIT, self._turn_ended.wait())
 
     def _deliver(self) -> None:
-        self._delivering = False  # what comes from now on needs another call
+        self._delivering = False  # an item that comes from now on needs another call
         for _ in range(len(self._inbox)):
-            fed = self._inbox.popleft()
+            item = self._inbox.popleft()
             try:
-                fed() if callable(fed) else self._receive(fed)
+                item() if callable(item) else self._receive(item)
             except Exception as error:  # noqa: BLE001  one bad message must not stop the next
-                what = "what was fed" if callable(fed) else fed.get_type()
-                context = {"message": f"uavapi: defect on {what}", "exception": error}
+                name = "what was fed" if callable(item) else item.get_type()
+                context = {"message": f"uavapi: defect on {name}", "exception": error}
                 self.loop.call_exception_handler(context)
 
     def turn(self) -> None:
-        """Between two turns of the main loop: hand over what was fed, run what the asyncio side asked for."""
+        """Between two turns of the main loop: hand over what was fed, and run the calls of the asyncio side."""
         self._hand_over()
         self._calls.drain()
 
     def post(self, call: Callable[[], None]) -> None:
-        """Have the main loop run `call`, which must not raise, and do not wait for it. Any thread."""
+        """Let the main loop run `call`, which must not raise, and do not wait for it. Any thread."""
         self._calls.put(call)
 
     async def on_main(self, call: Callable[[], T]) -> T:
-        """Have the main loop run `call`; its result, or what it raised.
+        """Let the main loop run `call`, and return its result or raise its exception.
 
-        Cancelled before the main loop came to it, it is never run.
+        If it is cancelled before the main loop gets to it, it never runs.
         """
         future: asyncio.Future[T] = self.loop.create_future()
 
@@ -143,7 +143,7 @@ class Bridge:
                 return
             try:
                 outcome = call(), None
-            except Exception as error:  # noqa: BLE001  it belongs to whoever awaits, not to MAVProxy
+            except Exception as error:  # noqa: BLE001  for the caller that awaits, not for MAVProxy
                 self._thread.call_soon(settle, None, error)
             else:
                 self._thread.call_soon(settle, *outcome)
@@ -164,7 +164,7 @@ class Bridge:
         self._open_sockets.append(filenos)
 
     def keep_in_children(self, filenos: Callable[[], list[int]]) -> None:
-        """Take back what `close_in_children` named: whoever had those descriptors has closed them."""
+        """Take back what `close_in_children` named, because those descriptors are closed."""
         self._open_sockets.remove(filenos)
 
     def close_inherited(self) -> None:
@@ -187,6 +187,6 @@ def _close_inherited_sockets() -> None:
         bridge.close_inherited()
 
 
-# MAVProxy forks children (map, console) that would keep our port open after an unload; close-on-exec does
-# not help a fork. Registered once per process: Python has no way to take such a hook back.
+# MAVProxy forks children (map, console), which would keep our port open after an unload; close-on-exec does not
+# affect a fork. Registered once per process, because Python cannot remove such a hook.
 os.register_at_fork(after_in_child=_close_inherited_sockets)

@@ -16,7 +16,7 @@ class EventLoopThread:
 
     Args:
         name: of the thread.
-        loop: a loop that somebody else runs, in place of the thread's own.
+        loop: a loop that somebody else runs, in place of a thread of its own.
     """
 
     def __init__(self, name: str, loop: asyncio.AbstractEventLoop | None = None) -> None:
@@ -31,12 +31,12 @@ class EventLoopThread:
         asyncio.set_event_loop(self.loop)
         try:
             self.loop.run_forever()
-            self._cancel_what_is_left()
+            self._cancel_tasks()
         finally:
             asyncio.set_event_loop(None)
             self.loop.close()
 
-    def _cancel_what_is_left(self) -> None:
+    def _cancel_tasks(self) -> None:
         tasks = asyncio.all_tasks(self.loop)
         for task in tasks:
             task.cancel()
@@ -54,7 +54,7 @@ class EventLoopThread:
         """Run `call(*args)` in the loop; False when the loop has ended."""
         try:
             self.loop.call_soon_threadsafe(call, *args)
-        except RuntimeError:  # asyncio's word for a closed loop
+        except RuntimeError:  # the loop is closed
             return False
         return True
 

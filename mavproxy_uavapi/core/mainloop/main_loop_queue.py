@@ -1,4 +1,4 @@
-"""Work that the asyncio thread hands to MAVProxy's main loop, and the wake-up for its select()."""
+"""Calls that the asyncio thread hands to MAVProxy's main loop, and the wake-up for its select()."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ WAKE = b"\0"
 
 
 class MainLoopQueue:
-    """A queue of calls: anybody puts, only MAVProxy's main loop drains.
+    """A queue of calls: any thread puts, only MAVProxy's main loop drains.
 
     Thread safe: `put` may be called from any thread; deque's append and popleft are atomic.
     """
@@ -35,12 +35,12 @@ class MainLoopQueue:
         try:
             self._writer.send(WAKE)
         except BlockingIOError:
-            pass  # the pipe is full of wake-ups that were not read yet: it wakes all the same
+            pass  # the pipe is full of unread wake-ups: it wakes the main loop anyway
         except OSError:
-            self._calls.clear()  # closed: MAVProxy is unloading us, nobody will drain any more
+            self._calls.clear()  # closed: MAVProxy unloads us, and nobody drains any more
 
     def drain(self) -> None:
-        """Run what is queued now. Main loop only; what a call queues in turn waits for the next time."""
+        """Run what is queued now. Main loop only; what a call queues in turn waits for the next drain."""
         for _ in range(len(self._calls)):
             self._calls.popleft()()
 
@@ -55,7 +55,7 @@ class MainLoopQueue:
         self.drain()
 
     def close(self) -> None:
-        """Drop what is queued and close both ends."""
+        """Drop the queue and close both ends."""
         self._calls.clear()
         self._reader.close()
         self._writer.close()

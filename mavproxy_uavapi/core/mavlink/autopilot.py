@@ -8,7 +8,7 @@ from pymavlink import mavutil
 
 mavlink = mavutil.mavlink
 
-# MAV_TYPE, by number where older dialects lack the name: what is carried, watches, or stands by.
+# MAV_TYPE of payloads, ground stations and accessories; by number where older dialects lack the name.
 NOT_VEHICLES = {
     mavlink.MAV_TYPE_GCS,
     mavlink.MAV_TYPE_ONBOARD_CONTROLLER,
@@ -34,7 +34,7 @@ NONE = 0
 
 
 def rank(heartbeat: Any) -> int:
-    """How surely the sender of `heartbeat` is its system's autopilot; NONE when it is none at all.
+    """How surely the sender of `heartbeat` is its system's autopilot; NONE when it is not one.
 
     An autopilot that names its firmware comes before a generic one, which counts only if it says what vehicle
     it is: the heartbeat of a program that left everything at 0 tells nothing. Among equals component 1 comes

@@ -1,4 +1,4 @@
-"""The only way out: one MAVLink message to one vehicle."""
+"""Sends MAVLink messages to vehicles; nothing else does."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def is_finite(message: Any) -> bool:
 
 
 def require_finite(message: Any) -> None:
-    """Raises UavApiError where a number in `message` is NaN or infinite: no autopilot must ever get such a one."""
+    """Raise UavApiError if a number in `message` is NaN or infinite: no autopilot must ever get one."""
     if not is_finite(message):
         raise UavApiError(f"not sent, because a number in it is not finite: {message}")
 
@@ -35,7 +35,7 @@ class Link(Protocol):
 
     @property
     def source(self) -> Address:
-        """Who we are on the link; acknowledgements come back to this address."""
+        """Our address on the link; acknowledgements come back to it."""
 
     async def send(self, message: Any, system: int) -> None:
         """Send `message` by the best link to vehicle `system`; returns when it has been written.

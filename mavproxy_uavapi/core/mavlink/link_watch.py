@@ -45,7 +45,7 @@ class LinkWatch:
         return self.silent_for(state) < self.timeout
 
     def require_alive(self, state: VehicleState) -> None:
-        """Raises LinkLost where the link is lost."""
+        """Raise LinkLost if the link is lost."""
         if not self.is_alive(state):
             raise LinkLost.since(state.system, self.silent_for(state))
 

@@ -1,5 +1,5 @@
-"""What MAVProxy knows of the vehicles' parameters: it may have fetched them before we were loaded, or by MAVLink FTP,
-which sends no PARAM_VALUE. Pure: the clock is an argument.
+"""Parameters that MAVProxy knows: it may have fetched them before we were loaded, or by MAVLink FTP, which sends no
+PARAM_VALUE. Pure: the clock is an argument.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ PERIOD = 1.0  # s between two looks; comparing a thousand parameters takes some 
 
 
 class ParameterWatch:
-    """Sees what has changed in MAVProxy's tables since it last looked."""
+    """Finds what has changed in MAVProxy's tables since the last look."""
 
     def __init__(self) -> None:
         self._seen: dict[Key, Values] = {}

@@ -14,7 +14,7 @@ T = TypeVar("T")
 
 
 class Wait(Generic[T]):
-    """One thing that is awaited: settled once, with a value or an error.
+    """One wait: settled once, with a value or an error.
 
     Args:
         system: the system id whose messages are looked at.
@@ -81,6 +81,6 @@ class PendingWaits:
             wait.look(message)
 
     def fail(self, system: int, error: Callable[[], Exception]) -> None:
-        """End every wait on `system`, each with an error of its own: its link is lost, or we unload."""
+        """End every wait on `system`, each with an error of its own, because its link is lost or we unload."""
         for wait in [w for w in self._waits if w.system == system]:
             wait.settle(error=error())

@@ -13,16 +13,16 @@ NOT_BOOT_TIME = {"GLOBAL_POSITION_INT"}
 class TimeRatio:
     """Simulated seconds per second of ours: 1 for a real vehicle, about SIM_SPEEDUP for a simulated one.
 
-    Measured from `time_boot_ms`, because a machine that cannot keep up makes SIM_SPEEDUP a promise only.
+    Measured from `time_boot_ms`, because a slow machine does not reach SIM_SPEEDUP.
     """
 
     def __init__(self) -> None:
         self.ratio = 1.0
         self._from: tuple[float, int] | None = None
-        self._newest: tuple[float, int] | None = None  # arrival (s), ms since the boot, wraps counted in
+        self._newest: tuple[float, int] | None = None  # arrival (s), ms since the boot including wraps
 
     def update(self, boot_ms: int | None, name: str, now: float) -> bool:
-        """Take a message's `time_boot_ms`, arrived at `now` (s); whether it says that the vehicle rebooted."""
+        """Take a message's `time_boot_ms`, arrived at `now` (s); whether it shows a reboot."""
         if not boot_ms or name in NOT_BOOT_TIME:
             return False
         uptime = self._uptime(boot_ms, now)
@@ -35,10 +35,10 @@ class TimeRatio:
         return rebooted
 
     def _uptime(self, boot_ms: int, now: float) -> int:
-        """The ms since the boot, wraps counted in.
+        """The ms since the boot, including wraps.
 
-        The time that falls back has wrapped when it would have come to that value by itself meanwhile; a message
-        from before a wrap may be overtaken by one from after it.
+        A time that steps back has wrapped if the clock would have reached it by now; else it shows a reboot. A
+        message from before a wrap may arrive after one from behind it.
         """
         if self._newest is None:
             return boot_ms
@@ -51,9 +51,9 @@ class TimeRatio:
         return boot_ms
 
     def boot_time(self, now: float) -> float:
-        """The vehicle's own clock at `now` (s of ours), in s since its boot; 0 before it told.
+        """The vehicle's own clock at `now` (s of ours), in s since its boot; 0 while unknown.
 
-        Between two messages it is reckoned by the ratio.
+        Between two messages it is extrapolated by the ratio.
         """
         if self._newest is None:
             return 0.0

@@ -19,12 +19,12 @@ RATE_SMOOTHING = 0.2  # weight of the newest interval in the smoothed rate
 STATUSTEXTS_KEPT = 200
 MODE_CHANGES_KEPT = 16
 CHUNK = 50  # characters of a full chunk of a STATUSTEXT
-CHUNK_TIMEOUT = 2.0  # s after which the chunks of a text that are missing are taken as lost
-RECENT = 5.0  # s before the newest heartbeat; a state that was told earlier is the present one no more
+CHUNK_TIMEOUT = 2.0  # s after which the missing chunks of a text count as lost
+RECENT = 5.0  # s before the newest heartbeat; an older report does not show the present state
 SEQUENCE_REORDER = 128  # a step back of less than this is a message out of order, not a loss
 FAILING = {mavlink.MAV_STATE_CRITICAL, mavlink.MAV_STATE_EMERGENCY}
 ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
-# What a reboot makes worthless; the rest is overwritten soon enough.
+# What is outdated after a reboot; the rest is soon overwritten.
 FORGOTTEN_AT_REBOOT = ("HOME_POSITION", "HEARTBEAT", "EXTENDED_SYS_STATE", "SYS_STATUS", "EKF_STATUS_REPORT")
 
 
@@ -47,7 +47,7 @@ class Received:
         self.message, self.at, self.count = message, now, self.count + 1
 
     def rate(self, now: float) -> float:
-        """Messages per second (Hz) of late; falls by itself when they stop coming."""
+        """Messages per second (Hz), smoothed; it falls when they stop."""
         if self.interval is None:
             return 0.0
         return 1.0 / max(self.interval, now - self.at, 1e-3)
@@ -80,7 +80,7 @@ class ChunkedText:
         return len(self._chunks[max(self._chunks)]) < CHUNK
 
     def __str__(self) -> str:
-        """What is here of it, with one … for chunks in a row that are lost."""
+        """The chunks that arrived, with … in place of lost ones."""
         numbers = sorted(self._chunks)
         gaps = [n for n, before in zip(numbers, [-1, *numbers], strict=False) if n > before + 1]
         return "".join(("…" if n in gaps else "") + self._chunks[n] for n in numbers)
@@ -93,7 +93,7 @@ class VehicleState:
     Attributes:
         system, component: its MAVLink address.
         vehicle_type: MAV_TYPE of its heartbeat.
-        armed: None until a heartbeat since the last boot said so.
+        armed: whether it is armed; None until the first heartbeat since the last boot.
         mode: the heartbeat's custom_mode; None likewise.
         system_status: MAV_STATE of the heartbeat; None likewise.
         heartbeat_at: arrival of the newest heartbeat (s).
@@ -139,7 +139,7 @@ class VehicleState:
     def recent_field(self, name: str, attribute: str) -> Any:
         """As `field`, but None as well when the message is much older than the newest heartbeat.
 
-        After a reboot the streams may be off, and what was told before must not count as the present state.
+        After a reboot the streams may be off; a report from before it does not show the present state.
         """
         received = self.messages.get(name)
         if received is None or self.heartbeat_at - received.at > RECENT:
@@ -152,7 +152,7 @@ class VehicleState:
         return None if received is None else now - received.at
 
     def statustexts_since(self, at: float) -> list[str]:
-        """What the autopilot said since `at` (s), oldest first."""
+        """The autopilot's STATUSTEXTs since `at` (s), oldest first."""
         return [text.text for text in self.statustexts if text.at >= at]
 
     @property
@@ -161,8 +161,8 @@ class VehicleState:
 
         A rover or boat always does: its heartbeat says ACTIVE in every mode but HOLD, and it sends no landed state
         (ArduRover, vehicle_system_status). Any other vehicle does while it is disarmed. Else EXTENDED_SYS_STATE
-        tells, or the heartbeat: STANDBY on the ground, ACTIVE in the air, CRITICAL says neither. A copter's word
-        is the one that came last; a plane's heartbeat counts only while EXTENDED_SYS_STATE is not told.
+        decides, or the heartbeat: STANDBY on the ground, ACTIVE in the air, CRITICAL for neither. For a copter the
+        newer one of both counts; for a plane the heartbeat counts only while EXTENDED_SYS_STATE does not arrive.
         """
         kind = kind_of(self.vehicle_type)
         if kind == "rover":
@@ -208,15 +208,15 @@ class VehicleState:
             self._say_chunked(number, now)
 
     def become(self, component: int, vehicle_type: int, now: float) -> None:
-        """Be the state of another component from now on, which has turned out to be the autopilot.
+        """Become the state of another component, which is the autopilot after all.
 
-        What that one told so far counts; what the former one told moves to `others`.
+        Its messages so far count; those of the former component move to `others`.
         """
         former = {(self.component, name): received for name, received in self.messages.items() if "[" not in name}
         others = {**self.others, **former}
         own = {name: others.pop((c, name)) for c, name in list(others) if c == component}
         fresh = VehicleState(self.system, component, vehicle_type, now, messages=own, others=others)
-        vars(self).update(vars(fresh))  # in place: whoever flies or watches the vehicle holds this object
+        vars(self).update(vars(fresh))  # in place, because others hold this object
 
     def _take_heartbeat(self, message: Any, now: float) -> None:
         self.heartbeat_at = now
@@ -267,9 +267,9 @@ def _keep(store: dict[Any, Received], key: Any, message: Any, now: float) -> Non
 class Fleet:
     """Every vehicle that was ever heard on the links, by system id.
 
-    A system's state is its autopilot's, by `autopilot.rank`; when a better candidate is heard it becomes that one's.
-    It never goes back, not even when the better one falls silent: a second autopilot's mode and arming, told
-    from one moment to the next, would be taken for the vehicle's own. The link is lost then, and that is told.
+    The state of a system is its autopilot's, by `autopilot.rank`; it changes to a better candidate when one is heard.
+    It never changes back, not even when the better one falls silent: the mode and arming of a second autopilot must
+    not pass for the vehicle's own. The link counts as lost then.
     """
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""Arming and disarming, by the rule that a pilot is asked first: whoever arms the vehicle meanwhile has it."""
+"""Arming and disarming. A pilot who arms the vehicle meanwhile keeps it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mavproxy_uavapi.core.vehicle.base import BaseVehicle
 from mavproxy_uavapi.core.vehicle.jobs import Job
 
 TIMEOUT = 90.0  # s until an estimator that does not settle is reported
-REASON_TIME = 2.0  # s of a client's timeout that asking why it is not ready may need
+REASON_TIME = 2.0  # s of a client's timeout that are kept for asking why the vehicle is not ready
 SHOWN_WITHIN = 5.0  # s until a heartbeat must show what was acknowledged
 GUIDED = "GUIDED"
 
@@ -20,8 +20,8 @@ async def arm(vehicle: BaseVehicle, job: Job, timeout: float | None) -> None:
     """See `Vehicle.arm`."""
     before = vehicle.state.armed, vehicle.state.mode
 
-    def is_nobodys() -> None:
-        """Raises when somebody else armed it or switched its mode, so that it is his."""
+    def check_unclaimed() -> None:
+        """Raise ModeChanged if somebody else armed the vehicle or switched its mode."""
         armed = vehicle.state.armed
         flies = armed and not vehicle.state.landed
         if vehicle.mode == GUIDED or ((armed, vehicle.state.mode) == before and not flies):
@@ -32,9 +32,9 @@ async def arm(vehicle: BaseVehicle, job: Job, timeout: float | None) -> None:
             raise ModeChanged(f"the vehicle is in {vehicle.mode} now: somebody else switched it meanwhile")
 
     deadline = vehicle.clock() + (max(timeout - REASON_TIME, timeout / 2) if timeout else TIMEOUT)
-    await _get_ready(vehicle, lambda: vehicle.has_position, is_nobodys, deadline)
+    await _get_ready(vehicle, lambda: vehicle.has_position, check_unclaimed, deadline)
     if vehicle.mode != GUIDED:
-        await vehicle.switch_to(job, GUIDED, is_nobodys)
+        await vehicle.switch_to(job, GUIDED, check_unclaimed)
     still_guided = _requires_guided(vehicle)
     await _get_ready(vehicle, lambda: vehicle.is_ready_to_arm, still_guided, deadline)
     still_guided()
@@ -86,10 +86,12 @@ async def _get_ready(
 
 async def _why_not_ready(vehicle: BaseVehicle, waited: float) -> Rejected:
     asked_at = vehicle.clock()
-    with contextlib.suppress(Rejected, TimedOut):  # the texts that it makes the autopilot say are what counts
+    with contextlib.suppress(Rejected, TimedOut):  # only the texts that it triggers count
         await vehicle.commands.send(messages.check_prearm())
     with contextlib.suppress(TimedOut):
-        await vehicle.waiting.message({"STATUSTEXT"}, lambda _: None, 1.0, "fall silent")  # it has several reasons
+        await vehicle.waiting.message(
+            {"STATUSTEXT"}, lambda _: None, 1.0, "fall silent"
+        )  # there may be several reasons
     texts = vehicle.state.statustexts_since(asked_at)
     because = "; ".join(texts) or "it does not say why"
     return Rejected(f"not ready to arm after {waited:.0f} s: {because}", statustext=texts)

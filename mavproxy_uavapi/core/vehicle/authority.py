@@ -1,7 +1,7 @@
 """Who may command a vehicle: one commander at a time, by rank. Pure.
 
-Every verb asks here before anything goes out, and each message of it asks again. Until telemetry shows that a verb
-has taken effect, only its own rank or a higher one supersedes it; a lower one is refused.
+A verb asks here before it sends anything, and again before each message. Until telemetry shows that a verb has taken
+effect, only its own rank or a higher one supersedes it; a lower one is refused.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ YAW = "yaw"
 
 
 class Rank(IntEnum):
-    """What goes before what."""
+    """Which verb supersedes which: a higher rank comes first."""
 
     MOVEMENT = 1  # movements, yaw, speeds
     ARM = 2  # arm, takeoff, a mode asked for on purpose, the start of a mission
@@ -28,10 +28,10 @@ class CommandAuthority:
     """Says who commands one vehicle.
 
     Attributes:
-        commander: the job that has the vehicle, or had it last.
+        commander: the job that commands the vehicle, or was the last to do so.
 
     Args:
-        state: what is known of the vehicle: a pause ends when it leaves its mode.
+        state: the vehicle's state; a pause ends when its mode changes.
     """
 
     def __init__(self, state: VehicleState) -> None:
@@ -40,7 +40,7 @@ class CommandAuthority:
         self._rank = Rank.MOVEMENT
         self._shown = True
         self._suspended: tuple[Job, Rank, bool] | None = None  # the commander that a pause interrupted
-        self._companions: dict[str, Job] = {}  # what goes beside a movement, by kind: yaw, a speed, resume
+        self._companions: dict[str, Job] = {}  # jobs beside a movement, by kind: yaw, a speed, resume
         self._paused_at: float | None = None
 
     # -- asking -------------------------------------------------------------------------------------------
@@ -69,7 +69,7 @@ class CommandAuthority:
         return None
 
     def require(self, job: Job) -> None:
-        """Raises unless `job` still commands: to be called before each message of it.
+        """Raise unless `job` still commands; called before each of its messages.
 
         Raises:
             Paused: `stop` interrupts it.
@@ -82,11 +82,11 @@ class CommandAuthority:
         raise Superseded(f"{job.verb} was superseded")
 
     def admit(self, rank: Rank, *, stopped_too: bool = False) -> None:
-        """Raises unless a verb of that rank may command now.
+        """Raise unless a verb of that rank may command now.
 
         Args:
             rank: the verb's.
-            stopped_too: whether it may be said to a vehicle that `stop` holds, though it is of rank MOVEMENT.
+            stopped_too: whether a verb of rank MOVEMENT may command a vehicle that `stop` holds.
 
         Raises:
             Busy: a verb of a higher rank has not shown its effect yet.
@@ -101,7 +101,7 @@ class CommandAuthority:
     # -- commanding ---------------------------------------------------------------------------------------
 
     def take(self, job: Job, rank: Rank) -> None:
-        """Make `job` the commander; whoever was it is superseded.
+        """Make `job` the commander; the commander before is superseded.
 
         Raises:
             Busy, Paused: as `admit`; then nothing has changed.
@@ -131,8 +131,8 @@ class CommandAuthority:
         """Let `job` command beside the commander; an earlier one of its kind is superseded.
 
         Args:
-            job: who commands.
-            kind: what: YAW, a speed, resume.
+            job: the job that commands.
+            kind: YAW, a speed, or resume.
             rank, stopped_too: as for `admit`.
 
         Raises:
@@ -143,16 +143,16 @@ class CommandAuthority:
         self._companions[kind] = job
 
     def shown(self, job: Job) -> None:
-        """Telemetry shows the effect of the commander's verb: from now on any rank supersedes it."""
+        """Note that telemetry shows the effect of the commander's verb: from now on any rank supersedes it."""
         if job is self.commander:
             self._shown = True
 
     def begin_pause(self) -> None:
-        """The vehicle is held still, or about to be."""
+        """Note that the vehicle is held still, or is about to be."""
         self._paused_at = max(self._state.heartbeat_at, self._state.mode_since)
 
     def end_pause(self) -> None:
-        """The vehicle is held still no more; a movement that waited for that goes on."""
+        """Note the end of the pause; the movement that it interrupted goes on."""
         self._paused_at = None
         if self._suspended is not None:
             self.commander, self._rank, self._shown = self._suspended

@@ -1,4 +1,4 @@
-"""What the verbs of every type of vehicle are made of: its state, guards, waits, a mode's switch, requests."""
+"""What the verbs of all vehicles use: state, guards, waits, mode switches, requests."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ T = TypeVar("T")
 mavlink = mavutil.mavlink
 
 HEARTBEAT_TIMEOUT = 5.0  # s until a message must show what was acknowledged
-FRESH = 3.0  # s; older positions are not flown by
+FRESH = 3.0  # s; no verb uses an older position
 
 
 class BaseVehicle:
-    """One vehicle, and what its verbs are made of.
+    """One vehicle, and what its verbs use.
 
     Verbs raise errors of `errors.py`: `Rejected` when the autopilot refuses, `TimedOut`, `LinkLost`,
     `ModeChanged` when the pilot or a failsafe takes the vehicle, `Busy` and `NotArmed` when its state
-    stands against it; then nothing has been sent.
+    forbids the verb; then nothing has been sent.
 
     Args:
-        state: what is known of it; kept up to date by the host.
+        state: its state, which the host keeps up to date.
         link: the way out.
         pending: the host's waits.
         clock: monotonic seconds, the clock of arrivals.
@@ -55,10 +55,10 @@ class BaseVehicle:
         self.waypoints = Waypoints(state, link, self.waiting)
         self.parameters = Parameters(state, link, self.waiting)
         self.speeds = Speeds(state)
-        self._modes_asked: dict[int, float] = {}  # modes that we asked for, the last one last, and when (s)
+        self._modes_asked: dict[int, float] = {}  # modes that we asked for, the newest last, and when (s)
         self._requests: dict[str, asyncio.Task[Any]] = {}  # REQUEST_MESSAGE in flight, by message name
 
-    # -- what it is ---------------------------------------------------------------------------------------
+    # -- state --------------------------------------------------------------------------------------------
 
     @property
     def address(self) -> Address:
@@ -77,25 +77,25 @@ class BaseVehicle:
 
     @property
     def next_mode(self) -> str:
-        """The name of the mode that it was told to take, until a heartbeat shows its answer; else `mode`."""
+        """The name of the mode that we asked for last, until a heartbeat shows the outcome; else `mode`."""
         coming = self._on_its_way()
         return mode_name(self.state.vehicle_type, coming[-1]) if coming else self.mode
 
     def _on_its_way(self) -> list[int]:
-        """The modes that we asked for of late and that it has not shown since, the last one last."""
+        """The modes that we asked for lately and that no heartbeat has shown since, the newest last."""
         now = self.clock()
         requests = [(mode, at) for mode, at in self._modes_asked.items() if now - at <= HEARTBEAT_TIMEOUT]
         for changed_at, mode in self.state.mode_changes:
             answered = [at for requested, at in requests if requested == mode and at <= changed_at]
             if answered:
                 requests = [(requested, at) for requested, at in requests if at > answered[-1]]
-            else:  # somebody else's switch: what we asked for before it has come to nothing
+            else:  # somebody else's switch: our earlier requests are void
                 requests = [(requested, at) for requested, at in requests if at >= changed_at]
         return [mode for mode, _ in requests]
 
     @property
     def is_ready_to_arm(self) -> bool:
-        """Whether its pre-arm checks pass, by SYS_STATUS; an autopilot that does not report them may try."""
+        """Whether its pre-arm checks pass, by SYS_STATUS; without a report of them it counts as ready."""
         present = self.state.recent_field("SYS_STATUS", "onboard_control_sensors_present")
         health = self.state.recent_field("SYS_STATUS", "onboard_control_sensors_health")
         if present is None:
@@ -106,8 +106,8 @@ class BaseVehicle:
     def has_position(self) -> bool:
         """Whether its estimator has an absolute horizontal position, by EKF_STATUS_REPORT.
 
-        Without that report the pre-arm bit decides. The pre-arm bit alone is not
-        enough: in STABILIZE ArduCopter sets it 20 s before its position is good for GUIDED.
+        Without that report the pre-arm bit decides. With it, the bit alone is not enough: in STABILIZE ArduCopter
+        sets the bit 20 s before its position is good enough for GUIDED.
         """
         flags = self.state.recent_field("EKF_STATUS_REPORT", "flags")
         if flags is None:
@@ -116,7 +116,7 @@ class BaseVehicle:
 
     @property
     def height(self) -> float:
-        """Metres above home; 0 before it said so."""
+        """Metres above home; 0 while unknown."""
         relative_alt = self.state.field("GLOBAL_POSITION_INT", "relative_alt")
         return 0.0 if relative_alt is None else relative_alt / 1000.0
 
@@ -129,35 +129,35 @@ class BaseVehicle:
         h, p = home.message, here.message
         return math.hypot(*offset(p.lat / 1e7, p.lon / 1e7, h.latitude / 1e7, h.longitude / 1e7))
 
-    # -- what verbs are made of ---------------------------------------------------------------------------
+    # -- guards and waits ---------------------------------------------------------------------------------
 
     def fresh(self, name: str) -> Any:
-        """The newest message of that name, to fly by.
+        """The newest message of that name, if it is good enough for flight.
 
         Raises:
             Stale: there is none, it is older than FRESH, or a number in it is not finite.
         """
         age = self.state.age(name, self.clock())
         if age is None or age > FRESH:
-            age_text = "never told" if age is None else f"told {age:.1f} s ago"
-            raise Stale(f"vehicle {self.state.system} does not tell where it is ({name}: {age_text})")
+            age_text = "never received" if age is None else f"{age:.1f} s old"
+            raise Stale(f"vehicle {self.state.system} does not report its position ({name}: {age_text})")
         message = self.state.messages[name].message
         if not is_finite(message):
-            raise Stale(f"vehicle {self.state.system} does not tell where it is ({name}: not a number)")
+            raise Stale(f"vehicle {self.state.system} does not report its position ({name}: not a number)")
         return message
 
     def require_armed(self) -> None:
-        """Raises NotArmed unless it is armed."""
+        """Raise NotArmed unless the vehicle is armed."""
         if not self.state.armed:
             raise NotArmed("the vehicle is not armed; `arm` it first")
 
     def require_mode(self, mode: str) -> None:
-        """Raises ModeChanged unless it is in that mode."""
+        """Raise ModeChanged unless the vehicle is in that mode."""
         if self.mode != mode:
             raise ModeChanged(f"the vehicle is in {self.mode}, not in {mode}; `{mode.lower()}` gets it there")
 
     def held_by(self, mode: str) -> None:
-        """A guard for waits: raises when the vehicle was disarmed, or somebody else took it out of `mode`."""
+        """Raise NotArmed if the vehicle was disarmed, ModeChanged if somebody else took it out of `mode`."""
         if self.state.armed is None:
             raise NotArmed("the autopilot rebooted meanwhile")
         if not self.state.armed:  # the mode comes second: a reboot changes both
@@ -185,7 +185,7 @@ class BaseVehicle:
         return await self.waiting.until({"HEARTBEAT", *names}, guarded, timeout, action)
 
     def commanding(self, job: Job, *needs: Callable[[], None]) -> Callable[[], None]:
-        """What is asked before each message of `job`: whether it still commands, and what else it needs."""
+        """The check before each message of `job`: it still commands, and no need raises."""
 
         def check() -> None:
             self.authority.require(job)
@@ -200,9 +200,9 @@ class BaseVehicle:
         """Switch the flight mode for `job` and wait until a heartbeat shows it.
 
         Args:
-            job: who commands.
+            job: the job that commands.
             mode: the mode's name.
-            needs: what must hold each time before it is sent; they raise where it does not.
+            needs: called before each sending; what one raises ends the switch.
             command: what switches it; None for DO_SET_MODE.
 
         Raises:
@@ -241,7 +241,7 @@ class BaseVehicle:
         self.authority.shown(job)
 
     async def limits(self) -> time_limits.FlightLimits:
-        """Its speeds and heights, for deadlines; asked for where they are not known."""
+        """Its speeds and heights, for deadlines; unknown ones are requested from the vehicle."""
         return time_limits.limits(await self.parameters.read(time_limits.WANTED), self.speeds.in_force)
 
     def allowed(self, expected: float, timeout: float | None) -> float:
@@ -249,7 +249,7 @@ class BaseVehicle:
         return timeout or time_limits.allowed(expected, self.state.time_ratio.ratio)
 
     async def request(self, name: str) -> Any:
-        """Ask for a message of that name; the autopilot's answer. Several who ask at a time share one request.
+        """Request a message of that name from the autopilot, and return it. Simultaneous callers share one request.
 
         Raises:
             Rejected: it has no such message.
@@ -265,7 +265,7 @@ class BaseVehicle:
     def _requested(self, name: str, task: asyncio.Task[Any]) -> None:
         del self._requests[name]
         if not task.cancelled():
-            task.exception()  # whoever asked may have gone, and asyncio would call it unheeded
+            task.exception()  # the caller may have gone; asyncio would report the exception as never retrieved
 
     async def _request(self, name: str) -> Any:
         def from_autopilot(message: Any) -> Any:

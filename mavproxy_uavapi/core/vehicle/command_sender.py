@@ -1,7 +1,7 @@
 """A command and its acknowledgement.
 
-An ack counts only from the vehicle and component that was asked, for the command that was asked, to us,
-after we asked. Silence means sending again, for commands that may be repeated.
+An ack counts only if it comes from the component that was asked, for that command, to us, after we asked. Without
+an ack, a command that may be repeated is sent again.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ log = logging.getLogger("uavapi.copter")
 
 ACK_TIMEOUT = 1.5  # s until a command is sent again
 SENDINGS = 4  # the first one and three more
-IN_PROGRESS_TIMEOUT = 10.0  # s that each IN_PROGRESS buys
+IN_PROGRESS_TIMEOUT = 10.0  # s by which each IN_PROGRESS extends the wait
 IN_PROGRESS_LIMIT = 60.0  # s until a command that is still in progress is given up
-RETRY_PAUSE = 1.0  # s before a patient command is asked again
+RETRY_PAUSE = 1.0  # s before a patient command is sent again
 SHOWN_WITHIN = (2.0, 1.5, 1.5)  # s after each acknowledgement in which a heartbeat must show what was done
 LATE_ACK = 10.0  # s after a sending in which its ack may still come
-LAST_WORDS = 0.5  # s that a refusal's STATUSTEXT may come after its ack
+TEXT_TIMEOUT = 0.5  # s that the STATUSTEXT of a refusal may come after its ack
 QUESTIONS = {mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAV_CMD_RUN_PREARM_CHECKS}  # they change nothing
 WORTH_ASKING_AGAIN = {mavlink.MAV_RESULT_TEMPORARILY_REJECTED, mavlink.MAV_RESULT_FAILED}
 
@@ -49,7 +49,7 @@ class Sending:
 
 
 class CommandSender:
-    """Sends commands to one vehicle and waits for their acks; identical ones go one after the other."""
+    """Sends commands to one vehicle and waits for their acks; those of one MAV_CMD go one after the other."""
 
     def __init__(self, state: VehicleState, link: Link, waiting: MessageWaiter) -> None:
         self._state = state
@@ -71,14 +71,14 @@ class CommandSender:
         Args:
             command: what to send.
             check: called before each sending: what it raises ends the command, and nothing more is sent.
-            retry_for: how long (s) a patient command is asked again while it is refused.
-            shown: looked at after each heartbeat: whether the vehicle shows that it was heard although its ack was
-                lost; what it raises ends the command.
+            retry_for: how long (s) a patient command is sent again while it is refused.
+            shown: called after each heartbeat: whether telemetry shows the effect, even if the ack was lost; what
+                it raises ends the command.
 
         Raises:
             Rejected: refused, with MAV_RESULT and the STATUSTEXTs since it was asked.
             TimedOut: no ack, also after sending again.
-            LinkLost: no heartbeat meanwhile, or nothing to send through.
+            LinkLost: the heartbeats stopped, or there is no link.
         """
         async with self._locks[command.number]:
             started = self._waiting.clock()
@@ -99,7 +99,7 @@ class CommandSender:
     ) -> None:
         """Send `command` until a heartbeat shows that it was done.
 
-        The ack alone does not do: MAVLink does not number commands, so it may be an earlier one's, and this one lost.
+        The ack is not enough: MAVLink does not number commands, so it may belong to an earlier one.
 
         Args:
             command: what to send.
@@ -126,8 +126,8 @@ class CommandSender:
     async def _ask(self, command: Command, check: Callable[[], None], shown: Callable[[], bool]) -> int:
         """One exchange: the MAV_RESULT that ends it.
 
-        MAVLink does not number commands. Where the ack is the only proof, as many acks do not count as may
-        still come for earlier commands; each one that comes is followed by one more sending.
+        MAVLink does not number commands. Where the ack is the only proof, an ack that may belong to an earlier
+        command does not count: the command is sent once more for each of them.
         """
         unanswered = self._outstanding(command.number)
         others = sum(sending.params != command.params for sending in unanswered)
@@ -165,7 +165,7 @@ class CommandSender:
     async def _refusal(self, command: Command, result: int, started: float) -> Rejected:
         with contextlib.suppress(TimedOut):  # ArduPilot queues its texts, so that they may come after the ack
             await self._waiting.until(
-                {"STATUSTEXT"}, lambda: self._state.statustexts_since(started) or None, LAST_WORDS, "say why"
+                {"STATUSTEXT"}, lambda: self._state.statustexts_since(started) or None, TEXT_TIMEOUT, "say why"
             )
         texts = self._state.statustexts_since(started)
         ack = result_name(result)

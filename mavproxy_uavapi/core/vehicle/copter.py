@@ -17,9 +17,9 @@ from mavproxy_uavapi.core.vehicle.turning import TurningVehicle
 
 TAKEOFF_SHARE = 0.05  # of the altitude, between TAKEOFF_TOLERANCE's two ends
 TAKEOFF_TOLERANCE = (0.3, 1.0)  # m
-OVER_WITHIN = 3.0  # s at its altitude in which the autopilot should call a takeoff over
+TAKEOFF_END = 3.0  # s at its altitude after which a takeoff counts as done, whatever the autopilot says
 LIFT_OFF_TIMEOUT = 5.0  # s in which an unacknowledged takeoff must show
-SLOWED_DOWN = 0.3  # s in which a pause on the ground takes the motors from full throttle
+SLOWDOWN = 0.3  # s that a pause on the ground needs to slow the motors from full throttle
 STOP_TIMEOUT = 20.0  # s from full speed to rest
 SPEED_MODES = {"GUIDED", "RTL", *MISSION_MODES}  # others refuse DO_CHANGE_SPEED
 
@@ -71,8 +71,8 @@ class Copter(TurningVehicle):
                 near_since = None
                 return None
             near_since = self.clock() if near_since is None else near_since
-            # Movements are refused until the autopilot calls it over, which it does a moment later.
-            over = not self.is_taking_off or self.clock() - near_since >= OVER_WITHIN
+            # The autopilot ends the takeoff a moment later, and refuses movements until then.
+            over = not self.is_taking_off or self.clock() - near_since >= TAKEOFF_END
             return True if over else None
 
         allowed = self.allowed(time_limits.leg_time(limits, 0.0, alt), timeout)
@@ -83,7 +83,7 @@ class Copter(TurningVehicle):
     async def _lift_off(self, job: Job, alt: float) -> None:
         try:
             await self.commands.send(messages.takeoff(alt), self.commanding(job, self.flying))
-        except TimedOut:  # the ack may be lost; then the vehicle itself shows that it was heard
+        except TimedOut:  # the ack may be lost: telemetry shows whether the takeoff began
             ratio = max(self.state.time_ratio.ratio, 0.1)
             await self.flown(
                 GUIDED,
@@ -96,7 +96,7 @@ class Copter(TurningVehicle):
     async def land(self, job: Job, timeout: float | None = None) -> None:
         """Land where it is; done when it has disarmed.
 
-        On the ground and disarmed nothing is sent, and an `arm` that waits ends.
+        Nothing is sent to a disarmed vehicle; an `arm` that waits ends.
         """
         self.authority.take(job, Rank.STOP)
         if self.state.armed is False:
@@ -109,12 +109,12 @@ class Copter(TurningVehicle):
     async def rtl(self, job: Job, timeout: float | None = None) -> None:
         """Return to launch; done when the vehicle has landed there and disarmed.
 
-        On the ground and disarmed it is not switched, and an `arm` that waits ends: at home it is done, elsewhere
-        `NotArmed`.
+        A disarmed vehicle is not switched; an `arm` that waits ends. The verb is done then if the vehicle is at home;
+        elsewhere it fails with `NotArmed`.
 
         Raises:
-            NotFound: disarmed, and it has no home yet.
-            ModeChanged: somebody armed it while its home was asked for.
+            NotFound: the vehicle is disarmed and has no home yet.
+            ModeChanged: somebody armed it while we requested its home.
         """
         self.authority.take(job, Rank.STOP)
         if await self.is_done_at_home():
@@ -136,13 +136,13 @@ class Copter(TurningVehicle):
         await super().set_mode(job, mode)
         if was_paused and mode.upper() == GUIDED and self.authority.paused:
             if self.state.armed:
-                await self.send_setpoint(job, VelocityTarget(0, 0, 0))  # it must not take up the old movement
+                await self.send_setpoint(job, VelocityTarget(0, 0, 0))  # so that it does not resume the old movement
             await self._continue(job)
 
     async def stop(self, job: Job) -> None:
         """Hold the vehicle still, in GUIDED or in its mission, until `resume`; done when telemetry shows it.
 
-        A movement under way waits; no other begins. A mission that cannot be paused just now is left for BRAKE.
+        A movement in progress waits; no other begins. A mission that cannot be paused now is left for BRAKE.
 
         Raises:
             ModeChanged: it is in another mode.
@@ -157,7 +157,7 @@ class Copter(TurningVehicle):
         try:
             await self.commands.send(messages.pause(True), self.commanding(job, lambda: self.held_by(mode)))
         except TimedOut:
-            pass  # the acks may be lost; whether it stands still is what counts
+            pass  # the acks may be lost: telemetry shows whether it stands still
         except Rejected:
             if mode == GUIDED:
                 self.authority.end_pause()
@@ -176,7 +176,7 @@ class Copter(TurningVehicle):
         self.authority.accompany(job, "resume", stopped_too=True)
         interrupted = self.authority.interrupted
         if interrupted is not None and interrupted.steers and not interrupted.running and self.mode == GUIDED:
-            await self.send_setpoint(job, VelocityTarget(0, 0, 0))  # nobody sends what it flew by any more
+            await self.send_setpoint(job, VelocityTarget(0, 0, 0))  # its setpoints have stopped
         await self._continue(job)
 
     async def _continue(self, job: Job) -> None:
@@ -185,9 +185,9 @@ class Copter(TurningVehicle):
         self.authority.end_pause()
 
     async def hold(self, job: Job) -> None:
-        """Stop and stay, however it flies for us: by zero velocities in GUIDED, else by BRAKE.
+        """Stop and stay: by zero velocities in GUIDED, else by BRAKE.
 
-        A mode that is on its way to it counts: it is not in GUIDED any more when it hears us.
+        A mode switch that is on its way counts: the vehicle may have left GUIDED when it hears us.
         """
         self.authority.take(job, Rank.STOP)
         if not self.mode == self.next_mode == GUIDED:
@@ -198,14 +198,14 @@ class Copter(TurningVehicle):
             await self.rest(job)
 
     async def _hold_down(self, job: Job) -> None:
-        """Break off a take-off before it lifts off: a pause first, in which the motors slow down.
+        """Abort a takeoff before lift-off: pause first, so that the motors slow down.
 
-        ArduCopter takes a setpoint between full throttle and lift-off for a defect of its own ("Internal Errors",
-        flow_of_ctrl), and does not arm any more until it reboots.
+        ArduCopter reports a setpoint between full throttle and lift-off as an internal error (flow_of_ctrl), and does
+        not arm again until it reboots.
         """
-        with contextlib.suppress(TimedOut):  # the setpoints are sent all the same
-            self.authority.begin_pause()  # who takes over meanwhile has to end it
+        with contextlib.suppress(TimedOut):  # the setpoints are sent anyway
+            self.authority.begin_pause()  # whoever takes over has to end the pause
             await self.commands.send(messages.pause(True), self.commanding(job, self.flying))
-            await asyncio.sleep(SLOWED_DOWN)
+            await asyncio.sleep(SLOWDOWN)
         await self.rest(job)
         await self._continue(job)

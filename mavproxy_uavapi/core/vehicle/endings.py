@@ -1,7 +1,7 @@
-"""What a vehicle does when the job that flies it ends: the one place that decides, by telemetry, and sees to it.
+"""What a vehicle does when the job that flies it ends. Only this module decides that, from telemetry.
 
-Whoever superseded a job, and the pilot, have the vehicle: nothing is sent then. Else the table says what follows. It
-is a job like any other: it commands by rank, is sent until telemetry shows it, and ends when somebody else commands.
+If another job or the pilot has the vehicle, nothing is sent. Else the table says what follows: a job like any other,
+which commands by rank, sends until telemetry shows the effect, and ends when somebody else commands.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ log = logging.getLogger("uavapi.copter")
 
 
 class Policy(Enum):
-    """What is wanted of a vehicle that nobody flies any more."""
+    """What a vehicle shall do when nobody flies it any more."""
 
-    NOTHING = "nothing"  # it goes on with what it was told last
+    NOTHING = "nothing"  # it follows its last command
     HOLD = "hold"  # it stops and stays, a landing too
-    SAFE = "safe"  # it stops and stays, but what the autopilot flies by itself goes on
+    SAFE = "safe"  # it stops and stays, unless the autopilot flies by itself
     LAND = "land"
     RTL = "rtl"
 
@@ -37,7 +37,7 @@ class Situation(Enum):
     DISARMED = "disarmed"
     IDLE = "stands on the ground"  # in a landing's mode, its motors idle
     GUIDED = "GUIDED"  # on the ground too: a climb begins there
-    PAUSED = "held still"  # with a target yet, which `resume` would fly to
+    PAUSED = "held still"  # by `stop`: `resume` would fly on to its target
     MISSION = "AUTO"
     LAND = "LAND"
     RTL = "RTL"
@@ -59,11 +59,11 @@ WHAT_FOLLOWS: Mapping[Situation, Mapping[Policy, str | None]] = {
 }
 LANDINGS = {"LAND", "QLAND"}
 RETURNS = {"RTL", "SMART_RTL", "QRTL"}
-# A pilot has it, whoever stopped it, or the autopilot's own failsafe.
+# After these errors somebody else has the vehicle: a pilot, whoever stopped it, or a failsafe.
 HAS_ANOTHER_MASTER = (ModeChanged, NotArmed, Paused, LinkLost)
 FIXED: Mapping[Ending, Policy] = {
     Ending.DONE: Policy.NOTHING,
-    Ending.FAILED: Policy.NOTHING,  # its pilot has it, or it goes on to the target that it has
+    Ending.FAILED: Policy.NOTHING,  # its pilot has it, or it flies on to its target
     Ending.SUPERSEDED: Policy.NOTHING,
     Ending.ABORTED: Policy.HOLD,
     Ending.UNLOADED: Policy.SAFE,
@@ -72,11 +72,11 @@ FIXED: Mapping[Ending, Policy] = {
 
 
 def situation(vehicle: Vehicle, modes: Collection[str] = ()) -> Situation:
-    """What telemetry shows of it.
+    """The situation that telemetry shows.
 
     Args:
-        vehicle: which.
-        modes: those that the job which ended had switched to; a landing or a mission of another is its pilot's.
+        vehicle: the vehicle to look at.
+        modes: modes that the ended job switched to; a landing or a mission in any other mode is the pilot's.
     """
     state, mode = vehicle.state, vehicle.next_mode
     if not state.armed:
@@ -92,11 +92,11 @@ def situation(vehicle: Vehicle, modes: Collection[str] = ()) -> Situation:
 
 
 class FlightEndings:
-    """Sees to the vehicles of jobs that end.
+    """Commands the vehicles whose jobs have ended.
 
     Attributes:
-        on_disconnect: what a vehicle does whose client hung up.
-        on_script_exit: what a vehicle does whose script died.
+        on_disconnect: policy for a vehicle whose client hung up.
+        on_script_exit: policy for a vehicle whose script died.
 
     Args:
         jobs: all jobs.
@@ -106,11 +106,11 @@ class FlightEndings:
         self.on_disconnect = Policy.NOTHING
         self.on_script_exit = Policy.HOLD
         self._jobs = jobs
-        self._closing: dict[str, Job] = {}  # by the number of the job that it follows
+        self._closing: dict[str, Job] = {}  # by the number of the job before
         jobs.on_ended.append(self._ended)
 
     def policy(self, job: Job) -> Policy:
-        """What is wanted of the vehicle of a job that has ended."""
+        """The policy for the vehicle of a job that has ended."""
         assert job.ending is not None
         if job.ending is Ending.CLIENT_GONE:
             return self.on_disconnect
@@ -121,7 +121,7 @@ class FlightEndings:
         return FIXED[job.ending]
 
     def closing(self, job: Job) -> Job | None:
-        """The job that sees to the vehicle after `job`; None when nothing is sent."""
+        """The job that follows `job`; None when nothing is sent."""
         return self._closing.get(job.id)
 
     def _ended(self, job: Job) -> None:
@@ -133,11 +133,11 @@ class FlightEndings:
                 self._closing = running | {job.id: closing}
 
     def what_follows(self, vehicle: Vehicle, policy: Policy, modes: Collection[str] = ()) -> str | None:
-        """What the vehicle would be told now, as `see_to`; None for nothing."""
+        """The action that `see_to` would take now; None for none."""
         return WHAT_FOLLOWS[situation(vehicle, modes)][policy]
 
     def last_words(self) -> list[tuple[Any, int]]:
-        """What must be sent before nobody can send any more: messages, and the systems that they go to."""
+        """Messages that must be sent before the link is given back, and the systems that they go to."""
         last_words = []
         for job in self._closing.values():
             if job.running:
@@ -147,14 +147,14 @@ class FlightEndings:
     def see_to(
         self, vehicle: Vehicle, policy: Policy, why: str, client: str, modes: Collection[str] = ()
     ) -> Job | None:
-        """Have the vehicle do what follows; the job that does it, None where nothing is sent.
+        """Begin the job that policy and telemetry call for; None where nothing is sent.
 
         Args:
-            vehicle: which.
-            policy: what is wanted.
-            why: for the log and the trail.
-            client: in whose name.
-            modes: those that the job which ended had switched to.
+            vehicle: the vehicle to command.
+            policy: what it shall do.
+            why: the reason, for the log and the trail.
+            client: the client in whose name the job runs.
+            modes: modes that the ended job switched to.
         """
         action = self.what_follows(vehicle, policy, modes)
         shown = situation(vehicle, modes).value
@@ -168,7 +168,7 @@ class FlightEndings:
             return f"{action} is done"
 
         job = self._jobs.begin(vehicle, f"{action} {why}", {}, body, client=client, outlives_client=True)
-        vehicle.authority.take(job, Rank.STOP)  # at once: what comes now is newer
+        vehicle.authority.take(job, Rank.STOP)  # at once, because a command that comes now is newer
         return job
 
 

@@ -1,4 +1,4 @@
-"""Short distances on the Earth, as ArduPilot reckons them: a flat patch around the vehicle. Pure."""
+"""Short distances on the Earth, computed as ArduPilot does: flat around the vehicle. Pure."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ METRES_PER_DEGREE = 111318.84502145034
 
 
 def offset(from_lat: float, from_lon: float, to_lat: float, to_lon: float) -> tuple[float, float]:
-    """Metres north and east from one place to another, both in degrees; good to some kilometres."""
+    """Metres north and east from one place to another, both in degrees; accurate within some kilometres."""
     north = (to_lat - from_lat) * METRES_PER_DEGREE
     delta_lon = (to_lon - from_lon + 180.0) % 360.0 - 180.0
     east = delta_lon * METRES_PER_DEGREE * math.cos(math.radians((from_lat + to_lat) / 2))

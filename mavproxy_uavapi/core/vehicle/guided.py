@@ -20,9 +20,9 @@ from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 GUIDED = "GUIDED"
 TOLERANCE = 1.0  # m, horizontally and vertically
 ARRIVAL_SPEED = 0.5  # m/s; slower than this the vehicle does not overshoot its tolerance any more
-FLOOR = 0.0  # m above home: no target lies lower, but for the noise of the estimate
-TARGET_SHOWN = 2.0  # s after a setpoint in which telemetry may still tell the one before
-SAME_PLACE = 2.0  # m on each axis, between targets that are told
+FLOOR = 0.0  # m above home: the lowest target, less TOLERANCE for the noise of the estimate
+TARGET_SHOWN = 2.0  # s after a setpoint in which telemetry may still report the one before
+SAME_PLACE = 2.0  # m on each axis: reported targets within this are the same
 TAKING_OFF = messages.mavlink.MAV_LANDED_STATE_TAKEOFF
 
 
@@ -31,12 +31,12 @@ class GuidedVehicle(Vehicle):
 
     def __init__(self, state: VehicleState, link: Link, pending: PendingWaits, clock: Callable[[], float]) -> None:
         super().__init__(state, link, pending, clock)
-        self._sent: Target | None = None  # our newest setpoint, until telemetry tells the one in force
+        self._sent: Target | None = None  # our newest setpoint
         self._sent_at = 0.0
-        self._shown: GlobalTarget | None = None  # as the autopilot tells it
+        self._shown: GlobalTarget | None = None  # our target as the autopilot reports it
 
     def require_guided_flight(self) -> None:
-        """Raises NotArmed, ModeChanged or Busy unless it flies in GUIDED."""
+        """Raise NotArmed, ModeChanged or Busy unless it flies in GUIDED."""
         self.require_armed()
         self.require_mode(GUIDED)
         if self.state.landed:
@@ -44,16 +44,16 @@ class GuidedVehicle(Vehicle):
 
     @property
     def is_taking_off(self) -> bool:
-        """Whether the autopilot says that it climbs from the ground, whoever told it to."""
+        """Whether the autopilot reports a takeoff, whoever commanded it."""
         return bool(self.state.recent_field("EXTENDED_SYS_STATE", "landed_state") == TAKING_OFF)
 
     def require_no_takeoff(self) -> None:
-        """Raises Busy while it climbs from the ground."""
+        """Raise Busy during a takeoff."""
         if self.is_taking_off:
             raise Busy("the vehicle is taking off")
 
     def flying(self) -> None:
-        """What a movement needs before each message: it is armed, in GUIDED."""
+        """The check before each message of a movement: the vehicle is armed and in GUIDED."""
         self.held_by(GUIDED)
 
     async def brake(self, job: Job) -> None:
@@ -108,7 +108,7 @@ class GuidedVehicle(Vehicle):
         try:
             north, east, up = self.leg_to(target)
         except Stale:
-            return None  # a gap in the telemetry: nobody knows yet, and the deadline is still there
+            return None  # a gap in the telemetry; the deadline still holds
         horizontal = math.hypot(north, east)
         self.report_leg(job, math.hypot(horizontal, up))
         self.require_own_target()
@@ -116,7 +116,7 @@ class GuidedVehicle(Vehicle):
         return True if near and self.speed_by(target) <= ARRIVAL_SPEED else None
 
     def require_own_target(self) -> None:
-        """Raises Superseded where the autopilot says that it flies to another target than when we sent ours."""
+        """Raise Superseded if the autopilot reports another target than ours."""
         flown = setpoint_in_force.shown(self.state, self._sent_at + TARGET_SHOWN)
         if flown is None:
             return
@@ -127,7 +127,7 @@ class GuidedVehicle(Vehicle):
         raise Superseded("another ground station gave the vehicle another target")
 
     def speed_by(self, target: NedTarget | GlobalTarget) -> float:
-        """Speed (m/s) by the message that tells the position in the target's frame."""
+        """Speed (m/s), from the message that has the position in the target's frame."""
         if isinstance(target, NedTarget):
             here, scale = self.fresh("LOCAL_POSITION_NED"), 1.0
         else:
@@ -144,7 +144,7 @@ class GuidedVehicle(Vehicle):
         """Send a setpoint of `job` to a vehicle that is still in GUIDED.
 
         Raises:
-            Superseded, Paused, NotArmed, ModeChanged: somebody else has it; nothing is sent.
+            Superseded, Paused, NotArmed, ModeChanged: somebody else has the vehicle; nothing is sent.
         """
         await pass_gate()
         self.commanding(job, self.flying)()
@@ -154,10 +154,12 @@ class GuidedVehicle(Vehicle):
     def sent(self, target: Target) -> None:
         """Remember the setpoint that went out last."""
         self._sent, self._sent_at = target, self.clock()
-        self._shown = target if isinstance(target, GlobalTarget) else None  # another frame: as it is told first
+        self._shown = (
+            target if isinstance(target, GlobalTarget) else None
+        )  # in another frame: the first report counts
 
     async def take_up(self, job: Job, target: Target, yaw: Yaw) -> None:
-        """Begin a movement. ArduCopter takes up its own speeds again whenever the kind of setpoint changes."""
+        """Begin a movement. ArduCopter goes back to its own speeds when the kind of setpoint changes."""
         other_kind = not self._flies_kind_of(target)
         await self.send_setpoint(job, target, yaw)
         for kind, speed in self.speeds.to_send(other_kind).items():

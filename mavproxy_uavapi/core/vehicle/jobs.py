@@ -1,7 +1,6 @@
 """Verbs in flight: every blocking call is a job that somebody awaits.
 
-Which of them commands a vehicle is the vehicle's CommandAuthority's to say. An identical request joins the job that
-is in flight.
+The CommandAuthority of a vehicle decides which job commands it. An identical request joins the running job.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ class Ending(Enum):
     """Why a job ended; `endings.py` says what its vehicle does then."""
 
     DONE = "done"
-    FAILED = "failed"  # the vehicle or its pilot stood against it, or it took too long
+    FAILED = "failed"  # the vehicle or its pilot prevented it, or it took too long
     SUPERSEDED = "superseded"
     ABORTED = "aborted"  # by DELETE, or at the prompt
     CLIENT_GONE = "client gone"
@@ -40,15 +39,15 @@ class Job:
         verb: the path that was called, `/movement/go_to_ned_wait`.
         request: the validated parameters.
         vehicle: what it commands; two jobs of one vehicle have the same object here.
-        client: who asked for it: an address, or CONSOLE.
+        client: the client that began it: an address, or CONSOLE.
         began_at, ended_at: on the loop's clock (s); ended_at is None while it runs.
         ending: why it ended; None while it runs.
-        steers: whether the vehicle is flown by what the job goes on sending, so that it must not go on without it.
-        modes: names of the flight modes that it switched to: in any other the vehicle is somebody else's.
+        steers: whether the job flies the vehicle by a stream of setpoints, without which the vehicle must stop.
+        modes: names of the flight modes that it switched to; in any other mode somebody else has the vehicle.
         script: the session of a script that the job goes on for; None for no script.
         outlives_client: whether it goes on when its client hangs up (land, rtl).
-        stage: of a verb that is made of others, which one it is at: its name and numbers.
-        progress: what it last said of itself, such as distance_to_go (m) and altitude (m above home).
+        stage: the present step of a verb that consists of several: its name and numbers.
+        progress: its last report, such as distance_to_go (m) and altitude (m above home).
         result: the text of its success.
         error: why it failed.
         sent: names of the messages sent for it; None where the HTTP call that began it notes them.
@@ -89,7 +88,7 @@ class Job:
         return not self._finished.is_set()
 
     def is_for(self, verb: str, request: Mapping[str, Any]) -> bool:
-        """Whether it does just what another request asks for."""
+        """Whether it does exactly what another request asks for."""
         return self.verb == verb and self.request == dict(request)
 
     @property
@@ -100,7 +99,7 @@ class Job:
         return "succeeded" if self.error is None else "failed"
 
     def start(self, body: Callable[[Job], Awaitable[str]], timeout: float | None = None) -> None:
-        """Run `body`, whose text is the result; it never outlives `timeout` (s)."""
+        """Run `body`, which returns the text of the result, for `timeout` s at most."""
         self._task = self._loop.create_task(self._run(body))
         if timeout is not None:
             self._limit = self._loop.call_later(timeout, self._overdue, timeout)
@@ -118,19 +117,19 @@ class Job:
         except asyncio.CancelledError:
             self._finish(Ending.UNLOADED, error=Aborted(f"{self.verb} was aborted"))
             raise
-        except Exception as error:  # a defect of ours: its client learns of it, and the log has the trace
-            sentence = f"{self.verb} failed by a defect of this program: {error!r}"
+        except Exception as error:  # our own defect: the client gets a sentence, the log the traceback
+            sentence = f"{self.verb} failed because of a defect in this program: {error!r}"
             self._finish(Ending.DEFECT, error=UavApiError(sentence))
             raise
         else:
             self._finish(Ending.DONE, result)
 
     def abort(self, error: UavApiError, ending: Ending | None = None) -> None:
-        """End it now with that error: its clients know at once, and it sends nothing more.
+        """End the job now with that error: its clients get it at once, and nothing more is sent.
 
         Args:
-            error: what its clients are told.
-            ending: why; ABORTED, or SUPERSEDED for that error, where it is not said.
+            error: what its clients get.
+            ending: why it ended; by default SUPERSEDED for that error, else ABORTED.
         """
         self._finish(ending or (Ending.SUPERSEDED if isinstance(error, Superseded) else Ending.ABORTED), error=error)
         if self._task is not None:
@@ -148,7 +147,7 @@ class Job:
                 callback()
 
     def when_ended(self, callback: Callable[[], None]) -> None:
-        """Have `callback` called when the outcome of a running job is known."""
+        """Call `callback` when the outcome of a running job is known."""
         self._when_ended.append(callback)
 
     async def go_on_for(self, session: Awaitable[str | None]) -> str | None:
@@ -230,7 +229,7 @@ class JobBook:
         outlives_client: bool = False,
         timeout: float | None = None,
     ) -> Job:
-        """Start a job for `vehicle`, or join the one that does just the same."""
+        """Start a job for `vehicle`, or join the running one that does exactly the same."""
         for job in self.running():
             if job.vehicle is vehicle and job.is_for(verb, request):
                 return job

@@ -1,4 +1,4 @@
-"""Several messages of one vehicle to us: the acks of a command, or the mission protocol's."""
+"""A series of messages from one vehicle to us: the acks of a command, or the mission protocol."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ T = TypeVar("T")
 
 
 class MessageExchange(Generic[T]):
-    """What a vehicle's autopilot says to us, in order; several messages may arrive in one batch.
+    """The values of an autopilot's messages to us, in order; several messages may arrive in one batch.
 
     Attributes:
         wait: to be registered while the exchange lasts.
 
     Args:
         state: the vehicle.
-        asker: who we are; what is said to others does not count.
+        asker: our address; messages to others do not count.
         names: message names that belong to the exchange.
-        read: what a message says, None when nothing; what it raises ends the exchange.
+        read: gives the value of a message, or None to ignore it; what it raises ends the exchange.
     """
 
     def __init__(
@@ -45,12 +45,12 @@ class MessageExchange(Generic[T]):
                 self._values.put_nowait(value)
 
     def _is_to_us(self, message: Any) -> bool:
-        """Whether its target is us, or everybody; a message without a target is for everybody."""
+        """Whether it is addressed to us or to everybody; a message without a target is for everybody."""
         system, component = getattr(message, "target_system", 0), getattr(message, "target_component", 0)
         return system in (0, self._asker.system) and component in (0, self._asker.component)
 
     async def next(self, timeout: float) -> T | None:
-        """What the next message says; None when none came for `timeout` s.
+        """The value of the next message; None when none comes within `timeout` s.
 
         Raises:
             LinkLost: the vehicle's heartbeats stopped; and whatever `read` raises.

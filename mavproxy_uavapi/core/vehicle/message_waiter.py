@@ -24,7 +24,7 @@ class MessageWaiter:
     """Waits on one vehicle.
 
     Args:
-        state: what is known of it.
+        state: its state.
         pending: the host's waits.
         clock: monotonic seconds, the clock of arrivals.
     """
@@ -55,7 +55,7 @@ class MessageWaiter:
     async def until(
         self, names: Collection[str], condition: Callable[[], T | None], timeout: float, action: str
     ) -> T:
-        """Wait until `condition` of the state, looked at now and after each message of these names, holds.
+        """Wait until `condition` is not None; it is checked now and after each message of these names.
 
         Raises:
             TimedOut, LinkLost: as `message`; and whatever `condition` raises.
@@ -67,7 +67,7 @@ class MessageWaiter:
 
     @contextlib.contextmanager
     def expecting(self, names: Collection[str], test: Callable[[Any], T | None]) -> Iterator[ExpectedMessage[T]]:
-        """A context that waits from its entering on: enter it, send, then await `within`."""
+        """A context that waits from the moment it is entered: enter it, send, then await `within`."""
         expected = ExpectedMessage(Wait(self.state.system, names, test))
         with self._pending.registered(expected.wait):
             yield expected

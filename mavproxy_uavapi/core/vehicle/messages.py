@@ -46,11 +46,11 @@ class Command:
         number: MAV_CMD.
         params: param1, param2 …; the missing ones are 0.
         repeatable: whether it may be sent again when no acknowledgement comes.
-        patient: whether TEMPORARILY_REJECTED (and what else a settling estimator answers) is worth asking
-            again for.
-        again_after: the MAV_RESULTs after which an impatient one is asked again all the same.
-        proven_by_ack: whether nothing but the ack shows that it was done, so that an ack which may be an
-            earlier one's does not do.
+        patient: whether it is sent again after the refusals of an estimator that still settles, such as
+            TEMPORARILY_REJECTED.
+        again_after: MAV_RESULTs after which it is sent again although it is not patient.
+        proven_by_ack: whether only the ack shows that it was done; an ack that may belong to an earlier command
+            does not count then.
     """
 
     number: int
@@ -118,7 +118,7 @@ def check_prearm() -> Command:
 def takeoff(alt: float, pitch: float = 0.0) -> Command:
     """Take off to `alt` m above home; `pitch` in degrees, for planes.
 
-    Not repeatable: the second is refused when the first one's acknowledgement was lost.
+    Not repeatable: if the acknowledgement of the first one is lost, the second is refused.
     """
     return Command(mavlink.MAV_CMD_NAV_TAKEOFF, (pitch, 0, 0, 0, 0, 0, alt), repeatable=False)
 
@@ -177,7 +177,7 @@ def set_mission_current(seq: int) -> Command:
 
 
 def start_mission() -> Command:
-    """Run the mission; on the ground this stands for the pilot's raising the throttle."""
+    """Run the mission; on the ground this replaces raising the throttle."""
     return Command(mavlink.MAV_CMD_MISSION_START)
 
 
@@ -225,7 +225,7 @@ NO_YAW = Yaw()
 
 
 def towards(north: float, east: float) -> Yaw:
-    """The yaw that looks along (`north`, `east`); none when that points nowhere."""
+    """The yaw that looks along (`north`, `east`); NO_YAW when they are shorter than 0.1 m."""
     if math.hypot(north, east) < 0.1:
         return NO_YAW
     return Yaw(heading=math.atan2(east, north))

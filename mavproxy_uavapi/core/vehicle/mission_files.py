@@ -1,6 +1,6 @@
 """Mission files -> mission items: QGC WPL 110, QGroundControl's .plan, and our own JSON. pymavlink parses.
 
-Item 0 of an ArduPilot mission is home, which is no item here: a list begins with item 1.
+Item 0 of an ArduPilot mission is home. It is no item here: a list begins with item 1.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ WPL_110 = "QGC WPL 110"
 LOWEST, HIGHEST = -1000.0, 10_000.0  # m, in whichever frame
 MOST_ITEMS = 5000  # more than any ArduPilot vehicle stores
 ALTITUDE_TOLERANCE = 0.02  # m; ArduPilot stores whole centimetres
-PLACE_TOLERANCE = 10  # 1e-7 degrees, about 0.1 m; an autopilot that answers in floats has no more
+PLACE_TOLERANCE = 10  # 1e-7 degrees, about 0.1 m; an answer in floats is no better
 DEGREES = 1e7
 
 
@@ -76,7 +76,7 @@ class MissionItem:
         return mavlink.MAVLink_mission_item_int_message(*head, *self.params, self.x, self.y, self.z)
 
     def report(self, seq: int) -> dict[str, Any]:
-        """What clients see, and may post again."""
+        """The item as clients see it, and may post it again."""
         report: dict[str, Any] = {"seq": seq, "command": self.name, "frame": _frame_name(self.frame)}
         report |= {f"param{number}": value for number, value in enumerate(self.params, 1)}
         if self.has_location:
@@ -100,7 +100,7 @@ def read(text: str) -> list[MissionItem]:
 
     Raises:
         BadRequest: it is none of them.
-        Invalid: an item of it is of no use.
+        Invalid: an item cannot be flown.
     """
     if text.lstrip("\ufeff").startswith("QGC WPL"):
         return checked(_from_wpl(text.lstrip("\ufeff")))
@@ -128,9 +128,9 @@ def from_message(message: Any) -> MissionItem:
 
 
 def difference(sent: Sequence[MissionItem], read_back: Sequence[MissionItem]) -> str | None:
-    """How a mission that was read back differs from what was sent, in words; None where it does not.
+    """How the mission that was read back differs from the one that was sent, in words; None where it does not.
 
-    Command, place and altitude are looked at: of the parameters each autopilot keeps what it needs.
+    Only command, place and altitude are compared: an autopilot keeps only those parameters that it needs.
     """
     if len(sent) != len(read_back):
         return f"it has {len(read_back)} items, not {len(sent)}"
@@ -152,7 +152,7 @@ def _same_place(a: MissionItem, b: MissionItem) -> bool:
 
 
 def checked(messages: Sequence[Any]) -> list[MissionItem]:
-    """The items of MISSION_ITEMs whose values can be flown.
+    """The items of MISSION_ITEMs, if their values can be flown.
 
     Raises:
         Invalid: with one entry for each problem.
@@ -176,7 +176,7 @@ def _problem(message: Any) -> str | None:
     if not 0 <= message.command <= 65535:
         return f"there is no command {message.command}"
     if message.frame not in (*FRAMES.values(), *SAME_FRAMES):
-        return f"frame {message.frame} is none of a mission's"
+        return f"frame {message.frame} is not a mission frame"
     if not has_location(message.command):
         return None if max(abs(message.x), abs(message.y)) < 2**31 else "param5 or param6 is too large"
     return _misplaced(message.x, message.y, message.z)
@@ -194,12 +194,12 @@ def _from_wpl(text: str) -> list[Any]:
     loader = mavwp.MAVWPLoader()
     header, _, rows = text.partition("\n")
     if header.strip() != WPL_110:
-        raise BadRequest(f"this is no {WPL_110} file: it begins with {header.strip()!r}")
+        raise BadRequest(f"this is not a {WPL_110} file: it begins with {header.strip()!r}")
     try:
-        # What load() calls once it has opened a file, which it leaves open when a row is wrong.
+        # load() calls this, too, but leaves its file open when a row is wrong.
         loader._read_waypoints_v110(io.StringIO(rows))
     except (mavwp.MAVWPError, ValueError) as error:
-        raise BadRequest(f"this is no {WPL_110} file: {error}") from error
+        raise BadRequest(f"this is not a {WPL_110} file: {error}") from error
     if loader.count() and loader.item(0).command != mavlink.MAV_CMD_NAV_WAYPOINT:
         raise BadRequest("the first row of a QGC WPL file is home, a waypoint (16); this one is another command")
     return list(loader.wpoints[1:])
@@ -220,10 +220,10 @@ def _loaded(items: Iterable[Any], convert: Any) -> list[Any]:
 
 
 def _flattened(items: Any) -> list[Any]:
-    """The simple items of a .plan file, those of its surveys and corridors included.
+    """The simple items of a .plan file, including those of its surveys and corridors.
 
     Raises:
-        BadRequest: there are none, or some that only QGroundControl can turn into simple ones.
+        BadRequest: there are no items, or items that only QGroundControl can convert.
     """
     if not isinstance(items, list):
         raise BadRequest("the .plan file has no mission items")
@@ -267,13 +267,13 @@ def _command(command: Any) -> int:
 
 def _int(value: Any) -> int:
     if isinstance(value, bool) or not isinstance(value, int):
-        raise ValueError(f"{value!r} is no whole number")
+        raise ValueError(f"{value!r} is not a whole number")
     return value
 
 
 def _float(value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"{value!r} is no number")
+        raise ValueError(f"{value!r} is not a number")
     return float(value)
 
 

@@ -19,7 +19,7 @@ mavlink = mavutil.mavlink
 
 AUTO = "AUTO"
 LANDINGS = {mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH, mavlink.MAV_CMD_NAV_VTOL_LAND}
-STARTING_MODES = (AUTO, "GUIDED")  # any other is the pilot's; `guided` takes it from there
+STARTING_MODES = (AUTO, "GUIDED")  # in any other mode the pilot has it; `guided` takes over
 START_TIMEOUT = 10.0  # s until the vehicle must show that the mission runs
 LONGEST = 4 * 3600.0  # s for a mission whose client gave no timeout: longer than any copter flies
 UNKNOWN_TOTAL = 65535
@@ -81,7 +81,7 @@ async def begin(vehicle: Vehicle, job: Job, startable: Callable[[], None]) -> No
 
 
 def _held(vehicle: Vehicle) -> None:
-    """Raises NotArmed or ModeChanged unless it flies its mission."""
+    """Raise NotArmed or ModeChanged unless it flies its mission."""
     if not (vehicle.state.armed and flies_mission(vehicle.mode)):
         vehicle.held_by(AUTO)
 
@@ -93,7 +93,7 @@ def _require_startable(vehicle: Vehicle) -> None:
 
 
 def _is_active(vehicle: Vehicle, since: float) -> bool:
-    """Whether a MISSION_CURRENT of after `since` (s) shows a mission that runs, or has ended already."""
+    """Whether a MISSION_CURRENT since `since` (s) shows a mission that runs, or has ended already."""
     received = vehicle.state.newest("MISSION_CURRENT")
     if received is None or received.at < since:
         return False
@@ -105,7 +105,7 @@ def _is_active(vehicle: Vehicle, since: float) -> bool:
 
 async def _flown_to_its_end(vehicle: Vehicle, job: Job, items: Sequence[MissionItem], timeout: float) -> None:
     final = {seq for seq, item in enumerate(items, 1) if item.command in LANDINGS} | {len(items)}
-    flown = 0  # the item flown last: a vehicle that has disarmed is back at the mission's beginning
+    flown = 0  # the item flown last; a disarmed vehicle reports the first item again
 
     def complete() -> bool | None:
         nonlocal flown
@@ -123,7 +123,7 @@ async def _flown_to_its_end(vehicle: Vehicle, job: Job, items: Sequence[MissionI
 
 
 def _is_complete(vehicle: Vehicle) -> bool:
-    """By MISSION_CURRENT's state; an older autopilot tells none, and has then reached the last item."""
+    """Whether MISSION_CURRENT says so; with an older autopilot, which does not, whether the last item is reached."""
     mission = progress(vehicle)
     if mission["state"] == "unknown":
         return bool(mission["total"] and mission["last_reached"] == mission["total"])
@@ -144,16 +144,16 @@ def progress(vehicle: Vehicle) -> dict[str, Any]:
 
     Returns:
         current, last_reached: item numbers, from 1; 0 and None before any.
-        total: items besides home; None where the autopilot does not tell.
+        total: items besides home; None where the autopilot does not report it.
         state: of STATES.
         distance_m: horizontally to the current item, in AUTO; None elsewhere.
 
     Raises:
-        Stale: it was not told yet.
+        Stale: the autopilot has not reported it yet.
     """
     received = vehicle.state.newest("MISSION_CURRENT")
     if received is None:
-        raise Stale(f"vehicle {vehicle.state.system} has not told MISSION_CURRENT yet")
+        raise Stale(f"vehicle {vehicle.state.system} has not sent MISSION_CURRENT yet")
     current = received.message
     reached = vehicle.state.newest("MISSION_ITEM_REACHED")
     since_the_start = reached is not None and reached.at >= vehicle.waypoints.changed_at

@@ -1,8 +1,8 @@
 """MAVLink's mission protocol: upload with read-back, download, clear.
 
-What counts comes from the autopilot that we asked, to us, about the mission (not the fence or the rally
-points). Silence means asking again. MAVProxy's own `wp` module hears the same messages; it answers nothing
-that it did not begin.
+Messages count only from the autopilot that we asked, to us, and about the mission (not the fence or the rally
+points). Without an answer we ask again. MAVProxy's own `wp` module hears the same messages, but answers only those of
+transfers that it began.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Waypoints:
         """Home (None where the vehicle has no item 0 yet), and the items from 1 on.
 
         Raises:
-            Rejected: another ground station transfers a mission just now.
+            Rejected: another ground station transfers a mission now.
             TimedOut, LinkLost.
         """
         async with self._lock:
@@ -68,12 +68,12 @@ class Waypoints:
     ) -> None:
         """Put `items` in place of the vehicle's mission, and read them back.
 
-        A failed upload leaves the old mission: untouched where the vehicle refused at once, else put back.
-        The error says which, and where that was not possible.
+        After a failed upload the vehicle has its old mission: untouched if it refused at once, else put back. The
+        error says which, or that this failed.
 
         Args:
             items: from item 1 on.
-            progress: told how many were asked for, of how many.
+            progress: called with the number of items that were requested, and of all.
             check: called before the first item and after each; what it raises ends the upload, as a failure does.
 
         Raises:
@@ -96,7 +96,7 @@ class Waypoints:
                 raise _with(error, await self._undo(old, error)) from error
 
     async def clear(self, check: Check = lambda: None) -> None:
-        """Remove the mission, and see that it is gone.
+        """Remove the mission, and check that it is gone.
 
         Args:
             check: called before it is removed; what it raises ends that.
@@ -112,7 +112,7 @@ class Waypoints:
                 await self._clear(talk)
                 remaining = await self._ask_count(talk) - 1
             if remaining > 0:
-                raise Rejected(f"the vehicle accepted the clearing, but its mission has {remaining} items still")
+                raise Rejected(f"the vehicle accepted the clearing, but its mission still has {remaining} items")
 
     # -- the protocol -------------------------------------------------------------------------------------
 
@@ -132,7 +132,7 @@ class Waypoints:
         """Ask until `test` of an answer is not None.
 
         Raises:
-            Rejected: the vehicle answered with errors only. One alone may belong to an upload that just ended.
+            Rejected: the vehicle answered with errors only. A single one may belong to an upload that has just ended.
         """
         refusal = None
         for _ in range(SENDINGS):
@@ -176,10 +176,10 @@ class Waypoints:
         await self._ask(talk, question, accepted, "clear its mission")
 
     async def _put(self, items: Sequence[MissionItem], progress: Progress) -> None:
-        """Upload and read back; once more where the transfer itself failed.
+        """Upload and read back; try again once if the transfer itself failed.
 
         Raises:
-            Rejected: refused, or read back otherwise.
+            Rejected: the vehicle refused it, or has another mission afterwards.
         """
         try:
             await self._hand_over([HOME, *items], progress)
@@ -190,7 +190,7 @@ class Waypoints:
         _, read_back = await self._download()
         differs = difference(items, read_back)
         if differs is not None:
-            raise Rejected(f"the mission was read back otherwise than it was sent: {differs}")
+            raise Rejected(f"the mission that was read back is not the one that was sent: {differs}")
 
     async def _hand_over(self, items: Sequence[MissionItem], progress: Progress) -> None:
         with self._talk(REQUESTS) as talk:
@@ -199,17 +199,17 @@ class Waypoints:
     async def _answer_requests(
         self, talk: MessageExchange[Any], items: Sequence[MissionItem], progress: Progress
     ) -> None:
-        """Offer the items and give each as often as the vehicle asks for it, which knows what it lacks.
+        """Offer the items, and send each one whenever the vehicle asks for it.
 
-        Nothing is sent unasked but the offer: an item that comes twice is an error to an ArduPilot. When the
-        acknowledgement of the last one is lost, the read-back tells.
+        Only the offer is sent unasked: for ArduPilot an item that comes twice is an error. If the last
+        acknowledgement is lost, the read-back shows the outcome.
         """
         handed_over: set[int] = set()
         offers = 0
         while True:
             if not handed_over:
                 if offers == SENDINGS:
-                    raise TimedOut(f"vehicle {self._state.system} did not take the mission up, {offers} offers")
+                    raise TimedOut(f"vehicle {self._state.system} did not accept the mission, offered {offers} times")
                 await self._send(mavlink.MAVLink_mission_count_message(*self._address, len(items), MISSION))
                 offers += 1
             message = await self._next_request(talk, ASKING_TIMEOUT if handed_over else ANSWER_TIMEOUT)
@@ -247,7 +247,7 @@ class Waypoints:
         return None
 
     async def _undo(self, old: Sequence[MissionItem], error: UavApiError) -> str:
-        """After a failed upload: have the old mission there, and say whether that is so."""
+        """After a failed upload restore the old mission, and say whether that succeeded."""
         if isinstance(error, LinkLost):
             return "; its mission may be incomplete now, because the link is lost"
         try:
@@ -283,7 +283,7 @@ def _item_number(seq: int) -> Callable[[Any], MissionItem | None]:
 
 
 def _with(error: Rejected | TimedOut | LinkLost | Busy, addition: str) -> UavApiError:
-    """The same error, whose sentence goes on."""
+    """The same error with a longer sentence."""
     sentence = f"{error}{addition}"
     if isinstance(error, Busy):
         return Busy(sentence)

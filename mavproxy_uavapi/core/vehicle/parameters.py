@@ -1,4 +1,4 @@
-"""Parameters of one vehicle: what it told, and what it is asked for."""
+"""Parameters of one vehicle: those that are known, and requests for others."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle import messages
 from mavproxy_uavapi.core.vehicle.message_waiter import MessageWaiter
 
-ASKINGS = 2  # of a name in one boot
+MOST_REQUESTS = 2  # for a name in one boot
 TIMEOUT = 1.0  # s; ArduPilot answers a known name at once and an unknown one not at all
 
-Names = tuple[str, ...]  # of one quantity: a firmware has one of them
+Names = tuple[str, ...]  # of one quantity, of which a firmware has one
 
 
 class Parameters:
-    """Reads parameters; each is asked for once and then remembered."""
+    """Reads parameters; each is read once and then remembered."""
 
     def __init__(self, state: VehicleState, link: Link, waiting: MessageWaiter) -> None:
         self._state = state
@@ -29,16 +29,16 @@ class Parameters:
     async def read(self, quantities: Iterable[Names]) -> dict[str, float]:
         """Values by name, of those that the vehicle has.
 
-        ArduPilot does not answer for a name that it does not have: such are asked for twice in a boot, since a
-        message may be lost, and then taken as absent.
+        ArduPilot does not answer for an unknown name. A name is requested twice in a boot, because a message may be
+        lost, and then counts as absent.
 
         Args:
-            wanted: one entry for each quantity.
+            quantities: the names of each quantity.
         """
         quantities = list(quantities)
         known = self._state.parameters
         missing = [names for names in quantities if not known.keys() & set(names)]
-        requested = [name for names in missing for name in names if self._count(name) < ASKINGS]
+        requested = [name for names in missing for name in names if self._count(name) < MOST_REQUESTS]
         if requested:
             with self._waiting.expecting(
                 {"PARAM_VALUE"}, lambda _: all(known.keys() & set(names) for names in missing) or None

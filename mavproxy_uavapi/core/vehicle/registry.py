@@ -1,4 +1,4 @@
-"""The vehicles that can be flown, each made when it is first asked for."""
+"""The vehicles that can be flown, each made at its first use."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ class VehicleRegistry:
         current: the system id that MAVProxy's own commands go to; 0 before it knows one.
 
     Args:
-        fleet: what was heard of each.
-        link: the way out.
-        link_watch: whether they hear us.
+        fleet: the state of each vehicle.
+        link: sends messages.
+        link_watch: knows whether a link is alive.
         pending: the waits on them.
         clock: monotonic seconds, the clock of arrivals.
     """

@@ -1,8 +1,8 @@
-"""The setpoint that an autopilot flies in GUIDED, by its own telling: others may have sent it a newer one than ours.
+"""The setpoint in GUIDED as the autopilot reports it: others may have sent it a newer one than ours.
 
-A position is told by POSITION_TARGET_GLOBAL_INT, which ArduCopter sends only while it flies to one, and a velocity by
-POSITION_TARGET_LOCAL_NED. The latter's position is no use: during a take-off, and until the first setpoint after it,
-it is one of long ago.
+POSITION_TARGET_GLOBAL_INT reports a position; ArduCopter sends it only while it flies to one.
+POSITION_TARGET_LOCAL_NED reports a velocity. Its position is not used: during a takeoff, and until the first setpoint
+after it, that position is outdated.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ LATER = 0.5  # s for the second
 
 
 async def ask(state: VehicleState, waiting: MessageWaiter, link: Link) -> GlobalTarget | VelocityTarget | None:
-    """What it flies to; None where it does not say, or flies neither to a place nor at a velocity.
+    """Ask for the setpoint in force; None without an answer, or if it is neither a position nor a velocity.
 
     Raises:
         LinkLost: its heartbeats stopped.
@@ -70,7 +70,7 @@ def place_of(message: Any, state: VehicleState) -> GlobalTarget | None:
 
 
 def shown(state: VehicleState, since: float) -> GlobalTarget | VelocityTarget | None:
-    """What it has told since then (s) without being asked."""
+    """The setpoint that the autopilot has reported since `since` (s) without a request."""
     place, motion = state.messages.get(PLACE), state.messages.get(MOTION)
     if place is not None and place.at >= since and (motion is None or place.at >= motion.at or not _moves(motion)):
         return place_of(place.message, state)

@@ -1,7 +1,7 @@
 """The speeds that clients ask for. Pure.
 
-ArduCopter forgets a speed when its mode changes, and takes up its own again when the kind of setpoint does. In a
-pilot's mode it takes none: what is asked for then is remembered until it flies in GUIDED.
+ArduCopter forgets a speed when its mode or the kind of setpoint changes. In a pilot's mode it accepts none: a speed
+that is asked for then is remembered until the vehicle flies in GUIDED.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ class Speeds:
         self._reboots = 0
 
     def take(self, kind: str, speed: float) -> None:
-        """The autopilot has accepted it."""
+        """Note a speed that the autopilot has accepted."""
         if self._mode_since != self._state.mode_since:
             self._in_force = {}
             self._mode_since = self._state.mode_since
@@ -34,7 +34,7 @@ class Speeds:
         self._remembered[kind] = speed
 
     def to_send(self, new_kind: bool) -> dict[str, float]:
-        """What the autopilot must be told with a setpoint.
+        """The speeds to send with a setpoint.
 
         Args:
             new_kind: whether the setpoint is of another kind than the one before.
@@ -44,5 +44,5 @@ class Speeds:
 
     @property
     def in_force(self) -> dict[str, float]:
-        """What was set since the mode changed last."""
+        """The speeds that were set since the last mode change."""
         return dict(self._in_force) if self._mode_since == self._state.mode_since else {}

@@ -1,8 +1,8 @@
-"""Messages that a vehicle should send but that do not arrive are asked for.
+"""Requests the messages that a vehicle should send but that do not arrive.
 
-MAVProxy asks every vehicle for all streams at its `streamrate`; that is respected. What still does not come
-(EXTENDED_SYS_STATE is in no stream; a stream rate may be 0) is asked for with SET_MESSAGE_INTERVAL, and
-asked for again when something made it stop.
+MAVProxy asks every vehicle for all streams at its `streamrate`, which stays as it is. What still does not arrive
+(EXTENDED_SYS_STATE is in no stream; a stream rate may be 0) is requested with SET_MESSAGE_INTERVAL, and again when it
+stops.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 LOOK_EVERY = 2.0  # s
-MISSING_AFTER = 3.0  # s without a message before it is asked for
-ASK_AGAIN = 30.0  # s, after the first few askings have not helped
+MISSING_AFTER = 3.0  # s without a message until it is requested
+ASK_AGAIN = 30.0  # s between requests, after the first few
 FIRST_ASKINGS = 3
 
-# Hz: enough to fly by (positions) or to know by (the rest), little enough for a telemetry radio.
+# Hz: enough for flight (positions) and for a status (the rest), and few enough for a telemetry radio.
 WANTED = {
     "GLOBAL_POSITION_INT": 4,
     "LOCAL_POSITION_NED": 4,
@@ -34,7 +34,7 @@ WANTED = {
     "POSITION_TARGET_LOCAL_NED": 2,
     "POSITION_TARGET_GLOBAL_INT": 2,
 }
-IN_GUIDED = {"POSITION_TARGET_LOCAL_NED", "POSITION_TARGET_GLOBAL_INT"}  # elsewhere they say nothing
+IN_GUIDED = {"POSITION_TARGET_LOCAL_NED", "POSITION_TARGET_GLOBAL_INT"}  # in other modes they say nothing
 
 
 class StreamRequester:
@@ -58,7 +58,7 @@ class StreamRequester:
             await asyncio.sleep(LOOK_EVERY)
 
     async def look(self, vehicle: Vehicle) -> None:
-        """Ask for what is missing now.
+        """Request what is missing now.
 
         Raises:
             LinkLost: it went away meanwhile.
@@ -69,7 +69,7 @@ class StreamRequester:
             await vehicle.commands.send(set_interval(MESSAGE_IDS[name], WANTED[name]))
 
     def missing(self, vehicle: Vehicle) -> list[str]:
-        """The wanted messages that do not come and that it is time to ask for."""
+        """The wanted messages that do not arrive and whose next request is due."""
         now = vehicle.clock()
         missing = []
         guided = vehicle.state.armed and vehicle.mode == "GUIDED"

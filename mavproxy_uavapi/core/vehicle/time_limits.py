@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 FACTOR = 2.0
 MARGIN = 30.0  # s of the vehicle's clock
-FLOOR = 30.0  # s of ours: acks, heartbeats and a machine's hiccups do not get faster with SIM_SPEEDUP
+FLOOR = 30.0  # s of ours: SIM_SPEEDUP does not shorten acks, heartbeats and a machine's pauses
 
 # ArduCopter's parameters: each quantity's name up to 4.6 in cm or cm/s, its name since 4.7 in m or m/s, and the
 # default (m, m/s, m/s/s), which counts until the vehicle has told its own. Times are in ms and s in both.
@@ -52,8 +52,8 @@ def limits(parameters: Mapping[str, float], speeds: Mapping[str, float]) -> Flig
     """The limits in force.
 
     Args:
-        parameters: what the vehicle told, in ArduCopter's units; missing ones are taken as its defaults.
-        speeds: what DO_CHANGE_SPEED set since, m/s, by kind (ground, air, climb, descent). A mode change
+        parameters: the vehicle's, in ArduCopter's units; a missing one counts as its default.
+        speeds: those that DO_CHANGE_SPEED has set since, m/s, by kind (ground, air, climb, descent). A mode change
             undoes it in the autopilot, so the slower of the two counts.
     """
     known = {name: _value(parameters, *names) for name, names in NAMES.items()}

@@ -1,15 +1,15 @@
-"""Was that a landing? Pure: the clock is an argument."""
+"""Whether a disarming was a landing. Pure: the clock is an argument."""
 
 from __future__ import annotations
 
 from mavproxy_uavapi.core.vehicle.time_limits import FlightLimits
 
-STANDING = 1.0  # m/s; what sinks faster than this after its disarming does not stand
+STANDING = 1.0  # m/s; a vehicle that sinks faster after disarming has not landed
 POSITION_TIMEOUT = 2.0  # s in which a position must come after the disarming, if positions come at all
 
 
 class Touchdown:
-    """Tells a landing from a fall: after a landing's disarming the vehicle stands."""
+    """Tells a landing from a fall: after a landing the disarmed vehicle stands still."""
 
     def __init__(self, limits: FlightLimits) -> None:
         self._fall = 2 * max(limits.down, limits.land, limits.land_high) + STANDING  # m/s; no descent is as fast
@@ -23,11 +23,11 @@ class Touchdown:
         self.fell = self.fell or speed > self._fall
 
     def is_over(self, now: float, age: float | None) -> bool | None:
-        """Whether a disarmed vehicle stands, by a position told since it is known to be disarmed.
+        """Whether a disarmed vehicle stands still, from a position that arrived after the disarming.
 
         Args:
             now: s.
-            age: of the newest position, s; where none comes any more, the disarming alone has to do.
+            age: of the newest position, s; if none arrives any more, the disarming alone counts.
         """
         if self._disarmed_at is None:
             self._disarmed_at = now

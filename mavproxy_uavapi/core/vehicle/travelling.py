@@ -50,7 +50,7 @@ class TravellingVehicle(GuidedVehicle):
         while remaining > 0:
             stretch = min(period, remaining)
             await self._travelled(stretch)
-            remaining = round(remaining - stretch, 6)  # what is left of a float is no setpoint
+            remaining = round(remaining - stretch, 6)  # a rounding error is no setpoint
             await self.send_setpoint(job, velocity if remaining > 0 else self.standstill, yaw)
 
     async def _travelled(self, seconds: float) -> None:
@@ -59,7 +59,7 @@ class TravellingVehicle(GuidedVehicle):
         ends_at = clock.boot_time(self.clock()) + seconds
         while (remaining := ends_at - clock.boot_time(self.clock())) > 0:
             self.flying()
-            with contextlib.suppress(TimedOut):  # the time has passed, unless the vehicle's clock ran slower
+            with contextlib.suppress(TimedOut):  # the time has passed, unless the vehicle's clock runs slower
                 await self.waiting.message(
                     {"HEARTBEAT"}, lambda beat: beat, max(remaining / clock.ratio, 0.01), "beat"
                 )
@@ -67,7 +67,7 @@ class TravellingVehicle(GuidedVehicle):
     async def rest(self, job: Job) -> None:
         """Stop by setpoints in GUIDED, sent until telemetry shows that it stands still.
 
-        A setpoint may be lost and a climb begins slowly: so it must be shown for a while.
+        A setpoint may be lost, and a climb begins slowly, so the vehicle must stand still for REST_SHOWN s.
 
         Raises:
             TimedOut: it goes on moving.
@@ -78,7 +78,7 @@ class TravellingVehicle(GuidedVehicle):
             if self.clock() > deadline:
                 raise TimedOut(f"vehicle {self.state.system} does not stop within {REST_TIMEOUT:g} s")
             await self.send_setpoint(job, self.standstill)
-            self.authority.shown(job)  # a newer movement replaces it as it replaced the one before
+            self.authority.shown(job)  # from now on a newer movement may replace it
             await asyncio.sleep(REST_PERIOD)
             if not self.stands_still:
                 still_since = self.clock()

@@ -13,7 +13,7 @@ from mavproxy_uavapi.core.vehicle.travelling import TravellingVehicle
 
 HEADING_TOLERANCE = 3.0  # degrees
 RATE_TOLERANCE = 2.0, 0.2  # deg/s, and a share of the rate
-SLOWEST_TURN = 10.0  # deg/s: a vehicle that turns slower than this does not turn
+SLOWEST_TURN = 10.0  # deg/s; a slower turn is too slow
 
 
 class TurningVehicle(TravellingVehicle):
@@ -42,8 +42,8 @@ class TurningVehicle(TravellingVehicle):
     async def set_yaw_rate(self, job: Job, rate: float, timeout: float | None = None) -> None:
         """Turn at `rate` deg/s, clockwise positive; done when the attitude shows it. A movement goes on.
 
-        ArduCopter takes a yaw rate only with a setpoint: so the one that it flies is repeated, or the place where it
-        is, where it does not say what it flies.
+        ArduCopter takes a yaw rate only with a setpoint. So the setpoint in force is repeated; if the autopilot does
+        not report one, the present position is sent.
         """
         self.require_guided_flight()
         self.require_no_takeoff()

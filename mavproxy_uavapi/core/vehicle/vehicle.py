@@ -24,7 +24,7 @@ class Vehicle(Verbs):
 
     Verbs raise errors of `errors.py`: `Rejected` when the autopilot refuses, `TimedOut`, `LinkLost`,
     `ModeChanged` when the pilot or a failsafe takes the vehicle, `Busy` and `NotArmed` when its state
-    stands against it; then nothing has been sent.
+    forbids the verb; then nothing has been sent.
     """
 
     async def arm(self, job: Job, timeout: float | None = None) -> None:
@@ -34,7 +34,7 @@ class Vehicle(Verbs):
         somebody arms meanwhile.
 
         Raises:
-            Rejected: it did not get ready, or refused; with the reasons that it gave.
+            Rejected: it did not get ready, or refused; with the autopilot's reasons.
         """
         if self.state.armed and self.mode == "GUIDED":
             return
@@ -47,7 +47,7 @@ class Vehicle(Verbs):
     async def disarm(self, job: Job, force: bool = False) -> None:
         """Disarm and wait until a heartbeat shows it. In flight it is refused, unless `force`: then it falls.
 
-        It ends an `arm` that waits; nothing is sent then, unless that may have been on its way.
+        It ends an `arm` that waits. Nothing is sent then, unless the command to arm may be on its way.
         """
         armed = self.state.armed is not False
         if armed and not force and self.state.landed is False:
@@ -59,7 +59,7 @@ class Vehicle(Verbs):
         self.authority.shown(job)
 
     async def set_mode(self, job: Job, mode: str) -> None:
-        """Switch to any mode of the vehicle's type. What stops it goes before what does not."""
+        """Switch to any mode of the vehicle's type. A mode that stops it has the higher rank."""
         mode_number(self.state.vehicle_type, mode)
         stops = mode.upper() in STOPPING_MODES | {self.holding_mode}
         self.authority.take(job, Rank.STOP if stops else Rank.ARM)
@@ -95,7 +95,7 @@ class Vehicle(Verbs):
         Raises:
             NotArmed: it is disarmed elsewhere.
             NotFound: it is disarmed, and has no home yet.
-            ModeChanged: somebody armed it while its home was asked for.
+            ModeChanged: somebody armed it while we requested its home.
         """
         if self.state.armed is not False:
             return False
@@ -170,7 +170,7 @@ class Vehicle(Verbs):
         await self.home()
 
     async def home(self) -> Any:
-        """HOME_POSITION, asked for.
+        """Request HOME_POSITION.
 
         Raises:
             NotFound: the vehicle has no home yet.

@@ -85,7 +85,9 @@ def test_defect_of_ours_reaches_the_client_and_the_log(bench: Bench) -> None:
         raise KeyError("oops")
 
     job = bench.begin_body(body)
-    with pytest.raises(UavApiError, match=r"/a failed by a defect of this program: KeyError\('oops'\)") as caught:
+    with pytest.raises(
+        UavApiError, match=r"/a failed because of a defect in this program: KeyError\('oops'\)"
+    ) as caught:
         bench.loop.run(job.outcome())
     assert (caught.value.status, caught.value.code) == (500, "internal")
     job._task = None  # the log is written when the task is collected

@@ -176,7 +176,7 @@ def test_refused_upload_to_an_empty_vehicle_leaves_it_empty(loop: Any, copter: A
 
 def test_mission_that_is_read_back_otherwise_is_an_error(loop: Any, copter: Any, store: Store) -> None:
     store.spoil = True
-    with pytest.raises(Rejected, match=r"otherwise than it was sent: item 1 .* could not be put back"):
+    with pytest.raises(Rejected, match=r"is not the one that was sent: item 1 .* could not be put back"):
         loop.run(copter.waypoints.upload(NEW))
 
 

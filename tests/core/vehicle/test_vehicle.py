@@ -404,9 +404,9 @@ def test_distance_home_needs_both_places(loop: Any, drone: Any, copter: Any) -> 
 def test_old_position_is_not_flown_by(loop: Any, drone: Any, copter: Any) -> None:
     drone.mute.add("LOCAL_POSITION_NED")
     loop.pass_time(3.5)
-    with pytest.raises(Stale, match=r"LOCAL_POSITION_NED: told 3\.5 s ago"):
+    with pytest.raises(Stale, match=r"LOCAL_POSITION_NED: 3\.5 s old"):
         copter.fresh("LOCAL_POSITION_NED")
-    with pytest.raises(Stale, match="never told"):
+    with pytest.raises(Stale, match="never received"):
         copter.fresh("HOME_POSITION")
 
 

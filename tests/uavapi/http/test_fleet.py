@@ -80,7 +80,7 @@ def test_all_or_none_begins_together_when_all_can(make_drone: Any, api: Any, loo
     """The second is ready to arm later: the first waits for it, disarmed."""
     first, second = make_drone(1), make_drone(2)
     second.ready = False
-    loop.settle()
+    loop.pass_time(2.0)
     flight = api.begin("POST", "/fleet/arm", json={"all_or_none": True})
     loop.pass_time(10.0)
     assert first.orders() == second.orders() == []
@@ -94,7 +94,7 @@ def test_all_or_none_begins_together_when_all_can(make_drone: Any, api: Any, loo
 def test_who_waits_at_the_gate_still_heeds_the_pilot(make_drone: Any, api: Any, loop: Any) -> None:
     first, second = make_drone(1), make_drone(2)
     second.ready = False
-    loop.settle()
+    loop.pass_time(2.0)
     flight = api.begin("POST", "/fleet/arm", json={"all_or_none": True})
     loop.pass_time(5.0)
     first.pilot("LOITER")
