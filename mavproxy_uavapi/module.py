@@ -12,6 +12,7 @@ try:
     from mavproxy_uavapi.api import Api
 except ModuleNotFoundError as missing:  # MAVProxy prints the text of an ImportError as one line
     raise ImportError(f"uavapi needs {missing.name}: pip install mavproxy-uavapi") from missing
+from mavproxy_uavapi import fleet_console
 from mavproxy_uavapi.console import report, vehicles
 from mavproxy_uavapi.core.background import BackgroundCommands
 from mavproxy_uavapi.core.errors import SettingError
@@ -21,7 +22,12 @@ from mavproxy_uavapi.core.remembered_settings import RememberedSettings
 from mavproxy_uavapi.settings import ApiModuleSettings, ApiSettings
 
 NAME = "uavapi"
-COMPLETIONS = ["<status|start|stop|vehicles|config|log|help>", "set (UAVAPISETTING)", "fly (FILENAME)"]
+COMPLETIONS = [
+    "<status|start|stop|vehicles|config|log|help>",
+    "fleet <arm|brake|disarm|guided|land|rtl|stop>",
+    "set (UAVAPISETTING)",
+    "fly (FILENAME)",
+]
 LOG_SHOWN = 20  # entries
 HELP = """\
 uavapi status            what it listens on, the vehicle that it flies, and the calls in flight
@@ -33,6 +39,7 @@ uavapi config            the settings in force, and where each came from
 uavapi log [N]           the last N commands: who asked, and how it ended
 uavapi vehicles          every vehicle that was heard
 uavapi fly FILE          fly a recorded track with the API's vehicle, `sysid` (module gradys)
+uavapi fleet VERB [N …]  arm, brake, disarm, guided, land, rtl or stop, for every vehicle or those system ids
 uavapi help              this"""
 
 
@@ -50,6 +57,7 @@ class UavApiModule(SharedModule[ApiSettings]):
             "log": self._log,
             "vehicles": lambda _: self._tell(vehicles),
             "fly": self._fly,
+            "fleet": self._fleet,
             "help": lambda _: print(HELP),
         }
         super().__init__(
@@ -140,6 +148,9 @@ class UavApiModule(SharedModule[ApiSettings]):
             print("uavapi: fly needs the module that knows tracks: `module load gradys`")
         else:
             fly(["--sysid", str(self.module_settings.snapshot().sysid), *args])
+
+    def _fleet(self, args: list[str]) -> None:
+        self._background.send(lambda: fleet_console.command(self.host, args), f"at fleet {' '.join(args)}")
 
     def _log(self, args: list[str]) -> None:
         try:

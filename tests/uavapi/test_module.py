@@ -101,6 +101,7 @@ def test_module_is_what_mavproxy_looks_for(module: Any, mpstate: Any) -> None:
     assert set(mpstate.command_map) == {"uavapi"}
     assert mpstate.completions["uavapi"] == [
         "<status|start|stop|vehicles|config|log|help>",
+        "fleet <arm|brake|disarm|guided|land|rtl|stop>",
         "set (UAVAPISETTING)",
         "fly (FILENAME)",
     ]
