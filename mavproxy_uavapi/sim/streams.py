@@ -7,10 +7,13 @@ wins: a REQUEST_DATA_STREAM overrides the intervals of all messages in that stre
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-GROUPS: dict[int, tuple[str, ...]] = {
+Groups = Mapping[int, tuple[str, ...]]
+
+GROUPS: Groups = {
     mavlink.MAV_DATA_STREAM_RAW_SENSORS: ("RAW_IMU", "SCALED_PRESSURE"),
     mavlink.MAV_DATA_STREAM_EXTENDED_STATUS: (
         "SYS_STATUS",
@@ -56,7 +59,8 @@ HEARTBEAT_INTERVAL = 1.0
 class Streams:
     """The intervals of one link."""
 
-    def __init__(self) -> None:
+    def __init__(self, groups: Groups | None = None) -> None:
+        self._groups = GROUPS if groups is None else groups
         self._interval: dict[str, float] = {}
         self._due: dict[str, float] = {}
         self._next = math.inf
@@ -82,9 +86,9 @@ class Streams:
         Returns:
             The streams that now have this rate.
         """
-        groups = [group for group in GROUPS if stream in (group, mavlink.MAV_DATA_STREAM_ALL)]
+        groups = [group for group in self._groups if stream in (group, mavlink.MAV_DATA_STREAM_ALL)]
         for group in groups:
-            for name in GROUPS[group]:
+            for name in self._groups[group]:
                 self.set(name, 1 / rate if rate > 0 else None, now)
         return groups
 
@@ -100,9 +104,9 @@ class Streams:
         return names
 
 
-def group_of(name: str) -> int | None:
+def group_of(name: str, groups: Groups = GROUPS) -> int | None:
     """The stream a message belongs to, or None."""
-    for stream, names in GROUPS.items():
+    for stream, names in groups.items():
         if name in names:
             return stream
     return None

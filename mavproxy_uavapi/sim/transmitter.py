@@ -8,11 +8,11 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from .copter import SimulatedCopter
 from .events import Broadcast, Event, StatusTextEvent
 from .faults import Faults
 from .link import PeerLink
 from .telemetry import Telemetry
+from .vehicle import Vehicle
 
 TEXT_LENGTH = 50
 
@@ -20,8 +20,8 @@ TEXT_LENGTH = 50
 class Transmitter:
     """Sends for one vehicle from one boot to the next; links is its owner's list, which may change meanwhile."""
 
-    def __init__(self, copter: SimulatedCopter, telemetry: Telemetry, faults: Faults, links: list[PeerLink]) -> None:
-        self._copter = copter
+    def __init__(self, vehicle: Vehicle, telemetry: Telemetry, faults: Faults, links: list[PeerLink]) -> None:
+        self._vehicle = vehicle
         self._telemetry = telemetry
         self._faults = faults
         self._links = links
@@ -32,13 +32,13 @@ class Transmitter:
         """Queue a message about the present state for one link, if there is something to say."""
         message = self._telemetry.build(name)
         if message is not None:
-            link.send(self._faults.spoilt(message, self._copter.now))
+            link.send(self._faults.spoilt(message, self._vehicle.now))
 
     def send_soon(self, link: PeerLink, name: str) -> None:
         """The same with the next step."""
         message = self._telemetry.build(name)
         if message is not None:
-            self.plan(self._copter.now, link, self._faults.spoilt(message, self._copter.now))
+            self.plan(self._vehicle.now, link, self._faults.spoilt(message, self._vehicle.now))
 
     def broadcast(self, name: str) -> None:
         """Queue a message about the present state for all links."""
@@ -63,6 +63,6 @@ class Transmitter:
 
     def send_planned(self) -> None:
         """Queue the planned messages whose time has come."""
-        while self._planned and self._planned[0][0] <= self._copter.now:
+        while self._planned and self._planned[0][0] <= self._vehicle.now:
             _, _, link, message, source = heapq.heappop(self._planned)
             link.send(message, source)
