@@ -17,7 +17,7 @@ from . import arming
 from .frames import AMSL_FRAMES, GLOBAL_FRAMES, HIGHEST_ALTITUDE, valid_location
 from .geodesy import Location
 from .link import PeerLink
-from .streams import HEARTBEAT_INTERVAL, RATE_PARAMETERS, group_of
+from .streams import HEARTBEAT_INTERVAL, group_of
 from .telemetry import Telemetry
 from .transmitter import Transmitter
 from .vehicle import Vehicle
@@ -117,6 +117,11 @@ class Commands:
         """Carry the command out; its MAV_RESULT. link is where answers beyond the ack go."""
         handler = self._handlers.get(command.command)
         return UNSUPPORTED if handler is None else handler(command, link)
+
+    def accept(self, command: CommandInt, link: PeerLink) -> int:
+        """A command that is for a gimbal, which is not there; ArduPilot accepts it all the same."""
+        del command, link
+        return ACCEPTED
 
     def _arm_disarm(self, command: CommandInt, link: PeerLink) -> int:
         del link
@@ -233,7 +238,7 @@ class Commands:
         if name == "HEARTBEAT":
             return HEARTBEAT_INTERVAL
         group = group_of(name, self._vehicle.streams)
-        rate = self._vehicle.parameters[RATE_PARAMETERS[group]] if group is not None else 0.0
+        rate = self._vehicle.parameters[self._vehicle.rate_parameter(group)] if group is not None else 0.0
         return 1 / rate if rate > 0 else None
 
     def _get_interval(self, command: CommandInt, link: PeerLink) -> int:

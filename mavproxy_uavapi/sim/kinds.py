@@ -11,7 +11,11 @@ from .copter import setpoints as copter_setpoints
 from .copter.commands import CopterCommands
 from .copter.copter import SimulatedCopter
 from .parameter_tables import copter as copter_parameters
+from .parameter_tables import rover as rover_parameters
 from .parameter_tables.blocks import Blocks
+from .rover import setpoints as rover_setpoints
+from .rover.commands import RoverCommands
+from .rover.rover import SimulatedRover
 
 
 @dataclass(frozen=True)
@@ -40,6 +44,15 @@ KINDS: Mapping[str, Kind] = {
             "SET_POSITION_TARGET_LOCAL_NED": copter_setpoints.apply_local,
             "SET_POSITION_TARGET_GLOBAL_INT": copter_setpoints.apply_global,
             "LANDING_TARGET": _landing_target,
+        },
+    ),
+    "rover": Kind(
+        SimulatedRover,
+        RoverCommands,
+        rover_parameters.BLOCKS,
+        {
+            "SET_POSITION_TARGET_LOCAL_NED": rover_setpoints.apply_local,
+            "SET_POSITION_TARGET_GLOBAL_INT": rover_setpoints.apply_global,
         },
     ),
 }

@@ -47,8 +47,8 @@ NAMES = {
 class Flyer(Protocol):
     """The mode that carries the items out."""
 
-    def begin_item(self, item: Item) -> None:
-        """Start a navigation item."""
+    def begin_item(self, item: Item) -> bool:
+        """Start a navigation item; False where the vehicle cannot, and the next one follows."""
 
     def item_done(self, item: Item) -> bool:
         """Whether the navigation item that was begun last is done."""
@@ -70,11 +70,16 @@ class Flyer(Protocol):
 
 
 class MissionRunner:
-    """Runs the mission of one vehicle from its marker on."""
+    """Runs the mission of one vehicle from its marker on.
 
-    def __init__(self, vehicle: Vehicle, flyer: Flyer) -> None:
+    With reports_all MISSION_ITEM_REACHED tells of immediate items, too, and of several at once the last one only.
+    """
+
+    def __init__(self, vehicle: Vehicle, flyer: Flyer, *, reports_all: bool = False) -> None:
         self._vehicle = vehicle
         self._flyer = flyer
+        self._reports_all = reports_all
+        self._reached: int | None = None
         self._alongside: deque[tuple[int, Item]] = deque()
         self._condition_since = 0.0
         self._seen_changes = 0
@@ -98,6 +103,9 @@ class MissionRunner:
         elif self._vehicle.mission.state is State.RUNNING:
             self._watch_for_changes()
             self._update()
+        if self._reports_all and self._reached is not None:
+            self._vehicle.tell(ItemReached(self._reached))
+        self._reached = None
 
     def _start_or_resume(self) -> None:
         """Begin at the first item, or where the mission was left (MIS_RESTART 0)."""
@@ -135,8 +143,10 @@ class MissionRunner:
                 seq = self._jump(seq, item)
                 continue
             if item.command in NAVIGATION:
-                self._begin(seq, item)
-                return
+                if self._begin(seq, item):
+                    return
+                seq += 1
+                continue
             # What follows a condition waits for it, while the next leg is already being flown.
             if item.command in CONDITION or self._alongside:
                 if not self._alongside:
@@ -160,15 +170,16 @@ class MissionRunner:
         name = NAMES.get(item.command, f"Cmd {item.command}")
         self._vehicle.say(mavlink.MAV_SEVERITY_INFO, f"Mission: {seq} {name}")
 
-    def _begin(self, seq: int, item: Item) -> None:
+    def _begin(self, seq: int, item: Item) -> bool:
         self._vehicle.mission.current = seq
         self._announce(seq, item)
         self._vehicle.tell(Broadcast("MISSION_CURRENT"))
-        self._flyer.begin_item(item)
+        return self._flyer.begin_item(item)
 
     def _do(self, seq: int, item: Item) -> None:
         self._announce(seq, item)
         self._flyer.do_item(item)
+        self._reached = seq
 
     def _update(self) -> None:
         """Is the current item done, is a condition fulfilled?"""
@@ -177,7 +188,9 @@ class MissionRunner:
         item = mission.items[mission.current]
         if not self._flyer.item_done(item) or mission.state is not State.RUNNING:
             return
-        vehicle.tell(ItemReached(mission.current))
+        self._reached = mission.current
+        if not self._reports_all:
+            vehicle.tell(ItemReached(mission.current))
         self.run_from(mission.current + 1)
 
     def _start_condition(self, item: Item) -> None:

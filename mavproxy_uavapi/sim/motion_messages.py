@@ -151,12 +151,15 @@ class MotionMessages(MessageSource):
 
     def _build_vfr_hud(self) -> Any:
         vehicle = self.vehicle
-        body = vehicle.body
         _, _, velocity, place = self._position()
         ground_speed = math.hypot(velocity.north, velocity.east)
-        air_speed = math.hypot(velocity.north - body.wind_north, velocity.east - body.wind_east)
         return mavlink.MAVLink_vfr_hud_message(
-            air_speed, ground_speed, int(self._heading()), vehicle.throttle_percent, place.altitude, -velocity.down
+            vehicle.airspeed,
+            ground_speed,
+            int(self._heading()),
+            vehicle.throttle_percent,
+            place.altitude,
+            -velocity.down,
         )
 
     def _build_ahrs(self) -> Any:

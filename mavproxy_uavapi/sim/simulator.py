@@ -29,13 +29,14 @@ from .mission import Mission
 from .mission_protocol import MissionProtocol
 from .options import Options
 from .parameters import Parameter, ParameterStore
-from .streams import RATE_PARAMETERS
 from .telemetry import Telemetry
 from .transmitter import Transmitter
 
 STEP = 0.01
 """Seconds of simulated time in one step, at any speedup."""
 PARAMETERS_PER_STEP = 20
+SYSTEM_ID_PARAMETERS = ("SYSID_THISMAV", "MAV_SYSID")
+"""Its name until ArduPilot 4.6, and since."""
 UNKNOWN_INDEX = 65535
 REMEMBERED_MESSAGES = 20000
 FTP_NAK = 129
@@ -62,7 +63,8 @@ class Simulator:
         self._kind = KINDS[options.vehicle]
         self.parameters = ParameterStore(self._kind.parameters)
         self.parameters.set("SIM_SPEEDUP", options.speedup)
-        self.parameters.set("SYSID_THISMAV", options.sysid)
+        for name in SYSTEM_ID_PARAMETERS:
+            self.parameters.set(name, options.sysid)
         self.parameters.set("SIM_WIND_SPD", options.wind.speed)
         self.parameters.set("SIM_WIND_DIR", options.wind.direction)
         self.faults = Faults()
@@ -207,7 +209,8 @@ class Simulator:
     def _request_stream(self, link: PeerLink, message: Any) -> None:
         rate = message.req_message_rate if message.start_stop == 1 else 0
         for group in link.streams.request_group(message.req_stream_id, rate, self.vehicle.now):
-            self.parameters.set(RATE_PARAMETERS[group], rate)  # as ArduPilot: it is the stream's default from now on
+            # As in ArduPilot it is the stream's default from now on.
+            self.parameters.set(self.vehicle.rate_parameter(group), rate)
 
     def _parameter_list(self, link: PeerLink, message: Any) -> None:
         del message

@@ -37,7 +37,6 @@ CAPABILITIES = (
     | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
 )
 """Without FTP: MAVProxy then loads the parameters one by one, at once."""
-FIRMWARE_VERSION = (4 << 24) | (6 << 16) | (0 << 8) | mavlink.FIRMWARE_VERSION_TYPE_OFFICIAL
 GPS_EPOCH = 315964800
 """1980-01-06 in unix seconds; before it a clock has never been set."""
 
@@ -146,8 +145,10 @@ class SystemMessages(MessageSource):
         return mavlink.MAVLink_vibration_message(self._microseconds(), 0.0, 0.0, 0.0, 0, 0, 0)
 
     def _build_autopilot_version(self) -> Any:
+        major, minor, patch, kind = self.vehicle.version
+        version = major << 24 | minor << 16 | patch << 8 | kind
         return mavlink.MAVLink_autopilot_version_message(
-            CAPABILITIES, FIRMWARE_VERSION, 0, 0, 0, list(b"embedded"), [0] * 8, [0] * 8, 0, 0, 0
+            CAPABILITIES, version, 0, 0, 0, list(b"embedded"), [0] * 8, [0] * 8, 0, 0, 0
         )
 
     def _build_extended_sys_state(self) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 from collections import deque
 from collections.abc import Mapping
@@ -21,7 +22,7 @@ from .options import Options
 from .parameters import ParameterStore
 from .physics import Body
 from .reports import LocalTarget, Navigation
-from .streams import GROUPS, Groups
+from .streams import GROUPS, RATE_PARAMETERS, Groups
 
 BOOT_TEXTS = (
     # Share of the time until the estimator is ready, and what SITL says then.
@@ -53,8 +54,12 @@ class Vehicle:
     """
 
     mav_type: ClassVar[int]
-    firmware: ClassVar[str]
-    frame: ClassVar[str]
+    version: ClassVar[tuple[int, int, int, int]]
+    """Major, minor, patch and FIRMWARE_VERSION_TYPE."""
+    banner: ClassVar[tuple[str, ...]]
+    """What it says at boot and when it is asked: the firmware, the frame."""
+    rate_prefix: ClassVar[str] = "SR0_"
+    """How the parameters with the rates of the streams begin."""
     mission_commands: ClassVar[frozenset[int]] = SUPPORTED
     """The MAV_CMDs that a mission may have."""
     streams: ClassVar[Groups] = GROUPS
@@ -85,7 +90,7 @@ class Vehicle:
         self.armed = False
         self._last_report = -arming.REPORT_INTERVAL + 1.0
         self._switch: int | None = None
-        banner = [(0.05, text) for text in (self.firmware, self.frame)]
+        banner = [(0.05, text) for text in self.banner]
         self._boot_texts = deque([*banner, *BOOT_TEXTS])
         mission.reset()
 
@@ -101,8 +106,12 @@ class Vehicle:
 
     def say_banner(self) -> None:
         """The firmware and frame, as at boot."""
-        self.say(mavlink.MAV_SEVERITY_INFO, self.firmware)
-        self.say(mavlink.MAV_SEVERITY_INFO, self.frame)
+        for text in self.banner:
+            self.say(mavlink.MAV_SEVERITY_INFO, text)
+
+    def rate_parameter(self, group: int) -> str:
+        """The parameter with the rate of a MAV_DATA_STREAM."""
+        return self.rate_prefix + RATE_PARAMETERS[group]
 
     # Derived state.
 
@@ -149,6 +158,12 @@ class Vehicle:
     def vtol_state(self) -> int:
         """MAV_VTOL_STATE of EXTENDED_SYS_STATE."""
         return int(mavlink.MAV_VTOL_STATE_UNDEFINED)
+
+    @property
+    def airspeed(self) -> float:
+        """What VFR_HUD tells, m/s."""
+        body, velocity = self.body, self.estimator.velocity
+        return math.hypot(velocity.north - body.wind_north, velocity.east - body.wind_east)
 
     @property
     def throttle_percent(self) -> int:

@@ -33,8 +33,8 @@ class SimulatedCopter(Aircraft):
     """An aircraft with its flight modes and what chooses among them: the ground, the pilot's switch, failsafes."""
 
     mav_type = mavlink.MAV_TYPE_QUADROTOR
-    firmware = "ArduCopter V4.6.0 (embedded)"
-    frame = "Frame: QUAD/PLUS"
+    version = (4, 6, 0, mavlink.FIRMWARE_VERSION_TYPE_OFFICIAL)
+    banner = ("ArduCopter V4.6.0 (embedded)", "Frame: QUAD/PLUS")
 
     mode: Mode
 

@@ -94,7 +94,7 @@ class Auto(Mode, MissionMode):
     def item_restarts(self) -> bool:
         return self.submode is AutoSubmode.WAYPOINT
 
-    def begin_item(self, item: Item) -> None:
+    def begin_item(self, item: Item) -> bool:
         aircraft = self.aircraft
         self._arrived_at, self._started_at = None, aircraft.now
         if item.command == mavlink.MAV_CMD_NAV_TAKEOFF:
@@ -111,6 +111,7 @@ class Auto(Mode, MissionMode):
             self.submode = AutoSubmode.HOLD
         else:
             self._begin_leg(item)
+        return True
 
     def _begin_leg(self, item: Item) -> None:
         aircraft = self.aircraft
