@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable
 from typing import TypeVar
 
+from .kinds import KINDS
 from .options import SITL_BASE_PORT, Home, Options, Wind
 from .server import Server
 from .simulator import Simulator
@@ -20,6 +21,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Run a vehicle until SIGINT or SIGTERM; the exit status (1 when a port is taken)."""
     chosen = _parser().parse_args(arguments)
     options = Options(
+        vehicle=chosen.vehicle,
         sysid=chosen.sysid,
         speedup=chosen.speedup,
         home=chosen.home,
@@ -42,7 +44,10 @@ def main(arguments: list[str] | None = None) -> int:
         signal.signal(number, lambda *_: server.stop())
     home = options.home
     place = f"{home.latitude:.6f},{home.longitude:.6f},{home.altitude:g}"
-    print(f"sim: vehicle {options.sysid} at {place} listening on tcp:{chosen.host}:{port}", flush=True)
+    print(
+        f"sim: vehicle {options.sysid} ({options.vehicle}) at {place} listening on tcp:{chosen.host}:{port}",
+        flush=True,
+    )
     if control is not None:
         print(f"sim: control on tcp:{chosen.host}:{control}", flush=True)
     server.run()
@@ -52,9 +57,11 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="python -m mavproxy_uavapi.sim", description="An ArduCopter-like vehicle to fly out of the box."
+        prog="python -m mavproxy_uavapi.sim",
+        description="A vehicle like ArduPilot's, to try out of the box.",
     )
     add = parser.add_argument
+    add("--vehicle", choices=list(KINDS), default="copter", help="its type (default copter)")
     add("--instance", type=_natural, default=0, metavar="N", help="TCP port 5760 + 10*N (default 0)")
     add("--sysid", type=_system, default=1, metavar="N", help="MAVLink system id (default 1)")
     add("--speedup", type=_positive, default=1.0, metavar="X", help="simulated seconds per second (default 1)")

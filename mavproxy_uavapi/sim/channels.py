@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from .parameters import ParameterStore
 
 NEUTRAL = (1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800)
@@ -14,14 +16,15 @@ STICK_DEADZONE = 20
 CHANNEL_COUNT = 16
 SERVO_COUNT = 16
 MOTOR_FUNCTIONS = (33, 34, 35, 36)
+STEERING_FUNCTION, THROTTLE_FUNCTION = 26, 70
 DISABLED_OUTPUT = 0
 
 
 class Sticks:
     """The radio channels 1..16 with overrides from MAVLink on top."""
 
-    def __init__(self) -> None:
-        self._radio = [*NEUTRAL, *([0] * (CHANNEL_COUNT - len(NEUTRAL)))]
+    def __init__(self, neutral: tuple[int, ...] = NEUTRAL) -> None:
+        self._radio = [*neutral, *([0] * (CHANNEL_COUNT - len(neutral)))]
         self._override: dict[int, tuple[int, float]] = {}
 
     def override(self, pulses: list[int], now: float) -> None:
@@ -82,8 +85,12 @@ class Servos:
         return True
 
     def pulses(self, motor_pulse: int) -> list[int]:
-        """All outputs; motors show motor_pulse."""
+        """All outputs; a copter's motors show motor_pulse."""
+        return self.driven(dict.fromkeys(MOTOR_FUNCTIONS, motor_pulse))
+
+    def driven(self, by_function: Mapping[int, int]) -> list[int]:
+        """All outputs; those with a SERVOn_FUNCTION of by_function show its pulse."""
         return [
-            motor_pulse if self.function(channel) in MOTOR_FUNCTIONS else self._pulses[channel - 1]
+            by_function.get(self.function(channel), self._pulses[channel - 1])
             for channel in range(1, SERVO_COUNT + 1)
         ]

@@ -1,7 +1,7 @@
-"""Commands: one handler for each MAV_CMD that ArduCopter takes from a ground station; each gives a MAV_RESULT.
+"""MAV_CMD to MAV_RESULT: one handler for each command that every ArduPilot vehicle takes from the ground.
 
 COMMAND_LONG and COMMAND_INT meet here in one shape, as in ArduPilot; commands not in the table are
-MAV_RESULT_UNSUPPORTED.
+MAV_RESULT_UNSUPPORTED. A type of vehicle adds its own to the table.
 """
 
 from __future__ import annotations
@@ -13,28 +13,21 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from .copter import SimulatedCopter
-from .frames import AMSL_FRAMES, GLOBAL_FRAMES, HIGHEST_ALTITUDE, global_target, valid_location
+from . import arming
+from .frames import AMSL_FRAMES, GLOBAL_FRAMES, HIGHEST_ALTITUDE, valid_location
 from .geodesy import Location
 from .link import PeerLink
-from .modes import Guided
-from .modes.auto import Auto
-from .position_control import SPEED_KINDS
-from .streams import HEARTBEAT_INTERVAL, RATE_PARAMETERS, group_of
+from .streams import HEARTBEAT_INTERVAL, group_of
 from .telemetry import Telemetry
 from .transmitter import Transmitter
+from .vehicle import Vehicle
 
 ACCEPTED: int = mavlink.MAV_RESULT_ACCEPTED
 DENIED: int = mavlink.MAV_RESULT_DENIED
 FAILED: int = mavlink.MAV_RESULT_FAILED
 BUSY: int = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
 UNSUPPORTED: int = mavlink.MAV_RESULT_UNSUPPORTED
-FORCE_ARM = 2989.0
-FORCE_ARM_OR_DISARM = 21196.0
-"""Values of param2 of MAV_CMD_COMPONENT_ARM_DISARM that skip checks."""
 FORCE_REBOOT = 20190226
-NO_SPEED_KIND = 4
-"""The end of the enumeration SPEED_TYPE: ArduCopter answers DENIED to it, and FAILED to larger values."""
 FASTEST_INTERVAL = 0.003
 """Seconds; ArduPilot refuses more than 0.8 of SCHED_LOOP_RATE. More than 100 Hz is not sent here."""
 LONGEST_INTERVAL = 60.0
@@ -66,8 +59,8 @@ class CommandInt:
 def from_message(message: Any) -> CommandInt | None:
     """COMMAND_LONG or COMMAND_INT as a Command; None for a COMMAND_LONG that ArduPilot takes as INT only.
 
-    A parameter that is not a finite number means "not given" and reads as 0. z stays as it is, because an altitude
-    must not become 0 by mistake.
+    A parameter that is not a finite number stands for "not given" and reads as 0; z is left as it is, for an
+    altitude must not become 0 by mistake.
     """
     sender = (message.get_srcSystem(), message.get_srcComponent())
     parameters = (
@@ -86,44 +79,30 @@ def from_message(message: Any) -> CommandInt | None:
     return CommandInt(message.command, frame, *parameters, x, y, message.param7, sender)
 
 
-def _means_here(command: CommandInt) -> bool:
-    """Zeros that stand for the present place or height in a mission; a reposition must not have them."""
-    return (command.x == 0 and command.y == 0) or (command.z == 0 and command.frame not in AMSL_FRAMES)
-
-
 def _finite(value: float) -> float:
     return value if math.isfinite(value) else 0.0
+
+
+Handler = Callable[[CommandInt, PeerLink], int]
 
 
 class Commands:
     """Carries out commands on one vehicle; reboot makes it boot again once the acknowledgement is out."""
 
     def __init__(
-        self, copter: SimulatedCopter, telemetry: Telemetry, transmitter: Transmitter, reboot: Callable[[], None]
+        self, vehicle: Vehicle, telemetry: Telemetry, transmitter: Transmitter, reboot: Callable[[], None]
     ) -> None:
-        self._copter = copter
+        self._vehicle = vehicle
         self._telemetry = telemetry
         self._transmitter = transmitter
         self._reboot_soon = reboot
-        self._handlers: dict[int, Callable[[CommandInt, PeerLink], int]] = {
+        self._handlers: dict[int, Handler] = {
             mavlink.MAV_CMD_COMPONENT_ARM_DISARM: self._arm_disarm,
             mavlink.MAV_CMD_RUN_PREARM_CHECKS: self._run_prearm_checks,
             mavlink.MAV_CMD_DO_SET_MODE: self._set_mode,
-            mavlink.MAV_CMD_NAV_TAKEOFF: self._take_off,
-            mavlink.MAV_CMD_NAV_LAND: self._mode_command(9),
-            mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: self._mode_command(6),
-            mavlink.MAV_CMD_NAV_LOITER_UNLIM: self._mode_command(5),
-            mavlink.MAV_CMD_DO_REPOSITION: self._reposition,
-            mavlink.MAV_CMD_MISSION_START: self._mission_start,
             mavlink.MAV_CMD_DO_SET_MISSION_CURRENT: self._set_mission_current,
-            mavlink.MAV_CMD_CONDITION_YAW: self._condition_yaw,
-            mavlink.MAV_CMD_DO_CHANGE_SPEED: self._change_speed,
-            mavlink.MAV_CMD_DO_PAUSE_CONTINUE: self._pause_continue,
             mavlink.MAV_CMD_DO_SET_HOME: self._set_home,
             mavlink.MAV_CMD_GET_HOME_POSITION: self._get_home,
-            mavlink.MAV_CMD_DO_SET_ROI: self._set_roi,
-            mavlink.MAV_CMD_DO_SET_ROI_LOCATION: self._set_roi,
-            mavlink.MAV_CMD_DO_SET_ROI_NONE: self._clear_roi,
             mavlink.MAV_CMD_DO_SET_SERVO: self._set_servo,
             mavlink.MAV_CMD_DO_FLIGHTTERMINATION: self._terminate,
             mavlink.MAV_CMD_REQUEST_MESSAGE: self._request_message,
@@ -139,201 +118,127 @@ class Commands:
         handler = self._handlers.get(command.command)
         return UNSUPPORTED if handler is None else handler(command, link)
 
+    def accept(self, command: CommandInt, link: PeerLink) -> int:
+        """A command that is for a gimbal, which is not there; ArduPilot accepts it all the same."""
+        del command, link
+        return ACCEPTED
+
     def _arm_disarm(self, command: CommandInt, link: PeerLink) -> int:
         del link
-        copter = self._copter
+        vehicle = self._vehicle
         if command.param1 == 1:
-            forced = command.param2 in (FORCE_ARM, FORCE_ARM_OR_DISARM)
-            return ACCEPTED if copter.arm(forced=forced) else FAILED
+            forced = command.param2 in (arming.FORCE, arming.FORCE_ARM)
+            return ACCEPTED if vehicle.arm(forced=forced) else FAILED
         if command.param1 == 0:
-            return ACCEPTED if copter.disarm(forced=command.param2 == FORCE_ARM_OR_DISARM) else FAILED
+            return ACCEPTED if vehicle.disarm(forced=command.param2 == arming.FORCE) else FAILED
         return UNSUPPORTED
 
     def _run_prearm_checks(self, command: CommandInt, link: PeerLink) -> int:
         del command, link
-        copter = self._copter
-        if copter.armed:
+        vehicle = self._vehicle
+        if vehicle.armed:
             return BUSY
-        copter.report_prearm()
+        vehicle.report_prearm()
         return ACCEPTED
 
     def set_mode(self, base_mode: int, custom_mode: int) -> int:
         """Change the mode as MAV_CMD_DO_SET_MODE and SET_MODE ask; a MAV_RESULT."""
         if not base_mode & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
             return DENIED
-        return ACCEPTED if self._copter.set_mode(custom_mode) else FAILED
+        return ACCEPTED if self._vehicle.set_mode(custom_mode) else FAILED
 
     def _set_mode(self, command: CommandInt, link: PeerLink) -> int:
         del link
         return self.set_mode(int(command.param1), int(command.param2))
 
-    def _mode_command(self, number: int) -> Callable[[CommandInt, PeerLink], int]:
+    def mode_command(self, number: int) -> Handler:
+        """A command that changes the mode and nothing else."""
+
         def handler(command: CommandInt, link: PeerLink) -> int:
             del command, link
-            return ACCEPTED if self._copter.set_mode(number) else FAILED
+            return ACCEPTED if self._vehicle.set_mode(number) else FAILED
 
         return handler
 
-    def _take_off(self, command: CommandInt, link: PeerLink) -> int:
-        del link
-        copter = self._copter
-        if command.frame not in (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT):
-            return DENIED
-        if not copter.armed or not copter.landed or not abs(command.z) <= HIGHEST_ALTITUDE:
-            return FAILED
-        return ACCEPTED if copter.mode.take_off(command.z) else FAILED
-
-    def _reposition(self, command: CommandInt, link: PeerLink) -> int:
-        del link
-        copter = self._copter
-        change = bool(int(command.param2) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
-        if copter.mode is not copter.guided and not change:
-            return DENIED
-        if not valid_location(command.x, command.y, command.z) or _means_here(command):
-            return DENIED
-        target = global_target(copter, command.frame, command.x, command.y, command.z)
-        if target is None:
-            return DENIED
-        if not copter.set_mode(Guided.number):
-            return FAILED
-        copter.guided.go_to(target)
-        return ACCEPTED
-
-    def _mission_start(self, command: CommandInt, link: PeerLink) -> int:
-        del link
-        copter = self._copter
-        if command.param1 != 0 or command.param2 != 0:
-            return DENIED
-        if not copter.set_mode(Auto.number):
-            return FAILED
-        # Otherwise a vehicle on the ground waits until the pilot raises the throttle.
-        copter.auto_armed = copter.armed
-        return ACCEPTED
-
     def _set_mission_current(self, command: CommandInt, link: PeerLink) -> int:
         del link
-        if not self._copter.current_item(int(command.param1)):
+        if not self._vehicle.current_item(int(command.param1)):
             return DENIED
         self._transmitter.broadcast("MISSION_CURRENT")
         return ACCEPTED
 
-    def _condition_yaw(self, command: CommandInt, link: PeerLink) -> int:
-        del link
-        if not 0 <= command.param1 <= 360 or command.param4 not in (0, 1):
-            return FAILED
-        self._copter.fix_yaw(command.param1, command.param2, int(command.param3), command.param4 == 1)
-        return ACCEPTED
-
-    def _change_speed(self, command: CommandInt, link: PeerLink) -> int:
-        del link
-        kind = SPEED_KINDS.get(int(command.param1))
-        if not command.param2 > 0 or int(command.param1) == NO_SPEED_KIND:
-            return DENIED
-        changed = kind is not None and self._copter.mode.set_speed(kind, command.param2)
-        return ACCEPTED if changed else FAILED
-
-    def _pause_continue(self, command: CommandInt, link: PeerLink) -> int:
-        del link
-        copter = self._copter
-        if int(command.param1) not in (0, 1):
-            return DENIED
-        pause = int(command.param1) == 0
-        if copter.mode.pause() if pause else copter.mode.resume():
-            return ACCEPTED
-        copter.say(mavlink.MAV_SEVERITY_INFO, "Failed to pause" if pause else "Failed to resume")
-        return FAILED
-
     def _set_home(self, command: CommandInt, link: PeerLink) -> int:
         del link
-        copter = self._copter
+        vehicle = self._vehicle
         if command.param1 == 1 or (command.x == 0 and command.y == 0):
-            return ACCEPTED if copter.set_home_here(lock=True) else FAILED
+            return ACCEPTED if vehicle.set_home_here(lock=True) else FAILED
         if command.param1 != 0:
             return FAILED
         if command.frame not in GLOBAL_FRAMES or not abs(command.z) <= HIGHEST_ALTITUDE:
             return DENIED
         if not valid_location(command.x, command.y, command.z):
             return FAILED
-        altitude = command.z if command.frame in AMSL_FRAMES else command.z + copter.home_altitude
+        altitude = command.z if command.frame in AMSL_FRAMES else command.z + vehicle.home_altitude
         home = Location(command.x / 1e7, command.y / 1e7, altitude)
-        return ACCEPTED if copter.set_home(home, lock=True) else FAILED
+        return ACCEPTED if vehicle.set_home(home, lock=True) else FAILED
 
     def _get_home(self, command: CommandInt, link: PeerLink) -> int:
         del command
-        if self._copter.home is None:
+        if self._vehicle.home is None:
             return FAILED
         self._transmitter.send(link, "HOME_POSITION")
         self._transmitter.send(link, "GPS_GLOBAL_ORIGIN")
         return ACCEPTED
 
-    def _set_roi(self, command: CommandInt, link: PeerLink) -> int:
-        if not (command.x or command.y or command.z):
-            return self._clear_roi(command, link)
-        copter = self._copter
-        if not valid_location(command.x, command.y, command.z):
-            return FAILED
-        target = global_target(copter, command.frame, command.x, command.y, command.z)
-        if target is None:
-            return FAILED
-        copter.yaw.look_at(target.north, target.east)
-        return ACCEPTED
-
-    def _clear_roi(self, command: CommandInt, link: PeerLink) -> int:
-        del command, link
-        copter = self._copter
-        copter.yaw.roi = None
-        copter.yaw.by_parameter(int(copter.parameters["WP_YAW_BEHAVIOR"]), returning=False)
-        return ACCEPTED
-
     def _set_servo(self, command: CommandInt, link: PeerLink) -> int:
         del link
-        done = self._copter.set_servo(int(command.param1), int(command.param2))
+        done = self._vehicle.set_servo(int(command.param1), int(command.param2))
         return ACCEPTED if done else FAILED
 
     def _terminate(self, command: CommandInt, link: PeerLink) -> int:
         del link
         if command.param1 <= 0.5:
             return FAILED
-        self._copter.disarm_landed()
+        self._vehicle.disarm_now()
         return ACCEPTED
 
     def _request_message(self, command: CommandInt, link: PeerLink) -> int:
-        message_id = int(command.param1)
-        if message_id == mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
+        wanted = int(command.param1)
+        if wanted == mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
             return self._send_interval(int(command.param2), link)
-        name = self._name_of(message_id)
+        name = self._name_of(wanted)
         if name is None:
             return FAILED
-        # As in ArduPilot the message waits its turn, so the acknowledgement comes first.
+        # Like most messages in ArduPilot it waits its turn, so the acknowledgement comes first.
         self._transmitter.send_soon(link, name)
         return ACCEPTED
 
     def _set_interval(self, command: CommandInt, link: PeerLink) -> int:
-        copter = self._copter
+        vehicle = self._vehicle
         name = self._name_of(int(command.param1))
         if name is None:
             text = f"No ap_message for mavlink id ({int(command.param1)})"
-            copter.say(mavlink.MAV_SEVERITY_INFO, text)
+            vehicle.say(mavlink.MAV_SEVERITY_INFO, text)
             return DENIED
         if command.param3 != 0 or command.param2 < -1:
             return DENIED
         if 0 < command.param2 < FASTEST_INTERVAL * 1e6:
             text = f"Requested rate for message ID {int(command.param1)} too fast. Increase SCHED_LOOP_RATE"
-            copter.say(mavlink.MAV_SEVERITY_INFO, text)
+            vehicle.say(mavlink.MAV_SEVERITY_INFO, text)
             return DENIED
         interval: float | None = min(LONGEST_INTERVAL, command.param2 / 1e6)
         if command.param2 == -1:
             interval = None
         elif command.param2 == 0:
             interval = self._default_interval(name)
-        link.streams.set(name, interval, copter.now)
+        link.streams.set(name, interval, vehicle.now)
         return ACCEPTED
 
     def _default_interval(self, name: str) -> float | None:
         if name == "HEARTBEAT":
             return HEARTBEAT_INTERVAL
-        group = group_of(name)
-        rate = self._copter.parameters[RATE_PARAMETERS[group]] if group is not None else 0.0
+        group = group_of(name, self._vehicle.streams)
+        rate = self._vehicle.parameters[self._vehicle.rate_parameter(group)] if group is not None else 0.0
         return 1 / rate if rate > 0 else None
 
     def _get_interval(self, command: CommandInt, link: PeerLink) -> int:
@@ -362,12 +267,12 @@ class Commands:
 
     def _banner(self, command: CommandInt, link: PeerLink) -> int:
         del command, link
-        self._copter.say_banner()
+        self._vehicle.say_banner()
         return ACCEPTED
 
     def _reboot(self, command: CommandInt, link: PeerLink) -> int:
         del link
-        if self._copter.armed and command.y != FORCE_REBOOT:
+        if self._vehicle.armed and command.y != FORCE_REBOOT:
             return FAILED
         if command.param1 not in (1, 3):
             return UNSUPPORTED

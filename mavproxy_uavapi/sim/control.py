@@ -19,9 +19,9 @@ all of its float fields. `pilot_arm` arms by radio in the present mode, with all
 the throttle. `other_station` is a GUIDED setpoint of another ground station, [north, east, down] in metres from the
 EKF origin or in m/s.
 
-Every answer has "ok"; if it is false, "error" says why. "received" does not list what is sent while the vehicle hears
-nothing, what is dropped, nor what the other station sends. As in ArduPilot, a low battery that has triggered its
-failsafe stays low until a reboot.
+Every answer has "ok"; with false there is an "error" that says why. What is sent while the vehicle hears nothing,
+what is dropped and what the other station sends are not in "received". A low battery that has made its failsafe act
+stays low until a reboot, as in ArduPilot.
 """
 
 from __future__ import annotations
@@ -31,11 +31,12 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from .channels import MOTOR_FUNCTIONS
 from .faults import FaultError
 from .geodesy import Ned, from_ned
-from .modes.guided import ZERO
 from .simulator import ReceivedMessage, Simulator
 
+_IDLE = dict.fromkeys(MOTOR_FUNCTIONS, 1000)
 LOW_VOLTAGE = 9.9
 CLIMBING_THROTTLE = 1700
 """Microseconds of the throttle stick that climb in STABILIZE, ALT_HOLD and LOITER."""
@@ -67,7 +68,7 @@ class Control:
         }
 
     def handle_line(self, line: str) -> str:
-        """Answer one line (without its end); no content of a line makes it raise."""
+        """Answer one line (without its end); never raises for what the line says."""
         try:
             request = json.loads(line)
             operation = self._operations[request["op"]]
@@ -87,111 +88,105 @@ class Control:
     def _clear(self, request: Mapping[str, Any]) -> dict[str, Any]:
         del request
         self._simulator.faults.clear()
-        self._simulator.copter.battery.forced_voltage = None
-        self._simulator.copter.estimator.blind_until = -math.inf
+        self._simulator.vehicle.battery.forced_voltage = None
+        self._simulator.vehicle.estimator.blind_until = -math.inf
         return {}
 
     def _silence(self, request: Mapping[str, Any]) -> None:
         self._simulator.faults.silence(
-            self._simulator.copter.now,
+            self._simulator.vehicle.now,
             _seconds(request),
             sending=bool(request.get("sending", True)),
             receiving=bool(request.get("receiving", True)),
         )
 
     def _freeze_gps(self, request: Mapping[str, Any]) -> None:
-        self._simulator.faults.freeze_gps(self._simulator.copter.now, _seconds(request))
+        self._simulator.faults.freeze_gps(self._simulator.vehicle.now, _seconds(request))
 
     def _low_battery(self, request: Mapping[str, Any]) -> None:
-        self._simulator.copter.battery.forced_voltage = float(request.get("voltage", LOW_VOLTAGE))
+        self._simulator.vehicle.battery.forced_voltage = float(request.get("voltage", LOW_VOLTAGE))
 
     def _pilot_mode(self, request: Mapping[str, Any]) -> None:
-        copter = self._simulator.copter
-        mode_name = str(request["mode"]).upper()
-        numbers = [number for number, mode in copter.modes.items() if mode.name == mode_name]
+        vehicle = self._simulator.vehicle
+        wanted = str(request["mode"]).upper()
+        numbers = [number for number, mode in vehicle.modes.items() if mode.name == wanted]
         if not numbers:
-            raise FaultError(f"no mode is called {mode_name}")
-        if not copter.landed:
-            # A pilot who takes over holds the throttle in the middle, not at the bottom.
-            copter.sticks.move(3, 1500)
-        if not copter.set_mode(numbers[0]):
-            raise FaultError(f"the vehicle refused {mode_name}")
+            raise FaultError(f"no mode is called {wanted}")
+        vehicle.take_sticks()
+        if not vehicle.set_mode(numbers[0]):
+            raise FaultError(f"the vehicle refused {wanted}")
 
     def _pilot_sticks(self, request: Mapping[str, Any]) -> None:
         for channel, name in enumerate(("roll", "pitch", "throttle", "yaw"), start=1):
             if name in request:
-                self._simulator.copter.sticks.move(channel, int(request[name]))
+                self._simulator.vehicle.sticks.move(channel, int(request[name]))
 
     def _pilot_arm(self, request: Mapping[str, Any]) -> None:
-        copter, throttle = self._simulator.copter, int(request.get("throttle", CLIMBING_THROTTLE))
-        if copter.mode is copter.guided or not copter.mode.armable or not copter.arm(forced=True):
-            raise FaultError(f"the vehicle does not arm by radio in {copter.mode.name} now")
-        copter.sticks.move(3, throttle)
+        vehicle, throttle = self._simulator.vehicle, int(request.get("throttle", CLIMBING_THROTTLE))
+        if not vehicle.arm_by_radio(throttle):
+            raise FaultError(f"the vehicle does not arm by radio in {vehicle.mode.name} now")
 
     def _other_station(self, request: Mapping[str, Any]) -> None:
-        copter = self._simulator.copter
-        if copter.mode is not copter.guided:
+        position = Ned(*map(float, request["position"])) if "position" in request else None
+        velocity = Ned(*map(float, request["velocity"])) if position is None else None
+        if not self._simulator.vehicle.obey_other_station(position, velocity):
             raise FaultError("setpoints are for GUIDED only")
-        if "position" in request:
-            copter.guided.go_to(Ned(*map(float, request["position"])))
-        else:
-            copter.guided.fly_at(Ned(*map(float, request["velocity"])), ZERO)
 
     def _nan(self, request: Mapping[str, Any]) -> None:
         simulator, name = self._simulator, str(request["message"])
         if not simulator.telemetry.knows(name):
             raise FaultError(f"the vehicle sends no {name}")
         fields = [str(field) for field in request.get("fields", ())]
-        simulator.faults.spoil(name, fields, simulator.copter.now, _seconds(request))
+        simulator.faults.spoil(name, fields, simulator.vehicle.now, _seconds(request))
 
     def _pilot_disarm(self, request: Mapping[str, Any]) -> None:
         del request
-        self._simulator.copter.disarm_landed()
+        self._simulator.vehicle.disarm_now()
 
     def _reboot(self, request: Mapping[str, Any]) -> None:
         del request
         self._simulator.reboot_soon()
 
     def _ekf_bad(self, request: Mapping[str, Any]) -> None:
-        copter = self._simulator.copter
-        copter.estimator.blind_until = copter.now + _seconds(request)
+        vehicle = self._simulator.vehicle
+        vehicle.estimator.blind_until = vehicle.now + _seconds(request)
 
     def _state(self, request: Mapping[str, Any]) -> dict[str, Any]:
         del request
-        copter = self._simulator.copter
-        body = copter.body
-        place = from_ned(copter.estimator.start, body.position)
-        home = copter.home
+        vehicle = self._simulator.vehicle
+        body = vehicle.body
+        place = from_ned(vehicle.estimator.start, body.position)
+        home = vehicle.home
         return {
-            "mode": copter.mode.name,
-            "armed": copter.armed,
-            "landed": copter.landed,
-            "ready": copter.estimator.ready,
+            "mode": vehicle.mode.name,
+            "armed": vehicle.armed,
+            "landed": vehicle.on_ground,
+            "ready": vehicle.estimator.ready,
             "position": body.position,
             "velocity": body.velocity,
             "latitude": place.latitude,
             "longitude": place.longitude,
             "altitude_amsl": place.altitude,
-            "altitude_above_home": place.altitude - copter.home_altitude,
+            "altitude_above_home": place.altitude - vehicle.home_altitude,
             "yaw_degrees": math.degrees(body.yaw) % 360,
-            "time_boot_ms": round(copter.now * 1000),
+            "time_boot_ms": round(vehicle.now * 1000),
             "speedup": self._simulator.speedup,
             "battery": {
-                "voltage": copter.battery.voltage,
-                "current": copter.battery.current,
-                "remaining": copter.battery.remaining,
+                "voltage": vehicle.battery.voltage,
+                "current": vehicle.battery.current,
+                "remaining": vehicle.battery.remaining,
             },
             "home": None if home is None else home._asdict(),
-            "servos": copter.servos.pulses(1000),
-            "mission": {"items": len(copter.mission.items), "current": copter.mission.current},
+            "servos": vehicle.servos.driven(_IDLE),
+            "mission": {"items": len(vehicle.mission.items), "current": vehicle.mission.current},
         }
 
     def _received(self, request: Mapping[str, Any]) -> dict[str, Any]:
         since, heartbeats = int(request.get("since", 0)), bool(request.get("heartbeats", False))
         entries = [entry for entry in self._simulator.received if entry.index > since]
         last = entries[-1].index if entries else since
-        shown = [entry for entry in entries if heartbeats or entry.message.get_type() != "HEARTBEAT"]
-        return {"last": last, "messages": [_describe(entry) for entry in shown]}
+        wanted = [entry for entry in entries if heartbeats or entry.message.get_type() != "HEARTBEAT"]
+        return {"last": last, "messages": [_describe(entry) for entry in wanted]}
 
 
 def _describe(entry: ReceivedMessage) -> dict[str, Any]:

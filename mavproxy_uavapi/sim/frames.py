@@ -6,9 +6,9 @@ import math
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from .aircraft import Aircraft
 from .geodesy import Location, Ned, to_ned
 from .mission import Item
+from .vehicle import Vehicle
 
 AMSL_FRAMES = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
 HOME_FRAMES = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
@@ -28,23 +28,23 @@ def valid_location(latitude_e7: int, longitude_e7: int, altitude: float) -> bool
     )
 
 
-def global_target(aircraft: Aircraft, frame: int, latitude_e7: int, longitude_e7: int, altitude: float) -> Ned | None:
+def global_target(vehicle: Vehicle, frame: int, latitude_e7: int, longitude_e7: int, altitude: float) -> Ned | None:
     """NED metres from the EKF origin, or None without an origin or for a frame that is not global.
 
     altitude is metres AMSL or above home by frame; the ground is flat here, so above terrain is above home.
     """
-    origin = aircraft.estimator.origin
+    origin = vehicle.estimator.origin
     if origin is None or frame not in GLOBAL_FRAMES:
         return None
     if frame not in AMSL_FRAMES:
-        altitude += aircraft.home.altitude if aircraft.home is not None else origin.altitude
+        altitude += vehicle.home.altitude if vehicle.home is not None else origin.altitude
     return to_ned(origin, Location(latitude_e7 / 1e7, longitude_e7 / 1e7, altitude))
 
 
-def item_target(aircraft: Aircraft, item: Item) -> Ned:
+def item_target(vehicle: Vehicle, item: Item) -> Ned:
     """Where a mission item leads; without a latitude and longitude straight up or down from here."""
-    here = aircraft.estimator.location
+    here = vehicle.estimator.location
     latitude = item.x if item.x or item.y else round(here.latitude * 1e7)
     longitude = item.y if item.x or item.y else round(here.longitude * 1e7)
-    target = global_target(aircraft, item.frame, latitude, longitude, item.z)
-    return target if target is not None else aircraft.estimator.position
+    target = global_target(vehicle, item.frame, latitude, longitude, item.z)
+    return target if target is not None else vehicle.estimator.position

@@ -7,7 +7,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from .streams import Streams
+from .streams import GROUPS, Groups, Streams
 
 COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
 
@@ -18,10 +18,13 @@ class PeerLink:
     While muted() is true what is to be sent is lost, as on a link that is down.
     """
 
-    def __init__(self, system: int, name: str = "", muted: Callable[[], bool] = lambda: False) -> None:
+    def __init__(
+        self, system: int, name: str = "", muted: Callable[[], bool] = lambda: False, groups: Groups = GROUPS
+    ) -> None:
+        self._groups = groups
         self.name = name
         self._muted = muted
-        self.streams = Streams()
+        self.streams = Streams(self._groups)
         self.parameter_cursor: int | None = None
         """Next index of a running PARAM_REQUEST_LIST, or None."""
         self._encoder = mavlink.MAVLink(None, srcSystem=system, srcComponent=COMPONENT)
@@ -29,7 +32,7 @@ class PeerLink:
 
     def restart(self) -> None:
         """The vehicle has booted: streams are back to heartbeats only."""
-        self.streams = Streams()
+        self.streams = Streams(self._groups)
         self.parameter_cursor = None
 
     def send(self, message: Any, source: tuple[int, int] | None = None) -> None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from .copter import SimulatedCopter
 from .geodesy import Location, Ned
+from .vehicle import Vehicle
 
 
 class MessageSource:
@@ -12,8 +12,8 @@ class MessageSource:
     unix_epoch is the unix time in seconds at which the vehicle booted.
     """
 
-    def __init__(self, copter: SimulatedCopter, unix_epoch: float) -> None:
-        self.copter = copter
+    def __init__(self, vehicle: Vehicle, unix_epoch: float) -> None:
+        self.vehicle = vehicle
         self.unix_epoch = unix_epoch
         self._frozen: tuple[float, Ned, Ned, Location] | None = None
 
@@ -22,19 +22,19 @@ class MessageSource:
         if not frozen:
             self._frozen = None
         elif self._frozen is None:
-            copter = self.copter
-            estimator = copter.estimator
-            self._frozen = (copter.now, estimator.position, estimator.velocity, estimator.location)
+            vehicle = self.vehicle
+            estimator = vehicle.estimator
+            self._frozen = (vehicle.now, estimator.position, estimator.velocity, estimator.location)
 
     def _milliseconds(self) -> int:
-        return int(self.copter.now * 1000 + 0.5) & 0xFFFFFFFF
+        return int(self.vehicle.now * 1000 + 0.5) & 0xFFFFFFFF
 
     def _microseconds(self) -> int:
-        return int(self.copter.now * 1e6 + 0.5)
+        return int(self.vehicle.now * 1e6 + 0.5)
 
     def _position(self) -> tuple[float, Ned, Ned, Location]:
         """Time, position, velocity and location as they are to be reported."""
         if self._frozen is not None:
             return self._frozen
-        estimator = self.copter.estimator
-        return self.copter.now, estimator.position, estimator.velocity, estimator.location
+        estimator = self.vehicle.estimator
+        return self.vehicle.now, estimator.position, estimator.velocity, estimator.location

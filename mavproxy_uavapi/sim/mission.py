@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from .geodesy import Location
 
-NAVIGATION = frozenset(
+COPTER_NAVIGATION = frozenset(
     {
         mavlink.MAV_CMD_NAV_WAYPOINT,
         mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT,
@@ -21,6 +21,15 @@ NAVIGATION = frozenset(
         mavlink.MAV_CMD_NAV_DELAY,
     }
 )
+NAVIGATION = COPTER_NAVIGATION | {
+    mavlink.MAV_CMD_NAV_LOITER_TURNS,
+    mavlink.MAV_CMD_NAV_LOITER_TO_ALT,
+    mavlink.MAV_CMD_NAV_CONTINUE_AND_CHANGE_ALT,
+    mavlink.MAV_CMD_NAV_GUIDED_ENABLE,
+    mavlink.MAV_CMD_NAV_SET_YAW_SPEED,
+    mavlink.MAV_CMD_NAV_VTOL_TAKEOFF,
+    mavlink.MAV_CMD_NAV_VTOL_LAND,
+}
 CONDITION = frozenset(
     {
         mavlink.MAV_CMD_CONDITION_DELAY,
@@ -42,7 +51,23 @@ IMMEDIATE = frozenset(
         mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST,
     }
 )
-SUPPORTED = NAVIGATION | CONDITION | IMMEDIATE
+SUPPORTED = COPTER_NAVIGATION | CONDITION | IMMEDIATE
+"""What a copter's mission may have."""
+ALL_ITEMS = (
+    NAVIGATION
+    | SUPPORTED
+    | {
+        mavlink.MAV_CMD_DO_SET_REVERSE,
+        mavlink.MAV_CMD_DO_GRIPPER,
+        mavlink.MAV_CMD_DO_MOUNT_CONTROL,
+        mavlink.MAV_CMD_DO_SET_RELAY,
+        mavlink.MAV_CMD_DO_FENCE_ENABLE,
+        mavlink.MAV_CMD_DO_VTOL_TRANSITION,
+        mavlink.MAV_CMD_IMAGE_START_CAPTURE,
+        mavlink.MAV_CMD_IMAGE_STOP_CAPTURE,
+    }
+)
+"""What ArduPilot stores for any vehicle; a vehicle skips what it cannot do."""
 
 
 class Item(NamedTuple):

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from .events import StatusTextEvent
-from .frames import HIGHEST_ALTITUDE, global_target
-from .mission import SUPPORTED, Item, home_item
+from .frames import HIGHEST_ALTITUDE
+from .mission import Item, home_item
 
 if TYPE_CHECKING:
-    from .copter import SimulatedCopter
     from .link import PeerLink
+    from .vehicle import Vehicle
 
 LIMIT = 724
 """What ArduCopter can store in SITL."""
@@ -27,7 +27,7 @@ MISSION = mavlink.MAV_MISSION_TYPE_MISSION
 GUIDED_TARGET = 2
 """Value of `current` in an item that GUIDED flies to at once."""
 ALTITUDE_CHANGE = 3
-"""Value of `current` in an item that changes the height; ArduCopter accepts it and does nothing."""
+"""Value of `current` in an item that changes the height; all accept it, ArduPlane alone does it."""
 OTHER_LISTS = (mavlink.MAV_MISSION_TYPE_FENCE, mavlink.MAV_MISSION_TYPE_RALLY)
 
 
@@ -48,8 +48,8 @@ class Upload:
 class MissionProtocol:
     """Answers MISSION_* messages for one vehicle."""
 
-    def __init__(self, copter: SimulatedCopter) -> None:
-        self.copter = copter
+    def __init__(self, vehicle: Vehicle) -> None:
+        self.vehicle = vehicle
         self._lists: dict[int, list[Item]] = {kind: [] for kind in OTHER_LISTS}
         self._upload: Upload | None = None
         self._handlers = {
@@ -75,8 +75,8 @@ class MissionProtocol:
         return True
 
     def step(self) -> None:
-        """Ask again for an item that does not come, and give up in the end."""
-        upload, now = self._upload, self.copter.now
+        """Ask again for an item that does not come; give up in the end."""
+        upload, now = self._upload, self.vehicle.now
         if upload is None:
             return
         if now - upload.heard_at > GIVE_UP_AFTER:
@@ -93,8 +93,8 @@ class MissionProtocol:
         """The stored list; item 0 of a mission is home as it is now."""
         if kind != MISSION:
             return self._lists[kind]
-        items = self.copter.mission.items
-        home = self.copter.home
+        items = self.vehicle.mission.items
+        home = self.vehicle.home
         if not items or home is None:
             return items
         return [home_item(home), *items[1:]]
@@ -124,8 +124,8 @@ class MissionProtocol:
             self._store(message.mission_type, [])
             self._ack(link, message, mavlink.MAV_MISSION_ACCEPTED)
         else:
-            former = self.items(message.mission_type)[: message.count]
-            self._begin(Upload(link, _sender(message), message.mission_type, 0, message.count - 1, former))
+            kept = self.items(message.mission_type)[: message.count]
+            self._begin(Upload(link, _sender(message), message.mission_type, 0, message.count - 1, kept))
 
     def _partial(self, link: PeerLink, message: Any) -> None:
         if self._busy(link, message):
@@ -133,20 +133,20 @@ class MissionProtocol:
         items = list(self.items(message.mission_type))
         first, last = message.start_index, message.end_index
         if not 0 <= first <= last < len(items):
-            self.copter.tell(StatusTextEvent(mavlink.MAV_SEVERITY_WARNING, "Flight plan update rejected"))
+            self.vehicle.tell(StatusTextEvent(mavlink.MAV_SEVERITY_WARNING, "Flight plan update rejected"))
             self._ack(link, message, mavlink.MAV_MISSION_ERROR)
             return
         self._begin(Upload(link, _sender(message), message.mission_type, first, last, items))
 
     def _begin(self, upload: Upload) -> None:
-        upload.heard_at = self.copter.now
+        upload.heard_at = self.vehicle.now
         self._upload = upload
         self._ask()
 
     def _ask(self) -> None:
         upload = self._upload
         if upload is not None:
-            upload.asked_at = self.copter.now
+            upload.asked_at = self.vehicle.now
             upload.link.send(mavlink.MAVLink_mission_request_message(*upload.sender, upload.next, upload.kind))
 
     def _item(self, link: PeerLink, message: Any) -> None:
@@ -165,35 +165,29 @@ class MissionProtocol:
 
     def _take_guided(self, message: Any) -> int:
         """An item that is for now and not for the mission; a MAV_MISSION_RESULT."""
-        refusal = _refusal(message)
+        refusal = self._refusal(message)
         if refusal is not None:
             return refusal
-        done = message.current == ALTITUDE_CHANGE or self._fly_guided(_as_item(message))
+        item = _as_item(message)
+        if message.current == ALTITUDE_CHANGE:
+            self.vehicle.change_altitude(item)
+            return int(mavlink.MAV_MISSION_ACCEPTED)
+        done = self.vehicle.fly_guided_item(item)
         return int(mavlink.MAV_MISSION_ACCEPTED if done else mavlink.MAV_MISSION_ERROR)
 
-    def _fly_guided(self, item: Item) -> bool:
-        copter = self.copter
-        if copter.mode is not copter.guided:
-            return False
-        if item.command == mavlink.MAV_CMD_CONDITION_YAW:
-            copter.fix_yaw(item.param1, item.param2, int(item.param3), item.param4 > 0)
-            return True
-        # Items without a location have the mission frame; ArduCopter reads heights in it as AMSL.
-        frame = mavlink.MAV_FRAME_GLOBAL if item.frame == mavlink.MAV_FRAME_MISSION else item.frame
-        target = global_target(copter, frame, item.x, item.y, item.z)
-        if item.command != mavlink.MAV_CMD_NAV_WAYPOINT or target is None:
-            return False
-        copter.guided.go_to(target)
-        return True
+    def _refusal(self, message: Any) -> int | None:
+        if message.command not in self.vehicle.mission_commands:
+            return int(mavlink.MAV_MISSION_UNSUPPORTED)
+        return _misplaced(message)
 
     def _take(self, link: PeerLink, message: Any, upload: Upload) -> None:
-        refusal = _refusal(message) if upload.kind == MISSION and message.seq > 0 else None
+        refusal = self._refusal(message) if upload.kind == MISSION and message.seq > 0 else None
         if refusal is not None:
             self._abandon(upload)
             self._ack(link, message, refusal)
             return
         upload.items[message.seq : message.seq + 1] = [_as_item(message)]
-        upload.heard_at = self.copter.now
+        upload.heard_at = self.vehicle.now
         upload.next += 1
         if upload.next <= upload.last:
             self._ask()
@@ -202,16 +196,16 @@ class MissionProtocol:
         self._store(upload.kind, upload.items)
         self._ack(link, message, mavlink.MAV_MISSION_ACCEPTED)
         if upload.kind == MISSION:
-            self.copter.say(mavlink.MAV_SEVERITY_INFO, "Flight plan received")
+            self.vehicle.say(mavlink.MAV_SEVERITY_INFO, "Flight plan received")
 
     def _abandon(self, upload: Upload) -> None:
-        """An upload that ends early keeps the items that came, and cuts the old list, as in ArduPilot."""
+        """An upload that ends early leaves what had come so far, and cuts the old list: so does ArduPilot."""
         self._upload = None
         self._store(upload.kind, upload.items)
 
     def _store(self, kind: int, items: list[Item]) -> None:
         if kind == MISSION:
-            self.copter.mission.replace(items)
+            self.vehicle.mission.replace(items)
         else:
             self._lists[kind] = items
 
@@ -238,7 +232,7 @@ class MissionProtocol:
             return
         cleared = True
         if message.mission_type == MISSION:
-            cleared = self.copter.mission.clear()
+            cleared = self.vehicle.mission.clear()
         else:
             self._lists[message.mission_type] = []
         self._ack(link, message, mavlink.MAV_MISSION_ACCEPTED if cleared else mavlink.MAV_MISSION_ERROR)
@@ -248,11 +242,9 @@ def _sender(message: Any) -> tuple[int, int]:
     return message.get_srcSystem(), message.get_srcComponent()
 
 
-def _refusal(message: Any) -> int | None:
-    if message.command not in SUPPORTED:
-        return int(mavlink.MAV_MISSION_UNSUPPORTED)
+def _misplaced(message: Any) -> int | None:
     scale = 1e7 if message.get_type() == "MISSION_ITEM_INT" else 1.0
-    # NaN must fail too.
+    # Written so that NaN fails, too.
     if not abs(message.x) <= 90 * scale:
         return int(mavlink.MAV_MISSION_INVALID_PARAM5_X)
     if not abs(message.y) <= 180 * scale:
@@ -264,7 +256,7 @@ def _refusal(message: Any) -> int | None:
 
 def _as_item(message: Any) -> Item:
     scale = 1 if message.get_type() == "MISSION_ITEM_INT" else 10_000_000
-    # NaN means "not given", mostly in the yaw of a waypoint.
+    # NaN stands for "not given", mostly in the yaw of a waypoint.
     param1, param2, param3, param4 = (
         value if math.isfinite(value) else 0.0
         for value in (message.param1, message.param2, message.param3, message.param4)

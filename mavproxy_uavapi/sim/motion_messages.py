@@ -9,22 +9,11 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from .geodesy import from_ned
 from .message_source import MessageSource
-from .modes.guided import ZERO, GuidedSubmode
 from .physics import GRAVITY
-from .setpoints import ACCELERATION_IGNORE, POSITION_IGNORE, VELOCITY_IGNORE, YAW_IGNORE, YAW_RATE_IGNORE
+from .setpoint_masks import ONLY_POSITION
 
-NO_YAW = YAW_IGNORE | YAW_RATE_IGNORE
-ONLY_POSITION = VELOCITY_IGNORE | ACCELERATION_IGNORE | NO_YAW
 UNUSED_MASK_BITS = 0xF000
-"""ArduCopter sets them in POSITION_TARGET_GLOBAL_INT."""
-TARGET_MASKS = {
-    GuidedSubmode.TAKEOFF: ONLY_POSITION,
-    GuidedSubmode.POSITION: ONLY_POSITION,
-    GuidedSubmode.TRACKING: NO_YAW,
-    GuidedSubmode.VELOCITY: POSITION_IGNORE | NO_YAW,
-    GuidedSubmode.ACCELERATION: POSITION_IGNORE | VELOCITY_IGNORE | NO_YAW,
-}
-"""The type mask of POSITION_TARGET_LOCAL_NED in each submode of GUIDED."""
+"""ArduPilot sets them in POSITION_TARGET_GLOBAL_INT."""
 UNKNOWN_QUATERNION = [math.nan] * 4
 
 
@@ -32,10 +21,10 @@ class MotionMessages(MessageSource):
     """Position, attitude and targets. Positions are the estimate, SIMSTATE is the truth."""
 
     def _heading(self) -> float:
-        return math.degrees(self.copter.body.yaw) % 360
+        return math.degrees(self.vehicle.body.yaw) % 360
 
     def _build_gps_raw_int(self) -> Any:
-        estimator = self.copter.estimator
+        estimator = self.vehicle.estimator
         time, _, velocity, place = self._position()
         fix = estimator.has_fix
         speed = math.hypot(velocity.north, velocity.east)
@@ -59,27 +48,24 @@ class MotionMessages(MessageSource):
             0,
         )
 
-    def _build_nav_controller_output(self) -> Any:
-        copter = self.copter
-        target, position = copter.mode.target, copter.estimator.position
-        distance, bearing = 0.0, 0.0
-        if target is not None:
-            distance = math.hypot(target.north - position.north, target.east - position.east)
-            bearing = math.degrees(math.atan2(target.east - position.east, target.north - position.north))
+    def _build_nav_controller_output(self) -> Any | None:
+        told = self.vehicle.navigation()
+        if told is None:
+            return None
         return mavlink.MAVLink_nav_controller_output_message(
-            math.degrees(copter.body.roll),
-            math.degrees(copter.body.pitch),
-            round(math.degrees(copter.body.yaw)),
-            round(bearing),
-            min(round(distance), 65535),
-            position.down - copter.position.position[2],
-            0.0,
-            0.0,
+            told.roll,
+            told.pitch,
+            round(told.nav_bearing),
+            round(told.target_bearing),
+            min(round(told.distance), 65535),
+            told.altitude_error,
+            told.speed_error,
+            told.crosstrack,
         )
 
     def _build_position_target_global_int(self) -> Any | None:
-        copter = self.copter
-        target, origin = copter.mode.target, copter.estimator.origin
+        vehicle = self.vehicle
+        target, origin = vehicle.mode.target, vehicle.estimator.origin
         if target is None or origin is None:
             return None
         place = from_ned(origin, target)
@@ -96,26 +82,23 @@ class MotionMessages(MessageSource):
         )
 
     def _build_position_target_local_ned(self) -> Any | None:
-        """GUIDED's targets. A takeoff has none of its own and reports the position that was flown to last."""
-        copter = self.copter
-        guided = copter.guided
-        if copter.mode is not guided:
+        target = self.vehicle.local_target()
+        if target is None:
             return None
-        mask = TARGET_MASKS[guided.submode]
         return mavlink.MAVLink_position_target_local_ned_message(
             self._milliseconds(),
             mavlink.MAV_FRAME_LOCAL_NED,
-            mask,
-            *(ZERO if mask & POSITION_IGNORE else guided.position_target),
-            *(ZERO if mask & VELOCITY_IGNORE else guided.velocity_target),
-            *(ZERO if mask & ACCELERATION_IGNORE else guided.acceleration_target),
+            target.mask,
+            *target.position,
+            *target.velocity,
+            *target.acceleration,
             0.0,
             0.0,
         )
 
     def _build_global_position_int(self) -> Any | None:
-        copter = self.copter
-        if copter.estimator.origin is None:
+        vehicle = self.vehicle
+        if vehicle.estimator.origin is None:
             return None
         time, _, velocity, place = self._position()
         return mavlink.MAVLink_global_position_int_message(
@@ -123,7 +106,7 @@ class MotionMessages(MessageSource):
             round(place.latitude * 1e7),
             round(place.longitude * 1e7),
             round(place.altitude * 1000),
-            round((place.altitude - copter.home_altitude) * 1000),
+            round((place.altitude - vehicle.home_altitude) * 1000),
             round(velocity.north * 100),
             round(velocity.east * 100),
             round(velocity.down * 100),
@@ -131,13 +114,13 @@ class MotionMessages(MessageSource):
         )
 
     def _build_local_position_ned(self) -> Any | None:
-        if self.copter.estimator.origin is None:
+        if self.vehicle.estimator.origin is None:
             return None
         time, position, velocity, _ = self._position()
         return mavlink.MAVLink_local_position_ned_message(int(time * 1000 + 0.5), *position, *velocity)
 
     def _build_attitude(self) -> Any:
-        body = self.copter.body
+        body = self.vehicle.body
         return mavlink.MAVLink_attitude_message(
             self._milliseconds(),
             body.roll,
@@ -149,9 +132,9 @@ class MotionMessages(MessageSource):
         )
 
     def _build_simstate(self) -> Any:
-        copter = self.copter
-        body = copter.body
-        place = from_ned(copter.estimator.start, body.position)
+        vehicle = self.vehicle
+        body = vehicle.body
+        place = from_ned(vehicle.estimator.start, body.position)
         return mavlink.MAVLink_simstate_message(
             body.roll,
             body.pitch,
@@ -167,21 +150,23 @@ class MotionMessages(MessageSource):
         )
 
     def _build_vfr_hud(self) -> Any:
-        copter = self.copter
-        body = copter.body
+        vehicle = self.vehicle
         _, _, velocity, place = self._position()
         ground_speed = math.hypot(velocity.north, velocity.east)
-        air_speed = math.hypot(velocity.north - body.wind_north, velocity.east - body.wind_east)
-        throttle = round(100 * min(copter.throttle * copter.hover_throttle, 1.0))
         return mavlink.MAVLink_vfr_hud_message(
-            air_speed, ground_speed, int(self._heading()), throttle, place.altitude, -velocity.down
+            vehicle.airspeed,
+            ground_speed,
+            int(self._heading()),
+            vehicle.throttle_percent,
+            place.altitude,
+            -velocity.down,
         )
 
     def _build_ahrs(self) -> Any:
         return mavlink.MAVLink_ahrs_message(0.0, 0.0, 0.0, 0.0, 0.0, 0.001, 0.001)
 
     def _build_raw_imu(self) -> Any:
-        body = self.copter.body
+        body = self.vehicle.body
         rates = (body.roll_rate, body.pitch_rate, body.yaw_rate)
         return mavlink.MAVLink_raw_imu_message(
             self._microseconds(),
@@ -195,19 +180,19 @@ class MotionMessages(MessageSource):
         )
 
     def _build_scaled_pressure(self) -> Any:
-        altitude = self.copter.estimator.location.altitude
+        altitude = self.vehicle.estimator.location.altitude
         pressure = 1013.25 * max(1 - 2.25577e-5 * altitude, 0.01) ** 5.25588
         return mavlink.MAVLink_scaled_pressure_message(self._milliseconds(), pressure, 0.0, 2500)
 
     def _build_home_position(self) -> Any | None:
-        home = self.copter.home
+        home = self.vehicle.home
         if home is None:
             return None
         return mavlink.MAVLink_home_position_message(
             round(home.latitude * 1e7),
             round(home.longitude * 1e7),
             round(home.altitude * 1000),
-            *self.copter.home_offset,
+            *self.vehicle.home_offset,
             UNKNOWN_QUATERNION,
             0.0,
             0.0,
@@ -216,7 +201,7 @@ class MotionMessages(MessageSource):
         )
 
     def _build_gps_global_origin(self) -> Any | None:
-        origin = self.copter.estimator.origin
+        origin = self.vehicle.estimator.origin
         if origin is None:
             return None
         return mavlink.MAVLink_gps_global_origin_message(

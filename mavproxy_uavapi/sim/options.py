@@ -56,10 +56,11 @@ class Wind:
 class Options:
     """Everything that makes one simulation differ from another.
 
-    speedup is simulated seconds per wall second, gps_noise metres (1 sigma), ready_after the simulated
-    seconds from boot until the estimator has a position.
+    vehicle is a name of `kinds.KINDS`, speedup simulated seconds per wall second, gps_noise metres (1 sigma),
+    ready_after the simulated seconds from boot until the estimator has a position.
     """
 
+    vehicle: str = "copter"
     sysid: int = 1
     speedup: float = 1.0
     home: Home = field(default_factory=Home)

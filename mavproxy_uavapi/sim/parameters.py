@@ -7,13 +7,14 @@ from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from . import parameter_table
+from .parameter_tables import copter
+from .parameter_tables.blocks import Blocks
 
-_BLOCKS = (
-    (parameter_table.INT8, mavlink.MAV_PARAM_TYPE_INT8),
-    (parameter_table.INT16, mavlink.MAV_PARAM_TYPE_INT16),
-    (parameter_table.INT32, mavlink.MAV_PARAM_TYPE_INT32),
-    (parameter_table.REAL32, mavlink.MAV_PARAM_TYPE_REAL32),
+_KINDS = (
+    mavlink.MAV_PARAM_TYPE_INT8,
+    mavlink.MAV_PARAM_TYPE_INT16,
+    mavlink.MAV_PARAM_TYPE_INT32,
+    mavlink.MAV_PARAM_TYPE_REAL32,
 )
 _INTEGER_RANGE = {
     mavlink.MAV_PARAM_TYPE_INT8: (-128, 127),
@@ -35,10 +36,10 @@ class Parameter:
 class ParameterStore:
     """All parameters, by name and by index; they outlive a reboot."""
 
-    def __init__(self) -> None:
+    def __init__(self, blocks: Blocks = copter.BLOCKS) -> None:
         rows = sorted(
             (name, kind, _as_stored(float(text), kind))
-            for block, kind in _BLOCKS
+            for block, kind in zip(blocks, _KINDS, strict=True)
             for name, text in (entry.split("=") for entry in block.split())
         )
         self.ordered = [Parameter(index, *row) for index, row in enumerate(rows)]

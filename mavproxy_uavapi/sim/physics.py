@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TypeVar
 
 from .geodesy import Ned, wrap_pi
 from .options import Wind
@@ -19,6 +20,8 @@ THRUST_LAG = 0.1
 """Time constant of thrust and lean, seconds."""
 YAW_ACCELERATION = math.radians(270)
 """ATC_ACCEL_Y_MAX of a default quad, rad/s/s."""
+
+AnyBody = TypeVar("AnyBody", bound="Body")
 
 
 @dataclass
@@ -45,7 +48,7 @@ class Body:
     wind_east: float = 0.0
 
     @classmethod
-    def at_rest(cls, heading: float, wind: Wind) -> Body:
+    def at_rest(cls: type[AnyBody], heading: float, wind: Wind) -> AnyBody:
         """Standing at the start, heading in degrees."""
         from_direction = math.radians(wind.direction)
         return cls(

@@ -20,22 +20,23 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from . import setpoints
-from .commands import UNSUPPORTED, Commands, from_message
-from .copter import SimulatedCopter
+from .commands import UNSUPPORTED, from_message
+from .copter.copter import SimulatedCopter
 from .faults import Faults, PlannedAck
+from .kinds import KINDS
 from .link import COMPONENT, PeerLink
 from .mission import Mission
 from .mission_protocol import MissionProtocol
 from .options import Options
 from .parameters import Parameter, ParameterStore
-from .streams import RATE_PARAMETERS
 from .telemetry import Telemetry
 from .transmitter import Transmitter
 
 STEP = 0.01
 """Seconds of simulated time in one step, at any speedup."""
 PARAMETERS_PER_STEP = 20
+SYSTEM_ID_PARAMETERS = ("SYSID_THISMAV", "MAV_SYSID")
+"""Its name until ArduPilot 4.6, and since."""
 UNKNOWN_INDEX = 65535
 REMEMBERED_MESSAGES = 20000
 FTP_NAK = 129
@@ -59,9 +60,11 @@ class Simulator:
 
     def __init__(self, options: Options, epoch: float = 0.0) -> None:
         self.options = options
-        self.parameters = ParameterStore()
+        self._kind = KINDS[options.vehicle]
+        self.parameters = ParameterStore(self._kind.parameters)
         self.parameters.set("SIM_SPEEDUP", options.speedup)
-        self.parameters.set("SYSID_THISMAV", options.sysid)
+        for name in SYSTEM_ID_PARAMETERS:
+            self.parameters.set(name, options.sysid)
         self.parameters.set("SIM_WIND_SPD", options.wind.speed)
         self.parameters.set("SIM_WIND_DIR", options.wind.direction)
         self.faults = Faults()
@@ -80,10 +83,7 @@ class Simulator:
             "PARAM_REQUEST_READ": self._parameter_read,
             "PARAM_SET": self._parameter_set,
             "MISSION_SET_CURRENT": self._mission_set_current,
-            "SET_POSITION_TARGET_LOCAL_NED": self._local_setpoint,
-            "SET_POSITION_TARGET_GLOBAL_INT": self._global_setpoint,
             "RC_CHANNELS_OVERRIDE": self._sticks,
-            "LANDING_TARGET": lambda _link, message: self.copter.precland.hear(message, self.copter.now),
             "TIMESYNC": self._timesync,
             "FILE_TRANSFER_PROTOCOL": self._file_transfer,
         }
@@ -92,11 +92,12 @@ class Simulator:
     def _boot(self, mission: Mission) -> None:
         """Boot: time zero, disarmed, where the vehicle began. Parameters and mission stay."""
         self._boots += 1
-        self.copter = SimulatedCopter(self.options, self.parameters, mission, self.options.seed + self._boots - 1)
-        self.telemetry = Telemetry(self.copter, self._epoch)
-        self.missions = MissionProtocol(self.copter)
-        self._transmitter = Transmitter(self.copter, self.telemetry, self.faults, self.links)
-        self.commands = Commands(self.copter, self.telemetry, self._transmitter, self.reboot_soon)
+        seed = self.options.seed + self._boots - 1
+        self.vehicle = self._kind.vehicle(self.options, self.parameters, mission, seed)
+        self.telemetry = Telemetry(self.vehicle, self._epoch)
+        self.missions = MissionProtocol(self.vehicle)
+        self._transmitter = Transmitter(self.vehicle, self.telemetry, self.faults, self.links)
+        self.commands = self._kind.commands(self.vehicle, self.telemetry, self._transmitter, self.reboot_soon)
         self._reboot_wanted = False
         for link in self.links:
             link.restart()
@@ -104,6 +105,12 @@ class Simulator:
     def reboot_soon(self) -> None:
         """Boot again after the present step, so that an acknowledgement still goes out."""
         self._reboot_wanted = True
+
+    @property
+    def copter(self) -> SimulatedCopter:
+        """The vehicle of a simulation of a copter."""
+        assert isinstance(self.vehicle, SimulatedCopter)
+        return self.vehicle
 
     @property
     def speedup(self) -> float:
@@ -115,7 +122,9 @@ class Simulator:
 
     def open_link(self, name: str = "") -> PeerLink:
         """A new link; it gets heartbeats at once and streams when it asks for them."""
-        link = PeerLink(self.options.sysid, name, lambda: self.faults.mute(self.copter.now))
+        link = PeerLink(
+            self.options.sysid, name, lambda: self.faults.mute(self.vehicle.now), self._kind.vehicle.streams
+        )
         self.links.append(link)
         return link
 
@@ -127,21 +136,21 @@ class Simulator:
 
     def step(self) -> None:
         """Advance by STEP seconds and queue what the links get in that time."""
-        copter = self.copter
-        self.telemetry.freeze_position(copter.now < self.faults.gps_frozen_until)
-        copter.step(STEP)
+        vehicle = self.vehicle
+        self.telemetry.freeze_position(vehicle.now < self.faults.gps_frozen_until)
+        vehicle.step(STEP)
         self.missions.step()
-        while copter.events:
-            self._transmitter.tell(copter.events.popleft())
+        while vehicle.events:
+            self._transmitter.tell(vehicle.events.popleft())
         self._transmitter.send_planned()
         for link in self.links:
-            for name in link.streams.due(copter.now):
+            for name in link.streams.due(vehicle.now):
                 self._transmitter.send(link, name)
             if link.parameter_cursor is not None:
                 self._send_parameters(link)
         if self._reboot_wanted:
-            self._epoch += copter.now
-            self._boot(copter.mission)
+            self._epoch += vehicle.now
+            self._boot(vehicle.mission)
 
     def run(self, seconds: float) -> None:
         """Advance by about seconds of simulated time."""
@@ -152,16 +161,19 @@ class Simulator:
 
     def receive(self, link: PeerLink, message: Any, wall: float = 0.0) -> None:
         """Take a decoded message from a link; wall is the caller's clock, kept for `received` only."""
-        copter = self.copter
-        if self.faults.deaf(copter.now) or not self._for_us(message) or self.faults.drops(message):
+        vehicle = self.vehicle
+        if self.faults.deaf(vehicle.now) or not self._for_us(message) or self.faults.drops(message):
             return
         self._received_count += 1
-        self.received.append(ReceivedMessage(self._received_count, copter.now, wall, link.name, message))
+        self.received.append(ReceivedMessage(self._received_count, vehicle.now, wall, link.name, message))
         if self.missions.handle(link, message):
             return
         handler = self._handlers.get(message.get_type())
+        own = self._kind.messages.get(message.get_type())
         if handler is not None:
             handler(link, message)
+        elif own is not None:
+            own(vehicle, message)
 
     def _for_us(self, message: Any) -> bool:
         system = getattr(message, "target_system", 0)
@@ -173,19 +185,19 @@ class Simulator:
         if fault is not None:
             result = fault.result
             if fault.text:
-                self.copter.say(mavlink.MAV_SEVERITY_WARNING, fault.text)
+                self.vehicle.say(mavlink.MAV_SEVERITY_WARNING, fault.text)
         else:
             command = from_message(message)
             result = UNSUPPORTED if command is None else self.commands.run(command, link)
         # As in SITL the acknowledgement goes out at once; texts that explain it and the heartbeat of a new mode
         # wait for the next step, so they come after it.
         sender = (message.get_srcSystem(), message.get_srcComponent())
-        for ack in self.faults.acks(message.command, result, self.copter.now):
+        for ack in self.faults.acks(message.command, result, self.vehicle.now):
             self._plan_ack(link, message.command, ack, sender)
 
     def _plan_ack(self, link: PeerLink, command: int, planned: PlannedAck, sender: tuple[int, int]) -> None:
         ack = mavlink.MAVLink_command_ack_message(command, planned.result, 0, 0, *sender)
-        if planned.at <= self.copter.now:
+        if planned.at <= self.vehicle.now:
             link.send(ack, planned.source)
         else:
             self._transmitter.plan(planned.at, link, ack, planned.source)
@@ -196,8 +208,9 @@ class Simulator:
 
     def _request_stream(self, link: PeerLink, message: Any) -> None:
         rate = message.req_message_rate if message.start_stop == 1 else 0
-        for group in link.streams.request_group(message.req_stream_id, rate, self.copter.now):
-            self.parameters.set(RATE_PARAMETERS[group], rate)  # as ArduPilot: it is the stream's default from now on
+        for group in link.streams.request_group(message.req_stream_id, rate, self.vehicle.now):
+            # As in ArduPilot it is the stream's default from now on.
+            self.parameters.set(self.vehicle.rate_parameter(group), rate)
 
     def _parameter_list(self, link: PeerLink, message: Any) -> None:
         del message
@@ -232,25 +245,17 @@ class Simulator:
                 link.send(self._parameter_value(parameter, UNKNOWN_INDEX))
 
     def _mission_set_current(self, link: PeerLink, message: Any) -> None:
-        if self.copter.current_item(message.seq):
+        if self.vehicle.current_item(message.seq):
             link.send(self.telemetry.mission_current(message.seq))
-
-    def _local_setpoint(self, link: PeerLink, message: Any) -> None:
-        del link
-        setpoints.apply_local(self.copter, message)
-
-    def _global_setpoint(self, link: PeerLink, message: Any) -> None:
-        del link
-        setpoints.apply_global(self.copter, message)
 
     def _sticks(self, link: PeerLink, message: Any) -> None:
         del link
         pulses = [getattr(message, f"chan{channel}_raw") for channel in range(1, 9)]
-        self.copter.sticks.override(pulses, self.copter.now)
+        self.vehicle.sticks.override(pulses, self.vehicle.now)
 
     def _timesync(self, link: PeerLink, message: Any) -> None:
         if message.tc1 == 0:
-            link.send(mavlink.MAVLink_timesync_message(int(self.copter.now * 1e9), message.ts1))
+            link.send(mavlink.MAVLink_timesync_message(int(self.vehicle.now * 1e9), message.ts1))
 
     def _file_transfer(self, link: PeerLink, message: Any) -> None:
         """There is no file system: a NAK lets MAVProxy fall back to PARAM_REQUEST_LIST at once."""

@@ -7,10 +7,13 @@ wins: a REQUEST_DATA_STREAM overrides the intervals of all messages in that stre
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-GROUPS: dict[int, tuple[str, ...]] = {
+Groups = Mapping[int, tuple[str, ...]]
+
+GROUPS: Groups = {
     mavlink.MAV_DATA_STREAM_RAW_SENSORS: ("RAW_IMU", "SCALED_PRESSURE"),
     mavlink.MAV_DATA_STREAM_EXTENDED_STATUS: (
         "SYS_STATUS",
@@ -40,23 +43,25 @@ EXTENDED_SYS_STATE, HOME_POSITION and POSITION_TARGET_LOCAL_NED are in no stream
 SET_MESSAGE_INTERVAL or REQUEST_MESSAGE only.
 """
 
-RATE_PARAMETERS = {
-    mavlink.MAV_DATA_STREAM_RAW_SENSORS: "SR0_RAW_SENS",
-    mavlink.MAV_DATA_STREAM_EXTENDED_STATUS: "SR0_EXT_STAT",
-    mavlink.MAV_DATA_STREAM_RC_CHANNELS: "SR0_RC_CHAN",
-    mavlink.MAV_DATA_STREAM_RAW_CONTROLLER: "SR0_RAW_CTRL",
-    mavlink.MAV_DATA_STREAM_POSITION: "SR0_POSITION",
-    mavlink.MAV_DATA_STREAM_EXTRA1: "SR0_EXTRA1",
-    mavlink.MAV_DATA_STREAM_EXTRA2: "SR0_EXTRA2",
-    mavlink.MAV_DATA_STREAM_EXTRA3: "SR0_EXTRA3",
+RATE_PARAMETERS: Mapping[int, str] = {
+    mavlink.MAV_DATA_STREAM_RAW_SENSORS: "RAW_SENS",
+    mavlink.MAV_DATA_STREAM_EXTENDED_STATUS: "EXT_STAT",
+    mavlink.MAV_DATA_STREAM_RC_CHANNELS: "RC_CHAN",
+    mavlink.MAV_DATA_STREAM_RAW_CONTROLLER: "RAW_CTRL",
+    mavlink.MAV_DATA_STREAM_POSITION: "POSITION",
+    mavlink.MAV_DATA_STREAM_EXTRA1: "EXTRA1",
+    mavlink.MAV_DATA_STREAM_EXTRA2: "EXTRA2",
+    mavlink.MAV_DATA_STREAM_EXTRA3: "EXTRA3",
 }
+"""Stream to the parameter with its rate, behind a prefix: SR0_ until ArduPilot 4.6, MAV1_ since."""
 HEARTBEAT_INTERVAL = 1.0
 
 
 class Streams:
     """The intervals of one link."""
 
-    def __init__(self) -> None:
+    def __init__(self, groups: Groups | None = None) -> None:
+        self._groups = GROUPS if groups is None else groups
         self._interval: dict[str, float] = {}
         self._due: dict[str, float] = {}
         self._next = math.inf
@@ -82,9 +87,9 @@ class Streams:
         Returns:
             The streams that now have this rate.
         """
-        groups = [group for group in GROUPS if stream in (group, mavlink.MAV_DATA_STREAM_ALL)]
+        groups = [group for group in self._groups if stream in (group, mavlink.MAV_DATA_STREAM_ALL)]
         for group in groups:
-            for name in GROUPS[group]:
+            for name in self._groups[group]:
                 self.set(name, 1 / rate if rate > 0 else None, now)
         return groups
 
@@ -100,9 +105,9 @@ class Streams:
         return names
 
 
-def group_of(name: str) -> int | None:
+def group_of(name: str, groups: Groups = GROUPS) -> int | None:
     """The stream a message belongs to, or None."""
-    for stream, names in GROUPS.items():
+    for stream, names in groups.items():
         if name in names:
             return stream
     return None

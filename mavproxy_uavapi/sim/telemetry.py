@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from .copter import SimulatedCopter
 from .motion_messages import MotionMessages
 from .system_messages import SystemMessages
 from .truth_messages import TruthMessages
+from .vehicle import Vehicle
 
 
 class Telemetry(MotionMessages, SystemMessages, TruthMessages):
-    """Builds messages by name; None where ArduCopter would not send one either."""
+    """Builds messages by name; None where ArduPilot would not send one either."""
 
-    def __init__(self, copter: SimulatedCopter, unix_epoch: float) -> None:
-        super().__init__(copter, unix_epoch)
+    def __init__(self, vehicle: Vehicle, unix_epoch: float) -> None:
+        super().__init__(vehicle, unix_epoch)
         self._builders: dict[str, Callable[[], Any]] = {
             name.removeprefix("_build_").upper(): getattr(self, name)
             for name in dir(self)

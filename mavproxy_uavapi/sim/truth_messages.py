@@ -15,9 +15,9 @@ class TruthMessages(MessageSource):
     """The true state, which no real vehicle knows."""
 
     def _build_sim_state(self) -> Any:
-        copter = self.copter
-        body = copter.body
-        place = from_ned(copter.estimator.start, body.position)
+        vehicle = self.vehicle
+        body = vehicle.body
+        place = from_ned(vehicle.estimator.start, body.position)
         lat, lon = round(place.latitude * 1e7), round(place.longitude * 1e7)
         return mavlink.MAVLink_sim_state_message(
             *_quaternion(body.roll, body.pitch, body.yaw),

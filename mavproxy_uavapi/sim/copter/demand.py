@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .geodesy import Ned
-from .physics import GRAVITY
+from ..geodesy import Ned
+from ..physics import GRAVITY
 
 NO_LIFT = Ned(0.0, 0.0, GRAVITY)
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from enum import Enum, auto
 
+from ...geodesy import Ned, wrap_pi
+from ...position_control import Speed
 from ..demand import Demand
-from ..geodesy import Ned, wrap_pi
-from ..position_control import Speed
 from ..yaw_control import YawMode
 from .base import Mode
 from .landing import descend

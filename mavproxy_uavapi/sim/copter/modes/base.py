@@ -1,35 +1,24 @@
-"""What all flight modes have in common."""
+"""What all flight modes of a copter have in common."""
 
 from __future__ import annotations
 
 from typing import ClassVar
 
+from ... import mode
+from ...position_control import Speed
 from ..aircraft import Aircraft
 from ..demand import IDLE, Demand
-from ..geodesy import Ned
-from ..position_control import Speed
 
 
-class Mode:
+class Mode(mode.Mode):
     """A flight mode; `step` is called at the control rate while it is the current one."""
 
-    name: ClassVar[str] = ""
-    number: ClassVar[int] = -1
-    needs_position: ClassVar[bool] = True
     manual_throttle: ClassVar[bool] = False
-    armable: ClassVar[bool] = True
     positions: ClassVar[bool] = True
     """Whether the horizontal position is under the controller, which base_mode's guided bit tells."""
 
     def __init__(self, aircraft: Aircraft) -> None:
         self.aircraft = aircraft
-
-    def enter(self, checked: bool) -> bool:
-        """Prepare to fly; False refuses the mode ("init failed"). checked is False while disarmed."""
-        raise NotImplementedError
-
-    def leave(self) -> None:
-        """Called when another mode takes over."""
 
     def step(self, dt: float) -> Demand:
         """One control step of dt seconds."""
@@ -62,11 +51,6 @@ class Mode:
     def taking_off(self) -> bool:
         """Whether a takeoff is under way."""
         return False
-
-    @property
-    def target(self) -> Ned | None:
-        """Where the vehicle is going, metres NED from the EKF origin, or None."""
-        return None
 
     def hold_still(self, dt: float) -> Demand:
         """Brake to a stop and stay there, without turning."""

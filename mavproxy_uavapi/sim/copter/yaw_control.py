@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from enum import Enum, auto
 
-from .geodesy import wrap_pi
+from ..geodesy import wrap_pi
 
 ANGLE_P = 4.5
 """ATC_ANG_YAW_P."""

@@ -13,11 +13,11 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from .estimator import Estimator
-from .events import Event, StatusTextEvent
-from .geodesy import Ned
-from .parameters import ParameterStore
-from .physics import Body
+from ..estimator import Estimator
+from ..events import Event, StatusTextEvent
+from ..geodesy import Ned
+from ..parameters import ParameterStore
+from ..physics import Body
 
 MAVLINK_TYPE = 1
 TIMEOUT = 2.0

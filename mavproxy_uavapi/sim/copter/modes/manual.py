@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
+from ...geodesy import Ned, rotate_to_ne
+from ...physics import GRAVITY
 from ..demand import Demand
-from ..geodesy import Ned, rotate_to_ne
-from ..physics import GRAVITY
 from .base import Mode
 
 BRAKE_DECELERATION = 7.5

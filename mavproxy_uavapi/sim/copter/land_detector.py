@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .geodesy import Ned
+from ..geodesy import Ned
 
 LANDED_AFTER = 1.0
 """Seconds, LAND_DETECTOR_TRIGGER_SEC of ArduCopter."""

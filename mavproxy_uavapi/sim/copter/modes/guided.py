@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from enum import Enum, auto
 
+from ...geodesy import Ned
+from ...position_control import Speed
 from ..demand import Demand
-from ..geodesy import Ned
-from ..position_control import Speed
 from .base import Mode
 from .takeoff import TakeoffClimb
 

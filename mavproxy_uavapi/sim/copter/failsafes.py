@@ -6,10 +6,10 @@ from typing import Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from .battery import Battery
-from .estimator import Estimator
+from ..battery import Battery
+from ..estimator import Estimator
+from ..parameters import ParameterStore
 from .modes import Land, Mode, Rtl
-from .parameters import ParameterStore
 
 POSITION_LOST_AFTER = 1.0
 """Seconds without a position after which ArduCopter's EKF failsafe acts."""
@@ -34,7 +34,7 @@ class WatchedVehicle(Protocol):
     def set_mode(self, number: int) -> bool:
         """Change the flight mode; False with a STATUSTEXT that says why."""
 
-    def disarm_landed(self) -> None:
+    def disarm_now(self) -> None:
         """Stop the motors, whatever the vehicle is doing."""
 
 
@@ -76,6 +76,6 @@ class Failsafes:
             return
         vehicle.say(mavlink.MAV_SEVERITY_WARNING, "Battery Failsafe")
         if vehicle.landed:
-            vehicle.disarm_landed()
+            vehicle.disarm_now()
         elif action == DO_LAND or not vehicle.set_mode(Rtl.number):
             vehicle.set_mode(Land.number)

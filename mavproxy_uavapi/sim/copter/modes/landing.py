@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .. import shaping
+from ... import shaping
 from ..demand import Demand
 from .base import Mode
 
@@ -14,7 +14,7 @@ def descend(mode: Mode, dt: float) -> Demand:
     """
     aircraft = mode.aircraft
     if aircraft.armed and aircraft.landed and aircraft.spooled_down:
-        aircraft.disarm_landed()
+        aircraft.disarm_now()
     if aircraft.grounded:
         return mode.wait_on_ground()
     parameters, control = aircraft.parameters, aircraft.position

@@ -9,22 +9,22 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from pymavlink.dialects.v20 import ardupilotmega as mavlink
-
+from ..frames import TERRAIN_FRAMES, global_target
+from ..geodesy import Ned, rotate_to_ne
+from ..setpoint_masks import (
+    ACCELERATION_IGNORE,
+    BODY_FRAMES,
+    FORCE,
+    LOCAL_FRAMES,
+    OFFSET_FRAMES,
+    POSITION_IGNORE,
+    VELOCITY_IGNORE,
+    YAW_IGNORE,
+    YAW_RATE_IGNORE,
+)
 from .copter import SimulatedCopter
-from .frames import TERRAIN_FRAMES, global_target
-from .geodesy import Ned, rotate_to_ne
 from .modes.guided import ZERO, YawSetpoint
 
-POSITION_IGNORE = 0x0007
-VELOCITY_IGNORE = 0x0038
-ACCELERATION_IGNORE = 0x01C0
-FORCE = mavlink.POSITION_TARGET_TYPEMASK_FORCE_SET
-YAW_IGNORE = mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE
-YAW_RATE_IGNORE = mavlink.POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE
-BODY_FRAMES = (mavlink.MAV_FRAME_BODY_NED, mavlink.MAV_FRAME_BODY_OFFSET_NED)
-OFFSET_FRAMES = (*BODY_FRAMES, mavlink.MAV_FRAME_LOCAL_OFFSET_NED)
-LOCAL_FRAMES = (mavlink.MAV_FRAME_LOCAL_NED, *OFFSET_FRAMES)
 HIGHEST_SPEED = 1000.0
 """m/s; a faster velocity cannot be used."""
 

@@ -1,25 +1,19 @@
-"""The aircraft that the flight modes fly: its state, what it can do, and its reaction to their demands."""
+"""The copter that the flight modes fly: its state, what it can do, and its reaction to their demands."""
 
 from __future__ import annotations
 
 import math
-import random
-from collections import deque
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from .battery import Battery
-from .channels import Servos, Sticks
+from ..geodesy import Ned
+from ..mission import Mission
+from ..options import Options
+from ..parameters import ParameterStore
+from ..position_control import Limits, PositionController, Speed
+from ..vehicle import Vehicle
 from .demand import Demand
-from .estimator import Estimator
-from .events import Broadcast, Event, StatusTextEvent
-from .geodesy import Location, Ned, to_ned
 from .land_detector import LandDetector
-from .mission import Mission, home_item
-from .options import Options
-from .parameters import ParameterStore
-from .physics import Body
-from .position_control import Limits, PositionController, Speed
 from .precland import PrecisionLander
 from .yaw_control import AutoYaw
 
@@ -29,67 +23,21 @@ ARRIVAL_DISTANCE = 0.1
 ARRIVAL_SPEED = 0.1
 
 
-class Aircraft:
-    """All state of one vehicle between two boots but its flight modes and what chooses among them.
-
-    Time is `now`, seconds since boot on the simulated clock. The flight code tells the ground through
-    `events`, which the owner empties.
-    """
+class Aircraft(Vehicle):
+    """A vehicle that hovers: all but its flight modes and what chooses among them."""
 
     def __init__(self, options: Options, parameters: ParameterStore, mission: Mission, seed: int) -> None:
-        self.parameters = parameters
-        self.mission = mission
-        self.events: deque[Event] = deque()
-        self.now = 0.0
-        self._steps = 0
-        home = options.home
-        start = Location(home.latitude, home.longitude, home.altitude)
-        self.body = Body.at_rest(home.heading, options.wind)
-        self.estimator = Estimator(start, options.ready_after, options.gps_noise, random.Random(seed))
+        super().__init__(options, parameters, mission, seed)
         self.position = PositionController()
         self.yaw = AutoYaw()
-        self.battery = Battery(parameters)
-        self.sticks = Sticks()
-        self.servos = Servos(parameters)
         self.precland = PrecisionLander(parameters, self.body, self.estimator, self.events)
-        self.home: Location | None = None
-        self._home_locked = False
-        self.armed = False
         self.auto_armed = False
         self.landed = True
         self._spool = 0.0
         self._armed_since = 0.0
         self._detector = LandDetector()
-        mission.reset()
-
-    # What the ground station is told.
-
-    def tell(self, event: Event) -> None:
-        """Queue an event for the ground."""
-        self.events.append(event)
-
-    def say(self, severity: int, text: str) -> None:
-        """Queue a STATUSTEXT of a MAV_SEVERITY."""
-        self.events.append(StatusTextEvent(severity, text))
 
     # Derived state.
-
-    @property
-    def home_offset(self) -> Ned:
-        """Home in NED metres from the EKF origin; before home is set, the origin."""
-        if self.home is None or self.estimator.origin is None:
-            return Ned(0.0, 0.0, 0.0)
-        return to_ned(self.estimator.origin, self.home)
-
-    @property
-    def home_altitude(self) -> float:
-        """Altitude of home in metres AMSL; before home is set, that of the start."""
-        return (self.home or self.estimator.start).altitude
-
-    @property
-    def altitude(self) -> float:
-        """Estimated metres above home."""
-        return self.home_offset.down - self.estimator.position.down
 
     @property
     def grounded(self) -> bool:
@@ -108,7 +56,7 @@ class Aircraft:
 
     @property
     def maybe_landed(self) -> bool:
-        """Whether the land detector assumes a landing that it has not confirmed yet."""
+        """Whether the land detector has its first suspicion."""
         return self.landed or self._detector.suspects
 
     @property
@@ -150,18 +98,18 @@ class Aircraft:
             lean=math.radians(max(1000, min(8000, parameters["ANGLE_MAX"])) / 100),
         )
 
-    # What the ground station or the flight code can do.
+    # What the ground or the flight code can do.
 
     def change_limit(self, kind: Speed, speed: float) -> None:
         """Set a speed limit in m/s until the mode or its submode resets them."""
         self.position.limits.change(kind, speed)
 
     def relax(self) -> None:
-        """Set all targets to where the vehicle is."""
+        """Bring all targets to where the vehicle is."""
         self.position.start_at(self.estimator.position, self.estimator.velocity)
 
     def lift_off(self) -> None:
-        """Note that the vehicle leaves the ground now."""
+        """The vehicle leaves the ground now."""
         self.landed = False
         self.auto_armed = True
         self._detector.restart()
@@ -171,40 +119,16 @@ class Aircraft:
         """MAV_CMD_CONDITION_YAW with angle in degrees and speed in deg/s."""
         self.yaw.fix(math.radians(angle), math.radians(speed), direction, relative, self.body.yaw)
 
-    def set_servo(self, channel: int, pulse: int) -> bool:
-        """Drive a free servo output; a STATUSTEXT says when it is not free."""
-        if self.servos.set(channel, pulse):
-            return True
-        self.say(mavlink.MAV_SEVERITY_INFO, f"ServoRelayEvent: Channel {channel} is already in use")
-        return False
-
-    def set_home(self, home: Location, *, lock: bool) -> bool:
-        """Move home; False before there is an EKF origin. A locked home is not moved by arming."""
-        if self.estimator.origin is None:
-            return False
-        self.home = home
-        self.mission.remember_home(home_item(home))
-        self._home_locked = self._home_locked or lock
-        self.tell(Broadcast("HOME_POSITION"))
-        self.tell(Broadcast("GPS_GLOBAL_ORIGIN"))
-        return True
-
-    def set_home_here(self, *, lock: bool) -> bool:
-        """Make the present position home; False without a position."""
-        return self.estimator.ready and self.set_home(self.estimator.location, lock=lock)
-
     def arm_motors(self) -> None:
-        """Arm without any check; home moves here unless the ground station has set it."""
         self.say(mavlink.MAV_SEVERITY_INFO, "Arming motors")
         self.yaw.armed_yaw = self.body.yaw
-        if self.home is not None and not self._home_locked:
+        if self.home is not None and not self.home_locked:
             self.set_home_here(lock=False)
         self.armed = True
         self._armed_since = self.now
         self._spool = 0.0
 
-    def disarm_landed(self) -> None:
-        """Stop the motors, whatever the vehicle is doing."""
+    def disarm_now(self) -> None:
         if not self.armed:
             return
         self.say(mavlink.MAV_SEVERITY_INFO, "Disarming motors")
@@ -214,12 +138,6 @@ class Aircraft:
         self.mission.reset()
 
     # One control step.
-
-    def sense(self, dt: float) -> None:
-        """Let dt seconds pass and estimate the state. Call it with the same dt always: time is counted in steps."""
-        self._steps += 1
-        self.now = self._steps * dt
-        self.estimator.update(self.now, self.body, dt)
 
     def obey(self, demand: Demand, dt: float) -> None:
         """Move for dt seconds as the flight mode demands, and notice a landing."""

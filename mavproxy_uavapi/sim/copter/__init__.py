@@ -1,0 +1,1 @@
+"""The copter: ArduCopter with four rotors."""

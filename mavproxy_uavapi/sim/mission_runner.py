@@ -1,0 +1,210 @@
+"""AUTO's order of events: navigation items one after the other, immediate ones in between, conditions alongside.
+
+What an item makes a vehicle do is its mode's business (`Flyer`).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Protocol
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from .events import Broadcast, ItemReached
+from .mission import CONDITION, NAVIGATION, Item, State
+from .vehicle import Vehicle
+
+LONGEST_CHAIN = 100
+"""Items that are stepped through at once; a jump loop without a waypoint ends here."""
+NAMES = {
+    mavlink.MAV_CMD_NAV_WAYPOINT: "WP",
+    mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT: "SplineWP",
+    mavlink.MAV_CMD_NAV_LOITER_UNLIM: "LoitUnlim",
+    mavlink.MAV_CMD_NAV_LOITER_TURNS: "LoitTurns",
+    mavlink.MAV_CMD_NAV_LOITER_TIME: "LoitTime",
+    mavlink.MAV_CMD_NAV_LOITER_TO_ALT: "LoitAltitude",
+    mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: "RTL",
+    mavlink.MAV_CMD_NAV_LAND: "Land",
+    mavlink.MAV_CMD_NAV_TAKEOFF: "Takeoff",
+    mavlink.MAV_CMD_NAV_VTOL_TAKEOFF: "VTOLTakeoff",
+    mavlink.MAV_CMD_NAV_VTOL_LAND: "VTOLLand",
+    mavlink.MAV_CMD_NAV_DELAY: "Delay",
+    mavlink.MAV_CMD_NAV_SET_YAW_SPEED: "SetYawSpd",
+    mavlink.MAV_CMD_NAV_CONTINUE_AND_CHANGE_ALT: "ContinueAndChangeAlt",
+    mavlink.MAV_CMD_DO_CHANGE_SPEED: "ChangeSpeed",
+    mavlink.MAV_CMD_DO_SET_SERVO: "SetServo",
+    mavlink.MAV_CMD_DO_SET_HOME: "SetHome",
+    mavlink.MAV_CMD_DO_SET_REVERSE: "SetReverse",
+    mavlink.MAV_CMD_DO_LAND_START: "LandStart",
+    mavlink.MAV_CMD_DO_JUMP: "Jump",
+    mavlink.MAV_CMD_CONDITION_DELAY: "CondDelay",
+    mavlink.MAV_CMD_CONDITION_DISTANCE: "CondDist",
+    mavlink.MAV_CMD_CONDITION_YAW: "CondYaw",
+}
+"""What "Mission: 3 WP" calls the items."""
+
+
+class Flyer(Protocol):
+    """The mode that carries the items out."""
+
+    def begin_item(self, item: Item) -> bool:
+        """Start a navigation item; False where the vehicle cannot, and the next one follows."""
+
+    def item_done(self, item: Item) -> bool:
+        """Whether the navigation item that was begun last is done."""
+
+    def do_item(self, item: Item) -> None:
+        """Carry an immediate item out."""
+
+    def start_condition(self, item: Item) -> None:
+        """A condition begins to count."""
+
+    def condition_met(self, item: Item, since: float) -> bool:
+        """Whether a condition holds that counts since that many seconds after boot."""
+
+    def item_restarts(self) -> bool:
+        """Whether a changed mission starts the current item anew."""
+
+    def mission_ended(self) -> None:
+        """Nothing is left to do."""
+
+
+class MissionRunner:
+    """Runs the mission of one vehicle from its marker on.
+
+    With reports_all MISSION_ITEM_REACHED tells of immediate items, too, and of several at once the last one only.
+    """
+
+    def __init__(self, vehicle: Vehicle, flyer: Flyer, *, reports_all: bool = False) -> None:
+        self._vehicle = vehicle
+        self._flyer = flyer
+        self._reports_all = reports_all
+        self._reached: int | None = None
+        self._alongside: deque[tuple[int, Item]] = deque()
+        self._condition_since = 0.0
+        self._seen_changes = 0
+        self.waiting_to_start = True
+
+    @property
+    def item(self) -> Item:
+        """The navigation item that is being flown."""
+        mission = self._vehicle.mission
+        return mission.items[mission.current]
+
+    def stop(self) -> None:
+        """AUTO is left; the mission can be resumed."""
+        if self._vehicle.mission.state is State.RUNNING:
+            self._vehicle.mission.state = State.STOPPED
+
+    def step(self) -> None:
+        """Start the mission, or see whether its item is done; once a control step."""
+        if self.waiting_to_start:
+            self._start_or_resume()
+        elif self._vehicle.mission.state is State.RUNNING:
+            self._watch_for_changes()
+            self._update()
+        if self._reports_all and self._reached is not None:
+            self._vehicle.tell(ItemReached(self._reached))
+        self._reached = None
+
+    def _start_or_resume(self) -> None:
+        """Begin at the first item, or where the mission was left (MIS_RESTART 0)."""
+        vehicle, mission = self._vehicle, self._vehicle.mission
+        self.waiting_to_start = False
+        self._seen_changes = mission.changes
+        if mission.state is not State.STOPPED or vehicle.parameters["MIS_RESTART"] == 1:
+            mission.reset()
+        mission.state = State.RUNNING
+        self.run_from(max(mission.current, 1))
+
+    def jump_to(self, seq: int) -> None:
+        """The ground chose another current item while the mission runs."""
+        self._vehicle.mission.state = State.RUNNING
+        self.run_from(max(seq, 1))
+
+    def _watch_for_changes(self) -> None:
+        mission = self._vehicle.mission
+        if mission.changes == self._seen_changes:
+            return
+        self._seen_changes = mission.changes
+        if self._flyer.item_restarts():
+            self._vehicle.say(mavlink.MAV_SEVERITY_CRITICAL, "Auto mission changed, restarted command")
+            self.run_from(max(mission.current, 1))
+
+    def run_from(self, seq: int) -> None:
+        """Do immediate items from seq on and begin the first navigation item there."""
+        mission = self._vehicle.mission
+        self._alongside.clear()
+        for _ in range(LONGEST_CHAIN):
+            if seq >= len(mission.items):
+                break
+            item = mission.items[seq]
+            if item.command == mavlink.MAV_CMD_DO_JUMP:
+                seq = self._jump(seq, item)
+                continue
+            if item.command in NAVIGATION:
+                if self._begin(seq, item):
+                    return
+                seq += 1
+                continue
+            # What follows a condition waits for it, while the next leg is already being flown.
+            if item.command in CONDITION or self._alongside:
+                if not self._alongside:
+                    self._start_condition(item)
+                self._alongside.append((seq, item))
+            else:
+                self._do(seq, item)
+            seq += 1
+        mission.state = State.COMPLETE
+        self._flyer.mission_ended()
+
+    def _jump(self, seq: int, item: Item) -> int:
+        left = self._vehicle.mission.jumps_left.setdefault(seq, int(item.param2))
+        if left == 0:
+            return seq + 1
+        if left > 0:
+            self._vehicle.mission.jumps_left[seq] = left - 1
+        return int(item.param1)
+
+    def _announce(self, seq: int, item: Item) -> None:
+        name = NAMES.get(item.command, f"Cmd {item.command}")
+        self._vehicle.say(mavlink.MAV_SEVERITY_INFO, f"Mission: {seq} {name}")
+
+    def _begin(self, seq: int, item: Item) -> bool:
+        self._vehicle.mission.current = seq
+        self._announce(seq, item)
+        self._vehicle.tell(Broadcast("MISSION_CURRENT"))
+        return self._flyer.begin_item(item)
+
+    def _do(self, seq: int, item: Item) -> None:
+        self._announce(seq, item)
+        self._flyer.do_item(item)
+        self._reached = seq
+
+    def _update(self) -> None:
+        """Is the current item done, is a condition fulfilled?"""
+        vehicle, mission = self._vehicle, self._vehicle.mission
+        self._run_alongside()
+        item = mission.items[mission.current]
+        if not self._flyer.item_done(item) or mission.state is not State.RUNNING:
+            return
+        self._reached = mission.current
+        if not self._reports_all:
+            vehicle.tell(ItemReached(mission.current))
+        self.run_from(mission.current + 1)
+
+    def _start_condition(self, item: Item) -> None:
+        self._condition_since = self._vehicle.now
+        self._flyer.start_condition(item)
+
+    def _run_alongside(self) -> None:
+        while self._alongside:
+            seq, item = self._alongside[0]
+            if item.command in CONDITION:
+                if not self._flyer.condition_met(item, self._condition_since):
+                    return
+            else:
+                self._do(seq, item)
+            self._alongside.popleft()
+            if self._alongside and self._alongside[0][1].command in CONDITION:
+                self._start_condition(self._alongside[0][1])

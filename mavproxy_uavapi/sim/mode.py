@@ -1,0 +1,42 @@
+"""What the modes of all vehicles have in common."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from .geodesy import Ned
+
+
+class Mode:
+    """A mode of a vehicle: MANUAL, GUIDED and so on. Each type of vehicle adds how it moves in it."""
+
+    name: ClassVar[str] = ""
+    number: ClassVar[int] = -1
+    needs_position: ClassVar[bool] = True
+    armable: ClassVar[bool] = True
+
+    def enter(self, checked: bool) -> bool:
+        """Prepare; False refuses the mode. checked is False while disarmed."""
+        del checked
+        return True
+
+    def leave(self) -> None:
+        """Another mode takes over."""
+
+    @property
+    def target(self) -> Ned | None:
+        """Where the vehicle is going, metres NED from the EKF origin, or None."""
+        return None
+
+
+class MissionMode(Mode):
+    """A mode that flies the mission."""
+
+    def jump_to(self, seq: int) -> None:
+        """The ground chose another current item while the mission runs."""
+        raise NotImplementedError
+
+    @property
+    def holding_mission(self) -> bool:
+        """Whether the mission is paused, which MISSION_CURRENT tells."""
+        return False

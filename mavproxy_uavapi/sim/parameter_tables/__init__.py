@@ -1,0 +1,1 @@
+"""The parameters of each type: only data."""

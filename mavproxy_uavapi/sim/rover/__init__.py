@@ -1,0 +1,1 @@
+"""The rover: ArduPilot's Rover with one steered axle."""

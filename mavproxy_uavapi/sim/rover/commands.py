@@ -1,0 +1,76 @@
+"""The commands that Rover takes beyond those of all vehicles. It knows no takeoff, landing, yaw or pause."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from ..commands import ACCEPTED, DENIED, FAILED, CommandInt, Commands
+from ..frames import global_target, valid_location
+from ..link import PeerLink
+from ..telemetry import Telemetry
+from ..transmitter import Transmitter
+from .modes import Auto, Guided, Rtl
+from .rover import SimulatedRover
+
+SPEED_TYPES = (mavlink.SPEED_TYPE_AIRSPEED, mavlink.SPEED_TYPE_GROUNDSPEED)
+DENIED_SPEED_TYPES = (mavlink.SPEED_TYPE_CLIMB_SPEED, mavlink.SPEED_TYPE_DESCENT_SPEED, mavlink.SPEED_TYPE_ENUM_END)
+
+
+class RoverCommands(Commands):
+    """Carries out commands on one rover."""
+
+    def __init__(
+        self, rover: SimulatedRover, telemetry: Telemetry, transmitter: Transmitter, reboot: Callable[[], None]
+    ) -> None:
+        super().__init__(rover, telemetry, transmitter, reboot)
+        self._rover = rover
+        self._handlers |= {
+            mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: self.mode_command(Rtl.number),
+            mavlink.MAV_CMD_DO_REPOSITION: self._reposition,
+            mavlink.MAV_CMD_MISSION_START: self._mission_start,
+            mavlink.MAV_CMD_DO_CHANGE_SPEED: self._change_speed,
+            mavlink.MAV_CMD_DO_SET_REVERSE: self._set_reverse,
+            mavlink.MAV_CMD_DO_SET_ROI: self.accept,
+            mavlink.MAV_CMD_DO_SET_ROI_LOCATION: self.accept,
+            mavlink.MAV_CMD_DO_SET_ROI_NONE: self.accept,
+        }
+        del self._handlers[mavlink.MAV_CMD_DO_FLIGHTTERMINATION]
+
+    def _reposition(self, command: CommandInt, link: PeerLink) -> int:
+        """As in Rover a speed (param1) is refused before there is a target, when GUIDED is entered already."""
+        del link
+        rover = self._rover
+        change = bool(int(command.param2) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
+        if rover.mode is not rover.guided and not change:
+            return DENIED
+        if not valid_location(command.x, command.y, command.z) or (command.x == 0 and command.y == 0):
+            return DENIED
+        target = global_target(rover, command.frame, command.x, command.y, command.z)
+        if target is None:
+            rover.say(mavlink.MAV_SEVERITY_INFO, f"Unknown mavlink coordinate frame {command.frame}")
+            return DENIED
+        if not rover.set_mode(Guided.number):
+            return FAILED
+        if command.param1 > 0 and not rover.guided.set_speed(command.param1):
+            return FAILED
+        rover.guided.go_to(target)
+        return ACCEPTED
+
+    def _mission_start(self, command: CommandInt, link: PeerLink) -> int:
+        del link
+        if command.param1 != 0 or command.param2 != 0:
+            return DENIED
+        return ACCEPTED if self._rover.set_mode(Auto.number) else FAILED
+
+    def _change_speed(self, command: CommandInt, link: PeerLink) -> int:
+        del link
+        if int(command.param1) in DENIED_SPEED_TYPES:
+            return DENIED
+        return ACCEPTED if self._rover.mode.set_speed(command.param2) else FAILED
+
+    def _set_reverse(self, command: CommandInt, link: PeerLink) -> int:
+        del link
+        self._rover.navigator.reversed = command.param1 == 1
+        return ACCEPTED

@@ -1,0 +1,81 @@
+"""Modes in which the pilot's sticks decide: MANUAL, ACRO and STEERING; and HOLD, in which nothing does."""
+
+from __future__ import annotations
+
+import math
+
+from ..drive import COAST, Drive
+from .base import Mode
+
+STEERING_STICK, THROTTLE_STICK = 1, 3
+
+
+class PilotMode(Mode):
+    """Reads the sticks."""
+
+    manual_input = True
+    needs_position = False
+
+    def _sticks(self) -> tuple[float, float]:
+        """Steering and throttle, -1 to 1; backwards the wheel turns the car the other way, as a car does."""
+        sticks, now = self.rover.sticks, self.rover.now
+        throttle = sticks.axis(THROTTLE_STICK, now)
+        steering = sticks.axis(STEERING_STICK, now)
+        return (-steering if throttle < 0 else steering), throttle
+
+
+class Manual(PilotMode):
+    """Sticks command wheel angle and motor output."""
+
+    name = "MANUAL"
+    number = 0
+    needs_velocity = False
+
+    def step(self, dt: float) -> Drive:
+        del dt
+        steering, throttle = self._sticks()
+        rover = self.rover
+        turn_rate = steering * abs(rover.body.speed) / max(rover.parameters["TURN_RADIUS"], 0.1)
+        return Drive(throttle * rover.top_speed, turn_rate, rolls=True)
+
+
+class Acro(PilotMode):
+    """Sticks command turn rate and speed."""
+
+    name = "ACRO"
+    number = 1
+
+    def step(self, dt: float) -> Drive:
+        del dt
+        steering, throttle = self._sticks()
+        turn_rate = math.radians(self.rover.parameters["ACRO_TURN_RATE"]) * steering
+        return Drive(throttle * self.rover.top_speed, turn_rate)
+
+
+class Steering(PilotMode):
+    """Sticks command lateral acceleration and speed."""
+
+    name = "STEERING"
+    number = 3
+
+    def step(self, dt: float) -> Drive:
+        del dt
+        steering, throttle = self._sticks()
+        rover = self.rover
+        speed = abs(rover.body.speed)
+        radius = max(rover.parameters["TURN_RADIUS"], 0.1)
+        lateral = max(0.1, min(speed * speed / radius, rover.parameters["ATC_TURN_MAX_G"] * 9.80665))
+        return Drive(throttle * rover.top_speed, lateral * steering / max(speed, 0.1))
+
+
+class Hold(Mode):
+    """No throttle and straight wheels: the rover rolls until it stands."""
+
+    name = "HOLD"
+    number = 4
+    needs_position = False
+    needs_velocity = False
+
+    def step(self, dt: float) -> Drive:
+        del dt
+        return COAST

@@ -1,0 +1,45 @@
+"""Modes that Rover has, and that it refuses to enter as this vehicle stands: nobody to follow, nowhere to dock."""
+
+from __future__ import annotations
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from ..drive import STOP, Drive
+from .base import Mode
+
+
+class Refused(Mode):
+    """A mode that is never entered."""
+
+    def enter(self, checked: bool) -> bool:
+        del checked
+        return False
+
+    def step(self, dt: float) -> Drive:
+        del dt
+        return STOP
+
+
+class Follow(Refused):
+    """Needs another vehicle's position."""
+
+    name = "FOLLOW"
+    number = 6
+
+
+class Dock(Refused):
+    """Needs a docking target in sight."""
+
+    name = "DOCK"
+    number = 8
+
+    def enter(self, checked: bool) -> bool:
+        self.rover.say(mavlink.MAV_SEVERITY_NOTICE, "Dock: target not acquired")
+        return super().enter(checked)
+
+
+class Initialising(Refused):
+    """The mode before the first one."""
+
+    name = "INITIALISING"
+    number = 16

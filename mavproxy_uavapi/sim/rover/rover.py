@@ -1,0 +1,120 @@
+"""The rover without its radio: modes, arming and the control loop of one ArduPilot Rover."""
+
+from __future__ import annotations
+
+import math
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from .. import mode as modes
+from ..frames import global_target
+from ..geodesy import Ned
+from ..mission import ALL_ITEMS, Item, Mission
+from ..options import Options
+from ..parameters import ParameterStore
+from ..reports import Navigation
+from .chassis import Chassis
+from .failsafes import Failsafes
+from .modes import Guided, Hold, Mode, build
+
+CENTRED = (1500, 1500, 1500, 1500, 1800, 1000, 1000, 1800)
+"""What SITL's radio sends to a rover: the throttle stick stands in the middle."""
+
+
+class SimulatedRover(Chassis):
+    """A rover with its modes and what chooses among them: the ground, the pilot's switch, failsafes."""
+
+    mav_type = mavlink.MAV_TYPE_GROUND_ROVER
+    version = (4, 7, 0, mavlink.FIRMWARE_VERSION_TYPE_DEV)
+    banner = ("ArduRover V4.7.0-dev (embedded)",)
+    mission_commands = ALL_ITEMS
+    neutral_sticks = CENTRED
+    mode_switch = ("MODE_CH", "MODE")
+    rate_prefix = "MAV1_"
+
+    mode: Mode
+
+    def __init__(self, options: Options, parameters: ParameterStore, mission: Mission, seed: int) -> None:
+        super().__init__(options, parameters, mission, seed)
+        self.failsafes = Failsafes(self)
+        self.modes = build(self)
+        self.mode = self.modes[0]
+
+    @property
+    def guided(self) -> Guided:
+        """The GUIDED mode, current or not."""
+        mode = self.modes[Guided.number]
+        assert isinstance(mode, Guided)
+        return mode
+
+    # What it says of itself.
+
+    @property
+    def on_ground(self) -> bool:
+        return True
+
+    @property
+    def base_mode(self) -> int:
+        base = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+        base |= mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED if self.mode.manual_input else 0
+        base |= mavlink.MAV_MODE_FLAG_GUIDED_ENABLED if self.mode.autopilot else 0
+        base |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED if self.armed else 0
+        return int(base)
+
+    @property
+    def system_status(self) -> int:
+        if self.failsafes.active:
+            return int(mavlink.MAV_STATE_CRITICAL)
+        holds = self.mode.number == Hold.number
+        return int(mavlink.MAV_STATE_STANDBY if holds else mavlink.MAV_STATE_ACTIVE)
+
+    def navigation(self) -> Navigation | None:
+        return self.mode.navigation()
+
+    # What the ground or a pilot can do.
+
+    def mode_refusal(self, mode: modes.Mode) -> str | None:
+        assert isinstance(mode, Mode)
+        lost = (mode.needs_position or mode.needs_velocity) and not self.estimator.ready
+        refused = (self.armed and lost) or not mode.enter(checked=self.armed)
+        return "Flight mode change failed" if refused else None
+
+    def prearm_failures(self) -> list[str]:
+        failures = super().prearm_failures()
+        return failures if self.armed or self.mode.armable else [*failures, "Mode not armable"]
+
+    def arm_failures(self) -> list[str]:
+        moved = self.sticks.axis(3, self.now) != 0
+        return ["Throttle (RC3) is not neutral"] if moved and self.parameters["ARMING_CHECK"] != 0 else []
+
+    def take_sticks(self) -> None:
+        self.sticks.move(3, 1500)
+
+    def arm_by_radio(self, throttle: int) -> bool:
+        if self.mode.autopilot or not self.arm(forced=True):
+            return False
+        self.sticks.move(3, throttle)
+        return True
+
+    def obey_other_station(self, position: Ned | None, velocity: Ned | None) -> bool:
+        if self.mode is not self.guided:
+            return False
+        if position is not None:
+            self.guided.go_to(position)
+        elif velocity is not None:
+            heading = math.atan2(velocity.east, velocity.north)
+            self.guided.drive_towards(heading, math.hypot(velocity.north, velocity.east))
+        return True
+
+    def fly_guided_item(self, item: Item) -> bool:
+        target = global_target(self, item.frame, item.x, item.y, item.z)
+        if self.mode is not self.guided or item.command != mavlink.MAV_CMD_NAV_WAYPOINT or target is None:
+            return False
+        self.guided.go_to(target)
+        return True
+
+    # The control loop.
+
+    def move(self, dt: float) -> None:
+        self.obey(self.mode.step(dt), dt)
+        self.remember()

@@ -1,0 +1,354 @@
+"""What all vehicles have in common: senses, home, sticks, outputs, modes, arming, and what they tell the ground."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections import deque
+from collections.abc import Mapping
+from typing import ClassVar, Protocol
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from . import arming
+from .battery import Battery
+from .channels import NEUTRAL, Servos, Sticks
+from .estimator import Estimator
+from .events import Broadcast, Event, StatusTextEvent
+from .geodesy import Location, Ned, to_ned
+from .mission import SUPPORTED, Item, Mission, State, home_item
+from .mode import MissionMode, Mode
+from .options import Options
+from .parameters import ParameterStore
+from .physics import Body
+from .reports import LocalTarget, Navigation
+from .streams import GROUPS, RATE_PARAMETERS, Groups
+
+BOOT_TEXTS = (
+    # Share of the time until the estimator is ready, and what SITL says then.
+    (0.1, "EKF3 IMU0 initialised"),
+    (0.3, "AHRS: EKF3 active"),
+    (0.4, "EKF3 IMU0 tilt alignment complete"),
+    (0.4, "EKF3 IMU0 MAG0 initial yaw alignment complete"),
+    (0.8, "GPS 1: detected u-blox"),
+    (1.0, "EKF3 IMU0 origin set"),
+    (1.0, "EKF3 IMU0 is using GPS"),
+)
+
+
+class Watch(Protocol):
+    """Failsafes of one vehicle."""
+
+    active: bool
+    """Whether the heartbeat says MAV_STATE_CRITICAL."""
+
+    def update(self, dt: float) -> None:
+        """Check everything; dt seconds have passed."""
+
+
+class Vehicle:
+    """All state of one vehicle between two boots.
+
+    Time is `now`, seconds since boot on the simulated clock. The vehicle tells the ground through `events`, which
+    the owner empties. A type of vehicle sets `modes`, `mode` and `failsafes`.
+    """
+
+    mav_type: ClassVar[int]
+    version: ClassVar[tuple[int, int, int, int]]
+    """Major, minor, patch and FIRMWARE_VERSION_TYPE."""
+    banner: ClassVar[tuple[str, ...]]
+    """What it says at boot and when it is asked: the firmware, the frame."""
+    rate_prefix: ClassVar[str] = "SR0_"
+    """How the parameters with the rates of the streams begin."""
+    mission_commands: ClassVar[frozenset[int]] = SUPPORTED
+    """The MAV_CMDs that a mission may have."""
+    streams: ClassVar[Groups] = GROUPS
+    neutral_sticks: ClassVar[tuple[int, ...]] = NEUTRAL
+    """What SITL's radio sends on channels 1 to 8 before anybody touches it."""
+
+    modes: Mapping[int, Mode]
+    mode: Mode
+    failsafes: Watch
+
+    def __init__(
+        self, options: Options, parameters: ParameterStore, mission: Mission, seed: int, body: Body | None = None
+    ) -> None:
+        self.parameters = parameters
+        self.mission = mission
+        self.events: deque[Event] = deque()
+        self.now = 0.0
+        self._steps = 0
+        home = options.home
+        start = Location(home.latitude, home.longitude, home.altitude)
+        self.body = Body.at_rest(home.heading, options.wind) if body is None else body
+        self.estimator = Estimator(start, options.ready_after, options.gps_noise, random.Random(seed))
+        self.battery = Battery(parameters)
+        self.sticks = Sticks(self.neutral_sticks)
+        self.servos = Servos(parameters)
+        self.home: Location | None = None
+        self.home_locked = False
+        self.armed = False
+        self._last_report = -arming.REPORT_INTERVAL + 1.0
+        self._switch: int | None = None
+        banner = [(0.05, text) for text in self.banner]
+        self._boot_texts = deque([*banner, *BOOT_TEXTS])
+        mission.reset()
+
+    # What the ground is told.
+
+    def tell(self, event: Event) -> None:
+        """Queue an event for the ground."""
+        self.events.append(event)
+
+    def say(self, severity: int, text: str) -> None:
+        """Queue a STATUSTEXT of a MAV_SEVERITY."""
+        self.events.append(StatusTextEvent(severity, text))
+
+    def say_banner(self) -> None:
+        """The firmware and frame, as at boot."""
+        for text in self.banner:
+            self.say(mavlink.MAV_SEVERITY_INFO, text)
+
+    def rate_parameter(self, group: int) -> str:
+        """The parameter with the rate of a MAV_DATA_STREAM."""
+        return self.rate_prefix + RATE_PARAMETERS[group]
+
+    # Derived state.
+
+    @property
+    def home_offset(self) -> Ned:
+        """Home in NED metres from the EKF origin; the origin itself before home is set."""
+        if self.home is None or self.estimator.origin is None:
+            return Ned(0.0, 0.0, 0.0)
+        return to_ned(self.estimator.origin, self.home)
+
+    @property
+    def home_altitude(self) -> float:
+        """Metres AMSL of home; of the start before home is set."""
+        return (self.home or self.estimator.start).altitude
+
+    @property
+    def altitude(self) -> float:
+        """Estimated metres above home."""
+        return self.home_offset.down - self.estimator.position.down
+
+    # What each type of vehicle says of itself.
+
+    @property
+    def on_ground(self) -> bool:
+        """Whether the vehicle itself takes it that it stands on the ground."""
+        raise NotImplementedError
+
+    @property
+    def base_mode(self) -> int:
+        """MAV_MODE_FLAG bits of the heartbeat."""
+        raise NotImplementedError
+
+    @property
+    def system_status(self) -> int:
+        """MAV_STATE of the heartbeat."""
+        raise NotImplementedError
+
+    @property
+    def landed_state(self) -> int:
+        """MAV_LANDED_STATE of EXTENDED_SYS_STATE."""
+        return int(mavlink.MAV_LANDED_STATE_UNDEFINED)
+
+    @property
+    def vtol_state(self) -> int:
+        """MAV_VTOL_STATE of EXTENDED_SYS_STATE."""
+        return int(mavlink.MAV_VTOL_STATE_UNDEFINED)
+
+    @property
+    def airspeed(self) -> float:
+        """What VFR_HUD tells, m/s."""
+        body, velocity = self.body, self.estimator.velocity
+        return math.hypot(velocity.north - body.wind_north, velocity.east - body.wind_east)
+
+    @property
+    def throttle_percent(self) -> int:
+        """What VFR_HUD tells."""
+        raise NotImplementedError
+
+    def servo_pulses(self) -> list[int]:
+        """Outputs 1..16, microseconds."""
+        raise NotImplementedError
+
+    def navigation(self) -> Navigation | None:
+        """What NAV_CONTROLLER_OUTPUT tells; None where nothing is sent."""
+        raise NotImplementedError
+
+    def local_target(self) -> LocalTarget | None:
+        """What POSITION_TARGET_LOCAL_NED tells; None where nothing is sent."""
+        return None
+
+    def mandatory_failures(self) -> list[str]:
+        """Checks that hold even for a forced arming or with ARMING_CHECK 0."""
+        return arming.mandatory_failures(self)
+
+    def prearm_failures(self) -> list[str]:
+        """Why the pre-arm check fails now; empty when the vehicle is ready. An armed vehicle passes."""
+        return arming.prearm_failures(self)
+
+    def arm_failures(self) -> list[str]:
+        """What else must hold at the moment of arming from the ground station."""
+        return []
+
+    def arm_motors(self) -> None:
+        """Arm without asking any check; home moves here unless the ground has set it."""
+        raise NotImplementedError
+
+    def disarm_now(self) -> None:
+        """Stop the motors, whatever the vehicle is doing."""
+        raise NotImplementedError
+
+    def fly_guided_item(self, item: Item) -> bool:
+        """A mission item that is for now (`current` 2); False where the vehicle does not take it."""
+        raise NotImplementedError
+
+    def change_altitude(self, item: Item) -> None:
+        """A mission item that changes the height (`current` 3)."""
+
+    # The back door for tests.
+
+    def take_sticks(self) -> None:
+        """A pilot who takes over lays hands on the sticks."""
+
+    def arm_by_radio(self, throttle: int) -> bool:
+        """The pilot arms in the present mode and moves the throttle stick (microseconds); False where it cannot."""
+        raise NotImplementedError
+
+    def obey_other_station(self, position: Ned | None, velocity: Ned | None) -> bool:
+        """A GUIDED setpoint of somebody else; False outside GUIDED."""
+        raise NotImplementedError
+
+    # What the ground or the flight code can do.
+
+    def set_servo(self, channel: int, pulse: int) -> bool:
+        """Drive a free servo output; says so when it is not free."""
+        if self.servos.set(channel, pulse):
+            return True
+        self.say(mavlink.MAV_SEVERITY_INFO, f"ServoRelayEvent: Channel {channel} is already in use")
+        return False
+
+    def set_home(self, home: Location, *, lock: bool) -> bool:
+        """Move home; False before there is an EKF origin. A locked home is not moved by arming."""
+        if self.estimator.origin is None:
+            return False
+        self.home = home
+        self.mission.remember_home(home_item(home))
+        self.home_locked = self.home_locked or lock
+        self.tell(Broadcast("HOME_POSITION"))
+        self.tell(Broadcast("GPS_GLOBAL_ORIGIN"))
+        return True
+
+    def set_home_here(self, *, lock: bool) -> bool:
+        """Make the present place home; False without a position."""
+        return self.estimator.ready and self.set_home(self.estimator.location, lock=lock)
+
+    def set_mode(self, number: int) -> bool:
+        """Change the mode; False with a STATUSTEXT that says why. While disarmed little is checked."""
+        if number == self.mode.number:
+            return True
+        mode = self.modes.get(number)
+        if mode is None:
+            self.say(mavlink.MAV_SEVERITY_WARNING, f"No such mode {number}")
+            return False
+        refusal = self.mode_refusal(mode)
+        if refusal is not None:
+            self.say(mavlink.MAV_SEVERITY_WARNING, refusal)
+            return False
+        self.mode.leave()
+        self.mode_left()
+        self.mode = mode
+        self.tell(Broadcast("HEARTBEAT"))
+        return True
+
+    def mode_refusal(self, mode: Mode) -> str | None:
+        """Enter the mode; the text that says why it cannot be, or None."""
+        raise NotImplementedError
+
+    def mode_left(self) -> None:
+        """The present mode has been left, and is the present one still."""
+
+    def arm(self, *, forced: bool) -> bool:
+        """Arm the motors; False with STATUSTEXTs that say why not."""
+        if self.armed:
+            return True
+        if not (forced and not self.mandatory_failures()):
+            failures = self.prearm_failures() or self.arm_failures()
+            for failure in failures:
+                self.say(mavlink.MAV_SEVERITY_CRITICAL, f"Arm: {failure}")
+            if failures:
+                return False
+        self.arm_motors()
+        return True
+
+    def may_disarm(self) -> bool:
+        """Whether the ground station may disarm now without force."""
+        return True
+
+    def disarm(self, *, forced: bool) -> bool:
+        """Disarm for the ground station; refused (False) where it would be a crash, unless forced."""
+        if self.armed and not forced and not self.may_disarm():
+            return False
+        self.disarm_now()
+        return True
+
+    def report_prearm(self) -> None:
+        """Tell the ground what keeps the vehicle from arming."""
+        for failure in self.prearm_failures():
+            self.say(mavlink.MAV_SEVERITY_CRITICAL, f"PreArm: {failure}")
+
+    @property
+    def mission_mode(self) -> MissionMode:
+        """AUTO, current or not."""
+        return next(mode for mode in self.modes.values() if isinstance(mode, MissionMode))
+
+    def current_item(self, seq: int) -> bool:
+        """Make seq the current mission item, at once when the mission is being flown."""
+        if not self.mission.select(seq):
+            return False
+        auto = self.mission_mode
+        if self.mode is auto and self.armed and self.mission.state is State.RUNNING:
+            auto.jump_to(seq)
+        return True
+
+    # One control step.
+
+    def step(self, dt: float) -> None:
+        """Advance the vehicle by dt seconds. Call it with the same dt always: time is counted in steps."""
+        self.sense(dt)
+        self.housekeeping()
+        self.failsafes.update(dt)
+        self.move(dt)
+
+    def move(self, dt: float) -> None:
+        """Do what the mode says for dt seconds."""
+        raise NotImplementedError
+
+    def sense(self, dt: float) -> None:
+        """Let dt seconds pass and estimate the state."""
+        self._steps += 1
+        self.now = self._steps * dt
+        self.estimator.update(self.now, self.body, dt)
+
+    def housekeeping(self) -> None:
+        """Boot texts, origin and home, the periodic pre-arm report, the mode switch."""
+        while self._boot_texts and self.now >= self._boot_texts[0][0] * self.estimator.ready_after:
+            self.say(mavlink.MAV_SEVERITY_INFO, self._boot_texts.popleft()[1])
+        if self.estimator.origin is None and self.estimator.ready:
+            self.estimator.origin = self.estimator.start
+            self.set_home_here(lock=False)
+            self.say(mavlink.MAV_SEVERITY_INFO, f"Field Elevation Set: {self.home_altitude:.0f}m")
+        if self.now - self._last_report >= arming.REPORT_INTERVAL:
+            self._last_report = self.now
+            self.report_prearm()
+        channel, names = self.mode_switch
+        position = self.sticks.mode_switch(int(self.parameters[channel]), self.now)
+        if self._switch is not None and position is not None and position != self._switch:
+            self.set_mode(int(self.parameters[f"{names}{position}"]))
+        self._switch = position
+
+    mode_switch: ClassVar[tuple[str, str]] = ("FLTMODE_CH", "FLTMODE")
+    """The parameter with the channel of the mode switch, and the one with the mode of each of its positions."""

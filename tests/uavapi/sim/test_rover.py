@@ -1,0 +1,342 @@
+"""The rover: what it says of itself, its answers, its driving. The figures are those of ArduPilot's SITL."""
+
+import math
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from mavproxy_uavapi.sim import Options
+from mavproxy_uavapi.sim.control import Control
+from mavproxy_uavapi.sim.geodesy import Ned, from_ned
+
+ACCEPTED, DENIED, UNSUPPORTED, FAILED = 0, 2, 3, 4
+MANUAL, HOLD, LOITER, AUTO, RTL, SMART_RTL, GUIDED = 0, 4, 5, 10, 11, 12, 15
+BODY = mavlink.MAV_FRAME_BODY_NED
+VELOCITY, VELOCITY_AND_RATE, ACCELERATION = 0x0DC7, 0x05C7, 0x0C3F
+
+
+@pytest.fixture
+def rover(new_ground):
+    """A rover that stands armed in GUIDED."""
+    ground = new_ground(Options(vehicle="rover"))
+    ground.run(6.0)
+    assert ground.mode(GUIDED) == ACCEPTED
+    assert ground.arm() == ACCEPTED
+    ground.run(0.02)
+    ground.heard.clear()
+    return ground
+
+
+def place(ground, north, east):
+    location = from_ned(ground.simulator.vehicle.estimator.start, Ned(north, east, 0.0))
+    return round(location.latitude * 1e7), round(location.longitude * 1e7)
+
+
+def body(ground):
+    return ground.simulator.vehicle.body
+
+
+def distance(ground, north, east):
+    return math.dist((north, east), body(ground).position[:2])
+
+
+def upload(ground, items):
+    ground.send(mavlink.MAVLink_mission_count_message(1, 1, len(items), 0))
+    for _ in items:
+        seq = [m for m in ground.run(0.01) if m.get_type() == "MISSION_REQUEST"][0].seq
+        command, parameters, where = items[seq]
+        lat, lon = place(ground, *where)
+        ground.send(
+            mavlink.MAVLink_mission_item_int_message(1, 1, seq, 3, command, 0, 1, *parameters, lat, lon, 0.0, 0)
+        )
+    assert [m.type for m in ground.run(0.01) if m.get_type() == "MISSION_ACK"] == [0]
+
+
+def waypoint(north, east, wait=0):
+    return (16, (wait, 0, 0, 0), (north, east))
+
+
+def do(command, *parameters):
+    return (command, (*parameters, *([0] * (4 - len(parameters)))), (0, 0))
+
+
+def test_it_says_that_it_is_a_rover(rover):
+    rover.run(1.1)
+    heartbeat = rover.of("HEARTBEAT")[-1]
+    assert (heartbeat.type, heartbeat.custom_mode) == (mavlink.MAV_TYPE_GROUND_ROVER, GUIDED)
+    assert heartbeat.base_mode == 128 + 8 + 1
+    assert heartbeat.system_status == mavlink.MAV_STATE_ACTIVE
+    rover.mode(HOLD)
+    rover.run(0.02)
+    assert rover.of("HEARTBEAT")[-1].system_status == mavlink.MAV_STATE_STANDBY
+
+
+def test_it_does_not_know_whether_it_has_landed(rover):
+    rover.command(mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE)
+    rover.run(0.02)
+    state = rover.of("EXTENDED_SYS_STATE")[-1]
+    assert (state.landed_state, state.vtol_state) == (0, 0)
+
+
+@pytest.mark.parametrize("command", [22, 21, 17, 115, 193, 213, 189, 84, 185])
+def test_commands_for_aircraft_are_unsupported(rover, command):
+    assert rover.command(command) == UNSUPPORTED
+
+
+@pytest.mark.parametrize(
+    ("number", "result", "text"),
+    [
+        (2, FAILED, "No such mode 2"),
+        (6, FAILED, "Flight mode change failed"),
+        (8, FAILED, "Dock: target not acquired"),
+        (AUTO, FAILED, "No Mission. Can't set AUTO."),
+        (SMART_RTL, ACCEPTED, None),
+    ],
+)
+def test_modes(rover, number, result, text):
+    assert rover.mode(number) == result
+    rover.run(0.02)
+    assert text is None or text in rover.texts()
+
+
+def test_rtl_is_not_armed_in_but_by_force(rover):
+    rover.mode(RTL)
+    rover.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0)
+    assert rover.arm() == FAILED
+    rover.run(0.02)
+    assert "Arm: Mode not armable" in rover.texts()
+    assert rover.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1, 2989) == ACCEPTED
+
+
+def test_a_raised_throttle_keeps_it_from_arming(rover):
+    rover.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0)
+    rover.send(mavlink.MAVLink_rc_channels_override_message(1, 1, 0, 0, 1700, 0, 0, 0, 0, 0))
+    assert rover.arm() == FAILED
+
+
+def test_a_place_is_driven_to_and_told_of(rover):
+    rover.local((40.0, 0.0, -5.0))
+    rover.run(12.0)
+    assert not rover.of("MISSION_ITEM_REACHED")
+    rover.run(6.0)
+    assert [m.seq for m in rover.of("MISSION_ITEM_REACHED")] == [0]
+    assert distance(rover, 40.0, 0.0) < 0.5
+    assert body(rover).speed == 0.0
+    assert body(rover).down == 0.0
+
+
+def test_the_speed_can_be_changed_on_the_way_only(rover):
+    speed = mavlink.MAV_CMD_DO_CHANGE_SPEED
+    assert rover.command(speed, 1, 2.0, -1) == FAILED
+    rover.local((60.0, 0.0, 0.0))
+    rover.run(8.0)
+    assert body(rover).speed == pytest.approx(5.0, abs=0.1)
+    assert rover.command(speed, 1, 2.0, -1) == ACCEPTED
+    assert rover.command(speed, 2, 2.0, -1) == DENIED
+    assert rover.command(speed, 1, -2.0, -1) == FAILED
+    rover.run(4.0)
+    assert body(rover).speed == pytest.approx(2.0, abs=0.1)
+
+
+def test_a_velocity_lasts_three_seconds(rover):
+    rover.local((-3.0, 0.0, 0.0), VELOCITY)
+    rover.run(2.9)
+    assert body(rover).speed > 2.0
+    rover.run(4.0)
+    assert body(rover).speed == 0.0
+    assert "target not received last 3secs, stopping" in rover.texts()
+
+
+def test_a_velocity_with_a_turn_rate_can_go_backwards(rover):
+    for _ in range(6):
+        rover.local((-1.0, 0.0, 0.0), VELOCITY_AND_RATE, BODY)
+        rover.run(0.5)
+    assert body(rover).speed == pytest.approx(-1.0, abs=0.05)
+    assert rover.simulator.vehicle.body.yaw == pytest.approx(math.radians(-7), abs=0.05)
+
+
+def test_an_acceleration_is_ignored_with_a_text(rover):
+    rover.local((0.0, 0.0, 0.0), ACCELERATION, acceleration=(1.0, 0.0, 0.0))
+    rover.run(1.0)
+    assert body(rover).speed == 0.0
+    assert "".join(rover.texts()) == "Ignoring SET_POSITION_TARGET_LOCAL_NED; set ACC_IGNORE in mask"
+
+
+def test_reposition(rover):
+    reposition = mavlink.MAV_CMD_DO_REPOSITION
+    there = (*place(rover, 20.0, 0.0), 0.0)
+    rover.mode(HOLD)
+    assert rover.command_int(reposition, 3, (-1, 0, 0, 0), there) == DENIED
+    assert rover.command_int(reposition, 3, (3, 1, 0, 0), there) == FAILED
+    assert rover.simulator.vehicle.mode.name == "GUIDED"
+    assert rover.command_int(reposition, 3, (-1, 1, 0, 0), there) == ACCEPTED
+    assert rover.command_int(reposition, 3, (3, 1, 0, 0), there) == ACCEPTED
+    assert rover.command_int(reposition, 3, (-1, 1, 0, 0), (0, 0, 0.0)) == DENIED
+    assert rover.command(reposition, -1, 1) == UNSUPPORTED
+    rover.run(15.0)
+    assert distance(rover, 20.0, 0.0) < 0.5
+
+
+def test_reverse(rover):
+    rover.local((-30.0, 0.0, 0.0))
+    assert rover.command(mavlink.MAV_CMD_DO_SET_REVERSE, 1) == ACCEPTED
+    rover.run(3.0)
+    assert body(rover).speed < -1.0
+    rover.mode(HOLD)
+    rover.mode(GUIDED)
+    assert not rover.simulator.vehicle.navigator.reversed
+
+
+def test_hold_rolls_out_and_loiter_brakes(rover):
+    rover.local((90.0, 0.0, 0.0))
+    rover.run(8.0)
+    start = body(rover).position
+    rover.mode(HOLD)
+    rover.run(12.0)
+    assert math.dist(start, body(rover).position) == pytest.approx(5.0 * 1.92, abs=0.5)
+    rover.mode(GUIDED)
+    rover.local((90.0, 0.0, 0.0))
+    rover.run(8.0)
+    start = body(rover).position
+    rover.mode(LOITER)
+    rover.run(8.0)
+    assert math.dist(start, body(rover).position) == pytest.approx(12.0, abs=1.0)
+    assert body(rover).speed == 0.0
+
+
+def test_disarmed_on_the_way_it_rolls_and_armed_again_goes_on(rover):
+    rover.local((90.0, 0.0, 0.0))
+    rover.run(6.0)
+    assert rover.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0) == ACCEPTED
+    assert body(rover).speed > 3.0
+    rover.run(12.0)
+    assert body(rover).speed == 0.0
+    rover.arm()
+    rover.run(4.0)
+    assert body(rover).speed > 2.0
+
+
+def test_home_moves_with_a_disarmed_rover_unless_the_ground_has_set_it(rover):
+    vehicle = rover.simulator.vehicle
+    rover.local((20.0, 0.0, 0.0))
+    rover.run(12.0)
+    assert vehicle.home_offset.north == 0.0
+    rover.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0)
+    rover.run(1.0)
+    assert vehicle.home_offset.north == pytest.approx(20.0, abs=0.5)
+    rover.command(mavlink.MAV_CMD_DO_SET_HOME, 1)
+    rover.arm()
+    rover.local((0.0, 0.0, 0.0))
+    rover.run(15.0)
+    rover.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0)
+    rover.run(1.0)
+    assert vehicle.home_offset.north == pytest.approx(20.0, abs=0.5)
+
+
+@pytest.mark.parametrize("mode", [RTL, SMART_RTL])
+def test_it_comes_home(rover, mode):
+    rover.local((30.0, 0.0, 0.0))
+    rover.run(14.0)
+    rover.local((30.0, 20.0, 0.0))
+    rover.run(12.0)
+    assert distance(rover, 30.0, 20.0) < 1.0
+    assert rover.mode(mode) == ACCEPTED
+    rover.run(60.0)
+    assert distance(rover, 0.0, 0.0) < 1.5
+    assert "Reached destination" in rover.texts()
+    assert rover.simulator.vehicle.armed
+
+
+def test_a_mission(rover):
+    upload(
+        rover,
+        [
+            waypoint(0, 0),
+            waypoint(30, 0),
+            do(178, 1, 2.0),
+            waypoint(30, 30),
+            do(194, 1),
+            waypoint(0, 30, 3),
+            do(194, 0),
+            do(93, 2, -1, -1, -1),
+            (19, (2, 0, 0, 0), (0, 0)),
+            do(20),
+        ],
+    )
+    assert rover.command(mavlink.MAV_CMD_MISSION_START) == ACCEPTED
+    started = rover.simulator.vehicle.now
+    while "Mission Complete" not in rover.texts() and rover.simulator.vehicle.now < started + 150:
+        rover.run(1.0)
+    # SITL: 78 s.
+    assert rover.simulator.vehicle.now - started == pytest.approx(78, abs=8)
+    assert [m.seq for m in rover.of("MISSION_ITEM_REACHED")] == [2, 4, 6, 7, 8, 9]
+    for text in (
+        "Mission: 4 SetReverse",
+        "speed: 2.0 m/s",
+        "Reached waypoint #1",
+        "Reached waypoint #5. Loiter for 3 seconds",
+        "Delaying 2 sec",
+        "Finished active loiter",
+    ):
+        assert text in rover.texts()
+    assert rover.simulator.vehicle.mode.name == "AUTO"
+    assert distance(rover, 0.0, 0.0) < 1.0
+
+
+def test_what_a_rover_cannot_do_is_skipped_in_a_mission(rover):
+    upload(rover, [waypoint(0, 0), do(22), waypoint(10, 0)])
+    rover.command(mavlink.MAV_CMD_MISSION_START)
+    rover.run(12.0)
+    assert "Mission: 1 Takeoff" in rover.texts()
+    assert [m.seq for m in rover.of("MISSION_ITEM_REACHED")] == [2]
+    assert distance(rover, 10.0, 0.0) < 1.0
+
+
+def test_a_guided_item_is_driven_to(rover):
+    lat, lon = place(rover, 10.0, 0.0)
+    rover.send(mavlink.MAVLink_mission_item_int_message(1, 1, 0, 3, 16, 2, 1, 0, 0, 0, 0, lat, lon, 0.0, 0))
+    rover.run(12.0)
+    assert distance(rover, 10.0, 0.0) < 0.5
+
+
+def test_the_pilot_drives_in_manual(rover):
+    rover.mode(MANUAL)
+    for _ in range(3):
+        rover.send(mavlink.MAVLink_rc_channels_override_message(1, 1, 0, 0, 1700, 0, 0, 0, 0, 0))
+        rover.run(1.0)
+    # SITL: 6.0 m/s after 3 s with 1700.
+    assert body(rover).speed == pytest.approx(5.0, abs=1.0)
+    heading = body(rover).yaw
+    rover.send(mavlink.MAVLink_rc_channels_override_message(1, 1, 1700, 0, 1500, 0, 0, 0, 0, 0))
+    rover.run(0.5)
+    assert body(rover).yaw > heading + 0.3
+
+
+def test_what_goes_wrong_goes_wrong_for_a_rover_too(rover):
+    control = Control(rover.simulator)
+    rover.local((90.0, 0.0, 0.0))
+    rover.run(5.0)
+    control.handle_line('{"op": "fault", "name": "ekf_bad", "seconds": 5}')
+    rover.run(2.0)
+    assert rover.simulator.vehicle.mode.name == "HOLD"
+    assert rover.of("HEARTBEAT")[-1].system_status == mavlink.MAV_STATE_CRITICAL
+    rover.run(5.0)
+    assert "EKF failsafe cleared" in rover.texts()
+    rover.simulator.parameters.set("BATT_LOW_VOLT", 10.5)
+    rover.simulator.parameters.set("BATT_FS_LOW_ACT", 1)
+    control.handle_line('{"op": "fault", "name": "low_battery"}')
+    rover.run(11.0)
+    assert rover.simulator.vehicle.mode.name == "RTL"
+    control.handle_line('{"op": "fault", "name": "pilot_mode", "mode": "manual"}')
+    assert rover.simulator.vehicle.mode.name == "MANUAL"
+    control.handle_line('{"op": "fault", "name": "pilot_disarm"}')
+    assert not rover.simulator.vehicle.armed
+
+
+def test_another_station_drives_it_in_guided_only(rover):
+    control = Control(rover.simulator)
+    assert '"ok": true' in control.handle_line('{"op": "fault", "name": "other_station", "velocity": [0, 2, 0]}')
+    rover.run(2.5)
+    assert body(rover).velocity_east > 1.0
+    rover.mode(HOLD)
+    assert '"ok": false' in control.handle_line('{"op": "fault", "name": "other_station", "position": [0, 2, 0]}')
