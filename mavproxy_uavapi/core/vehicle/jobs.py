@@ -47,6 +47,7 @@ class Job:
         modes: names of the flight modes that it switched to: in any other the vehicle is somebody else's.
         script: the session of a script that the job goes on for; None for no script.
         outlives_client: whether it goes on when its client hangs up (land, rtl).
+        on_disconnect: the `Policy`, by its value, of a client that hangs up; None for that of the setting.
         stage: of a verb that is made of others, which one it is at: its name and numbers.
         progress: what it last said of itself, such as distance_to_go (m) and altitude (m above home).
         result: the text of its success.
@@ -63,6 +64,7 @@ class Job:
         self.request = dict(request)
         self.vehicle = vehicle
         self.outlives_client = outlives_client
+        self.on_disconnect: str | None = None
         self.stage: dict[str, str | int] = {}
         self.progress: dict[str, float] = {}
         self.result: str | None = None
