@@ -198,14 +198,14 @@ class Drone:
         """Climb to `alt` m above home."""
         await self._fly("GET", "/command/takeoff", {"alt": alt, "timeout": timeout})
 
-    async def land(self, timeout: float | None = None) -> None:
-        """Land where it is, and disarm."""
-        await self._outliving("/command/land", timeout)
+    async def land(self, timeout: float | None = None, *, outlive: bool = False) -> None:
+        """Land where it is, and disarm; with `outlive` a cancellation leaves it landing."""
+        await self._outliving("/command/land", timeout, outlive)
         await self._shows(lambda: not self.armed)
 
-    async def rtl(self, timeout: float | None = None) -> None:
-        """Return to launch, land there and disarm."""
-        await self._outliving("/command/rtl", timeout)
+    async def rtl(self, timeout: float | None = None, *, outlive: bool = False) -> None:
+        """Return to launch, land there and disarm; with `outlive` a cancellation leaves it returning."""
+        await self._outliving("/command/rtl", timeout, outlive)
         await self._shows(lambda: not self.armed)
 
     # -- modes and speeds ---------------------------------------------------------------------------------
@@ -312,15 +312,16 @@ class Drone:
         """A verb that goes on when we hang up, and is short."""
         await self._heard(self._http.get(path, **query))
 
-    async def _outliving(self, path: str, timeout: float | None) -> None:
+    async def _outliving(self, path: str, timeout: float | None, outlive: bool) -> None:
         """A verb that goes on when we hang up: a cancellation has to say so."""
         begun = asyncio.ensure_future(self._http.get(path, wait=False, timeout=timeout))
         try:
             job = (await self._heard(asyncio.shield(begun)))["job"]
             told = await self._heard(self._ended(job))
         except asyncio.CancelledError:
-            with contextlib.suppress(UavApiError, asyncio.TimeoutError):  # it has just ended; it takes its time
-                await wait_with_timeout(ABORT_TIMEOUT, self._abort(begun))
+            if not outlive:
+                with contextlib.suppress(UavApiError, asyncio.TimeoutError):  # it has just ended; it takes its time
+                    await wait_with_timeout(ABORT_TIMEOUT, self._abort(begun))
             raise
         if told["error"] is not None:
             raise error_of(told["error"]["status"], told["error"])
