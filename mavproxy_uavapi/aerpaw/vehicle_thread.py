@@ -75,7 +75,7 @@ class VehicleThread:
     async def _live(self) -> None:
         try:
             async with connect(self._url, timeout=self._timeout) as self.drone:
-                await self._look()
+                await asyncio.gather(self._look(), self.look_home())
                 told = self.drone.telemetry
                 await told.shows(lambda: all(told.age(name) is not None for name in WANTED), FIRST_MESSAGES)
                 self._connected.set()

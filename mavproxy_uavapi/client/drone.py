@@ -25,6 +25,7 @@ SILENT = 20.0  # s without a heartbeat after which nobody waits for an answer; t
 ANSWER_TIMEOUT = 5.0  # s for the first answer of an API
 LOOK_EVERY = 0.2  # s between looks at a job that outlives its client
 ABORT_TIMEOUT = 5.0  # s that a cancelled landing waits for the vehicle to stop
+TURNED = 5.0  # degrees
 SHOWN = 2.0  # s in which the stream shows what a verb's answer has told already
 KEPT = 3600.0  # s; as long as the API repeats a velocity for one call
 ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
@@ -291,6 +292,7 @@ class Drone:
     async def turn_to(self, heading: float) -> None:
         """Turn to `heading` degrees clockwise from north, the shorter way round."""
         await self._fly("GET", "/movement/set_heading", {"heading": heading % 360.0})
+        await self._shows(lambda: abs((self.heading - heading + 180.0) % 360.0 - 180.0) <= TURNED)
 
     async def stop(self) -> None:
         """Hold still until `resume`."""
