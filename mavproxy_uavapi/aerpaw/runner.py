@@ -23,6 +23,7 @@ log = logging.getLogger("aerpawlib.v1.runner")
 
 Method = Callable[..., Awaitable[Any]]
 AGAIN_AFTER = 0.5  # s from a background method's failure to its next call
+BREATH = 0.001  # s between two of its calls
 ASIDE = "_script_s_run"  # where a script's own method `run` goes: the runner has one
 
 
@@ -152,7 +153,7 @@ class StateMachine(Runner):
             except Exception:
                 log.exception("%s failed, and is called again", getattr(method, "__name__", method))
                 await asyncio.sleep(AGAIN_AFTER)
-            await asyncio.sleep(0)  # it may never wait itself
+            await asyncio.sleep(BREATH)  # it may never wait itself
 
     def stop(self) -> None:
         """End after the state that it is in."""
