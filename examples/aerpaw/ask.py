@@ -1,4 +1,4 @@
-"""One of two runners that talk by ZMQ: `base` needs no vehicle; it has `flyer` take off, asks how high it is, and ends it.
+"""One of two runners that talk by ZMQ: `base` has no vehicle; it has `flyer` take off, asks where it is, and ends it.
 
     python -m mavproxy_uavapi.aerpaw.zmq_proxy
     python -m mavproxy_uavapi.aerpaw --script examples/aerpaw/answer.py --vehicle drone \

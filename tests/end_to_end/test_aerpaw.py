@@ -12,10 +12,21 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import requests
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "aerpaw"
 HOST = [sys.executable, "-m", "mavproxy_uavapi.aerpaw"]
 PATIENCE = 200.0  # s
+
+
+@pytest.fixture(scope="module")
+def embedded_rig(harness: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """A rig with the embedded vehicle, and folders of its own for scripts."""
+    directory = tmp_path_factory.mktemp("aerpaw")
+    folders = {"scripts_path": str(directory / "scripts"), "script_logs": str(directory / "logs")}
+    made = harness.embedded(directory, **folders)
+    yield made
+    made.stop()
 
 
 def begin(rig: Any, script: Path, *more: str) -> subprocess.Popen[str]:
@@ -137,7 +148,7 @@ def test_runners_talk_by_zmq(embedded_rig: Any, proxy: None) -> None:
 @pytest.mark.needs("tmux")
 def test_script_runs_uploaded_as_it_is(embedded_rig: Any) -> None:
     files = {"file": ("square.py", (EXAMPLES / "square.py").read_bytes())}
-    embedded_rig.ok(embedded_rig.session.post(f"{embedded_rig.url}/mission/upload-script", files=files))
+    embedded_rig.ok(requests.post(embedded_rig.url + "/mission/upload-script", files=files, timeout=10))
     embedded_rig.ok(embedded_rig.post("/mission/execute-script", script_name="square", args=["--side", "5"]))
     deadline = time.monotonic() + PATIENCE
     while (run := embedded_rig.get("/mission/scripts/square").json())["running"]:
