@@ -33,6 +33,7 @@ T = TypeVar("T")
 
 WAITS = {"true", "1", "yes"}  # values of the query's `wait`
 HURRIES = {"false", "0", "no"}
+ON_DISCONNECT = {"continue": "nothing", "hold": "hold"}  # the query's `on_disconnect`: the policy's value
 
 
 @dataclass
@@ -150,7 +151,7 @@ class Call:
             asked: what tells one request from another, where the parameters do not.
         """
         params = self.remembered = asked or self.remembered
-        is_async = self.is_async
+        is_async, on_disconnect = self.is_async, self.on_disconnect
 
         async def body(job: Job) -> str:
             with self.naming_source():
@@ -170,6 +171,7 @@ class Call:
             outlives_client=outlives_client,
             timeout=getattr(params, "timeout", None),
         )
+        job.on_disconnect = on_disconnect or job.on_disconnect
         script = None
         if is_async or (outlives_client and not urgent):  # else it ends with its client, or stops the vehicle
             self.job = job
@@ -221,6 +223,14 @@ class Call:
         if wait not in WAITS | HURRIES:
             raise Invalid(f"{wait!r} is neither true nor false", "query", "wait")
         return wait in HURRIES or "respond-async" in prefers
+
+    @property
+    def on_disconnect(self) -> str | None:
+        """What the client wants of the vehicle when it hangs up, where it says so in the query."""
+        wanted = self.request.query.get("on_disconnect")
+        if wanted is not None and wanted not in ON_DISCONNECT:
+            raise Invalid(f"{wanted!r} is none of {', '.join(ON_DISCONNECT)}", "query", "on_disconnect")
+        return None if wanted is None else ON_DISCONNECT[wanted]
 
     def accepted(self, job: Job) -> web.Response:
         """202: the job goes on, and where it is to be found."""

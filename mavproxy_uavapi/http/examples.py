@@ -129,6 +129,7 @@ RESULTS: Mapping[str, str] = {
     "/movement/drive_body": "Copter is driving",
     "/movement/drive_body_wait": "Copter arrived at (5, 0, 0)",
     "/movement/travel_at_ned": "Travelling at NED velocity (1, 0, 0)",
+    "/movement/travel_at_body": "Travelling at body velocity (1, 0, 0)",
     "/movement/set_heading": "Heading set to 90 degrees",
     "/movement/set_yaw_rate": "Yaw rate set to 10 deg/s",
     "/movement/stop": "Copter has stopped",

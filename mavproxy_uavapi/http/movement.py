@@ -8,7 +8,7 @@ from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.messages import GlobalTarget, NedTarget, VelocityTarget
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.http.call import Call
-from mavproxy_uavapi.http.requests import BodyOffset, GpsTarget, Heading, NedPlace, NedVelocity, YawRate
+from mavproxy_uavapi.http.requests import BodyOffset, BodyVelocity, GpsTarget, Heading, NedPlace, NedVelocity, YawRate
 from mavproxy_uavapi.http.responses import Answer
 
 STOPPED = {"plane": "Plane is loitering"}
@@ -56,7 +56,13 @@ def _going(
     async def verb(job: Job) -> None:
         vehicle.require_guided_flight()
         await vehicle.go_to(
-            job, aim(), look_at_target=p.look_at_target, wait=wait, tolerance=p.tolerance, timeout=p.timeout
+            job,
+            aim(),
+            look_at_target=p.look_at_target,
+            heading=p.heading,
+            wait=wait,
+            tolerance=p.tolerance,
+            timeout=p.timeout,
         )
 
     return verb
@@ -117,9 +123,21 @@ async def travel_at_ned(call: Call) -> Answer:
     velocity = VelocityTarget(p.vx, p.vy, p.vz)
 
     async def verb(job: Job) -> None:
-        await vehicle.travel(job, velocity, look_at_target=p.look_at_target, duration=p.duration)
+        await vehicle.travel(job, velocity, look_at_target=p.look_at_target, heading=p.heading, duration=p.duration)
 
     return await call.fly(vehicle, verb, f"Travelling at NED velocity ({p.vx}, {p.vy}, {p.vz})")
+
+
+async def travel_at_body(call: Call) -> Answer:
+    """Fly at a velocity in the body's frame until the autopilot drops it, or for a duration."""
+    vehicle, p = call.vehicle, call.params(BodyVelocity)
+
+    async def verb(job: Job) -> None:
+        vehicle.require_guided_flight()
+        velocity = vehicle.velocity_by_heading(p.front, p.right, p.down)
+        await vehicle.travel(job, velocity, look_at_target=p.look_at_target, heading=p.heading, duration=p.duration)
+
+    return await call.fly(vehicle, verb, f"Travelling at body velocity ({p.front}, {p.right}, {p.down})")
 
 
 async def set_heading(call: Call) -> Answer:

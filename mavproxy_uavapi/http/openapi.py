@@ -131,6 +131,13 @@ HURRY = [
         "description": "false: answer 202 at once, with the number of the job that goes on",
     },
     {
+        "name": "on_disconnect",
+        "in": "query",
+        "required": False,
+        "schema": {"type": "string", "enum": ["continue", "hold"]},
+        "description": "what the vehicle does when the client hangs up, over the setting of that name",
+    },
+    {
         "name": "Prefer",
         "in": "header",
         "required": False,

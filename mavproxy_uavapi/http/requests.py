@@ -49,6 +49,12 @@ Written = BeforeValidator(_written_as_number)
 Speed = Annotated[Number, Field(gt=0, le=50, description="m/s"), NotNothing]
 Timeout = Annotated[float | None, Field(gt=0, le=86400, description="s that the call may take"), Written]
 Looking = Annotated[bool, Field(description="point to where it goes")]
+Facing = Annotated[
+    float | None,
+    Field(ge=0, le=360, description="point there, degrees clockwise from north; over look_at_target"),
+    Written,
+]
+Duration = Annotated[float | None, Field(gt=0, le=3600, description="s of the vehicle's clock"), Written]
 Tolerance = Annotated[float, Field(gt=0, le=100, description="m, horizontally and vertically"), Written]
 Argument = Annotated[str, Field(max_length=4096, pattern=r"^[^\x00]*$")]  # no command line can hold a 0
 
@@ -122,6 +128,7 @@ class GpsTarget(Blocking):
     long: Annotated[Number, Field(ge=-180, le=180, description="degrees")]
     alt: Annotated[Number, Field(ge=0, le=10_000, description="m above home")]
     look_at_target: Looking = False
+    heading: Facing = None
     tolerance: Tolerance = 1.0
 
 
@@ -132,6 +139,7 @@ class NedPlace(Blocking):
     y: Annotated[Number, Field(ge=-NED_REACH, le=NED_REACH, description="m east")]
     z: Annotated[Number, Field(ge=-10_000, le=10_000, description="m down")]
     look_at_target: Looking = False
+    heading: Facing = None
     tolerance: Tolerance = 1.0
 
 
@@ -142,6 +150,7 @@ class BodyOffset(Blocking):
     right: Annotated[Number, Field(ge=-NED_REACH, le=NED_REACH, description="m")]
     down: Annotated[Number, Field(ge=-10_000, le=10_000, description="m")] = 0
     look_at_target: Looking = False
+    heading: Facing = None
     tolerance: Tolerance = 1.0
 
 
@@ -152,7 +161,19 @@ class NedVelocity(Request):
     vy: Annotated[Number, Field(ge=-50, le=50, description="m/s east")]
     vz: Annotated[Number, Field(ge=-50, le=50, description="m/s down")]
     look_at_target: Looking = False
-    duration: Annotated[float | None, Field(gt=0, le=3600, description="s of the vehicle's clock"), Written] = None
+    heading: Facing = None
+    duration: Duration = None
+
+
+class BodyVelocity(Request):
+    """Front, right, down in m/s, by the heading at the beginning; `duration` in s of the vehicle's clock."""
+
+    front: Annotated[Number, Field(ge=-50, le=50, description="m/s")]
+    right: Annotated[Number, Field(ge=-50, le=50, description="m/s")]
+    down: Annotated[Number, Field(ge=-50, le=50, description="m/s")] = 0
+    look_at_target: Looking = False
+    heading: Facing = None
+    duration: Duration = None
 
 
 class Heading(Request):

@@ -58,6 +58,7 @@ MOVEMENT = [
     Route("/movement/drive_body", movement.drive_body, requests.BodyOffset, POST, job=True, verb="go_to"),
     Route("/movement/drive_body_wait", movement.drive_body_wait, requests.BodyOffset, POST, job=True, verb="go_to"),
     Route("/movement/travel_at_ned", movement.travel_at_ned, requests.NedVelocity, POST, job=True, verb="travel"),
+    Route("/movement/travel_at_body", movement.travel_at_body, requests.BodyVelocity, POST, job=True, verb="travel"),
     Route("/movement/set_heading", movement.set_heading, requests.Heading, EITHER, job=True, verb="set_heading"),
     Route("/movement/set_yaw_rate", movement.set_yaw_rate, requests.YawRate, EITHER, job=True, verb="set_yaw_rate"),
     Route("/movement/stop", movement.stop, requests.Empty, EITHER, job=True, verb="stop", stops=True),

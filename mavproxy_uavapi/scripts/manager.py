@@ -14,7 +14,7 @@ from pathlib import Path
 
 from mavproxy_uavapi.core.errors import BadRequest, NoVehicle, ToolFailed
 from mavproxy_uavapi.core.host import Host
-from mavproxy_uavapi.scripts import clients, names, on_exit, runner, runs, tmux
+from mavproxy_uavapi.scripts import aerpaw, clients, names, on_exit, runner, runs, tmux
 from mavproxy_uavapi.scripts.runs import Run
 from mavproxy_uavapi.scripts.store import ScriptStore
 from mavproxy_uavapi.settings import ApiSettings
@@ -122,15 +122,15 @@ class Scripts:
         return run
 
     async def _create(self, path: Path, args: Sequence[str]) -> Run:
-        program = [SHELL] if path.suffix == ".sh" else [self._settings.python_path]
         try:
+            command = await asyncio.to_thread(self._command, path)
             return await asyncio.to_thread(
                 runs.create,
                 self.logs,
                 path.name,
                 args,
                 self.sysid,
-                command=[*program, str(path), *args],
+                command=[*command, *args],
                 cwd=path.parent,
                 port=self._settings.port,
                 grace=self._settings.script_grace,
@@ -138,6 +138,13 @@ class Scripts:
             )
         except OSError as error:
             raise ToolFailed(f"cannot write logs in {self.logs}: {error.strerror}") from error
+
+    def _command(self, path: Path) -> list[str]:
+        """What runs a script; those of aerpawlib do nothing by themselves, and have a host."""
+        if path.suffix == ".sh":
+            return [SHELL, str(path)]
+        host = aerpaw.HOST if aerpaw.needs_host(path.read_bytes()) else []
+        return [self._settings.python_path, *host, str(path)]
 
     async def _started(self, run: Run) -> Run:
         deadline = time.monotonic() + START_TIMEOUT

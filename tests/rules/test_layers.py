@@ -13,6 +13,9 @@ import pytest
 ROOT = Path(__file__).parents[2]
 UAVAPI, VISION, GRADYS = "mavproxy_uavapi", "mavproxy_vision", "mavproxy_gradys"
 CORE, SIMULATOR, EXTENSION = f"{UAVAPI}.core", f"{UAVAPI}.sim", f"{UAVAPI}.http.extension"
+CLIENT, AERPAW = f"{UAVAPI}.client", f"{UAVAPI}.aerpaw"
+# What a program at the other end of HTTP shares with the server: no state, no thread, no link.
+PURE = [f"{CORE}.{name}" for name in ("errors", "timeout", "mavlink.flight_modes", "vehicle.geodesy")]
 # The rooms of each package, from the one that stands on no other to the one on top.
 FLOORS = {
     CORE: ("mainloop", "mavlink", "vehicle"),
@@ -80,6 +83,20 @@ def test_core_imports_nothing_but_core() -> None:
 @pytest.mark.parametrize("package", [VISION, GRADYS])
 def test_other_modules_import_core_and_the_extension_only(package: str) -> None:
     assert crossings(package, CORE, EXTENSION) == []
+
+
+def test_client_imports_pure_core_only() -> None:
+    assert crossings(CLIENT, *PURE) == []
+
+
+def test_aerpaw_host_imports_the_client_and_pure_core_only() -> None:
+    assert crossings(AERPAW, CLIENT, *PURE) == []
+
+
+@pytest.mark.parametrize("package", [CLIENT, AERPAW])
+def test_server_knows_nothing_of_its_clients(package: str) -> None:
+    users = [name for name, others in imports().items() if any(is_in(other, package) for other in others)]
+    assert [name for name in users if not (is_in(name, CLIENT) or is_in(name, AERPAW))] == []
 
 
 def test_nobody_imports_the_simulator() -> None:

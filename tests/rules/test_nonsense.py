@@ -69,6 +69,7 @@ GOOD: dict[str, dict[str, Any]] = {
     "/movement/drive": {"x": 1, "y": 1, "z": 0},
     "/movement/drive_body": {"front": 1, "right": 1},
     "/movement/travel_at_ned": {"vx": 1, "vy": 1, "vz": 0},
+    "/movement/travel_at_body": {"front": 1, "right": 1},
     "/movement/set_heading": {"heading": 90},
     "/movement/set_yaw_rate": {"yaw_rate": 10},
     "/peripherical/servo_output": {"channel": 9, "pwm": 1500},
@@ -112,6 +113,8 @@ ONE_OF_EACH = list(
 
 
 def bounds(path: str, name: str) -> tuple[float, float]:
+    if path == "/movement/travel_at_body" and name in ("front", "right", "down"):
+        return VELOCITY
     return TAKEOFF_ALT if (path, name) == ("/command/takeoff", "alt") else BOUNDS[name]
 
 
@@ -174,7 +177,7 @@ def values(path: str, name: str) -> st.SearchStrategy[Any]:
 def is_bad(value: Any, path: str, name: str, as_text: bool) -> bool:
     """Whether it must be refused; a text that spells a good number may be taken."""
     if value is None:
-        return as_text or name not in OPTIONAL
+        return as_text or not (name in OPTIONAL or (name == "heading" and path != "/movement/set_heading"))
     if isinstance(value, bool | list | dict):
         return True
     if isinstance(value, str):

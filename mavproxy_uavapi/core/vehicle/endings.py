@@ -113,7 +113,7 @@ class FlightEndings:
         """The policy for the vehicle of a job that has ended."""
         assert job.ending is not None
         if job.ending is Ending.CLIENT_GONE:
-            return self.on_disconnect
+            return Policy(job.on_disconnect) if job.on_disconnect else self.on_disconnect
         if job.ending is Ending.SCRIPT_GONE:
             return self.on_script_exit
         if job.ending is Ending.FAILED and job.steers and not isinstance(job.error, HAS_ANOTHER_MASTER):

@@ -68,11 +68,12 @@ class GuidedVehicle(Vehicle):
         target: NedTarget | GlobalTarget,
         *,
         look_at_target: bool = False,
+        heading: float | None = None,
         wait: bool = False,
         tolerance: float = TOLERANCE,
         timeout: float | None = None,
     ) -> None:
-        """Fly to a position; with `wait`, done on arrival.
+        """Fly to a position; with `wait`, done on arrival. `heading`: where to point, degrees clockwise from north.
 
         Arrival is on all three axes: within `tolerance` m horizontally and vertically, and slow.
 
@@ -84,7 +85,7 @@ class GuidedVehicle(Vehicle):
         if self.height + up < FLOOR - TOLERANCE:
             raise Invalid(f"the target lies {-(self.height + up):.1f} m below home")
         self.authority.take(job, Rank.MOVEMENT)
-        yaw = messages.towards(north, east) if look_at_target else NO_YAW
+        yaw = messages.facing(heading, look_at_target, north, east)
         await self.take_up(job, target, yaw)
         if not wait:
             return

@@ -46,6 +46,7 @@ class Job:
         modes: names of the flight modes that it switched to; in any other mode somebody else has the vehicle.
         script: the session of a script that the job goes on for; None for no script.
         outlives_client: whether it goes on when its client hangs up (land, rtl).
+        on_disconnect: the `Policy`, by its value, of a client that hangs up; None for that of the setting.
         stage: the present step of a verb that consists of several: its name and numbers.
         progress: its last report, such as distance_to_go (m) and altitude (m above home).
         result: the text of its success.
@@ -62,6 +63,7 @@ class Job:
         self.request = dict(request)
         self.vehicle = vehicle
         self.outlives_client = outlives_client
+        self.on_disconnect: str | None = None
         self.stage: dict[str, str | int] = {}
         self.progress: dict[str, float] = {}
         self.result: str | None = None

@@ -231,6 +231,13 @@ def towards(north: float, east: float) -> Yaw:
     return Yaw(heading=math.atan2(east, north))
 
 
+def facing(heading: float | None, look: bool, north: float, east: float) -> Yaw:
+    """The yaw of a movement: at `heading` (degrees clockwise from north), or with `look` along (`north`, `east`)."""
+    if heading is not None:
+        return Yaw(heading=math.radians(heading))
+    return towards(north, east) if look else NO_YAW
+
+
 @dataclass(frozen=True)
 class NedTarget:
     """A position setpoint: north, east, down in m from the EKF origin."""

@@ -191,6 +191,7 @@ class Plane(GuidedVehicle):
         target: NedTarget | GlobalTarget,
         *,
         look_at_target: bool = False,
+        heading: float | None = None,
         wait: bool = False,
         tolerance: float = TOLERANCE,
         timeout: float | None = None,

@@ -53,6 +53,7 @@ class Rover(TravellingVehicle):
         target: NedTarget | GlobalTarget,
         *,
         look_at_target: bool = False,
+        heading: float | None = None,
         wait: bool = False,
         tolerance: float = TOLERANCE,
         timeout: float | None = None,

@@ -10,7 +10,7 @@ from mavproxy_uavapi.core.vehicle import messages
 from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_uavapi.core.vehicle.guided import ARRIVAL_SPEED, GuidedVehicle
 from mavproxy_uavapi.core.vehicle.jobs import Job
-from mavproxy_uavapi.core.vehicle.messages import NO_YAW, NedTarget, Target, VelocityTarget
+from mavproxy_uavapi.core.vehicle.messages import NedTarget, Target, VelocityTarget
 
 RESENDS_PER_TIMEOUT = 3  # velocity setpoints sent in each GUID_TIMEOUT
 REST_PERIOD = 0.3  # s between two setpoints of a standstill
@@ -32,15 +32,17 @@ class TravellingVehicle(GuidedVehicle):
         velocity: VelocityTarget,
         *,
         look_at_target: bool = False,
+        heading: float | None = None,
         duration: float | None = None,
     ) -> None:
         """Fly at a velocity: one setpoint, which the autopilot drops after GUID_TIMEOUT.
 
+        `heading` is where to point, degrees clockwise from north.
         With `duration` (s of the vehicle's clock) the setpoint is repeated for so long, then a stop is sent.
         """
         self.require_guided_flight()
         self.authority.take(job, Rank.MOVEMENT)
-        yaw = messages.towards(velocity.vx, velocity.vy) if look_at_target else NO_YAW
+        yaw = messages.facing(heading, look_at_target, velocity.vx, velocity.vy)
         job.steers = duration is not None
         await self.take_up(job, velocity, yaw)
         if duration is None:

@@ -55,6 +55,7 @@ class Verbs(BaseVehicle):
         target: NedTarget | GlobalTarget,
         *,
         look_at_target: bool = False,
+        heading: float | None = None,
         wait: bool = False,
         tolerance: float = 1.0,
         timeout: float | None = None,
@@ -76,8 +77,18 @@ class Verbs(BaseVehicle):
         north, east = rotate(front, right, self.fresh("ATTITUDE").yaw)
         return self.ned_from_here(north, east, down)
 
+    def velocity_by_heading(self, front: float, right: float, down: float) -> VelocityTarget:
+        """The velocity `front`, `right`, `down` in m/s, by the heading that the vehicle has now."""
+        return VelocityTarget(*rotate(front, right, self.fresh("ATTITUDE").yaw), down)
+
     async def travel(
-        self, job: Job, velocity: VelocityTarget, *, look_at_target: bool = False, duration: float | None = None
+        self,
+        job: Job,
+        velocity: VelocityTarget,
+        *,
+        look_at_target: bool = False,
+        heading: float | None = None,
+        duration: float | None = None,
     ) -> None:
         """Move at a velocity, for `duration` s of the vehicle's clock."""
         raise self.lacks("travel")

@@ -139,7 +139,15 @@ def test_call_that_joins_a_flight_of_the_prompt_leaves_its_trace_and_so_does_the
         return "there"
 
     async def begin() -> Any:
-        request = {"x": 500, "y": 0, "z": -20, "look_at_target": False, "tolerance": 1.0, "timeout": None}
+        request = {
+            "x": 500,
+            "y": 0,
+            "z": -20,
+            "look_at_target": False,
+            "heading": None,
+            "tolerance": 1.0,
+            "timeout": None,
+        }
         return host.jobs.begin(copter, "/movement/go_to_ned_wait", request, forever)
 
     loop.run(begin())

@@ -94,6 +94,24 @@ def test_look_at_target_turns_along_the_way(there: Any, api: Any, path: str, val
     assert math.degrees(setpoint.yaw) == pytest.approx(yaw, abs=0.1)
 
 
+@pytest.mark.parametrize(
+    ("path", "values"),
+    [("go_to_gps", GPS), ("go_to_ned", NED), ("drive_body", BODY), ("travel_at_ned", {"vx": 1, "vy": 1, "vz": 0})],
+)
+def test_heading_is_where_it_points_all_the_way(there: Any, api: Any, path: str, values: Any) -> None:
+    api.post(f"/movement/{path}", {**values, "heading": 350, "look_at_target": True})
+    setpoint = one_setpoint(there)
+    assert not setpoint.type_mask & mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE
+    assert math.degrees(setpoint.yaw) == pytest.approx(350)
+
+
+def test_body_velocity_is_turned_by_the_heading(there: Any, api: Any) -> None:
+    answer = api.post("/movement/travel_at_body", {"front": 2, "right": 1, "down": 0.5})
+    setpoint = one_setpoint(there)
+    assert answer.body["result"] == "Travelling at body velocity (2, 1, 0.5)"
+    assert (setpoint.vx, setpoint.vy, setpoint.vz) == pytest.approx((-1, 2, 0.5), abs=0.01)  # it points east
+
+
 def test_duration_keeps_travelling_then_stops(there: Any, api: Any) -> None:
     api.post("/movement/travel_at_ned", {"vx": 1, "vy": 0, "vz": 0, "duration": 4})
     assert [setpoint.vx for setpoint in there.setpoints()] == [1, 1, 1, 1, 0]
@@ -122,6 +140,10 @@ def test_duration_keeps_travelling_then_stops(there: Any, api: Any) -> None:
         ("drive_body", {**BODY, "front": float("-inf")}),
         ("drive_body", {"front": 3}),
         ("travel_at_ned", {"vx": 51, "vy": 0, "vz": 0}),
+        ("go_to_ned", {**NED, "heading": 360.5}),
+        ("go_to_ned", {**NED, "heading": float("nan")}),
+        ("travel_at_body", {"front": 1}),
+        ("travel_at_body", {"front": 1, "right": -50.5}),
         ("travel_at_ned", {"vx": 1, "vy": 0, "vz": 0, "duration": 0}),
         ("travel_at_ned", {"vx": 1, "vy": 0, "vz": 0, "duration": float("inf")}),
     ],
@@ -212,3 +234,38 @@ def test_telemetry_is_read_at_once_while_two_hundred_calls_wait(there: Any, loop
         return [(await request).status for request in waiting]
 
     assert loop.run(all_of_them()) == [409] * 200
+
+
+@pytest.mark.parametrize("wish", ["", "?on_disconnect=continue"])
+def test_client_that_hangs_up_leaves_the_vehicle_flying(there: Any, loop: Any, api: Any, wish: str) -> None:
+    going = api.begin("POST", f"/movement/go_to_ned_wait{wish}", json={"x": 500, "y": 0, "z": -30})
+    loop.pass_time(1.0)
+    going.cancel()
+    loop.pass_time(5.0)
+    one_setpoint(there)
+
+
+@pytest.mark.parametrize(
+    ("path", "values"),
+    [
+        ("go_to_ned_wait", {"x": 500, "y": 0, "z": -30}),
+        ("travel_at_ned", {"vx": 5, "vy": 0, "vz": 0, "duration": 600}),
+    ],
+)
+def test_client_that_wants_it_so_stops_the_vehicle_by_hanging_up(
+    there: Any, loop: Any, api: Any, path: str, values: dict[str, Any]
+) -> None:
+    going = api.begin("POST", f"/movement/{path}?on_disconnect=hold", json=values)
+    loop.pass_time(1.5)
+    assert not going.done()
+    going.cancel()
+    loop.pass_time(5.0)
+    last = there.setpoints()[-1]
+    assert (last.vx, last.vy, last.vz) == (0, 0, 0)
+    assert last.type_mask & mavlink.POSITION_TARGET_TYPEMASK_X_IGNORE
+
+
+def test_on_disconnect_is_continue_or_hold(there: Any, api: Any) -> None:
+    answer = api.post("/movement/go_to_ned?on_disconnect=land", NED)
+    assert (answer.status, answer.body["detail"][0]["loc"]) == (422, ["query", "on_disconnect"])
+    assert there.setpoints() == []

@@ -44,9 +44,11 @@ def test_every_route_is_described_with_its_action_and_model(operation: tuple[Rou
     assert told["summary"].endswith(".")
     assert told["tags"][0] in TAGS
     fields = {parameter["name"] for parameter in told["parameters"] if parameter["in"] == "query"}
-    assert ("wait" in fields) is ("202" in told["responses"]) is route.job
+    assert ("202" in told["responses"]) is route.job
+    assert ("207" in told["responses"]) is (told["tags"] == ["fleet"])
+    assert ("wait" in fields) is (route.job or told["tags"] == ["fleet"])
     if method == "GET":
-        assert fields - {"wait"} == set(route.model.model_fields)
+        assert fields - {"wait", "on_disconnect"} == set(route.model.model_fields)
     elif method == "POST" and not route.raw and route.model.model_fields:
         body = told["requestBody"]["content"]["application/json"]
         assert body["schema"]["$ref"].endswith(f"/{route.model.__name__}")

@@ -12,7 +12,7 @@ CONTRACT = {
     "/command": "arm disarm takeoff land rtl brake guided set_mode set_air_speed set_ground_speed set_climb_speed "
     "set_descent_speed set_sim_speedup set_home",
     "/movement": "go_to_gps go_to_gps_wait go_to_ned go_to_ned_wait drive drive_wait drive_body drive_body_wait "
-    "travel_at_ned set_heading set_yaw_rate stop resume",
+    "travel_at_ned travel_at_body set_heading set_yaw_rate stop resume",
     "/telemetry": "general gps gps_raw ned compass sys_status sensor_status battery_info error_info home_info "
     "attitude status message/{name} stream",
     "/peripherical": "servo_output",
@@ -29,6 +29,7 @@ POSTS = {
         "drive_body",
         "drive_body_wait",
         "travel_at_ned",
+        "travel_at_body",
     ]
 } | {"/peripherical/servo_output"}
 
@@ -62,6 +63,7 @@ VALUES = {
     "/movement/drive": {"x": 0, "y": 0, "z": 0},
     "/movement/drive_body": {"front": 0, "right": 0},
     "/movement/travel_at_ned": {"vx": 0, "vy": 0, "vz": 0},
+    "/movement/travel_at_body": {"front": 0, "right": 0},
     "/movement/set_heading": {"heading": 90},
     "/movement/set_yaw_rate": {"yaw_rate": 5},
 }

@@ -1,0 +1,90 @@
+"""What scripts write above the methods of their runners. A mark is an attribute of the function."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from mavproxy_uavapi.aerpaw.exceptions import InvalidStateNameError, StateMachineError
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+ENTRYPOINT, BACKGROUND, AT_INIT = "_entrypoint", "_is_background", "_run_at_init"
+STATE, EXPOSED_STATE, EXPOSED_FIELD = "_aerpaw_state", "_zmq_state_name", "_zmq_field_name"
+MARKS = (ENTRYPOINT, BACKGROUND, AT_INIT, STATE, EXPOSED_STATE, EXPOSED_FIELD)
+
+
+@dataclass(frozen=True)
+class StateMark:
+    """One state of a StateMachine.
+
+    Attributes:
+        name: what other states return to come to it.
+        first: whether the machine begins with it.
+        duration: s that it lasts at least; None for as long as it takes.
+        loop: whether its method is called over and over for so long.
+    """
+
+    name: str
+    first: bool
+    duration: float | None = None
+    loop: bool = False
+
+
+def _marked(func: F, mark: str, value: object = True) -> F:
+    setattr(func, mark, value)
+    return func
+
+
+def entrypoint(func: F) -> F:
+    """The one method that a BasicRunner runs."""
+    return _marked(func, ENTRYPOINT)
+
+
+def background(func: F) -> F:
+    """A method that runs over and over beside the states."""
+    return _marked(func, BACKGROUND)
+
+
+def at_init(func: F) -> F:
+    """A method that runs once, before the vehicle is armed."""
+    return _marked(func, AT_INIT)
+
+
+def state(name: str, first: bool = False) -> Callable[[F], F]:
+    """A state, which returns the name of the next one, or None at the end."""
+    return _state(StateMark(name, first))
+
+
+def timed_state(name: str, duration: float, loop: bool = False, first: bool = False) -> Callable[[F], F]:
+    """A state that lasts `duration` s at least; with `loop` its method is called over and over for so long."""
+    return _state(StateMark(name, first, duration, loop))
+
+
+def _state(mark: StateMark) -> Callable[[F], F]:
+    if not mark.name:
+        raise InvalidStateNameError
+
+    def decorate(func: F) -> F:
+        if hasattr(func, STATE):
+            raise StateMachineError("A method is one state only")
+        return _marked(func, STATE, mark)
+
+    return decorate
+
+
+def expose_zmq(name: str) -> Callable[[F], F]:
+    """A state that other runners may bring about by that name."""
+    return _exposed(EXPOSED_STATE, name)
+
+
+def expose_field_zmq(name: str) -> Callable[[F], F]:
+    """A method whose value other runners may ask for by that name."""
+    return _exposed(EXPOSED_FIELD, name)
+
+
+def _exposed(mark: str, name: str) -> Callable[[F], F]:
+    if not name:
+        raise InvalidStateNameError
+    return lambda func: _marked(func, mark, name)

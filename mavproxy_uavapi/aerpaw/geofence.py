@@ -1,0 +1,71 @@
+"""Geofences: polygons of KML files, and what lies in them. Points are `{"lat": degrees, "lon": degrees}`."""
+
+# ruff: noqa: PLR0917 - the signatures are aerpawlib's
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from xml.etree import ElementTree
+
+Point = dict[str, float]
+
+
+def read_geofence(file_path: str) -> list[Point]:
+    """The outer boundary of the first polygon of a KML file.
+
+    Raises:
+        ValueError: the file has none.
+    """
+    try:
+        root = ElementTree.parse(Path(file_path)).getroot()
+    except ElementTree.ParseError as error:
+        raise ValueError(f"{file_path} is no KML: {error}") from error
+    text = root.findtext(".//{*}Polygon/{*}outerBoundaryIs/{*}LinearRing/{*}coordinates")
+    if not text:
+        raise ValueError(f"{file_path} has no polygon")
+    corners = [corner.split(",") for corner in text.split()]
+    return [{"lon": float(lon), "lat": float(lat)} for lon, lat, *_ in corners]
+
+
+def inside(lon: float, lat: float, geofence: Sequence[Point]) -> bool:
+    """Whether a point lies in a polygon: a ray from it to the east crosses an odd number of its sides."""
+    is_inside = False
+    for a, b in zip(geofence, [*geofence[1:], *geofence[:1]], strict=True):
+        if (a["lat"] > lat) != (b["lat"] > lat):
+            crossing = a["lon"] + (b["lon"] - a["lon"]) * (lat - a["lat"]) / (b["lat"] - a["lat"])
+            is_inside ^= lon < crossing
+    return is_inside
+
+
+def lies_on_segment(px: float, py: float, qx: float, qy: float, rx: float, ry: float) -> bool:
+    """Whether q, which is in line with p and r, lies between them."""
+    return min(px, rx) <= qx <= max(px, rx) and min(py, ry) <= qy <= max(py, ry)
+
+
+def orientation(px: float, py: float, qx: float, qy: float, rx: float, ry: float) -> int:
+    """How one turns at q on the way from p to r: 0 not at all, 1 clockwise, 2 counterclockwise."""
+    turn = (qy - py) * (rx - qx) - (qx - px) * (ry - qy)
+    return 0 if turn == 0 else 1 if turn > 0 else 2
+
+
+def do_intersect(px: float, py: float, qx: float, qy: float, rx: float, ry: float, sx: float, sy: float) -> bool:
+    """Whether the segments pq and rs have a point in common."""
+    turns = (
+        orientation(px, py, qx, qy, rx, ry),
+        orientation(px, py, qx, qy, sx, sy),
+        orientation(rx, ry, sx, sy, px, py),
+        orientation(rx, ry, sx, sy, qx, qy),
+    )
+    if turns[0] != turns[1] and turns[2] != turns[3]:
+        return True
+    touching = (
+        lies_on_segment(px, py, rx, ry, qx, qy),
+        lies_on_segment(px, py, sx, sy, qx, qy),
+        lies_on_segment(rx, ry, px, py, sx, sy),
+        lies_on_segment(rx, ry, qx, qy, sx, sy),
+    )
+    return any(turn == 0 and touches for turn, touches in zip(turns, touching, strict=True))
+
+
+readGeofence, liesOnSegment, doIntersect = read_geofence, lies_on_segment, do_intersect

@@ -1,0 +1,196 @@
+"""Runs one script: connects its vehicle, waits for it, ends it, and sees to the vehicle afterwards."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import contextlib
+import logging
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from mavproxy_uavapi.aerpaw import on_exit
+from mavproxy_uavapi.aerpaw.event_log import EventLog
+from mavproxy_uavapi.aerpaw.exceptions import AerpawlibError, ConnectionTimeoutError, HeartbeatLostError
+from mavproxy_uavapi.aerpaw.platform import AERPAW_Platform
+from mavproxy_uavapi.aerpaw.runner import Runner
+from mavproxy_uavapi.aerpaw.vehicle import Vehicle
+from mavproxy_uavapi.aerpaw.vehicles import Drone, DummyVehicle, Rover
+from mavproxy_uavapi.aerpaw.zmq_runner import ZmqStateMachine
+from mavproxy_uavapi.client.drone import connect
+from mavproxy_uavapi.core.errors import UavApiError
+
+log = logging.getLogger("aerpawlib")
+
+CLASSES: dict[str, type[Vehicle]] = {"drone": Drone, "rover": Rover, "generic": Vehicle}
+BY_TYPE = {"copter": "drone", "rover": "rover"}
+LOOK_EVERY = 0.2  # s
+TELEMETRY_EVERY = 5.0  # s, in the structured log
+STOPPED = 130  # exit status after Ctrl-C
+
+
+class Stopped(Exception):
+    """Somebody has ended the script by a signal."""
+
+
+class Host:
+    """One script's run.
+
+    Args:
+        options: of the command line.
+        runner: the script's.
+    """
+
+    def __init__(self, options: argparse.Namespace, runner: Runner) -> None:
+        self._options, self._runner = options, runner
+        self._policy = "nothing" if options.skip_rtl else options.on_exit
+
+    def run(self) -> int:
+        """Run it; the exit status."""
+        try:
+            vehicle = self._connect()
+        except (AerpawlibError, UavApiError) as error:
+            log.error("could not connect: %s", error)
+            return 1
+        try:
+            status = self._fly(vehicle)
+            if isinstance(vehicle, Vehicle) and not asyncio.run(on_exit.see_to(vehicle, self._policy)):
+                return 1
+            return status
+        finally:
+            vehicle.close()
+
+    def _connect(self) -> Vehicle | DummyVehicle:
+        kind = self._options.vehicle or asyncio.run(self._kind())
+        if kind == "none":
+            return DummyVehicle()
+        log.info("connecting to %s", self._options.conn)
+        began = time.monotonic()
+        vehicle = CLASSES[kind](self._options.conn)
+        if time.monotonic() - began > self._options.conn_timeout:
+            vehicle.close()
+            raise ConnectionTimeoutError(self._options.conn_timeout)
+        return vehicle
+
+    async def _kind(self) -> str:
+        async with connect(self._options.conn, timeout=self._options.conn_timeout) as drone:
+            return BY_TYPE.get((await drone.status()).kind, "generic")
+
+    def _fly(self, vehicle: Vehicle | DummyVehicle) -> int:
+        with contextlib.ExitStack() as stack:
+            if self._options.structured_log and isinstance(vehicle, Vehicle):
+                events = stack.enter_context(EventLog(Path(self._options.structured_log)))
+                vehicle.set_event_log(events)
+                stack.callback(vehicle.set_event_log, None)
+            try:
+                asyncio.run(self._run(vehicle))
+            except (KeyboardInterrupt, Stopped):
+                log.warning("the script was stopped")
+                return STOPPED
+            except Exception as error:
+                log.exception("the script failed: %s", error)
+                return 1
+        return 0
+
+    async def _run(self, vehicle: Vehicle | DummyVehicle) -> None:
+        if not self._options.skip_init:
+            await asyncio.to_thread(vehicle.initialize, True)
+        if (
+            isinstance(self._runner, ZmqStateMachine)
+            and self._options.zmq_identifier
+            and self._options.zmq_proxy_server
+        ):
+            self._runner._initialize_zmq_bindings(self._options.zmq_identifier, self._options.zmq_proxy_server)
+        running = asyncio.ensure_future(self._runner.run(vehicle))
+        stopped = asyncio.get_running_loop().create_future()
+        beside = [asyncio.ensure_future(self._watch(vehicle)), stopped]
+        with _stopping(stopped):
+            try:
+                await asyncio.wait({running, *beside}, return_when=asyncio.FIRST_COMPLETED)
+            finally:
+                ended = running.done()
+                running.cancel()
+                await asyncio.gather(running, return_exceptions=True)
+                for one in beside:
+                    if not one.done():
+                        one.cancel()
+        if ended:
+            running.result()
+        else:
+            for one in beside:
+                if one.done() and not one.cancelled():
+                    one.result()
+
+    async def _watch(self, vehicle: Vehicle | DummyVehicle) -> None:
+        """Look after the vehicle while the script runs.
+
+        Raises:
+            HeartbeatLostError: it is not heard any more.
+        """
+        told_at = 0.0
+        while True:
+            await asyncio.sleep(LOOK_EVERY)
+            if not isinstance(vehicle, Vehicle):
+                continue
+            if vehicle.heartbeat_age > self._options.heartbeat_timeout:
+                raise HeartbeatLostError(vehicle.heartbeat_age)
+            if time.monotonic() - told_at > TELEMETRY_EVERY:
+                told_at = time.monotonic()
+                vehicle.log_telemetry()
+
+
+@contextlib.contextmanager
+def _stopping(stopped: asyncio.Future[None]) -> Iterator[None]:
+    """Have SIGINT and SIGTERM end the script between two of its steps; a second one, wherever it is."""
+    loop = asyncio.get_running_loop()
+
+    def stop(*_: Any) -> None:
+        if stopped.done():
+            raise KeyboardInterrupt
+        stopped.set_exception(Stopped())
+        loop.call_soon_threadsafe(lambda: None)
+
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def set_up_logging(options: argparse.Namespace) -> None:
+    """Have what is said go to stderr, and to a file where one is wanted."""
+    level = logging.DEBUG if options.verbose else logging.WARNING if options.quiet else logging.INFO
+    handlers: list[logging.Handler] = []
+    if not options.no_aerpawlib_stdout:
+        handlers.append(logging.StreamHandler(sys.stderr))
+        handlers[0].setLevel(level)
+        handlers[0].setFormatter(logging.Formatter("[%(name)s] %(message)s"))
+    if options.log_file:
+        handlers.append(logging.FileHandler(options.log_file, encoding="utf-8"))
+        handlers[-1].setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))
+    root = logging.getLogger("aerpawlib")
+    root.handlers = handlers or [logging.NullHandler()]
+    root.setLevel(logging.DEBUG)
+    root.propagate = False
+
+
+def run(options: argparse.Namespace, rest: Sequence[str], load: Callable[[str], type[Runner]]) -> int:
+    """Load the script, give it its arguments, and run it; the exit status."""
+    set_up_logging(options)
+    if options.no_aerpaw_environment:
+        AERPAW_Platform._connected = False
+    try:
+        runner = load(options.script)()
+        runner.initialize_args(list(rest))
+    except Exception as error:
+        log.exception("%s: %s", options.script, error)
+        return 1
+    if isinstance(runner, ZmqStateMachine) and not (options.zmq_identifier and options.zmq_proxy_server):
+        log.error("ZMQ runners need --zmq-identifier NAME --zmq-proxy-server ADDRESS")
+        return 1
+    return Host(options, runner).run()

@@ -1,0 +1,134 @@
+"""The names of aerpawlib, served by an import hook: only in a process that asks for it (`serve`).
+
+Where the real package is installed nothing is served, unless it is wanted so; then its `util` may be the real one.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.abc
+import importlib.machinery
+import importlib.metadata
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from types import ModuleType
+
+PACKAGE = "aerpawlib"
+OURS = "mavproxy_uavapi.aerpaw"
+# By aerpawlib's module, ours that have its names.
+V1: Mapping[str, Sequence[str]] = {
+    "aerpaw": ("platform",),
+    "constants": ("constants",),
+    "exceptions": ("exceptions",),
+    "external": ("external",),
+    "helpers": ("helpers",),
+    "log": ("log",),
+    "runner": ("runners",),
+    "runner.decorators": ("decorators",),
+    "runner.impl": ("runners",),
+    "safety": ("safety",),
+    "safety.client": ("safety",),
+    "safetyChecker": ("safety",),
+    "util": ("util",),
+    "util.geofence": ("geofence",),
+    "util.geometry": ("geometry",),
+    "util.plan_io": ("plans",),
+    "util.ports": ("util",),
+    "vehicle": ("vehicles",),
+    "vehicle.core_vehicle": ("vehicles",),
+    "vehicle.drone": ("vehicles",),
+    "vehicle.dummy_vehicle": ("vehicles",),
+    "vehicle.rover": ("vehicles",),
+    "zmqutil": ("zmq_proxy",),
+}
+LEGACY = ("aerpaw", "external", "log", "runner", "safetyChecker", "util", "vehicle", "zmqutil")  # without v1, too
+ALL = tuple(dict.fromkeys(name for names in V1.values() for name in names))
+
+
+class AlreadyInstalled(Exception):
+    """The real aerpawlib is installed."""
+
+
+def _served() -> dict[str, Sequence[str]]:
+    served: dict[str, Sequence[str]] = {PACKAGE: ALL, f"{PACKAGE}.v1": ALL}
+    served |= {f"{PACKAGE}.v1.{name}": ours for name, ours in V1.items()}
+    return served | {f"{PACKAGE}.{name}": V1[name] for name in LEGACY}
+
+
+class Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
+    """Finds aerpawlib's modules among ours; what it does not serve is not there.
+
+    Args:
+        real_util: whether the real package's `util` is served instead of ours.
+    """
+
+    def __init__(self, real_util: bool = False) -> None:
+        self._served = _served()
+        self._real = _real_util() if real_util else {}
+
+    def find_spec(
+        self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
+    ) -> importlib.machinery.ModuleSpec | None:
+        """See `importlib.abc.MetaPathFinder`."""
+        if name not in self._served:
+            if name == PACKAGE or name.startswith(f"{PACKAGE}."):
+                raise ModuleNotFoundError(f"{name} is not served here; aerpawlib's v1 is", name=name)
+            return None
+        spec = importlib.machinery.ModuleSpec(name, self, origin=OURS)
+        spec.submodule_search_locations = []  # all of them may be packages
+        return spec
+
+    def create_module(self, spec: importlib.machinery.ModuleSpec) -> ModuleType | None:
+        """The usual one."""
+        return None
+
+    def exec_module(self, module: ModuleType) -> None:
+        """Fill it with the public names of ours."""
+        for ours in self._served[module.__name__]:
+            source = self._real.get(ours) or importlib.import_module(f"{OURS}.{ours}")
+            vars(module).update(_public(source))
+        if module.__name__ == PACKAGE:
+            importlib.import_module(f"{PACKAGE}.v1")  # so that `import aerpawlib` is enough for `aerpawlib.v1`
+
+
+def _public(module: ModuleType) -> Iterator[tuple[str, object]]:
+    names = getattr(module, "__all__", None) or [name for name in vars(module) if not name.startswith("_")]
+    for name in names:
+        value = getattr(module, name)
+        if not isinstance(value, ModuleType):
+            yield name, value
+
+
+def _real_util() -> dict[str, ModuleType]:
+    """The real `util`, by our module's name; the real package is forgotten otherwise."""
+    real = importlib.import_module(f"{PACKAGE}.v1.util")
+    for name in [name for name in sys.modules if name == PACKAGE or name.startswith(f"{PACKAGE}.")]:
+        del sys.modules[name]
+    return {"util": real}
+
+
+def is_installed() -> bool:
+    """Whether the real package is installed; a copy in the current folder is not."""
+    try:
+        importlib.metadata.distribution(PACKAGE)
+    except importlib.metadata.PackageNotFoundError:
+        return False
+    return True
+
+
+def serve(*, real: bool = False) -> None:
+    """Serve aerpawlib's names from now on.
+
+    Args:
+        real: serve them though the real package is installed, with its `util`.
+
+    Raises:
+        AlreadyInstalled: it is, and that was not wanted.
+    """
+    if any(isinstance(finder, Finder) for finder in sys.meta_path):
+        return
+    if is_installed() and not real:
+        raise AlreadyInstalled(
+            "aerpawlib itself is installed here, and is left alone; --real flies its scripts here, with its own util"
+        )
+    sys.meta_path.insert(0, Finder(real_util=real and is_installed()))

@@ -1,0 +1,64 @@
+"""QGroundControl's .plan files: their take-offs, waypoints and returns, each with the speed in force there."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from mavproxy_uavapi.aerpaw.constants import (
+    DEFAULT_WAYPOINT_SPEED,
+    PLAN_CMD_RTL,
+    PLAN_CMD_SPEED,
+    PLAN_CMD_TAKEOFF,
+    PLAN_CMD_WAYPOINT,
+)
+from mavproxy_uavapi.aerpaw.geometry import Coordinate, Waypoint
+
+PLACES = (PLAN_CMD_TAKEOFF, PLAN_CMD_WAYPOINT, PLAN_CMD_RTL)
+PARAMETERS = 7
+
+
+def read_from_plan_complete(path: str, default_speed: float = DEFAULT_WAYPOINT_SPEED) -> list[dict[str, Any]]:
+    """Each place as `id`, `command`, `pos` [degrees, degrees, m above home], `wait_for` s and `speed` m/s.
+
+    Raises:
+        ValueError: it is no .plan file, or an item has too few parameters.
+    """
+    with Path(path).open(encoding="utf-8") as file:
+        plan = json.load(file)
+    if not isinstance(plan, dict) or plan.get("fileType") != "Plan":
+        raise ValueError("Wrong file type -- use a .plan file.")
+    speed, places = default_speed, []
+    for item in _simple(plan["mission"]["items"]):
+        parameters = [0 if value is None else value for value in item.get("params", [])]
+        if item["command"] == PLAN_CMD_SPEED:
+            speed = parameters[1]
+        elif item["command"] in PLACES:
+            if len(parameters) < PARAMETERS:
+                raise ValueError(f"Plan item has fewer than {PARAMETERS} params: {item}")
+            number, command = item["doJumpId"], item["command"]
+            place = {"id": number, "command": command, "pos": parameters[4:7], "wait_for": parameters[0]}
+            places.append({**place, "speed": speed})
+    return places
+
+
+def _simple(items: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    """The items; those of a survey or a corridor as QGroundControl made them."""
+    for item in items:
+        if "command" in item:
+            yield item
+        else:
+            yield from _simple(item.get("TransectStyleComplexItem", {}).get("Items", []))
+
+
+def read_from_plan(path: str, default_speed: float = DEFAULT_WAYPOINT_SPEED) -> list[Waypoint]:
+    """Each place as command, latitude, longitude, altitude, id and speed; errors as `read_from_plan_complete`."""
+    places = read_from_plan_complete(path, default_speed)
+    return [(place["command"], *place["pos"], place["id"], place["speed"]) for place in places]
+
+
+def get_location_from_waypoint(waypoint: Waypoint) -> Coordinate:
+    """Where a waypoint of `read_from_plan` is."""
+    return Coordinate(*waypoint[1:4])

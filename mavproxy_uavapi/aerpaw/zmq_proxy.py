@@ -1,0 +1,45 @@
+"""The proxy between runners: `python -m mavproxy_uavapi.aerpaw.zmq_proxy [--host ADDRESS]`."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import sys
+from collections.abc import Sequence
+
+from mavproxy_uavapi.aerpaw.constants import ZMQ_PROXY_IN_PORT, ZMQ_PROXY_OUT_PORT
+from mavproxy_uavapi.aerpaw.zmq_runner import check_zmq_proxy_reachable
+
+__all__ = ["check_zmq_proxy_reachable", "main", "run_zmq_proxy"]
+
+
+def run_zmq_proxy(
+    in_port: int | str = ZMQ_PROXY_IN_PORT, out_port: int | str = ZMQ_PROXY_OUT_PORT, host: str = "127.0.0.1"
+) -> None:
+    """Pass on what runners publish to `in_port` to all that listen at `out_port`, until Ctrl-C.
+
+    Anybody who reaches the ports may bring runners into states: `host` is this machine unless it is said otherwise.
+    """
+    import zmq  # noqa: PLC0415 - an extra
+
+    with zmq.Context() as context, context.socket(zmq.XSUB) as inward, context.socket(zmq.XPUB) as outward:
+        inward.bind(f"tcp://{host}:{in_port}")
+        outward.bind(f"tcp://{host}:{out_port}")
+        print(f"runners publish to {host}:{in_port} and listen at {host}:{out_port}", flush=True)
+        with contextlib.suppress(KeyboardInterrupt):
+            zmq.proxy(inward, outward)
+        inward.linger = outward.linger = 0
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """The command."""
+    parser = argparse.ArgumentParser(prog="python -m mavproxy_uavapi.aerpaw.zmq_proxy", description=__doc__)
+    parser.add_argument("--host", default="127.0.0.1", help="the address to listen at; 0.0.0.0 for all (%(default)s)")
+    try:
+        run_zmq_proxy(host=parser.parse_args(arguments).host)
+    except ImportError:
+        sys.exit("the proxy needs pyzmq: pip install 'mavproxy-uavapi[aerpaw]'")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,183 @@
+"""ZmqStateMachine: runners that bring each other into states and ask each other for values, over a proxy.
+
+pyzmq is imported when a runner is bound to its proxy: scripts without it need none.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import socket
+from typing import Any
+
+from mavproxy_uavapi.aerpaw import wire
+from mavproxy_uavapi.aerpaw.constants import (
+    ZMQ_PROXY_CHECK_TIMEOUT_S,
+    ZMQ_PROXY_IN_PORT,
+    ZMQ_PROXY_OUT_PORT,
+    ZMQ_QUERY_FIELD_TIMEOUT_S,
+    ZMQ_TYPE_FIELD_CALLBACK,
+    ZMQ_TYPE_FIELD_REQUEST,
+    ZMQ_TYPE_GOODBYE,
+    ZMQ_TYPE_HELLO,
+    ZMQ_TYPE_TRANSITION,
+)
+from mavproxy_uavapi.aerpaw.decorators import EXPOSED_FIELD, EXPOSED_STATE, STATE, background
+from mavproxy_uavapi.aerpaw.exceptions import StateMachineError
+from mavproxy_uavapi.aerpaw.runner import StateMachine, call
+from mavproxy_uavapi.core.timeout import wait_with_timeout
+
+log = logging.getLogger("aerpawlib.v1.zmq")
+
+SUBSCRIBED_WITHIN = 2.0  # s; what is published before the proxy has subscribed is lost
+LINGER = 500  # ms that the last messages get
+
+
+def check_zmq_proxy_reachable(proxy_addr: str, timeout_s: float = ZMQ_PROXY_CHECK_TIMEOUT_S) -> bool:
+    """Whether a proxy listens there."""
+    try:
+        with socket.create_connection((proxy_addr, int(ZMQ_PROXY_OUT_PORT)), timeout=timeout_s):
+            return True
+    except OSError:
+        return False
+
+
+class ZmqStateMachine(StateMachine):
+    """A StateMachine that other runners reach by its identifier."""
+
+    _identifier: str | None = None
+    _proxy = ""
+
+    def _initialize_zmq_bindings(self, vehicle_identifier: str, proxy_server_addr: str) -> None:
+        """Be reached by that name over that proxy.
+
+        Raises:
+            ConnectionError: there is no proxy.
+            StateMachineError: pyzmq is not installed.
+        """
+        try:
+            import zmq.asyncio  # noqa: PLC0415 - an extra
+        except ImportError as error:
+            raise StateMachineError("ZMQ runners need pyzmq: pip install 'mavproxy-uavapi[aerpaw]'") from error
+        if not check_zmq_proxy_reachable(proxy_server_addr):
+            raise ConnectionError(
+                f"ZMQ proxy at {proxy_server_addr} is not reachable; start it before its runners: "
+                "python -m mavproxy_uavapi.aerpaw.zmq_proxy"
+            )
+        self._zmq = zmq
+        self._context = zmq.asyncio.Context()
+        self._identifier, self._proxy = vehicle_identifier, proxy_server_addr
+        self._outgoing: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
+        self._asked: dict[tuple[str, str], list[asyncio.Future[Any]]] = {}
+
+    def _build(self) -> None:
+        super()._build()
+        self._fields = dict(self.marked(EXPOSED_FIELD))
+        self._aliases: dict[str, str] = {}
+        for name, method in self.marked(EXPOSED_STATE):
+            mark = getattr(method, STATE, None)
+            if mark is None:
+                raise StateMachineError("@expose_zmq is for states only")
+            self._aliases[name] = mark.name
+
+    async def run(self, vehicle: Any) -> None:
+        """As a StateMachine's.
+
+        Raises:
+            StateMachineError: it has no identifier and no proxy.
+        """
+        if self._identifier is None:
+            raise StateMachineError("ZMQ runners need --zmq-identifier NAME --zmq-proxy-server ADDRESS")
+        try:
+            await super().run(vehicle)
+        finally:
+            self._context.destroy(LINGER)
+
+    # -- what scripts call --------------------------------------------------------------------------------
+
+    async def transition_runner(self, identifier: str, state: str) -> None:
+        """Have another runner go to a state when the one that it is in is over."""
+        self._send(ZMQ_TYPE_TRANSITION, identifier, next_state=state)
+
+    async def query_field(self, identifier: str, field: str, timeout: float = ZMQ_QUERY_FIELD_TIMEOUT_S) -> Any:
+        """A value of another runner.
+
+        Raises:
+            asyncio.TimeoutError: it did not answer within `timeout` s.
+        """
+        answer: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
+        waiting = self._asked.setdefault((identifier, field), [])
+        waiting.append(answer)
+        self._send(ZMQ_TYPE_FIELD_REQUEST, identifier, field=field)
+        try:
+            return await wait_with_timeout(timeout, answer)
+        finally:
+            waiting.remove(answer)
+
+    def _send(self, kind: str, identifier: str | None = None, **members: Any) -> None:
+        to = {} if identifier is None else {"identifier": identifier}
+        self._outgoing.put_nowait({"msg_type": kind, "from": self._identifier, **to, **members})
+
+    # -- the network --------------------------------------------------------------------------------------
+
+    @background
+    async def _publish(self) -> None:
+        # An XPUB is a PUB that is told of its subscribers: the proxy, as soon as anybody listens there.
+        publisher = self._context.socket(self._zmq.XPUB)
+        publisher.linger = LINGER
+        try:
+            publisher.connect(f"tcp://{self._proxy}:{ZMQ_PROXY_IN_PORT}")
+            await publisher.poll(SUBSCRIBED_WITHIN * 1000)
+            await publisher.send(wire.written({"msg_type": ZMQ_TYPE_HELLO, "from": self._identifier}))
+            while True:
+                await publisher.send(wire.written(await self._outgoing.get()))
+        finally:
+            while not self._outgoing.empty():
+                publisher.send(wire.written(self._outgoing.get_nowait()))
+            publisher.send(wire.written({"msg_type": ZMQ_TYPE_GOODBYE, "from": self._identifier}))
+            publisher.close()
+
+    @background
+    async def _subscribe(self, vehicle: Any) -> None:
+        subscriber = self._context.socket(self._zmq.SUB)
+        answers: set[asyncio.Task[None]] = set()
+        try:
+            subscriber.setsockopt(self._zmq.SUBSCRIBE, b"")
+            subscriber.connect(f"tcp://{self._proxy}:{ZMQ_PROXY_OUT_PORT}")
+            while True:
+                try:
+                    message = wire.read(await subscriber.recv(), type(self).__module__)
+                except ValueError as error:
+                    log.warning("a message was not taken: %s", error)
+                    continue
+                if message.get("identifier") == self._identifier:
+                    answer = asyncio.create_task(self._take(message, vehicle))
+                    answers.add(answer)
+                    answer.add_done_callback(answers.discard)
+        finally:
+            subscriber.close(0)
+
+    async def _take(self, message: dict[str, Any], vehicle: Any) -> None:
+        kind, sender, field = message.get("msg_type"), str(message.get("from")), str(message.get("field"))
+        if kind == ZMQ_TYPE_TRANSITION:
+            wanted = str(message.get("next_state"))
+            log.info("%s wants state %s", sender, wanted)
+            self._overrides.append(self._aliases.get(wanted, wanted))
+        elif kind == ZMQ_TYPE_FIELD_REQUEST:
+            self._send(ZMQ_TYPE_FIELD_CALLBACK, sender, field=field, value=await self._value(field, vehicle))
+        elif kind == ZMQ_TYPE_FIELD_CALLBACK:
+            for answer in self._asked.get((sender, field), []):
+                if not answer.done():
+                    answer.set_result(message.get("value"))
+        else:
+            log.warning("a message of %s was not taken: its type is %r", sender, kind)
+
+    async def _value(self, field: str, vehicle: Any) -> Any:
+        if field not in self._fields:
+            log.warning("there is no field %s", field)
+            return None
+        try:
+            return await call(self._fields[field], vehicle)
+        except Exception:
+            log.exception("the value of %s failed", field)
+            return None

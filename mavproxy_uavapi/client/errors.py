@@ -1,0 +1,44 @@
+"""An answer of the API that is no success -> the error that the server had raised, of the same tree."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from mavproxy_uavapi.core import errors
+from mavproxy_uavapi.core.errors import Invalid, Rejected, TimedOut, UavApiError
+
+
+class Unreachable(errors.Unavailable):
+    """Nothing answers at the API's address, or what answers is no API."""
+
+    code = "unreachable"
+
+
+def _tree(base: type[UavApiError]) -> Iterator[type[UavApiError]]:
+    yield base
+    for child in base.__subclasses__():
+        yield from _tree(child)
+
+
+# A class comes before its children here: of a code that both have, the parent's counts.
+BY_CODE: dict[str, type[UavApiError]] = {}
+for _error in _tree(UavApiError):
+    if _error.__module__ == errors.__name__:
+        BY_CODE.setdefault(_error.code, _error)
+
+
+def error_of(status: int, body: Mapping[str, Any]) -> UavApiError:
+    """The error that a status and its body tell; one that is not in the tree is a UavApiError."""
+    detail, kind = body.get("detail"), BY_CODE.get(str(body.get("code")))
+    sentence = str(detail) if detail else f"the API answered {status}"
+    statustext = body.get("statustext", [])
+    if kind is None:
+        return UavApiError(f"{sentence} ({status})")
+    if issubclass(kind, Invalid):
+        return kind(detail if isinstance(detail, list) else sentence)
+    if issubclass(kind, Rejected):
+        return kind(sentence, body.get("ack"), statustext)
+    if issubclass(kind, TimedOut):
+        return kind(sentence, statustext)
+    return kind(sentence)

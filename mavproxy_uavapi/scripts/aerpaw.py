@@ -1,0 +1,32 @@
+"""Scripts of aerpawlib: known by what they import. Pure."""
+
+from __future__ import annotations
+
+import ast
+
+HOST = [
+    "-m",
+    "mavproxy_uavapi.aerpaw",
+    "--script",
+]  # by UAVAPI_URL it finds the API, by its status the vehicle's type
+
+
+def needs_host(source: bytes) -> bool:
+    """Whether a script imports aerpawlib and does not run itself: then it defines a runner, and a host runs that."""
+    try:
+        body = ast.parse(source).body
+    except (SyntaxError, ValueError):
+        return False  # Python itself will say so
+    return any(map(_imports_aerpawlib, body)) and not any(map(_runs_itself, body))
+
+
+def _imports_aerpawlib(statement: ast.stmt) -> bool:
+    if isinstance(statement, ast.Import):
+        return any(alias.name.partition(".")[0] == "aerpawlib" for alias in statement.names)
+    if isinstance(statement, ast.ImportFrom):
+        return not statement.level and (statement.module or "").partition(".")[0] == "aerpawlib"
+    return False
+
+
+def _runs_itself(statement: ast.stmt) -> bool:
+    return isinstance(statement, ast.If) and "__main__" in ast.dump(statement.test)

@@ -1,0 +1,158 @@
+"""Scripts of aerpawlib's kind fly the embedded vehicle: examples, a script that dies, one that is stopped, ZMQ."""
+
+from __future__ import annotations
+
+import csv
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import requests
+
+EXAMPLES = Path(__file__).parents[2] / "examples" / "aerpaw"
+HOST = [sys.executable, "-m", "mavproxy_uavapi.aerpaw"]
+PATIENCE = 200.0  # s
+
+
+@pytest.fixture(scope="module")
+def embedded_rig(harness: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """A rig with the embedded vehicle, and folders of its own for scripts."""
+    directory = tmp_path_factory.mktemp("aerpaw")
+    folders = {"scripts_path": str(directory / "scripts"), "script_logs": str(directory / "logs")}
+    made = harness.embedded(directory, **folders)
+    yield made
+    made.stop()
+
+
+def begin(rig: Any, script: Path, *more: str) -> subprocess.Popen[str]:
+    """A script in flight."""
+    command = [*HOST, "--script", str(script), "--conn", rig.url, *more]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def end(process: subprocess.Popen[str]) -> tuple[int, str, str]:
+    try:
+        out, err = process.communicate(timeout=PATIENCE)
+    finally:
+        process.kill()
+    return process.returncode, out, err
+
+
+def on_the_ground(rig: Any) -> bool:
+    status = rig.status()
+    return (status["armed"], status["landed_state"]) == (False, "on_ground")
+
+
+def test_square_is_flown(embedded_rig: Any) -> None:
+    status, out, err = end(begin(embedded_rig, EXAMPLES / "square.py", "--vehicle", "drone", "--side", "8"))
+    assert status == 0, out + err
+    assert [line.partition(":")[0] for line in out.splitlines()] == ["north", "east", "south", "west"]
+    assert on_the_ground(embedded_rig)
+
+
+def test_velocities_and_a_log_beside_them(embedded_rig: Any, tmp_path: Path) -> None:
+    log = tmp_path / "sweep.csv"
+    status, out, err = end(begin(embedded_rig, EXAMPLES / "sweep.py", "--output", str(log)))
+    assert status == 0, out + err
+    heading = float(out.splitlines()[-1].removeprefix("heading "))
+    assert abs((heading - 359 + 180) % 360 - 180) <= 5
+    rows = list(csv.reader(log.open()))
+    lats = [float(row[0]) for row in rows]
+    assert (max(lats) - min(lats)) * 111_319 > 2
+    assert on_the_ground(embedded_rig)
+
+
+DIES = """
+from aerpawlib.v1.runner import BasicRunner, entrypoint
+from aerpawlib.v1.util import VectorNED
+from aerpawlib.v1.vehicle import Drone
+
+class Dies(BasicRunner):
+    @entrypoint
+    async def fly(self, drone: Drone):
+        await drone.takeoff(5)
+        await drone.set_velocity(VectorNED(3, 0, 0))
+        print("under way", flush=True)
+        {rest}
+"""
+
+
+@pytest.fixture
+def script(tmp_path: Path) -> Any:
+    """A script that takes off, flies on, and then does that."""
+
+    def make(rest: str) -> Path:
+        file = tmp_path / "dies.py"
+        file.write_text(DIES.format(rest=rest))
+        return file
+
+    return make
+
+
+def test_script_that_dies_in_flight_brings_its_vehicle_home(embedded_rig: Any, script: Any) -> None:
+    status, _, err = end(begin(embedded_rig, script("raise RuntimeError('lost')")))
+    assert status == 1 and "lost" in err
+    assert on_the_ground(embedded_rig)
+
+
+def test_script_that_is_stopped_lands_its_vehicle(embedded_rig: Any, script: Any) -> None:
+    process = begin(embedded_rig, script("import asyncio; await asyncio.sleep(600)"), "--on-exit", "land")
+    assert process.stdout is not None and process.stdout.readline() == "under way\n"
+    process.send_signal(signal.SIGTERM)
+    status, _, err = end(process)
+    assert status == 130, err
+    assert on_the_ground(embedded_rig)
+
+
+def test_killed_script_leaves_no_velocity_behind(embedded_rig: Any, script: Any) -> None:
+    process = begin(embedded_rig, script("import time; time.sleep(600)"))
+    assert process.stdout is not None and process.stdout.readline() == "under way\n"
+    process.kill()
+    end(process)
+    deadline = time.monotonic() + 15
+    while (speed := embedded_rig.ok(embedded_rig.get("/telemetry/general"))["info"]["groundspeed"]) > 0.3:
+        assert time.monotonic() < deadline, f"it still flies at {speed} m/s"
+        time.sleep(0.2)
+    assert embedded_rig.status()["mode"] == "GUIDED"
+    embedded_rig.ok(embedded_rig.get("/command/land"))
+
+
+@pytest.fixture
+def proxy() -> Iterator[None]:
+    """The proxy between runners."""
+    pytest.importorskip("zmq")
+    made = subprocess.Popen(
+        [sys.executable, "-m", "mavproxy_uavapi.aerpaw.zmq_proxy"], stdout=subprocess.PIPE, text=True
+    )
+    assert made.stdout is not None and "publish to" in made.stdout.readline()
+    yield
+    made.send_signal(signal.SIGINT)
+    made.communicate(timeout=10)
+
+
+def test_runners_talk_by_zmq(embedded_rig: Any, proxy: None) -> None:
+    names = ["--zmq-proxy-server", "127.0.0.1", "--zmq-identifier"]
+    flyer = begin(embedded_rig, EXAMPLES / "answer.py", *names, "flyer")
+    base = begin(embedded_rig, EXAMPLES / "ask.py", "--vehicle", "none", *names, "base")
+    status, out, err = end(base)
+    assert (status, out) == (0, "the flyer is 4 m high\n"), err
+    assert end(flyer)[0] == 0
+    assert on_the_ground(embedded_rig)
+
+
+@pytest.mark.needs("tmux")
+def test_script_runs_uploaded_as_it_is(embedded_rig: Any) -> None:
+    files = {"file": ("square.py", (EXAMPLES / "square.py").read_bytes())}
+    embedded_rig.ok(requests.post(embedded_rig.url + "/mission/upload-script", files=files, timeout=10))
+    embedded_rig.ok(embedded_rig.post("/mission/execute-script", script_name="square", args=["--side", "5"]))
+    deadline = time.monotonic() + PATIENCE
+    while (run := embedded_rig.get("/mission/scripts/square").json())["running"]:
+        assert time.monotonic() < deadline
+        time.sleep(0.5)
+    assert run["exit_status"] == 0, run
+    assert on_the_ground(embedded_rig)

@@ -1,0 +1,305 @@
+"""Vehicles as scripts see them."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+import time
+from typing import Any
+
+import pytest
+
+from mavproxy_uavapi.aerpaw import on_exit
+from mavproxy_uavapi.aerpaw.exceptions import (
+    AerpawConnectionError,
+    ArmError,
+    InvalidSpeedError,
+    NavigationError,
+    NotConnectedError,
+    NotImplementedForVehicleError,
+    TakeoffError,
+    VelocityError,
+)
+from mavproxy_uavapi.aerpaw.geometry import VectorNED
+from mavproxy_uavapi.aerpaw.vehicles import Drone, DummyVehicle, Vehicle
+
+MODE_CHANGED = (409, {"detail": "the vehicle left GUIDED", "code": "mode_changed"})
+GO_TO, TRAVEL = "/movement/go_to_gps_wait", "/movement/travel_at_ned"
+
+
+async def until(condition: Any) -> None:
+    for _ in range(200):
+        if condition():
+            return
+        await asyncio.sleep(0.02)
+    raise AssertionError("it did not happen")
+
+
+def test_properties_are_those_that_scripts_read(drone: Drone) -> None:
+    assert drone.connected and not drone.armed and not drone.closed
+    assert (drone.position.lat, drone.position.lon, drone.position.alt) == (35.0, -78.0, 0.0)
+    assert (drone.velocity.north, drone.heading, drone.mode) == (1.5, 0.0, "LOITER")
+    assert (drone.attitude.pitch, drone.attitude.yaw, drone.attitude.roll) == (-0.2, 0.3, 0.1)
+    assert (drone.gps.fix_type, drone.gps.satellites_visible) == (6, 11)
+    assert drone.home_coords is not None and (drone.home_coords.lat, drone.home_amsl) == (35.0, 90.5)
+    assert drone.armable and drone.ekf_ready
+
+
+def test_battery_is_text_that_loggers_take_apart(drone: Drone) -> None:
+    text = str(drone.battery)
+    assert float(text[16 : text.find(",")]) == drone.battery.voltage == 12.6
+    assert re.fullmatch(r"Battery:voltage=12.6,current=1.5,level=88", text)
+
+
+def test_vehicle_goes_on_telling_while_its_script_blocks(api: Any, drone: Drone) -> None:
+    api.alt = 5.0
+    time.sleep(0.3)
+    assert drone.position.alt == 5.0
+
+
+def test_silent_vehicle_is_not_connected(api: Any, drone: Drone) -> None:
+    api.telling = False
+    for told in drone._thread.drone.telemetry._messages.values():
+        assert told.at
+    drone._thread.drone.telemetry._max_age = 0.05
+    time.sleep(0.2)
+    with pytest.raises(NotConnectedError, match="GLOBAL_POSITION_INT"):
+        _ = drone.position
+
+
+def test_mavlink_address_is_refused_with_what_to_say_instead() -> None:
+    with pytest.raises(AerpawConnectionError, match="http://127.0.0.1:8000"):
+        Drone("udpin://127.0.0.1:14550")
+
+
+def test_nothing_at_the_address_is_an_error_in_time(monkeypatch: Any) -> None:
+    monkeypatch.setattr("mavproxy_uavapi.aerpaw.vehicle.CONNECTION_TIMEOUT_S", 0.3)
+    with pytest.raises(AerpawConnectionError):
+        Drone("http://127.0.0.1:9")
+
+
+def test_takeoff_arms_first_and_is_done_at_the_altitude(api: Any, drone: Drone) -> None:
+    asyncio.run(drone.takeoff(8))
+    assert api.verbs() == ["/command/arm", "/command/takeoff"]
+    assert drone.armed and drone.position.alt == 8.0
+
+
+def test_script_may_go_on_in_a_climb_and_the_next_movement_waits_for_its_end(api: Any, drone: Drone) -> None:
+    async def flight() -> None:
+        api.takes["/command/takeoff"] = 1.0
+        asyncio.get_running_loop().call_later(0.3, setattr, api, "alt", 6.0)
+        await drone.takeoff(10, min_alt_tolerance=0.5)
+        assert drone.position.alt == 6.0 and not drone.done_moving()
+        await drone.goto_coordinates(drone.position + VectorNED(1, 0))
+
+    asyncio.run(flight())
+    assert api.alt == 10.0
+    assert api.verbs()[-2:] == ["/command/takeoff", GO_TO]
+
+
+def test_refusal_is_the_error_that_scripts_know(api: Any, drone: Drone) -> None:
+    api.refusals["/command/takeoff"] = (500, {"detail": "no", "code": "rejected", "statustext": ["PreArm: tilted"]})
+    with pytest.raises(TakeoffError, match="tilted") as caught:
+        asyncio.run(drone.takeoff(5))
+    assert type(caught.value.original_error).__name__ == "Rejected"
+
+
+def test_goto_points_to_where_it_goes(api: Any, flying: Drone) -> None:
+    asyncio.run(flying.goto_coordinates(flying.position + VectorNED(30, 0)))
+    asked = api.last(GO_TO)
+    assert asked["look_at_target"] is True and "heading" not in asked
+    assert (asked["tolerance"], asked["timeout"], asked["on_disconnect"]) == (2.0, 300.0, "hold")
+
+
+@pytest.mark.parametrize(("heading", "wanted"), [(-1, 359), (90, 90), (720, 0)])
+def test_goto_keeps_its_target_heading_and_forgets_it(api: Any, flying: Drone, heading: float, wanted: float) -> None:
+    asyncio.run(flying.goto_coordinates(flying.position + VectorNED(30, 0), target_heading=heading))
+    assert api.last(GO_TO)["heading"] == wanted
+    assert flying._current_heading is None
+
+
+def test_goto_is_done_within_its_tolerance_though_the_flight_goes_on(api: Any, flying: Drone) -> None:
+    async def flight() -> None:
+        api.takes[GO_TO] = None
+        await flying.goto_coordinates(flying.position + VectorNED(3, 0), tolerance=4)
+        assert flying.done_moving() and api.gone == []
+
+    asyncio.run(flight())
+
+
+def test_movements_wait_for_those_before(api: Any, flying: Drone) -> None:
+    async def flight() -> None:
+        api.takes[GO_TO] = 0.5
+        first = asyncio.ensure_future(flying.goto_coordinates(flying.position + VectorNED(50, 0)))
+        await asyncio.sleep(0)
+        assert not flying.done_moving()
+        await flying.await_ready_to_move()
+        assert first.done() and flying.done_moving()
+        await flying.set_heading(180)
+
+    asyncio.run(flight())
+    assert api.verbs() == [GO_TO, "/movement/set_heading"]
+
+
+def test_cancelled_goto_hangs_up_so_that_the_vehicle_stops(api: Any, flying: Drone) -> None:
+    async def flight() -> None:
+        api.takes[GO_TO] = None
+        going = asyncio.ensure_future(flying.goto_coordinates(flying.position + VectorNED(50, 0)))
+        await until(lambda: api.asked)
+        going.cancel()
+        await until(lambda: api.gone == [GO_TO])
+        assert flying.done_moving()
+
+    asyncio.run(flight())
+    assert api.last(GO_TO)["on_disconnect"] == "hold"
+
+
+def test_pilots_switch_ends_a_goto_and_is_not_taken_back(api: Any, flying: Drone) -> None:
+    api.mode = 5
+    api.refusals[GO_TO] = MODE_CHANGED
+    with pytest.raises(NavigationError, match="left GUIDED"):
+        asyncio.run(flying.goto_coordinates(flying.position + VectorNED(50, 0)))
+    assert api.verbs() == [GO_TO]
+
+
+def test_vehicle_that_its_pilot_armed_is_taken_over_at_the_first_command_only(api: Any, drone: Drone) -> None:
+    async def flight() -> None:
+        api.armed = True
+        await until(lambda: drone.armed)
+        await drone.await_ready_to_move()
+        assert api.verbs() == ["/command/set_mode"]
+        api.mode = 5
+        await until(lambda: drone.mode == "LOITER")
+        await drone.await_ready_to_move()
+        assert api.verbs() == ["/command/set_mode"]
+
+    asyncio.run(flight())
+
+
+def test_velocity_is_left_to_the_api_and_not_asked_for_twice(api: Any, flying: Drone) -> None:
+    async def flight() -> None:
+        api.takes[TRAVEL] = None
+        for _ in range(3):
+            await flying.set_velocity(VectorNED(1, 2, 0))
+        assert api.verbs() == [TRAVEL]
+        await flying.set_velocity(VectorNED(1, 2.5, 0))
+        assert api.verbs() == [TRAVEL, TRAVEL]
+
+    asyncio.run(flight())
+    asked = api.last(TRAVEL)
+    assert (asked["vx"], asked["vy"], asked["duration"], asked["on_disconnect"]) == (1, 2.5, 3600.0, "hold")
+    flying.close()
+    for _ in range(100):
+        if len(api.gone) == 2:
+            break
+        time.sleep(0.02)
+    assert api.gone == [TRAVEL, TRAVEL]
+
+
+def test_velocity_with_a_duration_returns_at_once(api: Any, flying: Drone) -> None:
+    async def flight() -> None:
+        api.takes["/movement/travel_at_body"] = 5.0
+        began = time.monotonic()
+        await flying.set_velocity(VectorNED(3, 0, 0), global_relative=False, duration=5)
+        assert time.monotonic() - began < 2
+        assert flying.done_moving()
+
+    asyncio.run(flight())
+    asked = api.last("/movement/travel_at_body")
+    assert (asked["front"], asked["right"]) == (3, 0) and asked["duration"] == pytest.approx(5, abs=1e-3)
+
+
+def test_velocity_that_is_refused_raises(api: Any, flying: Drone) -> None:
+    api.refusals[TRAVEL] = MODE_CHANGED
+    with pytest.raises(VelocityError):
+        asyncio.run(flying.set_velocity(VectorNED(1, 0, 0)))
+
+
+def test_heading_is_locked_in_until_it_is_cleared(api: Any, flying: Drone) -> None:
+    async def flight() -> None:
+        await flying.set_heading(90)
+        assert flying._current_heading == 90 and 80 < flying.heading < 100
+        await flying.set_heading(None)
+        assert flying._current_heading is None
+        await flying.set_heading(200, blocking=False)
+        assert api.verbs() == ["/movement/set_heading"]
+
+    asyncio.run(flight())
+
+
+def test_disarming_ends(api: Any, flying: Drone) -> None:
+    asyncio.run(flying.set_armed(False))
+    assert not flying.armed and api.verbs() == ["/command/disarm"]
+
+
+def test_arming_that_is_refused_raises(api: Any, drone: Drone) -> None:
+    api.refusals["/command/arm"] = (500, {"detail": "refused", "code": "rejected"})
+    with pytest.raises(ArmError):
+        asyncio.run(drone.set_armed(True))
+
+
+def test_ground_speed_goes_to_the_api_and_a_refusal_does_not_end_a_script(api: Any, flying: Drone) -> None:
+    asyncio.run(flying.set_groundspeed("3"))  # type: ignore[arg-type]  # as hide_rover hands it on
+    assert api.last("/command/set_ground_speed")["new_v"] == "3.0"
+    api.refusals["/command/set_ground_speed"] = (500, {"detail": "refused", "code": "rejected"})
+    asyncio.run(flying.set_groundspeed(4))
+    with pytest.raises(InvalidSpeedError):
+        asyncio.run(flying.set_groundspeed(0))
+
+
+def test_tolerance_that_is_none_is_refused_before_anything_else() -> None:
+    with pytest.raises(ValueError, match="at least"):
+        asyncio.run(Drone.goto_coordinates(Drone.__new__(Drone), None, tolerance=0.0))  # type: ignore[arg-type]
+
+
+def test_rover_drives_on_the_ground(api: Any, rover: Any) -> None:
+    asyncio.run(rover.goto_coordinates(rover.position + VectorNED(10, 0, -30), target_heading=90))
+    assert api.last(GO_TO)["alt"] == 0.0
+
+
+def test_generic_vehicle_does_not_move(vehicle: Any) -> None:
+    with pytest.raises(NotImplementedForVehicleError):
+        asyncio.run(vehicle(Vehicle).goto_coordinates(None))
+
+
+def test_dummy_is_closed_and_nothing_else() -> None:
+    dummy = DummyVehicle()
+    dummy.initialize(True)
+    dummy.close()
+    assert dummy.closed
+
+
+# -- its end ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("policy", "verbs"),
+    [("rtl", ["/command/rtl"]), ("land", ["/command/land"]), ("hold", [TRAVEL]), ("nothing", [])],
+)
+def test_vehicle_in_the_air_is_seen_to(api: Any, flying: Drone, policy: str, verbs: list[str]) -> None:
+    flying._has_commanded = True
+    assert asyncio.run(on_exit.see_to(flying, policy))
+    assert api.verbs() == verbs
+
+
+def test_vehicle_that_the_script_never_commanded_is_left_alone(api: Any, flying: Drone) -> None:
+    assert asyncio.run(on_exit.see_to(flying, "rtl"))
+    assert api.asked == []
+
+
+def test_vehicle_that_its_pilot_has_is_left_alone(api: Any, flying: Drone) -> None:
+    flying._has_commanded, api.mode = True, 5
+    assert asyncio.run(on_exit.see_to(flying, "rtl"))
+    assert api.asked == []
+
+
+def test_vehicle_on_the_ground_is_disarmed(api: Any, flying: Drone) -> None:
+    flying._has_commanded, api.alt = True, 0.0
+    assert asyncio.run(on_exit.see_to(flying, "rtl"))
+    assert api.verbs() == ["/command/disarm"]
+
+
+def test_refused_return_is_told(api: Any, flying: Drone) -> None:
+    flying._has_commanded = True
+    api.refusals["/command/rtl"] = (503, {"detail": "silent", "code": "link_lost"})
+    assert not asyncio.run(on_exit.see_to(flying, "rtl"))

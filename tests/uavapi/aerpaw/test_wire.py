@@ -1,0 +1,70 @@
+"""What is taken from the network, and what is not."""
+
+from __future__ import annotations
+
+import datetime
+import os
+import pickle
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
+
+from mavproxy_uavapi.aerpaw import wire
+from mavproxy_uavapi.aerpaw.geometry import Coordinate, VectorNED
+
+
+@dataclass
+class OfTheScript:
+    number: int
+
+
+class Evil:
+    def __reduce__(self) -> Any:
+        return os.system, ("true",)
+
+
+def as_sent(value: Any) -> bytes:
+    """As a peer writes it; the module that a peer has by that name need not be here."""
+    return pickle.dumps({"value": value})
+
+
+def place(kind: str) -> bytes:
+    """A place or vector as aerpawlib pickles it: the name of its class there, and its attributes."""
+    members = "}(Vnorth\nI1\nVeast\nI2\nVdown\nI3\nVlat\nF1.5\nVlon\nF2.5\nValt\nF3.5\nub"
+    return f"(dVvalue\ncaerpawlib.v1.util.geometry\n{kind}\n)\x81{members}s.".encode("latin-1")
+
+
+def test_places_of_peers_are_places_here() -> None:
+    value = wire.read(place("Coordinate"), "mission")["value"]
+    assert type(value) is Coordinate and (value.lat, value.lon, value.alt) == (1.5, 2.5, 3.5)
+    assert type(wire.read(place("VectorNED"), "mission")["value"]) is VectorNED
+
+
+@pytest.mark.parametrize(
+    "value", [None, 1.5, "text", [1, {"a": (2, 3)}], {1, 2}, datetime.datetime(2026, 1, 2), datetime.timedelta(1)]
+)
+def test_plain_data_is_taken(value: Any) -> None:
+    assert wire.read(as_sent(value), "mission") == {"value": value}
+
+
+def test_classes_of_the_script_itself_are_taken() -> None:
+    assert wire.read(as_sent(OfTheScript(3)), __name__)["value"] == OfTheScript(3)
+    with pytest.raises(ValueError, match="OfTheScript"):
+        wire.read(as_sent(OfTheScript(3)), "another_script")
+
+
+@pytest.mark.parametrize("data", [as_sent(Evil()), as_sent(print), b"", b"nonsense", pickle.dumps([1]), b"\x80\x05."])
+def test_what_runs_anything_or_makes_no_sense_is_not_taken(data: bytes) -> None:
+    with pytest.raises(ValueError, match="."):
+        wire.read(data, __name__)
+
+
+@pytest.mark.parametrize("name", ["os.system", "Evil", "os"])
+def test_what_the_script_has_imported_is_not_its_own(name: str) -> None:
+    data = b"(dVvalue\nc" + f"{__name__}\n{name}".encode() + b"\ns."
+    if name == "Evil":
+        assert wire.read(data, __name__)["value"] is Evil
+        return
+    with pytest.raises(ValueError, match="not taken"):
+        wire.read(data, __name__)
