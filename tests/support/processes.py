@@ -187,6 +187,14 @@ class Rig:
         info: dict[str, Any] = self.ok(self.get("/telemetry/status"))["info"]
         return info
 
+    def sleep(self, seconds: float) -> None:
+        """Wait; a rig in lock step has a clock of its own."""
+        time.sleep(seconds)
+
+    def clock(self) -> float:
+        """Seconds."""
+        return time.monotonic()
+
     def wait_until_up(self, timeout: float = PATIENCE) -> None:
         """Wait until the API knows its vehicle."""
 
