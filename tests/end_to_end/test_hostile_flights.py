@@ -1,6 +1,6 @@
-"""Flights against an adversary: pilots, other stations, streams and deaths at the worst moment.
+"""Flights against an adversary: pilots, other stations, streams and deaths at the worst moment; each was lost once.
 
-On the embedded vehicle and on ArduPilot's; each was lost once.
+On ArduPilot's vehicle; a few on the embedded one too.
 """
 
 from __future__ import annotations
@@ -43,7 +43,14 @@ WPL = """QGC WPL 110
 """
 
 
-@pytest.fixture(scope="module", params=["embedded", pytest.param("ardupilot", marks=pytest.mark.sitl)])
+ARDUPILOT = pytest.param("ardupilot", marks=pytest.mark.sitl)
+# tests/rules and tests/core have these moments in virtual time.
+# On the embedded vehicle only what needs real clocks is flown here.
+both = pytest.mark.parametrize("vehicle", ["embedded", ARDUPILOT], indirect=True, scope="module")
+on_ardupilot = pytest.mark.parametrize("vehicle", [ARDUPILOT], indirect=True, scope="module")
+
+
+@pytest.fixture(scope="module")
 def vehicle(request, harness, tmp_path_factory):
     directory = tmp_path_factory.mktemp("hostile")
     folders = {"scripts_path": str(directory / "scripts"), "script_logs": str(directory / "logs")}
@@ -158,6 +165,7 @@ def armed_on_the_ground(rig):
 # -- F1: a pilot who takes off while arm waits ------------------------------------------------------------
 
 
+@on_ardupilot
 def test_arm_that_waits_does_not_take_the_vehicle_from_the_pilot_who_arms_it(rig, harness):
     rig.ok(rig.get("/command/set_mode", mode="STABILIZE"))
     rig.control.fault("ekf_bad")
@@ -188,6 +196,7 @@ def pilot_arms(rig):
 # -- F2: what stops goes before what streams --------------------------------------------------------------
 
 
+@both
 @pytest.mark.parametrize("verb", ["land", "rtl"])
 def test_going_down_is_not_kept_from_the_vehicle_by_streams(rig, harness, verb):
     rig.in_the_air(50)
@@ -207,6 +216,7 @@ def test_going_down_is_not_kept_from_the_vehicle_by_streams(rig, harness, verb):
         assert rig.status()["armed"] is False
 
 
+@on_ardupilot
 def test_brake_is_not_kept_from_the_vehicle_by_streams(rig):
     rig.in_the_air(10)
     with Streams(rig) as streams:
@@ -218,6 +228,7 @@ def test_brake_is_not_kept_from_the_vehicle_by_streams(rig):
             rig.ok(rig.get("/command/guided"))
 
 
+@on_ardupilot
 def test_disarm_is_not_kept_from_the_vehicle_by_streams(rig):
     rig.control.fault("pilot_sticks", throttle=1000)
     with Streams(rig) as streams:
@@ -232,6 +243,7 @@ def test_disarm_is_not_kept_from_the_vehicle_by_streams(rig):
 # -- F3: stop is stop -------------------------------------------------------------------------------------
 
 
+@both
 def test_stop_holds_a_vehicle_still_against_a_stream_until_resume(rig, harness):
     rig.in_the_air(10)
     with Streams(rig, count=1) as streams:
@@ -249,6 +261,7 @@ def test_stop_holds_a_vehicle_still_against_a_stream_until_resume(rig, harness):
 # -- F4: the setpoint in force is the autopilot's ---------------------------------------------------------
 
 
+@on_ardupilot
 def test_yaw_rate_leaves_another_stations_target_in_force(rig, harness):
     rig.in_the_air(10)
     x, y, z = rig.ned()
@@ -261,6 +274,7 @@ def test_yaw_rate_leaves_another_stations_target_in_force(rig, harness):
     rig.get("/movement/set_yaw_rate", yaw_rate=0)
 
 
+@on_ardupilot
 def test_yaw_rate_after_a_takeoff_does_not_fly_to_the_target_before_it(rig):
     rig.in_the_air(10)
     x, y, z = rig.ned()
@@ -276,6 +290,7 @@ def test_yaw_rate_after_a_takeoff_does_not_fly_to_the_target_before_it(rig):
     rig.get("/movement/set_yaw_rate", yaw_rate=0)
 
 
+@on_ardupilot
 @pytest.mark.parametrize("after", [0.05, 0.4])
 def test_yaw_rate_in_a_takeoff_is_refused_and_the_climb_goes_on(rig, after):
     armed_on_the_ground(rig)
@@ -307,6 +322,7 @@ def assert_stays_low(rig):
     assert "Internal Error" not in rig.mavproxy.output()
 
 
+@on_ardupilot
 @pytest.mark.parametrize("after", [0.02, 0.15, 0.25, 0.35, 0.45, 0.6])
 def test_takeoff_that_is_deleted_in_its_first_second_does_not_climb_on(rig, after):
     armed_on_the_ground(rig)
@@ -317,6 +333,7 @@ def test_takeoff_that_is_deleted_in_its_first_second_does_not_climb_on(rig, afte
     assert_stays_low(rig)
 
 
+@on_ardupilot
 def test_takeoff_whose_client_hangs_up_in_its_first_second_does_not_climb_on(rig):
     armed_on_the_ground(rig)
     set_on_disconnect(rig, "hold")
@@ -334,6 +351,7 @@ def set_on_disconnect(rig, value):
     rig.mavproxy.ask("uavapi set on_disconnect", f" {value} ")
 
 
+@on_ardupilot
 def test_takeoff_whose_script_dies_in_its_first_second_does_not_climb_on(rig):
     armed_on_the_ground(rig)
     rig.ok(rig.get("/command/set_sim_speedup", sim_factor=SLOW))
@@ -349,6 +367,7 @@ def run_deadly(rig, path, body, lives, die=9):
 # -- F6: a dead script's job ------------------------------------------------------------------------------
 
 
+@both
 def test_dead_scripts_job_ends_with_it_and_the_vehicle_holds(rig, harness):
     rig.in_the_air(10)
     body = '{"vx": 8, "vy": 0, "vz": 0, "duration": 600}'
@@ -373,6 +392,7 @@ def show(rig):
 # -- F7: DELETE of a mission ------------------------------------------------------------------------------
 
 
+@on_ardupilot
 def test_mission_that_is_deleted_is_left_by_brake(rig, harness):
     rig.in_the_air(10)
     rig.ok(
@@ -390,6 +410,7 @@ def test_mission_that_is_deleted_is_left_by_brake(rig, harness):
 # -- F8: what is not a number -----------------------------------------------------------------------------
 
 
+@on_ardupilot
 @pytest.mark.parametrize(
     ("message", "path", "body"),
     [
@@ -414,6 +435,7 @@ def told(rig, message):
 # -- F9: the first command is on the wire at once ---------------------------------------------------------
 
 
+@on_ardupilot
 @pytest.mark.parametrize("verb", ["takeoff", "land", "rtl"])
 def test_first_command_goes_out_before_anything_is_asked(rig, harness, verb):
     if verb == "takeoff":
