@@ -29,6 +29,7 @@ from mavproxy_uavapi.http.security import door
 
 log = logging.getLogger("uavapi.http.server")
 MIDDLEWARES = (headers_are_here, errors_as_answers, door, at_a_bearable_rate, yield_to_main_loop)
+WITH_BODY = ("POST", "PUT")
 SHUTDOWN_TIMEOUT = 1.0  # s for answers that are being written when we stop
 
 
@@ -77,7 +78,7 @@ async def _answer(request: web.BaseRequest) -> web.StreamResponse:
     if route is None:
         raise web.HTTPMethodNotAllowed(request.method, match.allowed)
     await invite(request)
-    params = await parameters(request, route.model, body=request.method == "POST" and not route.raw)
+    params = await parameters(request, route.model, body=request.method in WITH_BODY and not route.raw)
     call = Call(request[SERVICE], request, params, match)
     with call.naming_source():
         answer = await (audited(call, route.action) if route.commands and route.trail else route.action(call))

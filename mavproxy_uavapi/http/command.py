@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from mavproxy_uavapi.core.vehicle.jobs import Job
+from mavproxy_uavapi.core.vehicle.reboot import reboot as reboot_of
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import Blocking, Disarm, LandAt, ModeName, NewSpeed, Reverse, SimFactor, Takeoff
 from mavproxy_uavapi.http.responses import Answer
@@ -65,6 +66,12 @@ async def brake(call: Call) -> Answer:
     vehicle = call.vehicle
     result = f"{vehicle.kind.capitalize()} braking. Use /command/guided to enable movement commands again"
     return await call.fly(vehicle, vehicle.brake, result, outlives_client=True, urgent=True)
+
+
+async def reboot(call: Call) -> Answer:
+    """Boot the autopilot again; refused while the vehicle is armed."""
+    vehicle = call.vehicle
+    return await call.fly(vehicle, lambda job: reboot_of(vehicle, job), "The autopilot has booted")
 
 
 async def set_reverse(call: Call) -> Answer:

@@ -6,7 +6,7 @@ from aiohttp import web
 
 TRUSTED: web.RequestKey[str] = web.RequestKey("trusted", str)  # the origin of the trusted page that asks
 HEADERS = {
-    "Access-Control-Allow-Methods": "GET, POST, DELETE",
+    "Access-Control-Allow-Methods": "GET, POST, PUT, DELETE",
     "Access-Control-Allow-Headers": "Authorization, Content-Type, Prefer",
     "Access-Control-Expose-Headers": "Location",
     "Vary": "Origin",

@@ -10,6 +10,7 @@ from typing import Any
 
 from mavproxy_uavapi.http import requests
 from mavproxy_uavapi.http.fleet import FleetRequest
+from mavproxy_uavapi.http.parameters import NewValue
 from mavproxy_uavapi.http.telemetry_views import SENSORS
 
 PLACE = {"lat": -35.3629, "long": 149.1652, "alt": 20}
@@ -59,6 +60,7 @@ REQUESTS: Mapping[type[requests.Request], Mapping[str, Any]] = {
     requests.LandAt: {"lat": -35.3629, "long": 149.1652},
     requests.Reverse: {"reverse": True},
     FleetRequest: {"vehicles": [1], "each": {"1": {}}, "all_or_none": False},
+    NewValue: {"value": 500},
     requests.ModeName: {"mode": "LOITER"},
     requests.NewSpeed: {"new_v": 5},
     requests.SimFactor: {"sim_factor": 5},
@@ -96,8 +98,12 @@ VEHICLE = {
 }
 
 PATH_PARAMETERS = {
+    "name": {
+        "/telemetry/message/{name}": "ATTITUDE",
+        "/mission/scripts/{name}": "square.py",
+        "/parameters/{name}": "WPNAV_SPEED",
+    },
     "sysid": {"/vehicles/{sysid}": "1"},
-    "name": {"/telemetry/message/{name}": "ATTITUDE", "/mission/scripts/{name}": "square.py"},
     "id": {"/jobs/{id}": "7"},
     "file": {"/docs/{file}": "swagger-ui.css"},
 }
@@ -112,6 +118,9 @@ RESULTS: Mapping[str, str] = {
     "/command/brake": "Copter braking. Use /command/guided to enable movement commands again",
     "/command/guided": "Copter in GUIDED mode",
     "/command/set_mode": "Mode LOITER",
+    "/command/reboot": "The autopilot has booted",
+    "PUT /parameters/{name}": "WPNAV_SPEED is 500",
+    "POST /parameters": "1 of 1 parameters are set",
     "/command/land_at": "Landing mission started for coord (-35.3629, 149.1652)",
     "/command/set_reverse": "Driving backwards",
     "/command/set_air_speed": "Air speed set to 5m/s",
@@ -217,6 +226,9 @@ MEMBERS: Mapping[str, Mapping[str, Any]] = {
         "info": {"mavpackettype": "ATTITUDE", "roll": 0.01, "count": 812, "rate": 4.0},
         **AGE,
     },
+    "GET /parameters": {"parameters": {"WPNAV_SPEED": 500.0}},
+    "POST /parameters": {"parameters": {"WPNAV_SPEED": 500.0}, "failed": {}},
+    "/parameters/{name}": {"name": "WPNAV_SPEED", "value": 500.0},
     "/mission/upload-script": {
         "type": 44,
         "info": "Mission File 'square.py' saved at /home/pilot/uav_scripts/square.py successfully.",

@@ -15,11 +15,10 @@ from mavproxy_uavapi.core.vehicle.start_gate import StartGate
 from mavproxy_uavapi.http.auditing import audited
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import Request, parse
-from mavproxy_uavapi.http.responses import dumps
+from mavproxy_uavapi.http.responses import MULTI_STATUS, dumps, reason
 from mavproxy_uavapi.http.route import POST, Route
 from mavproxy_uavapi.http.router import Match
 
-MULTI_STATUS = 207
 System = Annotated[int, Field(ge=1, le=255)]
 
 
@@ -87,7 +86,7 @@ async def _answer(
             answer = await audited(one, route.action)
     except UavApiError as error:
         without_frames(error)
-        return {"status": error.status, "detail": error.detail, "code": error.code, **error.extras()}
+        return {"status": error.status, **reason(error)}
     if isinstance(answer, web.StreamResponse):  # 202
         assert one.job is not None
         return {"status": answer.status, "job": one.job.id}

@@ -32,6 +32,7 @@ TAGS = {
     "telemetry": "What the vehicle last told, with its age.",
     "jobs": "The verbs in flight, and the last ones that ended.",
     "mission": "Scripts, each in a tmux session of its own; and the mission that the autopilot itself flies.",
+    "parameters": "The autopilot's parameters; each new value is read back.",
     "vehicles": "Which vehicles there are. `/vehicles/{sysid}` before any path means that vehicle; without it the "
     "setting `sysid` says which, or MAVProxy's current one is meant.",
     "fleet": "One verb for several vehicles, with an answer of each.",
@@ -52,6 +53,7 @@ BY_TAG: Mapping[str, tuple[type[UavApiError], ...]] = {
     "jobs": (errors.NotFound, errors.Busy),
     "mission": OF_A_SCRIPT,
     "vehicles": (errors.NotFound,),
+    "parameters": (*OF_A_VEHICLE, errors.NotFound, errors.TimedOut),
     "fleet": (),
     "docs": (errors.NotFound,),
 }
@@ -70,6 +72,10 @@ FILE_FORM = {
 }
 RAW_BODIES: Mapping[str, Mapping[str, Any]] = {
     "/mission/upload-script": {"multipart/form-data": {"schema": FILE_FORM}},
+    "/parameters": {
+        "text/plain": {"schema": {"type": "string"}, "example": "WPNAV_SPEED 500"},
+        "application/json": {"schema": {"type": "object"}, "example": {"parameters": {"WPNAV_SPEED": 500}}},
+    },
     "/mission/waypoints": {
         "text/plain": {"schema": {"type": "string"}, "example": examples.WPL},
         "application/json": {"schema": {"type": "object"}, "example": {"items": examples.ITEMS}},
@@ -202,7 +208,7 @@ def operation(route: Route, method: str) -> dict[str, Any]:
     if route.job:
         told["parameters"] += HURRY
         told["responses"]["202"] = ACCEPTED
-    if method == "POST" and (route.raw or route.model.model_fields):
+    if method in ("POST", "PUT") and (route.raw or route.model.model_fields):
         told["requestBody"] = _body(route)
     elif method == "GET":
         told["parameters"] += _query(route.model)
@@ -308,7 +314,9 @@ def _failures(found: Iterable[type[UavApiError]]) -> dict[str, Any]:
 def _models(routes: Sequence[Route]) -> dict[str, Any]:
     """The schemas of all bodies, by their models' names."""
     models = {
-        route.model for route in routes if "POST" in route.methods and not route.raw and route.model.model_fields
+        route.model
+        for route in routes
+        if {"POST", "PUT"} & set(route.methods) and not route.raw and route.model.model_fields
     }
     template = "#/components/schemas/{model}"
     _, schema = models_json_schema(

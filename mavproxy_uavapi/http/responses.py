@@ -12,6 +12,7 @@ from aiohttp import web
 from mavproxy_uavapi.core.errors import TooManyRequests, UavApiError, Unauthorized
 
 Answer = dict[str, Any] | web.StreamResponse  # of an action: a body, or the whole response
+MULTI_STATUS = 207  # of an answer for several, of which not all are a success
 Handler = Callable[[web.BaseRequest], Awaitable[web.StreamResponse]]
 
 
@@ -36,6 +37,11 @@ def finite(value: Any) -> Any:
     return value
 
 
+def reason(error: UavApiError) -> dict[str, Any]:
+    """What an answer says of an error: `detail`, `code`, and what else there is."""
+    return {"detail": error.detail, "code": error.code, **error.extras()}
+
+
 def success(body: Mapping[str, Any]) -> web.Response:
     """A 200 with a JSON body."""
     return web.json_response(body, dumps=dumps)
@@ -43,8 +49,7 @@ def success(body: Mapping[str, Any]) -> web.Response:
 
 def failure(error: UavApiError) -> web.Response:
     """The answer to any error of the tree."""
-    body = {"detail": error.detail, "code": error.code, **error.extras()}
-    response = web.json_response(body, status=error.status, dumps=dumps)
+    response = web.json_response(reason(error), status=error.status, dumps=dumps)
     if isinstance(error, Unauthorized):
         response.headers["WWW-Authenticate"] = "Bearer"
     if isinstance(error, TooManyRequests):

@@ -10,6 +10,7 @@ from mavproxy_uavapi.http import (
     jobs,
     mission,
     movement,
+    parameters,
     peripherical,
     photo,
     requests,
@@ -45,6 +46,7 @@ COMMAND = [
     Route("/command/set_climb_speed", command.set_climb_speed, requests.NewSpeed, EITHER, job=True),
     Route("/command/set_descent_speed", command.set_descent_speed, requests.NewSpeed, EITHER, job=True),
     Route("/command/set_sim_speedup", command.set_sim_speedup, requests.SimFactor, EITHER, job=True),
+    Route("/command/reboot", command.reboot, requests.Empty, EITHER, job=True),
     Route("/command/set_home", command.set_home, requests.Empty, EITHER, job=True),
 ]
 
@@ -112,6 +114,13 @@ PERIPHERICAL = [
 
 FLEET = fleet_routes([*COMMAND, *MOVEMENT])
 
+PARAMETERS = [
+    Route("/parameters", parameters.list_parameters, parameters.ParameterFilter),
+    Route("/parameters", parameters.load_parameters, requests.Empty, POST, raw=True),
+    Route("/parameters/{name}", parameters.show_parameter, requests.Empty),
+    Route("/parameters/{name}", parameters.set_parameter, parameters.NewValue, ("PUT",)),
+]
+
 VEHICLES = [
     Route("/vehicles", vehicles.list_vehicles, requests.Empty),
     Route("/vehicles/{sysid}", vehicles.show_vehicle, requests.Empty),
@@ -123,4 +132,4 @@ DOCS = [
     Route("/docs/{file}", docs_page.asset, requests.Empty),
 ]
 
-ROUTES = [*COMMAND, *MOVEMENT, *TELEMETRY, *JOBS, *MISSION, *PERIPHERICAL, *VEHICLES, *FLEET, *DOCS]
+ROUTES = [*COMMAND, *MOVEMENT, *TELEMETRY, *JOBS, *MISSION, *PERIPHERICAL, *PARAMETERS, *VEHICLES, *FLEET, *DOCS]

@@ -357,6 +357,8 @@ class Drone:
             self.target, self.lifting = [self.at[0], self.at[1], -message.param7], True
         elif number == mavlink.MAV_CMD_DO_PAUSE_CONTINUE:
             self.paused = not message.param1
+        elif number == mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN:
+            self._loop.call_later(BOOT_TIME, self.reboot)
         elif number == mavlink.MAV_CMD_REQUEST_MESSAGE and message.param1 == mavlink.MAVLINK_MSG_ID_HOME_POSITION:
             lat, lon = round(self.home[0] * 1e7), round(self.home[1] * 1e7)
             self.send("home_position", latitude=lat, longitude=lon, altitude=584000)

@@ -141,6 +141,11 @@ def reposition(place: GlobalTarget) -> Command:
     )
 
 
+def reboot() -> Command:
+    """Boot the autopilot again."""
+    return Command(mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, (1,))
+
+
 def start_landing() -> Command:
     """Fly the landing sequence of the mission (DO_LAND_START), for planes; it changes the mode to AUTO."""
     return Command(mavlink.MAV_CMD_DO_LAND_START)

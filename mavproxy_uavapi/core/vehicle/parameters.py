@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterable
+import math
+from collections.abc import Callable, Iterable
+from typing import Any
 
-from mavproxy_uavapi.core.errors import TimedOut
+from mavproxy_uavapi.core.errors import NotFound, TimedOut
 from mavproxy_uavapi.core.mavlink.link import Address, Link
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle import messages
 from mavproxy_uavapi.core.vehicle.message_waiter import MessageWaiter
 
 MOST_REQUESTS = 2  # for a name in one boot
+SET_TIMEOUT = 2.0  # s until a value is confirmed
 TIMEOUT = 1.0  # s; ArduPilot answers a known name at once and an unknown one not at all
 
 Names = tuple[str, ...]  # of one quantity, of which a firmware has one
 
 
 class Parameters:
-    """Reads parameters; each is read once and then remembered."""
+    """Reads and sets parameters; what the verbs need is read once and then remembered."""
 
     def __init__(self, state: VehicleState, link: Link, waiting: MessageWaiter) -> None:
         self._state = state
@@ -45,11 +48,61 @@ class Parameters:
             ) as answers:
                 for name in requested:
                     self._requests[self._state.reboots, name] = self._count(name) + 1
-                    address = Address(self._state.system, self._state.component)
-                    await self._link.send(messages.read_parameter(address, name), self._state.system)
+                    await self._link.send(messages.read_parameter(self._address, name), self._state.system)
                 with contextlib.suppress(TimedOut):
                     await answers.within(TIMEOUT, f"tell {', '.join(requested)}")
         return {name: known[name] for names in quantities for name in names if name in known}
 
+    async def read_now(self, name: str) -> float:
+        """The value of a parameter, asked for now.
+
+        Raises:
+            NotFound: the vehicle does not answer for it: it has no such parameter.
+            LinkLost: its heartbeats stopped.
+        """
+        for _ in range(MOST_REQUESTS):
+            with self._waiting.expecting({"PARAM_VALUE"}, _value_of(name)) as answer:
+                await self._link.send(messages.read_parameter(self._address, name), self._state.system)
+                with contextlib.suppress(TimedOut):
+                    return await answer.within(TIMEOUT, f"tell {name}")
+        raise NotFound(f"vehicle {self._state.system} has no parameter {name}")
+
+    async def set(self, name: str, value: float) -> float:
+        """Set a parameter; the value that the vehicle holds then: it rounds to the parameter's type.
+
+        Raises:
+            NotFound: it has no such parameter.
+            TimedOut: it does not confirm the value.
+            LinkLost: its heartbeats stopped.
+        """
+        if name not in self._state.parameters:
+            await self.read_now(name)
+        for _ in range(MOST_REQUESTS):
+            values: list[float] = []  # that it tells meanwhile: its own, or the answer to an earlier request
+
+            def set_to(message: Any, values: list[float] = values) -> float | None:
+                if message.param_id == name:
+                    values.append(float(message.param_value))
+                return value if values and math.isclose(values[-1], value, rel_tol=1e-5, abs_tol=1e-9) else None
+
+            with self._waiting.expecting({"PARAM_VALUE"}, set_to) as answer:
+                await self._link.send(messages.set_parameter(self._address, name, value), self._state.system)
+                with contextlib.suppress(TimedOut):
+                    await answer.within(SET_TIMEOUT, f"take {name} = {value:g}")
+            if values:
+                return values[-1]
+        raise TimedOut(f"vehicle {self._state.system} did not confirm {name} = {value:g}")
+
+    @property
+    def _address(self) -> Address:
+        return Address(self._state.system, self._state.component)
+
     def _count(self, name: str) -> int:
         return self._requests.get((self._state.reboots, name), 0)
+
+
+def _value_of(name: str) -> Callable[[Any], float | None]:
+    def value(message: Any) -> float | None:
+        return float(message.param_value) if message.param_id == name else None
+
+    return value

@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from mavproxy_uavapi.core.errors import Busy, ModeChanged, NotArmed, NotFound, NotSupported, Rejected
+from mavproxy_uavapi.core.errors import Busy, ModeChanged, NotArmed, NotFound, NotSupported, Rejected, TimedOut
 from mavproxy_uavapi.core.mavlink.flight_modes import mode_names, mode_number
 from mavproxy_uavapi.core.vehicle import arming, messages
 from mavproxy_uavapi.core.vehicle.authority import Rank
-from mavproxy_uavapi.core.vehicle.base import HEARTBEAT_TIMEOUT
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
 from mavproxy_uavapi.core.vehicle.verbs import Verbs
@@ -194,11 +193,6 @@ class Vehicle(Verbs):
         name = "SIM_SPEEDUP"
         if not await self.parameters.read([(name,)]):
             raise NotSupported("the vehicle is not a simulation: it has no parameter SIM_SPEEDUP")
-
-        def read_back(message: Any) -> float | None:
-            is_set = message.param_id == name and math.isclose(message.param_value, factor, rel_tol=1e-5)
-            return factor if is_set else None
-
-        with self.waiting.expecting({"PARAM_VALUE"}, read_back) as confirmation:
-            await self.link.send(messages.set_parameter(self.address, name, factor), self.state.system)
-            await confirmation.within(HEARTBEAT_TIMEOUT, f"take {name} = {factor:g}")
+        value = await self.parameters.set(name, factor)
+        if not math.isclose(value, factor, rel_tol=1e-5):
+            raise TimedOut(f"vehicle {self.state.system} did not take {name} = {factor:g}: it is {value:g}")

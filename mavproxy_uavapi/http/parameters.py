@@ -1,0 +1,130 @@
+"""/parameters: the autopilot's parameters, from MAVProxy's own table; each new value is read back."""
+
+from __future__ import annotations
+
+import asyncio
+import fnmatch
+import json
+import re
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+from aiohttp import web
+from pydantic import Field
+
+from mavproxy_uavapi.core.errors import BadRequest, NotFound, UavApiError
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+from mavproxy_uavapi.http.call import Call, in_time
+from mavproxy_uavapi.http.requests import Number, Request, parse
+from mavproxy_uavapi.http.responses import MULTI_STATUS, Answer, dumps, reason
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_]{1,16}$")]
+Value = Annotated[Number, Field(ge=-3.4e38, le=3.4e38, description="as the autopilot's type can hold it")]
+
+
+class ParameterFilter(Request):
+    """`match`: names, with * and ?. `format`: param for the text of a .param file."""
+
+    match: Annotated[str, Field(max_length=64, description="names, with * and ?")] = "*"
+    format: Annotated[Literal["json", "param"], Field(description="param: the text of a .param file")] = "json"
+
+
+class NewValue(Request):
+    """`value`: the new value of one parameter."""
+
+    value: Value
+
+
+class NewValues(Request):
+    """`parameters`: new values by name."""
+
+    parameters: Annotated[dict[Name, Value], Field(min_length=1, max_length=2000)]
+
+
+async def list_parameters(call: Call) -> Answer:
+    """The parameters that MAVProxy knows of the vehicle."""
+    p = call.params(ParameterFilter)
+    known = call.seen.state.parameters
+    values = {name: known[name] for name in sorted(known) if fnmatch.fnmatchcase(name, p.match.upper())}
+    if p.format == "param":
+        text = "".join(f"{name:<16} {value:.9g}\n" for name, value in values.items())
+        return web.Response(text=text, content_type="text/plain", charset="utf-8")
+    return call.answer("Success", parameters=values)
+
+
+async def show_parameter(call: Call) -> Answer:
+    """One parameter, read from the vehicle now."""
+    name = _name(call)
+    value = await call.vehicle.parameters.read_now(name)
+    return call.answer("Success", name=name, value=value)
+
+
+async def set_parameter(call: Call) -> Answer:
+    """Set one parameter; answers with the value that the autopilot holds now: it may have rounded it."""
+    name, vehicle = _name(call), call.vehicle
+    value = await vehicle.parameters.set(name, float(call.params(NewValue).value))
+    return call.answer(f"{name} is {value:g}", name=name, value=value)
+
+
+async def load_parameters(call: Call) -> Answer:
+    """Set many parameters, by JSON or the text of a .param file.
+
+    200 when all are set, else 207 with the `failed` ones.
+    """
+    vehicle = call.vehicle
+    values = parse(NewValues, "body", {"parameters": await _values(call)})
+    assert isinstance(values, NewValues)
+    done, failures = await _set_all(
+        vehicle, {name.upper(): float(value) for name, value in values.parameters.items()}
+    )
+    result = f"{len(done)} of {len(done) + len(failures)} parameters are set"
+    body = call.answer(result, parameters=done, failed=failures)
+    return web.json_response(body, status=MULTI_STATUS, dumps=dumps) if failures else body
+
+
+async def _set_all(vehicle: Vehicle, values: Mapping[str, float]) -> tuple[dict[str, float], dict[str, Any]]:
+    """The values that the autopilot holds now, and what became of the others."""
+    done: dict[str, float] = {}
+    failures: dict[str, Any] = {}
+    for name, value in values.items():
+        try:
+            done[name] = await vehicle.parameters.set(name, value)
+        except UavApiError as error:
+            failures[name] = reason(error)
+    return done, failures
+
+
+async def _values(call: Call) -> Any:
+    """The values by name, as the body has them.
+
+    Raises:
+        BadRequest: it is neither JSON nor a .param file.
+    """
+    data = await in_time(call.request.read())
+    try:
+        text = data.decode("utf-8")
+        if text.lstrip().startswith("{"):
+            return (await asyncio.to_thread(json.loads, text)).get("parameters")
+    except (ValueError, RecursionError) as error:
+        raise BadRequest(f"the body is neither JSON nor a .param file: {error}") from error
+    return dict(_lines(text))
+
+
+def _lines(text: str) -> list[tuple[str, str]]:
+    """Names and values of a .param file: `NAME VALUE` or `NAME,VALUE` a line, and comments after #."""
+    pairs = []
+    for number, line in enumerate(text.splitlines(), 1):
+        words = re.split(r"[\s,]+", line.partition("#")[0].strip())
+        if words == [""]:
+            continue
+        if len(words) != 2:
+            raise BadRequest(f"line {number} of the .param file is not `NAME VALUE`: {line[:80]!r}")
+        pairs.append((words[0], words[1]))
+    return pairs
+
+
+def _name(call: Call) -> str:
+    name = call.names["name"].upper()
+    if not re.fullmatch(r"[A-Z0-9_]{1,16}", name):
+        raise NotFound(f"there is no parameter {name[:32]!r}")
+    return name

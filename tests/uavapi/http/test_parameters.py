@@ -1,0 +1,93 @@
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+
+@pytest.fixture(autouse=True)
+def known(drone: Any, loop: Any, host: Any) -> None:
+    """MAVProxy has fetched some of the parameters before."""
+    loop.settle()
+    host.fleet.learn({(1, 1): {"WPNAV_SPEED": 1000.0, "RTL_ALT": 1500.0}})
+
+
+def test_what_mavproxy_knows_is_listed(api: Any) -> None:
+    assert api.get("/parameters").body["parameters"] == {"RTL_ALT": 1500.0, "WPNAV_SPEED": 1000.0}
+    assert api.get("/parameters?match=wpnav_*").body["parameters"] == {"WPNAV_SPEED": 1000.0}
+
+
+def test_a_parameter_is_read_from_the_vehicle(api: Any, drone: Any) -> None:
+    drone.parameters["WPNAV_SPEED"] = 700.0
+    body = api.get("/parameters/wpnav_speed").body
+    assert (body["name"], body["value"]) == ("WPNAV_SPEED", 700.0)
+
+
+@pytest.mark.parametrize("name", ["NO_SUCH", "A-B", "TOO_LONG_FOR_A_PARAMETER"])
+def test_what_the_vehicle_does_not_have_is_404(api: Any, name: str) -> None:
+    assert api.get(f"/parameters/{name}").status == 404
+    assert api.loop.run(api.ask("PUT", f"/parameters/{name}", json={"value": 1})).status == 404
+
+
+def put(api: Any, name: str, value: Any) -> Any:
+    return api.loop.run(api.ask("PUT", f"/parameters/{name}", json={"value": value}))
+
+
+def test_a_new_value_is_read_back(api: Any, drone: Any, host: Any) -> None:
+    answer = put(api, "WPNAV_SPEED", 500)
+    assert (answer.status, answer.body["value"]) == (200, 500.0)
+    assert drone.parameters["WPNAV_SPEED"] == 500.0
+    assert api.get("/parameters").body["parameters"]["WPNAV_SPEED"] == 500.0
+    assert [(entry.verb, entry.request) for entry in host.audit.entries] == [
+        ("/parameters/WPNAV_SPEED", {"value": 500})
+    ]
+
+
+@pytest.mark.parametrize("value", ["fast", None, 1e39, True, "1e400"])
+def test_what_is_no_value_is_422(api: Any, drone: Any, value: Any) -> None:
+    assert put(api, "WPNAV_SPEED", value).status == 422
+    assert drone.orders() == []
+
+
+def test_a_value_that_is_never_confirmed_is_504(api: Any, drone: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(drone, "_tell_parameter", lambda _name: None)
+    assert (answer := put(api, "WPNAV_SPEED", 500)).status == 504, answer.body
+
+
+def test_many_are_set_and_each_failure_is_told(api: Any, drone: Any) -> None:
+    body = {"parameters": {"wpnav_speed": 600, "RTL_ALT": 2000, "NO_SUCH": 1}}
+    answer = api.post("/parameters", body)
+    assert answer.status == 207
+    assert answer.body["parameters"] == {"WPNAV_SPEED": 600.0, "RTL_ALT": 2000.0}
+    assert answer.body["failed"]["NO_SUCH"]["code"] == "not_found"
+
+
+def test_a_param_file_goes_out_and_in_again(api: Any, drone: Any, loop: Any) -> None:
+    async def text() -> str:
+        async with api.client.get("/parameters?format=param") as response:
+            return await response.text()
+
+    saved = loop.run(text())
+    assert saved.splitlines() == ["RTL_ALT          1500", "WPNAV_SPEED      1000"]
+    put(api, "WPNAV_SPEED", 300)
+    answer = loop.run(api.ask("POST", "/parameters", data=f"# saved\n{saved}\n"))
+    assert (answer.status, answer.body["result"]) == (200, "2 of 2 parameters are set")
+    assert drone.parameters["WPNAV_SPEED"] == 1000.0
+
+
+@pytest.mark.parametrize("text", ["WPNAV_SPEED", "A B C", "{", "\xff", "[1]", '{"parameters": 3}', ""])
+def test_what_is_no_list_of_values_is_refused(api: Any, drone: Any, loop: Any, text: str) -> None:
+    answer = loop.run(api.ask("POST", "/parameters", data=text.encode("latin-1")))
+    assert answer.status in (400, 422)
+    assert drone.orders() == []
+
+
+def test_reboot_answers_when_it_has_booted(api: Any, drone: Any) -> None:
+    answer = api.get("/command/reboot")
+    assert (answer.status, answer.body["result"]) == (200, "The autopilot has booted")
+
+
+def test_reboot_in_flight_is_busy(api: Any, flying: Any) -> None:
+    answer = api.get("/command/reboot")
+    assert (answer.status, answer.body["code"]) == (409, "busy")
+    assert flying.orders() == []
