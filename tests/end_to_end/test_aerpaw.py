@@ -24,7 +24,7 @@ def embedded_rig(harness: Any, tmp_path_factory: pytest.TempPathFactory) -> Iter
     """A rig with the embedded vehicle, and folders of its own for scripts."""
     directory = tmp_path_factory.mktemp("aerpaw")
     folders = {"scripts_path": str(directory / "scripts"), "script_logs": str(directory / "logs")}
-    made = harness.embedded(directory, **folders)
+    made = harness.embedded(directory, speedup=3, **folders)  # a script has to keep up with it
     yield made
     made.stop()
 
@@ -154,5 +154,5 @@ def test_script_runs_uploaded_as_it_is(embedded_rig: Any) -> None:
     while (run := embedded_rig.get("/mission/scripts/square").json())["running"]:
         assert time.monotonic() < deadline
         time.sleep(0.5)
-    assert run["exit_status"] == 0, run
+    assert run.get("exit_status") == 0, run
     assert on_the_ground(embedded_rig)
