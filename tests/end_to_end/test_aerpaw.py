@@ -151,8 +151,8 @@ def test_script_runs_uploaded_as_it_is(embedded_rig: Any) -> None:
     embedded_rig.ok(requests.post(embedded_rig.url + "/mission/upload-script", files=files, timeout=10))
     embedded_rig.ok(embedded_rig.post("/mission/execute-script", script_name="square", args=["--side", "5"]))
     deadline = time.monotonic() + PATIENCE
-    while (run := embedded_rig.get("/mission/scripts/square").json())["running"]:
+    while (run := embedded_rig.ok(embedded_rig.get("/mission/scripts/square"))["run"])["running"]:
         assert time.monotonic() < deadline
         time.sleep(0.5)
-    assert run.get("exit_status") == 0, run
+    assert run["exit_status"] == 0, run["err"]
     assert on_the_ground(embedded_rig)
