@@ -61,7 +61,7 @@ def test_velocities_and_a_log_beside_them(embedded_rig: Any, tmp_path: Path) -> 
     assert status == 0, out + err
     heading = float(out.splitlines()[-1].removeprefix("heading "))
     assert abs((heading - 359 + 180) % 360 - 180) <= 5
-    rows = list(csv.reader(log.open()))
+    rows = list(csv.reader(log.read_text().splitlines()))
     lats = [float(row[0]) for row in rows]
     assert (max(lats) - min(lats)) * 111_319 > 2
     assert on_the_ground(embedded_rig)
