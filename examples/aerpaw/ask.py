@@ -7,13 +7,18 @@
         --zmq-identifier base --zmq-proxy-server 127.0.0.1
 """
 
+import asyncio
+
 from aerpawlib.v1.runner import ZmqStateMachine, sleep, state
 
 
 class Base(ZmqStateMachine):
     @state(name="begin", first=True)
     async def begin(self) -> str:
-        await self.query_field("flyer", "position")  # it is there
+        try:
+            await self.query_field("flyer", "position", timeout=1)
+        except asyncio.TimeoutError:
+            return "begin"  # it is not there yet
         await self.transition_runner("flyer", "fly")
         return "wait"
 

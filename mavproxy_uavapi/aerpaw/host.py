@@ -48,6 +48,7 @@ class Host:
     def __init__(self, options: argparse.Namespace, runner: Runner) -> None:
         self._options, self._runner = options, runner
         self._policy = "nothing" if options.skip_rtl else options.on_exit
+        self._seen_to = True  # whether nothing is left to be done for the vehicle
 
     def run(self) -> int:
         """Run it; the exit status."""
@@ -57,10 +58,7 @@ class Host:
             log.error("could not connect: %s", error)
             return 1
         try:
-            status = self._fly(vehicle)
-            if isinstance(vehicle, Vehicle) and not asyncio.run(on_exit.see_to(vehicle, self._policy)):
-                return 1
-            return status
+            return self._fly(vehicle) or int(not self._seen_to)
         finally:
             vehicle.close()
 
@@ -97,6 +95,14 @@ class Host:
         return 0
 
     async def _run(self, vehicle: Vehicle | DummyVehicle) -> None:
+        """Run the script, and see to the vehicle: before what the script has left behind ends with this loop."""
+        try:
+            await self._script(vehicle)
+        finally:
+            if isinstance(vehicle, Vehicle):
+                self._seen_to = await on_exit.see_to(vehicle, self._policy)
+
+    async def _script(self, vehicle: Vehicle | DummyVehicle) -> None:
         if not self._options.skip_init:
             await asyncio.to_thread(vehicle.initialize, True)
         if (

@@ -44,13 +44,12 @@ async def _see_to(vehicle: Vehicle, drone: Drone, policy: str) -> bool:
         await drone.disarm()
         return True
     log.warning("the script has ended with the vehicle under way: %s", policy)
-    if policy == "hold" or not vehicle.hovers:
-        await drone.travel(Ned(), HELD_FOR)
-    if vehicle.hovers and policy == "rtl":
+    if policy == "rtl":
         await drone.rtl(outlive=True)
-    elif vehicle.hovers and policy == "land":
+    elif not vehicle.hovers:
+        await drone.stop()
+    elif policy == "land":
         await drone.land(outlive=True)
-    elif policy == "rtl":
-        home, _ = await drone.home()
-        await drone.go_to(home, tolerance=2.1)
+    else:
+        await drone.travel(Ned(), HELD_FOR)
     return True

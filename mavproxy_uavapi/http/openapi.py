@@ -87,6 +87,7 @@ KINDS: Mapping[str, Mapping[str, Any]] = {
     "/peripherical/take_photo": {"image/jpeg": {}},
     "/telemetry/stream": {EVENTS: TEXT},
     "/mission/scripts/{name}/log": {"text/plain": TEXT, EVENTS: TEXT},
+    "/parameters.param": {"text/plain": TEXT},
     "/vision/frame.jpg": {"image/jpeg": {}},
     "/vision/stream.mjpg": {"multipart/x-mixed-replace": {}},
     "/docs": {"text/html": TEXT},
@@ -218,13 +219,13 @@ def operation(route: Route, method: str) -> dict[str, Any]:
 def tag_of(route: Route) -> str:
     """What it is listed under: the first word of its path."""
     word = route.path.split("/")[1]
-    return "docs" if word == "openapi.json" else word
+    return {"openapi.json": "docs", "parameters.param": "parameters"}.get(word, word)
 
 
 def errors_of(route: Route) -> list[type[UavApiError]]:
     """What it may answer besides success, by status and code."""
     own = BY_PATH.get(route.path, BY_TAG.get(tag_of(route), (*OF_A_FLIGHT, errors.BadRequest, errors.NotFound)))
-    body = (errors.BadRequest,) if "POST" in route.methods else ()
+    body = (errors.BadRequest,) if {"POST", "PUT"} & set(route.methods) else ()
     return sorted({*EVERYWHERE, *own, *body}, key=lambda error: (error.status, error.code))
 
 
@@ -313,11 +314,8 @@ def _failures(found: Iterable[type[UavApiError]]) -> dict[str, Any]:
 
 def _models(routes: Sequence[Route]) -> dict[str, Any]:
     """The schemas of all bodies, by their models' names."""
-    models = {
-        route.model
-        for route in routes
-        if {"POST", "PUT"} & set(route.methods) and not route.raw and route.model.model_fields
-    }
+    with_body = [route for route in routes if {"POST", "PUT"} & set(route.methods) and not route.raw]
+    models = {route.model for route in with_body if route.model.model_fields}
     template = "#/components/schemas/{model}"
     _, schema = models_json_schema(
         [(model, "validation") for model in sorted(models, key=_name)], ref_template=template

@@ -7,7 +7,7 @@ import fnmatch
 import json
 import re
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from aiohttp import web
 from pydantic import Field
@@ -23,10 +23,9 @@ Value = Annotated[Number, Field(ge=-3.4e38, le=3.4e38, description="as the autop
 
 
 class ParameterFilter(Request):
-    """`match`: names, with * and ?. `format`: param for the text of a .param file."""
+    """`match`: names, with * and ?."""
 
     match: Annotated[str, Field(max_length=64, description="names, with * and ?")] = "*"
-    format: Annotated[Literal["json", "param"], Field(description="param: the text of a .param file")] = "json"
 
 
 class NewValue(Request):
@@ -43,13 +42,18 @@ class NewValues(Request):
 
 async def list_parameters(call: Call) -> Answer:
     """The parameters that MAVProxy knows of the vehicle."""
-    p = call.params(ParameterFilter)
-    known = call.seen.state.parameters
-    values = {name: known[name] for name in sorted(known) if fnmatch.fnmatchcase(name, p.match.upper())}
-    if p.format == "param":
-        text = "".join(f"{name:<16} {value:.9g}\n" for name, value in values.items())
-        return web.Response(text=text, content_type="text/plain", charset="utf-8")
-    return call.answer("Success", parameters=values)
+    return call.answer("Success", parameters=_known(call))
+
+
+async def parameter_file(call: Call) -> web.StreamResponse:
+    """The same as the text of a .param file."""
+    text = "".join(f"{name:<16} {value:.9g}\n" for name, value in _known(call).items())
+    return web.Response(text=text, content_type="text/plain", charset="utf-8")
+
+
+def _known(call: Call) -> dict[str, float]:
+    known, pattern = call.seen.state.parameters, call.params(ParameterFilter).match.upper()
+    return {name: known[name] for name in sorted(known) if fnmatch.fnmatchcase(name, pattern)}
 
 
 async def show_parameter(call: Call) -> Answer:

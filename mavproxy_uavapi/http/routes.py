@@ -116,6 +116,7 @@ FLEET = fleet_routes([*COMMAND, *MOVEMENT])
 
 PARAMETERS = [
     Route("/parameters", parameters.list_parameters, parameters.ParameterFilter),
+    Route("/parameters.param", parameters.parameter_file, parameters.ParameterFilter),
     Route("/parameters", parameters.load_parameters, requests.Empty, POST, raw=True),
     Route("/parameters/{name}", parameters.show_parameter, requests.Empty),
     Route("/parameters/{name}", parameters.set_parameter, parameters.NewValue, ("PUT",)),

