@@ -1,7 +1,7 @@
 """A fleet's readings through `kill -9` of worker, broker and database and through fading links: once each?
 
-Real Mosquitto, real PostgreSQL, real workers. The vehicles have spool, sender and MQTT sink of mavproxy_gradys as they
-are, without MAVProxy; see tests/support/fleet_vehicles.py. In the end SQL counts what was sampled against the rows.
+Real Mosquitto, real PostgreSQL, real workers. The vehicles have spool, sender and MQTT sink of mavproxy_gradys as
+they are, without MAVProxy; see tests/support/fleet_vehicles.py. In the end SQL counts what was sampled and the rows.
 """
 
 from __future__ import annotations

@@ -92,10 +92,10 @@ class SpooledVehicle:
         self.sampled += len(numbers)
         self._ledger.writelines(f"uav-{self._number},{seq},{round(at * 1000)}\n" for seq in numbers)
 
-    @property
-    def is_empty(self) -> bool:
-        """Whether all is acknowledged."""
-        return self.thread.count == 0 and not self.thread.waiting
+    async def delivered(self) -> None:
+        """Wait until all is acknowledged."""
+        while self.thread.count != 0 or self.thread.waiting:  # noqa: ASYNC110  the spool tells nobody
+            await asyncio.sleep(0.1)
 
 
 async def sampling(vehicle: SpooledVehicle, rate: float, offset: float, over: asyncio.Event) -> None:
@@ -125,8 +125,8 @@ async def run(options: argparse.Namespace) -> None:
         flights = [sampling(one, options.rate, n * share, over) for n, one in enumerate(vehicles)]
         await asyncio.gather(*flights)
     print(json.dumps({"sampled": sum(one.sampled for one in vehicles)}), flush=True)
-    while not all(one.is_empty for one in vehicles):
-        await asyncio.sleep(0.1)
+    for vehicle in vehicles:
+        await vehicle.delivered()
     await tasks.end()
     dropped = sum((Counter(one.thread.dropped) for one in vehicles), Counter())
     for vehicle in vehicles:

@@ -1,6 +1,6 @@
-"""A wire of its own process: `python -m tests.support.tcp_relay FROM TO`. While it is stopped (SIGSTOP), nothing passes.
+"""A wire as a process: `python -m tests.support.tcp_relay FROM TO`.
 
-Connections stay open meanwhile and nobody is told, as with a radio link that fades.
+While it is stopped (SIGSTOP), nothing passes. Connections stay open and nobody is told: a radio link that fades.
 """
 
 from __future__ import annotations

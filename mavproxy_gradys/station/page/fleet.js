@@ -5,11 +5,12 @@ import {drawPlot} from "./plot.js";
 const ROW = 26, SPARE = 6; // pixels of a row; rows beyond both ends of what is seen
 const ON_HOLD = 5, INACTIVE = 10, FORGOTTEN = 86400; // s
 const MOST_EXPORTED = 10000000;
-const COLUMNS = ["vehicle", "alt m", "heading", "m/s", "battery %", "late s", "age s"];
+const COLUMNS = ["vehicle", "alt m", "hdg", "m/s", "bat %", "late s", "age s"];
 const element = id => document.getElementById(id);
 
 const fleet = new Map(); // vehicles by name
 let alarms = new Map(), now = 0, heard = 0, shown = [], chosen = "", order = 0, down = false, rate = null, before = null;
+let linked = decodeURIComponent(location.hash.slice(1)); // a vehicle that a link to this page names
 const map = new FleetMap(element("map"), choose);
 
 // -- what comes
@@ -25,6 +26,7 @@ source.onmessage = event => {
   if (before && now > before.now) rate = (news.readings - before.readings) / (now - before.now);
   before = news;
   summarise(news);
+  if (linked && fleet.has(linked)) { choose(linked); linked = ""; }
   refresh();
 };
 source.onerror = () => { element("summary").textContent = "the station does not answer"; };
@@ -55,14 +57,22 @@ function cellsOf(vehicle) {
 
 const KEYS = [v => v.device, v => v.alt, v => v.heading, v => v.speed, v => v.battery, v => v.received - v.time, v => -v.received];
 const names = new Intl.Collator(undefined, {numeric: true});
+const ranks = new Map(); // place of each name in their order: comparing a thousand texts each second takes long
+
+function rank() {
+  if (ranks.size === fleet.size && [...fleet.keys()].every(name => ranks.has(name))) return;
+  ranks.clear();
+  [...fleet.keys()].sort(names.compare).forEach((name, n) => ranks.set(name, n));
+}
 
 function refresh() {
   const wanted = element("filter").value.toLowerCase(), only = element("only-alarms").checked;
+  rank();
   for (const vehicle of fleet.values()) vehicle.status = statusOf(vehicle);
   shown = [...fleet.values()].filter(v => v.device.toLowerCase().includes(wanted) && (!only || alarms.has(v.device)));
   const key = KEYS[order];
-  const compare = order ? (a, b) => (key(a) ?? -Infinity) - (key(b) ?? -Infinity) || names.compare(a.device, b.device)
-                        : (a, b) => names.compare(a.device, b.device);
+  const byName = (a, b) => ranks.get(a.device) - ranks.get(b.device);
+  const compare = order ? (a, b) => (key(a) ?? -1e9) - (key(b) ?? -1e9) || byName(a, b) : byName;
   shown.sort(down ? (a, b) => compare(b, a) : compare);
   fill();
   map.show([...fleet.values()], chosen);
@@ -114,6 +124,7 @@ element("fit").addEventListener("click", () => map.fit());
 
 function choose(device) {
   chosen = fleet.has(device) ? device : "";
+  history.replaceState(null, "", `#${encodeURIComponent(chosen)}`);
   element("what").hidden = !chosen;
   if (chosen) offer();
   refresh();
@@ -148,10 +159,10 @@ async function look() {
   if (number !== null) query.set("element", number);
   query.set("parts", Math.max(Math.min(Math.floor(element("plot").clientWidth), 2000), 100));
   try {
-    const answer = await fetch(`history?${query}`), history = await answer.json();
+    const answer = await fetch(`history?${query}`), view = await answer.json();
     if (turn !== asked) return;
-    element("note").textContent = answer.ok ? countOf(history) : history.detail;
-    if (answer.ok) drawPlot(element("plot"), history, fleet.get(chosen)?.quantities[quantity] || "");
+    element("note").textContent = answer.ok ? countOf(view) : view.detail;
+    if (answer.ok) drawPlot(element("plot"), view, fleet.get(chosen)?.quantities[quantity] || "");
   } catch (error) {
     if (turn === asked) element("note").textContent = String(error);
   }
