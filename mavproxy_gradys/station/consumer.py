@@ -13,7 +13,7 @@ from typing import Protocol
 
 from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.forwarding.readings import CONFIRMED_TOPIC, STATUS
-from mavproxy_gradys.net.outage_log import Outage
+from mavproxy_gradys.net.outage_log import Defects, Outage
 from mavproxy_gradys.net.schedule import Backoff
 from mavproxy_gradys.station.inbox import Inbox, Message
 from mavproxy_gradys.station.intake import Intake
@@ -63,6 +63,7 @@ class Consumer:
         self._seconds = seconds
         self._clock = clock
         self._outage = Outage(log, "readings wait: nothing can be stored", "readings are stored again")
+        self._defects = Defects("the storing of readings")
         self._refusals = RefusalLog(log, clock)
 
     async def run(self) -> None:
@@ -99,16 +100,19 @@ class Consumer:
                 await self._intake.keep([row for _, row in readings])
             except NotStored as error:
                 self._outage.now(str(error))
-                await asyncio.sleep(backoff.failed(self._clock()))
             except ValueError as error:
                 if len(readings) == 1:
                     self._refuse(readings[0][0], str(error))
                     return []
                 half = len(readings) // 2
                 return [*await self._store(readings[:half]), *await self._store(readings[half:])]
+            except Exception as error:  # noqa: BLE001  a defect must not end the storing for ever
+                self._defects.tell(error)
+                self._outage.now(f"{type(error).__name__}: {error}")
             else:
                 self._outage.now("")
                 return readings
+            await asyncio.sleep(backoff.failed(self._clock()))
 
     def _confirm(self, readings: Sequence[tuple[Message, ReadingRow]]) -> None:
         """Tell the senders that want to know which of their readings are kept."""

@@ -7,7 +7,7 @@ import logging
 from collections.abc import Sequence
 
 from mavproxy_gradys.errors import NotStored
-from mavproxy_gradys.net.outage_log import Outage
+from mavproxy_gradys.net.outage_log import Defects, Outage
 from mavproxy_gradys.station.fleet import Alarm, AlarmLimits, FleetVehicle, alarms, vehicles
 from mavproxy_gradys.station.store import Store, StoreCounts
 
@@ -33,6 +33,7 @@ class FleetWatch:
         self._store = store
         self._limits = limits
         self._outage = Outage(log, "the fleet cannot be seen", "the fleet is seen again")
+        self._defects = Defects("the look at the fleet")
         self._looked = asyncio.Condition()
         self.now = 0.0
         self.vehicles: Sequence[FleetVehicle] = ()
@@ -52,6 +53,9 @@ class FleetWatch:
             fleet, self.counts = await self._store.fleet(), await self._store.counts()
         except NotStored as error:
             self.problem = str(error)
+        except Exception as error:  # noqa: BLE001  a defect must not end the watch for ever
+            self._defects.tell(error)
+            self.problem = f"{type(error).__name__}: {error}"
         else:
             self.now, self.vehicles, self.problem = fleet.now, vehicles(fleet), ""
             self._raise(alarms(self.vehicles, self.now, self._limits))

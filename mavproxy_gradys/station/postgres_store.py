@@ -5,26 +5,21 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import time
-from collections.abc import AsyncGenerator, AsyncIterator, Callable, Iterable, Sequence
+from collections.abc import AsyncGenerator, Callable, Iterable, Sequence
 from datetime import datetime, timezone
 from typing import Any
-
-import asyncpg
 
 from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.station.newest import Newest, NewestReadings, newest_of
 from mavproxy_gradys.station.partitions import Partitions, day_of
+from mavproxy_gradys.station.postgres_connection import PostgresConnection
 from mavproxy_gradys.station.postgres_schema import STAGING
 from mavproxy_gradys.station.reading_row import COLUMNS, ReadingRow
 from mavproxy_gradys.station.store import CHUNK, Bucket, FleetNow, HistoryQuery, ReadingQuery, StoreCounts
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 
-CONNECT_TIMEOUT = 5.0  # s
-ANSWER_TIMEOUT = 60.0  # s
-CONNECTIONS = 4
+EXPORTS = 4  # at once
 SHOW_EVERY = 1.0  # s between the updates of the fleet's table
-REFUSALS = (asyncpg.DataError, asyncpg.IntegrityConstraintViolationError, asyncpg.ProgramLimitExceededError)
-FAILURES = (asyncpg.PostgresError, asyncpg.InterfaceError, OSError, asyncio.TimeoutError)
 INSERT = """
 WITH fresh AS (
     INSERT INTO readings (device, seq, id, quantity, representation, value, number, time, received)
@@ -77,65 +72,43 @@ class PostgresStore:
     def __init__(self, url: str, worker: str, clock: Callable[[], float] = time.time) -> None:
         self._url = url
         self._worker = worker
-        self._pool: Any = None
-        self._connecting = asyncio.Lock()
         self._partitions = Partitions(clock)
         self._newest = NewestReadings()
+        self._writing = PostgresConnection(url, worker, self._prepare)
+        self._looking = PostgresConnection(url, worker, self._partitions.make_tables)
+        self._exports = asyncio.Semaphore(EXPORTS)
         self._tasks = HeldTasks()
+        self._showing: asyncio.Task[None] | None = None
 
-    @contextlib.asynccontextmanager
-    async def _connection(self) -> AsyncIterator[Any]:
-        """A connection of the pool.
-
-        Raises:
-            NotStored: the database is away, or fails.
-            ValueError: it refuses what it was given.
-        """
-        try:
-            async with self._connecting:
-                if self._pool is None:
-                    self._pool = await self._connect()
-                    self._tasks.start(self._show_changes(), "the update of the fleet's table")
-            async with self._pool.acquire(timeout=CONNECT_TIMEOUT) as connection:
-                yield connection
-        except REFUSALS as error:
-            raise ValueError(f"{type(error).__name__}: {error}") from error
-        except FAILURES as error:
-            raise NotStored(f"database: {str(error) or type(error).__name__}") from error
-
-    async def _connect(self) -> Any:
-        pool = await asyncpg.create_pool(
-            self._url,
-            min_size=1,
-            max_size=CONNECTIONS,
-            timeout=CONNECT_TIMEOUT,
-            command_timeout=ANSWER_TIMEOUT,
-            init=lambda connection: connection.execute(STAGING),
-            server_settings={"application_name": self._worker, "TimeZone": "UTC"},
-        )
-        try:
-            async with pool.acquire() as connection:
-                await self._partitions.make_tables(connection)
-        except BaseException:
-            pool.terminate()
-            raise
-        return pool
+    async def _prepare(self, connection: Any) -> None:
+        await self._partitions.make_tables(connection)
+        await connection.execute(STAGING)
 
     async def add(self, rows: Sequence[ReadingRow]) -> int:
         """See `Store.add`; a device, a time and a number are one reading."""
-        records = [(*row[:7], utc(row.time)) for row in rows]
-        async with self._connection() as connection:
-            await self._partitions.make(connection, {day_of(record[7]) for record in records})
-            async with connection.transaction():
-                await connection.copy_records_to_table("arriving", records=records)
-                new, received = await connection.fetchrow(INSERT)
-                await connection.execute(COUNT, self._worker, new, len(rows) - new)
+        self._start_showing()
+        new, received = await self._writing.do(lambda connection: self._insert(connection, rows))
         self._newest.put(newest_of(rows, received))
-        return int(new)
+        return new
+
+    async def _insert(self, connection: Any, rows: Sequence[ReadingRow]) -> tuple[int, float]:
+        """How many were new, and when that was by the database's clock."""
+        records = [(*row[:7], utc(row.time)) for row in rows]
+        await self._partitions.make(connection, {day_of(record[7]) for record in records})
+        async with connection.transaction():
+            await connection.copy_records_to_table("arriving", records=records)
+            new, received = await connection.fetchrow(INSERT)
+            await connection.execute(COUNT, self._worker, new, len(rows) - new)
+        return new, received
 
     async def show(self, newest: Iterable[Newest]) -> None:
         """See `Store.show`."""
+        self._start_showing()
         self._newest.put(newest)
+
+    def _start_showing(self) -> None:
+        if self._showing is None:
+            self._showing = self._tasks.start(self._show_changes(), "the update of the fleet's table")
 
     async def _show_changes(self) -> None:
         """Bring the fleet's table up to date, again and again: as often whether few readings come or many."""
@@ -148,52 +121,68 @@ class PostgresStore:
         if not newest:
             return
         cells = [(*reading[:5], utc(reading.time), utc(reading.received)) for reading in newest]
+        columns = list(map(list, zip(*cells, strict=True)))
         try:
-            async with self._connection() as connection:
-                await connection.execute(SHOW, *map(list, zip(*cells, strict=True)))
+            await self._writing.do(lambda connection: connection.execute(SHOW, *columns))
         except NotStored:
             self._newest.put_back(newest)
             raise
 
     async def fleet(self) -> FleetNow:
         """See `Store.fleet`."""
-        async with self._connection() as connection:
-            now = await connection.fetchval("SELECT extract(epoch FROM now())::float8")
-            return FleetNow(now, [Newest(*row) for row in await connection.fetch(FLEET)])
+        now, rows = await self._looking.do(self._fleet)
+        return FleetNow(now, [Newest(*row) for row in rows])
+
+    async def _fleet(self, connection: Any) -> tuple[float, list[Any]]:
+        now = await connection.fetchval("SELECT extract(epoch FROM now())::float8")
+        return now, await connection.fetch(FLEET)
 
     async def counts(self) -> StoreCounts:
         """See `Store.counts`."""
-        async with self._connection() as connection:
-            return StoreCounts(*await connection.fetchrow(COUNTS))
+        return StoreCounts(*await self._looking.do(lambda connection: connection.fetchrow(COUNTS)))
 
     async def readings(self, query: ReadingQuery) -> AsyncGenerator[Sequence[tuple[Any, ...]], None]:
-        """See `Store.readings`."""
+        """See `Store.readings`; in a transaction and over a connection of its own."""
         conditions = query.conditions()
         where = " AND ".join(f"{column} {operator} ${n}" for n, (column, operator, _) in enumerate(conditions, 1))
+        columns = ", ".join(map(expression, COLUMNS))
         select = (
-            f"SELECT {', '.join(map(told, COLUMNS))} FROM readings WHERE {where or 'TRUE'} ORDER BY {query.order}"
+            f"SELECT {columns} FROM readings WHERE {where or 'TRUE'} ORDER BY {query.order} LIMIT {query.limit:d}"
         )
         operands = [utc(operand) if column == "time" else operand for column, _, operand in conditions]
-        async with self._connection() as connection, connection.transaction(readonly=True):
-            cursor = await connection.cursor(f"{select} LIMIT {query.limit:d}", *operands)
-            while rows := await cursor.fetch(CHUNK):
-                yield [tuple(row) for row in rows]
+        async with self._exports:
+            export = PostgresConnection(self._url, self._worker, begin)
+            try:
+                cursor = await export.do(lambda connection: connection.cursor(select, *operands))
+                while rows := await export.do(lambda _: cursor.fetch(CHUNK)):
+                    yield [tuple(row) for row in rows]
+            finally:
+                export.terminate()
 
     async def history(self, query: HistoryQuery) -> list[Bucket]:
         """See `Store.history`."""
         number = "number" if query.element is None else ELEMENT.format(query.element)
         operands = query.device, query.quantity, utc(query.start), utc(query.end), query.width
-        async with self._connection() as connection:
-            return [Bucket(*row) for row in await connection.fetch(HISTORY.format(number=number), *operands)]
+        select = HISTORY.format(number=number)
+        async with self._exports:
+            connection = PostgresConnection(self._url, self._worker)
+            try:
+                return [Bucket(*row) for row in await connection.do(lambda one: one.fetch(select, *operands))]
+            finally:
+                connection.terminate()
 
     async def close(self) -> None:
         """See `Store.close`; the fleet's table is brought up to date first."""
         await self._tasks.end()
-        if self._pool is None:
-            return
         with contextlib.suppress(NotStored):
             await self._show(self._newest.take_changed())
-        self._pool.terminate()
+        self._writing.terminate()
+        self._looking.terminate()
+
+
+async def begin(connection: Any) -> None:
+    """Begin a transaction that only reads."""
+    await connection.execute("BEGIN READ ONLY")
 
 
 def utc(seconds: float) -> datetime:
@@ -201,8 +190,8 @@ def utc(seconds: float) -> datetime:
     return datetime.fromtimestamp(seconds, timezone.utc)
 
 
-def told(column: str) -> str:
-    """A column as it is told."""
+def expression(column: str) -> str:
+    """SQL of a column as it is answered."""
     if column in ("time", "received"):
         return f"extract(epoch FROM {column})::float8"
     return "value::text" if column == "value" else column
