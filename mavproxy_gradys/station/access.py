@@ -40,8 +40,8 @@ def only_with_token(token: str) -> Middleware:
 
     @web.middleware
     async def check(request: web.Request, handler: Handler) -> web.StreamResponse:
-        given = request.headers.get("Authorization", "").removeprefix("Bearer ")
-        if request.method == "POST" and token and not hmac.compare_digest(given.encode(), token.encode()):
+        sent = request.headers.get("Authorization", "").removeprefix("Bearer ")
+        if request.method == "POST" and token and not hmac.compare_digest(sent.encode(), token.encode()):
             return web.json_response({"detail": "a bearer token is needed"}, status=401)
         return await handler(request)
 

@@ -67,8 +67,8 @@ class Alarm(NamedTuple):
 
 def vehicles(fleet: FleetNow) -> list[FleetVehicle]:
     """The vehicles that were heard of in the last FORGOTTEN s, by name."""
-    found = [vehicle(list(readings)) for _, readings in groupby(fleet.newest, lambda newest: newest.device)]
-    return [one for one in found if fleet.now - one.received < FORGOTTEN]
+    everyone = [vehicle(list(readings)) for _, readings in groupby(fleet.newest, lambda newest: newest.device)]
+    return [one for one in everyone if fleet.now - one.received < FORGOTTEN]
 
 
 def vehicle(readings: Sequence[Newest]) -> FleetVehicle:
@@ -105,10 +105,10 @@ def first_number(values: dict[str, Any], quantities: Iterable[str]) -> float | N
     return next((number_of(values[quantity]) for quantity in quantities if quantity in values), None)
 
 
-def alarms(found: Iterable[FleetVehicle], now: float, limits: AlarmLimits) -> list[Alarm]:
+def alarms(fleet_vehicles: Iterable[FleetVehicle], now: float, limits: AlarmLimits) -> list[Alarm]:
     """What is wrong at `now` (s since 1970, the store's clock)."""
     raised = []
-    for one in found:
+    for one in fleet_vehicles:
         if now - one.received > limits.silent:
             raised.append(Alarm(one.device, SILENT))
         if one.battery is not None and one.battery < limits.battery:

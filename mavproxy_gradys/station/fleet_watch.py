@@ -68,11 +68,11 @@ class FleetWatch:
         async with self._looked:
             await self._looked.wait()
 
-    def _raise(self, found: Sequence[Alarm]) -> None:
+    def _raise(self, raised: Sequence[Alarm]) -> None:
         """Say what is new."""
-        for word, news in (("alarm", set(found) - set(self.alarms)), ("over", set(self.alarms) - set(found))):
+        for word, news in (("alarm", set(raised) - set(self.alarms)), ("over", set(self.alarms) - set(raised))):
             for alarm in sorted(news)[:LINES]:
                 log.warning("%s: %a %s", word, alarm.device, alarm.kind)
             if len(news) > LINES:
                 log.warning("%s: %d more", word, len(news) - LINES)
-        self.alarms = found
+        self.alarms = raised

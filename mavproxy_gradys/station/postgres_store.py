@@ -50,7 +50,7 @@ HISTORY = """
 SELECT extract(epoch FROM min(time))::float8, extract(epoch FROM max(time))::float8, min(number), max(number),
     count(*), extract(epoch FROM max(received - time))::float8
 FROM (SELECT time, received, {number} AS number FROM readings
-      WHERE device = $1 AND quantity = $2 AND time >= $3 AND time < $4) AS found
+      WHERE device = $1 AND quantity = $2 AND time >= $3 AND time < $4) AS numbers
 WHERE number IS NOT NULL GROUP BY floor(extract(epoch FROM time - $3) / $5::float8) ORDER BY 1
 """
 # A text is not looked into: PostgreSQL finds no NUL and no half a letter in it. A list has numbers only.

@@ -76,10 +76,10 @@ def value_json(value: Any) -> str:
     """
     if not is_value(value):
         raise ValueError("its value is no finite number, text, true, false, or list of numbers")
-    told = json.dumps(value, allow_nan=False)
-    if len(told) > LONGEST_JSON:
+    encoded = json.dumps(value, allow_nan=False)
+    if len(encoded) > LONGEST_JSON:
         raise ValueError(f"its value is longer than {LONGEST_JSON} bytes")
-    return told
+    return encoded
 
 
 def number_of(value: Any) -> float | None:
@@ -93,11 +93,11 @@ def text(cell: Any, longest: int) -> str:
     Raises:
         ValueError: it is too long, has a NUL, or half a letter.
     """
-    told = str(cell)
-    if len(told) > longest or "\0" in told:
-        raise ValueError(f"{told!r:.40} is longer than {longest} letters, or has a NUL")
-    told.encode()
-    return told
+    letters = str(cell)
+    if len(letters) > longest or "\0" in letters:
+        raise ValueError(f"{letters!r:.40} is longer than {longest} letters, or has a NUL")
+    letters.encode()
+    return letters
 
 
 def whole(number: Any) -> int:

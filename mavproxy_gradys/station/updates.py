@@ -67,11 +67,11 @@ class Updates:
     def devices(self) -> list[dict[str, Any]]:
         """Every device, with the age of its update and whether it is active."""
         now = self._clock()
-        found = []
+        devices = []
         for _, device in sorted(self._devices.items()):
             age = now - device["received"]
-            found.append({**device, "age_s": round(age, 3), "status": status_of(age)})
-        return found
+            devices.append({**device, "age_s": round(age, 3), "status": status_of(age)})
+        return devices
 
 
 def status_of(age: float) -> str:

@@ -32,10 +32,10 @@ source.onmessage = event => {
 source.onerror = () => { element("summary").textContent = "the station does not answer"; };
 
 function summarise(news) {
-  const told = [`${fleet.size} vehicle${fleet.size === 1 ? "" : "s"}`, `${news.readings.toLocaleString()} readings`];
-  if (rate !== null) told.push(`${rate.toFixed(rate < 10 ? 1 : 0)}/s`);
-  if (news.problem) told.push(news.problem);
-  element("summary").textContent = told.join(" \u00b7 ");
+  const words = [`${fleet.size} vehicle${fleet.size === 1 ? "" : "s"}`, `${news.readings.toLocaleString()} readings`];
+  if (rate !== null) words.push(`${rate.toFixed(rate < 10 ? 1 : 0)}/s`);
+  if (news.problem) words.push(news.problem);
+  element("summary").textContent = words.join(" \u00b7 ");
   element("alarms").hidden = !alarms.size;
   const silent = [...alarms.values()].filter(kinds => kinds.includes("silent")).length;
   const low = [...alarms.values()].filter(kinds => kinds.includes("battery")).length;

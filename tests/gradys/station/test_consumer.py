@@ -21,10 +21,12 @@ CONNECTION = object()
 
 
 class Store:
-    """Attributes:
-    batches: numbers of each transaction.
-    away: how often it is not there yet.
-    refuses: numbers that it refuses.
+    """A store in memory.
+
+    Attributes:
+        batches: numbers of each transaction.
+        away: how often it is not there yet.
+        refuses: numbers that it refuses.
     """
 
     def __init__(self) -> None:
@@ -43,9 +45,12 @@ class Store:
 
 
 class Broker:
-    """Attributes:
-    acknowledged: packet identifiers in their order; after how many batches of the store, of the newest ones.
-    told: (topic, numbers).
+    """A broker that remembers what it was told.
+
+    Attributes:
+        acknowledged: packet identifiers in their order.
+        after: batches that the store had by the newest acknowledgement.
+        told: (topic, numbers) of what was published.
     """
 
     def __init__(self, store: Store) -> None:
