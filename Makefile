@@ -10,11 +10,14 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 # Compiling all of pymavlink's dialects takes longer than the rest; what is imported is compiled then.
 LOCKED := install --no-compile --no-deps --require-hashes --only-binary :all: -r
 
-.PHONY: demo test test-sitl lint format bench soak lock clean help
+.PHONY: demo demo-fleet test test-sitl lint format bench soak lock clean help
 
 demo: $(MODULES)  ## fly a simulated copter: MAVProxy with uavapi and vision; ARGS go to mavproxy-uavapi
 	@echo "== a simulated copter, and MAVProxy with the API; Ctrl-C ends both"
 	@$(BIN)/mavproxy-uavapi --simulated --module 'vision:{"source":"sim"}' $(ARGS)
+
+demo-fleet: $(INSTALLED)  ## a broker, a database, a station of two workers and VEHICLES (100) vehicles on paper
+	@$(BIN)/python benchmarks/demo_fleet.py --vehicles $(or $(VEHICLES),100)
 
 test: $(INSTALLED)  ## run the tests; ARGS="-k name" picks some
 	$(BIN)/python -m pytest -m "not sitl" -n 4 --dist loadfile --no-loadscope-reorder --reruns 2 -rR $(ARGS)

@@ -107,7 +107,10 @@ class GradysModuleSettings(ModuleSettings[GradysSettings]):
             MPSetting("token", str, "", "bearer token for stations and HTTP sinks"),
             MPSetting("ca_file", str, "", "certificates that TLS is checked by; empty: the system's"),
             MPSetting(
-                "sink", str, "", "where readings go, by comma: http(s)://HOST/PATH[#ack=status], mqtt(s)://HOST/TOPIC"
+                "sink",
+                str,
+                "",
+                "where readings go, by comma: http(s)://HOST/PATH[#ack=status], mqtt(s)://HOST/TOPIC[#ack=station]",
             ),
             MPSetting("quantities", str, "position@1", "what is sampled while there is a sink"),
             MPSetting("spool", str, default_spool(), "file that keeps readings until they are acknowledged"),

@@ -4,6 +4,9 @@ The URL's path is the topic, in which {sysid}, {device} and {quantity} stand for
 `mqtt://broker/fleet/{sysid}/{quantity}`. Positions are retained, so that a new subscriber has the last one at
 once. Beside them a retained `status` says `online`, and by the broker's own hand `offline` when we are gone: the
 last will. A connection has one will, so each topic of that kind has a connection of its own.
+
+With `#ack=station` at the end of the URL the station's word is the acknowledgement; see `confirmations.py`. What it
+does not confirm is published again, so the broker need not keep it for longer than EXPIRY, the last position neither.
 """
 
 from __future__ import annotations
@@ -13,14 +16,18 @@ import contextlib
 import json
 import socket
 import ssl
+import uuid
 from collections import defaultdict
 from collections.abc import Awaitable, Sequence
 from urllib.parse import unquote
 
 import aiomqtt
+from paho.mqtt.packettypes import PacketTypes
+from paho.mqtt.properties import Properties
 
 from mavproxy_gradys.errors import NotDelivered
-from mavproxy_gradys.forwarding.readings import POSITION, STATUS, Reading, Stored, device_of
+from mavproxy_gradys.forwarding.confirmations import Confirmations
+from mavproxy_gradys.forwarding.readings import CONFIRMED_TOPIC, POSITION, STATUS, Reading, Stored, device_of
 from mavproxy_gradys.net.addresses import split_url
 from mavproxy_gradys.net.http_client import tls_context
 from mavproxy_gradys.net.resolver import Resolver
@@ -30,6 +37,8 @@ from mavproxy_uavapi.core.timeout import wait_with_timeout
 KEEP_ALIVE = 15  # s; the broker gives a silent connection up after one and a half of it
 WINDOW = 20  # readings on their way at once, on one connection
 GOODBYE = 1.0  # s
+CONFIRMED_WITHIN = 20.0  # s for a station's word; under load it may take long, and sending again would add to that
+EXPIRY = 60  # s
 DEFAULT_TOPIC = "fleet/{sysid}/{quantity}"
 ONLINE, OFFLINE = "online", "offline"
 
@@ -41,13 +50,17 @@ class MqttSink:
         url: mqtt(s)://[USER:PASSWORD@]HOST[:PORT]/TOPIC.
         timeout: s for an answer of the broker.
         ca_file: as for `Client`.
+        station_confirms: whether the station's word acknowledges, not the broker's.
     """
 
-    def __init__(self, url: str, timeout: float, ca_file: str) -> None:
+    def __init__(self, url: str, timeout: float, ca_file: str, station_confirms: bool = False) -> None:
         self._parts, self._port = split_url(url, ("mqtt", "mqtts"))
         self._topic = unquote(self._parts.path.lstrip("/")) or DEFAULT_TOPIC
         self._timeout = timeout
         self._ca_file = ca_file
+        self._station_confirms = station_confirms
+        self._confirmations: defaultdict[str, Confirmations] = defaultdict(Confirmations)  # by status topic
+        self._reply_topics: dict[str, str] = {}  # by status topic
         self._clients: dict[str, aiomqtt.Client] = {}  # by status topic
         self._names = Resolver()
         self._connecting: defaultdict[str, asyncio.Lock] = defaultdict(asyncio.Lock)
@@ -83,10 +96,29 @@ class MqttSink:
             raise NotDelivered(self._explain(error)) from error
 
     async def _send(self, status: str, batch: Sequence[Stored]) -> set[int]:
+        if not self._station_confirms:
+            return await self._publish_all(status, batch)
+        confirmations, numbers = self._confirmations[status], {stored.seq for stored in batch}
+        if late := confirmations.collect(numbers):
+            return late
+        confirmations.expect(numbers)
+        published = await self._publish_all(status, batch)
+        confirmed = await confirmations.wait(published, CONFIRMED_WITHIN)
+        if not confirmed:
+            raise NotDelivered(f"{self._where}: published, but no station says that it keeps it", reached=True)
+        return confirmed
+
+    async def _publish_all(self, status: str, batch: Sequence[Stored]) -> set[int]:
+        """The numbers of those that the broker has.
+
+        Raises:
+            NotDelivered: it has none.
+        """
         try:
             client = await self._client(status)
             window = asyncio.Semaphore(WINDOW)
-            publishing = [self._publish(client, window, stored) for stored in batch]
+            properties = self._properties(status)
+            publishing = [self._publish(client, window, stored, properties) for stored in batch]
             results = await asyncio.gather(*publishing, return_exceptions=True)
         except aiomqtt.MqttError as error:
             raise NotDelivered(self._explain(error)) from error
@@ -100,11 +132,25 @@ class MqttSink:
             raise NotDelivered(self._explain(next(result for result in results if result is not None)))
         return taken
 
-    async def _publish(self, client: aiomqtt.Client, window: asyncio.Semaphore, stored: Stored) -> None:
+    async def _publish(
+        self, client: aiomqtt.Client, window: asyncio.Semaphore, stored: Stored, properties: Properties | None
+    ) -> None:
         topic = topic_of(self._topic, stored.reading)
         payload = json.dumps(stored.body(), allow_nan=False)
         async with window:
-            await client.publish(topic, payload, qos=1, retain=is_position(stored.reading))
+            await client.publish(topic, payload, qos=1, retain=is_position(stored.reading), properties=properties)
+
+    def _properties(self, status: str) -> Properties | None:
+        """What goes with a reading: where the station is to confirm it."""
+        if not self._station_confirms:
+            return None
+        properties = Properties(PacketTypes.PUBLISH)  # type: ignore[no-untyped-call]
+        properties.ResponseTopic = self._reply_topic(status)
+        properties.MessageExpiryInterval = EXPIRY
+        return properties
+
+    def _reply_topic(self, status: str) -> str:
+        return self._reply_topics.setdefault(status, f"{CONFIRMED_TOPIC}{uuid.uuid4().hex}")
 
     async def _client(self, status: str) -> aiomqtt.Client:
         """The connection whose last will is for that topic, made if need be.
@@ -131,6 +177,10 @@ class MqttSink:
         try:
             await self._within(asyncio.shield(connecting))
             await client.publish(status, ONLINE, qos=1, retain=True)
+            if self._station_confirms:
+                await client.subscribe(self._reply_topic(status), qos=0)
+                self._confirmations[status].begin()
+                self._tasks.start(listen(client, self._confirmations[status]), "the listening to confirmations")
         except BaseException:
             leaving = self._leaving[status] = self._tasks.start(
                 leave(client, connecting), f"the leaving of {self._port}"
@@ -162,6 +212,7 @@ class MqttSink:
             max_inflight_messages=WINDOW,
             will=aiomqtt.Will(status, OFFLINE, qos=1, retain=True),
             tls_context=self._tls() if parts.scheme == "mqtts" else None,
+            protocol=aiomqtt.ProtocolVersion.V5 if self._station_confirms else aiomqtt.ProtocolVersion.V311,
         )
 
     def _tls(self) -> ssl.SSLContext:
@@ -169,8 +220,11 @@ class MqttSink:
         return context if isinstance(context, ssl.SSLContext) else ssl.create_default_context()
 
     def _explain(self, error: BaseException | None) -> str:
-        host = self._parts.hostname
-        return f"broker {host}:{self._port}: {str(error) or type(error).__name__}"
+        return f"{self._where}: {str(error) or type(error).__name__}"
+
+    @property
+    def _where(self) -> str:
+        return f"broker {self._parts.hostname}:{self._port}"
 
     async def _drop(self, status: str) -> None:
         """Give a connection up; the next batch makes a new one."""
@@ -189,6 +243,17 @@ class MqttSink:
         if self._leaving:
             await asyncio.wait(self._leaving.values(), timeout=GOODBYE)
         await asyncio.gather(*(say(status, client) for status, client in list(self._clients.items())))
+
+
+async def listen(client: aiomqtt.Client, confirmations: Confirmations) -> None:
+    """Hear the station until the connection is over."""
+    try:
+        async for message in client.messages:
+            confirmations.take(message.payload)
+    except aiomqtt.MqttError:
+        return
+    finally:
+        confirmations.end()
 
 
 async def leave(client: aiomqtt.Client, connecting: asyncio.Future[aiomqtt.Client]) -> None:

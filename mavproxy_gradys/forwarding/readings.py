@@ -21,6 +21,7 @@ from mavproxy_uavapi.core.mavlink.vehicle_state import Received, VehicleState
 
 POSITION = "position"
 STATUS = "status"  # the MQTT sink's word on whether a vehicle is online
+CONFIRMED_TOPIC = "confirmed/"  # below it a station says which readings it has kept
 POSITION_REPRESENTATION = "degrees, degrees, m above home"
 NAME = r"[A-Za-z0-9_.-]{1,64}"  # fits into an MQTT topic
 LONGEST_TEXT = 4096  # letters of a value or a representation

@@ -11,7 +11,8 @@ from mavproxy_uavapi.core.addresses import masked
 from mavproxy_uavapi.core.errors import SettingError
 
 SCHEMES = tuple(PORTS)
-STATUS_COUNTS = "ack=status"  # the one option there is
+STATUS_COUNTS = "ack=status"  # of an HTTP sink
+STATION_CONFIRMS = "ack=station"  # of an MQTT sink
 
 
 @dataclass(frozen=True)
@@ -21,14 +22,17 @@ class SinkAddress:
     Attributes:
         url: what to connect to. It may hold a password: it is neither shown nor stored.
         status_counts: whether a 200 acknowledges all that was sent though it names no numbers.
+        station_confirms: whether the station's word acknowledges, not the broker's.
     """
 
     url: str
     status_counts: bool = False
+    station_confirms: bool = False
 
     def __str__(self) -> str:
         """As it may be shown."""
-        return masked(self.url) + (f"#{STATUS_COUNTS}" if self.status_counts else "")
+        option = STATUS_COUNTS if self.status_counts else STATION_CONFIRMS if self.station_confirms else ""
+        return masked(self.url) + (f"#{option}" if option else "")
 
     @property
     def name(self) -> str:
@@ -59,10 +63,11 @@ def sink_address(text: str) -> SinkAddress:
     """
     split_url(text, SCHEMES)
     if text.startswith("mqtt"):
-        if set("+#?") & set(unquote(text.partition("://")[2].partition("/")[2])):
-            raise SettingError(f"{masked(text)}: a topic holds none of + # ?")
-        return SinkAddress(text)
+        url = text.removesuffix(f"#{STATION_CONFIRMS}")
+        if set("+#?") & set(unquote(url.partition("://")[2].partition("/")[2])):
+            raise SettingError(f"{masked(text)}: a topic holds none of + # ?; the option is #{STATION_CONFIRMS}")
+        return SinkAddress(url, station_confirms=url != text)
     url, _, option = text.partition("#")
     if option not in ("", STATUS_COUNTS):
-        raise SettingError(f"{masked(text)}: the only option of a sink is #{STATUS_COUNTS}")
+        raise SettingError(f"{masked(text)}: the only option of an HTTP sink is #{STATUS_COUNTS}")
     return SinkAddress(url, option == STATUS_COUNTS)

@@ -1,1 +1,1 @@
-"""A small receiver to try the module with: `python -m mavproxy_gradys.station`."""
+"""The station: keeps a fleet's readings, and shows it: `python -m mavproxy_gradys.station`."""

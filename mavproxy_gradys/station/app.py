@@ -3,147 +3,267 @@
 POST /update-info/       a device's position, as the GrADyS ground station takes it: form fields; answers
                          type 103, or 101 when no browser watches: then the update was received but dropped
 POST /readings           {"readings": [...]} -> {"acknowledged": [seq, ...]}
-GET  /devices            JSON; /devices.csv
-GET  /readings           JSON; /readings.csv; ?device= &quantity= &after=SEQ &limit=1000
-GET  /watch              every second all devices, as Server-Sent Events: the page watches by it
+GET  /devices            what update-info told, JSON; /devices.csv
+GET  /fleet              every vehicle, from readings and updates
+GET  /readings           JSON; /readings.csv; /readings.parquet;
+                         ?device= &quantity= &from= &to= (s since 1970) &after=SEQ &limit=1000
+GET  /history            a quantity for a plot; ?device= &quantity= &element= &from= &to= &parts=800
+GET  /alarms             what is wrong
+GET  /watch              every second what is new, as Server-Sent Events: the page watches by it
+GET  /metrics, /health   for Prometheus, and for whoever restarts it
 GET  /                   the page
 """
 
 from __future__ import annotations
 
-import asyncio
-import csv
-import hmac
-import io
+import contextlib
 import json
-from collections.abc import Awaitable, Callable, Iterable, Sequence
+import time
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
 
 from aiohttp import web
+from aiohttp.typedefs import Handler, Middleware
 
-from mavproxy_gradys.station.page import PAGE
-from mavproxy_gradys.station.store import COLUMNS, DEVICE_COLUMNS, PositionStore, parse, whole
+from mavproxy_gradys.errors import NotStored
+from mavproxy_gradys.station.access import add_headers, from_here, only_with_token
+from mavproxy_gradys.station.exports import ParquetMissing, csv_readings, csv_text, parquet_readings
+from mavproxy_gradys.station.fleet import FleetVehicle
+from mavproxy_gradys.station.fleet_watch import FleetWatch
+from mavproxy_gradys.station.health import Health
+from mavproxy_gradys.station.history import history_view
+from mavproxy_gradys.station.intake import Intake
+from mavproxy_gradys.station.queries import MOST_EXPORTED, MOST_ROWS, history_query, reading_query
+from mavproxy_gradys.station.reading_row import COLUMNS, reading_row
+from mavproxy_gradys.station.updates import DEVICE_COLUMNS, Updates, newest_of_update, parse
 
 RECEIVED, DROPPED = 103, 101
 LARGEST_BODY = 16 * 1024 * 1024  # bytes
-MOST_ROWS = 1_000_000
-Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+READ = 64 * 1024  # bytes of a file at once
+PAGE = Path(__file__).parent / "page"
+FILES = ("fleet.js", "map.js", "plot.js", "style.css")
 
 
 class Station:
     """The handlers.
 
     Args:
-        store: devices and readings.
+        intake: the store, and the way into it.
+        watch: the fleet.
+        health: whether broker and database are there.
         watched: whether to answer as if a browser always watched.
         token: bearer token that senders must know; empty for none.
+        clock: s since 1970.
     """
 
-    def __init__(self, store: PositionStore, watched: bool = False, token: str = "") -> None:
-        self.store = store
+    def __init__(
+        self,
+        intake: Intake,
+        watch: FleetWatch,
+        health: Health,
+        *,
+        watched: bool = False,
+        token: str = "",
+        clock: Callable[[], float] = time.time,
+    ) -> None:
+        self._intake = intake
+        self._store = intake.store
+        self._watch = watch
+        self._health = health
         self._watched = watched
         self._token = token
+        self._clock = clock
+        self._updates = Updates(clock)
         self._watchers = 0
 
     def app(self) -> web.Application:
         """The application."""
-        app = web.Application(client_max_size=LARGEST_BODY, middlewares=[self._from_here, self._only_with_token])
+        middlewares: list[Middleware] = [from_here, only_with_token(self._token), mistakes]
+        app = web.Application(client_max_size=LARGEST_BODY, middlewares=middlewares)
+        app.on_response_prepare.append(add_headers)
         for path in ("/update-info/", "/update-info"):
             app.router.add_post(path, self.update)
         for path in ("/readings", "/readings/"):
             app.router.add_post(path, self.take)
             app.router.add_get(path, self.readings)
-        app.router.add_get("/readings.csv", self.readings)
-        app.router.add_get("/devices", self.devices)
-        app.router.add_get("/devices.csv", self.devices)
-        app.router.add_get("/watch", self.watch)
-        app.router.add_get("/", self.page)
+        answers = {
+            "/readings.csv": self.readings_csv,
+            "/readings.parquet": self.readings_parquet,
+            "/devices": self.devices,
+            "/devices.csv": self.devices_csv,
+            "/fleet": self.fleet,
+            "/history": self.history,
+            "/alarms": self.alarms,
+            "/watch": self.watch,
+            "/metrics": self.metrics,
+            "/health": self.health,
+            "/": self.page,
+        }
+        for path, answer in answers.items():
+            app.router.add_get(path, answer)
+        for file in FILES:
+            app.router.add_get(f"/{file}", self.file)
         return app
 
-    @web.middleware
-    async def _from_here(self, request: web.Request, handler: Handler) -> web.StreamResponse:
-        """Refuse what a page of another site sends."""
-        origin = request.headers.get("Origin")
-        if origin is not None and urlsplit(origin).netloc != request.host:
-            return web.json_response({"detail": f"a page of {origin} may not call"}, status=403)
-        return await handler(request)
-
-    @web.middleware
-    async def _only_with_token(self, request: web.Request, handler: Handler) -> web.StreamResponse:
-        given = request.headers.get("Authorization", "").removeprefix("Bearer ")
-        if request.method == "POST" and self._token and not hmac.compare_digest(given.encode(), self._token.encode()):
-            return web.json_response({"detail": "a bearer token is needed"}, status=401)
-        return await handler(request)
+    # -- in -----------------------------------------------------------------------------------------------
 
     async def update(self, request: web.Request) -> web.Response:
         """Take a position. What the ground station cannot read it answers with 500, and so does this."""
+        now = self._clock()
         try:
             device = parse({name: str(value) for name, value in (await request.post()).items()})
+            shown = list(newest_of_update(device, now))
         except (ValueError, KeyError) as error:
             return web.json_response({"detail": f"cannot read that: {error!r}"}, status=500)
         watched = self._watched or self._watchers > 0
         if watched:
-            self.store.update(device)
+            self._updates.put(device)
+            await self._store.show(shown)
         kind = RECEIVED if watched else DROPPED
         return web.json_response({"id": 1, "type": kind, "seq": 0, "lat": 0, "lng": 0, "alt": 0, "DATA": "0"})
 
     async def take(self, request: web.Request) -> web.Response:
         """Keep readings; acknowledged are just those that are on the disk."""
         try:
-            given = json.loads(await request.read())
-            numbers = self.store.add(given["readings"])
-        except (ValueError, KeyError, TypeError, RecursionError) as error:
-            return web.json_response({"detail": f"cannot read that: {error}"}, status=400)
-        return web.json_response({"acknowledged": numbers})
+            rows = [reading_row(reading) for reading in json.loads(await request.read())["readings"]]
+        except (KeyError, TypeError, RecursionError) as error:
+            raise ValueError(f"no readings: {error!r:.80}") from error
+        await self._intake.keep(rows)
+        return web.json_response({"acknowledged": [row.seq for row in rows]})
 
-    async def devices(self, request: web.Request) -> web.Response:
-        """Every device."""
-        found = self.store.devices()
-        if request.path.endswith(".csv"):
-            return table(DEVICE_COLUMNS, ([device.get(name, "") for name in DEVICE_COLUMNS] for device in found))
-        return web.json_response({"devices": found})
+    # -- out ----------------------------------------------------------------------------------------------
+
+    async def devices(self, _request: web.Request) -> web.Response:
+        """Every device that was told of by update-info."""
+        return web.json_response({"devices": self._updates.devices()})
+
+    async def devices_csv(self, _request: web.Request) -> web.Response:
+        """The same as CSV."""
+        rows = [[device.get(name, "") for name in DEVICE_COLUMNS] for device in self._updates.devices()]
+        return web.Response(body=csv_text([DEVICE_COLUMNS, *rows]), content_type="text/csv", charset="utf-8")
+
+    async def fleet(self, _request: web.Request) -> web.Response:
+        """Every vehicle."""
+        return web.json_response({"now": self._watch.now, "vehicles": list(map(vars, self._watch.vehicles))})
+
+    async def alarms(self, _request: web.Request) -> web.Response:
+        """What is wrong."""
+        return web.json_response({"alarms": [alarm._asdict() for alarm in self._watch.alarms]})
 
     async def readings(self, request: web.Request) -> web.Response:
         """Readings."""
-        query = request.query
+        query = reading_query(request.query, 1000, MOST_ROWS)
+        readings = []
+        async with contextlib.aclosing(self._store.readings(query)) as chunks:
+            async for rows in chunks:
+                for row in rows:
+                    reading = dict(zip(COLUMNS, row, strict=True))
+                    readings.append({**reading, "value": json.loads(reading["value"])})
+        counts = await self._store.counts()
+        return web.json_response({"count": counts.stored, "repeats": counts.repeats, "readings": readings})
+
+    async def readings_csv(self, request: web.Request) -> web.StreamResponse:
+        """Readings as CSV, as they come out of the store."""
+        query = reading_query(request.query, 1000, MOST_EXPORTED)
+        response = download("text/csv; charset=utf-8", "readings.csv")
         try:
-            after, limit = whole(query.get("after", "-1")), whole(query.get("limit", "1000"))
-            if not 0 <= limit <= MOST_ROWS:
-                raise ValueError(f"limit is from 0 to {MOST_ROWS}")
-        except ValueError as error:
-            return web.json_response({"detail": str(error)}, status=400)
-        rows = self.store.readings(query.get("device", ""), query.get("quantity", ""), after, limit)
-        if request.path.endswith(".csv"):
-            return table(COLUMNS, rows)
-        found = [dict(zip(COLUMNS, row, strict=True)) for row in rows]
-        return web.json_response({"count": self.store.count(), "repeats": self.store.repeats, "readings": found})
+            async with contextlib.aclosing(self._store.readings(query)) as chunks:
+                async for text in csv_readings(chunks):
+                    if not response.prepared:
+                        await response.prepare(request)
+                    await response.write(text)
+        except NotStored:
+            if not response.prepared:
+                raise
+            if request.transport is not None:
+                request.transport.abort()  # so that nobody takes the part for the whole
+        return response
+
+    async def readings_parquet(self, request: web.Request) -> web.StreamResponse:
+        """Readings as Parquet."""
+        query = reading_query(request.query, 1000, MOST_EXPORTED)
+        try:
+            async with contextlib.aclosing(self._store.readings(query)) as chunks:
+                file = await parquet_readings(chunks)
+        except ParquetMissing as missing:
+            return web.json_response({"detail": str(missing)}, status=501)
+        with file:
+            response = download("application/vnd.apache.parquet", "readings.parquet")
+            await response.prepare(request)
+            while part := file.read(READ):
+                await response.write(part)
+        return response
+
+    async def history(self, request: web.Request) -> web.Response:
+        """A quantity over time."""
+        query = history_query(request.query, self._clock())
+        view = history_view(await self._store.history(query), query.width)
+        return web.json_response({"from": query.start, "to": query.end, **view})
 
     async def watch(self, request: web.Request) -> web.StreamResponse:
-        """All devices once a second, while somebody looks."""
+        """The fleet, once a second, while somebody looks: first all of it, then what is new."""
         response = web.StreamResponse(headers={"Content-Type": "text/event-stream", "Cache-Control": "no-store"})
         await response.prepare(request)
         self._watchers += 1
+        known: dict[str, FleetVehicle] = {}
         try:
             while True:
-                told = {"devices": self.store.devices(), "readings": self.store.count()}
-                await response.write(f"data: {json.dumps(told)}\n\n".encode())
-                await asyncio.sleep(1.0)
+                news = [vars(vehicle) for vehicle in self._watch.vehicles if known.get(vehicle.device) != vehicle]
+                known = {vehicle.device: vehicle for vehicle in self._watch.vehicles}
+                await response.write(f"data: {json.dumps(self._event(news))}\n\n".encode())
+                await self._watch.next_look()
         except ConnectionResetError:
             return response
         finally:
             self._watchers -= 1
 
-    async def page(self, request: web.Request) -> web.Response:
-        """The fleet on a canvas."""
-        return web.Response(text=PAGE, content_type="text/html")
+    def _event(self, news: list[dict[str, Any]]) -> dict[str, Any]:
+        watch = self._watch
+        return {
+            "now": watch.now,
+            "vehicles": news,
+            "count": len(watch.vehicles),
+            "alarms": watch.alarms,
+            "readings": watch.counts.stored,
+            "problem": watch.problem,
+        }
+
+    async def metrics(self, _request: web.Request) -> web.Response:
+        """For Prometheus."""
+        try:
+            from mavproxy_gradys.station.metrics import StationCollector, exposition  # noqa: PLC0415  an extra
+        except ModuleNotFoundError as missing:
+            detail = f"/metrics needs {missing.name}: pip install 'mavproxy-uavapi[fleet]'"
+            return web.json_response({"detail": detail}, status=501)
+        text = exposition(StationCollector(self._intake.statistics, self._watch, self._health))
+        return web.Response(body=text, headers={"Content-Type": "text/plain; version=0.0.4; charset=utf-8"})
+
+    async def health(self, _request: web.Request) -> web.Response:
+        """Whether it works."""
+        return web.json_response(self._health.report(), status=200 if self._health.is_good else 503)
+
+    async def page(self, _request: web.Request) -> web.FileResponse:
+        """The page."""
+        return web.FileResponse(PAGE / "fleet.html", headers={"Cache-Control": "no-cache"})
+
+    async def file(self, request: web.Request) -> web.FileResponse:
+        """One of the page's own files."""
+        return web.FileResponse(PAGE / request.path[1:], headers={"Cache-Control": "no-cache"})
 
 
-def table(columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> web.Response:
-    """Rows as CSV."""
-    text = io.StringIO()
-    writer = csv.writer(text)
-    writer.writerow(columns)
-    writer.writerows([json.dumps(cell) if isinstance(cell, list | dict) else cell for cell in row] for row in rows)
-    body = text.getvalue().encode("utf-8", "replace")  # JSON may name half a letter, which UTF-8 has not
-    return web.Response(body=body, content_type="text/csv", charset="utf-8")
+@web.middleware
+async def mistakes(request: web.Request, handler: Handler) -> web.StreamResponse:
+    """A query that means nothing is the client's mistake; a database that is away is none of its."""
+    try:
+        return await handler(request)
+    except ValueError as error:
+        return web.json_response({"detail": f"cannot read that: {error}"}, status=400)
+    except NotStored as error:
+        return web.json_response({"detail": str(error), "code": error.code}, status=error.status)
+
+
+def download(kind: str, name: str) -> web.StreamResponse:
+    """An answer that a browser saves."""
+    headers = {"Content-Type": kind, "Content-Disposition": f'attachment; filename="{name}"'}
+    return web.StreamResponse(headers=headers)

@@ -1,147 +1,146 @@
-"""What the station remembers: where each device is (in memory), and readings, once each (SQLite)."""
+"""What a station asks of its store; `sqlite_store.py` and `postgres_store.py` are two."""
 
 from __future__ import annotations
 
-import json
 import math
-import sqlite3
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from pathlib import Path
-from typing import Any
+from collections.abc import AsyncGenerator, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
 
-ACTIVE = 5.0  # s without an update after which a device is `on_hold`
-INACTIVE = 10.0  # s after which it is `inactive`
-COLUMNS = ("device", "seq", "id", "quantity", "representation", "value", "time", "received")
-DEVICE_COLUMNS = ("id", "device", "lat", "lng", "alt", "heading", "battery_percent", "ip", "seq", "age_s", "status")
-SCHEMA = """
-CREATE TABLE IF NOT EXISTS readings (
-    device TEXT, seq INTEGER, id TEXT, quantity TEXT, representation TEXT, value TEXT, time REAL, received REAL,
-    PRIMARY KEY (device, seq)) WITHOUT ROWID
-"""
+from mavproxy_gradys.station.newest import Newest
+from mavproxy_gradys.station.reading_row import ReadingRow
+
+CHUNK = 2000  # rows that are in memory at once
 
 
-def whole(text: Any) -> int:
-    """An integer that SQLite can hold.
-
-    Raises:
-        ValueError: it is none.
-    """
-    number = int(text)
-    if not -(2**63) <= number < 2**63:
-        raise ValueError(f"{text!r:.40} is too large")
-    return number
-
-
-def finite(text: Any) -> float:
-    """A number.
-
-    Raises:
-        ValueError: it is none, NaN, or infinite.
-    """
-    number = float(text)
-    if not math.isfinite(number):
-        raise ValueError(f"{text!r:.40} is not finite")
-    return number
-
-
-NUMBERS = {"id": whole, "type": whole, "seq": whole, "lat": finite, "lng": finite, "alt": finite}
-
-
-def parse(form: Mapping[str, str]) -> dict[str, Any]:
-    """A device's update, with numbers for numbers.
-
-    Raises:
-        ValueError: what should be a number is none.
-        KeyError: `device` or `id` is missing.
-    """
-    device: dict[str, Any] = dict(form)
-    for name, number in NUMBERS.items():
-        if name in device:
-            device[name] = number(device[name])
-    return {**device, "device": device["device"], "id": device["id"]}
-
-
-class PositionStore:
-    """Devices and readings; each call blocks for a transaction at most.
+@dataclass(frozen=True)
+class ReadingQuery:
+    """Which readings.
 
     Attributes:
-        repeats: readings that came again and were dropped.
-
-    Args:
-        file: SQLite database; `:memory:` forgets.
-        clock: s since 1970.
+        device, quantity: of these alone; empty for all.
+        after: with larger numbers than this, in the order of the numbers; -1 for all, by device and time.
+        start, end: measured from then on, before then (s since 1970).
+        limit: no more than so many.
     """
 
-    def __init__(self, file: Path | str, clock: Callable[[], float] = time.time) -> None:
-        self._clock = clock
-        self._db = sqlite3.connect(file, isolation_level=None)
-        self._db.execute("PRAGMA journal_mode=WAL")
-        self._db.execute("PRAGMA synchronous=FULL")
-        self._db.execute(SCHEMA)
-        self._devices: dict[int, dict[str, Any]] = {}
-        self.repeats = 0
+    device: str = ""
+    quantity: str = ""
+    after: int = -1
+    start: float = -math.inf
+    end: float = math.inf
+    limit: int = 1000
 
-    def close(self) -> None:
-        """Close the database."""
-        self._db.close()
+    def conditions(self) -> list[tuple[str, str, Any]]:
+        """Column, operator and operand of each condition."""
+        asked = (
+            ("device", "=", self.device, ""),
+            ("quantity", "=", self.quantity, ""),
+            ("seq", ">", self.after, -1),
+            ("time", ">=", self.start, -math.inf),
+            ("time", "<", self.end, math.inf),
+        )
+        return [(column, operator, operand) for column, operator, operand, default in asked if operand != default]
 
-    def update(self, device: dict[str, Any]) -> None:
-        """Take what `parse` made of a device's update."""
-        self._devices[device["id"]] = {**device, "received": self._clock()}
+    @property
+    def order(self) -> str:
+        """The columns to sort by."""
+        return "seq" if self.after >= 0 else "device, time, seq"
 
-    def devices(self) -> list[dict[str, Any]]:
-        """Every device, with the age of its update and whether it is active."""
-        now = self._clock()
-        found = []
-        for _, device in sorted(self._devices.items()):
-            age = now - device["received"]
-            status = "active" if age < ACTIVE else "on_hold" if age < INACTIVE else "inactive"
-            found.append({**device, "age_s": round(age, 3), "status": status})
-        return found
 
-    def add(self, readings: Sequence[Mapping[str, Any]]) -> list[int]:
-        """Keep readings once each; their numbers, when they are on the disk.
+@dataclass(frozen=True)
+class HistoryQuery:
+    """Which history.
+
+    Attributes:
+        device, quantity: of what.
+        element: which one, where the value is a list; None where it is a number.
+        start, end: measured from then on, before then (s since 1970).
+        buckets: of so many equal parts of that time.
+    """
+
+    device: str
+    quantity: str
+    element: int | None
+    start: float
+    end: float
+    buckets: int
+
+    @property
+    def width(self) -> float:
+        """s of one part."""
+        return (self.end - self.start) / self.buckets
+
+
+class Bucket(NamedTuple):
+    """The readings of one part of a history.
+
+    Attributes:
+        first, last: when the first and the last one were measured, s since 1970.
+        low, high: the smallest and the largest value.
+        readings: how many.
+        delay: s from sampling to row, the longest.
+    """
+
+    first: float
+    last: float
+    low: float
+    high: float
+    readings: int
+    delay: float
+
+
+class StoreCounts(NamedTuple):
+    """What a store has counted, of all workers.
+
+    Attributes:
+        stored: readings that were kept.
+        repeats: readings that came again.
+    """
+
+    stored: int
+    repeats: int
+
+
+class FleetNow(NamedTuple):
+    """The newest readings.
+
+    Attributes:
+        now: the store's clock, s since 1970.
+        newest: by device and quantity.
+    """
+
+    now: float
+    newest: Sequence[Newest]
+
+
+class Store(Protocol):
+    """Keeps readings, once each.
+
+    Every method raises NotStored while the database cannot be reached.
+    """
+
+    async def add(self, rows: Sequence[ReadingRow]) -> int:
+        """Keep rows; how many were new. They are on the disk when it returns.
 
         Raises:
-            ValueError: one is no reading; none is kept.
+            ValueError: the database refuses what one holds; none is kept.
         """
-        rows = [self._row(reading) for reading in readings]
-        before = self._db.total_changes
-        self._db.execute("BEGIN IMMEDIATE")
-        try:
-            self._db.executemany("INSERT OR IGNORE INTO readings VALUES (?, ?, ?, ?, ?, ?, ?, ?)", rows)
-            self._db.execute("COMMIT")
-        except BaseException:
-            self._db.execute("ROLLBACK")
-            raise
-        self.repeats += len(rows) - (self._db.total_changes - before)
-        return [row[1] for row in rows]
 
-    def _row(self, reading: Mapping[str, Any]) -> tuple[Any, ...]:
-        try:
-            device, seq, at = str(reading["device"]), reading["seq"], finite(reading["time"])
-            named = str(reading.get("id", "")), str(reading["quantity"]), str(reading.get("representation", ""))
-            value = json.dumps(reading["value"], allow_nan=False)
-        except (KeyError, TypeError, AttributeError, OverflowError) as error:
-            raise ValueError(f"not a reading: {error!r}") from error
-        if not isinstance(seq, int) or isinstance(seq, bool):
-            raise ValueError(f"seq {seq!r} is no number")
-        return (device, whole(seq), *named, value, at, self._clock())
+    async def show(self, newest: Iterable[Newest]) -> None:
+        """Have the fleet's table show these, which are not kept."""
 
-    def count(self) -> int:
+    async def fleet(self) -> FleetNow:
+        """The newest reading of each quantity of each device."""
+
+    async def counts(self) -> StoreCounts:
         """How many readings there are."""
-        (count,) = self._db.execute("SELECT count(*) FROM readings").fetchone()
-        return int(count)
 
-    def readings(
-        self, device: str = "", quantity: str = "", after: int = -1, limit: int = 1000
-    ) -> Iterator[tuple[Any, ...]]:
-        """Readings in the order of their numbers, as rows of COLUMNS; of one device, of one quantity."""
-        rows = self._db.execute(
-            f"SELECT {', '.join(COLUMNS)} FROM readings WHERE (? = '' OR device = ?) AND (? = '' OR quantity = ?)"
-            " AND seq > ? ORDER BY seq LIMIT ?",
-            (device, device, quantity, quantity, after, limit),
-        )
-        for row in rows:
-            yield (*row[:5], json.loads(row[5]), *row[6:])
+    def readings(self, query: ReadingQuery) -> AsyncGenerator[Sequence[tuple[Any, ...]], None]:
+        """Readings as rows of COLUMNS, in chunks; times are s since 1970, the value is JSON."""
+
+    async def history(self, query: HistoryQuery) -> list[Bucket]:
+        """The parts of a history that have readings, in order of time."""
+
+    async def close(self) -> None:
+        """Close it."""

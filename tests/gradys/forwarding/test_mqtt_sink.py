@@ -64,7 +64,7 @@ class Client:
     async def __aexit__(self, *_: Any) -> None:
         self._broker.open -= 1
 
-    async def publish(self, topic: str, _payload: Any, qos: int, retain: bool) -> None:
+    async def publish(self, topic: str, _payload: Any, qos: int, retain: bool, properties: Any = None) -> None:
         await asyncio.sleep(self._broker.publishes)
         if topic == self._broker.refuses:
             raise aiomqtt.MqttError("refused")

@@ -1,0 +1,130 @@
+"""From the broker into the store: batches, and acknowledgements after the commit."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import random
+import time
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from mavproxy_gradys.errors import NotStored
+from mavproxy_gradys.forwarding.readings import CONFIRMED_TOPIC, STATUS
+from mavproxy_gradys.net.outage_log import Defects, Outage
+from mavproxy_gradys.net.schedule import Backoff
+from mavproxy_gradys.station.inbox import Inbox, Message
+from mavproxy_gradys.station.intake import Intake
+from mavproxy_gradys.station.reading_row import LONGEST_NAME, ReadingRow, reading_row
+from mavproxy_gradys.station.refusal_log import RefusalLog
+
+LONGEST_PAUSE = 5.0  # s between attempts to store a batch
+log = logging.getLogger("station.consumer")
+
+
+class Broker(Protocol):
+    """What the consumer tells the broker; see `BrokerConnection`."""
+
+    def acknowledge(self, messages: Sequence[Message]) -> None:
+        """These are kept."""
+
+    def tell(self, topic: str, payload: str) -> None:
+        """Publish that."""
+
+
+class Consumer:
+    """Stores what is in the inbox.
+
+    Args:
+        inbox: the messages.
+        intake: the store.
+        broker: whom to tell.
+        size: messages in a batch, at most.
+        seconds: s that a batch waits for more.
+        clock: monotonic seconds.
+    """
+
+    def __init__(
+        self,
+        inbox: Inbox,
+        intake: Intake,
+        broker: Broker,
+        *,
+        size: int,
+        seconds: float,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._inbox = inbox
+        self._intake = intake
+        self._broker = broker
+        self._size = size
+        self._seconds = seconds
+        self._clock = clock
+        self._outage = Outage(log, "readings wait: nothing can be stored", "readings are stored again")
+        self._defects = Defects("the storing of readings")
+        self._refusals = RefusalLog(log, clock)
+
+    async def run(self) -> None:
+        """Store batch by batch, until cancelled."""
+        while True:
+            await self._keep(await self._inbox.batch(self._size, self._seconds))
+
+    async def _keep(self, messages: Sequence[Message]) -> None:
+        """Store a batch, however long that takes; then acknowledge it."""
+        readings = [(message, row) for message in messages if (row := self._row(message)) is not None]
+        kept = await self._store(readings)
+        self._broker.acknowledge(messages)
+        self._confirm(kept)
+
+    def _row(self, message: Message) -> ReadingRow | None:
+        """The reading that a message holds; None for a vehicle's status, and for what is none."""
+        if message.topic.rpartition("/")[2] == STATUS:
+            return None
+        try:
+            return reading_row(json.loads(message.payload))
+        except (ValueError, RecursionError) as error:
+            self._refuse(message, str(error))
+            return None
+
+    def _refuse(self, message: Message, why: str) -> None:
+        self._intake.statistics.refused += 1
+        self._refusals.add(message.topic, why)
+
+    async def _store(self, readings: Sequence[tuple[Message, ReadingRow]]) -> Sequence[tuple[Message, ReadingRow]]:
+        """Store readings; those that the database did not refuse. It is looked for by halves what it refuses."""
+        backoff = Backoff(random.random, LONGEST_PAUSE)
+        while True:
+            try:
+                await self._intake.keep([row for _, row in readings])
+            except NotStored as error:
+                self._outage.now(str(error))
+            except ValueError as error:
+                if len(readings) == 1:
+                    self._refuse(readings[0][0], str(error))
+                    return []
+                half = len(readings) // 2
+                return [*await self._store(readings[:half]), *await self._store(readings[half:])]
+            except Exception as error:  # noqa: BLE001  a defect must not end the storing for ever
+                self._defects.tell(error)
+                self._outage.now(f"{type(error).__name__}: {error}")
+            else:
+                self._outage.now("")
+                return readings
+            await asyncio.sleep(backoff.failed(self._clock()))
+
+    def _confirm(self, readings: Sequence[tuple[Message, ReadingRow]]) -> None:
+        """Tell the senders that want to know which of their readings are kept."""
+        numbers = defaultdict(list)
+        for message, row in readings:
+            if is_reply_topic(message.reply_to):
+                numbers[message.reply_to].append(row.seq)
+        for topic, kept in numbers.items():
+            self._broker.tell(topic, json.dumps({"acknowledged": kept}))
+            self._intake.statistics.confirmed += len(kept)
+
+
+def is_reply_topic(topic: str) -> bool:
+    """Whether we publish there: a sender must not have us write into topics of others."""
+    return topic.startswith(CONFIRMED_TOPIC) and len(topic) <= LONGEST_NAME and not set("+#\0") & set(topic)

@@ -1,0 +1,79 @@
+"""Readings as files: CSV row by row, Parquet by way of a temporary file."""
+
+from __future__ import annotations
+
+import asyncio
+import csv
+import io
+import json
+import tempfile
+from collections.abc import AsyncIterator, Iterable, Sequence
+from datetime import datetime, timezone
+from typing import Any, BinaryIO
+
+from mavproxy_gradys.station.reading_row import COLUMNS, number_of
+
+Chunks = AsyncIterator[Sequence[tuple[Any, ...]]]
+FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet calculates what begins so
+VALUE, TIMES = COLUMNS.index("value"), [COLUMNS.index(name) for name in ("time", "received")]
+
+
+class ParquetMissing(Exception):
+    """pyarrow is not installed."""
+
+
+def csv_text(rows: Iterable[Sequence[Any]]) -> bytes:
+    """Rows as CSV."""
+    text = io.StringIO()
+    csv.writer(text).writerows([csv_cell(cell) for cell in row] for row in rows)
+    return text.getvalue().encode("utf-8", "replace")  # JSON may name half a letter, which UTF-8 has not
+
+
+def csv_cell(cell: Any) -> Any:
+    """A cell; a text is never a formula."""
+    if isinstance(cell, list | dict):
+        return json.dumps(cell)
+    return f"'{cell}" if isinstance(cell, str) and cell.startswith(FORMULA) else cell
+
+
+async def csv_readings(chunks: Chunks) -> AsyncIterator[bytes]:
+    """Rows of COLUMNS as CSV, with headings."""
+    yield csv_text([COLUMNS])
+    async for rows in chunks:
+        yield csv_text((*row[:VALUE], json.loads(row[VALUE]), *row[VALUE + 1 :]) for row in rows)
+
+
+async def parquet_readings(chunks: Chunks) -> BinaryIO:
+    """Rows of COLUMNS, and the value as a number where it is one, as a Parquet file; its place is its beginning.
+
+    Raises:
+        ParquetMissing: pyarrow is not installed.
+    """
+    try:
+        import pyarrow  # noqa: PLC0415  an extra
+        from pyarrow import parquet  # noqa: PLC0415
+    except ModuleNotFoundError as missing:
+        raise ParquetMissing("Parquet needs pyarrow: pip install 'mavproxy-uavapi[parquet]'") from missing
+    moment = pyarrow.timestamp("us", tz="UTC")
+    types = {"seq": pyarrow.int64(), "time": moment, "received": moment}
+    schema = pyarrow.schema(
+        [*((name, types.get(name, pyarrow.string())) for name in COLUMNS), ("number", pyarrow.float64())]
+    )
+    file = tempfile.TemporaryFile()  # noqa: SIM115  who asked closes it
+    try:
+        with parquet.ParquetWriter(file, schema, compression="zstd") as writer:
+            async for rows in chunks:
+                columns = list(zip(*map(parquet_row, rows), strict=True))
+                table = pyarrow.table(dict(zip(schema.names, map(list, columns), strict=True)), schema)
+                await asyncio.get_running_loop().run_in_executor(None, writer.write_table, table)
+        file.seek(0)
+    except BaseException:
+        file.close()
+        raise
+    return file
+
+
+def parquet_row(row: Sequence[Any]) -> tuple[Any, ...]:
+    """A row of COLUMNS with moments for times, and with its number."""
+    cells = [datetime.fromtimestamp(cell, timezone.utc) if n in TIMES else cell for n, cell in enumerate(row)]
+    return (*cells, number_of(json.loads(row[VALUE])))

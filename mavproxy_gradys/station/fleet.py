@@ -1,0 +1,116 @@
+"""The fleet as it is now, and what is wrong with it. Pure."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Any, NamedTuple
+
+from mavproxy_gradys.forwarding.readings import POSITION
+from mavproxy_gradys.station.newest import Newest
+from mavproxy_gradys.station.reading_row import number_of
+from mavproxy_gradys.station.store import FleetNow
+
+FORGOTTEN = 24 * 3600.0  # s after which a vehicle that is not heard of leaves the table
+BATTERY = ("battery_percent", "battery")  # quantities, in %; the first that there is
+SPEED = ("ground_speed", "speed")  # m/s
+SILENT, LOW_BATTERY = "silent", "battery"
+
+
+@dataclass(frozen=True)
+class FleetVehicle:
+    """One vehicle.
+
+    Attributes:
+        device, id: its names.
+        lat, lng, alt: degrees, m above home; None when it does not tell.
+        heading, speed, battery: degrees, m/s, %; None when it does not tell.
+        time: when its newest reading was measured, s since 1970 by its own clock.
+        received: when it was last heard of, s since 1970 by the store's clock.
+        quantities: what it tells, with units.
+    """
+
+    device: str
+    id: str
+    lat: float | None
+    lng: float | None
+    alt: float | None
+    heading: float | None
+    speed: float | None
+    battery: float | None
+    time: float
+    received: float
+    quantities: dict[str, str]
+
+
+@dataclass(frozen=True)
+class AlarmLimits:
+    """When there is an alarm.
+
+    Attributes:
+        silent: s without a reading.
+        battery: %; below that.
+    """
+
+    silent: float
+    battery: float
+
+
+class Alarm(NamedTuple):
+    """Something that is wrong with a vehicle: `kind` is SILENT or LOW_BATTERY."""
+
+    device: str
+    kind: str
+
+
+def vehicles(fleet: FleetNow) -> list[FleetVehicle]:
+    """The vehicles that were heard of in the last FORGOTTEN s, by name."""
+    everyone = [vehicle(list(readings)) for _, readings in groupby(fleet.newest, lambda newest: newest.device)]
+    return [one for one in everyone if fleet.now - one.received < FORGOTTEN]
+
+
+def vehicle(readings: Sequence[Newest]) -> FleetVehicle:
+    """The vehicle that has told these, one of each quantity."""
+    values = {newest.quantity: json.loads(newest.value) for newest in readings}
+    lat, lng, alt = place_of(values.get(POSITION))
+    return FleetVehicle(
+        device=readings[0].device,
+        id=readings[0].id,
+        lat=lat,
+        lng=lng,
+        alt=alt,
+        heading=first_number(values, ("heading",)),
+        speed=first_number(values, SPEED),
+        battery=first_number(values, BATTERY),
+        time=max(newest.time for newest in readings),
+        received=max(newest.received for newest in readings),
+        quantities={newest.quantity: newest.representation for newest in readings},
+    )
+
+
+def place_of(value: Any) -> tuple[float | None, float | None, float | None]:
+    """Latitude, longitude (degrees) and height of a position; None for each when it is none on Earth."""
+    if not isinstance(value, list) or len(value) < 2 or not all(isinstance(one, int | float) for one in value):
+        return None, None, None
+    lat, lng, alt = (*map(float, value), None)[:3]
+    if lat is None or lng is None or abs(lat) > 90 or abs(lng) > 180:
+        return None, None, None
+    return lat, lng, alt
+
+
+def first_number(values: dict[str, Any], quantities: Iterable[str]) -> float | None:
+    """The number of the first quantity that there is."""
+    return next((number_of(values[quantity]) for quantity in quantities if quantity in values), None)
+
+
+def alarms(fleet_vehicles: Iterable[FleetVehicle], now: float, limits: AlarmLimits) -> list[Alarm]:
+    """What is wrong at `now` (s since 1970, the store's clock)."""
+    raised = []
+    for one in fleet_vehicles:
+        if now - one.received > limits.silent:
+            raised.append(Alarm(one.device, SILENT))
+        if one.battery is not None and one.battery < limits.battery:
+            raised.append(Alarm(one.device, LOW_BATTERY))
+    return raised

@@ -1,0 +1,46 @@
+"""A history as the page draws it: its parts, the gaps in it, and what came late. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from statistics import median
+from typing import Any
+
+from mavproxy_gradys.station.store import Bucket
+
+GAP = 3.5  # times the usual distance between readings
+SHORTEST_GAP = 2.0  # s
+LATE = 10.0  # s from sampling to row
+
+
+def spacing(buckets: Sequence[Bucket], width: float) -> float:
+    """The usual distance between readings (s); the width of a part where there is one reading in each.
+
+    Args:
+        buckets: the parts that have readings.
+        width: s of one part.
+    """
+    within = [(bucket.last - bucket.first) / (bucket.readings - 1) for bucket in buckets if bucket.readings > 1]
+    if 2 * len(within) >= len(buckets):
+        return max(median(within), 0.0) if within else width
+    between = [after.first - before.last for before, after in zip(buckets, buckets[1:], strict=False)]
+    return median(between) if between else width
+
+
+def gaps(buckets: Sequence[Bucket], width: float) -> list[tuple[float, float]]:
+    """From when to when there are no readings though there should be (s since 1970)."""
+    shortest = max(GAP * spacing(buckets, width), SHORTEST_GAP)
+    return [
+        (before.last, after.first)
+        for before, after in zip(buckets, buckets[1:], strict=False)
+        if after.first - before.last > shortest
+    ]
+
+
+def history_view(buckets: Sequence[Bucket], width: float) -> dict[str, Any]:
+    """What the page gets."""
+    return {
+        "parts": [list(bucket) for bucket in buckets],
+        "gaps": gaps(buckets, width),
+        "late": [[bucket.first, bucket.last, bucket.delay] for bucket in buckets if bucket.delay > LATE],
+    }

@@ -1,0 +1,45 @@
+"""The way into a store, counted."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+
+from mavproxy_gradys.station.reading_row import ReadingRow
+from mavproxy_gradys.station.statistics import Statistics
+from mavproxy_gradys.station.store import Store
+
+
+class Intake:
+    """Keeps readings.
+
+    Args:
+        store: where.
+        statistics: what counts.
+        clock: s since 1970.
+        stopwatch: monotonic seconds.
+    """
+
+    def __init__(
+        self,
+        store: Store,
+        statistics: Statistics,
+        clock: Callable[[], float] = time.time,
+        stopwatch: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.store = store
+        self.statistics = statistics
+        self._clock = clock
+        self._stopwatch = stopwatch
+
+    async def keep(self, rows: Sequence[ReadingRow]) -> None:
+        """Keep rows, once each; they are on the disk when it returns.
+
+        Raises:
+            ValueError, NotStored: as `Store.add`.
+        """
+        if not rows:
+            return
+        began = self._stopwatch()
+        new = await self.store.add(rows)
+        self.statistics.kept([row.time for row in rows], new, self._clock(), self._stopwatch() - began)

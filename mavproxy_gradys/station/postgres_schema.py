@@ -1,0 +1,61 @@
+"""The tables in PostgreSQL.
+
+readings   partitioned by the day (UTC) in which a reading was measured; unique on device, time and number
+newest     the newest reading of each quantity of each device
+workers    what each worker has counted, in the transactions that it counts
+"""
+
+from __future__ import annotations
+
+from datetime import date, timedelta
+
+SCHEMA_LOCK = 7_301_001  # of pg_advisory_xact_lock; one worker at a time makes tables
+PARTITIONED = "p"  # relkind
+DEFAULT_PARTITION = "readings_other"
+PAST, FUTURE = 30, 2  # days around today that get a partition of their own
+
+TABLES = """
+CREATE TABLE IF NOT EXISTS readings (
+    device text NOT NULL, seq bigint NOT NULL, id text NOT NULL, quantity text NOT NULL,
+    representation text NOT NULL, value json NOT NULL, number double precision,
+    time timestamptz NOT NULL, received timestamptz NOT NULL,
+    UNIQUE (device, time, seq)) PARTITION BY RANGE (time);
+CREATE TABLE IF NOT EXISTS newest (
+    device text NOT NULL, id text NOT NULL, quantity text NOT NULL, representation text NOT NULL,
+    value json NOT NULL, time timestamptz NOT NULL, received timestamptz NOT NULL,
+    PRIMARY KEY (device, quantity)) WITH (fillfactor = 50);
+CREATE TABLE IF NOT EXISTS workers (
+    name text PRIMARY KEY, stored bigint NOT NULL DEFAULT 0, repeats bigint NOT NULL DEFAULT 0)
+    WITH (fillfactor = 50);
+"""
+OTHER_DAYS = f"CREATE TABLE IF NOT EXISTS {DEFAULT_PARTITION} PARTITION OF readings DEFAULT"
+KIND = "SELECT relkind::text FROM pg_class WHERE oid = 'readings'::regclass"
+STAGING = """
+CREATE TEMPORARY TABLE IF NOT EXISTS arriving (
+    device text, seq bigint, id text, quantity text, representation text, value text, number double precision,
+    time timestamptz) ON COMMIT DELETE ROWS
+"""
+DAYS = """
+SELECT inhrelid::regclass::text FROM pg_inherits WHERE inhparent = 'readings'::regclass
+"""
+
+
+def partition_name(day: date) -> str:
+    """What the partition of a day is called."""
+    return f"readings_{day:%Y_%m_%d}"
+
+
+def has_partition(day: date, today: date) -> bool:
+    """Whether that day gets a partition of its own: vehicles' clocks may be wrong by years."""
+    return today - timedelta(PAST) <= day <= today + timedelta(FUTURE)
+
+
+def make_partition(day: date) -> str:
+    """SQL that makes the partition of a day, in one transaction; what waits among other days moves there."""
+    name, within = partition_name(day), f"time >= '{day} 00:00Z' AND time < '{day + timedelta(1)} 00:00Z'"
+    return f"""
+LOCK TABLE {DEFAULT_PARTITION} IN ACCESS EXCLUSIVE MODE;
+CREATE TABLE {name} (LIKE readings INCLUDING ALL);
+WITH moved AS (DELETE FROM {DEFAULT_PARTITION} WHERE {within} RETURNING *) INSERT INTO {name} SELECT * FROM moved;
+ALTER TABLE readings ATTACH PARTITION {name} FOR VALUES FROM ('{day} 00:00Z') TO ('{day + timedelta(1)} 00:00Z');
+"""

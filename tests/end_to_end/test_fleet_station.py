@@ -1,0 +1,131 @@
+"""A station of several workers, with a real broker, a real database, a real MAVProxy and a real browser."""
+
+from __future__ import annotations
+
+import asyncio
+import html
+import json
+import random
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import requests
+
+from tests.support.chromium import chromium
+from tests.support.fleet import Fleet
+from tests.support.fleet_faults import FaultyFleet
+
+pytest.importorskip("asyncpg")
+pytest.importorskip("paho.mqtt.client")
+BROKER, DATABASE = pytest.mark.needs("mosquitto"), pytest.mark.needs("pg_lsclusters", "postgresql")
+HOSTILE = "<img src=x onerror=document.title='owned'>"
+
+
+@pytest.fixture
+def fleet(tmp_path: Path) -> Iterator[Fleet]:
+    made = Fleet(tmp_path, 2)
+    try:
+        made.start()
+        yield made
+    finally:
+        made.stop()
+
+
+@BROKER
+@DATABASE
+def test_each_reading_is_one_row_whoever_dies(tmp_path: Path) -> None:
+    fleet = FaultyFleet(tmp_path, workers=2, vehicles=6, rate=5)
+    try:
+        fleet.start()
+        fleet.suffer(random.Random(3), seconds=1, longest=2.0)  # each fault once
+        audit = fleet.audit()
+    finally:
+        fleet.stop()
+    assert set(fleet.faults) == {"worker", "broker", "database", "link"}
+    assert audit.is_good and audit.sampled == audit.rows > 50, audit
+
+
+@BROKER
+@DATABASE
+def test_readings_of_a_mavproxy_reach_the_database(fleet: Fleet, harness: Any, tmp_path: Path) -> None:
+    rig = harness.embedded(tmp_path, "--sysid=10", speedup=1)
+    try:
+        sink = f"mqtt://127.0.0.1:{fleet.broker.port}/fleet/{{sysid}}/{{quantity}}#ack=station"
+        settings = json.dumps({"sink": sink, "spool": f"{tmp_path}/spool.db"}, separators=(",", ":"))
+        rig.mavproxy.ask(f"module load gradys:{settings}", "Loaded module gradys")
+        count = "SELECT count(*) FROM readings WHERE device = 'uav-10' AND quantity = '{}'"
+        positions = count.format("position")
+        harness.eventually(lambda: int(fleet.database.sql(positions)) >= 3, 30, "three positions")
+        fleet.database.kill()
+        harness.eventually(lambda: fleet.workers[0].health()["status"] == "failing", 10, "its being noticed")
+        body = {"readings": [{"quantity": "temperature", "value": n} for n in range(50)]}
+        assert rig.post("/gradys/readings", **body).status_code == 200
+        fleet.database.start()
+        rig.mavproxy.ask("gradys flush", "tried now")
+        harness.eventually(lambda: int(fleet.database.sql(count.format("temperature"))) == 50, 60, "all fifty")
+        harness.eventually(lambda: rig.get("/gradys/status").json()["info"]["spooled"] < 5, 30, "an empty spool")
+        for worker in fleet.workers:
+            worker.wait()
+            vehicles = requests.get(f"{worker.url}/fleet", timeout=10).json()["vehicles"]
+            assert [vehicle["device"] for vehicle in vehicles] == ["uav-10"]
+            assert vehicles[0]["lat"] == pytest.approx(-35.363, abs=0.01)
+        doubled = "SELECT count(*) FROM (SELECT 1 FROM readings GROUP BY device, seq HAVING count(*) > 1) AS doubled"
+        assert fleet.database.sql(doubled) == "0"
+    finally:
+        rig.stop()
+
+
+@BROKER
+@DATABASE
+def test_a_worker_ends_at_a_signal_and_its_session_waits_for_it(fleet: Fleet) -> None:
+    from paho.mqtt import publish
+
+    worker, other = fleet.workers
+    other.stop()
+    worker.stop()
+    assert worker.process is not None and worker.process.popen.returncode == 0
+    reading = {"device": "uav-1", "quantity": "alt", "value": 1, "time": time.time()}
+    messages = [("fleet/1/alt", json.dumps({**reading, "seq": n}), 1, False) for n in range(100)]
+    publish.multiple(messages, port=fleet.broker.port)
+    fleet.broker.stop()  # it writes down what it has
+    fleet.broker.start()
+    worker.start()
+    other.start()
+    worker.wait()
+    other.wait()
+    deadline = time.monotonic() + 20
+    while fleet.database.sql("SELECT count(*) FROM readings") != "100":
+        assert time.monotonic() < deadline
+        time.sleep(0.2)
+
+
+async def page_of(url: str, directory: Path) -> str:
+    """What the page has become when it has drawn a history."""
+    async with chromium(directory) as page:
+        await page.ask("Page.navigate", url=url)
+        await page.until("document.getElementById('note').textContent.includes('readings')")
+        return str(await page.evaluate("document.documentElement.outerHTML"))
+
+
+@pytest.mark.needs("chromium")
+def test_what_devices_are_called_is_text_on_the_page(harness: Any, tmp_path: Path) -> None:
+    port = harness.free_port()
+    command = [sys.executable, "-m", "mavproxy_gradys.station", f"--port={port}", "--database=s.db"]
+    station = harness.Process(command, tmp_path / "station.log", tmp_path)
+    try:
+        station.says("listening on")
+        reading = {"device": HOSTILE, "quantity": HOSTILE, "representation": HOSTILE, "time": time.time()}
+        body = {"readings": [{**reading, "seq": n, "value": n} for n in range(9)]}
+        assert requests.post(f"http://127.0.0.1:{port}/readings", json=body, timeout=10).status_code == 200
+        dom = asyncio.run(page_of(f"http://127.0.0.1:{port}/#{HOSTILE}", tmp_path))
+    finally:
+        station.stop()
+    escaped = html.escape(HOSTILE, quote=False)
+    assert f'<h2 id="device">{escaped}</h2>' in dom  # a link to the page has chosen it
+    assert f">{escaped}</option>" in dom
+    assert "<title>Fleet</title>" in dom and "<img" not in dom
+    assert "9 readings, 0 gaps" in dom

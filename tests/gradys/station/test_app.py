@@ -1,0 +1,251 @@
+"""The HTTP side, on an SQLite store."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from aiohttp.test_utils import TestClient, TestServer
+
+from mavproxy_gradys.errors import NotStored
+from mavproxy_gradys.station.app import FILES, PAGE, Station
+from mavproxy_gradys.station.fleet import AlarmLimits
+from mavproxy_gradys.station.fleet_watch import FleetWatch
+from mavproxy_gradys.station.health import Health
+from mavproxy_gradys.station.intake import Intake
+from mavproxy_gradys.station.sqlite_store import SqliteStore
+from mavproxy_gradys.station.statistics import Statistics
+from mavproxy_gradys.station.updates import Updates, parse
+
+FORM = {"id": "10", "lat": "-15.84", "lng": "-47.9", "alt": "20.1", "device": "uav", "type": "102", "seq": "0"}
+
+
+def reading(seq: Any, **given: Any) -> dict[str, Any]:
+    return {
+        "device": "uav-1",
+        "id": "1",
+        "seq": seq,
+        "quantity": "alt",
+        "representation": "m",
+        "value": 1.5,
+        "time": 5,
+        **given,
+    }
+
+
+def test_devices_have_an_age_and_a_status(clock: Any) -> None:
+    updates, began = Updates(clock), clock.now
+    updates.put(parse(FORM))
+    for age, status in ((0.0, "active"), (6.0, "on_hold"), (11.0, "inactive")):
+        clock.now = began + age
+        (device,) = updates.devices()
+        assert (device["id"], device["lat"], device["age_s"], device["status"]) == (10, -15.84, age, status)
+
+
+@pytest.mark.parametrize("change", [{"lat": "None"}, {"id": ""}, {"seq": "1.5"}, {"lat": "nan"},
+                                    {"alt": "inf"}, {"id": str(2**63)}])  # fmt: skip
+def test_what_the_ground_station_cannot_read_this_cannot_either(change: dict[str, str]) -> None:
+    with pytest.raises(ValueError):
+        parse({**FORM, **change})
+    with pytest.raises(KeyError):
+        parse({"id": "1"})
+
+
+class Asker:
+    """Asks a station: `ask("GET", "/readings")`; (status, text)."""
+
+    def __init__(self, loop: Any, client: TestClient[Any, Any], watch: FleetWatch) -> None:
+        self._loop, self._client, self.watch = loop, client, watch
+
+    def __call__(self, method: str, path: str, **given: Any) -> tuple[int, str]:
+        answer = self.whole(method, path, **given)
+        return answer.status, answer.body.decode()
+
+    def whole(self, method: str, path: str, **given: Any) -> Any:
+        async def asked() -> Any:
+            async with self._client.request(method, path, **given) as answer:
+                return SimpleNamespace(status=answer.status, headers=answer.headers, body=await answer.read())
+
+        return self._loop.run(asked())
+
+    def json(self, path: str) -> Any:
+        answer = self.whole("GET", path)
+        assert answer.status == 200, answer.body
+        return json.loads(answer.body)
+
+    def look(self) -> None:
+        self._loop.run(self.watch.look())
+
+
+@pytest.fixture
+def ask(
+    loop: Any, tmp_path: Path, clock: Any, at_once: type, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[Callable[..., Any]]:
+    loop.patience = 0.05
+    monkeypatch.setattr("mavproxy_gradys.station.sqlite_store.ThreadPoolExecutor", at_once)
+    store = SqliteStore(tmp_path / "station.db", clock)
+    watch = FleetWatch(store, AlarmLimits(10, 20))
+    station = Station(Intake(store, Statistics(), clock), watch, Health(watch), watched=True, clock=clock)
+
+    async def start() -> TestClient[Any, Any]:
+        client = TestClient(TestServer(station.app()))
+        await client.start_server()
+        return client
+
+    client = loop.run(start())
+    yield Asker(loop, client, watch)
+    loop.run(client.close())
+    loop.run(store.close())
+
+
+def post(ask: Any, *readings: dict[str, Any]) -> None:
+    status, text = ask("POST", "/readings", data=json.dumps({"readings": readings}))
+    assert status == 200, text
+
+
+def test_readings_are_kept_once_each(ask: Any) -> None:
+    post(ask, reading(1), reading(2))
+    status, text = ask("POST", "/readings", data=json.dumps({"readings": [reading(2, value=9), reading(3)]}))
+    assert (status, json.loads(text)) == (200, {"acknowledged": [2, 3]})  # a repeat is acknowledged again
+    found = ask.json("/readings")
+    assert [(one["seq"], one["value"]) for one in found["readings"]] == [(1, 1.5), (2, 1.5), (3, 1.5)]
+    assert (found["count"], found["repeats"]) == (3, 1)
+
+
+def test_a_batch_with_something_else_in_it_is_not_kept(ask: Any) -> None:
+    assert ask("POST", "/readings", data=json.dumps({"readings": [reading(5), reading("1")]}))[0] == 400
+    assert ask.json("/readings")["count"] == 0
+
+
+@pytest.mark.parametrize("query", ["limit=-1", f"limit={10**20}", f"after={10**20}", "after=x", "limit=1.5"])
+def test_a_query_that_means_nothing_is_a_mistake_of_the_client(ask: Any, query: str) -> None:
+    assert ask("GET", f"/readings?{query}")[0] == 400
+
+
+@pytest.mark.parametrize("body", [b'{"readings": ' + b"[" * 100_000, b"[]", b"", b'{"readings": [1]}'])
+def test_a_body_that_holds_no_readings_is_a_mistake_of_the_client(ask: Any, body: bytes) -> None:
+    assert ask("POST", "/readings", data=body)[0] == 400
+
+
+def test_history_and_its_gaps(ask: Any, clock: Any) -> None:
+    began = clock.now - 600
+    times = [began + n for n in range(600) if not 200 <= n < 300]
+    post(ask, *(reading(n, value=n, time=at) for n, at in enumerate(times)))
+    history = ask.json(f"/history?device=uav-1&quantity=alt&from={began}&to={clock.now}&parts=60")
+    assert [part[4] for part in history["parts"]] == [10] * 50
+    assert history["gaps"] == [[began + 199, began + 300]]
+    assert len(history["late"]) == 49  # the newest ten are not: they are from 1 to 10 s old
+    assert ask.json("/history?device=nobody&quantity=alt")["parts"] == []
+
+
+@pytest.mark.parametrize("query", ["parts=0", "parts=9999", "element=-1", "element=x", "from=5&to=4", "to=nan",
+                                   "device=%00", "from=1e300"])  # fmt: skip
+def test_a_history_that_means_nothing_is_a_mistake_of_the_client(ask: Any, query: str) -> None:
+    assert ask("GET", f"/history?{query}")[0] == 400
+
+
+def test_the_fleet_is_of_readings_and_of_updates(ask: Any, clock: Any) -> None:
+    post(
+        ask,
+        reading(1, quantity="battery", value=15, time=clock.now),
+        reading(2, quantity="position", value=[1, 2, 3]),
+    )
+    assert ask("POST", "/update-info/", data={**FORM, "heading": "90", "battery_percent": "x"})[0] == 200
+    clock.now += 11
+    ask.look()
+    one, other = ask.json("/fleet")["vehicles"]
+    assert (one["device"], one["lat"], one["alt"], one["battery"]) == ("uav-1", 1, 3, 15)
+    assert (other["device"], other["lat"], other["heading"], other["battery"]) == ("uav-10", -15.84, 90, None)
+    assert ask.json("/alarms")["alarms"] == [
+        {"device": "uav-1", "kind": "silent"},
+        {"device": "uav-1", "kind": "battery"},
+        {"device": "uav-10", "kind": "silent"},
+    ]
+    metrics = ask("GET", "/metrics")[1]
+    assert 'station_alarms{kind="silent"} 2.0' in metrics and "station_readings_stored_total 2.0" in metrics
+    assert 'station_delay_seconds_bucket{le="+Inf"} 2.0' in metrics
+
+
+def test_health_is_the_databases(ask: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    ask.look()
+    assert (ask("GET", "/health")[0], ask.json("/health")["database"]) == (200, "ok")
+
+    async def fail(*_: Any) -> None:
+        raise NotStored("database: gone")
+
+    monkeypatch.setattr(SqliteStore, "fleet", fail)
+    monkeypatch.setattr(SqliteStore, "add", fail)
+    ask.look()
+    assert ask("GET", "/health")[0] == 503
+    status, text = ask("POST", "/readings", data=json.dumps({"readings": [reading(1)]}))
+    assert (status, json.loads(text)["code"]) == (503, "not_stored")
+
+
+def test_csv_has_all_rows_and_no_formula(ask: Any) -> None:
+    post(ask, *(reading(n, value="=1+1", device="@cmd", time=n) for n in range(3000)))
+    rows = list(csv.reader(io.StringIO(ask("GET", "/readings.csv?limit=5000")[1])))
+    assert len(rows) == 3001 and rows[0][:3] == ["device", "seq", "id"]
+    assert rows[1][0] == "'@cmd" and rows[1][5] == "'=1+1"
+    assert len(ask("GET", "/readings.csv?limit=5000&from=2990")[1].splitlines()) == 11
+
+
+def test_parquet_has_the_same_rows(ask: Any) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    post(ask, *(reading(n, time=n) for n in range(3000)), reading(1, device="uav-2", value=[1, 2]))
+    answer = ask.whole("GET", "/readings.parquet?limit=5000")
+    assert answer.status == 200 and "attachment" in answer.headers["Content-Disposition"]
+    table = parquet.read_table(io.BytesIO(answer.body))
+    assert table.num_rows == 3001
+    last = table.slice(3000).to_pylist()[0]
+    assert (last["device"], last["value"], last["number"], last["time"].timestamp()) == ("uav-2", "[1, 2]", None, 5)
+    empty = ask.whole("GET", "/readings.parquet?device=nobody")
+    assert parquet.read_table(io.BytesIO(empty.body)).num_rows == 0
+
+
+def test_parquet_without_its_library_says_what_to_install(ask: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
+    status, text = ask("GET", "/readings.parquet")
+    assert status == 501 and "pip install" in text
+
+
+def test_the_page_loads_its_own_files_and_nothing_else(ask: Any) -> None:
+    page = ask.whole("GET", "/")
+    assert "script-src 'self'" in page.headers["Content-Security-Policy"]
+    assert page.headers["X-Content-Type-Options"] == "nosniff"
+    html = page.body.decode()
+    assert "onclick" not in html and "<script>" not in html and "style=" not in html and "//" not in html
+    assert {path.name for path in PAGE.iterdir()} == {*FILES, "fleet.html"}
+    for file in FILES:
+        answer = ask.whole("GET", f"/{file}")
+        assert answer.status == 200 and answer.headers["Content-Type"].startswith(("text/", "application/javascript"))
+        assert not any(
+            word in answer.body.decode() for word in ("innerHTML", "insertAdjacent", "document.write", "eval(")
+        )
+    assert ask("GET", "/../app.py")[0] == 404 and ask("GET", "/page/app.py")[0] == 404
+
+
+def test_half_a_letter_is_told_as_a_question_mark(ask: Any) -> None:
+    body = json.dumps({"readings": [reading(1, value="\ud800", device="s")]})
+    assert ask("POST", "/readings", data=body)[0] == 200
+    assert ask("GET", "/readings?device=s")[0] == 200
+    status, text = ask("GET", "/readings.csv")
+    assert status == 200 and "s,1,1,alt,m,?,5.0" in text
+
+
+def test_pages_of_other_sites_are_refused(ask: Any) -> None:
+    form = {"id": "1", "device": "uav", "lat": "1", "lng": "2"}
+    assert ask("POST", "/update-info/", data=form, headers={"Origin": "http://evil.example"})[0] == 403
+    assert ask("POST", "/update-info/", data=form, headers={"Origin": "null"})[0] == 403
+    assert ask("GET", "/devices", headers={"Origin": "http://evil.example"})[0] == 403
+    assert ask("POST", "/update-info/", data=form)[0] == 200
+
+
+def test_a_position_that_is_no_number_is_not_taken(ask: Any) -> None:
+    assert ask("POST", "/update-info/", data={**FORM, "lat": "nan"})[0] == 500
+    assert json.loads(ask("GET", "/devices")[1]) == {"devices": []}

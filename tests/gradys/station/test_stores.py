@@ -1,0 +1,121 @@
+"""Both stores behind one interface."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mavproxy_gradys.errors import NotStored
+from mavproxy_gradys.station.newest import Newest
+from mavproxy_gradys.station.reading_row import ReadingRow, reading_row
+from mavproxy_gradys.station.sqlite_store import SqliteStore
+from mavproxy_gradys.station.store import HistoryQuery, ReadingQuery, Store
+
+
+def row(seq: int, **given: Any) -> ReadingRow:
+    reading = {"device": "uav-1", "id": "1", "seq": seq, "quantity": "alt", "representation": "m", "value": 1.5}
+    return reading_row({**reading, "time": 1_699_999_000 + seq, **given})
+
+
+async def every(store: Store, **asked: Any) -> list[tuple[Any, ...]]:
+    return [found async for chunk in store.readings(ReadingQuery(**asked)) for found in chunk]
+
+
+async def history(store: Store, start: float, end: float, buckets: int, **asked: Any) -> list[Any]:
+    given = {"device": "uav-1", "quantity": "alt", "element": None, **asked}
+    return await store.history(HistoryQuery(start=start, end=end, buckets=buckets, **given))
+
+
+def test_readings_are_kept_once_each(store: Store, run: Any) -> None:
+    assert run(store.add([row(1), row(2)])) == 2
+    assert run(store.add([row(2, value=9), row(3), row(3)])) == 1
+    assert [(found[1], found[5]) for found in run(every(store))] == [(1, "1.5"), (2, "1.5"), (3, "1.5")]
+    assert run(store.counts()) == (3, 2)
+    assert run(store.add([row(1, device="uav-2")])) == 1
+    assert run(store.counts()).stored == 4
+
+
+def test_a_row_comes_back_as_it_was(store: Store, run: Any, clock: Any) -> None:
+    kept = row(7, value=[1.5, 2], time=1_699_999_999.123, representation="°")
+    run(store.add([kept]))
+    (found,) = run(every(store))
+    assert found[:5] == ("uav-1", 7, "1", "alt", "°") and json.loads(found[5]) == [1.5, 2]
+    assert found[6] == pytest.approx(1_699_999_999.123, abs=1e-6)
+
+
+@pytest.mark.parametrize("value", ["a\0b", "\ud800", "'; drop table readings", 2**63, -0.0, True, []])
+def test_hostile_values_are_kept(store: Store, run: Any, value: Any) -> None:
+    run(store.add([row(1, value=value), row(2)]))
+    found = run(every(store))
+    assert json.loads(found[0][5]) == value and len(found) == 2
+    assert isinstance(run(history(store, 1_699_999_000, 1_699_999_100, 10, element=0)), list)
+
+
+def test_queries(store: Store, run: Any) -> None:
+    run(store.add([row(n, quantity="alt" if n % 2 else "volt") for n in range(10)]))
+    run(store.add([row(n, device="uav-2", time=1_699_999_000 - n) for n in range(3)]))
+    assert [found[1] for found in run(every(store, quantity="alt", device="uav-1", after=3, limit=2))] == [5, 7]
+    assert run(every(store, device="nobody")) == []
+    assert [found[1] for found in run(every(store, device="uav-2"))] == [2, 1, 0]
+    within = run(every(store, start=1_699_999_004, end=1_699_999_007))
+    assert [found[1] for found in within] == [4, 5, 6]
+
+
+def test_more_readings_than_a_chunk(store: Store, run: Any) -> None:
+    run(store.add([row(n) for n in range(4500)]))
+    assert [found[1] for found in run(every(store, limit=1_000_000))] == list(range(4500))
+    assert len(run(every(store, limit=4100))) == 4100
+
+
+def test_history_in_parts(store: Store, run: Any) -> None:
+    run(store.add([row(n, value=n) for n in range(100)]))
+    run(store.add([row(500, value="text"), row(501, value=1e9, quantity="volt")]))
+    parts = run(history(store, 1_699_999_000, 1_699_999_100, 10))
+    assert [(part.low, part.high, part.readings) for part in parts] == [(n, n + 9, 10) for n in range(0, 100, 10)]
+    assert parts[1].first == pytest.approx(1_699_999_010) and parts[1].last == pytest.approx(1_699_999_019)
+    assert run(history(store, 1_699_999_400, 1_699_999_600, 10)) == []
+
+
+def test_history_of_a_list(store: Store, run: Any) -> None:
+    run(store.add([row(n, value=[n, -n]) for n in range(4)]))
+    (part,) = run(history(store, 1_699_999_000, 1_699_999_100, 1, element=1))
+    assert (part.low, part.high, part.readings) == (-3, 0, 4)
+    assert run(history(store, 1_699_999_000, 1_699_999_100, 1)) == []
+    assert run(history(store, 1_699_999_000, 1_699_999_100, 1, element=5)) == []
+
+
+def test_an_sqlite_file_is_found_again(tmp_path: Path, run: Any, clock: Any) -> None:
+    store = SqliteStore(tmp_path / "s.db", clock)
+    run(store.add([row(1, value=1), row(3, value=3), row(2, value=2)]))
+    run(store.close())
+    again = SqliteStore(tmp_path / "s.db", clock)
+    assert [newest.value for newest in run(again.fleet()).newest] == ["3"]
+    assert run(again.add([row(1)])) == 0
+    run(again.close())
+
+
+def test_the_fleet_shows_the_newest_of_each(store: Store, run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("mavproxy_gradys.station.postgres_store.SHOW_EVERY", 0.01, raising=False)
+
+    async def shown() -> list[Newest]:
+        await asyncio.sleep(0.2)
+        return list((await store.fleet()).newest)
+
+    run(store.add([row(5, value=5), row(4, value=4), row(6, device="uav-2", quantity="volt", value="x")]))
+    assert [(n.device, n.quantity, n.value) for n in run(shown())] == [
+        ("uav-1", "alt", "5"),
+        ("uav-2", "volt", '"x"'),
+    ]
+    run(store.show([Newest("uav-3", "3", "alt", "m", "9", 1_699_999_999.0, 1_699_999_999.0)]))
+    run(store.add([row(2, value=2)]))  # late
+    assert [(n.device, n.value) for n in run(shown())] == [("uav-1", "5"), ("uav-2", '"x"'), ("uav-3", "9")]
+
+
+def test_a_file_that_is_none_is_said(tmp_path: Path) -> None:
+    (tmp_path / "s.db").write_bytes(b"no database, but longer than a hundred bytes" * 9)
+    with pytest.raises(NotStored):
+        SqliteStore(tmp_path / "s.db")

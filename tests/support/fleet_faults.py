@@ -1,0 +1,194 @@
+"""A fleet under faults: workers, broker and database are killed, links fade; then SQL counts what became of it."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+from tests.support.fleet import Fleet
+from tests.support.processes import Process, eventually, free_port
+
+ROOT = Path(__file__).parents[2]
+AUDIT = """
+SELECT (SELECT count(*) FROM sampled),
+    (SELECT count(*) FROM sampled JOIN readings USING (device, seq)
+        WHERE round(extract(epoch FROM time) * 1000) = ms),
+    (SELECT count(*) FROM readings),
+    (SELECT count(*) FROM (SELECT 1 FROM readings GROUP BY device, seq HAVING count(*) > 1) AS doubled),
+    (SELECT count(*) FROM readings LEFT JOIN sampled USING (device, seq) WHERE ms IS NULL),
+    (SELECT sum(repeats) FROM workers),
+    (SELECT percentile_disc(0.5) WITHIN GROUP (ORDER BY extract(epoch FROM received - time)) FROM readings),
+    (SELECT percentile_disc(0.99) WITHIN GROUP (ORDER BY extract(epoch FROM received - time)) FROM readings),
+    (SELECT extract(epoch FROM max(received - time)) FROM readings)
+"""
+
+
+class Audit(NamedTuple):
+    """What SQL says.
+
+    Attributes:
+        sampled: readings that the vehicles have sampled.
+        kept: of these, which are a row.
+        rows: all rows.
+        doubled: readings that are more than one row.
+        strange: rows that nobody sampled.
+        repeats: readings that came again and made no row.
+        p50, p99, longest: s from sampling to row.
+        dropped: readings that the vehicles' own limits dropped.
+        drained: s from the end of the sampling until the spools were empty.
+    """
+
+    sampled: int
+    kept: int
+    rows: int
+    doubled: int
+    strange: int
+    repeats: int
+    p50: float
+    p99: float
+    longest: float
+    dropped: int
+    drained: float
+
+    @property
+    def lost(self) -> int:
+        """Readings that are no row, and that nobody counted as dropped."""
+        return self.sampled - self.kept - self.dropped
+
+    @property
+    def is_good(self) -> bool:
+        """Whether each reading is one row, or was counted as dropped."""
+        return self.sampled > 0 and not (self.lost or self.doubled or self.strange)
+
+
+class FaultyFleet:
+    """A fleet, half of whose vehicles are behind a link that fades.
+
+    Attributes:
+        faults: how often each kind happened.
+
+    Args:
+        directory: for all that it writes.
+        workers, vehicles: how many.
+        rate: readings/s of each vehicle.
+        ack: `station` or `broker`: whose word takes a reading out of the spool.
+    """
+
+    def __init__(self, directory: Path, workers: int, vehicles: int, rate: float, ack: str = "station") -> None:
+        self._directory = directory
+        self._fleet = Fleet(directory, workers)
+        self._vehicles, self._rate, self._ack = vehicles, rate, ack
+        self._ledger = directory / "sampled.csv"
+        self._processes: list[Process] = []
+        self.faults: Counter[str] = Counter()
+
+    def _start(self, name: str, *arguments: str) -> Process:
+        command = [sys.executable, "-m", f"tests.support.{name}", *arguments]
+        process = Process(command, self._directory / f"{name}.log", ROOT)
+        self._processes.append(process)
+        return process
+
+    def start(self) -> None:
+        """Start all; the vehicles fly when this returns."""
+        self._fleet.start()
+        near, far = free_port(), self._fleet.broker.port
+        self._relay = self._start("tcp_relay", str(near), str(far))
+        option = "#ack=station" if self._ack == "station" else ""
+        sinks = [f"mqtt://127.0.0.1:{port}/fleet/{{device}}/{{quantity}}{option}" for port in (far, near)]
+        spools = self._directory / "spools"
+        spools.mkdir()
+        flown = [f"--count={self._vehicles}", f"--rate={self._rate}"]
+        flown += [f"--directory={spools}", f"--ledger={self._ledger}"]
+        self._flying = self._start("fleet_vehicles", *sinks, *flown)
+        self._flying.says("vehicles fly")
+
+    # -- the faults ---------------------------------------------------------------------------------------
+
+    def _kill_worker(self, chance: random.Random) -> Callable[[], None]:
+        worker = chance.choice(self._fleet.workers)
+        worker.kill()
+        return worker.start
+
+    def _kill_broker(self, _chance: random.Random) -> Callable[[], None]:
+        self._fleet.broker.kill()
+        return self._fleet.broker.start
+
+    def _kill_database(self, _chance: random.Random) -> Callable[[], None]:
+        self._fleet.database.kill()
+        return self._fleet.database.start
+
+    def _cut(self, _chance: random.Random) -> Callable[[], None]:
+        os.kill(self._relay.pid, signal.SIGSTOP)
+        return lambda: os.kill(self._relay.pid, signal.SIGCONT)
+
+    def suffer(self, chance: random.Random, seconds: float, longest: float) -> None:
+        """One fault after the other, in random order, for so long; each lasts up to `longest` s."""
+        kinds = {
+            "worker": self._kill_worker,
+            "broker": self._kill_broker,
+            "database": self._kill_database,
+            "link": self._cut,
+        }
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            order = list(kinds)
+            chance.shuffle(order)
+            for kind in order:
+                mend = kinds[kind](chance)
+                time.sleep(chance.uniform(0.2, longest))
+                mend()
+                self.faults[kind] += 1
+                time.sleep(chance.uniform(0.2, longest))
+
+    # -- the end ------------------------------------------------------------------------------------------
+
+    def drain(self, patience: float) -> tuple[dict[str, int], float]:
+        """End the sampling and wait until the spools are empty; what was dropped, and how long (s) it took."""
+        began = time.monotonic()
+        os.kill(self._flying.pid, signal.SIGUSR1)
+        self._flying.says("drained", timeout=patience)
+        report = json.loads(self._flying.output().splitlines()[-1])
+        return report["dropped"], time.monotonic() - began
+
+    def audit(self, patience: float = 120.0) -> Audit:
+        """Drain, and count in SQL."""
+        dropped, drained = self.drain(patience)
+        self._settle()
+        sql = self._fleet.database.sql
+        sql("CREATE TABLE sampled (device text, seq bigint, ms bigint)")
+        with tempfile.NamedTemporaryFile(dir=self._fleet.database.directory, suffix=".csv") as file:
+            file.write(self._ledger.read_bytes())
+            file.flush()
+            os.chmod(file.name, 0o644)
+            sql(f"COPY sampled FROM '{file.name}' (FORMAT csv)")
+        sql("CREATE INDEX ON sampled (device, seq); ANALYZE sampled, readings")
+        counts = sql(AUDIT).split("|")
+        numbers = [*map(int, counts[:6]), *map(float, counts[6:])]
+        return Audit(*numbers, sum(dropped.values()), drained)  # type: ignore[arg-type]
+
+    def _settle(self) -> None:
+        """Wait until no worker has anything to store: the broker's own acknowledgement comes before the row."""
+        counted = [""]
+
+        def still() -> bool:
+            time.sleep(1.5)
+            counted.append(self._fleet.database.sql("SELECT sum(stored + repeats) FROM workers"))
+            return counted[-1] == counted[-2]
+
+        eventually(still, 120, "the workers' rest")
+
+    def stop(self) -> None:
+        """End all."""
+        for process in self._processes:
+            os.kill(process.pid, signal.SIGCONT) if process.popen.poll() is None else None
+            process.stop()
+        self._fleet.stop()
