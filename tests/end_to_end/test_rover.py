@@ -1,32 +1,42 @@
-"""ArduPilot's rover in a real MAVProxy: it says ACTIVE wherever it stands."""
+"""A rover in a real MAVProxy: the embedded one, and ArduPilot's."""
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-pytestmark = pytest.mark.sitl
 
-
-@pytest.fixture(scope="module")
-def rover(harness, tmp_path_factory) -> Iterator:
+def ardurover(harness: Any, directory: Path) -> Any:
     """ArduPilot's rover, with our module on its link."""
-    made, instance = harness.Rig(tmp_path_factory.mktemp("rover"), harness.free_port()), harness.free_instance()
+    rig, instance = harness.Rig(directory, harness.free_port()), harness.free_instance()
     home = Path(os.environ["ARDUPILOT_HOME"])
     defaults = home / "Tools" / "autotest" / "default_params" / "rover.parm"
     command = [str(home / "build" / "sitl" / "bin" / "ardurover"), "--model=rover", f"-I{instance}"]
     try:
-        made.start(
+        rig.start(
             "rover", [*command, f"--speedup={harness.SPEEDUP}", f"--home={harness.HOME}", f"--defaults={defaults}"]
         )
-        made.mavproxy = made.start("mavproxy", harness.mavproxy_command(instance, harness.load(made.port)))
-        made.wait_until_up(120)
-        yield made
-    finally:
-        made.stop()
+        rig.mavproxy = rig.start("mavproxy", harness.mavproxy_command(instance, harness.load(rig.port)))
+        rig.wait_until_up(120)
+    except BaseException:
+        rig.stop()
+        raise
+    return rig
+
+
+@pytest.fixture(scope="module", params=["embedded", pytest.param("ardupilot", marks=pytest.mark.sitl)])
+def rover(request: Any, harness: Any, tmp_path_factory: Any) -> Iterator[Any]:
+    """A rover that the tests share."""
+    directory = tmp_path_factory.mktemp(request.param)
+    embedded = request.param == "embedded"
+    rig = harness.embedded(directory, "--vehicle=rover") if embedded else ardurover(harness, directory)
+    yield rig
+    rig.stop()
 
 
 def test_rover_that_stands_armed_in_manual_is_armed_for_guided_and_disarmed(rover):
@@ -39,3 +49,27 @@ def test_rover_that_stands_armed_in_manual_is_armed_for_guided_and_disarmed(rove
     rover.ok(rover.get("/command/set_mode", mode="MANUAL"))
     rover.ok(rover.get("/command/disarm"))
     assert rover.status()["armed"] is False
+
+
+def test_rover_drives_to_places_stops_and_returns(rover):
+    rover.ok(rover.get("/command/arm"))
+    assert rover.ok(rover.get("/command/guided"))["result"] == "Rover in GUIDED mode"
+    there = rover.ok(rover.post("/movement/go_to_ned_wait", x=30, y=10, z=0))
+    assert there["result"] == "Arrived at NED coord (30, 10, 0)"
+    assert math.dist(rover.ned()[:2], (30, 10)) < 3
+    rover.ok(rover.post("/movement/go_to_ned", x=-300, y=0, z=0))
+    assert rover.ok(rover.get("/movement/stop"))["result"] == "Rover has stopped"
+    assert rover.status()["mode"] == "HOLD"
+    rover.ok(rover.get("/command/guided"))
+    rover.ok(rover.get("/command/set_reverse", reverse="true"))
+    rover.ok(rover.get("/command/set_ground_speed", new_v=3))
+    assert rover.ok(rover.get("/command/rtl"))["result"] == "Returned to launch"
+    assert math.hypot(*rover.ned()[:2]) < 5
+    rover.ok(rover.get("/command/brake"))
+    rover.ok(rover.get("/command/disarm"))
+
+
+@pytest.mark.parametrize("path", ["/command/takeoff", "/command/land", "/movement/set_heading?heading=3"])
+def test_what_a_rover_does_not_have_is_404(rover, path):
+    answer = rover.get(path)
+    assert (answer.status_code, answer.json()["code"]) == (404, "not_supported")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mavproxy_uavapi.core.errors import Busy
+from mavproxy_uavapi.core.errors import Busy, Rejected
 from mavproxy_uavapi.core.vehicle import messages, time_limits
 from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_uavapi.core.vehicle.guided import GUIDED, TOLERANCE
@@ -101,6 +101,16 @@ class Rover(TravellingVehicle):
     async def come_down(self, job: Job) -> None:
         """Stop where it is."""
         await self.hold(job)
+
+    async def set_speed(self, job: Job, kind: str, speed: float) -> bool:
+        """As for every vehicle; a rover that goes nowhere refuses a speed: it is remembered for the next movement."""
+        try:
+            return await super().set_speed(job, kind, speed)
+        except Rejected:
+            if self.mode != GUIDED or not self.stands_still:
+                raise
+            self.speeds.remember(kind, speed)
+            return False
 
     async def set_reverse(self, job: Job, reverse: bool) -> None:
         """Drive backwards from now on, or forwards again; a change of mode ends it.
