@@ -1,14 +1,17 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.core.errors import Busy, Paused, Superseded
+from mavproxy_uavapi.core.errors import Aborted, Busy, LinkLost, ModeChanged, NotArmed, Paused, Superseded
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle.authority import YAW, CommandAuthority, Rank
 from mavproxy_uavapi.core.vehicle.jobs import Job, JobBook
+from mavproxy_uavapi.core.vehicle.messages import GlobalTarget, VelocityTarget
+from tests.support.piloting import FAR, nothing_more
 
 RANKS = list(Rank)
 
@@ -199,3 +202,92 @@ def test_who_flies_is_the_commander_or_what_waits(stopped: Any) -> None:
     assert stopped.authority.flies is stopped.moving
     stopped.moving.abort(Superseded("it ended"))
     assert stopped.authority.flies is None
+
+
+# -- flights: who has the command -------------------------------------------------------------------------
+
+
+def waiting_verbs() -> dict[str, Callable[[Any, Any], Any]]:
+    """Each verb that waits, begun by `verb(copter, pilotage)`, from the air unless it is the takeoff."""
+    return {
+        "go_to_ned": lambda copter, pilotage: pilotage.start(copter.go_to, FAR, wait=True),
+        "go_to_gps": lambda copter, pilotage: pilotage.start(
+            copter.go_to, GlobalTarget(-35.002, 149.0, 20.0), wait=True
+        ),
+        "travel": lambda copter, pilotage: pilotage.start(copter.travel, VelocityTarget(1, 0, 0), duration=60.0),
+        "land": lambda copter, pilotage: pilotage.start(copter.land),
+        "rtl": lambda copter, pilotage: pilotage.start(copter.rtl),
+        "takeoff": lambda copter, pilotage: pilotage.start(copter.takeoff, 100.0),
+    }
+
+
+@pytest.fixture(params=waiting_verbs())
+def waiting(request: Any, loop: Any, drone: Any, copter: Any, pilotage: Any) -> Any:
+    """A verb that waits, three seconds after it began."""
+    if request.param == "takeoff":
+        drone.mode, drone.armed = "GUIDED", True
+    else:
+        drone.fly()
+    loop.pass_time(0.3)
+    job = waiting_verbs()[request.param](copter, pilotage)
+    loop.pass_time(3.0)
+    assert job.running
+    return job
+
+
+@pytest.mark.parametrize("mode", ["LOITER", "STABILIZE", "BRAKE"])
+def test_pilot_mode_change_ends_every_wait_and_sends_nothing_more(
+    waiting: Any, loop: Any, drone: Any, pilotage: Any, mode: str
+) -> None:
+    drone.pilot(mode)
+    started = loop.time()
+    with pytest.raises(ModeChanged, match=mode):
+        pilotage.result(waiting)
+    assert loop.time() - started < 0.05
+    nothing_more(loop, drone)
+    assert drone.mode == mode
+
+
+def test_newer_verb_supersedes_every_wait_at_once(
+    waiting: Any, loop: Any, drone: Any, copter: Any, pilotage: Any
+) -> None:
+    client = loop.create_task(waiting.outcome())
+    loop.settle()
+    started = loop.time()
+    pilotage.start(copter.set_mode, "BRAKE")
+    with pytest.raises(Superseded, match="was superseded by set_mode"):
+        loop.run(client)
+    assert loop.time() == started
+    loop.pass_time(1.0)
+    assert drone.mode == "BRAKE"
+    nothing_more(loop, drone)
+
+
+def test_client_that_hangs_up_ends_the_verb_and_nothing_more_is_sent(waiting: Any, loop: Any, drone: Any) -> None:
+    client = loop.create_task(waiting.outcome())
+    loop.settle()
+    client.cancel()
+    loop.settle()
+    assert isinstance(waiting.error, Aborted)
+    nothing_more(loop, drone)
+
+
+def test_link_loss_ends_every_wait(waiting: Any, loop: Any, host: Any, drone: Any, pilotage: Any) -> None:
+    drone.power_off()
+    started = loop.time()
+    with pytest.raises(LinkLost):
+        pilotage.result(waiting)
+    assert loop.time() - started <= host.link_watch.timeout + 0.1
+    assert len(host.pending) == 0
+    nothing_more(loop, drone)
+
+
+def test_disarming_ends_every_flight(waiting: Any, loop: Any, drone: Any, pilotage: Any) -> None:
+    drone.armed = False
+    drone.tell("HEARTBEAT")
+    if waiting.verb.startswith(("land", "rtl")):
+        assert pilotage.result(waiting) == "done"
+    else:
+        with pytest.raises(NotArmed):
+            pilotage.result(waiting)
+    nothing_more(loop, drone)

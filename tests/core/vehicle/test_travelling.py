@@ -1,0 +1,47 @@
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from mavproxy_uavapi.core.vehicle.messages import VelocityTarget
+from tests.support.piloting import STILL, nothing_more
+
+
+def test_travel_sends_one_velocity(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+    pilotage.do(copter.travel, VelocityTarget(1.0, 2.0, -0.5))
+    assert [(m.vx, m.vy, m.vz, m.type_mask) for m in flying.setpoints()] == [(1.0, 2.0, -0.5, 0b1101_1100_0111)]
+    nothing_more(loop, flying)
+
+
+def test_travel_with_duration_repeats_the_velocity_then_stops(
+    loop: Any, flying: Any, copter: Any, pilotage: Any
+) -> None:
+    started, times = loop.time(), []
+    copter.link.on_send = lambda message, system: (
+        times.append(loop.time() - started),
+        flying.on_send(message, system),
+    )
+    loop.run(copter.limits())
+    times.clear()
+    pilotage.do(copter.travel, VelocityTarget(1.0, 0.0, 0.0), duration=10.0)
+    assert loop.time() - started == pytest.approx(10.0, abs=0.3)
+    velocities = [(m.vx, m.vy, m.vz) for m in flying.setpoints()]
+    assert velocities == [(1.0, 0.0, 0.0)] * 10 + [STILL]
+    gaps = [after - before for before, after in zip(times, times[1:], strict=False)]
+    assert max(gaps) <= 1.1  # ArduCopter drops a velocity after GUID_TIMEOUT, 3 s
+    nothing_more(loop, flying)
+
+
+def test_travel_follows_the_vehicles_own_timeout(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+    flying.parameters["GUID_TIMEOUT"] = 0.6
+    pilotage.do(copter.travel, VelocityTarget(1.0, 0.0, 0.0), duration=2.0)
+    assert len(flying.setpoints()) == 11
+
+
+def test_travel_counts_the_vehicles_seconds(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+    copter.state.time_ratio.ratio = 5.0
+    copter.state.time_ratio.update = lambda *args: False
+    started = loop.time()
+    pilotage.do(copter.travel, VelocityTarget(1.0, 0.0, 0.0), duration=10.0)
+    assert loop.time() - started == pytest.approx(2.0, abs=0.2)
