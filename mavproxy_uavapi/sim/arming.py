@@ -14,6 +14,9 @@ from .parameters import ParameterStore
 REPORT_INTERVAL = 30.0
 """Seconds between reports of what keeps a disarmed vehicle from arming."""
 
+TEXT_LENGTH = 50
+"""Characters of a text; ArduPilot cuts these, and sends longer ones of other kinds in pieces."""
+
 
 class Candidate(Protocol):
     """What the checks look at."""

@@ -210,3 +210,12 @@ class MotionMessages(MessageSource):
             round(origin.altitude * 1000),
             self._microseconds(),
         )
+
+    def _build_wind(self) -> Any | None:
+        """What a plane estimates; others send nothing."""
+        if not self.vehicle.tells_wind:
+            return None
+        body = self.vehicle.body
+        speed = math.hypot(body.wind_north, body.wind_east)
+        direction = math.degrees(math.atan2(-body.wind_east, -body.wind_north)) if speed > 0 else 180.0
+        return mavlink.MAVLink_wind_message(direction, speed, 0.0)

@@ -63,6 +63,7 @@ class Vehicle:
     mission_commands: ClassVar[frozenset[int]] = SUPPORTED
     """The MAV_CMDs that a mission may have."""
     streams: ClassVar[Groups] = GROUPS
+    tells_wind: ClassVar[bool] = False
     neutral_sticks: ClassVar[tuple[int, ...]] = NEUTRAL
     """What SITL's radio sends on channels 1 to 8 at first."""
 
@@ -278,7 +279,7 @@ class Vehicle:
         if not (forced and not self.mandatory_failures()):
             failures = self.prearm_failures() or self.arm_failures()
             for failure in failures:
-                self.say(mavlink.MAV_SEVERITY_CRITICAL, f"Arm: {failure}")
+                self.say(mavlink.MAV_SEVERITY_CRITICAL, f"Arm: {failure}"[: arming.TEXT_LENGTH])
             if failures:
                 return False
         self.arm_motors()
@@ -298,7 +299,7 @@ class Vehicle:
     def report_prearm(self) -> None:
         """Tell the ground what keeps the vehicle from arming."""
         for failure in self.prearm_failures():
-            self.say(mavlink.MAV_SEVERITY_CRITICAL, f"PreArm: {failure}")
+            self.say(mavlink.MAV_SEVERITY_CRITICAL, f"PreArm: {failure}"[: arming.TEXT_LENGTH])
 
     @property
     def mission_mode(self) -> MissionMode:
