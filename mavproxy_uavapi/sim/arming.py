@@ -1,4 +1,4 @@
-"""May the vehicle arm, and if not, why: the checks in ArduPilot's order with its texts."""
+"""Whether a vehicle may arm, and why not: ArduPilot's checks, in its order and with its texts."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from .mission import Mission
 from .mode import Mode
 from .parameters import ParameterStore
 
-FORCE_ARM = 2989.0
-FORCE = 21196.0
-"""The magic in param2 of MAV_CMD_COMPONENT_ARM_DISARM that skips checks (the other one only arms)."""
 REPORT_INTERVAL = 30.0
 """Seconds between reports of what keeps a disarmed vehicle from arming."""
+
+TEXT_LENGTH = 50
+"""Characters of a text; ArduPilot cuts these, and sends longer ones of other kinds in pieces."""
 
 
 class Candidate(Protocol):

@@ -1,4 +1,4 @@
-"""MAV_CMD to MAV_RESULT: one handler for each command that every ArduPilot vehicle takes from the ground.
+"""Commands: one handler for each MAV_CMD that every ArduPilot vehicle takes; each gives a MAV_RESULT.
 
 COMMAND_LONG and COMMAND_INT meet here in one shape, as in ArduPilot; commands not in the table are
 MAV_RESULT_UNSUPPORTED. A type of vehicle adds its own to the table.
@@ -13,7 +13,6 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from . import arming
 from .frames import AMSL_FRAMES, GLOBAL_FRAMES, HIGHEST_ALTITUDE, valid_location
 from .geodesy import Location
 from .link import PeerLink
@@ -27,6 +26,9 @@ DENIED: int = mavlink.MAV_RESULT_DENIED
 FAILED: int = mavlink.MAV_RESULT_FAILED
 BUSY: int = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
 UNSUPPORTED: int = mavlink.MAV_RESULT_UNSUPPORTED
+FORCE_ARM = 2989.0
+FORCE_ARM_OR_DISARM = 21196.0
+"""Values of param2 of MAV_CMD_COMPONENT_ARM_DISARM that skip checks."""
 FORCE_REBOOT = 20190226
 FASTEST_INTERVAL = 0.003
 """Seconds; ArduPilot refuses more than 0.8 of SCHED_LOOP_RATE. More than 100 Hz is not sent here."""
@@ -59,8 +61,8 @@ class CommandInt:
 def from_message(message: Any) -> CommandInt | None:
     """COMMAND_LONG or COMMAND_INT as a Command; None for a COMMAND_LONG that ArduPilot takes as INT only.
 
-    A parameter that is not a finite number stands for "not given" and reads as 0; z is left as it is, for an
-    altitude must not become 0 by mistake.
+    A parameter that is not a finite number means "not given" and reads as 0. z stays as it is, because an altitude
+    must not become 0 by mistake.
     """
     sender = (message.get_srcSystem(), message.get_srcComponent())
     parameters = (
@@ -119,7 +121,7 @@ class Commands:
         return UNSUPPORTED if handler is None else handler(command, link)
 
     def accept(self, command: CommandInt, link: PeerLink) -> int:
-        """A command that is for a gimbal, which is not there; ArduPilot accepts it all the same."""
+        """Accept a command for a gimbal that is not there, as ArduPilot does."""
         del command, link
         return ACCEPTED
 
@@ -127,10 +129,10 @@ class Commands:
         del link
         vehicle = self._vehicle
         if command.param1 == 1:
-            forced = command.param2 in (arming.FORCE, arming.FORCE_ARM)
+            forced = command.param2 in (FORCE_ARM, FORCE_ARM_OR_DISARM)
             return ACCEPTED if vehicle.arm(forced=forced) else FAILED
         if command.param1 == 0:
-            return ACCEPTED if vehicle.disarm(forced=command.param2 == arming.FORCE) else FAILED
+            return ACCEPTED if vehicle.disarm(forced=command.param2 == FORCE_ARM_OR_DISARM) else FAILED
         return UNSUPPORTED
 
     def _run_prearm_checks(self, command: CommandInt, link: PeerLink) -> int:
@@ -203,13 +205,13 @@ class Commands:
         return ACCEPTED
 
     def _request_message(self, command: CommandInt, link: PeerLink) -> int:
-        wanted = int(command.param1)
-        if wanted == mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
+        message_id = int(command.param1)
+        if message_id == mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
             return self._send_interval(int(command.param2), link)
-        name = self._name_of(wanted)
+        name = self._name_of(message_id)
         if name is None:
             return FAILED
-        # Like most messages in ArduPilot it waits its turn, so the acknowledgement comes first.
+        # As in ArduPilot the message waits its turn, so the acknowledgement comes first.
         self._transmitter.send_soon(link, name)
         return ACCEPTED
 

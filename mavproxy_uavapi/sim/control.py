@@ -19,9 +19,9 @@ all of its float fields. `pilot_arm` arms by radio in the present mode, with all
 the throttle. `other_station` is a GUIDED setpoint of another ground station, [north, east, down] in metres from the
 EKF origin or in m/s.
 
-Every answer has "ok"; with false there is an "error" that says why. What is sent while the vehicle hears nothing,
-what is dropped and what the other station sends are not in "received". A low battery that has made its failsafe act
-stays low until a reboot, as in ArduPilot.
+Every answer has "ok"; if it is false, "error" says why. "received" does not list what is sent while the vehicle hears
+nothing, what is dropped, nor what the other station sends. As in ArduPilot, a low battery that has triggered its
+failsafe stays low until a reboot.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class Control:
         }
 
     def handle_line(self, line: str) -> str:
-        """Answer one line (without its end); never raises for what the line says."""
+        """Answer one line (without its end); no content of a line makes it raise."""
         try:
             request = json.loads(line)
             operation = self._operations[request["op"]]
@@ -108,13 +108,13 @@ class Control:
 
     def _pilot_mode(self, request: Mapping[str, Any]) -> None:
         vehicle = self._simulator.vehicle
-        wanted = str(request["mode"]).upper()
-        numbers = [number for number, mode in vehicle.modes.items() if mode.name == wanted]
+        mode_name = str(request["mode"]).upper()
+        numbers = [number for number, mode in vehicle.modes.items() if mode.name == mode_name]
         if not numbers:
-            raise FaultError(f"no mode is called {wanted}")
+            raise FaultError(f"no mode is called {mode_name}")
         vehicle.take_sticks()
         if not vehicle.set_mode(numbers[0]):
-            raise FaultError(f"the vehicle refused {wanted}")
+            raise FaultError(f"the vehicle refused {mode_name}")
 
     def _pilot_sticks(self, request: Mapping[str, Any]) -> None:
         for channel, name in enumerate(("roll", "pitch", "throttle", "yaw"), start=1):
@@ -185,8 +185,8 @@ class Control:
         since, heartbeats = int(request.get("since", 0)), bool(request.get("heartbeats", False))
         entries = [entry for entry in self._simulator.received if entry.index > since]
         last = entries[-1].index if entries else since
-        wanted = [entry for entry in entries if heartbeats or entry.message.get_type() != "HEARTBEAT"]
-        return {"last": last, "messages": [_describe(entry) for entry in wanted]}
+        shown = [entry for entry in entries if heartbeats or entry.message.get_type() != "HEARTBEAT"]
+        return {"last": last, "messages": [_describe(entry) for entry in shown]}
 
 
 def _describe(entry: ReceivedMessage) -> dict[str, Any]:

@@ -11,8 +11,12 @@ from .copter import setpoints as copter_setpoints
 from .copter.commands import CopterCommands
 from .copter.copter import SimulatedCopter
 from .parameter_tables import copter as copter_parameters
+from .parameter_tables import plane as plane_parameters
 from .parameter_tables import rover as rover_parameters
 from .parameter_tables.blocks import Blocks
+from .plane import setpoints as plane_setpoints
+from .plane.commands import PlaneCommands
+from .plane.plane import SimulatedPlane
 from .rover import setpoints as rover_setpoints
 from .rover.commands import RoverCommands
 from .rover.rover import SimulatedRover
@@ -44,6 +48,15 @@ KINDS: Mapping[str, Kind] = {
             "SET_POSITION_TARGET_LOCAL_NED": copter_setpoints.apply_local,
             "SET_POSITION_TARGET_GLOBAL_INT": copter_setpoints.apply_global,
             "LANDING_TARGET": _landing_target,
+        },
+    ),
+    "plane": Kind(
+        SimulatedPlane,
+        PlaneCommands,
+        plane_parameters.BLOCKS,
+        {
+            "SET_POSITION_TARGET_LOCAL_NED": plane_setpoints.apply_local,
+            "SET_POSITION_TARGET_GLOBAL_INT": plane_setpoints.apply_global,
         },
     ),
     "rover": Kind(

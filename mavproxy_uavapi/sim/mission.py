@@ -30,6 +30,7 @@ NAVIGATION = COPTER_NAVIGATION | {
     mavlink.MAV_CMD_NAV_VTOL_TAKEOFF,
     mavlink.MAV_CMD_NAV_VTOL_LAND,
 }
+TAKEOFFS = (mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_NAV_VTOL_TAKEOFF)
 CONDITION = frozenset(
     {
         mavlink.MAV_CMD_CONDITION_DELAY,
@@ -126,9 +127,13 @@ class Mission:
     @property
     def starts_with_takeoff(self) -> bool:
         """Whether the first navigation item lifts off."""
-        for item in self.items[1:]:
+        return self.takes_off_from(1)
+
+    def takes_off_from(self, seq: int) -> bool:
+        """Whether the first navigation item from number seq on lifts off."""
+        for item in self.items[max(seq, 1) :]:
             if item.command in NAVIGATION and item.command != mavlink.MAV_CMD_NAV_DELAY:
-                return bool(item.command == mavlink.MAV_CMD_NAV_TAKEOFF)
+                return item.command in TAKEOFFS
         return False
 
     def remember_home(self, home: Item) -> None:

@@ -75,7 +75,7 @@ class MissionProtocol:
         return True
 
     def step(self) -> None:
-        """Ask again for an item that does not come; give up in the end."""
+        """Ask again for an item that does not come, and give up in the end."""
         upload, now = self._upload, self.vehicle.now
         if upload is None:
             return
@@ -124,8 +124,8 @@ class MissionProtocol:
             self._store(message.mission_type, [])
             self._ack(link, message, mavlink.MAV_MISSION_ACCEPTED)
         else:
-            kept = self.items(message.mission_type)[: message.count]
-            self._begin(Upload(link, _sender(message), message.mission_type, 0, message.count - 1, kept))
+            former = self.items(message.mission_type)[: message.count]
+            self._begin(Upload(link, _sender(message), message.mission_type, 0, message.count - 1, former))
 
     def _partial(self, link: PeerLink, message: Any) -> None:
         if self._busy(link, message):
@@ -199,7 +199,7 @@ class MissionProtocol:
             self.vehicle.say(mavlink.MAV_SEVERITY_INFO, "Flight plan received")
 
     def _abandon(self, upload: Upload) -> None:
-        """An upload that ends early leaves what had come so far, and cuts the old list: so does ArduPilot."""
+        """An upload that ends early keeps the items that came, and cuts the old list, as in ArduPilot."""
         self._upload = None
         self._store(upload.kind, upload.items)
 
@@ -244,7 +244,7 @@ def _sender(message: Any) -> tuple[int, int]:
 
 def _misplaced(message: Any) -> int | None:
     scale = 1e7 if message.get_type() == "MISSION_ITEM_INT" else 1.0
-    # Written so that NaN fails, too.
+    # NaN must fail too.
     if not abs(message.x) <= 90 * scale:
         return int(mavlink.MAV_MISSION_INVALID_PARAM5_X)
     if not abs(message.y) <= 180 * scale:
@@ -256,7 +256,7 @@ def _misplaced(message: Any) -> int | None:
 
 def _as_item(message: Any) -> Item:
     scale = 1 if message.get_type() == "MISSION_ITEM_INT" else 10_000_000
-    # NaN stands for "not given", mostly in the yaw of a waypoint.
+    # NaN means "not given", mostly in the yaw of a waypoint.
     param1, param2, param3, param4 = (
         value if math.isfinite(value) else 0.0
         for value in (message.param1, message.param2, message.param3, message.param4)

@@ -15,7 +15,7 @@ from .mission import CONDITION, NAVIGATION, Item, State
 from .vehicle import Vehicle
 
 LONGEST_CHAIN = 100
-"""Items that are stepped through at once; a jump loop without a waypoint ends here."""
+"""Most items that one step runs through; a jump loop without a waypoint ends here."""
 NAMES = {
     mavlink.MAV_CMD_NAV_WAYPOINT: "WP",
     mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT: "SplineWP",
@@ -118,7 +118,7 @@ class MissionRunner:
         self.run_from(max(mission.current, 1))
 
     def jump_to(self, seq: int) -> None:
-        """The ground chose another current item while the mission runs."""
+        """Take up another current item, which the ground station chose while the mission runs."""
         self._vehicle.mission.state = State.RUNNING
         self.run_from(max(seq, 1))
 
@@ -147,7 +147,7 @@ class MissionRunner:
                     return
                 seq += 1
                 continue
-            # What follows a condition waits for it, while the next leg is already being flown.
+            # What follows a condition waits for it; the next leg is flown meanwhile.
             if item.command in CONDITION or self._alongside:
                 if not self._alongside:
                     self._start_condition(item)
@@ -159,11 +159,11 @@ class MissionRunner:
         self._flyer.mission_ended()
 
     def _jump(self, seq: int, item: Item) -> int:
-        left = self._vehicle.mission.jumps_left.setdefault(seq, int(item.param2))
-        if left == 0:
+        jumps_left = self._vehicle.mission.jumps_left.setdefault(seq, int(item.param2))
+        if jumps_left == 0:
             return seq + 1
-        if left > 0:
-            self._vehicle.mission.jumps_left[seq] = left - 1
+        if jumps_left > 0:
+            self._vehicle.mission.jumps_left[seq] = jumps_left - 1
         return int(item.param1)
 
     def _announce(self, seq: int, item: Item) -> None:

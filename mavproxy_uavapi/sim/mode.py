@@ -21,7 +21,7 @@ class Mode:
         return True
 
     def leave(self) -> None:
-        """Another mode takes over."""
+        """Called when another mode takes over."""
 
     @property
     def target(self) -> Ned | None:
@@ -33,7 +33,7 @@ class MissionMode(Mode):
     """A mode that flies the mission."""
 
     def jump_to(self, seq: int) -> None:
-        """The ground chose another current item while the mission runs."""
+        """Take up another current item, which the ground station chose while the mission runs."""
         raise NotImplementedError
 
     @property

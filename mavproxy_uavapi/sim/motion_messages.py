@@ -49,18 +49,18 @@ class MotionMessages(MessageSource):
         )
 
     def _build_nav_controller_output(self) -> Any | None:
-        told = self.vehicle.navigation()
-        if told is None:
+        navigation = self.vehicle.navigation()
+        if navigation is None:
             return None
         return mavlink.MAVLink_nav_controller_output_message(
-            told.roll,
-            told.pitch,
-            round(told.nav_bearing),
-            round(told.target_bearing),
-            min(round(told.distance), 65535),
-            told.altitude_error,
-            told.speed_error,
-            told.crosstrack,
+            navigation.roll,
+            navigation.pitch,
+            round(navigation.nav_bearing),
+            round(navigation.target_bearing),
+            min(round(navigation.distance), 65535),
+            navigation.altitude_error,
+            navigation.speed_error,
+            navigation.crosstrack,
         )
 
     def _build_position_target_global_int(self) -> Any | None:
@@ -210,3 +210,12 @@ class MotionMessages(MessageSource):
             round(origin.altitude * 1000),
             self._microseconds(),
         )
+
+    def _build_wind(self) -> Any | None:
+        """What a plane estimates; others send nothing."""
+        if not self.vehicle.tells_wind:
+            return None
+        body = self.vehicle.body
+        speed = math.hypot(body.wind_north, body.wind_east)
+        direction = math.degrees(math.atan2(-body.wind_east, -body.wind_north)) if speed > 0 else 180.0
+        return mavlink.MAVLink_wind_message(direction, speed, 0.0)

@@ -43,6 +43,12 @@ EXTENDED_SYS_STATE, HOME_POSITION and POSITION_TARGET_LOCAL_NED are in no stream
 SET_MESSAGE_INTERVAL or REQUEST_MESSAGE only.
 """
 
+PLANE_GROUPS: Groups = {
+    **GROUPS,
+    mavlink.MAV_DATA_STREAM_EXTRA3: (*GROUPS[mavlink.MAV_DATA_STREAM_EXTRA3], "WIND"),
+}
+"""A plane tells the wind, too."""
+
 RATE_PARAMETERS: Mapping[int, str] = {
     mavlink.MAV_DATA_STREAM_RAW_SENSORS: "RAW_SENS",
     mavlink.MAV_DATA_STREAM_EXTENDED_STATUS: "EXT_STAT",

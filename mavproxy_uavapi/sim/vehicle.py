@@ -63,8 +63,9 @@ class Vehicle:
     mission_commands: ClassVar[frozenset[int]] = SUPPORTED
     """The MAV_CMDs that a mission may have."""
     streams: ClassVar[Groups] = GROUPS
+    tells_wind: ClassVar[bool] = False
     neutral_sticks: ClassVar[tuple[int, ...]] = NEUTRAL
-    """What SITL's radio sends on channels 1 to 8 before anybody touches it."""
+    """What SITL's radio sends on channels 1 to 8 at first."""
 
     modes: Mapping[int, Mode]
     mode: Mode
@@ -94,7 +95,7 @@ class Vehicle:
         self._boot_texts = deque([*banner, *BOOT_TEXTS])
         mission.reset()
 
-    # What the ground is told.
+    # What the ground station is told.
 
     def tell(self, event: Event) -> None:
         """Queue an event for the ground."""
@@ -117,14 +118,14 @@ class Vehicle:
 
     @property
     def home_offset(self) -> Ned:
-        """Home in NED metres from the EKF origin; the origin itself before home is set."""
+        """Home in NED metres from the EKF origin; before home is set, the origin."""
         if self.home is None or self.estimator.origin is None:
             return Ned(0.0, 0.0, 0.0)
         return to_ned(self.estimator.origin, self.home)
 
     @property
     def home_altitude(self) -> float:
-        """Metres AMSL of home; of the start before home is set."""
+        """Altitude of home in metres AMSL; before home is set, that of the start."""
         return (self.home or self.estimator.start).altitude
 
     @property
@@ -195,7 +196,7 @@ class Vehicle:
         return []
 
     def arm_motors(self) -> None:
-        """Arm without asking any check; home moves here unless the ground has set it."""
+        """Arm without any check."""
         raise NotImplementedError
 
     def disarm_now(self) -> None:
@@ -203,29 +204,29 @@ class Vehicle:
         raise NotImplementedError
 
     def fly_guided_item(self, item: Item) -> bool:
-        """A mission item that is for now (`current` 2); False where the vehicle does not take it."""
+        """Fly to a guided mission item (`current` 2); False where the vehicle does not take it."""
         raise NotImplementedError
 
     def change_altitude(self, item: Item) -> None:
-        """A mission item that changes the height (`current` 3)."""
+        """Take a mission item that changes the height (`current` 3)."""
 
     # The back door for tests.
 
     def take_sticks(self) -> None:
-        """A pilot who takes over lays hands on the sticks."""
+        """Move the sticks to where a pilot who takes over holds them."""
 
     def arm_by_radio(self, throttle: int) -> bool:
         """The pilot arms in the present mode and moves the throttle stick (microseconds); False where it cannot."""
         raise NotImplementedError
 
     def obey_other_station(self, position: Ned | None, velocity: Ned | None) -> bool:
-        """A GUIDED setpoint of somebody else; False outside GUIDED."""
+        """Take a GUIDED setpoint of another ground station; False outside GUIDED."""
         raise NotImplementedError
 
-    # What the ground or the flight code can do.
+    # What the ground station or the vehicle itself can do.
 
     def set_servo(self, channel: int, pulse: int) -> bool:
-        """Drive a free servo output; says so when it is not free."""
+        """Drive a free servo output; a STATUSTEXT says when it is not free."""
         if self.servos.set(channel, pulse):
             return True
         self.say(mavlink.MAV_SEVERITY_INFO, f"ServoRelayEvent: Channel {channel} is already in use")
@@ -243,7 +244,7 @@ class Vehicle:
         return True
 
     def set_home_here(self, *, lock: bool) -> bool:
-        """Make the present place home; False without a position."""
+        """Make the present position home; False without a position."""
         return self.estimator.ready and self.set_home(self.estimator.location, lock=lock)
 
     def set_mode(self, number: int) -> bool:
@@ -269,7 +270,7 @@ class Vehicle:
         raise NotImplementedError
 
     def mode_left(self) -> None:
-        """The present mode has been left, and is the present one still."""
+        """Called when the present mode has been left, before the new one takes over."""
 
     def arm(self, *, forced: bool) -> bool:
         """Arm the motors; False with STATUSTEXTs that say why not."""
@@ -278,7 +279,7 @@ class Vehicle:
         if not (forced and not self.mandatory_failures()):
             failures = self.prearm_failures() or self.arm_failures()
             for failure in failures:
-                self.say(mavlink.MAV_SEVERITY_CRITICAL, f"Arm: {failure}")
+                self.say(mavlink.MAV_SEVERITY_CRITICAL, f"Arm: {failure}"[: arming.TEXT_LENGTH])
             if failures:
                 return False
         self.arm_motors()
@@ -298,7 +299,7 @@ class Vehicle:
     def report_prearm(self) -> None:
         """Tell the ground what keeps the vehicle from arming."""
         for failure in self.prearm_failures():
-            self.say(mavlink.MAV_SEVERITY_CRITICAL, f"PreArm: {failure}")
+            self.say(mavlink.MAV_SEVERITY_CRITICAL, f"PreArm: {failure}"[: arming.TEXT_LENGTH])
 
     @property
     def mission_mode(self) -> MissionMode:

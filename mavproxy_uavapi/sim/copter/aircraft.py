@@ -56,7 +56,7 @@ class Aircraft(Vehicle):
 
     @property
     def maybe_landed(self) -> bool:
-        """Whether the land detector has its first suspicion."""
+        """Whether the land detector assumes a landing that it has not confirmed yet."""
         return self.landed or self._detector.suspects
 
     @property
@@ -98,18 +98,18 @@ class Aircraft(Vehicle):
             lean=math.radians(max(1000, min(8000, parameters["ANGLE_MAX"])) / 100),
         )
 
-    # What the ground or the flight code can do.
+    # What the ground station or the flight code can do.
 
     def change_limit(self, kind: Speed, speed: float) -> None:
         """Set a speed limit in m/s until the mode or its submode resets them."""
         self.position.limits.change(kind, speed)
 
     def relax(self) -> None:
-        """Bring all targets to where the vehicle is."""
+        """Set all targets to where the vehicle is."""
         self.position.start_at(self.estimator.position, self.estimator.velocity)
 
     def lift_off(self) -> None:
-        """The vehicle leaves the ground now."""
+        """Note that the vehicle leaves the ground now."""
         self.landed = False
         self.auto_armed = True
         self._detector.restart()

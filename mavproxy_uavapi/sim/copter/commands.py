@@ -17,7 +17,7 @@ from .modes import Guided
 from .modes.auto import Auto
 
 NO_SPEED_KIND = 4
-"""The end of the enumeration SPEED_TYPE, which ArduCopter denies; it fails to change what lies beyond."""
+"""The end of the enumeration SPEED_TYPE: ArduCopter answers DENIED to it, and FAILED to larger values."""
 
 
 def _means_here(command: CommandInt) -> bool:
@@ -80,7 +80,7 @@ class CopterCommands(Commands):
             return DENIED
         if not copter.set_mode(Auto.number):
             return FAILED
-        # Without this a vehicle on the ground waits for the pilot to raise the throttle.
+        # Otherwise a vehicle on the ground waits until the pilot raises the throttle.
         copter.auto_armed = copter.armed
         return ACCEPTED
 

@@ -123,7 +123,7 @@ class SimulatedCopter(Aircraft):
             ZERO if mask & ACCELERATION_IGNORE else guided.acceleration_target,
         )
 
-    # What the ground or a pilot can do.
+    # What the ground station or a pilot can do.
 
     def mode_left(self) -> None:
         if not self.mode.positions:
@@ -186,7 +186,7 @@ class SimulatedCopter(Aircraft):
         if item.command == mavlink.MAV_CMD_CONDITION_YAW:
             self.fix_yaw(item.param1, item.param2, int(item.param3), item.param4 > 0)
             return True
-        # Items that are not for a place have the mission frame; ArduCopter reads heights in it as AMSL.
+        # Items without a location have the mission frame; ArduCopter reads heights in it as AMSL.
         frame = mavlink.MAV_FRAME_GLOBAL if item.frame == mavlink.MAV_FRAME_MISSION else item.frame
         target = global_target(self, frame, item.x, item.y, item.z)
         if item.command != mavlink.MAV_CMD_NAV_WAYPOINT or target is None:

@@ -54,7 +54,7 @@ class CarBody(Body):
     def _turn_wheels(self, turn_rate: float, grip: Grip, dt: float) -> None:
         size = abs(self.speed)
         most = min(grip.turn_rate, size / grip.radius, grip.lateral / size if size > 0 else math.inf)
-        wanted = max(-most, min(most, turn_rate))
+        rate = max(-most, min(most, turn_rate))
         change = grip.turn_acceleration * dt
-        self.yaw_rate += max(-change, min(change, wanted - self.yaw_rate))
+        self.yaw_rate += max(-change, min(change, rate - self.yaw_rate))
         self.yaw_rate = max(-most, min(most, self.yaw_rate))

@@ -102,7 +102,7 @@ class Chassis(Vehicle):
         self._drive = drive if self.armed else COAST
         body, limits = self.body, grip(self.parameters)
         if self._drive.rolls:
-            # Nobody but the steering controller heeds ATC_TURN_MAX_G and ATC_STR_ACC_MAX.
+            # Only the steering controller heeds ATC_TURN_MAX_G and ATC_STR_ACC_MAX.
             free = replace(limits, lateral=math.inf, turn_acceleration=WHEELS_TURN)
             body.throttle(self._drive.speed, self._drive.turn_rate, free, dt)
         else:

@@ -122,9 +122,9 @@ class Navigator:
         now = abs(self._body.speed)
         rest = self._corner_speed() if self._following is not None else 0.0
         braking = shaping.square_root_speed(distance, APPROACH, BRAKING_SHARE * limit.acceleration)
-        wanted = min(self.speed_limit, math.hypot(braking, rest))
-        wanted *= max(SLOWEST_TURN, math.cos(min(abs(error), math.pi / 2)))
-        self._acceleration = shaping.accelerate_1d(wanted - now, self._acceleration, limit.acceleration, jerk, dt)
+        desired = min(self.speed_limit, math.hypot(braking, rest))
+        desired *= max(SLOWEST_TURN, math.cos(min(abs(error), math.pi / 2)))
+        self._acceleration = shaping.accelerate_1d(desired - now, self._acceleration, limit.acceleration, jerk, dt)
         return max(0.0, now + self._acceleration * dt)
 
     def _corner_speed(self) -> float:

@@ -71,7 +71,7 @@ class SimulatedRover(Chassis):
     def navigation(self) -> Navigation | None:
         return self.mode.navigation()
 
-    # What the ground or a pilot can do.
+    # What the ground station or a pilot can do.
 
     def mode_refusal(self, mode: modes.Mode) -> str | None:
         assert isinstance(mode, Mode)

@@ -118,7 +118,7 @@ class Auto(Mode, MissionMode):
         self.submode = AutoSubmode.WAYPOINT
         target = item_target(aircraft, item)
         if item.command == mavlink.MAV_CMD_NAV_LAND:
-            # The way to a landing place is flown at the present altitude.
+            # The vehicle flies to a landing place at its present altitude.
             target = Ned(target.north, target.east, aircraft.estimator.position.down)
         self._target = target
         if aircraft.yaw.roi is None:
@@ -160,7 +160,7 @@ class Auto(Mode, MissionMode):
         return True
 
     def _flown_through(self, item: Item) -> bool:
-        """A waypoint without a delay before another waypoint need not be stopped at."""
+        """Whether the vehicle need not stop: a waypoint without a delay, before another waypoint."""
         items, following = self.aircraft.mission.items, self.aircraft.mission.current + 1
         waypoints = (mavlink.MAV_CMD_NAV_WAYPOINT, mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT)
         if item.command not in waypoints or item.param1 > 0 or following >= len(items):

@@ -1,0 +1,1 @@
+"""The plane and the QuadPlane: ArduPilot's ArduPlane."""

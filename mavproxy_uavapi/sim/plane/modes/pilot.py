@@ -1,0 +1,140 @@
+"""Modes in which the pilot's sticks decide. Their attitude control is simplified: sticks set bank and climb."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar
+
+from ..demand import Demand, Throttle
+from ..takeoff import CLIMB_AIRSPEED
+from .base import Mode
+
+ROLL_STICK, PITCH_STICK = 1, 2
+MANUAL_BANK = math.radians(60)
+STICK_CLIMB = 6.0
+"""m/s of climb with the pitch stick at its end."""
+GLIDE = -3.0
+"""m/s without throttle."""
+
+
+class PilotMode(Mode):
+    """Roll stick: bank. Pitch stick: climb. Throttle stick: airspeed."""
+
+    automatic_throttle = False
+    limits_bank: ClassVar[bool] = True
+
+    def step(self, dt: float) -> Demand:
+        del dt
+        plane = self.plane
+        sticks, now, parameters = plane.sticks, plane.now, plane.parameters
+        throttle = sticks.throttle(now)
+        most = math.radians(parameters["ROLL_LIMIT_DEG"]) if self.limits_bank else MANUAL_BANK
+        bank = sticks.axis(ROLL_STICK, now) * most
+        climb = -sticks.axis(PITCH_STICK, now) * STICK_CLIMB
+        if throttle <= 0.0:
+            return Demand(bank, climb + GLIDE, parameters["AIRSPEED_MIN"], Throttle.IDLE)
+        if not plane.body.airborne:
+            return Demand(bank, climb, CLIMB_AIRSPEED, Throttle.FULL if throttle > 0.5 else Throttle.IDLE)
+        return Demand(bank, climb, self._airspeed(throttle))
+
+    def _airspeed(self, throttle: float) -> float:
+        parameters = self.plane.parameters
+        slowest, fastest = parameters["AIRSPEED_MIN"], parameters["AIRSPEED_MAX"]
+        return slowest + (fastest - slowest) * throttle
+
+
+class Manual(PilotMode):
+    """Sticks straight to the surfaces."""
+
+    name = "MANUAL"
+    number = 0
+    limits_bank = False
+
+
+class Stabilize(PilotMode):
+    """Sticks, and level wings without them."""
+
+    name = "STABILIZE"
+    number = 2
+
+
+class Training(PilotMode):
+    """Sticks within the limits."""
+
+    name = "TRAINING"
+    number = 3
+
+
+class Acro(PilotMode):
+    """Sticks as rates, which are not told from angles here."""
+
+    name = "ACRO"
+    number = 4
+    limits_bank = False
+
+
+class FlyByWireA(PilotMode):
+    """Sticks as angles."""
+
+    name = "FBWA"
+    number = 5
+
+
+class Autotune(FlyByWireA):
+    """FBWA that learns, which is not simulated."""
+
+    name = "AUTOTUNE"
+    number = 8
+
+
+class FlyByWireB(PilotMode):
+    """Pitch stick as climb rate; without it the altitude is held. Throttle stick as airspeed."""
+
+    name = "FBWB"
+    number = 6
+    automatic_throttle = True
+
+    _down: float | None = None
+
+    def enter(self, checked: bool) -> bool:
+        self._down = None
+        return super().enter(checked)
+
+    def step(self, dt: float) -> Demand:
+        plane = self.plane
+        if plane.throttle_suppressed and not plane.flying:
+            return super().step(dt) if plane.sticks.throttle(plane.now) > 0 else Demand(throttle=Throttle.SUPPRESSED)
+        stick = -plane.sticks.axis(PITCH_STICK, plane.now)
+        if self._down is None or stick != 0.0:
+            self._down = plane.estimator.position.down
+        climb = stick * plane.parameters["FBWB_CLIMB_RATE"]
+        if stick == 0.0:
+            climb = plane.navigator.climb_to(self._down)
+        return Demand(self._bank(), climb, self._airspeed(plane.sticks.throttle(plane.now)))
+
+    def _bank(self) -> float:
+        plane = self.plane
+        return plane.sticks.axis(ROLL_STICK, plane.now) * math.radians(plane.parameters["ROLL_LIMIT_DEG"])
+
+
+class Cruise(FlyByWireB):
+    """FBWB that holds the course over ground while the roll stick is centred."""
+
+    name = "CRUISE"
+    number = 7
+
+    _course: float | None = None
+
+    def enter(self, checked: bool) -> bool:
+        self._course = None
+        return super().enter(checked)
+
+    def _bank(self) -> float:
+        plane = self.plane
+        if plane.sticks.axis(ROLL_STICK, plane.now) != 0.0:
+            self._course = None
+            return super()._bank()
+        if self._course is None:
+            velocity = plane.estimator.velocity
+            self._course = math.atan2(velocity.east, velocity.north)
+        return plane.navigator.hold_course(self._course).bank
