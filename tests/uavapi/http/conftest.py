@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import fcntl
+import json
+import resource
+import socket
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,9 +16,11 @@ import pytest
 from aiohttp import TCPConnector, web
 from aiohttp.test_utils import RawTestServer, TestClient
 
-from mavproxy_uavapi.http.app import make_handler
+from mavproxy_uavapi.http.app import ApiServer, make_handler
 from mavproxy_uavapi.http.call import Service
+from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.settings import ApiModuleSettings
+from tests.support.api_port import TOKEN, Port
 
 SOCKET_PATIENCE = 0.002  # real s that the sockets get before the clock jumps
 
@@ -37,8 +44,6 @@ class Api:
             raise AssertionError(f"{constant} is not JSON")
 
         async with self.client.request(method, path, allow_redirects=False, **kwargs) as response:
-            import json
-
             text = await response.text()
             body = json.loads(text, parse_constant=forbidden)
             return SimpleNamespace(status=response.status, body=body, headers=response.headers)
@@ -93,7 +98,6 @@ def raising(loop: Any, service: Service) -> Any:
             raise error
 
         async def ask() -> Any:
-            import json
 
             from aiohttp.test_utils import make_mocked_request
 
@@ -107,3 +111,41 @@ def raising(loop: Any, service: Service) -> Any:
         return loop.run(ask())
 
     return raising
+
+
+@pytest.fixture
+def idle_strangers(port: Port) -> Iterator[Callable[[int], list[socket.socket]]]:
+    """Opens so many connections that say nothing; their own ends take none of the low descriptors."""
+    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (min(limits[1], 8192), limits[1]))
+    clients: list[socket.socket] = []
+
+    def connect(count: int) -> list[socket.socket]:
+        for _ in range(count):
+            with socket.socket() as low:
+                clients.append(socket.socket(fileno=fcntl.fcntl(low, fcntl.F_DUPFD, 2000)))
+            clients[-1].setblocking(False)
+            clients[-1].connect_ex(("127.0.0.1", port.port))
+        return clients
+
+    yield connect
+    for client in clients:
+        client.close()
+    resource.setrlimit(resource.RLIMIT_NOFILE, limits)
+
+
+@pytest.fixture
+def port(loop: Any, service: Any, tmp_path: Path) -> Iterator[Port]:
+    """The API with a token, on a real port of the loopback."""
+    loop.patience = 0.002
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        free = int(probe.getsockname()[1])
+    given = {"port": free, "token": TOKEN, "scripts_path": str(tmp_path / "scripts")}
+    service.settings = ApiModuleSettings(given, environ={}).snapshot()
+    service.scripts = Scripts(service.host, service.settings)
+    server = ApiServer(service)
+    loop.run(server.start())
+    port = Port(loop, server, free)
+    yield port
+    loop.run(port.close())

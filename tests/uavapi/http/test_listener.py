@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import asyncio
+import ipaddress
+import os
 import resource
 import socket
 from types import SimpleNamespace
@@ -9,6 +12,8 @@ import pytest
 
 from mavproxy_uavapi.http import listener
 from mavproxy_uavapi.http.listener import KEPT_FREE, RESERVE, SHARE, NoRoom, highest_descriptor, who_makes_room
+from mavproxy_uavapi.http.streaming import MOST_OPEN
+from tests.support.api_port import OWNER, Port
 
 MOST = 200
 
@@ -110,3 +115,86 @@ def test_kernel_gives_up_a_peer_that_reads_nothing() -> None:
             near, _ = listening.accept()
             with near:
                 assert near.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT) == listener.UNREAD_TIMEOUT
+
+
+# -- strangers at a real port -------------------------------------------------------------------------------
+
+
+def test_1100_idle_connections_leave_the_owner_in_and_the_cap_as_it_is(
+    drone: Any, port: Port, idle_strangers: Any
+) -> None:
+    async def act() -> tuple[int, int]:
+        for _ in range(11):
+            idle_strangers(100)
+            await port.settled()
+        answer = await port.ask("GET", "/telemetry/gps", OWNER)
+        return answer.status, len(port.server.filenos()) - 1
+
+    status, connections = port.run(act)
+    assert status == 200
+    assert connections <= MOST
+
+
+def test_strangers_leave_a_reserve_to_those_who_pass_the_door(drone: Any, port: Port) -> None:
+    async def act() -> tuple[list[int], int]:
+        strangers = [await port.connect() for _ in range(MOST)]
+        await port.settled()
+        owners = [await port.connect() for _ in range(RESERVE)]
+        statuses = [(await owner.ask("GET", "/telemetry/gps", OWNER)).status for owner in owners]
+        again = [(await owner.ask("GET", "/telemetry/gps", OWNER)).status for owner in owners]
+        assert sum(not stranger.reader.at_eof() for stranger in strangers) >= MOST - 2 * RESERVE
+        return [*statuses, *again], len(port.server.filenos()) - 1
+
+    statuses, connections = port.run(act)
+    assert set(statuses) == {200}
+    assert connections <= MOST
+
+
+def test_descriptors_are_left_and_the_log_has_a_line_rather_than_tracebacks(
+    drone: Any, port: Port, idle_strangers: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    async def act() -> tuple[int, int]:
+        owner = await port.connect()
+        await owner.ask("GET", "/telemetry/gps", OWNER)
+        idle_strangers(180)
+        limit = 128 + sum(int(fd) < 2000 for fd in os.listdir("/proc/self/fd"))
+        resource.setrlimit(resource.RLIMIT_NOFILE, (limit, resource.getrlimit(resource.RLIMIT_NOFILE)[1]))
+        await port.settled()
+        spare = [os.dup(0) for _ in range(20)]  # as MAVProxy does to connect again
+        for fd in spare:
+            os.close(fd)
+        return max(spare), (await owner.ask("GET", "/telemetry/gps", OWNER)).status
+
+    highest, status = port.run(act)
+    assert highest < 1024 and status == 200
+    assert [record for record in caplog.records if record.exc_info] == []
+    assert len(caplog.records) <= 5
+
+
+def test_streams_of_one_address_leave_most_to_others(
+    drone: Any, port: Port, service: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A stream takes a connection, so that the share of connections is one of streams too."""
+    far = "127.0.0.2"  # stands for another computer
+    addresses = {far: ipaddress.ip_address("10.0.0.5")}
+    monkeypatch.setattr(listener, "address_of", lambda remote: addresses.get(remote, ipaddress.ip_address(remote)))
+    upgrade = ("Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13")
+    kinds = (OWNER,), (OWNER, *upgrade, "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==")
+
+    async def status_of_stream(source: str, *headers: str) -> int | None:
+        wire = await port.connect(source)
+        wire.send("GET", "/telemetry/stream", *headers)
+        try:
+            return int((await wire.reader.readuntil(b"\r\n")).split()[1])
+        except (asyncio.IncompleteReadError, ConnectionError):
+            return None
+
+    async def act() -> tuple[list[int | None], list[int | None], int]:
+        theirs = [await status_of_stream(far, *kinds[number % 2]) for number in range(2 * SHARE)]
+        ours = [await status_of_stream("127.0.0.1", *kinds[number % 2]) for number in range(MOST_OPEN - SHARE + 1)]
+        return theirs, ours, service.streams.count
+
+    theirs, ours, count = port.run(act)
+    assert theirs == [200, 101] * (SHARE // 2) + [None] * SHARE
+    assert ours == [200, 101] * ((MOST_OPEN - SHARE) // 2) + [429]
+    assert count == MOST_OPEN

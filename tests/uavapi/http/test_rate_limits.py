@@ -6,6 +6,7 @@ import pytest
 
 from mavproxy_uavapi.http.bucket import BURST, CLIENTS_KEPT, Bucket
 from mavproxy_uavapi.settings import ApiModuleSettings
+from tests.support.api_port import OWNER, Port
 
 
 def test_bucket_gives_a_burst_then_the_rate() -> None:
@@ -51,3 +52,36 @@ def test_what_stops_a_vehicle_is_refused_for_no_rate(
     answers = [loop.run(api.ask(method, path, headers={"Prefer": "respond-async"})) for _ in range(5)]
     assert 429 not in [answer.status for answer in answers]
     assert api.get("/command/guided").status == 429
+
+
+# -- strangers at a real port -------------------------------------------------------------------------------
+
+
+def test_flood_of_refused_requests_takes_nothing_from_the_owner_at_the_same_address(flying: Any, port: Port) -> None:
+    async def act() -> tuple[list[int], list[int]]:
+        floods = [(await port.ask("GET", "/command/arm")).status for _ in range(1200)]
+        brakes = [(await port.ask("GET", "/command/brake", OWNER)).status for _ in range(20)]
+        return floods, brakes
+
+    floods, brakes = port.run(act)
+    assert 429 not in brakes and brakes.count(200) == 20
+    assert set(floods) <= {401, 429}
+
+
+def test_stranger_who_asks_too_often_is_answered_late(drone: Any, port: Port, loop: Any) -> None:
+    async def act() -> tuple[list[int], float]:
+        began = loop.time()
+        statuses = [(await port.ask("GET", "/jobs")).status for _ in range(60)]
+        return statuses, loop.time() - began
+
+    statuses, seconds = port.run(act)
+    assert statuses[:20] == [401] * 20
+    assert 429 in statuses
+    assert seconds > 1.0
+
+
+def test_reader_of_the_documentation_needs_no_token_and_has_a_strangers_rate(drone: Any, port: Port) -> None:
+    statuses = [port.run(lambda: port.ask("GET", "/docs")).status for _ in range(30)]
+    assert statuses[:15] == [200] * 15
+    assert 429 in statuses
+    assert port.run(lambda: port.ask("GET", "/docs", OWNER)).status == 200

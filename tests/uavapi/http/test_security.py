@@ -7,6 +7,7 @@ import pytest
 from mavproxy_uavapi.core.errors import Forbidden, Unauthorized
 from mavproxy_uavapi.http.security import check_caller, check_origin, check_page, has_token, is_our_name
 from mavproxy_uavapi.settings import ApiModuleSettings
+from tests.support.api_port import Port
 
 HOST = {"Host": "127.0.0.1:8000"}
 
@@ -193,3 +194,12 @@ def test_network_is_known_however_its_addresses_are_written() -> None:
         check_caller("::ffff:11.0.0.5", {}, settings(token="t", allow_from="10.0.0.0/8"))
     with pytest.raises(Forbidden):
         check_caller(None, {}, settings())
+
+
+@pytest.mark.parametrize(
+    "value", ["Bearer \xff", "Bearer \xff\xfe\x80", "\xff", "Bearer", "Bearer ", " ", "Basic \xe4"]
+)
+def test_bad_authorization_is_401_and_no_traceback(port: Port, caplog: pytest.LogCaptureFixture, value: str) -> None:
+    answer = port.run(lambda: port.ask("GET", "/jobs", f"Authorization: {value}"))
+    assert (answer.status, answer.body["code"]) == (401, "unauthorized")
+    assert [record for record in caplog.records if record.exc_info] == []

@@ -1,0 +1,68 @@
+"""What the tests of landings in lock step share: tags, and what is asked of a rig."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from mavproxy_uavapi.sim.mission import Item
+
+TAG = "0:0.30@0.8,-0.6"
+FAR_TAG = "0:0.30@1.6,-1.2"
+LARGE = {"tags": "0:0.6", "sim_tags": "0:0.6@0.8,-0.6"}
+SMALL = {"width": 320, "height": 240, "fps": 12.0, "sim_noise": 3.0, "sim_jitter": 0.0}
+SWITCH_MODE, TAKEOFF = 176, 22
+PLND = ("PLND_ENABLED", "PLND_STRICT", "PLND_RET_MAX", "PLND_ALT_MIN", "PLND_ALT_MAX")
+MODES = {"LAND": 9, "RTL": 6, "BRAKE": 17, "GUIDED": 4}
+
+
+def height(rig: Any) -> float:
+    return -float(rig.truth.down)
+
+
+def until(rig: Any, condition: Any, limit: float = 60.0) -> None:
+    for _ in range(round(limit / 0.05)):
+        if condition():
+            return
+        rig.pass_time(0.05)
+    raise AssertionError("it did not happen")
+
+
+def sent(rig: Any, kind: str, since: int = 0) -> list[Any]:
+    return [message for message in rig.wire.sent[since:] if message.get_type() == kind]
+
+
+def plnd(rig: Any) -> dict[str, float]:
+    return {name: rig.simulator.parameters[name] for name in PLND}
+
+
+def silent(rig: Any, name: str) -> None:
+    """From now on nobody hears that message."""
+    hear = rig.host._receive
+    rig.host._receive = lambda message: None if message.get_type() == name else hear(message)
+
+
+def unheard(rig: Any, mode: str) -> Any:
+    """From now on nobody hears a heartbeat of that mode; what has to be put back to hear it."""
+    hear = rig.host._receive
+    rig.host._receive = lambda message: (
+        None if message.get_type() == "HEARTBEAT" and message.custom_mode == MODES[mode] else hear(message)
+    )
+    return hear
+
+
+def holds(rig: Any, mode: str = "GUIDED", seconds: float = 10.0) -> bool:
+    """Whether it stays where it is, armed, in that mode: what the autopilot flew by itself is left by BRAKE."""
+    rig.pass_time(3.0)
+    before = height(rig)
+    rig.pass_time(seconds)
+    return rig.mode == mode and rig.simulator.copter.armed and abs(height(rig) - before) < 0.5
+
+
+def pilot(rig: Any, mode: int) -> None:
+    """The pilot switches; for AUTO there is a mission."""
+    rig.simulator.copter.sticks.move(3, 1500)
+    item = Item(mavlink.MAV_CMD_NAV_LOITER_UNLIM, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, 0, 0, 0, 0, 0, 0, 10.0)
+    rig.simulator.copter.mission.replace([item, item])
+    assert rig.simulator.copter.set_mode(mode)

@@ -1,0 +1,21 @@
+"""What the tests of landings share."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from tests.support.landing import SMALL, TAG
+
+
+@pytest.fixture
+def flying(lockstep: Any) -> Any:
+    """A vehicle some metres above home: `flying(alt=6, sim_tags=…)`."""
+
+    def make(alt: float = 5.0, **settings: Any) -> Any:
+        rig = lockstep(**{"sim_tags": TAG, **SMALL, **settings})
+        rig.start(alt)
+        return rig
+
+    return make

@@ -1,0 +1,289 @@
+"""LANDING_TARGET in LAND, and the PLND parameters that are set for it and given back."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from mavproxy_uavapi.core.errors import LinkLost, ModeChanged, NotArmed
+from mavproxy_uavapi.core.mavlink.link import is_finite
+from mavproxy_uavapi.core.vehicle.messages import NedTarget
+from mavproxy_vision.errors import LandingFailed
+from mavproxy_vision.geometry.frames import Attitude, vector
+from mavproxy_vision.landing.precision_landing import WANTED, landing_target
+from tests.support.landing import LARGE, PLND, holds, pilot, plnd, sent, silent, unheard, until
+
+
+@pytest.mark.parametrize(("forward", "right"), [(1.0, 0.5), (-1.0, 0.5), (0.3, -2.0)])
+def test_the_angles_of_landing_target_mean_the_same_as_its_position(forward, right):
+    message = landing_target(1.0, vector(forward, right, 4.0), Attitude())
+    told = (-math.tan(message.angle_y), math.tan(message.angle_x))  # as AC_PrecLand_MAVLink.cpp reads them
+    assert told == pytest.approx((forward / 4.0, right / 4.0))
+    assert (message.x, message.y, message.z) == pytest.approx((forward, right, 4.0))
+
+
+# -- stopped, and taken over -----------------------------------------------------------------------------------
+
+
+def test_stopped_in_land_by_landing_target_it_holds_and_plnd_is_as_before(flying):
+    rig = flying(alt=6.0, plnd=True, **LARGE)
+    before = plnd(rig)
+    job = rig.land(method="landing_target")
+    until(rig, lambda: rig.mode == "LAND")
+    rig.pass_time(2.0)
+    assert rig.stop()
+    rig.outcome(job)
+    assert holds(rig, "BRAKE")
+    assert plnd(rig) == before
+
+
+def test_stopped_and_unloaded_in_one_breath_it_holds_and_plnd_is_as_before(flying):
+    rig = flying(alt=6.0, plnd=True, **LARGE)
+    before = plnd(rig)
+    rig.land(method="landing_target")
+    until(rig, lambda: rig.mode == "LAND")
+    rig.pass_time(1.0)
+
+    flights, abort_all = rig.flights, rig.flights.abort_all
+    flights.abort_all = lambda: (flights.stop("stopped"), abort_all())
+    rig.unload(last=True)
+    assert holds(rig, "BRAKE")
+    assert plnd(rig) == before
+
+
+def test_last_words_of_an_unloaded_module_go_when_its_parameters_are_given_back(flying):
+    rig = flying(alt=6.0, plnd=True, **LARGE)
+    before, words = plnd(rig), rig.host.last_words
+    rig.land(method="landing_target")
+    until(rig, lambda: rig.mode == "LAND")
+    rig.pass_time(1.0)
+    hear = rig.host._receive
+    silent(rig, "PARAM_VALUE")
+    rig.unload()
+    rig.pass_time(5.0)
+    assert rig.flights.last_words in words
+    rig.host._receive = hear
+    until(rig, lambda: rig.flights.last_words not in words)
+    assert plnd(rig) == before
+
+
+def test_what_is_on_its_way_to_land_by_landing_target_refuses_movements(flying):
+    rig = flying(alt=6.0, plnd=True, **LARGE)
+    hear = unheard(rig, "LAND")
+    job = rig.land(method="landing_target")
+    until(rig, lambda: rig.mode == "LAND")
+    rig.pass_time(0.2)
+    other = rig.begin(lambda one: rig.copter.go_to(one, NedTarget(30, 0, -9)), "/movement/go_to_ned")
+    assert rig.outcome(other).code == "busy"
+    rig.host._receive = hear
+    assert rig.outcome(job).startswith("Landed on tag 0")
+
+
+def test_a_landing_target_that_supersedes_another_gives_back_what_was_before_both(flying):
+    rig = flying(alt=6.0, plnd=True, **LARGE)
+    before = plnd(rig)
+    rig.land(method="landing_target")
+    until(rig, lambda: rig.simulator.parameters["PLND_ENABLED"] == 1)
+    second = rig.land(method="landing_target")
+    during: list[float] = []
+    rig.each_step.append(
+        lambda: during.append(rig.simulator.parameters["PLND_ENABLED"]) if rig.mode == "LAND" else None
+    )
+    assert rig.outcome(second).startswith("Landed on tag 0")
+    assert set(during[:-50]) == {1}
+    assert plnd(rig) == before
+
+
+@pytest.mark.parametrize("pause", [0.0, 1.1])
+def test_parameters_are_given_back_after_two_landings_in_a_row(flying, pause):
+    rig = flying(alt=7.0, plnd=True, **LARGE)
+    for name, value in (("PLND_RET_MAX", 4), ("PLND_ALT_MAX", 8), ("PLND_STRICT", 2), ("PLND_ALT_MIN", 0.75)):
+        rig.simulator.parameters.set(name, value)
+    before = plnd(rig)
+    hear = rig.host._receive
+    late = [rig.loop.call_later(0, int)]
+
+    def slowly(message: Any) -> None:
+        if message.get_type() == "PARAM_VALUE":
+            late.append(rig.loop.call_at(max(rig.loop.time() + 0.15, late[-1].when() + 1e-6), hear, message))
+        else:
+            hear(message)
+
+    rig.host._receive = slowly
+    first = rig.land(method="landing_target")
+    until(rig, lambda: rig.mode == "LAND")
+    rig.stop()
+    rig.outcome(first)
+    rig.pass_time(pause)
+    until(rig, lambda: rig.copter.mode == "BRAKE")
+    rig.outcome(rig.begin(lambda job: rig.copter.set_mode(job, "GUIDED"), "/command/guided"))
+    during: list[dict[str, float]] = []
+    rig.each_step.append(lambda: during.append(plnd(rig)) if rig.mode == "LAND" and rig.flights.running else None)
+    assert rig.outcome(rig.land(method="landing_target")).startswith("Landed on tag 0")
+    wanted = {name: WANTED[name] for name in PLND}
+    assert during[100] == wanted
+    rig.pass_time(20.0)
+    assert plnd(rig) == before
+
+
+@pytest.mark.parametrize("answers", ["slow", "lost"])
+def test_pilot_who_switches_while_parameters_are_set_ends_that(flying, answers):
+    rig = flying(alt=6.0, plnd=True, **LARGE)
+    for name, value in (("PLND_RET_MAX", 4), ("PLND_ALT_MAX", 8), ("PLND_STRICT", 2), ("PLND_ALT_MIN", 0.75)):
+        rig.simulator.parameters.set(name, value)
+    before, hear = plnd(rig), rig.host._receive
+
+    def hampered(message: Any) -> None:
+        if message.get_type() != "PARAM_VALUE":
+            hear(message)
+        elif answers == "slow":
+            rig.loop.call_later(0.5, hear, message)
+
+    job = rig.land(method="landing_target")
+    until(rig, lambda: sent(rig, "PARAM_SET"))
+    rig.host._receive = hampered
+    pilot(rig, 5)
+    until(rig, lambda: rig.copter.mode == "LOITER")
+    mark = len(rig.wire.sent)
+    rig.pass_time(0.1)
+    assert isinstance(rig.outcome(job), ModeChanged)
+    rig.pass_time(2.0)
+    rig.host._receive = hear
+    rig.pass_time(20.0)
+    assert [m.param_id for m in sent(rig, "PARAM_SET", mark) if m.param_value != before[m.param_id]] == []
+    assert plnd(rig) == before
+    assert rig.mode == "LOITER"
+
+
+def test_a_parting_is_not_cut_short_by_the_next_flight(flying):
+    rig = flying(alt=6.0, plnd=True, **LARGE)
+    job = rig.land(method="landing_target")
+    until(rig, lambda: rig.mode == "LAND")
+    rig.pass_time(1.0)
+    deliver = rig.wire.deliver
+
+    async def in_turns(message: Any, _system: int) -> None:  # MAVProxy's main loop turns every 20 ms
+        await asyncio.sleep(0.02)
+        deliver(message)
+
+    rig.wire.send = in_turns
+    rig.stop()
+    rig.pass_time(0.05)
+    job._task.cancel()
+    assert holds(rig, "BRAKE")
+
+
+def test_a_landing_that_is_stopped_before_it_took_over_leaves_the_one_under_way_alone(flying):
+    rig = flying(alt=6.0, plnd=True, **LARGE)
+    first = rig.land(method="landing_target")
+    until(rig, lambda: rig.mode == "GUIDED" and rig.simulator.parameters["PLND_ENABLED"] == 1)
+    ask = rig.copter.parameters.read
+
+    async def slowly(names: Any) -> Any:
+        await asyncio.sleep(5.0)
+        return await ask(names)
+
+    rig.copter.parameters.read = slowly
+    second = rig.land(method="landing_target")
+    rig.pass_time(0.2)
+    rig.abort(second)
+    rig.copter.parameters.read = ask
+    assert rig.outcome(first).startswith("Landed on tag 0")
+
+
+# -- what goes wrong in LAND -----------------------------------------------------------------------------------
+
+
+def test_without_positions_land_is_taken_back_and_ends(flying):
+    rig = flying(alt=6.0, plnd=True, **LARGE)
+    job = rig.land(method="landing_target")
+    until(rig, lambda: rig.mode == "LAND")
+    rig.pass_time(2.0)
+    silent(rig, "LOCAL_POSITION_NED")
+    until(rig, lambda: rig.mode == "GUIDED", 10)
+    error = rig.outcome(job)
+    assert isinstance(error, LandingFailed)
+    rig.pass_time(5.0)
+    assert rig.simulator.parameters["PLND_ENABLED"] == 0
+
+
+def test_a_landing_by_landing_target_ends_at_the_time_limit(flying):
+    rig = flying(alt=7.0, plnd=True, time_limit=10, **LARGE)
+    rig.simulator.parameters.set("LAND_SPEED", 30)
+    rig.simulator.parameters.set("LAND_SPEED_HIGH", 30)
+    error = rig.outcome(rig.land(method="landing_target"))
+    assert isinstance(error, LandingFailed)
+    assert "not landed within 10 s" in str(error)
+    assert error.report["action"] == "rtl"
+
+
+def test_parameters_are_given_back_when_a_lost_link_returns(flying):
+    rig = flying(alt=6.0, plnd=True, **LARGE)
+    before = plnd(rig)
+    job = rig.land(method="landing_target")
+    until(rig, lambda: rig.mode == "LAND")
+    rig.pass_time(1.0)
+    rig.simulator.faults.silence(rig.simulator.copter.now, 7.0, sending=True, receiving=True)
+    assert isinstance(rig.outcome(job), LinkLost)
+    assert plnd(rig) != before
+    rig.pass_time(20.0)
+    assert plnd(rig) == before
+
+
+@pytest.mark.parametrize("stuck", ["PLND_ENABLED", "PLND_ALT_MAX"])
+def test_a_parameter_that_cannot_be_given_back_does_not_keep_it_from_returning(flying, stuck):
+    rig = flying(alt=6.0, plnd=True, attempts=1, **LARGE)
+    rig.simulator.parameters.set("PLND_ALT_MAX", 8)
+    before = plnd(rig)
+    job = rig.land(method="landing_target")
+    until(rig, lambda: rig.mode == "LAND")
+    rig.eye.blind = lambda _: True
+    parameters = rig.simulator.parameters
+    take = parameters.set
+    parameters.set = lambda name, value: take(name, parameters[name] if name == stuck else value)
+    error = rig.outcome(job)
+    assert isinstance(error, LandingFailed)
+    assert error.report["action"] == "rtl"
+    assert ("does not take PLND_ENABLED = 0" in str(error)) == (stuck == "PLND_ENABLED")
+    parameters.set = take  # it was a bad link, say
+    rig.pass_time(30.0)
+    assert plnd(rig) == before
+
+
+def test_a_landing_that_succeeded_is_one_even_when_the_battery_is_pulled_at_once(flying):
+    rig = flying(plnd=True, **LARGE)
+    job = rig.land(method="landing_target")
+    until(rig, lambda: rig.mode == "LAND")
+    until(rig, lambda: rig.simulator.copter.armed is False)
+    rig.pass_time(2.5)  # what tells a landing from a fall
+    rig.simulator.faults.silence(rig.simulator.copter.now, 1000, sending=True, receiving=True)
+    assert rig.outcome(job).startswith("Landed on tag 0")
+
+
+def test_motors_that_stop_in_flight_are_no_landing(flying):
+    rig = flying(alt=6.0, plnd=True, **LARGE)
+    job = rig.land(method="landing_target")
+    until(rig, lambda: rig.mode == "LAND")
+    rig.pass_time(1.5)
+    rig.wire.deliver(mavlink.MAVLink_command_long_message(1, 1, 400, 0, 0, 21196, 0, 0, 0, 0, 0))
+    error = rig.outcome(job)
+    assert isinstance(error, NotArmed)
+    assert "fell" in str(error)
+
+
+def test_a_target_that_is_no_number_is_not_told_and_the_landing_goes_on_by_itself(flying):
+    rig = flying(alt=6.0, plnd=True, **LARGE)
+    before = plnd(rig)
+    job = rig.land(method="landing_target")
+    until(rig, lambda: rig.mode == "LAND")
+    rig.pass_time(1.5)
+    rig.tracker.target.place[:] = math.nan
+    assert "a number in it is not finite" in str(rig.outcome(job))
+    rig.pass_time(3.0)
+    assert rig.mode == "LAND"
+    assert plnd(rig) == before
+    assert all(map(is_finite, rig.wire.sent))
