@@ -1,4 +1,4 @@
-"""What answers every request, and the server that listens for them."""
+"""The HTTP application and its server."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ from mavproxy_uavapi.http.security import door
 log = logging.getLogger("uavapi.http.server")
 MIDDLEWARES = (headers_are_here, errors_as_answers, door, at_a_bearable_rate, yield_to_main_loop)
 WITH_BODY = ("POST", "PUT")
-SHUTDOWN_TIMEOUT = 1.0  # s for answers that are being written when we stop
+SHUTDOWN_TIMEOUT = 1.0  # s for unfinished answers when the server stops
 
 
 def make_handler(service: Service, system: int = 0) -> Handler:
-    """What answers every request.
+    """The handler of all requests.
 
     Args:
-        service: what the handlers work with.
-        system: the system id that paths mean which name none; 0 for the settings' one.
+        service: the objects that the handlers work with.
+        system: the system id for paths that name none; 0 for the one in the settings.
     """
     router = Router(ROUTES, service.host.extensions, system)
 
@@ -57,16 +57,16 @@ def make_handler(service: Service, system: int = 0) -> Handler:
 
 
 async def make_server(service: Service, system: int = 0) -> web.Server:
-    """aiohttp's server, without an address yet; arguments as for `make_handler`."""
+    """aiohttp's server, not yet listening; arguments as for `make_handler`."""
     return web.Server(
         make_handler(service, system),
-        # A handler is cancelled when its client hangs up: that is how a verb learns that nobody awaits it.
+        # A handler is cancelled when its client hangs up; so a verb learns that its client has gone.
         handler_cancellation=True,
         access_log=None,
         logger=log,
         keepalive_timeout=IDLE_TIMEOUT,
         lingering_time=LINGER,
-        auto_decompress=False,  # what is compressed is refused, and thrown away as it is
+        auto_decompress=False,  # compressed bodies are refused and discarded unread
     )
 
 
@@ -95,7 +95,7 @@ _behind_the_door = _guarded(_answer)
 
 
 def is_ours(record: logging.LogRecord) -> bool:
-    """Whether a line of aiohttp's is about us, rather than about a client that speaks no HTTP, or has gone."""
+    """Whether an aiohttp log line is about us; lines about clients that speak no HTTP or have gone are not."""
     return record.exc_info is None or not isinstance(record.exc_info[1], HttpProcessingError | ConnectionError)
 
 
@@ -112,7 +112,7 @@ class ApiServer:
         self._listener: Listener | None = None
 
     async def start(self) -> None:
-        """Listen, on each port of the settings.
+        """Listen on each port of the settings.
 
         Raises:
             OSError: a port is taken, there is no such address, or the TLS files cannot be read.
@@ -129,7 +129,7 @@ class ApiServer:
         self._listener = Listener(servers, tls, most, throttle)
 
     async def stop(self) -> None:
-        """End the verbs in flight, answer their clients, and close the ports."""
+        """End the running jobs, answer their clients, and close the ports."""
         self.service.host.jobs.abort_remote("the API is stopping")
         if self._listener is not None:
             self._listener.close_ports()
@@ -145,13 +145,13 @@ class ApiServer:
 
 
 def tls_context(certfile: str, keyfile: str) -> ssl.SSLContext:
-    """What a TLS server needs.
+    """The TLS context of the server.
 
     Raises:
-        OSError: a file cannot be read, or is no PEM of that kind.
+        OSError: a file cannot be read, or is not a PEM file of that kind.
     """
     for file in (certfile, keyfile):
-        Path(file).open("rb").close()  # ssl's own error would not name the file
+        Path(file).open("rb").close()  # ssl's own error does not name the file
     context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
     context.load_cert_chain(certfile, keyfile)
     return context

@@ -1,4 +1,4 @@
-"""What the audit trail learns of a call: when its answer is known, and of a job that goes on, when that has ended."""
+"""Writes calls to the audit trail when their answer is known; jobs that go on are written when they end."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ GONE = "the client hung up"
 
 
 async def audited(call: Call, action: Action) -> Answer:
-    """Run an action that commands, and leave a trace of it."""
+    """Run a command and leave a trace of it."""
     with noting_sent() as sent:
         trace = Trace(call, sent)
         try:
@@ -32,11 +32,11 @@ async def audited(call: Call, action: Action) -> Answer:
 
 
 class Trace:
-    """One call, from its request on.
+    """The trail entry of one call, from its request on.
 
     Args:
         call: the call.
-        sent: names of the messages that it sends, as they go out.
+        sent: names of the messages that the call sends; it grows as they go out.
     """
 
     def __init__(self, call: Call, sent: SentNames) -> None:
@@ -50,14 +50,14 @@ class Trace:
             self._system = 0
 
     def leave_at_end(self, outcome: str, detail: str) -> None:
-        """Leave the trace when the call's job has ended: now, unless that goes on without its client."""
+        """Leave the trace when the call's job has ended, or now if the job does not go on without its client."""
         job = self._call.job
         if job is None or not job.running:
             self.leave(outcome, detail)
             return
         loop = asyncio.get_running_loop()
 
-        def leave_soon() -> None:  # what the vehicle is sent then goes out first
+        def leave_soon() -> None:  # the last messages to the vehicle go out first
             loop.call_soon(self._leave_with_job, outcome, detail)
 
         job.when_ended(leave_soon)

@@ -1,4 +1,4 @@
-"""Bodies, before they are read: whether they can be taken, and that they may come."""
+"""Request bodies before they are read: which are refused, and 100-continue."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ CONTINUE = b"HTTP/1.1 100 Continue\r\n\r\n"
 
 
 async def invite(request: web.BaseRequest) -> None:
-    """Refuse a body that is compressed: a small one may hold a very large one. Send for one that waits to be asked.
+    """Refuse a compressed body, because a small one may hold a very large one; answer 100-continue if it is expected.
 
     Raises:
         BadRequest: the client has gone.
         HTTPUnsupportedMediaType: it is compressed.
-        HTTPExpectationFailed: the client expects what there is not.
+        HTTPExpectationFailed: the client expects something other than 100-continue.
     """
     encoding = request.headers.get("Content-Encoding", "identity").strip().lower()
     if encoding != "identity":
-        raise web.HTTPUnsupportedMediaType(reason="compressed bodies are not taken")
+        raise web.HTTPUnsupportedMediaType(reason="compressed bodies are not accepted")
     expected = request.headers.get("Expect")
     if expected is None:
         return

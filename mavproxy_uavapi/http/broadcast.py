@@ -1,4 +1,4 @@
-"""Each message that arrives, for all who listen: encoded once, and only when somebody reads it. Pure."""
+"""Passes each arriving message to all subscribers, encoded once and only when somebody reads it. Pure."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from mavproxy_uavapi.http.responses import dumps
 from mavproxy_uavapi.http.telemetry_views import fields
 
 QUEUED = 1000  # messages; a client that reads slower than that loses the oldest
-TOGETHER = 100  # messages that a client gets in one go
+TOGETHER = 100  # messages that a client gets at once
 
 Listener = Callable[[VehicleState, Any, float], None]
 
 
 class Event:
-    """A message on its way to all who want it.
+    """A message on its way to its subscribers.
 
     Args:
         message: the MAVLink message.
-        at: when it arrived, s since 1970.
+        at: its arrival, s since 1970.
     """
 
     def __init__(self, message: Any, at: float) -> None:
@@ -34,30 +34,30 @@ class Event:
 
     @cached_property
     def _members(self) -> str:
-        told = {
+        members = {
             "system": self.message.get_srcSystem(),
             "component": self.message.get_srcComponent(),
             "name": self.name,
             "time": round(self._at, 3),
             "fields": fields(self.message),
         }
-        return dumps(told)[1:]
+        return dumps(members)[1:]
 
     def json(self, dropped: int) -> str:
-        """The event for a client that has lost `dropped` messages so far."""
+        """The event as JSON, for a client that has lost `dropped` messages so far."""
         return f'{{"dropped": {dropped}, {self._members}'
 
 
 class Subscription:
-    """What one client wants to hear, and what it has not read yet.
+    """One client's filter, and its messages that are not yet read.
 
     Args:
-        names: of the messages that it wants; none for all.
+        names: of the wanted messages; empty for all.
         system: the system id; None for all.
-        rate: Hz at most of each name of each component; None for all.
+        rate: highest rate of each name of each component in Hz; None for all messages.
 
     Attributes:
-        dropped: messages that it has lost, because it read too slowly.
+        dropped: messages lost because the client reads too slowly.
     """
 
     def __init__(self, names: frozenset[str], system: int | None, rate: float | None) -> None:
@@ -84,7 +84,7 @@ class Subscription:
         self._news.set()
 
     async def next(self) -> list[Event]:
-        """The next events, one at least."""
+        """The next events, at least one."""
         while not self._queue:
             self._news.clear()
             await self._news.wait()
@@ -92,10 +92,10 @@ class Subscription:
 
 
 class TelemetryBroadcast:
-    """Tells every subscription of the messages that arrive.
+    """Passes arriving messages to every subscription.
 
     Args:
-        listeners: the host's; it is among them while there is a subscription.
+        listeners: the host's; the broadcast is in it while there is a subscription.
     """
 
     def __init__(self, listeners: list[Listener]) -> None:
@@ -104,7 +104,7 @@ class TelemetryBroadcast:
 
     @contextmanager
     def heard_by(self, subscription: Subscription) -> Iterator[Subscription]:
-        """Offer it all messages for as long as the context lasts."""
+        """Offer all messages to a subscription for as long as the context lasts."""
         if not self._subscriptions:
             self._listeners.append(self._offer)
         self._subscriptions.append(subscription)

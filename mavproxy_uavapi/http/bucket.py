@@ -1,6 +1,6 @@
-"""How often who may ask."""
+"""Limits how often a client may call."""
 
-BURST = 2.0  # s of the long-run rate that a client may use up at once
+BURST = 2.0  # s of the long-run rate that a client may use at once
 CLIENTS_KEPT = 1000
 
 
@@ -8,13 +8,13 @@ class Bucket:
     """A token bucket for each client. Pure: the clock is an argument."""
 
     def __init__(self) -> None:
-        self._used: dict[str, tuple[float, float]] = {}  # client -> (tokens used up, at)
+        self._used: dict[str, tuple[float, float]] = {}  # client -> (tokens used, at)
 
     def take(self, client: str, rate: float, now: float) -> float:
-        """Take one request of `client`; 0, or the seconds to wait when it has used up its share.
+        """Take one request of `client`; 0, or the seconds to wait if its tokens are used.
 
         Args:
-            client: who it is (`caller.group_of`).
+            client: the client's group (`caller.group_of`).
             rate: requests per second in the long run.
             now: s.
         """

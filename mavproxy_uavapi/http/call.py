@@ -1,4 +1,4 @@
-"""One request on its way through: who is asked, for what, and how a verb is awaited."""
+"""One request: its vehicle, its parameters, and how its verb is awaited."""
 
 from __future__ import annotations
 
@@ -38,17 +38,17 @@ ON_DISCONNECT = {"continue": "nothing", "hold": "hold"}  # the query's `on_disco
 
 @dataclass
 class Service:
-    """What the handlers work with.
+    """The objects that the handlers work with.
 
     Attributes:
-        host: the vehicles, and the verbs in flight.
-        settings: the snapshot in force.
+        host: the vehicles and their jobs.
+        settings: the present settings.
         scripts: the mission scripts.
-        broadcast: the telemetry, for those who listen.
-        streams: the slots of answers that go on, of all kinds.
-        callers: how often those have asked whom the door let in.
-        strangers: how often those whom it did not.
-        throttle: for lines of the log that a stranger can cause.
+        broadcast: the telemetry for subscribers.
+        streams: the slots of streaming answers, of all kinds.
+        callers: the request rates of callers that passed the door check.
+        strangers: the request rates of callers that did not.
+        throttle: for log lines that a stranger can cause.
     """
 
     host: Host
@@ -72,9 +72,9 @@ class Call:
     Attributes:
         path: the route's path, without the prefix of a vehicle.
         named_system: the system id that the path, or the port, names; 0 for none.
-        names: what stands in the place of each `{name}` of the route's path.
-        job: what the call has begun, or joined.
-        remembered: what stands for the parameters in the job and in the trail: themselves, unless they are long.
+        names: the value of each `{name}` in the route's path.
+        job: the job that the call has begun or joined.
+        remembered: what the job and the audit trail store instead of the parameters, if those are long.
     """
 
     def __init__(self, service: Service, request: web.BaseRequest, params: Request, match: Match = NOWHERE) -> None:
@@ -88,13 +88,13 @@ class Call:
         self.job: Job | None = None
 
     def params(self, model: type[R]) -> R:
-        """The parameters, which the route has validated by `model`."""
+        """The parameters, already validated by the route as `model`."""
         assert isinstance(self._params, model)
         return self._params
 
     @property
     def system(self) -> int:
-        """The system id that is meant; 0 for MAVProxy's current vehicle."""
+        """The system id that the request means; 0 for MAVProxy's current vehicle."""
         return self.named_system or self.service.settings.sysid
 
     @property
@@ -104,7 +104,7 @@ class Call:
 
     @property
     def vehicle(self) -> Vehicle:
-        """The vehicle, with a link that is alive: it can be commanded.
+        """The vehicle, whose link must be alive so that it can be commanded.
 
         Raises:
             NotSupported: its type does not have the route's verb.
@@ -138,19 +138,19 @@ class Call:
         *,
         outlives_client: bool = False,
         urgent: bool = False,
-        asked: Request | None = None,
+        identity: Request | None = None,
     ) -> Answer:
-        """Run a flight verb as a job and await it; or answer 202 at once, where the client wants it so.
+        """Run a flight verb as a job and await it; answer 202 at once if the client wants that.
 
         Args:
-            vehicle: what the job commands.
-            verb: what to do.
-            result: the text of its success, or what makes it afterwards.
+            vehicle: the vehicle that the job commands.
+            verb: the verb.
+            result: the result text of a success, or a function that makes it afterwards.
             outlives_client: whether it goes on when the client hangs up.
-            urgent: whether it ends a flight or a movement, so that no limit of jobs refuses it.
-            asked: what tells one request from another, where the parameters do not.
+            urgent: whether it ends a flight or a movement; no limit on jobs refuses it then.
+            identity: what identifies the request, if the parameters do not.
         """
-        params = self.remembered = asked or self.remembered
+        params = self.remembered = identity or self.remembered
         is_async, on_disconnect = self.is_async, self.on_disconnect
 
         async def body(job: Job) -> str:
@@ -173,7 +173,7 @@ class Call:
         )
         job.on_disconnect = on_disconnect or job.on_disconnect
         script = None
-        if is_async or (outlives_client and not urgent):  # else it ends with its client, or stops the vehicle
+        if is_async or (outlives_client and not urgent):  # other jobs end with their client, or stop the vehicle
             self.job = job
             script = await job.go_on_for(self.service.scripts.session_of(self.peer))
         if is_async:
@@ -181,22 +181,22 @@ class Call:
         return self.answer(await self.outcome(job, script))
 
     async def outcome(self, job: Job, script: str | None = None) -> str:
-        """Await a job for the client, which `script` is if it is the session of one.
+        """Await a job for the client; `script` is the client's session, if it is a script.
 
         Raises:
-            UavApiError: what the job failed with.
+            UavApiError: the error that the job failed with.
         """
         self.job = job
         return await job.outcome(script)
 
     @property
     def asked(self) -> dict[str, Any]:
-        """The parameters that were given, or have a default; or what stands for them."""
+        """The parameters that were sent or have a default, or `remembered`."""
         return self.remembered.model_dump(exclude_none=True)
 
     @contextlib.contextmanager
     def naming_source(self) -> Iterator[None]:
-        """What is refused as Invalid tells by what part of the request it came."""
+        """Within the context an Invalid error names the part of the request that its value came from."""
         try:
             yield
         except Invalid as error:
@@ -217,7 +217,7 @@ class Call:
 
     @property
     def is_async(self) -> bool:
-        """Whether the client wants the job's number rather than its outcome."""
+        """Whether the client wants the job's number instead of its outcome."""
         prefers = self.request.headers.get("Prefer", "").replace(" ", "").lower().split(",")
         wait = self.request.query.get("wait", "true").lower()
         if wait not in WAITS | HURRIES:
@@ -226,14 +226,14 @@ class Call:
 
     @property
     def on_disconnect(self) -> str | None:
-        """What the client wants of the vehicle when it hangs up, where it says so in the query."""
-        wanted = self.request.query.get("on_disconnect")
-        if wanted is not None and wanted not in ON_DISCONNECT:
-            raise Invalid(f"{wanted!r} is none of {', '.join(ON_DISCONNECT)}", "query", "on_disconnect")
-        return None if wanted is None else ON_DISCONNECT[wanted]
+        """What the vehicle does when the client hangs up, if the query says so."""
+        action = self.request.query.get("on_disconnect")
+        if action is not None and action not in ON_DISCONNECT:
+            raise Invalid(f"{action!r} is none of {', '.join(ON_DISCONNECT)}", "query", "on_disconnect")
+        return None if action is None else ON_DISCONNECT[action]
 
     def accepted(self, job: Job) -> web.Response:
-        """202: the job goes on, and where it is to be found."""
+        """202: the job goes on; the answer says where to find it."""
         self.job = job
         body = self.answer(f"Job {job.id} accepted", job=job.id)
         return web.json_response(body, status=202, headers={"Location": f"/jobs/{job.id}"})
@@ -244,10 +244,10 @@ SERVICE = web.RequestKey("service", Service)
 
 
 async def in_time(body: Awaitable[T]) -> T:
-    """The body, once it has arrived.
+    """The body, when it has arrived.
 
     Raises:
-        BadRequest: it has not, within BODY_TIMEOUT, or the client hung up.
+        BadRequest: it did not arrive within BODY_TIMEOUT, or the client hung up.
     """
     try:
         return await wait_with_timeout(BODY_TIMEOUT, body)
@@ -262,7 +262,7 @@ async def _body(request: web.BaseRequest, form: bool) -> Any:
 
 
 async def parameters(request: web.BaseRequest, model: type[Request], body: bool) -> Request:
-    """The request's parameters: the query's, and where the route takes a body, the body's over them.
+    """The request's parameters: the query's, overridden by those of the body if the route takes one.
 
     Raises:
         BadRequest: the body is not a JSON object.
@@ -273,10 +273,10 @@ async def parameters(request: web.BaseRequest, model: type[Request], body: bool)
         return parse(model, "query", values)
     form = request.content_type == "application/x-www-form-urlencoded"
     try:
-        body_is_here = request.content.is_eof()  # as a rule, and then nothing has to be timed
-        given = await (_body(request, form) if body_is_here else in_time(_body(request, form)))
-    except (ValueError, LookupError, RecursionError) as error:  # no such charset; nested without end
+        body_is_here = request.content.is_eof()  # usually, and then no timeout is needed
+        members = await (_body(request, form) if body_is_here else in_time(_body(request, form)))
+    except (ValueError, LookupError, RecursionError) as error:  # unknown charset; nested too deeply
         raise BadRequest(f"the body is not {'a form' if form else 'JSON'}: {error}") from error
-    if not isinstance(given, dict):
+    if not isinstance(members, dict):
         raise BadRequest("the body is not a JSON object")
-    return parse(model, "body", {**values, **cast(dict[str, Any], given)})
+    return parse(model, "body", {**values, **cast(dict[str, Any], members)})

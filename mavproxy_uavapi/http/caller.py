@@ -1,4 +1,4 @@
-"""Who calls: an address, whom it shares its limits with, and what the door let it in by."""
+"""The caller: its address, its group for limits, and how it passed the door check."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from mavproxy_uavapi.settings import Network
 
 IpAddress = ipaddress.IPv4Address | ipaddress.IPv6Address
 
-PREFIX = 64  # bits of an IPv6 address that say whose it is: the rest its owner chooses as he likes
+PREFIX = 64  # bits of an IPv6 address that identify its owner, who chooses the other bits freely
 NOBODY = "unknown"
 LOOPBACK = "this machine"
 
 
 @functools.lru_cache(maxsize=1024)
 def address_of(remote: str | None) -> IpAddress | None:
-    """A peer's address without its zone; an IPv4 address that is written as IPv6 is IPv4. None where it is none."""
+    """A peer's address without its zone; an IPv4 address written as IPv6 becomes IPv4. None if there is none."""
     try:
         address = ipaddress.ip_address((remote or "").partition("%")[0])
     except ValueError:
@@ -31,7 +31,7 @@ def address_of(remote: str | None) -> IpAddress | None:
 
 @functools.lru_cache(maxsize=1024)
 def group_of(address: IpAddress | None) -> str:
-    """Who counts as one caller: an IPv4 address, a /64 of IPv6, or this machine."""
+    """The caller's group for limits: an IPv4 address, a /64 of IPv6, or this machine."""
     if address is None:
         return NOBODY
     if address.is_loopback:
@@ -43,12 +43,12 @@ def group_of(address: IpAddress | None) -> str:
 
 @dataclass(frozen=True)
 class Caller:
-    """Whom the door let in.
+    """A caller that passed the door check.
 
     Attributes:
-        address: its IP address; None where the connection has none.
+        address: its IP address; None if the connection has none.
         has_token: whether it sent the token.
-        forwarded: whether a proxy passed the request on, so that the address is the proxy's.
+        forwarded: whether a proxy passed the request on; the address is the proxy's then.
     """
 
     address: IpAddress | None
@@ -57,17 +57,19 @@ class Caller:
 
     @property
     def group(self) -> str:
-        """Whose requests are counted together."""
+        """The group whose requests are counted together."""
         return group_of(self.address)
 
     @property
     def is_local(self) -> bool:
-        """Whether it is a program of this machine."""
+        """Whether it is a program on this machine."""
         return not self.forwarded and self.address is not None and self.address.is_loopback
 
     def is_in(self, networks: Iterable[Network]) -> bool:
-        """Whether one of them is its own, as far as its address says."""
-        return not self.forwarded and self.address is not None and any(self.address in one for one in networks)
+        """Whether its address is in one of `networks`; never behind a proxy."""
+        return (
+            not self.forwarded and self.address is not None and any(self.address in network for network in networks)
+        )
 
 
-CALLER = web.RequestKey("caller", Caller)  # where the door leaves whom it let in
+CALLER = web.RequestKey("caller", Caller)  # set by the door check

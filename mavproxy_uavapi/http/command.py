@@ -8,7 +8,7 @@ from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import Blocking, Disarm, LandAt, ModeName, NewSpeed, Reverse, SimFactor, Takeoff
 from mavproxy_uavapi.http.responses import Answer
 
-LANDED = {"plane": "Landed successfully"}  # by the type of vehicle, as its clients know it
+LANDED = {"plane": "Landed successfully"}  # by type of vehicle; clients expect these texts
 RETURNED = {"copter": "Landed at home successfully"}
 
 
@@ -43,7 +43,7 @@ async def land(call: Call) -> Answer:
 
 
 async def land_at(call: Call) -> Answer:
-    """Begin to land a plane at a place, by a mission that takes the place of its own; answers when it flies that."""
+    """Begin to land a plane at a place, by a mission that replaces its own; answers when the plane flies it."""
     vehicle, p = call.vehicle, call.params(LandAt)
     return await call.fly(
         vehicle,
@@ -75,7 +75,7 @@ async def reboot(call: Call) -> Answer:
 
 
 async def set_reverse(call: Call) -> Answer:
-    """Drive a rover backwards from now on, or forwards again."""
+    """Drive a rover backwards, or forwards again."""
     vehicle, p = call.vehicle, call.params(Reverse)
     result = f"Driving {'backwards' if p.reverse else 'forwards'}"
     return await call.fly(vehicle, lambda job: vehicle.set_reverse(job, p.reverse), result)
@@ -103,8 +103,8 @@ async def _set_speed(call: Call, kind: str, name: str) -> Answer:
         in_force.append(await vehicle.set_speed(job, kind, speed))
 
     def result() -> str:
-        when = "" if in_force[0] else "; it takes effect when the vehicle flies in GUIDED"
-        return f"{name} speed set to {speed}m/s{when}"
+        condition = "" if in_force[0] else "; it takes effect when the vehicle flies in GUIDED"
+        return f"{name} speed set to {speed}m/s{condition}"
 
     return await call.fly(vehicle, verb, result)
 
@@ -130,7 +130,7 @@ async def set_descent_speed(call: Call) -> Answer:
 
 
 async def set_sim_speedup(call: Call) -> Answer:
-    """Set how much faster than the clock a simulated vehicle flies."""
+    """Set how much faster than real time a simulated vehicle flies."""
     vehicle, factor = call.vehicle, call.params(SimFactor).sim_factor
     result = f"Simulation speedup set to {factor}x"
     return await call.fly(vehicle, lambda _: vehicle.set_sim_speedup(factor), result)

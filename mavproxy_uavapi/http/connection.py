@@ -1,4 +1,4 @@
-"""One connection: its patience with slow headers, and what decides whether it may stay."""
+"""One connection: its timeout for slow headers, and the state that decides whether it may stay."""
 
 from __future__ import annotations
 
@@ -12,34 +12,34 @@ from aiohttp import web
 
 from mavproxy_uavapi.http.responses import Handler
 
-HEADER_TIMEOUT = 10.0  # s from the first byte of a connection, or of its next request, to the end of the headers
+HEADER_TIMEOUT = 10.0  # s from the first byte of a request to the end of its headers
 IDLE_TIMEOUT = 30.0  # s that a connection may wait for its next request
-LINGER = 1.0  # s in which the rest of a refused body is thrown away: closed at once, its sender would lose the answer
-LINGER_SIZE = 4 * 1024 * 1024  # bytes of it
+LINGER = 1.0  # s in which the rest of a refused body is discarded; an immediate close would lose the answer
+LINGER_SIZE = 4 * 1024 * 1024  # bytes that are discarded at most
 
 
 class Connection(asyncio.Protocol):
-    """Wraps aiohttp's protocol: closes a connection whose headers do not arrive in time.
+    """Wraps aiohttp's protocol and closes a connection whose headers do not arrive in time.
 
-    aiohttp itself waits for the rest of a request line for ever.
+    aiohttp itself waits without limit for the rest of a request line.
 
     Args:
         factory: makes aiohttp's protocol.
-        peer: the socket, which nobody reads yet; None where a transport is there at once.
-        group: whose connection it is (`caller.group_of`).
-        on_lost: called when it is over.
+        peer: the socket, not yet read; None if the transport exists already.
+        group: the caller's group (`caller.group_of`).
+        on_lost: called when the connection is over.
 
     Attributes:
-        group: as given.
+        group: see above.
         silent: whether the peer has sent nothing yet.
-        admitted: whether the last request has passed the door.
-        refused: whether the last request has not; the connection is about to be closed.
+        admitted: whether the last request has passed the door check.
+        refused: whether the last request has failed it; the connection is about to be closed.
         answering: whether a request is being answered.
-        idle_since: s, of the loop's clock; when it was made, or its last answer was ready.
-        closing: whether it has been told to end.
+        idle_since: s, of the loop's clock: when it was made, or when its last answer was ready.
+        closing: whether it is being closed.
     """
 
-    _of: ClassVar[dict[Any, Connection]] = {}  # by aiohttp's protocol, while the connection lasts
+    _of: ClassVar[dict[Any, Connection]] = {}  # by aiohttp's protocol, for open connections
 
     def __init__(
         self,
@@ -62,11 +62,11 @@ class Connection(asyncio.Protocol):
 
     @classmethod
     def of(cls, request: web.BaseRequest) -> Connection | None:
-        """The wrapper of a request's connection; None under a server that is not ours."""
+        """The wrapper of a request's connection; None under another server."""
         return cls._of.get(request.protocol)
 
     def began(self) -> None:
-        """The headers are here."""
+        """The headers have arrived."""
         self.answering = True
         self._stop_timer()
 
@@ -76,24 +76,24 @@ class Connection(asyncio.Protocol):
         self.idle_since = self._loop.time()
 
     def judged(self, admitted: bool) -> None:
-        """The door has let the request in, or refused it."""
+        """The door check has passed or refused the request."""
         self.admitted, self.refused = admitted, not admitted
 
-    def await_first_byte(self, ready: Callable[[Connection], object]) -> None:
-        """Call `ready` when the peer has sent something; until then a connection costs a socket and no more."""
+    def await_first_byte(self, on_ready: Callable[[Connection], object]) -> None:
+        """Call `on_ready` when the peer has sent something; until then a connection needs no more than a socket."""
         assert self.peer is not None
         self.silent = True
-        self._loop.add_reader(self.peer, self._first_byte, ready)
+        self._loop.add_reader(self.peer, self._first_byte, on_ready)
         self._expect_headers()
 
-    def _first_byte(self, ready: Callable[[Connection], object]) -> None:
+    def _first_byte(self, on_ready: Callable[[Connection], object]) -> None:
         assert self.peer is not None
         self.silent = False
         self._loop.remove_reader(self.peer)
-        ready(self)
+        on_ready(self)
 
     def abort(self) -> None:
-        """Close it, without waiting for anything."""
+        """Close the connection at once."""
         self.closing = True
         if self._transport is not None:
             self._transport.abort()
@@ -102,8 +102,8 @@ class Connection(asyncio.Protocol):
             self.peer.close()
             self._lost()
         elif self.peer is not None:
-            with contextlib.suppress(OSError):  # the peer was quicker
-                self.peer.shutdown(socket.SHUT_RDWR)  # what waits for the handshake sees its end
+            with contextlib.suppress(OSError):  # the peer closed it first
+                self.peer.shutdown(socket.SHUT_RDWR)  # this ends a wait for the handshake
 
     def _stop_timer(self) -> None:
         if self._timer is not None:
@@ -117,7 +117,7 @@ class Connection(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """See asyncio.Protocol."""
         self._transport = transport
-        if self.closing:  # somebody else has its place since
+        if self.closing:  # its place has been given away
             self.abort()
             return
         self._inner = self._factory()
@@ -158,7 +158,7 @@ class Connection(asyncio.Protocol):
         self._lost()
 
     def abandon(self) -> None:
-        """There was no TLS handshake: aiohttp never hears of it."""
+        """The TLS handshake failed; aiohttp never learns of the connection."""
         self.closing = True
         self._lost()
 
@@ -169,7 +169,7 @@ class Connection(asyncio.Protocol):
 
 
 async def headers_are_here(request: web.BaseRequest, handler: Handler) -> web.StreamResponse:
-    """Tell the connection that a request has begun, and when it is answered; close it on a body that nobody read."""
+    """Mark a request as begun and later as answered; close its connection if nobody read the body."""
     connection = Connection.of(request)
     if connection is not None:
         connection.began()

@@ -1,10 +1,10 @@
-"""Pages of other sites that the owner trusts (setting `cors_origins`): what tells the browser so."""
+"""CORS headers for pages of other sites that the owner trusts (setting `cors_origins`)."""
 
 from __future__ import annotations
 
 from aiohttp import web
 
-TRUSTED: web.RequestKey[str] = web.RequestKey("trusted", str)  # the origin of the trusted page that asks
+TRUSTED: web.RequestKey[str] = web.RequestKey("trusted", str)  # the origin of the trusted page that calls
 HEADERS = {
     "Access-Control-Allow-Methods": "GET, POST, PUT, DELETE",
     "Access-Control-Allow-Headers": "Authorization, Content-Type, Prefer",
@@ -14,7 +14,7 @@ HEADERS = {
 
 
 def name_the_trusted(request: web.BaseRequest, response: web.StreamResponse) -> None:
-    """Tell the browser, in an answer's headers, that the page which asked may read it; nothing for any other page."""
+    """Tell the browser, in an answer's headers, that the calling page may read it, if that page is trusted."""
     origin = request.get(TRUSTED)
     if origin is not None:
         response.headers.update({"Access-Control-Allow-Origin": origin, **HEADERS})

@@ -1,4 +1,4 @@
-"""/docs: Swagger UI over /openapi.json, without internet: its files come from the package swagger-ui-py."""
+"""/docs: Swagger UI for /openapi.json, without internet: its files come from the package swagger-ui-py."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ASSETS = {
     "swagger-ui-bundle.js": "text/javascript",
     "favicon-32x32.png": "image/png",
 }
-# Only what we serve runs there; Swagger UI itself sets styles on elements and has its icons in the CSS.
+# Only our own scripts run there; Swagger UI itself sets styles on elements and has its icons in the CSS.
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
     "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -63,9 +63,9 @@ window.ui = SwaggerUIBundle({
 
 
 async def page(_call: Call) -> web.StreamResponse:
-    """The documentation as a page, from which each endpoint can be tried."""
+    """The documentation as a page on which each endpoint can be tried."""
     if await asyncio.to_thread(_folder) is None:
-        raise NotFound("the page needs swagger-ui-py (pip install swagger-ui-py); /openapi.json is there without it")
+        raise NotFound("the page needs swagger-ui-py (pip install swagger-ui-py); /openapi.json works without it")
     return web.Response(text=PAGE, content_type="text/html", charset="utf-8", headers=HEADERS)
 
 
@@ -83,8 +83,8 @@ async def asset(call: Call) -> web.StreamResponse:
 
 
 def _folder() -> Path | None:
-    """Where the package has its files; it is not imported, because it would bring its web frameworks along."""
-    found = find_spec(PACKAGE)
-    if found is None or found.origin is None:
+    """The folder of the package's files; the package is not imported, because that would import web frameworks."""
+    spec = find_spec(PACKAGE)
+    if spec is None or spec.origin is None:
         return None
-    return Path(found.origin).parent / "static"
+    return Path(spec.origin).parent / "static"

@@ -1,4 +1,4 @@
-"""The one place where errors become answers."""
+"""Turns errors into answers, in one place."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from mavproxy_uavapi.http.call import SERVICE
 from mavproxy_uavapi.http.responses import Handler, dumps, failure
 
 log = logging.getLogger("uavapi.http")
-REFUSALS = (401, 403, 429)  # statuses of a caller that is turned away
+REFUSALS = (401, 403, 429)  # statuses of refused callers
 
 
 def of_http_exception(error: web.HTTPException) -> web.Response:
-    """What aiohttp itself refuses (no such path, wrong method, too large a body), in our words."""
-    ours: UavApiError
+    """The answer to a refusal by aiohttp itself (no such path, wrong method, too large a body), in our format."""
+    refusal: UavApiError
     if error.status == 404:
-        ours = NotFound("no such path")
-        return failure(ours)
-    ours = BadRequest(error.reason)
-    response = web.json_response({"detail": ours.detail, "code": ours.code}, status=error.status, dumps=dumps)
+        refusal = NotFound("no such path")
+        return failure(refusal)
+    refusal = BadRequest(error.reason)
+    response = web.json_response({"detail": refusal.detail, "code": refusal.code}, status=error.status, dumps=dumps)
     if "Allow" in error.headers:
         response.headers["Allow"] = error.headers["Allow"]
     return response
 
 
 async def errors_as_answers(request: web.BaseRequest, handler: Handler) -> web.StreamResponse:
-    """The one place where errors become answers."""
+    """Turn every error into an answer."""
     try:
         return await handler(request)
     except UavApiError as error:

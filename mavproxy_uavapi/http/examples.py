@@ -1,6 +1,6 @@
-"""What the documentation shows: an example request for each model, an example answer for each path.
+"""The documentation's examples: a request per model, an answer per path.
 
-Tests hold both against the program: requests against their models, answers against what a vehicle makes of them.
+Tests check both: requests against their models, answers against those for a vehicle.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ PATH_PARAMETERS = {
     "file": {"/docs/{file}": "swagger-ui.css"},
 }
 
-# What is in the body's `result`, and what there is besides device, id and result.
+# The body's `result`, and its members besides device, id and result.
 RESULTS: Mapping[str, str] = {
     "/command/arm": "Armed vehicle",
     "/command/disarm": "Disarmed vehicle",
@@ -258,7 +258,7 @@ MEMBERS: Mapping[str, Mapping[str, Any]] = {
     },
 }
 
-# Bodies that are not the usual envelope.
+# Bodies without the usual envelope.
 BODIES: Mapping[str, Mapping[str, Any]] = {
     "/vehicles": {"vehicles": [VEHICLE]},
     "/vehicles/{sysid}": VEHICLE,

@@ -1,4 +1,4 @@
-"""What other modules use to add paths to the API: they import nothing else of `mavproxy_uavapi.http`.
+"""The interface for other modules that add paths to the API; they import nothing else of `mavproxy_uavapi.http`.
 
 A module puts its routes into `Host.extensions`, by path; the API serves them while it is loaded:
 

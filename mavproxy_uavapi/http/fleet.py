@@ -1,4 +1,4 @@
-"""/fleet: one verb for several vehicles, with an answer of each."""
+"""/fleet: one verb for several vehicles, with an answer for each."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ System = Annotated[int, Field(ge=1, le=255)]
 
 
 class FleetRequest(Request):
-    """The vehicles by system id, or all; the verb's own parameters; and in `each` what is different for one vehicle.
+    """The vehicles by system id, or all; the verb's parameters; and in `each` other values for single vehicles.
 
-    With `all_or_none` nothing is sent before every vehicle has passed the checks of its verb; where one does not,
+    With `all_or_none` nothing is sent before every vehicle has passed the checks of its verb; if one does not,
     nothing is sent to any.
     """
 
     model_config = ConfigDict(extra="allow", allow_inf_nan=False)
     vehicles: Annotated[list[System] | Literal["all"], Field(description="system ids, or all")] = "all"
     each: Annotated[dict[str, dict[str, Any]], Field(description="by system id: other values for one vehicle")] = {}
-    all_or_none: Annotated[bool, Field(description="nothing is sent unless every vehicle can")] = False
+    all_or_none: Annotated[bool, Field(description="nothing is sent unless every vehicle can begin")] = False
 
 
 def fleet_routes(routes: Iterable[Route]) -> list[Route]:
@@ -48,9 +48,9 @@ def _fleet_route(route: Route) -> Route:
 
     action.__doc__ = f"""`{route.path}` for several vehicles at once; answers when it has ended for all.
 
-    200 when it was done by every vehicle, else 207; `vehicles` has the answer of each.
+    200 if every vehicle has done it, else 207; `vehicles` has the answer of each.
     """
-    # Each vehicle's own call is in the trail.
+    # The call of each vehicle is in the audit trail.
     return Route(f"/fleet/{name}", action, FleetRequest, POST, stops=route.stops, trail=False)
 
 
@@ -58,9 +58,9 @@ async def _command(call: Call, route: Route) -> web.StreamResponse:
     """Call `route` for each vehicle."""
     p = call.params(FleetRequest)
     if p.all_or_none and call.is_async:
-        raise Invalid("who does not wait cannot learn whether all or none began", "all_or_none")
-    heard = call.service.host.fleet.vehicles
-    systems = sorted(heard) if p.vehicles == "all" else list(dict.fromkeys(p.vehicles))
+        raise Invalid("a call that does not wait cannot say whether all or none began", "all_or_none")
+    known = call.service.host.fleet.vehicles
+    systems = sorted(known) if p.vehicles == "all" else list(dict.fromkeys(p.vehicles))
     common = p.model_extra or {}
     params = {system: parse(route.model, "body", {**common, **p.each.get(str(system), {})}) for system in systems}
     gate = StartGate(len(systems)) if p.all_or_none else None
@@ -80,14 +80,14 @@ async def _answer(
 ) -> Mapping[str, Any]:
     """One vehicle's answer: its status and body."""
     path = f"/fleet/{route.path.rpartition('/')[2]}"
-    one = Call(call.service, call.request, params, Match(path, system, route))
+    vehicle_call = Call(call.service, call.request, params, Match(path, system, route))
     try:
         with contextlib.nullcontext() if gate is None else gate.place(f"vehicle {system}"):
-            answer = await audited(one, route.action)
+            answer = await audited(vehicle_call, route.action)
     except UavApiError as error:
         without_frames(error)
         return {"status": error.status, **reason(error)}
     if isinstance(answer, web.StreamResponse):  # 202
-        assert one.job is not None
-        return {"status": answer.status, "job": one.job.id}
+        assert vehicle_call.job is not None
+        return {"status": answer.status, "job": vehicle_call.job.id}
     return {"status": 200, "result": answer["result"]}

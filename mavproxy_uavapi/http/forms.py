@@ -1,4 +1,4 @@
-"""The one file of a multipart form."""
+"""Reads the one file of a multipart form."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from mavproxy_uavapi.core.errors import BadRequest
 from mavproxy_uavapi.http.call import in_time
 
 CHUNK = 65536  # bytes
-WRAPPING = 65536  # bytes of a form besides its file
+WRAPPING = 65536  # bytes of a form in addition to its file
 FIELD = "file"
-MOST_PARTS = 100  # up to the file; each of tens of thousands would hold up the loop a little
+MOST_PARTS = 100  # before the file; tens of thousands would delay the event loop
 
 
 def any_name(name: str) -> str:
-    """A check of names that lets all pass."""
+    """A check that accepts all names."""
     return name
 
 
@@ -29,13 +29,13 @@ async def file_of(
     """Name and contents of the form's field `file`.
 
     Args:
-        request: whose body it is.
+        request: the request.
         limit: bytes; reading stops there.
-        checked: looks at the name before anything is read; what it raises refuses the file.
+        checked: checks the name before anything is read; an error that it raises refuses the file.
 
     Raises:
-        BadRequest: there is none, it is too large, it does not arrive in time, or a form within the form or too many
-            other parts come before it.
+        BadRequest: there is no file, it is too large, it does not arrive in time, or too many other parts or a nested
+        form come before it.
     """
     if request.content_type != "multipart/form-data":
         raise BadRequest(f"the file goes into field `{FIELD}` of a multipart/form-data body")
@@ -50,7 +50,7 @@ async def file_of(
             if part.name == FIELD and part.filename is not None:
                 return checked(part.filename), await _contents(part, limit)
     except (ValueError, LookupError, AssertionError, RuntimeError) as error:
-        raise BadRequest(f"the body is no multipart form: {error}") from error
+        raise BadRequest(f"the body is not a multipart form: {error}") from error
     except HttpProcessingError as error:
         raise BadRequest(f"a part of the form has bad headers: {error.message}") from error
     raise BadRequest(f"the form has {MOST_PARTS} parts before its file")
@@ -65,7 +65,7 @@ async def _body(request: web.BaseRequest, limit: int) -> bytes:
 
 
 def _stream_of(body: bytes) -> StreamReader:
-    """What aiohttp reads forms from."""
+    """The kind of stream from which aiohttp reads forms."""
     loop = asyncio.get_running_loop()
     stream = StreamReader(BaseProtocol(loop), limit=len(body) + 1, loop=loop)
     stream.feed_data(body)

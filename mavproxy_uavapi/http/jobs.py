@@ -1,4 +1,4 @@
-"""/jobs: the verbs in flight, and the last ones that ended."""
+"""/jobs: the running verbs and the last ones that ended."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mavproxy_uavapi.http.call import Call
 
 
 def describe(job: Job, now: float) -> dict[str, Any]:
-    """A job as an answer shows it; times in s."""
+    """A job as an answer body; times in s."""
     return {
         "job": job.id,
         "verb": job.verb,
@@ -26,7 +26,7 @@ def describe(job: Job, now: float) -> dict[str, Any]:
 
 
 def error_of(job: Job) -> dict[str, Any]:
-    """Why it failed, as the blocking call's answer would have said it."""
+    """Why the job failed, as in the answer of the blocking call."""
     assert job.error is not None
     error = job.error
     return {"status": error.status, "code": error.code, "detail": error.detail, **error.extras()}
@@ -40,18 +40,18 @@ def _job(call: Call) -> Job:
 
 
 def _is_meant(call: Call, job: Job) -> bool:
-    """Whether the path, if it names a vehicle, names this job's."""
+    """Whether the job is for the vehicle that the path names; always true if it names none."""
     return call.named_system in (0, job.vehicle.state.system)
 
 
 async def list_jobs(call: Call) -> dict[str, Any]:
-    """All jobs that are running, and the last ones that ended; under /vehicles/{sysid} those of that vehicle."""
+    """All running jobs and the last ones that ended; under /vehicles/{sysid} only those of that vehicle."""
     host = call.service.host
     return {"jobs": [describe(job, host.clock()) for job in host.jobs.all() if _is_meant(call, job)]}
 
 
 async def show_job(call: Call) -> dict[str, Any]:
-    """One job: its state, its progress, its result or error."""
+    """One job: its state, progress, and result or error."""
     return describe(_job(call), call.service.host.clock())
 
 
@@ -64,6 +64,6 @@ async def abort_job(call: Call) -> dict[str, Any]:
     closing = host.endings.closing(job)
     if closing is None:
         return {**describe(job, host.clock()), "then": "nothing is sent"}
-    with contextlib.suppress(UavApiError):  # the job that follows tells it
+    with contextlib.suppress(UavApiError):  # the job that follows reports it
         await closing.outcome()
     return {**describe(job, host.clock()), "then": closing.result or str(closing.error)}

@@ -1,4 +1,4 @@
-"""Accepts connections, and keeps strangers from taking all that there are."""
+"""Accepts connections, and keeps strangers from taking all of them."""
 
 from __future__ import annotations
 
@@ -13,78 +13,81 @@ from mavproxy_uavapi.http.caller import address_of, group_of
 from mavproxy_uavapi.http.connection import Connection
 from mavproxy_uavapi.http.log_throttle import LogThrottle
 
-BACKLOG = 2048  # connections that wait to be accepted; who finds no place asks again a second later
-AT_ONCE = 64  # are accepted before others get a turn: some 4 ms
-SHARE = 20  # connections of one caller beyond the loopback
-RESERVE = 16  # connections that only those who have passed the door can have
-HANDSHAKE_TIMEOUT = 10.0  # s, of TLS
-UNREAD_TIMEOUT = 30_000  # ms in which a peer takes nothing of what we send, and the kernel gives it up
+BACKLOG = 2048  # connections that wait to be accepted; further clients retry a second later
+AT_ONCE = 64  # connections accepted in one go: some 4 ms
+SHARE = 20  # connections of one caller that is not on the loopback
+RESERVE = 16  # connections kept for callers that have passed the door check
+HANDSHAKE_TIMEOUT = 10.0  # s, for TLS
+UNREAD_TIMEOUT = 30_000  # ms without an acknowledgement from the peer after which the kernel closes the connection
 AFTER_FAILURE = 1.0  # s until we accept again when the system is out of descriptors or memory
 
-SELECT_LIMIT = 1024  # MAVProxy's select() takes no descriptor from here on
-KEPT_FREE = 64  # descriptors below that, and below the process's own limit, that no connection takes
-REPLACING = 32  # descriptors below these: who gets one of them replaces somebody
+SELECT_LIMIT = 1024  # MAVProxy's select() takes no descriptor from this number on
+KEPT_FREE = 64  # descriptors below that and below the process's limit that no connection takes
+REPLACING = 32  # descriptors below these; a connection that gets one of them replaces another
 
 
 class NoRoom(Exception):
-    """There is no room for another connection, and nobody who could make it; `cause` says of what kind."""
+    """There is no room for another connection, and none can be closed for it; `cause` says which limit is reached."""
 
     def __init__(self, cause: str, sentence: str) -> None:
         super().__init__(sentence)
         self.cause = cause
 
 
-def who_makes_room(
+def to_replace(
     connections: Iterable[Connection], group: str, is_local: bool, most: int, scarce: bool = False
 ) -> Connection | None:
-    """Which connection is to be closed for a new one of `group`; None while there is room.
+    """Which connection to close for a new one of `group`; None while there is room.
 
-    A connection that has not passed the door goes first: one that has said nothing, then the oldest; whoever was
-    refused would be back at once. Then that which has been idle longest: HTTP clients open another. One that is being
-    answered stays.
+    A connection that has not passed the door check goes first: one that has sent nothing, then the oldest; a refused
+    client would be back at once. Then the one that has been idle longest, because HTTP clients open another. A
+    connection with a call in flight stays.
 
     Args:
         connections: the open ones, oldest first.
-        group: whose the new one is.
+        group: the group of the new one.
         is_local: whether it comes from the loopback, which has no share of its own.
-        most: connections of all.
+        most: the limit for all connections.
         scarce: whether descriptors are running out.
 
     Raises:
-        NoRoom: nobody can go.
+        NoRoom: no connection can be closed.
     """
-    there = [one for one in connections if not one.closing]
-    of_group = [one for one in there if one.group == group]
-    strangers = sum(not one.admitted for one in there)
+    open_ones = [connection for connection in connections if not connection.closing]
+    of_group = [connection for connection in open_ones if connection.group == group]
+    strangers = sum(not connection.admitted for connection in open_ones)
     if not is_local and len(of_group) >= SHARE:
         candidates, error = of_group, NoRoom("share", f"{group} has {SHARE} connections, all with calls in flight")
     elif scarce:
-        candidates, error = there, NoRoom("descriptors", "MAVProxy needs the descriptors that are left")
-    elif len(there) >= most or strangers >= most - RESERVE:
-        candidates, error = there, NoRoom("full", f"all {most} connections have calls in flight (max_connections)")
+        candidates, error = open_ones, NoRoom("descriptors", "MAVProxy needs the descriptors that are left")
+    elif len(open_ones) >= most or strangers >= most - RESERVE:
+        candidates, error = (
+            open_ones,
+            NoRoom("full", f"all {most} connections have calls in flight (max_connections)"),
+        )
     else:
         return None
-    unknown = [one for one in candidates if not one.admitted]
-    idle = [one for one in candidates if not one.answering]
+    unknown = [connection for connection in candidates if not connection.admitted]
+    idle = [connection for connection in candidates if not connection.answering]
     if unknown:
-        return min(unknown, key=lambda one: not one.silent)
+        return min(unknown, key=lambda connection: not connection.silent)
     if idle:
-        return min(idle, key=lambda one: one.idle_since)
+        return min(idle, key=lambda connection: connection.idle_since)
     raise error
 
 
 def highest_descriptor() -> int:
-    """The highest descriptor that a connection may have, so that KEPT_FREE ones, or a quarter, are left."""
+    """The highest descriptor that a connection may have; KEPT_FREE ones, or a quarter, stay free."""
     soft, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     limit = SELECT_LIMIT if soft == resource.RLIM_INFINITY else min(soft, SELECT_LIMIT)
     return limit - 1 - min(KEPT_FREE, limit // 4)
 
 
 def lowest(near: socket.socket) -> socket.socket:
-    """The same socket by the lowest free descriptor, if one is lower."""
+    """The same socket under the lowest free descriptor, if that is lower."""
     try:
         copy = near.dup()
-    except OSError:  # there is none
+    except OSError:  # no descriptor is free
         return near
     higher, lower = sorted((near, copy), key=socket.socket.fileno, reverse=True)
     higher.close()
@@ -92,15 +95,15 @@ def lowest(near: socket.socket) -> socket.socket:
 
 
 class Listener:
-    """Listening sockets whose connections become aiohttp's; all methods belong to the asyncio thread.
+    """Accepts connections for aiohttp; all methods belong to the asyncio thread.
 
-    asyncio's own server accepts whatever comes, and writes a traceback for each that there is no descriptor for.
+    asyncio's own server has no limit, and writes a traceback for each connection without a descriptor.
 
     Args:
-        ports: bound sockets, and what makes aiohttp's protocols for each; the limits are for all of them together.
+        ports: bound sockets, each with a factory of aiohttp's protocols; the limits count all of them together.
         tls: None for plain HTTP.
-        most: tells how many connections there may be.
-        throttle: takes what is to be told.
+        most: returns the limit of connections.
+        throttle: for the log lines.
     """
 
     def __init__(
@@ -146,7 +149,7 @@ class Listener:
         highest = highest_descriptor()
         scarce = near.fileno() > highest - REPLACING
         try:
-            going = who_makes_room(self._connections, group, is_local, self._most(), scarce)
+            going = to_replace(self._connections, group, is_local, self._most(), scarce)
             if going is not None:
                 self._throttle.tell("replaced", f"an idle connection of {going.group} was closed for one of {group}")
                 going.abort()
@@ -178,15 +181,15 @@ class Listener:
             await self._loop.connect_accepted_socket(
                 lambda: connection, near, ssl=self._tls, ssl_handshake_timeout=timeout
             )
-        except OSError:  # it speaks no TLS, hung up, or has been replaced; asyncio closes the socket
+        except OSError:  # no TLS, hung up or replaced; asyncio closes the socket
             connection.abandon()
 
     def filenos(self) -> list[int]:
         """Descriptors of the ports and of every connection."""
-        return [one.fileno() for one in (*self._ports, *self._connections.values())]
+        return [sock.fileno() for sock in (*self._ports, *self._connections.values())]
 
     def close_ports(self) -> None:
-        """Accept no more."""
+        """Accept no more connections."""
         for resuming in self._resuming.values():
             resuming.cancel()
         for port in self._ports:
@@ -204,13 +207,13 @@ def listening_socket(host: str, port: int) -> socket.socket:
     """A bound TCP socket that can be bound again at once after we close it.
 
     Raises:
-        OSError: taken, or no such address.
+        OSError: the port is taken, or there is no such address.
     """
     family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
     listening = socket.socket(family, kind, protocol)
     try:
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        if hasattr(socket, "TCP_USER_TIMEOUT"):  # Linux; what is accepted inherits it
+        if hasattr(socket, "TCP_USER_TIMEOUT"):  # on Linux; accepted sockets inherit it
             listening.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, UNREAD_TIMEOUT)
         listening.bind(address)
     except OSError:

@@ -1,4 +1,4 @@
-"""Lines for the log that a stranger can cause as often as he likes."""
+"""Log lines that a stranger can cause any number of times."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ EVERY = 60.0  # s
 
 
 class LogThrottle:
-    """Writes one line for each cause and minute, and with the next one how many were left out.
+    """Writes one line per cause and minute; the next one says how many were left out.
 
     Args:
         clock: monotonic seconds.
@@ -25,7 +25,7 @@ class LogThrottle:
         """Write `line`, unless one of that cause was written within the last minute.
 
         Args:
-            cause: one of a few words of ours; never what a client sent.
+            cause: one of a few fixed words; never text from a client.
             line: what happened.
         """
         now = self._clock()

@@ -19,11 +19,11 @@ LARGEST = 1024 * 1024  # bytes of a mission file
 
 
 async def upload(call: Call) -> Answer:
-    """Replace the vehicle's mission and read it back; one that fails leaves the old mission, or says why not."""
+    """Replace the vehicle's mission and read it back; on failure the old mission stays, or the error says why not."""
     vehicle = call.vehicle
     body = await _body(call)
     items = await asyncio.to_thread(mission_files.read, body)
-    asked = MissionFile(digest=hashlib.sha256(body.encode()).hexdigest(), items=len(items))
+    identity = MissionFile(digest=hashlib.sha256(body.encode()).hexdigest(), items=len(items))
 
     async def verb(job: Job) -> None:
         _require_no_flown_mission(vehicle)
@@ -33,17 +33,20 @@ async def upload(call: Call) -> Answer:
 
         await vehicle.waypoints.upload(items, told, check=lambda: _require_no_flown_mission(vehicle))
 
-    # A client that hangs up must not leave half a mission.
+    # A client that hangs up must not leave half a mission behind.
     result = f"Mission of {len(items)} items uploaded"
-    return await call.fly(vehicle, verb, result, outlives_client=True, asked=asked)
+    return await call.fly(vehicle, verb, result, outlives_client=True, identity=identity)
 
 
 async def download(call: Call) -> Answer:
-    """The vehicle's mission, read from it now: `home`, and `items` from number 1 on."""
+    """The vehicle's mission, freshly read from it: `home`, and `items` from number 1 on."""
     vehicle = call.vehicle
     home, items = await vehicle.waypoints.download()
-    told = {"home": None if home is None else home.report(0), "items": [i.report(n) for n, i in enumerate(items, 1)]}
-    return call.answer("Success", **told)
+    members = {
+        "home": None if home is None else home.report(0),
+        "items": [i.report(n) for n, i in enumerate(items, 1)],
+    }
+    return call.answer("Success", **members)
 
 
 async def clear(call: Call) -> Answer:
@@ -65,20 +68,20 @@ async def start(call: Call) -> Answer:
 
 
 async def progress(call: Call) -> Answer:
-    """Which item is flown, of how many, which was reached last, and how far (m) it is."""
+    """The current item, the number of items, the item reached last, and the distance (m) to the current one."""
     vehicle = call.seen
-    told = mission_flight.progress(vehicle)
+    info = mission_flight.progress(vehicle)
     age = vehicle.state.newest("MISSION_CURRENT")
     assert age is not None
     seconds = max(vehicle.clock() - age.at, 0.0)
     limit = call.params(Read).max_age or call.service.settings.max_age
     if seconds > limit:
         raise Stale(f"vehicle {vehicle.state.system} last told MISSION_CURRENT {seconds:.1f} s ago")
-    return call.answer("Success", info=told, age_s=round(seconds, 3))
+    return call.answer("Success", info=info, age_s=round(seconds, 3))
 
 
 def _require_no_flown_mission(vehicle: Vehicle) -> None:
-    """Raises Busy while the vehicle flies the mission that is to be changed."""
+    """Raise Busy while the vehicle flies the mission that would be changed."""
     if vehicle.state.armed and flies_mission(vehicle.mode):
         raise Busy("the vehicle flies its mission; /command/guided or /command/brake first")
 
@@ -87,7 +90,7 @@ async def _body(call: Call) -> str:
     """The mission's text: the body itself, or the file of a multipart form.
 
     Raises:
-        BadRequest: there is none, or it is no text.
+        BadRequest: the body is empty or not UTF-8 text.
     """
     request = call.request
     if request.content_type == "multipart/form-data":
@@ -99,4 +102,4 @@ async def _body(call: Call) -> str:
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError as error:
-        raise BadRequest(f"the mission is no UTF-8 text: {error}") from error
+        raise BadRequest(f"the mission is not UTF-8 text: {error}") from error

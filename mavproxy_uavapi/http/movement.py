@@ -51,7 +51,7 @@ async def _go_to_ned(call: Call, wait: bool) -> Answer:
 def _going(
     vehicle: Vehicle, aim: Callable[[], NedTarget | GlobalTarget], p: GpsTarget | NedPlace | BodyOffset, wait: bool
 ) -> Callable[[Job], Awaitable[None]]:
-    """The verb that goes to what `aim` gives once the job begins: a joined request must not move a target."""
+    """The verb that goes to the target that `aim` computes when the job begins: a joined request must not move it."""
 
     async def verb(job: Job) -> None:
         vehicle.require_guided_flight()
@@ -69,12 +69,12 @@ def _going(
 
 
 async def drive(call: Call) -> Answer:
-    """Fly an NED offset from here; answer once it is on its way."""
+    """Fly an NED offset from the present position; answer once it is on its way."""
     return await _drive(call, wait=False)
 
 
 async def drive_wait(call: Call) -> Answer:
-    """Fly an NED offset from here; answer on arrival."""
+    """Fly an NED offset from the present position; answer on arrival."""
     return await _drive(call, wait=True)
 
 
@@ -84,12 +84,12 @@ async def _drive(call: Call, wait: bool) -> Answer:
 
 
 async def drive_body(call: Call) -> Answer:
-    """Fly an offset in the body's frame; answer once it is on its way."""
+    """Fly an offset in the body frame; answer once it is on its way."""
     return await _drive_body(call, wait=False)
 
 
 async def drive_body_wait(call: Call) -> Answer:
-    """Fly an offset in the body's frame; answer on arrival."""
+    """Fly an offset in the body frame; answer on arrival."""
     return await _drive_body(call, wait=True)
 
 
@@ -118,7 +118,7 @@ async def _drive_to(
 
 
 async def travel_at_ned(call: Call) -> Answer:
-    """Fly at an NED velocity until the autopilot drops it, or for a duration."""
+    """Fly at an NED velocity for a duration, or until the autopilot's own timeout."""
     vehicle, p = call.vehicle, call.params(NedVelocity)
     velocity = VelocityTarget(p.vx, p.vy, p.vz)
 
@@ -129,7 +129,7 @@ async def travel_at_ned(call: Call) -> Answer:
 
 
 async def travel_at_body(call: Call) -> Answer:
-    """Fly at a velocity in the body's frame until the autopilot drops it, or for a duration."""
+    """Fly at a velocity in the body frame for a duration, or until the autopilot's own timeout."""
     vehicle, p = call.vehicle, call.params(BodyVelocity)
 
     async def verb(job: Job) -> None:
@@ -141,21 +141,21 @@ async def travel_at_body(call: Call) -> Answer:
 
 
 async def set_heading(call: Call) -> Answer:
-    """Turn to a heading, the shorter way round."""
+    """Turn to a heading by the shorter way."""
     vehicle, heading = call.vehicle, call.params(Heading).heading
     return await call.fly(vehicle, lambda job: vehicle.set_heading(job, heading), f"Heading set to {heading} degrees")
 
 
 async def set_yaw_rate(call: Call) -> Answer:
-    """Turn at a rate."""
+    """Turn at a yaw rate."""
     vehicle, rate = call.vehicle, call.params(YawRate).yaw_rate
     return await call.fly(vehicle, lambda job: vehicle.set_yaw_rate(job, rate), f"Yaw rate set to {rate} deg/s")
 
 
 async def stop(call: Call) -> Answer:
-    """Hold a copter still until it is resumed; a movement under way waits, no other begins.
+    """Hold a copter still until it is resumed; its movement waits, and no other begins.
 
-    A plane circles in LOITER and a rover stops in HOLD: their movement ends.
+    A plane circles in LOITER and a rover stops in HOLD; their movement ends.
     """
     vehicle = call.vehicle
     result = STOPPED.get(vehicle.kind, f"{vehicle.kind.capitalize()} has stopped")
@@ -163,6 +163,6 @@ async def stop(call: Call) -> Answer:
 
 
 async def resume(call: Call) -> Answer:
-    """Continue the guided movement."""
+    """Continue the paused guided movement."""
     vehicle = call.vehicle
     return await call.fly(vehicle, vehicle.resume, f"{vehicle.kind.capitalize()} has resumed")

@@ -1,7 +1,7 @@
-"""OpenAPI 3.1 from the table of routes, the request models, and the tree of errors. Pure.
+"""OpenAPI 3.1 from the table of routes, the request models, and the error tree. Pure.
 
-The routes of other modules, which come and go, are described just as ours; what nobody gave an example for
-gets one that its model takes.
+The routes of other modules, which come and go, are described in the same way. A model without an example gets one
+that it accepts.
 """
 
 from __future__ import annotations
@@ -24,23 +24,23 @@ ABOUT = """\
 Arm, fly, watch and script an ArduPilot vehicle through MAVProxy. Units: metres, m/s, degrees, seconds, unless a \
 name says otherwise. NED is north, east, down of the EKF origin; relative altitudes are above home.
 
-**What is tried here is flown.** Each call answers when telemetry shows that it was done, or says why it was not."""
+**Calls from this page fly the vehicle.** Each call answers when telemetry shows its effect, or says why it failed."""
 
 TAGS = {
     "command": "Arm, take off, land, modes, speeds, home. GET and POST do the same.",
     "movement": "Guided flight. Needs an armed vehicle that flies in GUIDED.",
-    "telemetry": "What the vehicle last told, with its age.",
-    "jobs": "The verbs in flight, and the last ones that ended.",
-    "mission": "Scripts, each in a tmux session of its own; and the mission that the autopilot itself flies.",
+    "telemetry": "The newest data from the vehicle, with its age.",
+    "jobs": "The running verbs and the last ones that ended.",
+    "mission": "Scripts, each in its own tmux session; and the mission that the autopilot itself flies.",
     "parameters": "The autopilot's parameters; each new value is read back.",
-    "vehicles": "Which vehicles there are. `/vehicles/{sysid}` before any path means that vehicle; without it the "
-    "setting `sysid` says which, or MAVProxy's current one is meant.",
-    "fleet": "One verb for several vehicles, with an answer of each.",
+    "vehicles": "All known vehicles. The prefix `/vehicles/{sysid}` of any path means that vehicle; without it the "
+    "setting `sysid` decides, or MAVProxy's current vehicle is meant.",
+    "fleet": "One verb for several vehicles, with an answer for each.",
     "peripherical": "Servos and cameras.",
     "docs": "This documentation.",
 }
 
-# Errors by what a route is about; each of the tree's leaves is in some of them.
+# Errors by the subject of a route; each leaf of the error tree is in at least one.
 EVERYWHERE = (errors.Unauthorized, errors.Forbidden, errors.Invalid, errors.TooManyRequests)
 OF_A_VEHICLE = (errors.LinkLost, errors.NoVehicle)
 OF_A_COMMAND = (*OF_A_VEHICLE, errors.NotSupported, errors.Rejected, errors.TimedOut, errors.Busy)
@@ -95,12 +95,12 @@ KINDS: Mapping[str, Mapping[str, Any]] = {
     "/openapi.json": {"application/json": {"schema": {"type": "object"}}},
 }
 
-# How pydantic spells a bound that it found on a union, and how JSON Schema does.
+# pydantic's names for a bound on a union, and JSON Schema's.
 BOUNDS = {"ge": "minimum", "gt": "exclusiveMinimum", "le": "maximum", "lt": "exclusiveMaximum"}
 
 ENVELOPE = {
     "type": "object",
-    "description": "A success: the device, the vehicle's system id as text, and the result; telemetry says its age.",
+    "description": "A success: the device, the vehicle's system id as text, and the result; telemetry has its age.",
     "required": ["device", "id", "result"],
     "properties": {
         "device": {"const": "uav"},
@@ -117,14 +117,14 @@ PROBLEM = {
 }
 FAILURE = {
     "type": "object",
-    "description": "A failure: a sentence that a pilot understands, and a word that a program does.",
+    "description": "A failure: a sentence for the pilot, and an error code for programs.",
     "required": ["detail", "code"],
     "properties": {
         "detail": {"anyOf": [{"type": "string"}, {"type": "array", "items": PROBLEM}]},
         "code": {"type": "string"},
-        "ack": {"type": "string", "description": "MAV_RESULT or MAV_MISSION_RESULT, where the autopilot refused"},
-        "statustext": {"type": "array", "items": {"type": "string"}, "description": "what the autopilot said since"},
-        "stderr": {"type": "string", "description": "what the program said that failed"},
+        "ack": {"type": "string", "description": "MAV_RESULT or MAV_MISSION_RESULT, if the autopilot refused"},
+        "statustext": {"type": "array", "items": {"type": "string"}, "description": "the autopilot's texts since"},
+        "stderr": {"type": "string", "description": "the error output of the program that failed"},
     },
 }
 
@@ -135,21 +135,21 @@ HURRY = [
         "in": "query",
         "required": False,
         "schema": {"type": "boolean", "default": True},
-        "description": "false: answer 202 at once, with the number of the job that goes on",
+        "description": "false: answer 202 at once with the job's number; the job goes on",
     },
     {
         "name": "on_disconnect",
         "in": "query",
         "required": False,
         "schema": {"type": "string", "enum": ["continue", "hold"]},
-        "description": "what the vehicle does when the client hangs up, over the setting of that name",
+        "description": "what the vehicle does when the client hangs up; it overrides the setting of that name",
     },
     {
         "name": "Prefer",
         "in": "header",
         "required": False,
         "schema": {"type": "string", "enum": ["respond-async"]},
-        "description": "respond-async: as wait=false",
+        "description": "respond-async: same as wait=false",
     },
 ]
 ACCEPTED = {
@@ -165,7 +165,7 @@ ACCEPTED = {
 
 
 def document(routes: Sequence[Route]) -> dict[str, Any]:
-    """The whole description."""
+    """The whole OpenAPI document."""
     paths: dict[str, dict[str, Any]] = {}
     for route in routes:
         for method in route.methods:
@@ -189,9 +189,9 @@ def document(routes: Sequence[Route]) -> dict[str, Any]:
 
 def operation(route: Route, method: str) -> dict[str, Any]:
     """One method of one path."""
-    summary, _, more = inspect.cleandoc(route.action.__doc__ or "").partition("\n")
-    about = [more.strip(), inspect.cleandoc(route.model.__doc__ or "") if route.model.model_fields else ""]
-    told: dict[str, Any] = {
+    summary, _, details = inspect.cleandoc(route.action.__doc__ or "").partition("\n")
+    about = [details.strip(), inspect.cleandoc(route.model.__doc__ or "") if route.model.model_fields else ""]
+    description: dict[str, Any] = {
         "tags": [tag_of(route)],
         "operationId": f"{method.lower()}{re.sub(r'[^A-Za-z0-9]+', '_', route.path)}".rstrip("_"),
         "summary": summary.strip(),
@@ -201,63 +201,66 @@ def operation(route: Route, method: str) -> dict[str, Any]:
     }
     if route.verb:
         types = [kind for kind, vehicle in CLASSES.items() if vehicle.has(route.verb)]
-        told["x-vehicle-types"] = types
-        told["description"] = f"{told['description']}\n\nOf: {', '.join(types)}.".strip()
+        description["x-vehicle-types"] = types
+        description["description"] = f"{description['description']}\n\nOf: {', '.join(types)}.".strip()
     if tag_of(route) == "fleet":
-        told["parameters"] += HURRY
-        told["responses"]["207"] = {**told["responses"]["200"], "description": "Not every vehicle has done it."}
+        description["parameters"] += HURRY
+        description["responses"]["207"] = {
+            **description["responses"]["200"],
+            "description": "Not every vehicle has done it.",
+        }
     if route.job:
-        told["parameters"] += HURRY
-        told["responses"]["202"] = ACCEPTED
+        description["parameters"] += HURRY
+        description["responses"]["202"] = ACCEPTED
     if method in ("POST", "PUT") and (route.raw or route.model.model_fields):
-        told["requestBody"] = _body(route)
+        description["requestBody"] = _body(route)
     elif method == "GET":
-        told["parameters"] += _query(route.model)
-    return told
+        description["parameters"] += _query(route.model)
+    return description
 
 
 def tag_of(route: Route) -> str:
-    """What it is listed under: the first word of its path."""
+    """The tag of a route: the first word of its path."""
     word = route.path.split("/")[1]
     return {"openapi.json": "docs", "parameters.param": "parameters"}.get(word, word)
 
 
 def errors_of(route: Route) -> list[type[UavApiError]]:
-    """What it may answer besides success, by status and code."""
-    own = BY_PATH.get(route.path, BY_TAG.get(tag_of(route), (*OF_A_FLIGHT, errors.BadRequest, errors.NotFound)))
+    """The errors that it may answer, by status and code."""
+    specific = BY_PATH.get(route.path, BY_TAG.get(tag_of(route), (*OF_A_FLIGHT, errors.BadRequest, errors.NotFound)))
     body = (errors.BadRequest,) if {"POST", "PUT"} & set(route.methods) else ()
-    return sorted({*EVERYWHERE, *own, *body}, key=lambda error: (error.status, error.code))
+    return sorted({*EVERYWHERE, *specific, *body}, key=lambda error: (error.status, error.code))
 
 
 def example_of(model: type[requests.Request]) -> dict[str, Any]:
-    """Values that the model takes."""
-    given = examples.REQUESTS.get(model)
-    if given is not None:
-        return dict(given)
+    """Example values that the model accepts."""
+    example = examples.REQUESTS.get(model)
+    if example is not None:
+        return dict(example)
     fields = model.model_json_schema().get("properties", {})
     return {name: fields[name].get("default", 1) for name, field in model.model_fields.items() if field.is_required()}
 
 
 def _path_parameters(route: Route) -> list[dict[str, Any]]:
-    found = []
+    parameters = []
     for name in re.findall(r"{(\w+)}", route.path):
-        shown = examples.PATH_PARAMETERS.get(name, {})
-        example = next((value for path, value in shown.items() if route.path.startswith(path)), "x")
+        by_path = examples.PATH_PARAMETERS.get(name, {})
+        example = next((value for path, value in by_path.items() if route.path.startswith(path)), "x")
         schema = {"type": "string"}
-        found.append({"name": name, "in": "path", "required": True, "schema": schema, "example": example})
-    return found
+        parameters.append({"name": name, "in": "path", "required": True, "schema": schema, "example": example})
+    return parameters
 
 
 def _query(model: type[requests.Request]) -> list[dict[str, Any]]:
     schema = simplified(model.model_json_schema())
-    shown = example_of(model)
-    found = []
+    examples_by_name = example_of(model)
+    parameters = []
     for name, field in schema.get("properties", {}).items():
-        told = {"name": name, "in": "query", "required": name in schema.get("required", []), "schema": field}
+        parameter = {"name": name, "in": "query", "required": name in schema.get("required", []), "schema": field}
         if "description" in field:
-            told["description"] = field.pop("description")
-        found.append({**told, "example": shown[name]} if name in shown else told)
-    return found
+            parameter["description"] = field.pop("description")
+        parameters.append({**parameter, "example": examples_by_name[name]} if name in examples_by_name else parameter)
+    return parameters
 
 
 def _body(route: Route) -> dict[str, Any]:
@@ -284,23 +287,28 @@ def _success(route: Route, method: str) -> dict[str, Any]:
 def example_answer(path: str, method: str) -> dict[str, Any]:
     """The body of a success."""
 
-    def given(table: Mapping[str, Any], otherwise: Any) -> Any:
+    def example(table: Mapping[str, Any], otherwise: Any) -> Any:
         return table.get(f"{method} {path}", table.get(path, otherwise))
 
-    whole = given(examples.BODIES, None)
-    if whole is not None:
-        return dict(whole)
-    return {"device": "uav", "id": "1", "result": given(examples.RESULTS, "Success"), **given(examples.MEMBERS, {})}
+    whole_body = example(examples.BODIES, None)
+    if whole_body is not None:
+        return dict(whole_body)
+    return {
+        "device": "uav",
+        "id": "1",
+        "result": example(examples.RESULTS, "Success"),
+        **example(examples.MEMBERS, {}),
+    }
 
 
-def _failures(found: Iterable[type[UavApiError]]) -> dict[str, Any]:
+def _failures(error_types: Iterable[type[UavApiError]]) -> dict[str, Any]:
     """Responses by status, with an example for each code."""
-    told: dict[str, Any] = {}
-    for error in found:
+    responses: dict[str, Any] = {}
+    for error in error_types:
         sentence = inspect.cleandoc(error.__doc__ or "").partition("\n")[0]
         detail: Any = [{"loc": ["body", "x"], "msg": sentence, "type": "value_error"}]
         body = {"detail": detail if error is errors.Invalid else sentence, "code": error.code}
-        status = told.setdefault(
+        status = responses.setdefault(
             str(error.status),
             {
                 "description": "",
@@ -309,7 +317,7 @@ def _failures(found: Iterable[type[UavApiError]]) -> dict[str, Any]:
         )
         status["description"] = f"{status['description']}\n- `{error.code}`: {sentence}".strip()
         status["content"]["application/json"]["examples"][error.code] = {"value": body}
-    return told
+    return responses
 
 
 def _models(routes: Sequence[Route]) -> dict[str, Any]:
@@ -325,21 +333,21 @@ def _models(routes: Sequence[Route]) -> dict[str, Any]:
 
 
 def simplified(schema: Any) -> Any:
-    """A schema as people read it: one kind of number, and what may be left out without its null."""
+    """A simpler schema for readers: one number type, and no null for optional values."""
     if isinstance(schema, list):
         return [simplified(item) for item in schema]
     if not isinstance(schema, dict):
         return schema
     choices = schema.get("anyOf")
     if isinstance(choices, list):
-        left = [choice for choice in choices if choice.get("type") != "null"]
-        if [choice.get("type") for choice in left] == ["integer", "number"]:
-            left = [left[1]]
-        if len(left) == 1:
-            rest = {
+        non_null = [choice for choice in choices if choice.get("type") != "null"]
+        if [choice.get("type") for choice in non_null] == ["integer", "number"]:
+            non_null = [non_null[1]]
+        if len(non_null) == 1:
+            other_members = {
                 key: value for key, value in schema.items() if key != "anyOf" and (key, value) != ("default", None)
             }
-            return simplified({**left[0], **rest})
+            return simplified({**non_null[0], **other_members})
     return {BOUNDS.get(key, key): simplified(value) for key, value in schema.items()}
 
 

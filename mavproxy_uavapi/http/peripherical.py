@@ -1,4 +1,4 @@
-"""/peripherical (sic): what hangs on the vehicle."""
+"""/peripherical (sic): devices on the vehicle."""
 
 from __future__ import annotations
 

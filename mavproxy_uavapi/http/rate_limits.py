@@ -1,4 +1,4 @@
-"""How often who may ask: those whom the door let in, and, far less often, those whom it did not."""
+"""Limits how often a caller may ask; callers that fail the door check get far less."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from mavproxy_uavapi.http.caller import CALLER, Caller
 from mavproxy_uavapi.http.responses import Handler
 from mavproxy_uavapi.http.router import MATCH
 
-COMMANDS = ("/command/", "/movement/")  # paths that command by GET too
+COMMANDS = ("/command/", "/movement/")  # paths that also command by GET
 
 
 def stops(request: web.BaseRequest) -> bool:
-    """Whether the request stops a vehicle: it is refused for no limit, and waits for nobody."""
+    """Whether the request stops a vehicle; no limit refuses or delays it then."""
     route = request[MATCH].route
     return route is not None and route.stops
 
 
 async def yield_to_main_loop(request: web.BaseRequest, handler: Handler) -> web.StreamResponse:
-    """Let MAVProxy's main loop finish what it is at: its messages are not to wait for our answers.
+    """Let MAVProxy's main loop finish its work, so that its messages do not wait for our answers.
 
-    What commands does not wait: it is short, and a vehicle is to hear of it at once.
+    A command does not wait: it is short, and the vehicle must get it at once.
     """
     if request.method == "GET" and not request[MATCH].path.startswith(COMMANDS):
         await request[SERVICE].host.bridge.wait_for_main_loop()
@@ -32,15 +32,15 @@ async def yield_to_main_loop(request: web.BaseRequest, handler: Handler) -> web.
 
 
 def _whose(caller: Caller, request: web.BaseRequest) -> str:
-    """What is counted together: the requests of one caller about one vehicle. What was not heard is no vehicle."""
+    """The key under which requests are counted: the caller and the vehicle. Unknown vehicles count as one."""
     system = request[MATCH].system
     return f"{caller.group} {system if system in request[SERVICE].host.fleet.vehicles else 0}"
 
 
 async def at_a_bearable_rate(request: web.BaseRequest, handler: Handler) -> web.StreamResponse:
-    """Refuse a caller who asks more often than he may."""
+    """Refuse a caller that asks more often than it may."""
     service = request[SERVICE]
-    caller: Caller | None = request.get(CALLER)  # None: a reader of the documentation, counted at the door
+    caller: Caller | None = request.get(CALLER)  # None for a reader of the documentation, counted by the door check
     if caller is None or stops(request):
         return await handler(request)
     rate = service.settings.local_rate if caller.is_local else service.settings.max_rate

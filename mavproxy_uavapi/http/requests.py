@@ -1,4 +1,4 @@
-"""Request models: one for each set of parameters, for queries and JSON bodies alike.
+"""Request models: one per set of parameters, for queries and JSON bodies.
 
 Unknown members are ignored. NaN and infinities are refused everywhere: they must never reach an autopilot.
 """
@@ -13,25 +13,25 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 from mavproxy_uavapi.core.errors import Invalid
 
 SMALLEST = 1e-30  # more than single precision's least number
-NED_REACH = 100_000.0  # m; farther than that NED is no flat patch any more
+NED_REACH = 100_000.0  # m; beyond this the earth's curvature matters
 
 
 def _written_as_number(value: Any) -> Any:
-    """Refuse what only Python would take for a number: true and false, and `1_000`."""
+    """Refuse values that only Python reads as numbers: true, false and `1_000`."""
     if isinstance(value, bool) or (isinstance(value, str) and "_" in value):
         raise ValueError("Input should be a valid number")
     return value
 
 
 def _not_nothing(value: float) -> float:
-    """Refuse what is more than 0 here, and 0 in the single precision that goes to the autopilot."""
+    """Refuse a value that is greater than 0 but becomes 0 in the single precision that the autopilot receives."""
     if value < SMALLEST:
         raise ValueError("Input should be greater than 0 in single precision")
     return value
 
 
 def _number(value: Any) -> Any:
-    """Keep what the client wrote: `30` stays an int and `30.5` is a float, so that answers repeat it."""
+    """Keep the client's notation: `30` stays an int and `30.5` is a float, so that answers repeat it."""
     value = _written_as_number(value)
     if isinstance(value, str):
         try:
@@ -48,13 +48,13 @@ NotNothing = AfterValidator(_not_nothing)
 Written = BeforeValidator(_written_as_number)
 Speed = Annotated[Number, Field(gt=0, le=50, description="m/s"), NotNothing]
 Timeout = Annotated[float | None, Field(gt=0, le=86400, description="s that the call may take"), Written]
-Looking = Annotated[bool, Field(description="point to where it goes")]
+Looking = Annotated[bool, Field(description="point in the direction of travel")]
 Facing = Annotated[
     float | None,
-    Field(ge=0, le=360, description="point there, degrees clockwise from north; over look_at_target"),
+    Field(ge=0, le=360, description="point there, degrees clockwise from north; it overrides look_at_target"),
     Written,
 ]
-Duration = Annotated[float | None, Field(gt=0, le=3600, description="s of the vehicle's clock"), Written]
+Duration = Annotated[float | None, Field(gt=0, le=3600, description="s, on the vehicle's clock"), Written]
 Tolerance = Annotated[float, Field(gt=0, le=100, description="m, horizontally and vertically"), Written]
 Argument = Annotated[str, Field(max_length=4096, pattern=r"^[^\x00]*$")]  # no command line can hold a 0
 
@@ -76,9 +76,9 @@ class Blocking(Request):
 
 
 class Disarm(Request):
-    """`force` stops the motors in flight too."""
+    """`force` stops the motors even in flight."""
 
-    force: Annotated[bool, Field(description="in flight too: it falls")] = False
+    force: Annotated[bool, Field(description="even in flight: the vehicle falls")] = False
 
 
 class Takeoff(Blocking):
@@ -89,7 +89,7 @@ class Takeoff(Blocking):
 
 
 class LandAt(Request):
-    """A place to land at: degrees, and m above home; `vtol` vertically, where the plane can."""
+    """A landing place: degrees, and m above home; `vtol` lands vertically, if the plane can."""
 
     lat: Annotated[Number, Field(ge=-90, le=90, description="degrees")]
     long: Annotated[Number, Field(ge=-180, le=180, description="degrees")]
@@ -98,7 +98,7 @@ class LandAt(Request):
 
 
 class Reverse(Request):
-    """`reverse`: backwards, or forwards again."""
+    """`reverse`: true drives backwards, false forwards again."""
 
     reverse: Annotated[bool, Field(description="backwards")] = True
 
@@ -133,7 +133,7 @@ class GpsTarget(Blocking):
 
 
 class NedPlace(Blocking):
-    """North, east, down in m: from the EKF origin, or from here, as the path says."""
+    """North, east, down in m: from the EKF origin or from the present position, depending on the path."""
 
     x: Annotated[Number, Field(ge=-NED_REACH, le=NED_REACH, description="m north")]
     y: Annotated[Number, Field(ge=-NED_REACH, le=NED_REACH, description="m east")]
@@ -144,7 +144,7 @@ class NedPlace(Blocking):
 
 
 class BodyOffset(Blocking):
-    """Front, right, down in m from here, in the body's frame."""
+    """Front, right, down in m from the present position, in the body frame."""
 
     front: Annotated[Number, Field(ge=-NED_REACH, le=NED_REACH, description="m")]
     right: Annotated[Number, Field(ge=-NED_REACH, le=NED_REACH, description="m")]
@@ -155,7 +155,7 @@ class BodyOffset(Blocking):
 
 
 class NedVelocity(Request):
-    """North, east, down in m/s; `duration` in s of the vehicle's clock."""
+    """North, east, down in m/s; `duration` in s on the vehicle's clock."""
 
     vx: Annotated[Number, Field(ge=-50, le=50, description="m/s north")]
     vy: Annotated[Number, Field(ge=-50, le=50, description="m/s east")]
@@ -166,7 +166,7 @@ class NedVelocity(Request):
 
 
 class BodyVelocity(Request):
-    """Front, right, down in m/s, by the heading at the beginning; `duration` in s of the vehicle's clock."""
+    """Front, right, down in m/s, by the heading at the start; `duration` in s on the vehicle's clock."""
 
     front: Annotated[Number, Field(ge=-50, le=50, description="m/s")]
     right: Annotated[Number, Field(ge=-50, le=50, description="m/s")]
@@ -202,33 +202,33 @@ class ScriptName(Request):
 
 
 class ExecuteScript(ScriptName):
-    """`args`: what the script gets on its command line."""
+    """`args`: the script's command-line arguments."""
 
-    args: Annotated[list[Argument], Field(max_length=100, description="its command line")] = []
+    args: Annotated[list[Argument], Field(max_length=100, description="its command-line arguments")] = []
 
 
 class ScriptLog(Request):
-    """`stream`: out or err. With `follow` both come, line by line, as Server-Sent Events, until the run ends."""
+    """`stream`: out or err. With `follow` both come line by line, as Server-Sent Events, until the run ends."""
 
     stream: Annotated[Literal["out", "err"], Field(description="which log, without follow")] = "out"
     follow: Annotated[bool, Field(description="as Server-Sent Events, until the run ends")] = False
 
 
 class MissionFile(Request):
-    """A mission as it came: a QGC WPL 110 file, a .plan file, or JSON items."""
+    """An uploaded mission: a QGC WPL 110 file, a .plan file, or JSON items."""
 
-    digest: str  # what tells one upload from another
+    digest: str  # identifies the upload
     items: int
 
 
 class StartMission(Blocking):
-    """`until_complete`: answer at the mission's end rather than at its beginning."""
+    """`until_complete`: answer when the mission ends; otherwise when it begins."""
 
-    until_complete: Annotated[bool, Field(description="answer at the mission's end")] = False
+    until_complete: Annotated[bool, Field(description="answer when the mission ends")] = False
 
 
 class Photo(Request):
-    """A picture: the tool, pixels, ms of exposure, and m to what is in focus."""
+    """A picture: the tool, pixels, ms of exposure, and the focus distance in m."""
 
     command: Annotated[str, Field(description="fswebcam, rpicam-still, libcamera-still, or vision")]
     resolution: Annotated[str, Field(description="width x height in pixels")] = "1280x720"
@@ -237,24 +237,24 @@ class Photo(Request):
 
 
 class Read(Request):
-    """A telemetry read: `max_age` is the age (s) up to which the answer is wanted."""
+    """A telemetry read: `max_age` is the highest acceptable age (s) of the data."""
 
-    max_age: Annotated[float | None, Field(gt=0, le=86400, description="s; the oldest wanted"), Written] = None
+    max_age: Annotated[float | None, Field(gt=0, le=86400, description="highest acceptable age in s"), Written] = None
 
 
 class StreamFilter(Request):
-    """What a telemetry stream carries: message names by comma, a system id, and at most `rate` Hz of each name."""
+    """The contents of a telemetry stream: message names by comma, a system id, and at most `rate` Hz per name."""
 
-    names: Annotated[str, Field(description="message names by comma; none for all")] = ""
-    sysid: Annotated[int | None, Field(ge=1, le=255, description="system id; none for all"), Written] = None
-    rate: Annotated[float | None, Field(gt=0, le=1000, description="Hz at most, of each"), Written] = None
+    names: Annotated[str, Field(description="message names by comma; empty for all")] = ""
+    sysid: Annotated[int | None, Field(ge=1, le=255, description="system id; omitted for all"), Written] = None
+    rate: Annotated[float | None, Field(gt=0, le=1000, description="highest rate of each name in Hz"), Written] = None
 
 
 def parse(model: type[Request], source: str, values: dict[str, Any]) -> Request:
-    """Validate `values`, which came by `source` (query or body).
+    """Validate `values`, which come from `source` (query or body).
 
     Raises:
-        Invalid: with one entry for each problem.
+        Invalid: with one entry per problem.
     """
     try:
         return model.model_validate(values)

@@ -1,4 +1,4 @@
-"""Answers: the envelope that clients know, and what an error becomes."""
+"""Answers: the success envelope, and the body of an error."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from aiohttp import web
 
 from mavproxy_uavapi.core.errors import TooManyRequests, UavApiError, Unauthorized
 
-Answer = dict[str, Any] | web.StreamResponse  # of an action: a body, or the whole response
+Answer = dict[str, Any] | web.StreamResponse  # an action returns a body or the whole response
 MULTI_STATUS = 207  # of an answer for several, of which not all are a success
 Handler = Callable[[web.BaseRequest], Awaitable[web.StreamResponse]]
 
 
 def envelope(system: int, result: str, **members: Any) -> dict[str, Any]:
-    """A success body: device, id (the system id as text), result, and what else there is to say."""
+    """A success body: device, id (the system id as text), result, and further members."""
     return {"device": "uav", "id": str(system), "result": result, **members}
 
 
 def dumps(body: Any) -> str:
-    """JSON without NaN and infinities, which are not JSON: they become null."""
+    """JSON in which NaN and infinities become null, because JSON does not have them."""
     return json.dumps(finite(body), allow_nan=False)
 
 
 def finite(value: Any) -> Any:
-    """`value` with each float that is not finite replaced by None, to any depth."""
+    """`value` with each float that is not finite replaced by None, at any depth."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, Mapping):
@@ -48,7 +48,7 @@ def success(body: Mapping[str, Any]) -> web.Response:
 
 
 def failure(error: UavApiError) -> web.Response:
-    """The answer to any error of the tree."""
+    """The answer to any UavApiError."""
     response = web.json_response(reason(error), status=error.status, dumps=dumps)
     if isinstance(error, Unauthorized):
         response.headers["WWW-Authenticate"] = "Bearer"

@@ -1,4 +1,4 @@
-"""One path of the API: who may ask how, what is validated, and who answers."""
+"""One path of the API: its access, its parameters, and its action."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ POST = ("POST",)
 
 @dataclass(frozen=True)
 class Route:
-    """A path: who may ask how, what is validated, and who answers. The action's docstring is its summary."""
+    """A path: its access, its parameters, and its action. The action's docstring is its summary."""
 
     path: str
     action: Action
     model: type[Request]
     methods: tuple[str, ...] = ("GET",)
     raw: bool = False  # whether the action itself reads the body, which holds no parameters
-    job: bool = False  # whether the action runs as a job, which a client need not wait for
-    stops: bool = False  # whether it stops a vehicle: no limit refuses it
-    verb: str = ""  # the method of a vehicle that it calls, where not every type of vehicle has that
-    trail: bool = True  # whether a call that commands is audited; one that comes many times a second would flush it
+    job: bool = False  # whether the action runs as a job; a client need not wait for it
+    stops: bool = False  # whether it stops a vehicle; no limit refuses it then
+    verb: str = ""  # the vehicle's method that it calls, if not every type of vehicle has it
+    trail: bool = True  # whether a command is audited; not for one that comes many times a second
 
     @property
     def commands(self) -> bool:
-        """Whether it does something; what can only be read with GET does not."""
+        """Whether it is a command; it is one unless GET is its only method."""
         return self.methods != ("GET",)
 
     @property
     def pattern(self) -> re.Pattern[str]:
-        """What matches a path that is this one, with something in the place of each `{name}`."""
+        """Matches the paths of this route, with any value for each `{name}`."""
         return re.compile(re.sub(r"\\{(\w+)\\}", r"(?P<\1>[^/]+)", re.escape(self.path)))

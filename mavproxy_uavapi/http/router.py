@@ -1,4 +1,4 @@
-"""Which route a request is for."""
+"""Finds the route of a request."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ LARGEST_SYSTEM = 255
 
 @dataclass(frozen=True)
 class Match:
-    """What there is at a path.
+    """The routes at a path.
 
     Attributes:
-        path: the path without the vehicle's prefix, and without a slash at its end.
-        system: the system id of the vehicle that the request names; 0 where it names none.
-        route: the one for the request's method; None where there is none.
+        path: the path without the vehicle's prefix and without a trailing slash.
+        system: the system id of the vehicle that the request names; 0 for none.
+        route: the route for the request's method; None if there is none.
         allowed: the methods that the path has.
-        names: what stands in the place of each `{name}` of the route's path.
+        names: the value of each `{name}` in the route's path.
     """
 
     path: str
@@ -36,12 +36,12 @@ class Match:
 class Router:
     """Finds the route of a request.
 
-    It is ours, since aiohttp's own answers some requests (a path that is not there, an `Expect`) before any check.
+    It replaces aiohttp's router, which answers some requests (an unknown path, an `Expect`) before any check.
 
     Args:
-        routes: those that are always there.
-        extensions: by path, those of other modules, which come and go.
-        system: the system id that paths mean which name none; 0 for no certain one.
+        routes: the permanent routes.
+        extensions: the routes of other modules by path; they come and go.
+        system: the system id for paths that name none; 0 for no fixed one.
     """
 
     def __init__(self, routes: Iterable[Route], extensions: Mapping[str, Route], system: int = 0) -> None:
@@ -56,7 +56,7 @@ class Router:
                 self._by_path.setdefault(route.path, []).append(route)
 
     def find(self, method: str, path: str) -> Match:
-        """The route of a request; a slash at the end of its path makes no difference."""
+        """The route of a request; a trailing slash of its path makes no difference."""
         path, system = path.rstrip("/"), self._system
         named = OF_A_VEHICLE.fullmatch(path)
         if named is not None and int(named["system"]) <= LARGEST_SYSTEM:
@@ -66,7 +66,7 @@ class Router:
         return Match(path, system, route, frozenset(method for route in routes for method in route.methods), names)
 
     def _at(self, path: str) -> tuple[list[Route], dict[str, str]]:
-        """All that is at a path, and its names."""
+        """All routes at a path, and the values of its names."""
         routes = self._by_path.get(path)
         if routes is not None:
             return routes, {}

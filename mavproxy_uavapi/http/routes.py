@@ -1,4 +1,4 @@
-"""The one table of paths."""
+"""The table of all paths."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from mavproxy_uavapi.http.route import EITHER, POST, Route
 
 
 async def specification(call: Call) -> dict[str, Any]:
-    """The description of this API, OpenAPI 3.1; with the routes of the other modules that are loaded."""
+    """The description of this API, OpenAPI 3.1, including the routes of other loaded modules."""
     return document([*ROUTES, *call.service.host.extensions.values()])
 
 

@@ -22,15 +22,15 @@ from mavproxy_uavapi.scripts.follower import Follower
 from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.scripts.runs import Run
 
-# The kinds of these answers, as clients of the original service know them.
+# The numbers of these answers that clients of the original service expect.
 SAVED, LISTED, STARTED, CLEARED, RUNNING, STOPPED = 44, 42, 46, 48, 50, 52
 
-LOG_SERVED = 1024 * 1024  # bytes of a log's end
-FOLLOW_EVERY = 0.25  # s between looks at a log: a file tells nobody when it grows
+LOG_SERVED = 1024 * 1024  # bytes of the end of a log
+FOLLOW_EVERY = 0.25  # s between looks at a log, because a file does not signal its growth
 
 
 async def upload_script(call: Call) -> dict[str, Any]:
-    """Save a .py or .sh file, sent as the multipart field `file`, in place of one of that name."""
+    """Save a .py or .sh file, sent as the multipart field `file`; it replaces one of the same name."""
     scripts = _scripts(call)
     name, data = await file_of(call.request, scripts.store.size_limit, names.checked)
     path = await scripts.save(name, data)
@@ -45,31 +45,31 @@ async def list_scripts(call: Call) -> dict[str, Any]:
 
 
 async def execute_script(call: Call) -> dict[str, Any]:
-    """Run a script in a tmux session of its own; answers when it runs."""
+    """Run a script in a tmux session of its own; answers when it has started."""
     scripts, p = _scripts(call), call.params(ExecuteScript)
     run = await scripts.execute(p.script_name, p.args)
     return _answer(call, STARTED, **_report(run))
 
 
 async def running_scripts(call: Call) -> dict[str, Any]:
-    """The scripts that run now, and of those being stopped the seconds until they are killed."""
+    """The scripts that run now; for those being stopped also the seconds until they are killed."""
     return _answer(call, RUNNING, scripts=[_report(run) for run in await _scripts(call).running()])
 
 
 async def stop_script(call: Call) -> dict[str, Any]:
-    """Ctrl-C, so that the script can land the vehicle; a kill after the grace period; answers at its end."""
+    """Stop a script by Ctrl-C, so that it can land the vehicle; kill it after the grace period; wait for its end."""
     run = await _scripts(call).halt(call.params(ScriptName).script_name)
     return _answer(call, STOPPED, info="Stopped", **_report(run))
 
 
 async def clear_scripts(call: Call) -> dict[str, Any]:
-    """Remove all uploaded scripts. Those that run go on; logs stay."""
+    """Remove all uploaded scripts. Running scripts go on; logs stay."""
     removed = await asyncio.to_thread(_scripts(call).store.clear)
     return _answer(call, CLEARED, info=f"Removed {len(removed)} script(s)", removed=removed)
 
 
 async def show_script(call: Call) -> dict[str, Any]:
-    """A script's newest run: whether it goes on, its exit status, and the ends of both logs."""
+    """A script's newest run: whether it still runs, its exit status, and the ends of both logs."""
     scripts, script = _scripts(call), _script_of(call)
     run = await scripts.newest(script)
     if run is None:
@@ -92,14 +92,14 @@ async def script_log(call: Call) -> web.StreamResponse:
     return web.Response(text=text, content_type="text/plain", charset="utf-8")
 
 
-# -- what they are made of ----------------------------------------------------------------------------------
+# -- helpers ------------------------------------------------------------------------------------------------
 
 
 def _scripts(call: Call) -> Scripts:
-    """The scripts, for whoever may have them.
+    """The scripts, if the caller may use them.
 
     Raises:
-        Forbidden: the caller has no token, is no program of this machine, and his network was not named.
+        Forbidden: the caller has no token, is not a program of this machine, and its network is not in the settings.
     """
     caller: Caller = call.request[CALLER]
     if not (caller.has_token or caller.is_local or caller.is_in(call.service.settings.allow_scripts_from)):
@@ -112,7 +112,7 @@ def _script_of(call: Call) -> str:
 
 
 def _answer(call: Call, kind: int | None, **members: Any) -> dict[str, Any]:
-    """A success body; a script needs no vehicle, so neither do these."""
+    """A success body without a vehicle, because scripts do not need one."""
     of_that_kind = {} if kind is None else {"type": kind}
     return envelope(call.service.scripts.sysid, "Success", **of_that_kind, **members)
 
@@ -122,12 +122,12 @@ def _report(run: Run) -> dict[str, Any]:
 
 
 async def _follow(call: Call, run: Run) -> web.StreamResponse:
-    """Both logs from their beginning, line by line, then how the run ended."""
+    """Send both logs from their beginning, line by line, then how the run ended."""
     response = EventStream()
     followers = {"out": Follower(run.out_log), "err": Follower(run.err_log)}
     now = asyncio.get_running_loop().time
     said_at = now()
-    with suppress(ConnectionError):  # the client has gone, or reads no more: that is how following ends
+    with suppress(ConnectionError):  # the client has gone or reads no more; following ends so
         await response.prepare(call.request)
         while True:
             run, events = await asyncio.to_thread(_next_events, run, followers)
@@ -147,14 +147,14 @@ async def _follow(call: Call, run: Run) -> web.StreamResponse:
 
 
 def _next_events(run: Run, followers: dict[str, Follower]) -> tuple[Run, bytes]:
-    """The run as it is now, and an event for each of the next lines. Blocking."""
-    run = runs.refreshed(run)  # before the logs: then nothing of them is missed
+    """The run's present state, and an event for each of the next lines. Blocking."""
+    run = runs.refreshed(run)  # before the logs, so that nothing of them is missed
     events = [_events(kind, follower.lines(not run.running)) for kind, follower in followers.items()]
     return run, "".join(events).encode()
 
 
 def _events(kind: str, lines: list[str]) -> str:
-    """An event for each line: a log may have a million, so that they are encoded all at once."""
+    """An event for each line; all lines are encoded at once, because a log may have a million."""
     if not lines:
         return ""
     before, after = f'event: {kind}\ndata: {{"line": ', "}\n\n"

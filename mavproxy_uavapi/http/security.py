@@ -1,8 +1,8 @@
-"""The door: who may call. No page of another site, no name but ours, and with a token where one is asked for.
+"""The door check: who may call. It refuses pages of other sites and foreign host names, and asks for a token if set.
 
-Many commands are GETs, and any web page can make a browser issue a GET to a loopback address. A browser says
-so in Origin or Sec-Fetch-Site; Host catches a foreign name that was rebound to our address. Over plain HTTP to a
-LAN address a browser says neither with a GET: there it is known by what else it says (`check_page`).
+Many commands are GETs, and any web page can make a browser send a GET to a loopback address. A browser says so in
+Origin or Sec-Fetch-Site; Host shows a foreign name that was rebound to our address. Over plain HTTP to a LAN address
+a browser sends neither with a GET; other headers show it there (`check_page`).
 """
 
 from __future__ import annotations
@@ -29,19 +29,19 @@ from mavproxy_uavapi.http.router import MATCH
 from mavproxy_uavapi.settings import ApiSettings
 
 log = logging.getLogger("uavapi.http.door")
-OURSELVES = {"same-origin", "none"}  # Sec-Fetch-Site of our own page, and of an address typed by hand
-# What a browser accepts for a page, a picture, a style, a script, a film; programs ask for JSON or for anything.
+OURSELVES = {"same-origin", "none"}  # Sec-Fetch-Site of our own page and of a typed address
+# What a browser accepts for a page, picture, style, script or film; programs ask for JSON or for anything.
 BROWSERS_WANT = ("text/html", "application/xhtml", "image/", "text/css", "javascript", "video/", "audio/")
 PROXIES_SAY = ("Forwarded", "X-Forwarded-For", "X-Real-IP", "Via")
-STRANGERS_RATE = 10.0  # requests/s of one address that the door does not let in
-REFUSED_LATE = 1.0  # s that the answer waits when its address was refused too often
+STRANGERS_RATE = 10.0  # requests/s of one address that fail the door check
+REFUSED_LATE = 1.0  # s by which the answer is delayed if its address was refused too often
 
 
 def check_origin(headers: Mapping[str, str], trusted: tuple[str, ...] = ()) -> None:
-    """Refuse what a page of another site sent, and a Host that is not ours.
+    """Refuse requests from pages of other sites, and a Host that is not ours.
 
     Args:
-        headers: the request's.
+        headers: the request's headers.
         trusted: origins of other sites' pages that may call.
 
     Raises:
@@ -61,13 +61,13 @@ def check_origin(headers: Mapping[str, str], trusted: tuple[str, ...] = ()) -> N
 
 
 def check_page(headers: Mapping[str, str], trusted: tuple[str, ...] = ()) -> None:
-    """Refuse a command that a browser sent without saying for which page, or for one of another site.
+    """Refuse a command from a browser that does not name the page, or names one of another site.
 
-    A page can keep its browser from sending a Referer and choose what it accepts, but not whose Referer is sent,
-    nor what the browser calls itself. With Origin or Sec-Fetch-Site `check_origin` has judged already.
+    A page can keep its browser from sending a Referer and can choose what it accepts; it cannot send another site's
+    Referer, nor change the browser's name. `check_origin` has already judged Origin and Sec-Fetch-Site.
 
     Args:
-        headers: the request's.
+        headers: the request's headers.
         trusted: origins of other sites' pages that may call.
 
     Raises:
@@ -89,25 +89,27 @@ def check_page(headers: Mapping[str, str], trusted: tuple[str, ...] = ()) -> Non
 
 
 def is_browser(headers: Mapping[str, str]) -> bool:
-    """Whether a browser sent this, by its name or by what it accepts."""
+    """Whether a browser sent this, by its name or by the types that it accepts."""
     name = headers.get("User-Agent", "")
-    wanted = headers.get("Accept", "").lower()
-    return (name.startswith("Mozilla/") and "PowerShell" not in name) or any(kind in wanted for kind in BROWSERS_WANT)
+    accepted = headers.get("Accept", "").lower()
+    return (name.startswith("Mozilla/") and "PowerShell" not in name) or any(
+        kind in accepted for kind in BROWSERS_WANT
+    )
 
 
 def is_our_name(host: str) -> bool:
-    """Whether a Host header names us: by `localhost`, this machine's name, or an IP address.
+    """Whether a Host header names this machine: `localhost`, its name, or an IP address.
 
-    No foreign name server can make any of these point here.
+    A foreign name server cannot make any of these point to this machine.
     """
     return _names_us(host, socket.gethostname().lower())
 
 
-@functools.lru_cache(maxsize=256)  # each request has one, and mostly the same
+@functools.lru_cache(maxsize=256)  # each request has one, mostly the same
 def _names_us(host: str, own: str) -> bool:
     try:
         name = (urlsplit(f"//{host}").hostname or "").lower()
-    except ValueError:  # such as a bracket that is not closed
+    except ValueError:  # for example a bracket that is not closed
         return False
     if name in ("localhost", own, f"{own}.local"):
         return True
@@ -119,18 +121,18 @@ def _names_us(host: str, own: str) -> bool:
 
 
 def check_caller(remote: str | None, headers: Mapping[str, str], settings: ApiSettings) -> Caller:
-    """Let in who has the token, or comes from a network that needs none; who that is.
+    """The caller, if it has the token or comes from a network that needs none.
 
-    What a proxy passed on comes from an address that is not the caller's: the address opens nothing then.
+    Behind a proxy the peer's address is the proxy's, not the caller's; it gives no access then.
 
     Args:
         remote: the peer's IP address.
         headers: the request's.
-        settings: what is asked for.
+        settings: the access settings.
 
     Raises:
         Unauthorized: a token is needed, and missing or wrong.
-        Forbidden: there is no token to have, and the caller's network was not named.
+        Forbidden: no token is set, and the caller's network is not in the settings.
     """
     forwarded = any(name in headers for name in PROXIES_SAY)
     caller = Caller(address_of(remote), has_token(headers.get("Authorization"), settings.token), forwarded)
@@ -144,28 +146,28 @@ def check_caller(remote: str | None, headers: Mapping[str, str], settings: ApiSe
 
 
 def has_token(authorization: str | None, token: str) -> bool:
-    """Whether the header of that name holds the token; it may hold any bytes."""
-    scheme, _, given = (authorization or "").partition(" ")
-    given_bytes = given.strip().encode("utf-8", "surrogateescape")
-    return bool(token) and scheme.lower() == "bearer" and hmac.compare_digest(given_bytes, token.encode())
+    """Whether the Authorization header holds the token; the header may hold any bytes."""
+    scheme, _, credentials = (authorization or "").partition(" ")
+    credential_bytes = credentials.strip().encode("utf-8", "surrogateescape")
+    return bool(token) and scheme.lower() == "bearer" and hmac.compare_digest(credential_bytes, token.encode())
 
 
 def admitted(request: web.BaseRequest, settings: ApiSettings) -> Caller:
-    """Who calls, if he may, and commands for no page of another site.
+    """The caller, if it may call and its command does not come from a page of another site.
 
     Raises:
-        Unauthorized, Forbidden: nobody, and why.
+        Unauthorized, Forbidden: it may not, with the reason.
     """
     caller = check_caller(request.remote, request.headers, settings)
     route = request[MATCH].route
-    # No page of another site has the token, nor may it send that header.
+    # A page of another site does not have the token, and cannot send that header.
     if route is not None and route.commands and not caller.has_token:
         check_page(request.headers, settings.cors_origins)
     return caller
 
 
 async def door(request: web.BaseRequest, handler: Handler) -> web.StreamResponse:
-    """All checks, for every request, before anything else of it is looked at; the answer to a trusted preflight."""
+    """Check every request before anything else reads it; answer the preflight of a trusted page."""
     settings = request[SERVICE].settings
     connection = Connection.of(request)
     try:
@@ -174,7 +176,7 @@ async def door(request: web.BaseRequest, handler: Handler) -> web.StreamResponse
             return web.Response(status=204)
         caller = admitted(request, settings)
     except Unauthorized as error:
-        # A browser has no token before it has the page that asks for one; the page tells nothing of the vehicle.
+        # A browser has no token before it has the page that asks for one; the page shows nothing of the vehicle.
         if not is_documentation(request[MATCH].path) or _wait_of_stranger(request):
             return await _refused(request, connection, error)
         return await handler(request)
@@ -187,7 +189,7 @@ async def door(request: web.BaseRequest, handler: Handler) -> web.StreamResponse
 
 
 async def _refused(request: web.BaseRequest, connection: Connection | None, error: UavApiError) -> web.StreamResponse:
-    """The answer to whom the door does not let in; late, where that happens often. The connection ends with it."""
+    """The answer to a request that fails the door check, delayed if that happens often. It ends the connection."""
     service, group = request[SERVICE], group_of(address_of(request.remote))
     service.throttle.tell(error.code, f"a request of {group} was refused: {ascii(str(error))[1:-1]}")
     if connection is not None:
@@ -203,7 +205,7 @@ async def _refused(request: web.BaseRequest, connection: Connection | None, erro
 
 
 def _wait_of_stranger(request: web.BaseRequest) -> float:
-    """Count a request that the door does not let in; 0, or the seconds to wait when there were too many."""
+    """Count a request that fails the door check; 0, or the seconds to wait if there were too many."""
     service, group = request[SERVICE], group_of(address_of(request.remote))
     return service.strangers.take(group, STRANGERS_RATE, service.host.clock())
 

@@ -22,8 +22,8 @@ from mavproxy_uavapi.http.streaming import (
     while_read,
 )
 
-MOST_SAID = 4096  # bytes of a message that a WebSocket's client may say; nothing is expected of it
-HEARD_EVERY = 0.1  # s from one of its messages to the next: more of them wait on its own side
+MOST_SAID = 4096  # bytes of a message from a WebSocket's client; no message is expected
+HEARD_EVERY = 0.1  # s between two of its messages; more of them wait on its side
 
 
 async def stream(call: Call) -> web.StreamResponse:
@@ -35,19 +35,19 @@ async def stream(call: Call) -> web.StreamResponse:
 
 
 def _subscription(call: Call) -> Subscription:
-    wanted = call.params(StreamFilter)
-    names = frozenset(name.strip().upper() for name in wanted.names.split(",") if name.strip())
-    return Subscription(names, wanted.sysid or call.named_system or None, wanted.rate)
+    wishes = call.params(StreamFilter)
+    names = frozenset(name.strip().upper() for name in wishes.names.split(",") if name.strip())
+    return Subscription(names, wishes.sysid or call.named_system or None, wishes.rate)
 
 
 async def _websocket(request: web.BaseRequest, subscription: Subscription) -> web.StreamResponse:
-    # Compressed, each message would have to be encoded for each client anew.
+    # With compression each message would have to be encoded for each client.
     socket = web.WebSocketResponse(compress=False, max_msg_size=MOST_SAID)
     limit_kernel(request.transport)
     await socket.prepare(request)
     sender = asyncio.create_task(_send_all(socket, request, subscription))
     try:
-        async for message in socket:  # until it is closed, by either side
+        async for message in socket:  # until either side closes it
             if message.type is WSMsgType.ERROR:
                 break
             await asyncio.sleep(HEARD_EVERY)
@@ -78,7 +78,7 @@ async def _send_all(socket: web.WebSocketResponse, request: web.BaseRequest, sub
 
 async def _events(request: web.BaseRequest, subscription: Subscription) -> web.StreamResponse:
     response = EventStream()
-    with suppress(ConnectionError):  # the client has gone, or reads no more: that is how a stream ends
+    with suppress(ConnectionError):  # the client has gone or reads no more; a stream ends so
         await response.prepare(request)
         while True:
             try:

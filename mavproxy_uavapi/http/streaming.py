@@ -1,4 +1,4 @@
-"""Answers that go on: how many are open at once, and the end of one whose client reads no more."""
+"""Streaming answers: their number, and the end of one whose client does not read."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from mavproxy_uavapi.http.cors import name_the_trusted
 log = logging.getLogger("uavapi.http")
 
 MOST_OPEN = 100  # streams at once, of all kinds
-KEEP_ALIVE = 15.0  # s; a comment or ping after such a silence, so that dead connections are noticed
+KEEP_ALIVE = 15.0  # s; silence after which a comment or ping is sent, to notice dead connections
 UNREAD = 30.0  # s without reading after which a client is dropped
-LINGER = 30.0  # s that it then has to read why
+LINGER = 30.0  # s that it then has to read the reason
 WHY = f"nothing was read for {UNREAD:g} s"
-SEND_BUFFER = 128 * 1024  # bytes that the kernel keeps of a stream: what it holds is old when it is read
-LOW_WATER = 16 * 1024  # bytes of asyncio's own buffer up to which no writer waits
+SEND_BUFFER = 128 * 1024  # bytes of a stream that the kernel buffers; a larger buffer delays the data
+LOW_WATER = 16 * 1024  # bytes in asyncio's own buffer up to which writers do not wait
 
 COMMENT = b": still here\n\n"
 END = f"event: end\ndata: {json.dumps({'code': 'not_read', 'detail': WHY})}\n\n".encode()
@@ -35,29 +35,29 @@ class NotRead(ConnectionError):
 
 
 class Slots:
-    """So many of a kind may be there at once.
+    """Limits how many of a kind are open at once.
 
     Args:
-        most: how many.
-        what: they are, for the refusal: `streams are open`.
+        most: the limit.
+        what: a phrase for the refusal: `streams are open`.
 
     Attributes:
-        count: how many there are.
+        count: the number now open.
     """
 
-    def __init__(self, most: int, what: str) -> None:
-        self._most, self._what = most, what
+    def __init__(self, most: int, phrase: str) -> None:
+        self._most, self._phrase = most, phrase
         self.count = 0
 
     @contextmanager
     def one_more(self) -> Iterator[None]:
-        """One more is there for as long as the context lasts.
+        """Take a slot for as long as the context lasts.
 
         Raises:
             TooManyRequests: all slots are taken.
         """
         if self.count >= self._most:
-            raise TooManyRequests(f"{self._most} {self._what} already")
+            raise TooManyRequests(f"{self._most} {self._phrase} already")
         self.count += 1
         try:
             yield
@@ -66,11 +66,11 @@ class Slots:
 
 
 class StreamingResponse(web.StreamResponse):
-    """An answer that goes on until its client leaves, or reads no more.
+    """An answer that goes on until its client leaves or stops reading.
 
     Args:
-        content_type: of what is written.
-        last_words: what a client that reads no more is sent, in case it reads on.
+        content_type: of the data.
+        last_words: sent last to a client that stopped reading, in case it reads on.
     """
 
     def __init__(self, content_type: str, last_words: bytes = b"") -> None:
@@ -86,17 +86,17 @@ class StreamingResponse(web.StreamResponse):
         return await super().prepare(request)
 
     async def write(self, data: bytes | bytearray | memoryview) -> None:
-        """Write; waits while the client is slow.
+        """Write; wait while the client is slow.
 
         Raises:
-            NotRead: it reads no more.
-            ConnectionError: it has gone.
+            NotRead: the client has stopped reading.
+            ConnectionError: the client has gone.
         """
         try:
             await while_read(self._transport, len(data), super().write(data))
         except NotRead:
             await super().write(self._last_words)
-            self._transport.close()  # when it has sent what it holds
+            self._transport.close()  # after it has sent its buffer
             abort_later(self._transport)
             raise
 
@@ -109,27 +109,27 @@ class EventStream(StreamingResponse):
 
 
 def limit_kernel(transport: asyncio.Transport | None) -> None:
-    """Have the kernel keep little of a stream, and notice by itself when the client's machine has gone."""
+    """Let the kernel buffer only a little of a stream, and notice when the client's machine has gone."""
     sock = None if transport is None else transport.get_extra_info("socket")
     if sock is None:
         return
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
-    if hasattr(socket, "TCP_USER_TIMEOUT"):  # Linux has it; after UNREAD, which can say why
+    if hasattr(socket, "TCP_USER_TIMEOUT"):  # on Linux; longer than UNREAD, which can give the reason
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, int(2 * UNREAD * 1000))
 
 
 async def while_read(transport: asyncio.Transport, size: int, writing: Awaitable[None]) -> None:
-    """Await `writing` of `size` bytes, for as long as the client reads.
+    """Await `writing` of `size` bytes for as long as the client reads.
 
     Raises:
         NotRead: it read nothing for UNREAD seconds; `writing` is cancelled.
     """
     if transport.get_write_buffer_size() + size <= LOW_WATER:
-        await writing  # waits for nothing
+        await writing  # returns at once
         return
     task = asyncio.ensure_future(writing)
     try:
-        await asyncio.sleep(0)  # it hands over all its bytes, then waits until most are sent
+        await asyncio.sleep(0)  # it hands over all bytes, then waits until most are sent
         while not task.done():
             before = transport.get_write_buffer_size()
             await asyncio.wait({task}, timeout=UNREAD)
@@ -141,7 +141,7 @@ async def while_read(transport: asyncio.Transport, size: int, writing: Awaitable
 
 
 def abort_later(transport: asyncio.Transport) -> None:
-    """Close a connection that is not read after LINGER seconds, whatever is left to be sent."""
+    """Close a connection that is not read after LINGER seconds, even with unsent data."""
     peer = transport.get_extra_info("peername")
     log.info("a stream of %s was dropped: %s", peer[0] if peer else "a client", WHY)
     asyncio.get_running_loop().call_later(LINGER, transport.abort)

@@ -1,4 +1,4 @@
-"""/telemetry: what the vehicle last told, with its age; old data is never passed off as new."""
+"""/telemetry: the vehicle's newest messages, with their age; old data never counts as new."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from mavproxy_uavapi.http import telemetry_views as views
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import Read
 
-FIRST_TIMEOUT = 2.0  # s for a message that was never told and is asked for
-HOME_AGE = 1.0  # s for which a home position that was asked for serves further readers
+FIRST_TIMEOUT = 2.0  # s to wait for a message that has not arrived yet and is requested
+HOME_AGE = 1.0  # s for which a requested home position serves further readers
 
 
 async def _newest(call: Call, name: str) -> Received:
-    """The newest message of that name, young enough; one that was never told is asked for.
+    """The newest message of that name, if it is young enough; one that never arrived is requested.
 
     Raises:
         Stale: it is too old, or did not come.
@@ -31,7 +31,7 @@ async def _newest(call: Call, name: str) -> Received:
     if received is None:
         await _ask_for(call, name)
         received = vehicle.state.newest(name)
-        if received is None:  # it came, and with it the news of a reboot, which makes it worthless
+        if received is None:  # it came with the news of a reboot, so it is outdated
             raise Stale(f"vehicle {vehicle.state.system} has not told {name} since it rebooted")
     age = vehicle.clock() - received.at
     if age > max_age:
@@ -110,7 +110,7 @@ async def compass(call: Call) -> dict[str, Any]:
     if newest is None:
         raise NotFound("no compass calibration was reported; MAG_CAL_REPORT comes during a calibration only")
     per_compass = [messages.get(f"MAG_CAL_REPORT[{number}]") for number in range(3)]
-    fitness = [None if one is None else one.message.fitness for one in per_compass]
+    fitness = [None if calibration is None else calibration.message.fitness for calibration in per_compass]
     return call.answer("Success", info=views.compass(newest.message, fitness), age_s=_age(call, newest))
 
 

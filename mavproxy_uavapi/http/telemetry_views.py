@@ -1,4 +1,4 @@
-"""MAVLink message -> what an answer says of it. Pure. Units: m, m/s, degrees; frames: docs/api.md."""
+"""MAVLink message -> answer body. Pure. Units: m, m/s, degrees; frames: docs/api.md."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ UINT16_MAX = 65535
 INT16_MAX = 32767
 UINT8_MAX = 255
 
-# "Not known" as MAVLink's message definitions spell it, for the messages that an ArduPilot vehicle sends.
+# The values that mean "unknown" in MAVLink's message definitions, for messages that ArduPilot sends.
 UNKNOWN: dict[str, dict[str, int]] = {
     "GLOBAL_POSITION_INT": {"hdg": UINT16_MAX},
     "GPS_RAW_INT": {
@@ -50,7 +50,7 @@ SENSORS = {
 
 
 def known(message: Any, name: str) -> Any:
-    """A field's value; None where the message says that it does not know, of an array each element's."""
+    """A field's value; None if it means "unknown"; of an array element by element."""
     value = getattr(message, name)
     unknown = UNKNOWN.get(message.get_type(), {}).get(name)
     if isinstance(value, list):
@@ -63,18 +63,18 @@ def known(message: Any, name: str) -> Any:
 
 
 def scaled(message: Any, name: str, divisor: float) -> float | None:
-    """A field's value in the answer's unit; None where it is not known."""
+    """A field's value in the answer's unit; None if unknown."""
     value = known(message, name)
     return None if value is None else value / divisor
 
 
 def fields(message: Any) -> dict[str, Any]:
-    """All fields, as they are on the wire but for the unknown ones; bytes as base64 text."""
-    found = {"mavpackettype": message.get_type()}
+    """All fields as on the wire, except unknown values; bytes as base64 text."""
+    values = {"mavpackettype": message.get_type()}
     for name in message.get_fieldnames():
         value = known(message, name)
-        found[name] = base64.b64encode(bytes(value)).decode() if isinstance(value, bytes | bytearray) else value
-    return found
+        values[name] = base64.b64encode(bytes(value)).decode() if isinstance(value, bytes | bytearray) else value
+    return values
 
 
 def general(m: Any) -> dict[str, Any]:
@@ -122,16 +122,16 @@ def attitude(m: Any) -> dict[str, Any]:
 
 
 def sensors(m: Any) -> dict[str, Any]:
-    """SYS_STATUS: of each sensor whether it is present, enabled and healthy."""
+    """SYS_STATUS: for each sensor whether it is present, enabled and healthy."""
 
-    def one(bit: int) -> dict[str, bool]:
+    def condition(bit: int) -> dict[str, bool]:
         return {
             "present": bool(m.onboard_control_sensors_present & bit),
             "enabled": bool(m.onboard_control_sensors_enabled & bit),
             "health": bool(m.onboard_control_sensors_health & bit),
         }
 
-    return {name: one(bit) for name, bit in SENSORS.items()}
+    return {name: condition(bit) for name, bit in SENSORS.items()}
 
 
 def battery(m: Any) -> dict[str, Any]:
@@ -144,7 +144,7 @@ def battery(m: Any) -> dict[str, Any]:
 
 
 def errors(m: Any) -> dict[str, Any]:
-    """SYS_STATUS: drop rate (0.01 %), errors on the autopilot's links, and its own counters that are not 0."""
+    """SYS_STATUS: drop rate (0.01 %), errors on the autopilot's links, and its own non-zero counters."""
     counts = (m.errors_count1, m.errors_count2, m.errors_count3, m.errors_count4)
     return {
         "communication_drop_rate": m.drop_rate_comm,

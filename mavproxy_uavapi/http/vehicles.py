@@ -1,4 +1,4 @@
-"""/vehicles: every vehicle that was heard, and who commands it."""
+"""/vehicles: every known vehicle, and its commander."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from mavproxy_uavapi.http.telemetry_views import gps
 
 
 async def list_vehicles(call: Call) -> dict[str, Any]:
-    """Every vehicle that was heard; `/vehicles/{sysid}` before any other path means that vehicle."""
+    """Every vehicle that was heard; the prefix `/vehicles/{sysid}` of any path means that vehicle."""
     registry = call.service.host.registry
     return {
         "vehicles": [describe(call, registry.find(system)) for system in sorted(call.service.host.fleet.vehicles)]
@@ -28,7 +28,7 @@ async def show_vehicle(call: Call) -> dict[str, Any]:
 
 
 def describe(call: Call, vehicle: Vehicle) -> dict[str, Any]:
-    """A vehicle as an answer shows it."""
+    """A vehicle as an answer body."""
     host, state = call.service.host, vehicle.state
     now = host.clock()
     info = status(vehicle, host.link_watch.is_alive(state), now)
@@ -43,7 +43,7 @@ def describe(call: Call, vehicle: Vehicle) -> dict[str, Any]:
 
 
 def _position(vehicle: Vehicle, now: float) -> dict[str, Any]:
-    """Position, velocity and heading as `/telemetry/gps` has them, and their age (s); None before it told them."""
+    """Position, velocity and heading as in `/telemetry/gps`, and their age (s); None while unknown."""
     received = vehicle.state.newest("GLOBAL_POSITION_INT")
     if received is None:
         return {"position": None, "velocity": None, "heading": None, "age_s": None}
@@ -51,6 +51,6 @@ def _position(vehicle: Vehicle, now: float) -> dict[str, Any]:
 
 
 def _commander(vehicle: Vehicle) -> dict[str, Any] | None:
-    """The job that flies the vehicle; None where none does."""
+    """The job that flies the vehicle; None if there is none."""
     job = vehicle.authority.flies
     return None if job is None else {"job": job.id, "verb": job.verb, "client": job.client}
