@@ -1,4 +1,4 @@
-"""The API as one thing that is started and stopped: its server and its watch over the telemetry."""
+"""The API as a whole: its server and its watch over the telemetry."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from mavproxy_uavapi.settings import ApiSettings
 
 
 class Api:
-    """Everything of uavapi that lives in the asyncio thread; so do all its methods but `filenos`."""
+    """The part of uavapi in the asyncio thread; all methods except `filenos` belong to that thread."""
 
     def __init__(self, host: Host) -> None:
         self.host = host
@@ -25,7 +25,7 @@ class Api:
         return self._server is not None
 
     async def start(self, settings: ApiSettings) -> None:
-        """Listen as the settings say; does nothing when it listens already.
+        """Listen according to the settings; does nothing if it already listens.
 
         Raises:
             OSError: the port is taken, or there is no such address.
@@ -36,7 +36,7 @@ class Api:
         server = ApiServer(Service(self.host, settings))
         try:
             await server.start()
-        except BaseException:  # a cancellation too: nobody would close the port
+        except BaseException:  # also a cancellation: the port must be closed
             await server.stop()
             raise
         self._server = server
@@ -45,7 +45,7 @@ class Api:
         self._tasks.start(server.service.scripts.start(), "the search for running scripts")
 
     async def renew(self, settings: ApiSettings) -> None:
-        """Take up settings that need no other listening (`ApiSettings.listens_as`): what is in flight goes on."""
+        """Apply settings that do not need another port (`ApiSettings.listens_as`); calls in flight go on."""
         if self._server is None:
             return
         self._take_up(settings)
@@ -59,7 +59,7 @@ class Api:
         self.host.endings.on_script_exit = Policy(settings.on_script_exit)
 
     async def stop(self) -> None:
-        """Close the port and end what is in flight."""
+        """Close the port and end the calls in flight."""
         server, self._server = self._server, None
         if server is None:
             return

@@ -1,4 +1,4 @@
-"""Camera programs: which arguments make each of them take one picture."""
+"""Camera programs: the arguments with which each takes one picture."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mavproxy_uavapi.core.errors import BadRequest, ToolFailed
 from mavproxy_uavapi.tools import run_tool
 
 TIME_LIMIT = 30.0  # s
-SETTLING = 1000  # ms that a Raspberry Pi's camera gets for exposure and white balance before the picture
+SETTLING = 1000  # ms for a Raspberry Pi's camera to settle exposure and white balance before the picture
 SKIPPED_FRAMES = 5  # of a USB camera, whose first ones are dark
 RESOLUTION = re.compile(r"([1-9][0-9]{1,4})x([1-9][0-9]{1,4})")
 JPEG = b"\xff\xd8\xff"
@@ -37,10 +37,10 @@ class Shot:
 
 
 def fswebcam(shot: Shot, file: str) -> list[str]:
-    """A USB camera. It sets its exposure by itself.
+    """A USB camera, which sets its exposure itself.
 
     Raises:
-        BadRequest: a focus distance; V4L2's focus has no metres.
+        BadRequest: a focus distance is set; V4L2's focus has no metres.
     """
     if shot.focus_distance is not None:
         raise BadRequest("fswebcam cannot focus at a distance; leave focus_distance out")
@@ -72,7 +72,7 @@ def size_of(resolution: str) -> tuple[int, int]:
     """Width and height (pixels) of `1280x720`.
 
     Raises:
-        BadRequest: it is no resolution.
+        BadRequest: the text is not a resolution.
     """
     match = RESOLUTION.fullmatch(resolution)
     if match is None:
@@ -81,7 +81,7 @@ def size_of(resolution: str) -> tuple[int, int]:
 
 
 async def take(tool: str, shot: Shot) -> bytes:
-    """A picture as JPEG, by one of TOOLS. Nothing is left on the disk, whatever happens.
+    """A JPEG picture by one of TOOLS. It leaves no file on the disk.
 
     Raises:
         BadRequest: the tool cannot do that.
@@ -99,7 +99,7 @@ async def take(tool: str, shot: Shot) -> bytes:
             raise ToolFailed(f"{tool} made no picture", outcome.stderr.strip())
         return picture
     finally:
-        # In a thread of its own time: a client that hangs up must not keep the folder from going.
+        # In its own thread: the folder must be removed even if the client hangs up.
         await asyncio.shield(asyncio.to_thread(shutil.rmtree, folder, ignore_errors=True))
 
 

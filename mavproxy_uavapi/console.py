@@ -1,4 +1,4 @@
-"""What the prompt shows of the API. Pure."""
+"""The prompt's texts about the API. Pure."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def report(api: Api, settings: ApiSettings) -> str:
 
 
 def vehicles(api: Api) -> str:
-    """A line for each vehicle that was heard."""
+    """A line for each known vehicle."""
     fleet = api.host.fleet.vehicles
     if not fleet:
         return "uavapi: no vehicle was heard yet"
@@ -33,7 +33,7 @@ def vehicles(api: Api) -> str:
 
 
 def describe(api: Api, state: VehicleState) -> str:
-    """One vehicle in a line."""
+    """One vehicle as a line."""
     armed = {True: "armed", False: "disarmed", None: "armed or not: unknown"}[state.armed]
     link = "link ok" if api.host.link_watch.is_alive(state) else "LINK LOST"
     age = api.host.clock() - state.heartbeat_at

@@ -22,10 +22,10 @@ VERBS: Mapping[str, Callable[[Vehicle, Job], Awaitable[None]]] = {
 
 
 async def command(host: Host, args: Sequence[str]) -> str:
-    """Carry out `VERB [SYSID …]`, for every vehicle that was heard where none is named; a line of each.
+    """Run `VERB [SYSID …]`, for every known vehicle if none is named; returns a line per vehicle.
 
     Raises:
-        BadRequest: there is no such verb, or a word is no system id.
+        BadRequest: there is no such verb, or a word is not a system id.
     """
     if not args or args[0] not in VERBS:
         raise BadRequest(f"fleet takes a verb ({', '.join(VERBS)}) and, for some vehicles only, their system ids")

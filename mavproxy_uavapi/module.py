@@ -36,7 +36,7 @@ uavapi stop              close the port; calls in flight end
 uavapi set               show the settings
 uavapi set NAME VALUE    change one; it takes effect at once
 uavapi config            the settings in force, and where each came from
-uavapi log [N]           the last N commands: who asked, and how it ended
+uavapi log [N]           the last N commands: the caller and the outcome of each
 uavapi vehicles          every vehicle that was heard
 uavapi fly FILE          fly a recorded track with the API's vehicle, `sysid` (module gradys)
 uavapi fleet VERB [N …]  arm, brake, disarm, guided, land, rtl or stop, for every vehicle or those system ids
@@ -49,7 +49,7 @@ class UavApiModule(SharedModule[ApiSettings]):
     def __init__(self, mpstate: Any, keywords: dict[str, Any]) -> None:
         remembered = RememberedSettings(mpstate, NAME, keywords)
         settings = ApiModuleSettings(remembered.combined)
-        self._wanted = True  # whether it is to listen; `uavapi stop` says no
+        self._should_listen = True  # whether it should listen; `uavapi stop` clears it
         actions: dict[str, Callable[[list[str]], None]] = {
             "status": self._status,
             "start": lambda _: self._start(),
@@ -71,24 +71,24 @@ class UavApiModule(SharedModule[ApiSettings]):
         self.logs = Logs(lambda text: self.host.bridge.post(lambda: print_above_prompt(text, self.mpstate.rl.prompt)))
         self.api = Api(self.host)
         self._background = BackgroundCommands(self.host, NAME)
-        self._changing = asyncio.Lock()  # starts, stops and settings, in the order in which they were typed
+        self._changing = asyncio.Lock()  # starts, stops and settings, in the typed order
         self.host.bridge.close_in_children(self.api.filenos)
         self.remembered.keep(self.module_settings.shown)
 
     def begin(self) -> None:
-        """Listen, unless a startup script said no."""
+        """Listen, unless a startup script ran `uavapi stop`."""
         for note in self.module_settings.notes:
             print(f"uavapi: {note}")
-        if self._wanted:
+        if self._should_listen:
             self._start()
 
     async def end(self) -> None:
-        """Stop listening, and trying to."""
+        """Stop listening, or trying to."""
         await self._background.close()
         await self.api.stop()
 
     def unload(self) -> None:
-        """Give back what is ours alone, then the rest."""
+        """Release our own resources, then the shared ones."""
         try:
             super().unload()
         finally:
@@ -100,7 +100,7 @@ class UavApiModule(SharedModule[ApiSettings]):
         self._tell(lambda api: report(api, settings))
 
     def _tell(self, tell: Callable[[Api], str]) -> None:
-        """Print what `tell` makes of the state, which belongs to the asyncio thread."""
+        """Print the text that `tell` makes of the state, which belongs to the asyncio thread."""
 
         async def told() -> str:
             return tell(self.api)
@@ -108,7 +108,7 @@ class UavApiModule(SharedModule[ApiSettings]):
         print(self.host.bridge.run(told()) if self._begun else tell(self.api))
 
     def _start(self) -> None:
-        self._wanted = True
+        self._should_listen = True
         if not self._begun:
             print("uavapi: it listens once MAVProxy's main loop runs")
             return
@@ -121,7 +121,7 @@ class UavApiModule(SharedModule[ApiSettings]):
         self._background.send(start, f"trying to listen on {settings.url}")
 
     async def _listen(self, settings: ApiSettings) -> str:
-        """Listen; what came of it. A disk may take its time, so a thread opens the logs."""
+        """Listen; returns a line with the outcome. A slow disk may delay it, so a thread opens the logs."""
         address = settings.url
         try:
             await self._open_logs(settings)
@@ -129,20 +129,20 @@ class UavApiModule(SharedModule[ApiSettings]):
         except ssl.SSLError as error:
             return f"cannot use {settings.certfile} with {settings.keyfile}: {error.reason}"
         except OSError as error:
-            why = os.strerror(error.errno) if error.errno else str(error)
+            reason = os.strerror(error.errno) if error.errno else str(error)
             if error.filename is not None:
-                return f"cannot open {error.filename}: {why}"
-            return f"cannot listen on {address}: {why}; `uavapi set port N` takes another port"
+                return f"cannot open {error.filename}: {reason}"
+            return f"cannot listen on {address}: {reason}; `uavapi set port N` takes another port"
         if settings.allow_open and not settings.is_local:
             self._background.say("WARNING: allow_open is set: anybody who reaches this port can fly the vehicle")
         return f"listening on {address}"
 
     async def _open_logs(self, settings: ApiSettings) -> None:
-        told = settings.log_console, settings.debug, settings.log_path, settings.sysid
-        await asyncio.to_thread(self.logs.open, *told)
+        log_settings = settings.log_console, settings.debug, settings.log_path, settings.sysid
+        await asyncio.to_thread(self.logs.open, *log_settings)
 
     def _fly(self, args: list[str]) -> None:
-        """`uavapi fly FILE`: the module that knows tracks flies it, with the API's vehicle."""
+        """`uavapi fly FILE`: the module `gradys` flies the track with the API's vehicle."""
         fly = self.host.commands.get("fly")
         if fly is None:
             print("uavapi: fly needs the module that knows tracks: `module load gradys`")
@@ -164,7 +164,7 @@ class UavApiModule(SharedModule[ApiSettings]):
             print(f"all of them: {self.host.audit.file}")
 
     def _stop(self) -> None:
-        self._wanted = False
+        self._should_listen = False
         if not self._begun:
             print("uavapi: stopped")
             return
@@ -177,19 +177,19 @@ class UavApiModule(SharedModule[ApiSettings]):
         self._background.send(stop, "stopping")
 
     def use_settings(self, name: str, before: ApiSettings, after: ApiSettings) -> None:
-        """Listen anew where address or door change; else calls in flight go on."""
-        if self._wanted:
+        """Listen again if the address or the access changes; otherwise calls in flight go on."""
+        if self._should_listen:
             take_up = self._renew if after.listens_as(before) else self._restart
             self._background.send(lambda: take_up(after), "taking up the setting")
 
     async def _restart(self, settings: ApiSettings) -> str:
-        """Listen anew; what is in flight ends."""
+        """Listen again; calls in flight end."""
         async with self._changing:
             await self.api.stop()
             return await self._listen(settings)
 
     async def _renew(self, settings: ApiSettings) -> str:
-        """Take up settings without ending what is in flight."""
+        """Apply settings without ending calls in flight."""
         async with self._changing:
             await self.api.renew(settings)
             try:
@@ -203,8 +203,8 @@ def init(mpstate: Any, **kwargs: Any) -> UavApiModule:
     """MAVProxy calls this on `module load uavapi`, or `uavapi:{"port":8001}`.
 
     Raises:
-        ImportError: a setting that does not exist or a value that it does not take; MAVProxy reports this
-            kind of error in one line, and goes on.
+        ImportError: a setting does not exist or its value is wrong; MAVProxy reports this kind of error in one line,
+        and goes on.
     """
     try:
         return UavApiModule(mpstate, kwargs)

@@ -19,15 +19,15 @@ from mavproxy_uavapi.core.values import is_unset
 
 Network = ipaddress.IPv4Network | ipaddress.IPv6Network
 
-# Keys that an INI file of the original service, or of the launcher, may have and that are not the module's,
-# with the reason; a line tells of each.
+# Keys of the original service's or the launcher's INI file that are not settings of the module, with the reason; each
+# is reported in a line.
 LAUNCHERS = "`mavproxy-uavapi --config` starts simulated vehicles"
 NOT_OURS: dict[str, dict[str, str]] = {
     "api": {
         "uav_connection": "MAVProxy has the link (--master)",
         "connection_type": "MAVProxy has the link (--master)",
         "gradys_gs": "the module gradys reads it from here (`module load gradys`, with this file as its config)",
-        "vehicle": "the vehicle tells its type itself",
+        "vehicle": "the vehicle's heartbeat gives its type",
         "udp": "there is no HTTP/3",
     },
     "simulated": {
@@ -40,7 +40,7 @@ NOT_OURS: dict[str, dict[str, str]] = {
     },
     "logs": {},
 }
-# What an API takes up by listening anew: its address, its vehicle, and who may call.
+# Settings for which an API must listen again: its address, its vehicle, and the access.
 ACCESS = ("token", "allow_from", "allow_scripts_from", "allow_open", "cors_origins")
 LISTENING = ("host", "port", "sysid", "ports", "certfile", "keyfile", *ACCESS)
 ON_SCRIPT_EXIT = ("nothing", "hold", "land", "rtl")
@@ -54,12 +54,12 @@ class ApiSettings:
         host: address to listen on.
         port: TCP port to listen on.
         sysid: system id of the vehicle that the API flies; 0 is MAVProxy's current one.
-        ports: further TCP ports, and the system id of the vehicle that is at the root of each.
+        ports: further TCP ports, and the system id of the vehicle at the root of each.
         link_timeout: s without a heartbeat after which a vehicle counts as lost.
         max_age: s after which telemetry is no longer served.
         on_disconnect: what the vehicle does when the client of a waiting verb hangs up: continue or hold.
         allow_from: networks that may call without a token.
-        allow_scripts_from: networks among these that may run scripts, too.
+        allow_scripts_from: networks among these that may also run scripts.
         allow_open: whether anybody may call without a token, from anywhere.
         cors_origins: origins of the web pages that may call.
         certfile, keyfile: PEM files for TLS; empty for none.
@@ -69,14 +69,14 @@ class ApiSettings:
         local_rate: the same on the loopback, where there is no limit (0) unless `max_rate` was set.
         scripts_path: folder of the uploaded scripts.
         script_logs: folder of their logs.
-        python_path: what runs .py scripts.
+        python_path: the Python for .py scripts.
         script_grace: s from Ctrl-C to the kill of a script that is stopped.
         script_size: kB of one script.
         script_quota: MB of all scripts together.
         on_script_exit: what the vehicle does when its script dies in flight: nothing, hold, land or rtl.
         log_console, debug: components (COPTER, API, GRADYS_GS, SCRIPT) that log to the console, in detail.
         log_path: the log file, or its folder; empty for none.
-        token: what clients must send as a bearer token; empty for none.
+        token: the bearer token that clients must send; empty for none.
     """
 
     host: str
@@ -115,12 +115,12 @@ class ApiSettings:
 
     @property
     def local_url(self) -> str:
-        """The URL by which this machine reaches the API."""
+        """The API's URL on this machine."""
         return local_url_of(self.host, self.port, tls=bool(self.certfile))
 
     @property
     def listening(self) -> Mapping[int, int]:
-        """All TCP ports, and the system id of the vehicle at the root of each; 0 for that of `sysid`."""
+        """All TCP ports with the system id of the vehicle at the root of each; 0 for that of `sysid`."""
         return {self.port: 0, **self.ports}
 
     @property
@@ -129,11 +129,11 @@ class ApiSettings:
         return is_loopback(self.host)
 
     def listens_as(self, other: ApiSettings) -> bool:
-        """Whether an API that runs by the other ones can take these up as it runs."""
+        """Whether a running API with the settings `other` can change to these without listening again."""
         return all(getattr(self, name) == getattr(other, name) for name in LISTENING)
 
     def check(self) -> None:
-        """Refuse combinations that would let anybody fly the vehicle, or that cannot work.
+        """Refuse combinations that let anybody fly the vehicle, or that cannot work.
 
         Raises:
             SettingError: with the reason.
@@ -152,7 +152,7 @@ def address(text: str) -> str:
     """The text, if it is an address to listen on.
 
     Raises:
-        SettingError: it is another host's name, or none.
+        SettingError: it is the name of another host, or not a name.
     """
     if text != "localhost":
         try:
@@ -171,7 +171,7 @@ def ports(text: str) -> Mapping[int, int]:
     """`8001:1,8002:2` -> {8001: 1, 8002: 2}: TCP ports, and the system id of the vehicle at each.
 
     Raises:
-        SettingError: it is written otherwise, or a number is out of range.
+        SettingError: the text has another form, or a number is out of range.
     """
     systems: dict[int, int] = {}
     for word in words(text):
@@ -179,16 +179,16 @@ def ports(text: str) -> Mapping[int, int]:
         if not (port.isdecimal() and system.isdecimal() and 0 < int(port) < 65536 and 0 < int(system) < 256):
             raise SettingError(f"{word!r} is no port and system id such as 8001:2")
         if int(port) in systems:
-            raise SettingError(f"port {port} is there twice")
+            raise SettingError(f"port {port} is named twice")
         systems[int(port)] = int(system)
     return systems
 
 
 def networks(text: str) -> tuple[Network, ...]:
-    """The networks that a list names.
+    """The networks in a list.
 
     Raises:
-        SettingError: one of the words is no network.
+        SettingError: a word is not a network.
     """
     return tuple(network(word) for word in words(text))
 
@@ -197,7 +197,7 @@ def network(text: str) -> Network:
     """A network, or one address.
 
     Raises:
-        SettingError: it is neither.
+        SettingError: it is neither of them.
     """
     try:
         return ipaddress.ip_network(text, strict=False)
@@ -206,10 +206,10 @@ def network(text: str) -> Network:
 
 
 def log_components(text: str) -> frozenset[str]:
-    """The log components that a list names.
+    """The log components in a list.
 
     Raises:
-        SettingError: there is no such one.
+        SettingError: a name is not a component.
     """
     try:
         return components(text)
@@ -265,7 +265,7 @@ class ApiModuleSettings(ModuleSettings[ApiSettings]):
         ]
 
     def make(self, values: Mapping[str, Any], origins: Mapping[str, str]) -> ApiSettings:
-        """The snapshot; a rate that somebody set is for this machine, too."""
+        """The snapshot; a rate that the user sets also applies to this machine."""
         is_set = origins.get("max_rate", DEFAULT) != DEFAULT
         return ApiSettings(**values, local_rate=values["max_rate"] if is_set else 0.0)
 
@@ -274,17 +274,17 @@ class ApiModuleSettings(ModuleSettings[ApiSettings]):
         settings.check()
 
     def settings_in(self, ini: IniFile) -> Iterator[tuple[str, str]]:
-        """The keys of the original service's sections that are settings here; a note tells of each other one.
+        """The settings among the keys of the original service's sections; a note reports each other key.
 
         Raises:
-            SettingError: there is no such key.
+            SettingError: a key is unknown.
         """
         for section, not_ours in NOT_OURS.items():
-            ours = [] if section == "simulated" else self.names()
+            names = [] if section == "simulated" else self.names()
             for key, text in ini.section(section).items():
-                if key in ours:
+                if key in names:
                     yield key, text
                 elif key not in not_ours:
-                    raise ini.no_key(section, key, [*ours, *not_ours])
+                    raise ini.no_key(section, key, [*names, *not_ours])
                 elif not is_unset(text):
                     self.notes.append(f"{ini.file}: {key} is ignored here, {not_ours[key]}")

@@ -1,4 +1,4 @@
-"""What the prompt shows, and what /vision/status tells. Pure."""
+"""The texts at the prompt, and the body of /vision/status. Pure."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ vision help                        this"""
 
 
 def status(tracker: Tracker, flights: FlightJobs) -> dict[str, Any]:
-    """The camera and the flight as JSON has them."""
+    """The camera and the flight as a JSON object."""
     health, settings = tracker.health, tracker.settings
     seen = tracker.fresh_seen
-    told: dict[str, Any] = {
+    body: dict[str, Any] = {
         "source": settings.shown_source or None,
         "camera": health.state,
         "error": health.error or None,
@@ -39,42 +39,42 @@ def status(tracker: Tracker, flights: FlightJobs) -> dict[str, Any]:
         "reconnects": health.reconnects,
         "families": list(settings.families),
         "tags": [vars(tag) for tag in settings.tag_list],
-        "in_view": [one["id"] for one in in_view(seen)],
+        "in_view": [detection["id"] for detection in in_view(seen)],
         "frame_age_s": None if seen is None else round(tracker.host.clock() - seen.captured_at, 3),
         "detector_ms": None if seen is None else round(1000 * (seen.done_at - seen.received_at), 1),
     }
     if tracker.latencies:
-        told["setpoint_ms"] = {
+        body["setpoint_ms"] = {
             "median": percentile(tracker.latencies, 0.5),
             "p99": percentile(tracker.latencies, 0.99),
         }
     if flights.report is not None:
-        told["flight"] = {"running": flights.running, "phase": flights.phase, **flights.report.told()}
-    return told
+        body["flight"] = {"running": flights.running, "phase": flights.phase, **flights.report.told()}
+    return body
 
 
 def percentile(seconds: Iterable[float], share: float) -> float:
-    """Of some times, in ms."""
+    """A percentile of times, in ms."""
     ordered = sorted(seconds)
     return round(1000 * ordered[min(int(share * len(ordered)), len(ordered) - 1)], 1)
 
 
 def report(tracker: Tracker, flights: FlightJobs) -> str:
-    """The same in a few lines."""
-    told = status(tracker, flights)
-    source = told["source"] or "none; `vision set source camera:0`, sim, http, a path or a URL"
-    camera = f"camera {told['camera']}" + (f" ({told['error']})" if told["error"] else "")
+    """The same as a few lines."""
+    body = status(tracker, flights)
+    source = body["source"] or "none; `vision set source camera:0`, sim, http, a path or a URL"
+    camera = f"camera {body['camera']}" + (f" ({body['error']})" if body["error"] else "")
     lines = [
-        f"vision: source {source}: {camera}, {told['rate']} frames/s, {told['frames']} looked at, "
-        f"{told['repeated']} repeated, {told['reconnects']} reconnects",
-        f"AprilTags of {', '.join(told['families'])}: {tracker.settings.tags}; in view: {told['in_view'] or 'none'}",
+        f"vision: source {source}: {camera}, {body['rate']} frames/s, {body['frames']} looked at, "
+        f"{body['repeated']} repeated, {body['reconnects']} reconnects",
+        f"AprilTags of {', '.join(body['families'])}: {tracker.settings.tags}; in view: {body['in_view'] or 'none'}",
     ]
-    if told["detector_ms"] is not None:
-        lines.append(f"detector {told['detector_ms']} ms, newest frame {1000 * told['frame_age_s']:.0f} ms old")
+    if body["detector_ms"] is not None:
+        lines.append(f"detector {body['detector_ms']} ms, newest frame {1000 * body['frame_age_s']:.0f} ms old")
     if flights.report is not None:
         flight = flights.report
-        what = flights.phase if flights.running else flight.reason or flight.line()
-        lines.append(f"{flight.verb}: {what}; attempt {flight.attempts}, {flight.duration:.0f} s")
+        activity = flights.phase if flights.running else flight.reason or flight.line()
+        lines.append(f"{flight.verb}: {activity}; attempt {flight.attempts}, {flight.duration:.0f} s")
     return "\n".join(lines)
 
 
@@ -86,22 +86,22 @@ def tags(tracker: Tracker) -> str:
     if not seen.detections:
         return "vision: no tags in view"
     lines = []
-    for one in in_view(seen):
-        if one["position"] is None:
-            lines.append(f"{one['family']} {one['id']}: of unknown size (`tags` does not list it)")
+    for tag in in_view(seen):
+        if tag["position"] is None:
+            lines.append(f"{tag['family']} {tag['id']}: of unknown size (`tags` does not list it)")
             continue
-        right, down, ahead = one["position"]
+        right, down, ahead = tag["position"]
         lines.append(
-            f"{one['family']} {one['id']}: {one['distance']:.2f} m away; in the camera right {right:+.2f}, "
-            f"down {down:+.2f}, ahead {ahead:.2f} m; hamming {one['hamming']}, "
-            f"error {one['reprojection_error']:.2f} px, "
-            f"{1000 * one['latency_s']:.0f} ms after its light"
+            f"{tag['family']} {tag['id']}: {tag['distance']:.2f} m away; in the camera right {right:+.2f}, "
+            f"down {down:+.2f}, ahead {ahead:.2f} m; hamming {tag['hamming']}, "
+            f"error {tag['reprojection_error']:.2f} px, "
+            f"{1000 * tag['latency_s']:.0f} ms after its light"
         )
     return "\n".join(lines)
 
 
 def caption(tracker: Tracker, flights: FlightJobs) -> list[str]:
-    """What is written into the annotated frame."""
+    """The lines written into the annotated frame."""
     state = tracker.health.state
     lines = [
         f"{tracker.settings.shown_source}: {tracker.health.rate:.0f} frames/s"

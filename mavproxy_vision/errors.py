@@ -1,10 +1,10 @@
-"""What can go wrong with seeing and landing, as children of the project's error tree.
+"""The errors of vision and landing, as children of the project's error tree.
 
 UavApiError
 |- Aborted (409 aborted)
-|  `- LandingFailed     not landed on the tag; `report` tells what was tried and what was done instead
+|  `- LandingFailed     not landed on the tag; `report` says what was tried and what was done instead
 |- BadRequest (400 bad_request)
-|  `- BadImage          what was posted is no image
+|  `- BadImage          the posted data is not an image
 `- Unavailable (503)
    `- NoCamera          503 no_camera: no source is set, or it gives no frames
 """
@@ -22,7 +22,7 @@ class LandingFailed(Aborted):
 
     Args:
         sentence: why.
-        tell: tells what was tried, and what was done instead: all of it, once the flight is over.
+        tell: returns what was tried and what was done instead; it is complete once the flight is over.
     """
 
     def __init__(self, sentence: str, tell: Callable[[], dict[str, Any]]) -> None:
@@ -40,7 +40,7 @@ class LandingFailed(Aborted):
 
 
 class BadImage(BadRequest):
-    """What was posted is no image that OpenCV can read."""
+    """The posted data is not an image that OpenCV can read."""
 
 
 class NoCamera(Unavailable):

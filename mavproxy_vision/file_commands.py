@@ -1,8 +1,8 @@
-"""The commands at the prompt that read or write files; each returns the line that is printed.
+"""The commands at the prompt that read or write files; each returns the line to print.
 
 Raises:
     OSError: a file cannot be read or written.
-    SettingError: the words or what is in the files make no sense.
+    SettingError: the words or the files' contents are wrong.
 """
 
 from __future__ import annotations
@@ -34,10 +34,12 @@ def calibrated(args: list[str]) -> str:
     if len(args) not in (2, 3):
         raise SettingError("calibrate FOLDER charuco:7x5:0.03:0.022|chessboard:9x6:0.025 [FILE]")
     file = path_of(args[2] if len(args) == 3 else "camera.json", "FILE")
-    made = calibrate(path_of(args[0], "FOLDER"), Board.parse(args[1]))
-    save(made.model, file)
-    focal = f"fx {made.model.fx:.1f}, fy {made.model.fy:.1f}"
-    return f"{made.views} views, error {made.error:.2f} px, {focal}; wrote {file}: `vision set calibration {file}`"
+    result = calibrate(path_of(args[0], "FOLDER"), Board.parse(args[1]))
+    save(result.model, file)
+    focal = f"fx {result.model.fx:.1f}, fy {result.model.fy:.1f}"
+    return (
+        f"{result.views} views, error {result.error:.2f} px, {focal}; wrote {file}: `vision set calibration {file}`"
+    )
 
 
 def snapshot(args: list[str], seen: FrameResult | None, image: Image | None) -> str:
@@ -48,10 +50,10 @@ def snapshot(args: list[str], seen: FrameResult | None, image: Image | None) -> 
         return "there is no frame yet"
     file = path_of(args[0], "FILE")
     try:
-        good, data = cv2.imencode(file.suffix or ".png", annotated(image, seen, []))
-    except cv2.error:  # which kinds there are depends on how OpenCV was built
-        good = False
-    if not good:
+        encoded, data = cv2.imencode(file.suffix or ".png", annotated(image, seen, []))
+    except cv2.error:  # the supported formats depend on OpenCV's build
+        encoded = False
+    if not encoded:
         raise SettingError(f"{file.name}: OpenCV writes no {file.suffix} files; .png and .jpg it does")
     file.write_bytes(data.tobytes())
     return f"wrote {file}"

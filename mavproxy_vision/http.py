@@ -1,4 +1,4 @@
-"""/vision: what `uavapi` serves while both modules are loaded."""
+"""/vision: the endpoints that `uavapi` serves while both modules are loaded."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from mavproxy_vision.tracking.tracker import FRESH, Tracker, in_view
 
 BOUNDARY = "frame"
 FRAME_TIMEOUT = 5.0  # s without a frame until a stream ends
-MOST_POSTED = 32  # frames that are on their way in at once, each of up to 1 MB
+MOST_POSTED = 32  # frames that may be in upload at once, each of up to 1 MB
 
 TagId = Annotated[int | None, Field(ge=0, le=100_000, description="of the tag; none for the main tag"), Written]
 Method = Annotated[str | None, Field(pattern=f"^({'|'.join(METHODS)})$", description="none for the setting")]
@@ -54,7 +54,7 @@ class LandRequest(Blocking):
 
 
 class SearchRequest(Blocking):
-    """`id` of the tag; `leash` m that the search may go away."""
+    """`id` of the tag; `leash`: the largest distance (m) of the search from its start."""
 
     id: TagId = None
     leash: Annotated[float | None, Field(gt=0, le=500), Written] = None
@@ -103,7 +103,7 @@ class VisionHandlers:
         self._drawing: tuple[FrameResult, asyncio.Task[bytes]] | None = None  # the newest picture with its tags
 
     def routes(self) -> list[Route]:
-        """What is served."""
+        """The routes."""
         return [
             Route("/vision/status", self.status, Empty),
             Route("/vision/tags", self.tags, Empty),
@@ -119,7 +119,7 @@ class VisionHandlers:
     # -- reading -------------------------------------------------------------------------------------------
 
     async def status(self, _call: Call) -> dict[str, Any]:
-        """The camera, what it sees, and what is in flight."""
+        """The camera, the detected tags, and the flight."""
         return self._answer("Success", info=status(self.tracker, self.flights))
 
     async def tags(self, _call: Call) -> dict[str, Any]:
@@ -138,16 +138,16 @@ class VisionHandlers:
         )
 
     async def newest_frame(self) -> bytes:
-        """The newest frame as it came, as JPEG: what take_photo answers with `command=vision`."""
+        """The newest frame without drawings, as JPEG; take_photo answers it with `command=vision`."""
         self.tracker.require_camera()
         _, image = self._newest()
         return await self._encoding.run(lambda: jpeg(image))
 
     def _newest(self) -> tuple[FrameResult, Image]:
-        """The newest frame, and what was seen in it.
+        """The newest frame and its detections.
 
         Raises:
-            NoCamera: there is none yet, or it is old: only a folder's frames keep.
+            NoCamera: there is none yet, or it is too old; only frames of a folder do not age.
         """
         seen, image, worker = self.tracker.seen, self.tracker.image, self.tracker.worker
         if seen is None or image is None or worker is None:
@@ -158,7 +158,7 @@ class VisionHandlers:
         return seen, image
 
     async def _picture(self) -> bytes:
-        """The newest frame with its tags; drawn once for all who ask, and none before the last one is done."""
+        """The newest frame with its tags; drawn once for all callers, one frame at a time."""
         seen, image = self._newest()
         if self._drawing is None or (self._drawing[1].done() and self._drawing[0] is not seen):
             lines = caption(self.tracker, self.flights)
@@ -167,7 +167,7 @@ class VisionHandlers:
         return await asyncio.shield(self._drawing[1])
 
     async def stream(self, call: Call) -> web.StreamResponse:
-        """Annotated frames as they come, as browsers show them (MJPEG)."""
+        """Annotated frames as they arrive, in the format that browsers show (MJPEG)."""
         self.tracker.require_camera()
         pause = 1.0 / call.params(StreamRequest).rate
         response = StreamingResponse(f"multipart/x-mixed-replace; boundary={BOUNDARY}")
@@ -183,7 +183,7 @@ class VisionHandlers:
         return response
 
     async def post_frame(self, call: Call) -> dict[str, Any]:
-        """Take a frame: the body is a JPEG or PNG; source `http`."""
+        """Take a frame: the body is a JPEG or PNG; needs source `http`."""
         worker = self.tracker.worker
         if worker is None or not isinstance(worker.source, Posted):
             raise BadRequest("frames are taken with `vision set source http` only")
@@ -193,14 +193,14 @@ class VisionHandlers:
         latency = call.params(FrameRequest).latency
         worker.source.post(image, None if latency is None else latency / 1000)
         why_not = worker.detector.model.misfit(image.shape[1], image.shape[0])
-        if why_not:  # posted all the same: the status says so too
+        if why_not:  # it is posted anyway; the status reports it too
             raise BadImage(why_not)
         return self._answer("Frame taken")
 
     # -- flying --------------------------------------------------------------------------------------------
 
     async def land(self, call: Call) -> Any:
-        """Land on a tag from here; answers when it stands on it."""
+        """Land on a tag from here; answers when the vehicle stands on it."""
         p = call.params(LandRequest)
         sortie = self.flights.landing(call.copter, p.id, p.method or self.tracker.settings.method)
         return await self._fly(call, sortie)
@@ -211,7 +211,7 @@ class VisionHandlers:
         return await self._fly(call, self.flights.searching(call.copter, p.id, p.leash))
 
     async def mission(self, call: Call) -> Any:
-        """Take off, fly there, land on the tag or without one; return when there is none."""
+        """Take off, fly to a place, land on the tag or without one; return if there is none."""
         p = call.params(MissionRequest)
         method = p.method or self.tracker.settings.method
         errand = MissionPlan(p.alt, p.north, p.east, p.lat, p.long, p.id, p.tag, method)
@@ -224,7 +224,7 @@ class VisionHandlers:
 
     async def _fly(self, call: Call, sortie: FlightTask) -> Any:
         answer = await call.fly(call.copter, sortie, sortie.result, outlives_client=True)
-        report = sortie.report if sortie.begun else self.flights.report  # of the flight in progress that it joined
+        report = sortie.report if sortie.begun else self.flights.report  # of the running flight that it joined
         if isinstance(answer, dict) and report is not None:
             answer["info"] = report.told()
         return answer

@@ -34,7 +34,7 @@ COMPLETIONS = [
     "<calibrate|snapshot|tag> (FILENAME)",
 ]
 MISSION = ("5", "8", "-5")  # m: altitude, north, east; the seed's
-RESTARTS = {  # settings that the camera must be opened anew for
+RESTARTS = {  # settings that need the camera to be opened again
     "source", "family", "tags", "any_id", "far", "calibration", "fov", "width", "height", "fps", "latency", "mount",
     "offset", "gimbal", "threads",
 }  # fmt: skip
@@ -91,7 +91,7 @@ class VisionModule(SharedModule[VisionSettings]):
         await self._background.close()
 
     def unload(self) -> None:
-        """Make the vehicle hold, then give everything back."""
+        """Make the vehicle hold, then release everything."""
         for path in self._routes:
             self.host.extensions.pop(path, None)
         self.host.newest_frame = None
@@ -108,11 +108,11 @@ class VisionModule(SharedModule[VisionSettings]):
 
         if self.host.bridge.running:
             self.host.bridge.run(abandoned())
-        else:  # there is no asyncio thread yet, and nothing flies
+        else:  # there is no asyncio thread yet, so nothing flies
             self.flights.abort_all()
 
     def _directory(self) -> Path:
-        """Where files go."""
+        """The directory for files."""
         chosen = self.module_settings.snapshot().directory
         if chosen:
             return Path(chosen).expanduser()
@@ -121,7 +121,7 @@ class VisionModule(SharedModule[VisionSettings]):
     # -- helpers ---------------------------------------------------------------------------------------------
 
     def _awake(self) -> bool:
-        """Whether MAVProxy's main loop has run; says so when it has not."""
+        """Whether MAVProxy's main loop has run; prints a line if it has not."""
         if not self._begun:
             print("vision: it begins once MAVProxy's main loop runs")
         return self._begun
@@ -130,7 +130,7 @@ class VisionModule(SharedModule[VisionSettings]):
         return self.host.bridge.run(coroutine)
 
     def _tell(self, tell: Callable[[], str]) -> None:
-        """Print what `tell` makes of the state, which belongs to the asyncio thread."""
+        """Print the text that `tell` makes of the state, which belongs to the asyncio thread."""
 
         async def told() -> str:
             return tell()
@@ -164,16 +164,16 @@ class VisionModule(SharedModule[VisionSettings]):
             print("vision: nothing is in flight")
 
     def check_change(self, name: str) -> None:
-        """Refuse in flight what the camera must be opened anew for.
+        """Refuse changes in flight that need the camera to be opened again.
 
         Raises:
-            SettingError: that is so.
+            SettingError: something is in flight.
         """
         if reopens_camera(name) and self._flying():
             raise SettingError(f"{name} is not changed in flight (`vision abort` ends it)", name)
 
     def use_settings(self, name: str, before: VisionSettings, after: VisionSettings) -> None:
-        """Open the camera anew, close it, or go on with the new settings."""
+        """Open the camera again, close it, or go on with the new settings."""
         if reopens_camera(name) and after.source:
             self._start()
         elif before.source and not after.source:
@@ -208,7 +208,7 @@ class VisionModule(SharedModule[VisionSettings]):
         return self.flights.searching(self.flights.copter(), request["id"], None)
 
     def _id(self, words: list[str]) -> Any:
-        """The id among the words, None without one, False for what is none."""
+        """The id among the words; None without one, False for a wrong one."""
         if not words:
             return None
         if len(words) == 1 and words[0].isdigit():
@@ -226,7 +226,7 @@ class VisionModule(SharedModule[VisionSettings]):
         if not 0 < alt <= 500:
             print("vision: the altitude is more than 0 and at most 500 m above home")
             return
-        if not max(abs(north), abs(east)) <= NED_REACH:  # nor is what is no number
+        if not max(abs(north), abs(east)) <= NED_REACH:  # NaN is refused too
             print(f"vision: north and east are at most {NED_REACH:g} m")
             return
         tag = args[3] if len(args) > 3 else ""
@@ -243,7 +243,7 @@ class VisionModule(SharedModule[VisionSettings]):
         return self.flights.errand(self.flights.copter(), errand)
 
     def _fly(self, path: str, request: dict[str, Any], make: Callable[[dict[str, Any]], FlightTask]) -> None:
-        """Begin a flight and say so; its end is printed when it comes."""
+        """Begin a flight and print that; print its end when it comes."""
 
         async def begin() -> Job:
             copter = self.flights.copter()
@@ -271,7 +271,7 @@ class VisionModule(SharedModule[VisionSettings]):
         self._in_background(lambda: file_commands.tag(args, settings.families[0], settings.tag_list[0]))
 
     def _in_background(self, work: Callable[[], str]) -> None:
-        """Run what takes long, or touches a disk, and print what it says."""
+        """Run slow work or disk access in the background, and print its result."""
 
         def said() -> str:
             try:
@@ -291,7 +291,7 @@ class VisionModule(SharedModule[VisionSettings]):
 
 
 def reopens_camera(name: str) -> bool:
-    """Whether the camera must be opened anew when that setting changes."""
+    """Whether a change of that setting needs the camera to be opened again."""
     return name in RESTARTS or name.startswith("sim_")
 
 
@@ -299,8 +299,8 @@ def init(mpstate: Any, **kwargs: Any) -> VisionModule:
     """MAVProxy calls this on `module load vision`, or `vision:{"source":"sim"}`.
 
     Raises:
-        ImportError: a setting that does not exist or a value that it does not take; MAVProxy reports this
-            kind of error in one line, and goes on.
+        ImportError: a setting does not exist or its value is wrong; MAVProxy reports this kind of error in one line,
+        and goes on.
     """
     try:
         module = VisionModule(mpstate, kwargs)

@@ -23,12 +23,12 @@ from mavproxy_vision.geometry.frames import Mount
 
 METHODS = ("velocity", "landing_target")
 ON_FAILURE = ("rtl", "land", "hold")
-TURN, ARM = 360.0, 10.0  # degrees that a camera may be turned, and m that it may be off the vehicle's centre
+TURN, ARM = 360.0, 10.0  # largest turn of a camera in degrees, and its largest offset from the vehicle's centre in m
 
 
 @dataclass(frozen=True)
 class VisionSettings:
-    """A snapshot; the table of `VisionModuleSettings` says what each means."""
+    """A snapshot of the settings; the table of `VisionModuleSettings` describes each."""
 
     source: str
     family: str
@@ -71,7 +71,7 @@ class VisionSettings:
 
     @property
     def families(self) -> tuple[str, ...]:
-        """The families to look for; the first one's tags are landed on."""
+        """The families to look for; landings use the tags of the first one."""
         return parse_families(self.family)
 
     @property
@@ -81,14 +81,14 @@ class VisionSettings:
 
     @functools.cached_property
     def model(self) -> CameraModel:
-        """The calibration's camera, as its file was when it was first asked for, or one of the field of view."""
+        """The calibration's camera, as its file was at the first read, or one with the field of view."""
         if self.calibration:
             return load(path_of(self.calibration, "calibration"))
         return CameraModel.from_field_of_view(self.width, self.height, self.fov)
 
     @property
     def camera_mount(self) -> Mount:
-        """How the camera sits on the vehicle."""
+        """The camera's position and orientation on the vehicle."""
         angles = numbers(self.mount, "mount", TURN)
         roll, pitch, yaw = angles if len(angles) == 3 else (0.0, 0.0, angles[0])
         offset = numbers(self.offset, "offset", ARM)
@@ -98,13 +98,13 @@ class VisionSettings:
 
     @property
     def timing(self) -> Timing:
-        """When the simulated camera's frames come."""
+        """The timing of the simulated camera's frames."""
         jitter, dropout = self.sim_jitter / 1000, self.sim_dropout
         return Timing(self.fps, self.sim_latency / 1000, jitter, dropout, self.latency / 1000)
 
     @property
     def look(self) -> Look:
-        """How good the simulated camera is."""
+        """The image quality of the simulated camera."""
         return Look(self.sim_noise, self.sim_blur, self.sim_exposure, self.sim_occlusion)
 
 
@@ -112,18 +112,18 @@ def numbers(text: str, name: str, most: float) -> list[float]:
     """One number, or three with commas, between -`most` and `most`.
 
     Raises:
-        SettingError: neither, or beyond that.
+        SettingError: the text is neither, or out of range.
     """
     parts = [part.strip() for part in text.split(",")]
     if len(parts) not in (1, 3) or not all(re.fullmatch(NUMBER, part) for part in parts):
         raise SettingError(f"{name}: {text!r} is not one number, nor three with commas", name)
-    found = [float(part) for part in parts]
-    if max(abs(number) for number in found) > most:
+    values = [float(part) for part in parts]
+    if max(abs(number) for number in values) > most:
         raise SettingError(f"{name}: {text!r} goes beyond {most:g}", name)
-    return found
+    return values
 
 
-# What is looked at when one of some settings changes: each raises SettingError.
+# The check of each setting after a change; each raises SettingError.
 CHECKS: tuple[tuple[set[str], Callable[[VisionSettings], object]], ...] = (
     ({"source"}, lambda now: path_of(now.source, "source")),
     ({"directory"}, lambda now: path_of(now.directory, "directory")),
@@ -188,12 +188,12 @@ class VisionModuleSettings(ModuleSettings[VisionSettings]):
         return VisionSettings(**values)
 
     def check(self, settings: VisionSettings, changed: Set[str]) -> None:
-        """Look at what was changed, and at what has to do with it."""
+        """Check the changed settings and those that depend on them."""
         for names, look in CHECKS:
             if not names.isdisjoint(changed):
                 look(settings)
 
     def shown(self, name: str) -> str:
-        """As any setting; of the source, all but its passwords."""
+        """As any setting; the source without its passwords."""
         text = super().shown(name)
         return masked_source(text) if name == "source" else text

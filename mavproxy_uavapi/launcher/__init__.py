@@ -12,10 +12,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         argv: the arguments after the program's name; those of the process by default.
 
     Returns:
-        0 after a clean shutdown, 1 when something did not start or crashed, 2 for a wrong option; 128 plus
-        the signal's number when a signal that we did not send killed MAVProxy.
+        0 after a clean shutdown, 1 if something did not start or crashed, 2 for a wrong option; 128 plus the signal's
+        number if MAVProxy was killed by a signal that we did not send.
     """
-    # The watchdog is a module of this package too: it must not carry argparse and asyncio about.
+    # The watchdog is a module of this package too; it must not import argparse and asyncio.
     from mavproxy_uavapi.launcher.cli import run  # noqa: PLC0415
 
     return run(argv)

@@ -1,4 +1,4 @@
-"""The console script from the arguments to the exit status."""
+"""The console script, from its arguments to its exit status."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from mavproxy_uavapi.launcher.locations import resolve
 from mavproxy_uavapi.launcher.options import RunOptions, parse
 from mavproxy_uavapi.launcher.supervisor import Supervisor
 
-# sim_vehicle.py first kills whatever it takes for its own vehicles when it is instance 0.
+# sim_vehicle.py as instance 0 first kills all vehicles that it takes for its own.
 FIRST_SITL_INSTANCE = 1
 
 
@@ -36,10 +36,10 @@ def run(argv: Sequence[str] | None = None) -> int:
 
 
 def prepare(options: RunOptions) -> RunOptions:
-    """Settle what depends on the terminal, and refuse what cannot work on this machine.
+    """Complete the options that depend on the terminal, and refuse those that cannot work on this machine.
 
     Raises:
-        OptionError: the copy of ArduPilot is not one, or not built.
+        OptionError: the ArduPilot directory is not a copy of ArduPilot, or it is not built.
         LaunchError: the API's port is taken.
     """
     if options.simulated and options.ardupilot_path is not None:
@@ -56,12 +56,12 @@ def prepare(options: RunOptions) -> RunOptions:
 
 
 def has_terminal() -> bool:
-    """Whether there is a terminal to own; one that we may not read from, after `&`, does not count."""
+    """Whether we own a terminal; one that we may not read from, after `&`, does not count."""
     return sys.stdin is not None and sys.stdin.isatty() and os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
 
 
 def launch(options: RunOptions) -> int:
-    """Give the run its directory and each simulated vehicle a number, and supervise it to its end."""
+    """Give the run its directory and each simulated vehicle a number, and supervise the run to its end."""
     root, log_file = directories.split_log_path(options.log_path, options.sysid)
     options = dataclasses.replace(options, log_path=log_file)
     home = resolve(options.location, options.ardupilot_path) if options.simulated else None
@@ -81,7 +81,7 @@ def launch(options: RunOptions) -> int:
 
 @contextmanager
 def terminal_kept() -> Iterator[None]:
-    """Put the terminal back as it was: a MAVProxy that was killed at its prompt leaves it without echo."""
+    """Restore the terminal at the end: a MAVProxy that was killed at its prompt leaves it without echo."""
     descriptor = sys.stdin.fileno()
     before = termios.tcgetattr(descriptor)
     try:

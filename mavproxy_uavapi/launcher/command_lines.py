@@ -1,4 +1,4 @@
-"""Options -> the command lines of the processes and the files and lines that go with them (pure).
+"""Options -> the command lines of the processes, with their files and input lines (pure).
 
 A token never appears here: the modules read it from the environment variable UAVAPI_TOKEN.
 """
@@ -18,13 +18,13 @@ from mavproxy_uavapi.launcher.fleet import SimulatedVehicle, kinds
 from mavproxy_uavapi.launcher.options import RunOptions
 from mavproxy_uavapi.settings import ApiModuleSettings
 
-# What makes run_in_terminal_window.sh put the vehicle into a window, a tmux server or a screen that is not
+# With these variables run_in_terminal_window.sh puts the vehicle into a window, a tmux server or a screen that is not
 # our child. Without them it runs in the background, where we can end it.
 WINDOW_VARIABLES = ("DISPLAY", "SITL_RITW_TERMINAL", "TMUX", "STY", "ZELLIJ")
 ARDUPILOT_VEHICLES = {"copter": "ArduCopter", "plane": "ArduPlane", "quadplane": "ArduPlane", "rover": "Rover"}
 BINARIES = {"copter": "arducopter", "plane": "arduplane", "quadplane": "arduplane", "rover": "ardurover"}
 
-# SITL opens its port only after reading its parameters; MAVProxy tries once a second.
+# SITL opens its port only after it has read its parameters; MAVProxy tries once a second.
 SITL_RETRIES = 30
 
 
@@ -38,11 +38,11 @@ def mavproxy_command(
     """MAVProxy's command line.
 
     Args:
-        options: what the user asked for; `headless` already says whether there is a prompt.
-        program: how MAVProxy itself is started.
-        run_dir: where its telemetry log and parameters go.
-        vehicles: the simulated ones; none for a real one.
-        config: the file with those settings of the API that have no keyword argument.
+        options: the user's options; `headless` already says whether there is a prompt.
+        program: the command that starts MAVProxy.
+        run_dir: the directory for its telemetry log and parameters.
+        vehicles: the simulated vehicles; empty for a real one.
+        config: the file with the API settings that have no keyword argument.
     """
     command = [
         *program,
@@ -54,7 +54,7 @@ def mavproxy_command(
         # As sim_vehicle.py does it: `rc` at the prompt reaches SITL on this port.
         command += [f"--retries={SITL_RETRIES}", f"--sitl=127.0.0.1:{5501 + 10 * vehicles[0].instance}"]
     if options.headless:
-        # Otherwise MAVProxy quits as soon as its stdin ends.
+        # Without this MAVProxy quits when its stdin ends.
         command.append("--daemon")
     command += [f"--out={address}" for address in options.gs_connection]
     command += [f"--cmd={load}" for load in module_loads(options, config)]
@@ -71,7 +71,7 @@ def masters(options: RunOptions, vehicles: Sequence[SimulatedVehicle]) -> list[s
 
 
 def module_loads(options: RunOptions, config: Path | None) -> list[str]:
-    """One `module load` command per module; keywords that the user gave one of ours (`--module NAME:{…}`) win."""
+    """One `module load` command per module; keywords that the user gave for our modules (`--module NAME:{…}`) win."""
     settings: dict[str, object] = {"host": options.host, "port": options.port, "sysid": options.sysid}
     names = ApiModuleSettings.names()
     settings["origins"] = {
@@ -80,21 +80,21 @@ def module_loads(options: RunOptions, config: Path | None) -> list[str]:
     }
     if config is not None:
         settings["config"] = str(config)
-    given = {"uavapi": settings, "gradys": gradys_keywords(options)}
+    by_module = {"uavapi": settings, "gradys": gradys_keywords(options)}
     if options.vision_config is not None:
-        given["vision"] = {"config": options.vision_config}
+        by_module["vision"] = {"config": options.vision_config}
     others = []
     for module in options.module:
         name, _, keywords = module.partition(":")
-        if given.get(name):
-            given[name].update(json.loads(keywords or "{}"))
+        if by_module.get(name):
+            by_module[name].update(json.loads(keywords or "{}"))
         else:
             others.append(f"module load {module}")
-    return [module_load(name, keywords) for name, keywords in given.items() if keywords] + others
+    return [module_load(name, keywords) for name, keywords in by_module.items() if keywords] + others
 
 
 def gradys_keywords(options: RunOptions) -> dict[str, object]:
-    """What the module `gradys` is loaded with; nothing where the user set nothing of it."""
+    """The settings with which the module `gradys` is loaded; empty if the user set none."""
     keywords: dict[str, object] = {}
     if options.gradys_config is not None:
         keywords["config"] = options.gradys_config
@@ -115,7 +115,7 @@ def module_load(name: str, settings: Mapping[str, object]) -> str:
 
 
 def settings_file(options: RunOptions) -> str | None:
-    """The INI text with what the `uavapi` module takes by file only; None where the user set none of it."""
+    """The INI text with the settings that the `uavapi` module takes only from a file; None if the user set none."""
     parser = configparser.ConfigParser(interpolation=None)
     for section, names in {
         "api": ("scripts_path", "python_path"),
@@ -154,7 +154,7 @@ def embedded_command(options: RunOptions, vehicle: SimulatedVehicle) -> list[str
 def sim_vehicle_command(options: RunOptions, python: str, vehicle: SimulatedVehicle, use_dir: Path) -> list[str]:
     """The command line of ArduPilot's sim_vehicle.py, for the vehicle alone.
 
-    MAVProxy is ours to start (`--no-mavproxy`): it keeps the terminal, and its arguments need not survive
+    We start MAVProxy ourselves (`--no-mavproxy`): it keeps the terminal, and its arguments do not pass through
     sim_vehicle.py, which splits them at spaces and `=`.
     """
     assert options.ardupilot_path is not None
@@ -174,22 +174,22 @@ def sim_vehicle_command(options: RunOptions, python: str, vehicle: SimulatedVehi
 
 
 def sim_vehicle(ardupilot_path: str) -> Path:
-    """Where a copy of ArduPilot keeps the script."""
+    """The path of the script in a copy of ArduPilot."""
     return Path(ardupilot_path, "Tools", "autotest", "sim_vehicle.py")
 
 
 def sitl_binary(ardupilot_path: str, kind: str) -> Path:
-    """The vehicle that sim_vehicle.py starts for a type."""
+    """The program that sim_vehicle.py starts for a type of vehicle."""
     return Path(ardupilot_path, "build", "sitl", "bin", BINARIES[kind])
 
 
 def api_url(options: RunOptions) -> str:
-    """Where to reach the API from this machine."""
+    """The API's URL on this machine."""
     return local_url_of(options.host, options.port)
 
 
 def greeting(options: RunOptions, with_token: bool) -> str:
-    """What is printed once the API answers: its address and, with a simulated vehicle, three lines to try."""
+    """The text printed when the API answers: its address and, with a simulated vehicle, three lines to try."""
     url = api_url(options)
     count = len(kinds(options))
     if count > 1:

@@ -1,4 +1,4 @@
-"""Where a run keeps its telemetry logs and output: never the current directory."""
+"""The directory of a run's telemetry logs and output; never the current directory."""
 
 from __future__ import annotations
 
@@ -10,21 +10,20 @@ from mavproxy_uavapi.launcher.options import RunOptions
 
 
 def split_log_path(log_path: str | None, sysid: int) -> tuple[Path, str | None]:
-    """The directory for the runs, and the API's log file where `--log_path` asks for one.
+    """The directory for the runs, and the API's log file if `--log_path` names one.
 
-    The original service took a file there; a path without a suffix, or of an existing directory, is taken
-    for the directory of both.
+    The original service took a file; a path without a suffix, or of an existing directory, is the directory for both.
     """
     if log_path is None:
         return state_directory(), None
-    given = Path(log_path).expanduser().absolute()
-    if given.suffix and not given.is_dir() or given.is_file():
-        return given.parent, str(given)
-    return given, str(given / f"uav_{sysid}.log")
+    path = Path(log_path).expanduser().absolute()
+    if path.suffix and not path.is_dir() or path.is_file():
+        return path.parent, str(path)
+    return path, str(path / f"uav_{sysid}.log")
 
 
 def new_run(root: Path, options: RunOptions) -> Path:
-    """Make a fresh directory for this run, readable by its user only: `uav<sysid>/<date>-<time>`."""
+    """Make a new directory for this run, readable only by its user: `uav<sysid>/<date>-<time>`."""
     started = time.strftime("%Y%m%d-%H%M%S")
     for attempt in range(1, 1000):
         name = started if attempt == 1 else f"{started}-{attempt}"

@@ -1,4 +1,4 @@
-"""Where MAVProxy is, and the environment variables that the processes get."""
+"""The path of MAVProxy, and the environment variables of the processes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from mavproxy_uavapi.launcher.options import VARIABLES
 
 
 def mavproxy_program() -> list[str]:
-    """How to start MAVProxy: that of this Python's environment, which need not be in PATH, else PATH's.
+    """The command for MAVProxy: the one in this Python's environment, which may not be in PATH, else the one in PATH.
 
     Raises:
         LaunchError: there is none.
@@ -27,22 +27,22 @@ def mavproxy_program() -> list[str]:
         script = Path(directory, "mavproxy.py")
         if script.is_file():
             return [sys.executable, str(script)]
-    found = shutil.which("mavproxy.py")
-    if found is None:
+    program = shutil.which("mavproxy.py")
+    if program is None:
         raise LaunchError("mavproxy.py is neither beside this Python nor in PATH (pip install MAVProxy)")
-    return [found]
+    return [program]
 
 
 def ardupilot_python() -> str:
-    """The Python for sim_vehicle.py: this one where it has what ArduPilot's tools need, else PATH's."""
+    """The Python for sim_vehicle.py: this one if it has the packages of ArduPilot's tools, else the one in PATH."""
     return sys.executable if importlib.util.find_spec("pexpect") else "python3"
 
 
 def for_python(environ: Mapping[str, str]) -> dict[str, str]:
     """The environment for the embedded vehicle and the watchdog, and most of MAVProxy's.
 
-    Out of a checkout that is not installed they would not find our modules. What they print must reach
-    their logs at once: that is where we look for the vehicle's being ready.
+    In a checkout that is not installed they would not find our modules. Their output must reach their logs at once,
+    because we look there for the line that the vehicle is ready.
     """
     env = {**environ, "PYTHONUNBUFFERED": "1"}
     root = Path(mavproxy_uavapi.__file__).resolve().parent.parent
@@ -52,19 +52,19 @@ def for_python(environ: Mapping[str, str]) -> dict[str, str]:
 
 
 def for_mavproxy(environ: Mapping[str, str]) -> dict[str, str]:
-    """The environment for MAVProxy: without the settings that we read already and hand over.
+    """The environment for MAVProxy, without the settings that we have read and hand over.
 
-    The module would take them from its environment, over what the command line said.
+    Otherwise the module would take them from its environment and ignore the command line.
     """
-    ours = {*VARIABLES, CONFIG_VARIABLE}
-    return {name: value for name, value in for_python(environ).items() if name not in ours}
+    own_names = {*VARIABLES, CONFIG_VARIABLE}
+    return {name: value for name, value in for_python(environ).items() if name not in own_names}
 
 
 def for_sim_vehicle(environ: Mapping[str, str], run_dir: Path) -> dict[str, str]:
     """The environment for sim_vehicle.py: no windows, and a `pkill` that does nothing.
 
-    Where psutil is missing, sim_vehicle.py tidies up with `pkill arducopter`, that is, it kills everybody's.
-    What it started we end ourselves.
+    Without psutil, sim_vehicle.py cleans up with `pkill arducopter`, which kills the vehicles of all users. We end
+    its processes ourselves.
     """
     env = {name: value for name, value in environ.items() if name not in WINDOW_VARIABLES}
     tools = run_dir / "bin"

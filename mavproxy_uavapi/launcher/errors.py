@@ -1,4 +1,4 @@
-"""What may go wrong before and while the processes run; the text is the one line that the user reads."""
+"""The launcher's errors; their text is the one line that the user reads."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which vehicles a run simulates: their types, system ids, numbers and homes. Pure."""
+"""The vehicles that a run simulates: their types, system ids, numbers and homes. Pure."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class SimulatedVehicle:
     Attributes:
         kind: copter, plane, quadplane or rover.
         sysid: its MAVLink system id.
-        instance: its number, which says what ports it has.
-        home: where it stands at the beginning.
+        instance: its number, which sets its ports.
+        home: its start position.
     """
 
     kind: str

@@ -1,4 +1,4 @@
-"""Simulated vehicles on one machine: each has a number that spreads their ports, 10 apart."""
+"""Simulated vehicles on one machine: the number of each sets its ports, 10 apart."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ SERIAL_PORTS = (0, 2, 3)
 
 
 def is_free(port: int, host: str = "127.0.0.1", kind: socket.SocketKind = socket.SOCK_STREAM) -> bool:
-    """Whether a server could listen on the port now. Raises OSError where the host is not ours."""
+    """Whether a server could listen on the port now. Raises OSError if the host is not this machine."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     with socket.socket(family, kind) as probe:
         if kind == socket.SOCK_STREAM:
-            # A server that ended a moment ago does not count.
+            # A server that has just ended does not count.
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind((host, port))
@@ -41,9 +41,9 @@ def ports_are_free(instance: int) -> bool:
 
 @contextmanager
 def reserved(directory: Path, first: int) -> Iterator[int]:
-    """The first free instance from `first` on, reserved against other launchers of this user meanwhile.
+    """The first free instance from `first` on, reserved against other launchers of this user.
 
-    The ports alone would not do: between looking at them and the vehicle's opening them lie seconds.
+    A look at the ports is not enough: the vehicle opens them seconds later.
 
     Args:
         directory: where the lock files are; the kernel releases a lock with the process that held it.

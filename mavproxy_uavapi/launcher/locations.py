@@ -1,4 +1,4 @@
-"""Where a simulated vehicle starts: a name or four numbers -> a home position."""
+"""The start of a simulated vehicle: a name or four numbers -> a home position."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ BUILT_IN: Mapping[str, HomePosition] = {
 
 
 def read_home(text: str) -> HomePosition | None:
-    """`lat,lon,alt,heading` -> a home; None where the text is not four numbers or one is out of range."""
+    """`lat,lon,alt,heading` -> a home; None if the text is not four numbers or one is out of range."""
     try:
         numbers = [float(part) for part in text.split(",")]
     except ValueError:
@@ -42,22 +42,22 @@ def read_home(text: str) -> HomePosition | None:
 
 
 def read_locations(lines: Iterable[str]) -> dict[str, HomePosition]:
-    """The lines `NAME=lat,lon,alt,heading  # comment` of an ArduPilot locations.txt; others are passed by."""
-    found: dict[str, HomePosition] = {}
+    """The lines `NAME=lat,lon,alt,heading  # comment` of an ArduPilot locations.txt; others are skipped."""
+    homes: dict[str, HomePosition] = {}
     for line in lines:
         name, _, numbers = line.partition("#")[0].partition("=")
         home = read_home(numbers)
         if home is not None:
             # ArduPilot takes the first of two lines with the same name.
-            found.setdefault(name.strip(), home)
-    return found
+            homes.setdefault(name.strip(), home)
+    return homes
 
 
 def resolve(location: str, ardupilot_path: str | None = None) -> HomePosition:
-    """The home of a location as written on the command line.
+    """The home for a location on the command line.
 
-    Names are looked up where sim_vehicle.py does (the user's own file, then ArduPilot's locations.txt), then
-    in the table here: ArduPilot itself does not know AbraDF, and asks a geocoder on the network instead.
+    Names are looked up where sim_vehicle.py does it (the user's own file, then ArduPilot's locations.txt), then in
+    the table here: ArduPilot itself does not know AbraDF, and asks a geocoder on the network instead.
 
     Raises:
         OptionError: neither a known name nor four numbers in range.
@@ -69,17 +69,17 @@ def resolve(location: str, ardupilot_path: str | None = None) -> HomePosition:
         return home
     for file in location_files(ardupilot_path):
         if file.is_file():
-            found = read_locations(file.read_text(encoding="utf-8", errors="replace").splitlines())
-            if location in found:
-                return found[location]
+            homes = read_locations(file.read_text(encoding="utf-8", errors="replace").splitlines())
+            if location in homes:
+                return homes[location]
     if location not in BUILT_IN:
         raise OptionError(f"--location: unknown name {location!r}; lat,lon,alt,heading works everywhere")
     return BUILT_IN[location]
 
 
 def location_files(ardupilot_path: str | None) -> list[Path]:
-    """The files that may name locations, the strongest first."""
-    # XDG_CONFIG_DIR is what sim_vehicle.py reads; the standard's own name for it comes second.
+    """The files that may name locations, in order of precedence."""
+    # sim_vehicle.py reads XDG_CONFIG_DIR; the standard's own name for it comes second.
     named = os.environ.get("XDG_CONFIG_DIR") or os.environ.get("XDG_CONFIG_HOME")
     config = Path(named) if named else Path.home() / ".config"
     files = [Path(os.environ.get("ARDUPILOT_LOCATIONS") or config / "ardupilot" / "locations.txt")]

@@ -1,7 +1,7 @@
-"""Command line and INI file -> one frozen `RunOptions`; one table serves both, so they cannot disagree.
+"""Command line and INI file -> one frozen `RunOptions`; one table serves both, so that they agree.
 
-The names are those of the original service, and so are the sections of the file. Unlike there the command
-line wins over the file, and a missing file or a misspelt key is an error.
+Names and sections of the file are those of the original service. Unlike there, the command line wins over the file,
+and a missing file or a misspelt key is an error.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ class RunOptions:
     """What to start. `None` and empty tuples mean "not given".
 
     Attributes:
-        further: settings of the `uavapi` module that the file has and the command line does not know.
-        vision_config, gradys_config: the file, where it has a section for that module, which reads it itself.
-        origins: where each option came from: the file's name, "environment" or "command line"; none for a default.
+        further: settings of the `uavapi` module in the file that are not options of the command line.
+        vision_config, gradys_config: the file, if it has a section for that module; the module reads it itself.
+        origins: the source of each option: the file's name, "environment" or "command line"; absent for a default.
 
     The others are the rows of TABLE.
     """
@@ -69,7 +69,7 @@ class RunOptions:
 
 @dataclass(frozen=True)
 class Row:
-    """One option: its name, the section of the file it is written in, its converter and its help."""
+    """One option: its name, its section in the file, its converter and its help."""
 
     name: str
     section: str
@@ -86,12 +86,12 @@ class Row:
         """Whether several words may follow the flag."""
         return self.convert in (values.words, values.components)
 
-    def read(self, text: str, where: str) -> Any:
-        """The value of the text; OptionError, naming the place, where it is wrong."""
+    def read(self, text: str, place: str) -> Any:
+        """The value of the text; raises OptionError, which names the place, if it is wrong."""
         try:
             return self.convert(text)
         except ValueError as error:
-            raise OptionError(f"{where}: {error}, got {text!r}") from error
+            raise OptionError(f"{place}: {error}, got {text!r}") from error
 
 
 def path(text: str) -> str:
@@ -111,7 +111,7 @@ TABLE = (
     Row("scripts_path", "api", path, "directory of uploaded scripts"),
     Row("python_path", "api", path, "Python that runs uploaded scripts"),
     Row("vehicle", "api", values.one_of(*values.VEHICLES), "type of the simulated vehicle (copter)"),
-    Row("simulated", "simulated", boolean, "start a simulated vehicle too"),
+    Row("simulated", "simulated", boolean, "also start a simulated vehicle"),
     Row("count", "simulated", values.count, "how many vehicles to simulate (1), with system ids from sysid on"),
     Row(
         "vehicles",
@@ -123,7 +123,7 @@ TABLE = (
     Row("ardupilot_path", "simulated", path, "ArduPilot to simulate with; else the embedded vehicle"),
     Row("location", "simulated", str.strip, "home: a name or lat,lon,alt,heading in deg, m AMSL (AbraDF)"),
     Row("gs_connection", "simulated", values.words, "addresses to forward MAVLink to (MAVProxy's --out)"),
-    Row("speedup", "simulated", values.factor, "how many times faster than the clock to simulate (1)"),
+    Row("speedup", "simulated", values.factor, "how many times faster than real time to simulate (1)"),
     Row("headless", "simulated", boolean, "no MAVProxy prompt; so too where stdin is not a terminal"),
     Row("log_console", "logs", values.components, f"components that log to the console: {_NAMES}"),
     Row("log_path", "logs", path, "log file, beside which telemetry logs go, or the directory for both"),
@@ -131,7 +131,7 @@ TABLE = (
     Row("script_logs", "logs", path, "directory for the output of uploaded scripts"),
 )
 VARIABLES = {f"UAVAPI_{row.name.upper()}": row for row in TABLE}
-SECTIONS = ("api", "simulated", "logs")  # of the INI file; the others are modules'
+SECTIONS = ("api", "simulated", "logs")  # of the INI file; the other sections belong to modules
 
 
 class _Parser(argparse.ArgumentParser):
@@ -140,11 +140,11 @@ class _Parser(argparse.ArgumentParser):
 
 
 def build_parser() -> argparse.ArgumentParser:
-    """The command line as argparse sees it: plain texts, converted later by the table."""
+    """The command line for argparse: plain texts, which the table converts later."""
     parser = _Parser(
         prog="mavproxy-uavapi",
         description="MAVProxy with an HTTP API for the vehicle and, on request, a simulated vehicle.",
-        epilog="Everything after -- goes to MAVProxy as it is. The command line wins over the file.",
+        epilog="Everything after -- goes to MAVProxy unchanged. The command line wins over the file.",
         allow_abbrev=False,
         argument_default=argparse.SUPPRESS,
     )
@@ -165,27 +165,27 @@ def build_parser() -> argparse.ArgumentParser:
 
 
 def parse(argv: Sequence[str], environ: Mapping[str, str] | None = None) -> RunOptions:
-    """Read the arguments, the environment (`UAVAPI_PORT` …) and the file; the former win over the latter.
+    """Read the arguments, the environment (`UAVAPI_PORT` …) and the file, in this order of precedence.
 
-    Where no argument names the file, `UAVAPI_CONFIG` may.
+    `UAVAPI_CONFIG` names the file if no argument does.
 
     Raises:
         OptionError: a wrong option, value, file or combination; its text is one line.
     """
     arguments = list(argv)
     cut = arguments.index("--") if "--" in arguments else len(arguments)
-    given = vars(build_parser().parse_args(_southern(arguments[:cut])))
+    arguments_by_name = vars(build_parser().parse_args(_southern(arguments[:cut])))
     environ = os.environ if environ is None else environ
-    config = given.pop("config", None) or environ.get(CONFIG_VARIABLE, "")
+    config = arguments_by_name.pop("config", None) or environ.get(CONFIG_VARIABLE, "")
     merged = {} if is_unset(config) else read_ini(Path(path(config)), environ)
     origins = dict.fromkeys([*merged, *dict(merged.get("further", ()))], config)
     from_environment = read_environment(environ)
     merged.update(from_environment)
     origins.update(dict.fromkeys(from_environment, ENVIRONMENT))
-    merged["module"] = tuple(name for text in given.pop("module", ()) for name in _read_module(text))
+    merged["module"] = tuple(name for text in arguments_by_name.pop("module", ()) for name in _read_module(text))
     for row in TABLE:
-        if row.name in given:
-            raw = given[row.name]
+        if row.name in arguments_by_name:
+            raw = arguments_by_name[row.name]
             text = " ".join(raw) if isinstance(raw, list) else raw
             if is_unset(text):
                 merged.pop(row.name, None)
@@ -198,7 +198,7 @@ def parse(argv: Sequence[str], environ: Mapping[str, str] | None = None) -> RunO
 
 
 def _southern(words: Sequence[str]) -> list[str]:
-    """The words with `--location -35.3,149.1` as one word: argparse takes a minus for the beginning of an option."""
+    """The words with `--location -35.3,149.1` as one word, because argparse takes a minus for an option."""
     joined: list[str] = []
     for word in words:
         if joined[-1:] == ["--location"] and re.match(r"-[\d.]", word):
@@ -229,60 +229,60 @@ def read_environment(environ: Mapping[str, str]) -> dict[str, Any]:
 
 
 def read_ini(file: Path, environ: Mapping[str, str]) -> dict[str, Any]:
-    """The values of an INI file, by option name. A key may stand in any of our sections, as it always could.
+    """The values of an INI file, by option name. A key may stand in any of our sections, as in the original service.
 
     A section [simulated] means a simulated vehicle unless it says `simulated = false`. The modules' sections are
-    checked here already, with what `environ` adds to them.
+    already checked here, together with `environ`.
 
     Raises:
-        OptionError: the file is missing or unreadable, a section or key is unknown, a value is wrong, or a section is
-            there whose module cannot be imported.
+        OptionError: the file is missing or unreadable, a section or key is unknown, a value is wrong, or the module
+        of a section cannot be imported.
     """
     try:
         ini = IniFile(file)
-        found: dict[str, Any] = {"simulated": True} if "simulated" in ini.sections else {}
+        values_by_name: dict[str, Any] = {"simulated": True} if "simulated" in ini.sections else {}
         for section in SECTIONS:
-            found.update(_read_section(ini, section))
+            values_by_name.update(_read_section(ini, section))
         further = _modules_own(ini)
     except SettingError as error:
         raise OptionError(f"--config {error}") from error
     if further:
-        found["further"] = further
-    return {**found, **_modules_configs(ini, environ)}
+        values_by_name["further"] = further
+    return {**values_by_name, **_modules_configs(ini, environ)}
 
 
 def _modules_configs(ini: IniFile, environ: Mapping[str, str]) -> dict[str, str]:
     """The file by option name, for each module that has a section in it."""
-    found = {}
+    configs = {}
     for name, check_module in MODULES.items():
         if name in ini.sections:
             try:
                 check_module({"config": str(ini.file)}, environ)
             except SettingError as error:
                 raise OptionError(str(error)) from error
-            found[f"{name}_config"] = str(ini.file.absolute())
-    return found
+            configs[f"{name}_config"] = str(ini.file.absolute())
+    return configs
 
 
 def _read_section(ini: IniFile, section: str) -> dict[str, Any]:
     rows = {row.name: row for row in TABLE}
     further = [] if section == "simulated" else [name for name in ApiModuleSettings.names() if name not in rows]
-    found = {}
+    section_values = {}
     for key, text in ini.section(section).items():
         if key in further or (key == "udp" and not _read_udp(ini.file, text)):
             continue
         if key not in rows:
             raise ini.no_key(section, key, [*rows, *further])
         if not is_unset(text):
-            found[key] = rows[key].read(text, f"--config {ini.file}: {key} in [{section}]")
-    return found
+            section_values[key] = rows[key].read(text, f"--config {ini.file}: {key} in [{section}]")
+    return section_values
 
 
 def _read_udp(file: Path, text: str) -> bool:
     """The original service's switch for HTTP/3; always False.
 
     Raises:
-        OptionError: it is on, or no switch.
+        OptionError: it is on, or not a switch.
     """
     if not is_unset(text) and Row("udp", "api", boolean, "").read(text, f"--config {file}: udp"):
         raise OptionError(f"--config {file}: udp: there is no HTTP/3 here; certfile and keyfile switch to TLS")
@@ -290,41 +290,41 @@ def _read_udp(file: Path, text: str) -> bool:
 
 
 def _modules_own(ini: IniFile) -> tuple[tuple[str, str], ...]:
-    """The keys that are the `uavapi` module's alone, as they are written; it checks them here already.
+    """The keys that only the `uavapi` module has, unchanged; they are already checked here.
 
     Raises:
         SettingError: a value is wrong.
     """
     rows = {row.name for row in TABLE}
-    own = [
+    keys = [
         (key, text)
         for section in SECTIONS
         for key, text in ini.section(section).items()
         if key not in rows and key in ApiModuleSettings.names() and not is_unset(text)
     ]
     try:
-        ApiModuleSettings(dict(own), environ={"UAVAPI_ALLOW_OPEN": "true"})
+        ApiModuleSettings(dict(keys), environ={"UAVAPI_ALLOW_OPEN": "true"})
     except SettingError as error:
         raise SettingError(f"{ini.file}: {error}") from error
-    return tuple(own)
+    return tuple(keys)
 
 
-def _check_vision(given: Mapping[str, Any], environ: Mapping[str, str]) -> None:
+def _check_vision(option_values: Mapping[str, Any], environ: Mapping[str, str]) -> None:
     problem = opencv_install.problem()
     if problem is not None:
-        raise SettingError(f"{given['config']}: [vision]: {problem}")
+        raise SettingError(f"{option_values['config']}: [vision]: {problem}")
     from mavproxy_vision.settings import VisionModuleSettings  # noqa: PLC0415  it imports OpenCV
 
-    VisionModuleSettings(given, environ)
+    VisionModuleSettings(option_values, environ)
 
 
-def _check_gradys(given: Mapping[str, Any], environ: Mapping[str, str]) -> None:
-    from mavproxy_gradys.settings import GradysModuleSettings  # noqa: PLC0415  others need not wait
+def _check_gradys(option_values: Mapping[str, Any], environ: Mapping[str, str]) -> None:
+    from mavproxy_gradys.settings import GradysModuleSettings  # noqa: PLC0415  a slow import, only if needed
 
-    GradysModuleSettings(given, environ)
+    GradysModuleSettings(option_values, environ)
 
 
-# The modules that read their section of the file themselves.
+# The modules that read their own section of the file.
 MODULES: Mapping[str, Callable[[Mapping[str, Any], Mapping[str, str]], None]] = {
     "vision": _check_vision,
     "gradys": _check_gradys,

@@ -1,4 +1,4 @@
-"""Asks the API whether it is there."""
+"""Checks whether the API answers."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ TIMEOUT_S = 2.0
 
 
 async def answers(options: RunOptions) -> int | None:
-    """The HTTP status of `/telemetry/status`; None while nothing answers. 401 is an answer too: no token is
-    sent, for it is not certain who listens on the port.
+    """The HTTP status of `/telemetry/status`; None while nothing answers. 401 is an answer too: no token is sent,
+    because the program on the port may not be ours.
     """
     try:
         return await wait_with_timeout(TIMEOUT_S, _status(api_url(options)))
@@ -23,10 +23,10 @@ async def answers(options: RunOptions) -> int | None:
 
 
 async def _status(url: str) -> int:
-    where = urlsplit(url)
-    reader, writer = await asyncio.open_connection(where.hostname, where.port)
+    parts = urlsplit(url)
+    reader, writer = await asyncio.open_connection(parts.hostname, parts.port)
     try:
-        request = f"GET /telemetry/status HTTP/1.1\r\nHost: {where.netloc}\r\nConnection: close\r\n\r\n"
+        request = f"GET /telemetry/status HTTP/1.1\r\nHost: {parts.netloc}\r\nConnection: close\r\n\r\n"
         writer.write(request.encode("ascii"))
         protocol, status = (await reader.readline()).split(maxsplit=2)[:2]
         if not protocol.startswith(b"HTTP/"):

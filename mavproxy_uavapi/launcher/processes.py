@@ -1,9 +1,8 @@
-"""Which processes belong to this run, and how they are ended: exactly those, and never by their names.
+"""Finds the processes of this run and ends exactly those, never by name.
 
-A process is ours when it carries our tag, an environment variable with a random value that its children
-inherit, and runs in one of the sessions in which we started something. The tag alone would not do: a tmux
-server started by an uploaded script inherits it, and that server may hold windows that are nobody's
-business here; but it runs in a session of its own.
+A process is ours if it carries our tag, an environment variable with a random value that its children inherit, and
+runs in one of the sessions in which we started something. The tag alone is not enough: a tmux server started by an
+uploaded script inherits it and may hold windows of others; but it runs in its own session.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ POLL_S = 0.05
 
 
 def carries(pid: int, tag: str) -> bool:
-    """Whether the process was started with our tag; False also where it has gone or is another user's."""
+    """Whether the process was started with our tag; False also if it has gone or belongs to another user."""
     try:
         with open(f"/proc/{pid}/environ", "rb") as environ:
             return f"{TAG}={tag}".encode() in environ.read().split(b"\0")
@@ -43,13 +42,13 @@ def members(tag: str, sessions: Collection[int]) -> Iterator[int]:
 
 
 def signal_member(pid: int, signum: signal.Signals, tag: str, sessions: Collection[int]) -> bool:
-    """Signal the process if it is ours; a number that was given to another process meanwhile is not."""
+    """Signal the process if it is ours; not if its number belongs to another process by now."""
     try:
         descriptor = os.pidfd_open(pid)
     except ProcessLookupError:
         return False
     try:
-        # Asked with the descriptor open: from here on the signal can reach this very process only.
+        # Checked with the descriptor open: from here on the signal can reach only this process.
         if not is_member(pid, tag, sessions):
             return False
         with suppress(ProcessLookupError):
@@ -60,14 +59,14 @@ def signal_member(pid: int, signum: signal.Signals, tag: str, sessions: Collecti
 
 
 def signal_members(tag: str, sessions: Collection[int], signum: signal.Signals) -> int:
-    """Signal all processes of the run and say how many there were."""
+    """Signal all processes of the run; returns their number."""
     return sum(signal_member(pid, signum, tag, sessions) for pid in list(members(tag, sessions)))
 
 
 def end_members(
     tag: str, sessions: Collection[int], grace_s: float, sleep: Callable[[float], None] = time.sleep
 ) -> bool:
-    """SIGTERM to all processes of the run, SIGKILL to those still there after the grace period (s).
+    """SIGTERM to all processes of the run, SIGKILL to those that remain after the grace period (s).
 
     Returns:
         Whether they are all gone.
@@ -78,7 +77,7 @@ def end_members(
         sleep(POLL_S)
         if not any(True for _ in members(tag, sessions)):
             return True
-    # Again and again: a process may have forked while the list was read.
+    # Repeated, because a process may have forked while the list was read.
     for _ in range(20):
         if not signal_members(tag, sessions, signal.SIGKILL):
             return True

@@ -1,4 +1,4 @@
-"""Starts the processes of a run, waits for the first that ends or for a signal, and ends them all."""
+"""Starts the processes of a run, waits for the first one to end or for a signal, and ends them all."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from mavproxy_uavapi.launcher.probe import answers
 VEHICLE_START_S = 30.0
 API_START_S = 90.0
 
-# Unloading our module ends uploaded scripts, which may be landing the vehicle; see its own grace period.
+# The unload of our module ends uploaded scripts, which may be landing the vehicle; see its own grace period.
 MAVPROXY_GRACE_S = 15.0
 MAVPROXY_FORCED_S = 2.0
 
-# At its prompt MAVProxy takes note of a SIGTERM but then waits for a line; there is nothing to wait for.
+# At its prompt MAVProxy notes a SIGTERM but then waits for a line; there is nothing to wait for.
 PROMPT_GRACE_S = 1.0
 VEHICLE_GRACE_S = 3.0
 STRAY_GRACE_S = 1.0
 
-# Two Ctrl-C at the prompt within this time are meant for the launcher too.
+# Two Ctrl-C at the prompt within this time also end the launcher.
 INSIST_S = 3.0
 
 _READY = b" listening on "
@@ -49,7 +49,7 @@ class Supervisor:
         self.tag = uuid.uuid4().hex
         self.sessions: set[int] = set()
         self.watchdog: Process | None = None
-        self.vehicles: dict[Process, SimulatedVehicle] = {}  # those that run
+        self.vehicles: dict[Process, SimulatedVehicle] = {}  # the running ones
         self.mavproxy: Process | None = None
         self.came_up = False
         self.interrupted_at = -INSIST_S
@@ -57,13 +57,13 @@ class Supervisor:
         self.hurry = asyncio.Event()
 
     async def run(self) -> int:
-        """The whole life of the run.
+        """Run from start to end.
 
         Returns:
-            The exit status: 0 when it was ended by a signal to us, or by the user at the prompt.
+            The exit status: 0 if a signal to us or the user at the prompt ended the run.
 
         Raises:
-            LaunchError: something did not start, or ended on its own.
+            LaunchError: something did not start, or ended by itself.
         """
         self._watch_signals()
         work = asyncio.create_task(self._work())
@@ -82,7 +82,7 @@ class Supervisor:
     def _watch_signals(self) -> None:
         loop = asyncio.get_running_loop()
         for signum in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            # nohup and shells ignore a signal on purpose.
+            # nohup and shells ignore a signal on purpose; it stays ignored.
             if signal.getsignal(signum) is not signal.SIG_IGN:
                 loop.add_signal_handler(signum, self._on_signal, signum)
 
@@ -90,7 +90,7 @@ class Supervisor:
         if self.stop.is_set():
             self.hurry.set()
         elif signum == signal.SIGINT and self._mavproxy_has_terminal():
-            # The terminal sent it to MAVProxy as well, which may be set to stay (`set requireexit`).
+            # The terminal also sent it to MAVProxy, which may be set to stay (`set requireexit`).
             now = asyncio.get_running_loop().time()
             if now - self.interrupted_at < INSIST_S:
                 self.stop.set()
@@ -148,7 +148,7 @@ class Supervisor:
         return self.run_dir / ("vehicle.log" if len(self.simulated) == 1 else f"vehicle-{vehicle.sysid}.log")
 
     async def _all_vehicles_ended(self) -> None:
-        """Wait until no simulated vehicle is left; tell of each that ends while others go on."""
+        """Wait until no simulated vehicle is left; report each that ends while others go on."""
         if not self.vehicles:
             await asyncio.Event().wait()
 
@@ -163,7 +163,7 @@ class Supervisor:
                 complain(f"vehicle {vehicle.sysid} ended, the others go on: {last_line(log)} (log: {log})")
 
     async def _vehicle_ready(self, process: Process, log: Path) -> None:
-        """Wait for the line that the embedded vehicle prints once its port is open."""
+        """Wait for the line that the embedded vehicle prints when its port is open."""
         deadline = asyncio.get_running_loop().time() + VEHICLE_START_S
         while not has_said(log, _READY):
             if process.returncode is not None:
@@ -181,7 +181,7 @@ class Supervisor:
         command = command_lines.mavproxy_command(
             self.options, environment.mavproxy_program(), self.run_dir, self.simulated, config
         )
-        # With components logging to the console the console is where MAVProxy's output belongs.
+        # If components log to the console, MAVProxy's output belongs there too.
         to_file = self.options.headless and not self.options.log_console
         self.mavproxy = await self._start(
             command,
@@ -214,15 +214,15 @@ class Supervisor:
         return process
 
     async def _announce(self) -> None:
-        """Say where the API is once it answers. Without a prompt to look at, not answering is the end."""
+        """Print the API's address when it answers. Without a prompt, an API that does not answer ends the run."""
         url = command_lines.api_url(self.options)
         deadline = asyncio.get_running_loop().time() + API_START_S
         status = await answers(self.options)
         while status is None or (status == 503 and self.options.simulated):
             self._check_api_loaded()
             if asyncio.get_running_loop().time() > deadline:
-                what = "does not answer" if status is None else "does not see the vehicle"
-                problem = f"the API at {url} {what} after {API_START_S:.0f} s (log: {self._where()})"
+                failure = "does not answer" if status is None else "does not see the vehicle"
+                problem = f"the API at {url} {failure} after {API_START_S:.0f} s (log: {self._where()})"
                 if self.options.headless:
                     raise LaunchError(problem)
                 complain(problem)
@@ -233,10 +233,10 @@ class Supervisor:
         print("\n" + command_lines.greeting(self.options, bool(os.environ.get("UAVAPI_TOKEN"))), flush=True)
 
     def _check_api_loaded(self) -> None:
-        """Do not wait for an API whose module MAVProxy could not load: it says so, and goes on without.
+        """Do not wait for the API if MAVProxy could not load its module; MAVProxy reports that and goes on.
 
         Raises:
-            LaunchError: in MAVProxy's own words.
+            LaunchError: with MAVProxy's own text.
         """
         log = self.run_dir / "mavproxy.log"
         for line in read_lines(log) if log.exists() else []:
@@ -247,13 +247,13 @@ class Supervisor:
         log = self.run_dir / "mavproxy.log"
         return str(log) if log.exists() else "above"
 
-    # What an end means
+    # The exit status
 
     def _verdict(self) -> int:
-        """The exit status after a process has ended that we did not end.
+        """The exit status after a process has ended by itself.
 
-        MAVProxy exits with status 1 whatever happened. It was shut down on purpose when it said so in its
-        log, or, at a prompt, when it had come up or was interrupted.
+        MAVProxy always exits with status 1. The shutdown was on purpose if its log says so or, at a prompt, if it had
+        come up or was interrupted.
 
         Raises:
             LaunchError: the vehicle ended, or MAVProxy crashed or never came up.
@@ -270,25 +270,25 @@ class Supervisor:
         interrupted = self.interrupted_at > 0
         on_purpose = _UNLOADING in log.read_bytes() if log.exists() else self.came_up or interrupted
         if status > 1 or not on_purpose:
-            said = f": {last_line(log)}" if log.exists() else ""
-            raise LaunchError(f"MAVProxy ended with status {status}{said} (log: {self._where()})")
+            reason = f": {last_line(log)}" if log.exists() else ""
+            raise LaunchError(f"MAVProxy ended with status {status}{reason} (log: {self._where()})")
         return 0
 
     # Ending
 
     async def _end(self) -> None:
-        """End what is left, MAVProxy first: while it unloads its modules the vehicle must still be there."""
+        """End the remaining processes, MAVProxy first: the vehicle must be there while it unloads its modules."""
         self.stop.set()
         if self.mavproxy is not None:
             await self._end_mavproxy(self.mavproxy)
         if self.vehicles:
             pids = {process.pid for process in self.vehicles}
             await asyncio.to_thread(processes.end_members, self.tag, pids, VEHICLE_GRACE_S)
-        # The log writer and the windows of MAVProxy, should it have died before them.
-        gone = await asyncio.to_thread(processes.end_members, self.tag, self.sessions, STRAY_GRACE_S)
-        if not gone:
-            left = ", ".join(map(str, processes.members(self.tag, self.sessions)))
-            complain(f"these processes would not end: {left}")
+        # MAVProxy's log writer and windows, in case it died before them.
+        all_ended = await asyncio.to_thread(processes.end_members, self.tag, self.sessions, STRAY_GRACE_S)
+        if not all_ended:
+            remaining = ", ".join(map(str, processes.members(self.tag, self.sessions)))
+            complain(f"these processes would not end: {remaining}")
         for process in (self.mavproxy, *self.vehicles, self.watchdog):
             if process is not None:
                 if process.stdin is not None:
@@ -296,7 +296,7 @@ class Supervisor:
                 await process.wait()
 
     async def _end_mavproxy(self, mavproxy: Process) -> None:
-        """SIGTERM, which it takes as `exit`; a second one, at which it leaves at once; then SIGKILL."""
+        """SIGTERM, which MAVProxy takes as `exit`; a second one, which ends it at once; then SIGKILL."""
         for signum, grace_s in (
             (signal.SIGTERM, MAVPROXY_GRACE_S if self.options.headless else PROMPT_GRACE_S),
             (signal.SIGTERM, MAVPROXY_FORCED_S),
@@ -315,20 +315,20 @@ class Supervisor:
 
 
 def complain(problem: str) -> None:
-    """One line to stderr, below whatever MAVProxy's prompt shows."""
+    """Print one line to stderr, below MAVProxy's prompt."""
     print(f"\nmavproxy-uavapi: {problem}", file=sys.stderr)
 
 
 def has_said(log: Path, words: bytes) -> bool:
-    """Whether the log has them."""
+    """Whether the log contains the words."""
     return words in log.read_bytes()
 
 
 def last_line(log: Path) -> str:
-    """The last line with something on it, for an error that fits one line."""
+    """The last line that is not empty, for an error that fits one line."""
     return next((line for line in reversed(read_lines(log)) if line), "it said nothing")
 
 
 def read_lines(log: Path) -> list[str]:
-    """The log so far, line by line, without the white space at the ends."""
+    """The lines of the log so far, without white space at the ends."""
     return [line.strip() for line in log.read_text(encoding="utf-8", errors="replace").splitlines()]

@@ -1,4 +1,4 @@
-"""Text from the command line or an INI file -> a value; a ValueError says what was expected."""
+"""Text from the command line or an INI file -> a value; a ValueError says what is expected."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 from mavproxy_uavapi.core import logs
 
-# The names that may be written, those of the original service too, and the components that they stand for.
+# The accepted names, including those of the original service, and the components that they mean.
 LOG_COMPONENTS = {**{name: name for name in logs.COMPONENTS}, **logs.ALIASES}
 VEHICLES = ("copter", "plane", "quadplane", "rover")
 _MODULE = re.compile(r"[A-Za-z_]\w*(:\{[^;\s]*\})?")
@@ -54,7 +54,7 @@ def distance(text: str) -> float:
 
 
 def factor(text: str) -> float:
-    """A finite number above 0 (how many times faster than the clock a simulation runs)."""
+    """A finite number above 0 (how many times faster than real time a simulation runs)."""
     try:
         number = float(text)
     except ValueError:
@@ -70,11 +70,11 @@ def words(text: str) -> tuple[str, ...]:
 
 
 def components(text: str) -> tuple[str, ...]:
-    """Log components by their names here or in the original service, each once."""
-    found = dict.fromkeys(LOG_COMPONENTS.get(word.upper(), "") for word in words(text))
-    if "" in found:
+    """Log components, by their names here or in the original service, without duplicates."""
+    names = dict.fromkeys(LOG_COMPONENTS.get(word.upper(), "") for word in words(text))
+    if "" in names:
         raise ValueError(f"expected some of {', '.join(LOG_COMPONENTS)}")
-    return tuple(found)
+    return tuple(names)
 
 
 def host_port(text: str) -> str:
@@ -89,7 +89,7 @@ def host_port(text: str) -> str:
 def modules(text: str) -> tuple[str, ...]:
     """One MAVProxy module, `NAME` or `NAME:{"key":value}`, or several names with commas between."""
     names = (text,) if "{" in text else tuple(part for part in text.split(",") if part)
-    # MAVProxy splits a command line at `;` and at white space: nothing may slip in behind a name.
+    # MAVProxy splits a command line at `;` and at white space; a name must not contain either.
     if not names or not all(_MODULE.fullmatch(name) for name in names):
         raise ValueError('expected NAME or NAME:{"key":value} without spaces')
     for name in names:
@@ -98,7 +98,7 @@ def modules(text: str) -> tuple[str, ...]:
 
 
 def one_of(*choices: str) -> Callable[[str], str]:
-    """A converter that accepts these words only."""
+    """A converter that accepts only these words."""
 
     def choice(text: str) -> str:
         if text.strip() not in choices:

@@ -1,8 +1,8 @@
-"""The process that ends the others when the launcher cannot: it died of SIGKILL, or of a defect.
+"""Ends the other processes when the launcher cannot, because of SIGKILL or a defect.
 
-It holds the reading end of a pipe whose only writing end is the launcher's, so the pipe ends with the
-launcher, however that happens. PR_SET_PDEATHSIG would reach direct children only, and ArduPilot's vehicle is
-a grandchild; it also depends on the thread that started the child.
+It holds the reading end of a pipe whose only writing end is the launcher's, so the pipe always ends with the
+launcher. PR_SET_PDEATHSIG reaches direct children only, and ArduPilot's vehicle is a grandchild; it also depends on
+the thread that started the child.
 
     python -m mavproxy_uavapi.launcher.watchdog TAG     (session numbers on stdin, one per line)
 """
@@ -18,8 +18,8 @@ GRACE_S = 5.0
 
 
 def main() -> int:
-    """Read sessions until the pipe ends, then end what is left of the run."""
-    # A service manager may send SIGTERM to all of a service's processes: this one goes after the launcher.
+    """Read sessions until the pipe ends, then end the remaining processes of the run."""
+    # A service manager may send SIGTERM to all of a service's processes; this one must end after the launcher.
     for signum in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(signum, signal.SIG_IGN)
     sessions = {int(line) for line in sys.stdin}

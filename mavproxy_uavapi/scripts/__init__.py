@@ -1,1 +1,1 @@
-"""Mission scripts: uploaded programs that fly by the API, each run in a tmux session of its own."""
+"""Mission scripts: uploaded programs that fly by the API, each in its own tmux session."""

@@ -1,4 +1,4 @@
-"""Scripts of aerpawlib: known by what they import. Pure."""
+"""Finds out whether a script is for aerpawlib, by its imports. Pure."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ HOST = [
     "-m",
     "mavproxy_uavapi.aerpaw",
     "--script",
-]  # by UAVAPI_URL it finds the API, by its status the vehicle's type
+]  # it finds the API by UAVAPI_URL, and the vehicle's type by the API's status
 
 
 def needs_host(source: bytes) -> bool:
-    """Whether a script imports aerpawlib and does not run itself: then it defines a runner, and a host runs that."""
+    """Whether a script imports aerpawlib and does not run itself; it then defines a runner, which a host runs."""
     try:
         body = ast.parse(source).body
     except (SyntaxError, ValueError):
-        return False  # Python itself will say so
+        return False  # Python itself will report it
     return any(map(_imports_aerpawlib, body)) and not any(map(_runs_itself, body))
 
 

@@ -1,4 +1,4 @@
-"""Which script a connection comes from. Blocking: for an executor, not for the loop."""
+"""Finds the script that a connection comes from. Blocking: for an executor, not for the loop."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mavproxy_uavapi.scripts.runs import Run
 
 
 def session_of(address: str, port: int, running: Sequence[Run]) -> str | None:
-    """The session of the script whose process has a connection from there; None where none has.
+    """The session of the script whose process has this connection; None if none has it.
 
     Args:
         address, port: the client's end of the connection.

@@ -1,35 +1,35 @@
-"""A log as it grows, a piece at a time. Blocking: for an executor, not for the loop."""
+"""Reads a growing log piece by piece. Blocking: for an executor, not for the loop."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
 
-PIECE = 32 * 1024  # bytes that are read in one go; a line that is longer comes in several
+PIECE = 32 * 1024  # bytes that are read at once; a longer line comes in several pieces
 
 
 class Follower:
-    """Reads a log from its beginning; anew when it was cut, or replaced by another file.
+    """Reads a log from its beginning; starts again if it was cut or replaced by another file.
 
     Args:
-        log: the file, which need not be there yet.
+        log: the file, which may not exist yet.
 
     Attributes:
-        behind: whether there was more to read.
+        behind: whether there is more to read.
     """
 
     def __init__(self, log: Path) -> None:
         self._log = log
         self._inode = self._position = 0
-        self._rest = b""  # of a line whose end is not there yet
+        self._unfinished = b""  # the beginning of an unfinished line
         self.behind = False
 
     def lines(self, at_end: bool) -> list[str]:
-        """The next lines; what is no whole line yet waits for its rest, unless none comes."""
-        *lines, self._rest = (self._rest + self._piece()).split(b"\n")
-        if len(self._rest) >= PIECE or (self._rest and at_end and not self.behind):
-            lines.append(self._rest)
-            self._rest = b""
+        """The next lines; an unfinished line waits for its end, unless `at_end`."""
+        *lines, self._unfinished = (self._unfinished + self._piece()).split(b"\n")
+        if len(self._unfinished) >= PIECE or (self._unfinished and at_end and not self.behind):
+            lines.append(self._unfinished)
+            self._unfinished = b""
         return [line.decode(errors="replace").rstrip("\r") for line in lines]
 
     def _piece(self) -> bytes:
@@ -39,7 +39,7 @@ class Follower:
                 begun = b""
                 if is_now.st_ino != self._inode or is_now.st_size < self._position:
                     self._inode, self._position = is_now.st_ino, 0
-                    begun = b"\n" if self._rest else b""  # nothing will end that line any more
+                    begun = b"\n" if self._unfinished else b""  # that line will not be finished
                 file.seek(self._position)
                 data = file.read(PIECE)
         except FileNotFoundError:

@@ -21,16 +21,16 @@ from mavproxy_uavapi.settings import ApiSettings
 
 log = logging.getLogger("uavapi.script")
 
-LOOK_EVERY = 0.25  # s between looks at a running script's lock and record: files tell nobody when they change
+LOOK_EVERY = 0.25  # s between looks at a running script's lock and record, because files do not signal changes
 START_TIMEOUT = 10.0  # s until the runner must have started the script
 SHELL = "bash"
 
 
 class Scripts:
-    """What the API knows and does of scripts. A script goes on when the API ends; the next one finds it again.
+    """The scripts of the API: stored files and runs. A script goes on when the API ends; the next API finds it again.
 
     Args:
-        host: the vehicle that they fly.
+        host: the vehicles that they fly.
         settings: the snapshot in force.
     """
 
@@ -42,7 +42,7 @@ class Scripts:
         self._launching = asyncio.Lock()
 
     def renew(self, settings: ApiSettings) -> None:
-        """Take up other settings. Scripts that run go on as they were started."""
+        """Use other settings. Running scripts go on as they were started."""
         self._settings = settings
         self.store = ScriptStore(
             Path(settings.scripts_path).expanduser().absolute(),
@@ -54,13 +54,13 @@ class Scripts:
     # -- life ---------------------------------------------------------------------------------------------
 
     async def start(self) -> None:
-        """Find the scripts again that an earlier API started, by their sessions."""
+        """Find the running scripts of an earlier API by their sessions."""
         try:
-            found = await tmux.sessions(names.session_prefix(self._settings.sysid))
+            records = await tmux.sessions(names.session_prefix(self._settings.sysid))
         except ToolFailed as error:
             log.info("%s", error)  # execute will say so too
             return
-        for session, record in found.items():
+        for session, record in records.items():
             if record is None or session in self._watched:
                 continue
             try:
@@ -73,7 +73,7 @@ class Scripts:
                 self._watch(run)
 
     async def stop(self) -> None:
-        """Watch no more. The scripts go on."""
+        """Stop watching. The scripts go on."""
         watches = list(self._watches.values())
         for watch in watches:
             watch.cancel()
@@ -94,18 +94,18 @@ class Scripts:
             raise ToolFailed(f"cannot save {name} in {self.store.folder}: {error.strerror}") from error
 
     async def execute(self, name: str, args: Sequence[str]) -> Run:
-        """Start a script in a session of its own; returns when it runs.
+        """Start a script in its own session; returns when it runs.
 
         Raises:
-            BadRequest: it is running already, or `name` is no name for a script.
+            BadRequest: it is already running, or `name` is not a valid script name.
             NotFound: no such script.
-            ToolFailed: no tmux, or it could not be started; nothing is left behind.
+            ToolFailed: there is no tmux, or the script could not be started; nothing is left behind.
         """
         path = await asyncio.to_thread(self.store.find, name)
         async with self._launching:
             if self.running_run(path.name) is not None:
                 raise BadRequest(f"{path.name} is already running")
-            # A client that hangs up now must not leave a script that nobody watches.
+            # A client that hangs up now must not leave an unwatched script.
             return await asyncio.shield(self._launch(path, args))
 
     async def _launch(self, path: Path, args: Sequence[str]) -> Run:
@@ -140,7 +140,7 @@ class Scripts:
             raise ToolFailed(f"cannot write logs in {self.logs}: {error.strerror}") from error
 
     def _command(self, path: Path) -> list[str]:
-        """What runs a script; those of aerpawlib do nothing by themselves, and have a host."""
+        """The command that runs a script; scripts of aerpawlib need a host."""
         if path.suffix == ".sh":
             return [SHELL, str(path)]
         host = aerpaw.HOST if aerpaw.needs_host(path.read_bytes()) else []
@@ -158,9 +158,9 @@ class Scripts:
         raise ToolFailed(f"session {run.session} did not start {run.script} within {START_TIMEOUT:g} s")
 
     async def halt(self, name: str) -> Run:
-        """Ctrl-C, and a kill where that does not end it within the grace period; returns when it has ended.
+        """Stop a script by Ctrl-C, then by a kill after the grace period; returns when it has ended.
 
-        A client that hangs up does not change that.
+        A client that hangs up does not change this.
 
         Raises:
             NotFound, BadRequest: no such script; it is not running.
@@ -172,49 +172,49 @@ class Scripts:
             raise BadRequest(f"{script} is not running")
         assert run.pid is not None
         with contextlib.suppress(ProcessLookupError):  # it has just ended
-            os.kill(run.pid, signal.SIGTERM)  # to its runner, which knows what to do
+            os.kill(run.pid, signal.SIGTERM)  # to its runner, which stops the script
         await asyncio.shield(self._watches[run.session])
         return await asyncio.to_thread(runs.refreshed, run)
 
     async def running(self) -> list[Run]:
         """The scripts that run now, oldest first."""
-        found = [await asyncio.to_thread(runs.refreshed, run) for run in list(self._watched.values())]
-        return sorted((run for run in found if run.running), key=lambda run: run.started_at)
+        running = [await asyncio.to_thread(runs.refreshed, run) for run in list(self._watched.values())]
+        return sorted((run for run in running if run.running), key=lambda run: run.started_at)
 
     def running_run(self, script: str) -> Run | None:
-        """The run of a script that goes on, as it was last looked at."""
+        """The running run of a script, as of the last look."""
         return next((run for run in self._watched.values() if run.script == script), None)
 
     async def newest(self, script: str) -> Run | None:
-        """The newest run of a script, whether it goes on or not."""
+        """The newest run of a script, running or ended."""
         running = self.running_run(script)
         if running is not None:
             return await asyncio.to_thread(runs.refreshed, running)
-        told = await asyncio.to_thread(runs.of_script, self.logs, script)
-        return told[0] if told else None
+        script_runs = await asyncio.to_thread(runs.of_script, self.logs, script)
+        return script_runs[0] if script_runs else None
 
     async def session_of(self, peer: tuple[str, int] | None) -> str | None:
-        """The session of the script that a request comes from, by its end of the connection; None for others."""
+        """The session of the script whose connection a request came by, from the client's end of it; else None."""
         running = list(self._watched.values())
         if peer is None or not running:
             return None
         return await asyncio.to_thread(clients.session_of, *peer, running)
 
-    # -- what a script is given ---------------------------------------------------------------------------
+    # -- the scripts' environment -------------------------------------------------------------------------
 
     @property
     def sysid(self) -> int:
-        """The vehicle's system id; 0 while none was heard and none is set."""
+        """The vehicle's system id; 0 while no vehicle is known and none is set."""
         try:
             return self._host.registry.find(self._settings.sysid).state.system
         except NoVehicle:
             return self._settings.sysid
 
     def environment(self) -> dict[str, str]:
-        """Our own environment, and what a script needs to reach us."""
+        """Our own environment, and the variables by which a script reaches the API."""
         return {
             **os.environ,
-            "PYTHONUNBUFFERED": "1",  # so that the logs and the session show what it prints as it prints
+            "PYTHONUNBUFFERED": "1",  # so that its output reaches the logs and the session at once
             "UAVAPI_URL": self._settings.local_url,
             "UAVAPI_TOKEN": self._settings.token,
             "UAVAPI_SYSID": str(self.sysid),
@@ -240,7 +240,7 @@ class Scripts:
             self._keep(asyncio.create_task(self._after_death(run)))
 
     def _keep(self, task: asyncio.Task[None]) -> None:
-        """Hold a task until it is done; asyncio itself holds it weakly."""
+        """Keep a reference to a task until it is done; asyncio itself keeps a weak one."""
         name = f"after {id(task)}"
         self._watches[name] = task
         task.add_done_callback(lambda _: self._watches.pop(name, None))

@@ -1,4 +1,4 @@
-"""What a script may be called. Pure."""
+"""The names of scripts. Pure."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from pathlib import PurePath
 from mavproxy_uavapi.core.errors import BadRequest
 
 SUFFIXES = (".py", ".sh")
-LONGEST = 100  # characters; with a timestamp behind it a log's name must still fit into 255 bytes
+LONGEST = 100  # characters; the name of a log, with its timestamp, must fit into 255 bytes
 ALLOWED = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]*")
 
 
 def checked(name: str) -> str:
-    """A script's file name, as it is.
+    """`name`, if it is valid.
 
     Raises:
-        BadRequest: it is no single, plain file name, or neither .py nor .sh.
+        BadRequest: it is not a plain file name, or does not end in .py or .sh.
     """
     if not ALLOWED.fullmatch(name) or len(name) > LONGEST:
         raise BadRequest(
@@ -29,7 +29,7 @@ def checked(name: str) -> str:
 
 
 def resolved(name: str) -> str:
-    """The file name that a client means, which may leave `.py` out.
+    """The file name that a client means; the client may omit `.py`.
 
     Raises:
         BadRequest: as `checked`.
@@ -38,7 +38,7 @@ def resolved(name: str) -> str:
 
 
 def stem(script: str) -> str:
-    """The file name without its extension, by which logs are named."""
+    """The file name without its extension; logs are named by it."""
     return PurePath(script).stem
 
 
@@ -48,5 +48,5 @@ def session_name(sysid: int, run: str) -> str:
 
 
 def session_prefix(sysid: int) -> str:
-    """How the sessions of a vehicle's scripts begin; of every vehicle's, where `sysid` is 0."""
+    """The prefix of the sessions of a vehicle's scripts; of every vehicle's if `sysid` is 0."""
     return f"uavapi_{sysid}_" if sysid else "uavapi_"

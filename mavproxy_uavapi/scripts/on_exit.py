@@ -1,4 +1,4 @@
-"""What happens to a vehicle when its script dies in flight (the setting `on_script_exit`)."""
+"""Handles the vehicle of a script that dies in flight (setting `on_script_exit`)."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.scripts.runs import Run
 
-FLOWN_BY_SCRIPTS = "GUIDED"  # in any other mode the vehicle is its pilot's, or on its way down already
-# A dead script's landing or return is what is best for the vehicle; half a mission is no use to anybody.
+FLOWN_BY_SCRIPTS = "GUIDED"  # in any other mode a pilot has the vehicle, or it is already on its way down
+# A landing or return that a dead script began stays the best for the vehicle; a half mission is of no use.
 GOES_ON = {"/command/land", "/command/rtl", "/mission/waypoints"}
 
 
 async def after_death(host: Host, sysid: int, run: Run, others: list[str]) -> str:
-    """End the jobs that only this script asked for, and do what is set if nobody else flies the vehicle.
+    """End the jobs that only this script requested, and apply the setting if nobody else flies the vehicle.
 
     Args:
         host: the vehicles and the jobs.
         sysid: the vehicle; 0 is MAVProxy's current one.
-        run: who died.
-        others: other scripts that go on with that vehicle.
+        run: the dead script's run.
+        others: other running scripts of that vehicle.
 
     Returns:
-        What was done, or why nothing was, for the log.
+        What was done, or why nothing was done, for the log.
     """
     closing = None
     for job in host.jobs.running():

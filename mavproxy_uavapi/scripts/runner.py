@@ -1,12 +1,11 @@
 """The program in a script's tmux session: runs the script, logs it, stops it, and records how it ended.
 
-It is started by its path and uses the standard library only, so that it runs whatever the session's
-environment is. Its one argument is the run's record (see `runs.py`), which it alone writes from then on. It
-holds a lock on the output log for as long as it lives: so the API, even one started later, knows without any
-process id whether the run goes on.
+It is started by its path and uses the standard library only, so that it runs in any environment. Its one argument is
+the run's record (see `runs.py`); from then on only the runner writes the record. It holds a lock on the output log
+while it lives. So the API, even one started later, knows without a process id whether the run goes on.
 
-SIGTERM (or the end of the tmux session) stops the script: Ctrl-C first, so that `finally` blocks land the
-vehicle; it is killed when it has not ended within the grace period. The API's end changes nothing here.
+SIGTERM (or the end of the tmux session) stops the script. Ctrl-C comes first, so that `finally` blocks land the
+vehicle; if the script has not ended after the grace period, it is killed. The end of the API changes nothing here.
 """
 
 from __future__ import annotations
@@ -25,45 +24,45 @@ from typing import Any, BinaryIO
 
 CHUNK = 65536  # bytes
 LOG_LIMIT = 50 * 1024 * 1024  # bytes of each log; an endless script must not fill a companion computer's card
-LAST_OUTPUT = 0.5  # s for what the script's own children still write after its end
-CANNOT_START = 127  # as a shell has it
+LAST_OUTPUT = 0.5  # s for the output of the script's children after its end
+CANNOT_START = 127  # as in a shell
 
 
 class Terminal:
-    """The tmux pane: shows what it can take at once, so that Ctrl-S there does not stop a flying script."""
+    """The tmux pane. It shows only what it can take at once, so that Ctrl-S there does not stop a flying script."""
 
     def __init__(self) -> None:
         try:
             self._fd = os.open(os.ttyname(1), os.O_WRONLY | os.O_NONBLOCK | os.O_NOCTTY)
-        except OSError:  # there is none: somebody started us by hand with the output sent elsewhere
+        except OSError:  # there is none: the runner was started by hand with redirected output
             self._fd = 1
 
     def show(self, data: bytes) -> None:
-        """Write it; what the terminal does not take is in the log."""
-        with contextlib.suppress(OSError):  # nobody has the session any more: the script goes on all the same
+        """Write to the terminal; output that it does not take is in the log."""
+        with contextlib.suppress(OSError):  # the session is gone; the script goes on
             os.write(self._fd, data)
 
 
 class Log:
-    """One output stream of the script: into its file, and onto the terminal."""
+    """One output stream of the script: written to its file and to the terminal."""
 
     def __init__(self, path: str, terminal: Terminal) -> None:
         self.file: BinaryIO = open(path, "ab", buffering=0)  # noqa: SIM115  open until the runner ends
         self._terminal = terminal
-        self._left = LOG_LIMIT
+        self._remaining = LOG_LIMIT
 
     def write(self, data: bytes) -> None:
-        """Take what the script wrote."""
+        """Write output of the script."""
         self._terminal.show(data)
-        if self._left <= 0:
+        if self._remaining <= 0:
             return
-        self._left -= len(data)
+        self._remaining -= len(data)
         try:
             self.file.write(data)
-            if self._left <= 0:
+            if self._remaining <= 0:
                 self.file.write(b"\n[the log is full]\n")
-        except OSError as error:  # the disk is full: no reason to end a script in flight
-            self._left = 0
+        except OSError as error:  # a full disk must not end a script in flight
+            self._remaining = 0
             self._terminal.show(f"\n[no more log: {error.strerror}]\n".encode())
 
 
@@ -81,7 +80,7 @@ class Runner:
         self._kill_at: float | None = None
 
     def run(self) -> int:
-        """Run the script to its end; its exit status."""
+        """Run the script to its end; returns its exit status."""
         fcntl.flock(self._out.file, fcntl.LOCK_EX)
         with selectors.DefaultSelector() as selector:
             self._listen_to_signals(selector)
@@ -97,12 +96,12 @@ class Runner:
 
     def _start(self) -> None:
         environment = self._path.with_name(self._path.name.replace("_run.json", "_env.json"))
-        given: dict[str, str] = json.loads(environment.read_text(encoding="utf-8"))
+        variables: dict[str, str] = json.loads(environment.read_text(encoding="utf-8"))
         environment.unlink()  # it may hold a token
         self._child = subprocess.Popen(
             self._record["command"],
             cwd=self._record["cwd"],
-            env={**given, **{name: os.environ[name] for name in os.environ if name.startswith(("TERM", "TMUX"))}},
+            env={**variables, **{name: os.environ[name] for name in os.environ if name.startswith(("TERM", "TMUX"))}},
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             preexec_fn=_be_in_front,  # noqa: PLW1509  this process has no threads
@@ -118,14 +117,14 @@ class Runner:
             signal.signal(number, self._on_stop)
         for number in (signal.SIGCHLD, signal.SIGINT):
             signal.signal(number, lambda *_: None)
-        signal.signal(signal.SIGTTOU, signal.SIG_IGN)  # the script has the terminal, and we write to it too
+        signal.signal(signal.SIGTTOU, signal.SIG_IGN)  # the script owns the terminal, and we also write to it
         selector.register(reader, selectors.EVENT_READ)
 
     def _on_stop(self, *_: object) -> None:
         self._stop_wanted = True
 
     def _pump(self, selector: selectors.BaseSelector) -> None:
-        """Pass on what the script writes, until it has ended."""
+        """Pass on the script's output until it has ended."""
         child = self._child
         assert child is not None and child.stdout is not None and child.stderr is not None
         for stream, log in ((child.stdout, self._out), (child.stderr, self._err)):
@@ -140,7 +139,7 @@ class Runner:
             self._stop_if_wanted(child)
             for key, _ in selector.select(self._patience(ended_at)):
                 self._pass_on(selector, key)
-        while child.poll() is None:  # it closed its outputs, and goes on
+        while child.poll() is None:  # it has closed its outputs, but still runs
             self._stop_if_wanted(child)
             for key, _ in selector.select(self._patience(None)):
                 self._pass_on(selector, key)
@@ -169,7 +168,7 @@ class Runner:
             self._kill_at = time.monotonic() + self._record["grace"]
             self._note(stopping_at=time.time())
             _send(child, signal.SIGINT)
-            _send(child, signal.SIGCONT)  # a script that was suspended (Ctrl-Z) cannot hear otherwise
+            _send(child, signal.SIGCONT)  # a suspended script (Ctrl-Z) gets no other signal
         if self._kill_at is not None and time.monotonic() >= self._kill_at and not self._record.get("killed"):
             self._note(killed=True)
             _send(child, signal.SIGKILL)
@@ -179,19 +178,19 @@ class Runner:
         self._terminal.show(f"\n[{self._record['script']} ended with status {status}]\n".encode())
         return status
 
-    def _note(self, **what: Any) -> None:
-        """Write it into the record, which readers find whole at any time."""
-        self._record.update(what)
+    def _note(self, **values: Any) -> None:
+        """Write values into the record; readers always find a complete record."""
+        self._record.update(values)
         written = self._path.with_suffix(".tmp")
         try:
             written.write_text(json.dumps(self._record), encoding="utf-8")
             written.replace(self._path)
-        except OSError as error:  # the disk is full: no reason to end a script in flight
+        except OSError as error:  # a full disk must not end a script in flight
             self._terminal.show(f"\n[cannot write {self._path.name}: {error.strerror}]\n".encode())
 
 
 def _be_in_front() -> None:
-    """In the script's process: a group of its own, which has the terminal, so that Ctrl-C there reaches it."""
+    """In the script's process: make a process group that owns the terminal, so that Ctrl-C there reaches it."""
     os.setpgid(0, 0)
     if os.isatty(0):
         os.tcsetpgrp(0, os.getpgrp())

@@ -1,4 +1,4 @@
-"""A run of a script: what its record, its logs and its lock tell. Blocking: for an executor, not for the loop."""
+"""A run of a script, read from its record, logs and lock. Blocking: for an executor, not for the loop."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from mavproxy_uavapi.scripts import names
 
 RECORD = "_run.json"
 ENVIRONMENT = "_env.json"
-TAIL = 4096  # bytes of a log's end that an answer carries
+TAIL = 4096  # bytes of the end of a log in an answer
 
 
 @dataclass(frozen=True)
 class Run:
-    """One run, as its record told it last.
+    """One run, as last read from its record.
 
     Attributes:
         path: the record's file.
-        script, args: what runs.
+        script, args: the script and its arguments.
         session: its tmux session.
-        sysid, port: the vehicle that it flies, and the API that started it.
-        started_at, stopping_at, ended_at: s since 1970; None where that has not happened.
-        out_log, err_log: what it writes.
+        sysid, port: the vehicle that it flies, and the port of the API that started it.
+        started_at, stopping_at, ended_at: s since 1970; None if that has not happened.
+        out_log, err_log: its logs.
         grace: s from Ctrl-C to the kill.
-        pid: its runner's process; None before it has started.
-        exit_status: as a shell has it, negative for a signal; None while it runs, and where nobody could tell.
+        pid: its runner's process; None before the runner has started.
+        exit_status: as in a shell, negative for a signal; None while it runs, or if it is unknown.
         killed: whether it was killed after the grace period.
         error: why it could not start.
         alive: whether its runner lives.
@@ -58,20 +58,20 @@ class Run:
 
     @property
     def running(self) -> bool:
-        """Whether it goes on."""
+        """Whether it still runs."""
         return self.alive and self.ended_at is None
 
     @property
     def died(self) -> bool:
-        """Whether it ended otherwise than by itself with status 0, or by Ctrl-C on our asking."""
+        """Whether it ended, but neither with status 0 nor after a stop request."""
         if self.running:
             return False
         asked_to = self.stopping_at is not None and not self.killed and self.exit_status is not None
         return self.exit_status != 0 and not asked_to
 
     def report(self, now: float) -> dict[str, Any]:
-        """What clients see; `now` is in s since 1970."""
-        told: dict[str, Any] = {
+        """The run as clients see it; `now` is in s since 1970."""
+        report: dict[str, Any] = {
             "script": self.script,
             "args": self.args,
             "session": self.session,
@@ -82,15 +82,15 @@ class Run:
             "running": self.running,
         }
         if self.running:
-            told["running_for_s"] = round(now - self.started_at, 3)
-            told["stopping"] = self.stopping_at is not None
+            report["running_for_s"] = round(now - self.started_at, 3)
+            report["stopping"] = self.stopping_at is not None
             if self.stopping_at is not None:
-                told["kill_in_s"] = round(max(self.stopping_at + self.grace - now, 0.0), 3)
-            return told
-        told["ended_at"] = None if self.ended_at is None else moment(self.ended_at)
-        told["exit_status"] = self.exit_status
-        told["killed"] = self.killed
-        return told if self.error is None else {**told, "error": self.error}
+                report["kill_in_s"] = round(max(self.stopping_at + self.grace - now, 0.0), 3)
+            return report
+        report["ended_at"] = None if self.ended_at is None else moment(self.ended_at)
+        report["exit_status"] = self.exit_status
+        report["killed"] = self.killed
+        return report if self.error is None else {**report, "error": self.error}
 
 
 def moment(at: float) -> str:
@@ -110,7 +110,7 @@ def create(
     grace: float,
     environment: Mapping[str, str],
 ) -> Run:
-    """The files of a new run: record, environment (for the runner alone) and two empty logs.
+    """Create the files of a new run: record, environment (only for the runner) and two empty logs.
 
     Raises:
         OSError: they cannot be written.
@@ -120,7 +120,7 @@ def create(
     stamp = datetime.fromtimestamp(started_at).strftime("%Y%m%d_%H%M%S")
     name = f"{names.stem(script)}_{stamp}"
     path = logs / f"{name}{RECORD}"
-    if path.exists():  # the run before it was as short as that; a name holds whole seconds
+    if path.exists():  # an earlier run began in the same second; names hold whole seconds
         time.sleep(1.0 - started_at % 1.0)
         return create(
             logs, script, args, sysid, command=command, cwd=cwd, port=port, grace=grace, environment=environment
@@ -149,31 +149,31 @@ def create(
 
 
 def discard(run: Run) -> None:
-    """Remove the files of a run that never began."""
+    """Remove the files of a run that did not begin."""
     environment = run.path.with_name(run.path.name.replace(RECORD, ENVIRONMENT))
     for file in (run.path, environment, run.out_log, run.err_log):
         file.unlink(missing_ok=True)
 
 
 def load(path: Path) -> Run:
-    """The run that this record tells of.
+    """The run that a record describes.
 
     Raises:
-        OSError, ValueError: there is no such record.
+        OSError, ValueError: there is no valid record.
     """
     out_log = path.with_name(path.name.replace(RECORD, "_out.log"))
-    alive = _is_locked(out_log)  # first: a run that ends meanwhile has written its record by then
+    alive = _is_locked(out_log)  # first, because a run writes its record before it ends
     record = json.loads(path.read_text(encoding="utf-8"))
-    told = {name: record[name] for name in Run.__dataclass_fields__ if name in record}
+    fields = {name: record[name] for name in Run.__dataclass_fields__ if name in record}
     try:
-        told |= {"path": path, "out_log": out_log, "err_log": Path(record["err_log"]), "alive": alive}
-        return Run(**told)
+        fields |= {"path": path, "out_log": out_log, "err_log": Path(record["err_log"]), "alive": alive}
+        return Run(**fields)
     except (TypeError, KeyError) as error:
         raise ValueError(f"{path} is no record of a run") from error
 
 
 def refreshed(run: Run) -> Run:
-    """The run as it is now."""
+    """The present state of the run."""
     try:
         return load(run.path)
     except (OSError, ValueError):  # somebody removed the record
@@ -181,20 +181,20 @@ def refreshed(run: Run) -> Run:
 
 
 def of_script(logs: Path, script: str) -> list[Run]:
-    """The runs of a script that `logs` tell of, newest first."""
-    found = []
+    """The runs of a script in the folder `logs`, newest first."""
+    script_runs = []
     for path in logs.glob(f"{names.stem(script)}_*{RECORD}"):
         try:
             run = load(path)
         except (OSError, ValueError):
-            continue  # another file of that name, or one that was just removed
+            continue  # another kind of file, or one just removed
         if run.script == script:
-            found.append(run)
-    return sorted(found, key=lambda run: run.started_at, reverse=True)
+            script_runs.append(run)
+    return sorted(script_runs, key=lambda run: run.started_at, reverse=True)
 
 
 def tail(log: Path, size: int = TAIL) -> str:
-    """The end of a log; empty when there is none."""
+    """The end of a log; empty if there is none."""
     try:
         with log.open("rb") as file:
             file.seek(max(file.seek(0, os.SEEK_END) - size, 0))

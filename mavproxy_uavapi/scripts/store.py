@@ -15,7 +15,7 @@ MODE = 0o755
 
 @dataclass(frozen=True)
 class ScriptStore:
-    """The folder, and how much it may hold.
+    """The folder of scripts and its limits.
 
     Attributes:
         folder: where the scripts are.
@@ -28,18 +28,18 @@ class ScriptStore:
     quota: int
 
     def save(self, name: str, data: bytes) -> Path:
-        """Save a script whole or not at all, in place of one of that name; where it is.
+        """Save a script completely or not at all; it replaces one of the same name; returns its path.
 
         Raises:
-            BadRequest: its name is not fit, or it is too large.
+            BadRequest: its name is not valid, or it is too large.
             OSError: the folder cannot be written to.
         """
         name = names.checked(name)
         if len(data) > self.size_limit:
             raise BadRequest(f"{name} is larger than {self.size_limit // 1024} kB")
         self.folder.mkdir(parents=True, exist_ok=True)
-        held = sum(file.stat().st_size for file in self._files() if file.name != name)
-        if held + len(data) > self.quota:
+        used = sum(file.stat().st_size for file in self._files() if file.name != name)
+        if used + len(data) > self.quota:
             raise BadRequest(f"no room for {name}: all scripts together may have {self.quota // 1024} kB")
         handle, temporary = tempfile.mkstemp(prefix=".upload-", dir=self.folder)
         try:
@@ -56,15 +56,15 @@ class ScriptStore:
         return path
 
     def find(self, name: str) -> Path:
-        """The script that a client means by `name`, which may leave `.py` out.
+        """The script that a client means by `name`; the client may omit `.py`.
 
         Raises:
-            BadRequest: it is no name for a script.
+            BadRequest: it is not a valid script name.
             NotFound: there is no such script.
         """
         path = self.folder / names.resolved(name)
         if not path.is_file():
-            raise NotFound(f"no script {path.name}; /mission/list-scripts names those that there are")
+            raise NotFound(f"no script {path.name}; /mission/list-scripts lists the scripts")
         return path
 
     def listed(self, suffixes: tuple[str, ...] = names.SUFFIXES) -> list[str]:
@@ -72,7 +72,7 @@ class ScriptStore:
         return sorted(file.name for file in self._files() if file.suffix in suffixes)
 
     def clear(self) -> list[str]:
-        """Remove all scripts; their names."""
+        """Remove all scripts; returns their names."""
         removed = []
         for file in self._files():
             file.unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""tmux, by argument lists only: no name ever reaches a shell."""
+"""Calls tmux by argument lists only, so that no name ever reaches a shell."""
 
 from __future__ import annotations
 
@@ -10,56 +10,56 @@ from mavproxy_uavapi.core.errors import ToolFailed
 from mavproxy_uavapi.tools import Outcome, run_tool
 
 TIMEOUT = 10.0  # s for one call
-RECORD = "@uavapi_record"  # the session's option that says where its run's record is
-ENDING = "server exited"  # it ends with its last session, which may be just now
-NOBODY = ("no server running", "error connecting to", "no sessions", ENDING)  # how tmux says that it has no session
+RECORD = "@uavapi_record"  # the session's option with the path of its run's record
+ENDING = "server exited"  # the server ends with its last session
+NOBODY = ("no server running", "error connecting to", "no sessions", ENDING)  # tmux's messages for "no session"
 
 
 async def start(session: str, command: Sequence[str], record: Path) -> None:
-    """Run a command in a new, detached session, which ends with it.
+    """Run a command in a new, detached session; the session ends with the command.
 
     Args:
         session: its name.
         command: two words or more; tmux gives a single one to a shell.
-        record: what the session is to remember.
+        record: the path that the session stores.
 
     Raises:
-        ToolFailed: there is no tmux, or it could not.
+        ToolFailed: there is no tmux, or it failed.
     """
     assert len(command) > 1
     beginning = ["new-session", "-d", "-s", session, "-x", "200", "-y", "50", *command]
     remembering = ["set-option", "-t", f"={session}:", RECORD, str(record)]
-    told = await _tmux(*beginning, ";", *remembering)
-    if ENDING in told.stderr:
-        told = await _tmux(*beginning, ";", *remembering)
-    # An option that comes too late for a run that is over already is no failure of the run.
-    if told.status and "no such session" not in told.stderr and "can't find" not in told.stderr:
-        raise ToolFailed(f"tmux could not start session {session}", told.stderr.strip())
+    result = await _tmux(*beginning, ";", *remembering)
+    if ENDING in result.stderr:
+        result = await _tmux(*beginning, ";", *remembering)
+    # If the run is over already, the option comes too late; that is not a failure.
+    if result.status and "no such session" not in result.stderr and "can't find" not in result.stderr:
+        raise ToolFailed(f"tmux could not start session {session}", result.stderr.strip())
 
 
 async def kill(session: str) -> None:
-    """End a session if there is one."""
+    """End a session, if there is one."""
     with contextlib.suppress(ToolFailed):
         await _tmux("kill-session", "-t", f"={session}")
 
 
 async def sessions(prefix: str) -> dict[str, Path | None]:
-    """The sessions whose names begin with `prefix`, and the record that each remembers.
+    """The sessions whose names begin with `prefix`, and the record path of each.
 
     Raises:
-        ToolFailed: there is no tmux, or it could not tell.
+        ToolFailed: there is no tmux, or it failed.
     """
-    told = await _tmux("list-sessions", "-F", f"#{{session_name}} #{{{RECORD}}}")
-    if told.status:
-        if any(words in told.stderr for words in NOBODY):
+    result = await _tmux("list-sessions", "-F", f"#{{session_name}} #{{{RECORD}}}")
+    if result.status:
+        if any(words in result.stderr for words in NOBODY):
             return {}
-        raise ToolFailed("tmux could not list its sessions", told.stderr.strip())
-    found: dict[str, Path | None] = {}
-    for line in told.stdout.splitlines():
+        raise ToolFailed("tmux could not list its sessions", result.stderr.strip())
+    records: dict[str, Path | None] = {}
+    for line in result.stdout.splitlines():
         name, _, record = line.partition(" ")
         if name.startswith(prefix):
-            found[name] = Path(record) if record else None
-    return found
+            records[name] = Path(record) if record else None
+    return records
 
 
 async def _tmux(*arguments: str) -> Outcome:

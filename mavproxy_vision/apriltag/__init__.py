@@ -1,1 +1,1 @@
-"""AprilTags: which are looked for, how they are found in a frame, and how they are drawn."""
+"""AprilTags: the tags to look for, their detection in a frame, and their drawing."""

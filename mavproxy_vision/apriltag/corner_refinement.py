@@ -1,7 +1,7 @@
 """Corners to a tenth of a pixel: lines through the edge points of each side, intersected. Pure.
 
-OpenCV's own corners lie inside the true edge, so that a far tag seems farther: 0.17 m at 5 m, 1.04 m at 9 m.
-Of a tag with few pixels to a cell `pattern` makes them better still.
+OpenCV's own corners lie inside the true edge, so that a far tag seems farther: 0.17 m at 5 m, 1.04 m at 9 m. For a
+tag with few pixels per cell `pattern` improves them further.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ Corners = NDArray[np.float64]
 
 ALONG = 20  # sample lines across each side
 ACROSS = 11  # samples along each of them
-ENDS = 0.12  # of a side left out at both ends, where the neighbouring side blurs in
+ENDS = 0.12  # share of a side that is omitted at both ends, because the neighbouring side blurs into it
 REACH = (1.5, 5.0)  # px to both sides of the rough edge, at least and at most
-REACH_SHARE = 0.10  # of the side's length: less than the outermost cell, so that no payload is taken for the edge
-TRUSTED = 2.5  # px that a refined corner may move; farther, the rough one was no corner
+REACH_SHARE = 0.10  # of the side's length: less than the outermost cell, to exclude the payload
+TRUSTED = 2.5  # px that a corner may move; a larger move means that the rough one was wrong
 
 
 def refine(image: NDArray[np.uint8], rough: Corners) -> Corners:
-    """The corners (4, 2) of a dark square on a light ground, sharpened; those that cannot be stay as they are.
+    """The refined corners (4, 2) of a dark square on a light ground; corners that cannot be refined stay unchanged.
 
     Args:
         image: grey, shape (height, width).
@@ -62,18 +62,18 @@ def _inside(points: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.f
 def _edges(
     profiles: NDArray[np.float64], offsets: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where each profile (dark to light, outward) rises: offset in px, and how much it can be trusted."""
+    """The position where each profile (dark to light, outward) rises: offset in px, and its weight."""
     rises = np.maximum(np.diff(profiles, axis=2), 0.0)
     middles = (offsets[:, 1:] + offsets[:, :-1]) / 2
     peak = rises.max(axis=2, keepdims=True)
-    rises = np.where(rises > 0.3 * peak, rises, 0.0)  # noise rises too
+    rises = np.where(rises > 0.3 * peak, rises, 0.0)  # remove noise
     total = rises.sum(axis=2)
     edge = (rises * middles[:, None]).sum(axis=2) / np.maximum(total, 1e-9)
     return edge, np.where(total > 15.0, total, 0.0)
 
 
 def _fit(points: NDArray[np.float64], weights: NDArray[np.float64], along: Corners) -> list[Any]:
-    """For each side a point on its line and its normal; None where too little is seen.
+    """For each side a point on its line and its normal; None if too few edge points are visible.
 
     Args:
         points: (4, n, 2) px.

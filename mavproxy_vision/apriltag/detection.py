@@ -1,4 +1,4 @@
-"""What the camera saw. Pure data."""
+"""The results of a frame. Pure data."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ class TagDetection:
     """One tag in one frame.
 
     Attributes:
-        family, id: what it is.
-        hamming: bits of its payload that were read wrong.
+        family, id: its family and id.
+        hamming: wrong bits in its payload.
         corners: (4, 2) px: top left, top right, bottom right, bottom left of the tag itself.
-        size: side of its black square (m) as the settings have it; 0 when they do not say.
-        position: its centre in the camera's frame (m); None without a size.
-        rotation: the tag's frame (right, up, out of its face) in the camera's, (3, 3). Near-parallel views have
-            two solutions and this may be the other one: nothing is flown by it.
+        size: side of its black square (m) from the settings; 0 if it is not in them.
+        position: its centre in the camera frame (m); None without a size.
+        rotation: the tag's frame (right, up, out of its face) in the camera's, (3, 3). Near-parallel views have two
+        solutions and this may be the wrong one; no setpoint depends on it.
         error: root mean square of the reprojection error, px.
     """
 
@@ -42,7 +42,7 @@ class TagDetection:
 
     @property
     def centre(self) -> tuple[float, float]:
-        """Where its diagonals meet, px."""
+        """The intersection of its diagonals, px."""
         a, b, c, d = (np.append(corner, 1.0) for corner in np.asarray(self.corners, float))
         x, y, w = np.cross(np.cross(a, c), np.cross(b, d))
         return float(x / w), float(y / w)
@@ -53,10 +53,10 @@ class FrameResult:
     """The outcome of one frame.
 
     Attributes:
-        number: of the frame, counted by the source.
-        captured_at: when its light fell (s, the host's clock), as far as the camera's latency is known.
-        received_at: when we had it (s).
-        done_at: when the detector was done (s).
+        number: the frame's number, counted by the source.
+        captured_at: when its light arrived (s, the host's clock), as well as the camera's latency is known.
+        received_at: when we received it (s).
+        done_at: when the detector finished (s).
         size: width and height, px.
         detections: the tags in it.
     """

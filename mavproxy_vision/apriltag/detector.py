@@ -1,6 +1,6 @@
-"""AprilTags in a grey frame, by cv2.aruco.
+"""Detects AprilTags in a grey frame by cv2.aruco.
 
-Not pupil-apriltags nor dt-apriltags: both aborted the process when detectors of several families were built.
+pupil-apriltags and dt-apriltags are not used: both aborted the process when detectors of several families were built.
 """
 
 from __future__ import annotations
@@ -23,28 +23,28 @@ from mavproxy_vision.geometry.camera_model import CameraModel
 
 Image = NDArray[np.uint8]
 
-# How often a frame is looked at: enlarged so much, windows (px) and constant of the adaptive threshold. A small
-# window finds small tags, a large one what is near, dim or blurred; noise costs time, less with a larger constant.
-# Enlarged, 9 px see as far as 7 do, and farther through a lens that is less than sharp.
+# The passes over a frame: its enlargement, and the windows (px) and constant of the adaptive threshold. A small
+# window finds small tags; a large one finds near, dim or blurred ones. Noise costs time, less so with a larger
+# constant. In an enlarged frame 9 px see as far as 7 px, and farther through a lens that is not sharp.
 PASSES: tuple[tuple[int, tuple[int, ...], float], ...] = ((1, (3, 23), 14.0),)
 FAR_PASSES = ((1, (3, 23), 20.0), (2, (9,), 15.0))
-FEW_IDS = 8  # of so few all correctable errors may be corrected without seeing ghosts
-SQUARE = 0.35  # the shorter diagonal of a tag in view is at least so much of the longer one
-SAME = 0.25  # of a tag's side between the corners of two finds of it
+FEW_IDS = 8  # with at most so many ids all correctable errors are corrected without false detections
+SQUARE = 0.35  # smallest ratio of a tag's shorter to its longer diagonal
+SAME = 0.25  # share of a tag's side by which the corners of two detections of it may differ
 DIM = 100.0  # brightness below which the brightest hundredth of a frame is raised to it …
 MOST_LIGHT = 6.0  # … by this factor at most
-SHARPEN = (1.0, 0.7)  # how much of what a blur takes away is added, and that blur's sigma (px)
+SHARPEN = (1.0, 0.7)  # share of the detail lost in a blur that is added, and the blur's sigma (px)
 
 
 @dataclass(frozen=True)
 class DetectorOptions:
-    """How to look.
+    """Options of the detector.
 
     Attributes:
-        families: names of `tags.FAMILIES`.
+        families: names from `tags.FAMILIES`.
         sizes: side of the black square (m) by id.
-        any_id: look for all ids, not only for those of `sizes`; slower, and 16h5 sees ghosts then.
-        far: look once more, at the frame enlarged: see a fifth farther, for a third more time.
+        any_id: look for all ids, not only those in `sizes`; slower, and 16h5 gives false detections then.
+        far: also look at the enlarged frame: a fifth more range for a third more time.
         refine: sharpen the corners.
     """
 
@@ -56,11 +56,11 @@ class DetectorOptions:
 
 
 class Detector:
-    """Finds tags. One thread at a time.
+    """Detects tags. Use it from one thread at a time.
 
     Args:
-        model: the camera; frames of another size are taken as the same lens scaled.
-        options: how to look.
+        model: the camera; frames of another size count as scaled frames of the same lens.
+        options: see `DetectorOptions`.
     """
 
     def __init__(self, model: CameraModel, options: DetectorOptions) -> None:
@@ -68,12 +68,12 @@ class Detector:
         self._sizes = dict(options.sizes or {})
         wanted: Iterable[int] | None = None if options.any_id or not self._sizes else self._sizes
         families = [family(name, wanted) for name in options.families]
-        self._families = [one for one in families if one.ids is None or one.ids]
+        self._families = [searched for searched in families if searched.ids is None or searched.ids]
         passes = FAR_PASSES if options.far else PASSES
         self._passes = [
-            (zoom, one, cv2.aruco.ArucoDetector(one.dictionary, parameters(one, windows, constant)))
+            (zoom, searched, cv2.aruco.ArucoDetector(searched.dictionary, parameters(searched, windows, constant)))
             for zoom, windows, constant in passes
-            for one in self._families
+            for searched in self._families
         ]
         self._bits: dict[str, dict[int, NDArray[np.uint8]]] = {f.name: {} for f in self._families}
         self._patterns: dict[tuple[str, int, int], Pattern] = {}
@@ -81,55 +81,58 @@ class Detector:
     def detect(self, image: Image) -> tuple[TagDetection, ...]:
         """The tags in a grey frame, shape (height, width)."""
         image = lit(image)
-        shown = {1: sharpened(image)}
+        by_zoom = {1: sharpened(image)}
         model = self.model.scaled_to(image.shape[1], image.shape[0])
-        found: list[tuple[Family, int, Corners]] = []
-        for zoom, one, detector in self._passes:
-            if zoom not in shown:
-                large = cv2.resize(shown[1], None, fx=zoom, fy=zoom, interpolation=cv2.INTER_CUBIC)
-                shown[zoom] = np.asarray(large, np.uint8)
-            corners, indices, _ = detector.detectMarkers(shown[zoom])
+        candidates: list[tuple[Family, int, Corners]] = []
+        for zoom, tag_family, detector in self._passes:
+            if zoom not in by_zoom:
+                large = cv2.resize(by_zoom[1], None, fx=zoom, fy=zoom, interpolation=cv2.INTER_CUBIC)
+                by_zoom[zoom] = np.asarray(large, np.uint8)
+            corners, indices, _ = detector.detectMarkers(by_zoom[zoom])
             for quad, index in zip(corners, () if indices is None else indices.ravel(), strict=True):
                 rough = (np.asarray(quad, np.float64).reshape(4, 2) + 0.5) / zoom - 0.5
-                if not any(one is other and index == same and is_same(rough, there) for other, same, there in found):
-                    found.append((one, int(index), rough))
-        detections = (self._sight(image, model, *tag) for tag in found)
+                if not any(
+                    tag_family is other and index == same and is_same(rough, there)
+                    for other, same, there in candidates
+                ):
+                    candidates.append((tag_family, int(index), rough))
+        detections = (self._sight(image, model, *tag) for tag in candidates)
         return tuple(detection for detection in detections if detection is not None)
 
     def _sight(
-        self, image: Image, model: CameraModel, one: Family, index: int, rough: Corners
+        self, image: Image, model: CameraModel, tag_family: Family, index: int, rough: Corners
     ) -> TagDetection | None:
         if not is_squarish(rough):
             return None
-        corners = self._refined(image, one, index, rough) if self.options.refine else rough
-        number = one.id_of(index)
-        hamming = self._hamming(image, one, index, corners)
+        corners = self._refined(image, tag_family, index, rough) if self.options.refine else rough
+        number = tag_family.id_of(index)
+        hamming = self._hamming(image, tag_family, index, corners)
         size = self._sizes.get(number, 0.0)
         if size <= 0:
-            return TagDetection(one.name, number, hamming, corners)
+            return TagDetection(tag_family.name, number, hamming, corners)
         position, turned, error = locate(model, corners, size)
-        return TagDetection(one.name, number, hamming, corners, size, position, turned, error)
+        return TagDetection(tag_family.name, number, hamming, corners, size, position, turned, error)
 
-    def _refined(self, image: Image, one: Family, index: int, rough: Corners) -> Corners:
+    def _refined(self, image: Image, tag_family: Family, index: int, rough: Corners) -> Corners:
         corners = refine(image, rough)
         sides = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1)
-        steps = round(float(sides.mean()) / FAMILIES[one.name][0] / SIZES)
+        steps = round(float(sides.mean()) / FAMILIES[tag_family.name][0] / SIZES)
         if not 0 < steps < LARGE / SIZES:
             return corners
-        key = (one.name, index, steps)
+        key = (tag_family.name, index, steps)
         if key not in self._patterns:
-            self._patterns[key] = Pattern.of(self._payload(one, index), steps * SIZES)
+            self._patterns[key] = Pattern.of(self._payload(tag_family, index), steps * SIZES)
         return align(image, corners, self._patterns[key])
 
-    def _payload(self, one: Family, index: int) -> NDArray[np.uint8]:
-        known = self._bits[one.name]
+    def _payload(self, tag_family: Family, index: int) -> NDArray[np.uint8]:
+        known = self._bits[tag_family.name]
         if index not in known:
-            known[index] = one.bits(index)
+            known[index] = tag_family.bits(index)
         return known[index]
 
-    def _hamming(self, image: Image, one: Family, index: int, corners: Corners) -> int:
-        """Payload bits that do not agree, read at the middles of the cells."""
-        bits, cells = self._payload(one, index), FAMILIES[one.name][0]
+    def _hamming(self, image: Image, tag_family: Family, index: int, corners: Corners) -> int:
+        """Payload bits that differ, read at the centres of the cells."""
+        bits, cells = self._payload(tag_family, index), FAMILIES[tag_family.name][0]
         square = np.array([[0, 0], [cells, 0], [cells, cells], [0, cells]], np.float32)
         transform = cv2.getPerspectiveTransform(square, corners.astype(np.float32))
         middles = np.arange(cells) + 0.5
@@ -143,13 +146,13 @@ class Detector:
 
 
 def is_squarish(corners: Corners) -> bool:
-    """Whether four corners may be a tag seen from a sane angle."""
-    one, other = np.linalg.norm(corners[0] - corners[2]), np.linalg.norm(corners[1] - corners[3])
-    return bool(min(one, other) >= SQUARE * max(one, other))
+    """Whether four corners may be a tag seen from a plausible angle."""
+    diagonal, other_diagonal = np.linalg.norm(corners[0] - corners[2]), np.linalg.norm(corners[1] - corners[3])
+    return bool(min(diagonal, other_diagonal) >= SQUARE * max(diagonal, other_diagonal))
 
 
 def sharpened(image: Image) -> Image:
-    """The frame with its edges raised: a camera's blur costs more range than its noise."""
+    """The frame with sharpened edges: a camera's blur costs more range than its noise."""
     amount, sigma = SHARPEN
     return np.asarray(
         cv2.addWeighted(image, 1 + amount, cv2.GaussianBlur(image, (0, 0), sigma), -amount, 0), np.uint8
@@ -157,29 +160,29 @@ def sharpened(image: Image) -> Image:
 
 
 def is_same(corners: Corners, others: Corners) -> bool:
-    """Whether two finds of an id are the same tag."""
+    """Whether two detections of an id are the same tag."""
     side = np.linalg.norm(corners[0] - corners[1])
     return bool(np.linalg.norm(corners.mean(axis=0) - others.mean(axis=0)) < SAME * side)
 
 
 def lit(image: Image) -> Image:
-    """The frame, or a brighter one if it is dim: the threshold wants a contrast."""
-    some = image[::8, ::8].ravel()
-    bright = float(np.partition(some, rank := int(0.99 * some.size))[rank])
+    """The frame, brightened if it is dim, because the threshold needs contrast."""
+    sample = image[::8, ::8].ravel()
+    bright = float(np.partition(sample, rank := int(0.99 * sample.size))[rank])
     if bright >= DIM:
         return image
     return np.asarray(cv2.convertScaleAbs(image, alpha=min(DIM / max(bright, 1.0), MOST_LIGHT)), np.uint8)
 
 
-def parameters(one: Family, windows: tuple[int, ...], constant: float) -> Any:
-    """OpenCV's detector parameters: the defaults, but for what was measured to be better.
+def parameters(tag_family: Family, windows: tuple[int, ...], constant: float) -> Any:
+    """OpenCV's detector parameters: its defaults, except where measurements showed better values.
 
-    Of 640x480 frames at 7 m (tag 0.166 m) plain defaults find 37 % of 36h11; with these, sharpened, it is more than
-    nine in ten, in half the time. OpenCV's third window between the two finds nothing more.
+    In 640x480 frames at 7 m (tag 0.166 m) plain defaults find 37 % of 36h11; these, with sharpening, find more than
+    nine in ten in half the time. OpenCV's third window between the two finds nothing more.
     """
     chosen = cv2.aruco.DetectorParameters()
-    few = one.ids is not None and len(one.ids) <= FEW_IDS
-    chosen.errorCorrectionRate = 1.0 if few and one.correction else one.correction
+    few = tag_family.ids is not None and len(tag_family.ids) <= FEW_IDS
+    chosen.errorCorrectionRate = 1.0 if few and tag_family.correction else tag_family.correction
     chosen.perspectiveRemovePixelPerCell = 8
     chosen.perspectiveRemoveIgnoredMarginPerCell = 0.3
     chosen.adaptiveThreshConstant = constant
@@ -189,10 +192,10 @@ def parameters(one: Family, windows: tuple[int, ...], constant: float) -> Any:
 
 
 def locate(model: CameraModel, corners: Corners, size: float) -> tuple[Any, Any, float]:
-    """Position (m) and rotation of a square of `size` m in the camera's frame, and the error (px, rms)."""
+    """Position (m) and rotation of a square of `size` m in the camera frame, and the error (px, rms)."""
     half = size / 2
     square = np.array([[-half, half, 0], [half, half, 0], [half, -half, 0], [-half, -half, 0]])
-    # Of a square that is exactly parallel to the image OpenCV makes nonsense; a millionth of a pixel helps.
+    # OpenCV's result is wrong for a square exactly parallel to the image; a millionth of a pixel helps.
     corners = corners + np.array([[0.0, 0.0], [1e-6, 0.0], [0.0, -1e-6], [1e-6, 1e-6]])
     count, rotations, positions, errors = cv2.solvePnPGeneric(
         square, corners.reshape(4, 1, 2), model.matrix, model.coefficients, flags=cv2.SOLVEPNP_IPPE_SQUARE

@@ -1,4 +1,4 @@
-"""The AprilTag families as OpenCV has them, cut down to the wanted ids."""
+"""OpenCV's AprilTag families, reduced to the wanted ids."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from mavproxy_vision.apriltag.tag_layout import FAMILIES
 
 NAMES = {family: f"DICT_APRILTAG_{family}" for family in FAMILIES}
-# Of 30 ids with a distance of 5 bits, some corrected noise always looks like one: measured, 2 to 13 false
-# frames in 200; without correction none.
+# With 30 ids and a distance of 5 bits, corrected noise always looks like some tag: measured, 2 to 13 false frames in
+# 200; without correction none.
 NO_CORRECTION = {"16h5"}
 
 
@@ -24,9 +24,9 @@ class Family:
 
     Attributes:
         name: `36h11` …
-        ids: the ids that it holds, in the order of OpenCV's indices; None means all.
-        dictionary: OpenCV's.
-        correction: `errorCorrectionRate` that is safe with it.
+        ids: its ids, in the order of OpenCV's indices; None means all.
+        dictionary: OpenCV's dictionary.
+        correction: a safe `errorCorrectionRate` for it.
     """
 
     name: str
@@ -35,7 +35,7 @@ class Family:
     correction: float
 
     def id_of(self, index: int) -> int:
-        """The tag's id, for the index that OpenCV reports."""
+        """The tag's id for the index that OpenCV reports."""
         return index if self.ids is None else self.ids[index]
 
     def bits(self, index: int) -> NDArray[np.uint8]:
@@ -47,24 +47,24 @@ class Family:
 
 
 def family(name: str, wanted: Iterable[int] | None = None) -> Family:
-    """The dictionary of a family with just the wanted ids, or all with None."""
-    whole = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, NAMES[name]))
+    """The dictionary of a family with only the wanted ids; None means all."""
+    full_dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, NAMES[name]))
     correction = 0.0 if name in NO_CORRECTION else 0.6
-    ids = None if wanted is None else tuple(sorted({one for one in wanted if one < FAMILIES[name][1]}))
-    rows = whole.bytesList if ids is None else np.ascontiguousarray(whole.bytesList[list(ids)])
-    return Family(name, ids, cv2.aruco.Dictionary(rows, whole.markerSize, correctable(name)), correction)
+    ids = None if wanted is None else tuple(sorted({number for number in wanted if number < FAMILIES[name][1]}))
+    rows = full_dictionary.bytesList if ids is None else np.ascontiguousarray(full_dictionary.bytesList[list(ids)])
+    return Family(name, ids, cv2.aruco.Dictionary(rows, full_dictionary.markerSize, correctable(name)), correction)
 
 
 def correctable(name: str) -> int:
-    """Bits that can be corrected: less than half of the family's distance. OpenCV 4 says that none can."""
+    """Bits that can be corrected: less than half of the family's distance. OpenCV 4 says 0."""
     return (int(name.partition("h")[2]) - 1) // 2
 
 
 def marker_image(name: str, number: int, pixels_per_cell: int = 8, border: int = 1) -> NDArray[np.uint8]:
     """A tag with its white border of `border` cells, as printed: shape (side, side), 0 to 255."""
-    whole = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, NAMES[name]))
-    cells = int(whole.markerSize) + 2
-    image = cv2.aruco.generateImageMarker(whole, number, cells * pixels_per_cell, borderBits=1)
+    dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, NAMES[name]))
+    cells = int(dictionary.markerSize) + 2
+    image = cv2.aruco.generateImageMarker(dictionary, number, cells * pixels_per_cell, borderBits=1)
     edge = border * pixels_per_cell
     framed: NDArray[np.uint8] = np.full((image.shape[0] + 2 * edge,) * 2, 255, np.uint8)
     framed[edge:-edge, edge:-edge] = image

@@ -1,4 +1,4 @@
-"""What the camera sees, drawn over: for people. Pure."""
+"""Draws detections into a frame, for people. Pure."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ GREEN, RED, YELLOW = (80, 220, 80), (60, 60, 230), (60, 220, 230)
 
 
 def annotated(image: NDArray[np.uint8], seen: FrameResult, lines: list[str]) -> NDArray[np.uint8]:
-    """A colour copy of a grey frame with its tags outlined, the middle marked, and lines of text."""
+    """A colour copy of a grey frame with outlined tags, a marked centre, and lines of text."""
     drawn: Any = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
     height, width = image.shape
     cv2.drawMarker(drawn, (width // 2, height // 2), YELLOW, cv2.MARKER_CROSS, 24, 1, cv2.LINE_AA)
@@ -39,6 +39,6 @@ def _text(image: Any, text: str, at: tuple[int, int]) -> None:
 
 
 def jpeg(image: NDArray[np.uint8], quality: int = 80) -> bytes:
-    """A JPEG of it."""
+    """The image as JPEG."""
     _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])
     return bytes(data.tobytes())

@@ -1,4 +1,4 @@
-"""A tag on paper: a PDF to scale. Pure, and without any library: a tag is black squares."""
+"""A printable tag: a PDF to scale. Pure, without any library: a tag is black squares."""
 
 from __future__ import annotations
 
@@ -8,25 +8,25 @@ from mavproxy_vision.apriltag.tag_layout import FAMILIES, require_id, require_si
 
 POINTS_PER_METRE = 72 / 0.0254
 PAPER = {"A4": (0.210, 0.297), "A3": (0.297, 0.420), "A2": (0.420, 0.594), "A1": (0.594, 0.841), "A0": (0.841, 1.189)}
-MARGIN = 0.008  # m that printers leave white
+MARGIN = 0.008  # m, the white margin of printers
 
 
 def tag_pdf(family: str, number: int, size: float) -> bytes:
     """A PDF page with the tag, whose black square has a side of `size` m, on the smallest paper that holds it.
 
     Raises:
-        SettingError: no such tag, or no paper holds it.
+        SettingError: there is no such tag, or it fits no paper.
     """
     if family not in FAMILIES:
         raise SettingError(f"family {family!r} is none of {', '.join(FAMILIES)}", "family")
     require_id("id", family, number)
     require_size("size", size)
     cells = FAMILIES[family][0]
-    whole = size * (cells + 2) / cells  # the white border is one cell wide, and part of the tag
+    bordered_size = size * (cells + 2) / cells  # with the white border, which is one cell wide
     for name, (width, height) in PAPER.items():
-        if whole + 2 * MARGIN <= width:
+        if bordered_size + 2 * MARGIN <= width:
             return _page(family, number, size, (name, width, height))
-    raise SettingError(f"a tag of {size:g} m needs {whole:.2f} m with its border: wider than A0", "size")
+    raise SettingError(f"a tag of {size:g} m needs {bordered_size:.2f} m with its border: wider than A0", "size")
 
 
 def _page(family: str, number: int, size: float, paper: tuple[str, float, float]) -> bytes:

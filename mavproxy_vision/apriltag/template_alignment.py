@@ -1,10 +1,10 @@
-"""Corners by the whole pattern of a tag, for one so small that its border's edges blur into its payload. Pure.
+"""Corners from the whole pattern of a tag that is so small that its border blurs into its payload. Pure.
 
-Lines through edge points (`corners`) want a border that is wider than the camera's blur. Of a tag with less than
-four pixels for a cell they sit inside the true edge: 36h11 of 0.166 m seemed 0.12 m too far at 7 m. Here the picture
-of the tag, blurred as a camera blurs it, is laid over the frame so that the two agree best: the inverse compositional
-algorithm of Baker and Matthews, "Lucas-Kanade 20 Years On" (IJCV 2004), with a homography, and with the brightness of
-black, of white and of the ground around it left open, and the blur as well.
+Lines through edge points (`corners`) need a border that is wider than the camera's blur. For a tag with less than
+four pixels per cell they lie inside the true edge: 36h11 of 0.166 m seemed 0.12 m too far at 7 m. Here the picture of
+the tag, blurred like a camera's, is fitted to the frame: the inverse compositional algorithm of Baker and Matthews,
+"Lucas-Kanade 20 Years On" (IJCV 2004), with a homography. The brightness of black, of white and of the ground around
+it is fitted too, and so is the blur.
 """
 
 from __future__ import annotations
@@ -19,29 +19,29 @@ from numpy.typing import NDArray
 Corners = NDArray[np.float64]
 Floats = NDArray[np.float64]
 
-FINE = 16  # pixels of our picture of a tag for a cell
-AROUND = 3  # cells of it around the black square: a white one, then ground
+FINE = 16  # pixels per cell in our picture of a tag
+AROUND = 3  # cells around the black square: a white one, then ground
 OUTSIDE = 0.7  # cells beyond the black square that are compared
-BLUR = 0.7  # px, sigma, that a picture begins with: how much more or less it truly is, is fitted
-FINEST = 4  # places to a cell and side at which it is compared, at most
-SIZES = 0.25  # px for a cell: steps in which pictures are kept
-LARGE = 5.0  # px for a cell from which lines are as good
+BLUR = 0.7  # px, sigma: the initial blur; the difference to the true one is fitted
+FINEST = 4  # compared places per cell and side, at most
+SIZES = 0.25  # px per cell: step between stored pictures
+LARGE = 5.0  # px per cell above which lines are as good
 STEPS = 8
-ENOUGH = 0.02  # px: a corner that moves less has arrived
-MOVED = 1.6  # px that a corner may move; farther, it went astray
-ALIKE = 0.85  # correlation of picture and frame that is believed
+ENOUGH = 0.02  # px: the fit ends when corners move less
+MOVED = 1.6  # px that a corner may move; a larger move is a wrong fit
+ALIKE = 0.85  # lowest accepted correlation of picture and frame
 
 
 @dataclass(frozen=True)
 class Pattern:
-    """A tag's picture at one size, ready to be compared.
+    """A tag's picture at one size, prepared for comparison.
 
     Attributes:
         points: (n, 2) places on the tag; its black square spans -1 to 1.
-        shades: (5, n) what makes up the brightness: a constant, what is white, what is ground, and how the latter two
-            change with the blur.
-        levels: (5, n) takes a frame's values at the points to the share of each shade.
-        warp: (8, n) takes what remains to the change of the homography.
+        shades: (5, n) the parts of the brightness: a constant, the white, the ground, and how the latter two change
+        with the blur.
+        levels: (5, n) maps a frame's values at the points to the share of each shade.
+        warp: (8, n) maps the residual to the change of the homography.
     """
 
     points: Floats
@@ -51,7 +51,7 @@ class Pattern:
 
     @classmethod
     def of(cls, bits: NDArray[np.uint8], cell: float) -> Pattern:
-        """Of a payload (n, n; 1 is white) whose cells are `cell` px wide."""
+        """The pattern of a payload (n, n; 1 is white) whose cells are `cell` px wide."""
         cells = bits.shape[0] + 2
         white = np.pad(np.pad(bits, 1).astype(np.float64), 1, constant_values=1.0)
         ground = np.pad(np.zeros_like(white), AROUND - 1, constant_values=1.0)
@@ -62,7 +62,9 @@ class Pattern:
         sigma = BLUR / cell * FINE
         shade, slope_x, slope_y = _read(white, sigma, x, y)
         dark = _read(ground, sigma, x, y)[0]
-        softer = [_read(one, 1.15 * sigma, x, y)[0] - _read(one, sigma, x, y)[0] for one in (white, ground)]
+        softer = [
+            _read(picture, 1.15 * sigma, x, y)[0] - _read(picture, sigma, x, y)[0] for picture in (white, ground)
+        ]
         u, v = 2 * x / cells - 1, 2 * y / cells - 1
         slope_x, slope_y = slope_x * cells / 2, slope_y * cells / 2
         turned = slope_x * u + slope_y * v
@@ -71,24 +73,26 @@ class Pattern:
         )
         shades = np.stack([np.ones_like(shade), shade, dark, *softer])
         levels = np.linalg.pinv(shades.T)
-        moves = moves - (moves @ levels.T) @ shades  # what another brightness would explain is no movement
+        moves = moves - (moves @ levels.T) @ shades  # remove what a change of brightness explains
         return cls(np.stack([u, v], axis=1), shades, levels, np.linalg.pinv(moves.T))
 
 
 def _read(picture: Floats, sigma: float, x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
-    """Values and slopes (1 for a cell) of a picture of cells, blurred, at x and y cells from the black square."""
+    """Values and slopes (per cell) of a blurred picture at x and y cells from the black square."""
     fine: Any = cv2.GaussianBlur(np.kron(picture, np.ones((FINE, FINE))), (0, 0), sigma)
     slopes = np.gradient(fine, 1.0 / FINE)
     column, row = (((at + AROUND) * FINE - 0.5).astype(np.float32) for at in (x, y))
-    read: list[Any] = [cv2.remap(one, column, row, cv2.INTER_LINEAR).ravel() for one in (fine, slopes[1], slopes[0])]
+    read: list[Any] = [
+        cv2.remap(image, column, row, cv2.INTER_LINEAR).ravel() for image in (fine, slopes[1], slopes[0])
+    ]
     return read[0], read[1], read[2]
 
 
 def align(image: NDArray[np.uint8], corners: Corners, pattern: Pattern) -> Corners:
-    """The corners (4, 2; px) with which the pattern fits the frame best; as they were where it does not fit."""
+    """The corners (4, 2; px) at which the pattern fits the frame best; unchanged if it does not fit."""
     square = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], np.float32)
     now: Any = cv2.getPerspectiveTransform(square, corners.astype(np.float32))
-    ends, found = np.column_stack([square, np.ones(4)]).T, corners
+    ends, refined = np.column_stack([square, np.ones(4)]).T, corners
     points = np.column_stack([pattern.points, np.ones(len(pattern.points))]).T
     for _ in range(STEPS):
         x, y, scale = now @ points
@@ -101,13 +105,13 @@ def align(image: NDArray[np.uint8], corners: Corners, pattern: Pattern) -> Corne
         fitted = levels @ pattern.shades
         a, b, c, d, e, f, g, h = pattern.warp @ (values - fitted) / levels[1]
         now = now @ np.linalg.inv(np.array([[1 + a, b, c], [d, 1 + e, f], [g, h, 1.0]]))
-        before, found = found, _flat(now @ ends)
-        if np.abs(found - before).max() < ENOUGH:
+        before, refined = refined, _flat(now @ ends)
+        if np.abs(refined - before).max() < ENOUGH:
             break
     alike = 1.0 - np.var(values - fitted) / max(np.var(values), 1e-9)
-    if alike < ALIKE**2 or np.abs(found - corners).max() > MOVED:
+    if alike < ALIKE**2 or np.abs(refined - corners).max() > MOVED:
         return corners
-    return found
+    return refined
 
 
 def _flat(homogeneous: Floats) -> Corners:

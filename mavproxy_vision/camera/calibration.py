@@ -87,8 +87,8 @@ class Board:
             on_board, in_image = board.matchImagePoints(corners, ids)
             return on_board.reshape(-1, 3).astype(np.float32), in_image.reshape(-1, 2).astype(np.float32)
         size = (self.columns - 1, self.rows - 1)
-        found, corners = cv2.findChessboardCornersSB(image, size)
-        if not found:
+        detected, corners = cv2.findChessboardCornersSB(image, size)
+        if not detected:
             return None
         grid = np.mgrid[0 : size[0], 0 : size[1]].T.reshape(-1, 2) * self.square
         on_board = np.column_stack([grid, np.zeros(len(grid))]).astype(np.float32)
@@ -198,14 +198,14 @@ def _model(values: Any) -> CameraModel:
     distortion = values.get("distortion", [])
     if not isinstance(distortion, list):
         raise ValueError(f"distortion: {distortion!r} is not a list")
-    given = {name: _number(name, values[name]) for name in names}
+    values_by_name = {name: _number(name, values[name]) for name in names}
     for name in ("width", "height"):
-        if not given[name].is_integer():
+        if not values_by_name[name].is_integer():
             raise ValueError(f"{name}: {values[name]!r} is not a whole number")
     return CameraModel(
-        int(given.pop("width")),
-        int(given.pop("height")),
-        **given,
+        int(values_by_name.pop("width")),
+        int(values_by_name.pop("height")),
+        **values_by_name,
         distortion=tuple(_number("distortion", value) for value in distortion),
     )
 

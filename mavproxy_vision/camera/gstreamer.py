@@ -53,7 +53,7 @@ class Pipeline:
         self._spec, self._latency, self._size, self._clock = spec, latency, size, clock
         self._stride = -(-size[0] // 4) * 4  # GStreamer's rows begin at multiples of four bytes
         self._process: subprocess.Popen[bytes] | None = None
-        self._said: IO[bytes] | None = None
+        self._stderr: IO[bytes] | None = None
         self._received = bytearray()
 
     def open(self) -> None:
@@ -64,12 +64,12 @@ class Pipeline:
         """
         self._received.clear()
         try:
-            self._said = tempfile.TemporaryFile()  # noqa: SIM115 — `close` closes it
+            self._stderr = tempfile.TemporaryFile()  # noqa: SIM115 — `close` closes it
             self._process = subprocess.Popen(
                 launch_command(self._spec, self._size),
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
-                stderr=self._said,
+                stderr=self._stderr,
                 start_new_session=True,  # the pilot's Ctrl-C is for MAVProxy, which then ends it
             )
         except OSError as error:
@@ -91,9 +91,9 @@ class Pipeline:
         assert process is not None
         assert process.stdout is not None
         width, height = self._size
-        whole = self._stride * height
+        frame_size = self._stride * height
         until = time.monotonic() + PATIENCE
-        while len(self._received) < whole:
+        while len(self._received) < frame_size:
             if not select.select([process.stdout], [], [], max(until - time.monotonic(), 0.0))[0]:
                 return None
             piece = os.read(process.stdout.fileno(), PIECE)
@@ -101,28 +101,28 @@ class Pipeline:
                 raise NoCamera(self._last_words())
             self._received += piece
         now = self._clock()
-        rows = np.frombuffer(bytes(self._received[:whole]), np.uint8).reshape(height, self._stride)
-        del self._received[:whole]
+        rows = np.frombuffer(bytes(self._received[:frame_size]), np.uint8).reshape(height, self._stride)
+        del self._received[:frame_size]
         return Frame(np.ascontiguousarray(rows[:, :width]), now - self._latency, now)
 
     def _last_words(self) -> str:
         assert self._process is not None
-        assert self._said is not None
+        assert self._stderr is not None
         with contextlib.suppress(subprocess.TimeoutExpired):  # it gives no frames, but goes on: `close` ends it
             self._process.wait(ENDING)
-        self._said.seek(0)
-        lines = [line.strip() for line in self._said.read().decode(errors="replace").splitlines()]
-        told = [line for line in lines if line.startswith(("ERROR", "WARNING"))] or lines[-1:]
-        return masked_source(told[0]) if told else "the pipeline ended"
+        self._stderr.seek(0)
+        lines = [line.strip() for line in self._stderr.read().decode(errors="replace").splitlines()]
+        problems = [line for line in lines if line.startswith(("ERROR", "WARNING"))] or lines[-1:]
+        return masked_source(problems[0]) if problems else "the pipeline ended"
 
     def close(self) -> None:
         """End the program."""
         process, self._process = self._process, None
-        said, self._said = self._said, None
+        stderr, self._stderr = self._stderr, None
         if process is not None:
             _end(process)
-        if said is not None:
-            said.close()
+        if stderr is not None:
+            stderr.close()
 
 
 def _end(process: subprocess.Popen[Any]) -> None:

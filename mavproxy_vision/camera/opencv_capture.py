@@ -125,18 +125,18 @@ class Capture:
         """
         if self._is_file:
             self._wait_for_its_time()
-        asked = self._clock()
+        requested_at = self._clock()
         try:
-            good, image = self._capture.read()
+            success, image = self._capture.read()
         except cv2.error as error:
             raise NoCamera(f"{self._shown}: {error.err}") from error
         now = self._clock()
-        if not good:
+        if not success:
             if self._is_gone():
                 raise NoCamera(f"{self._shown} is gone")
             time.sleep(0.02)  # a dead camera answers at once: do not spin
             return None
-        if self._is_stream and now - asked > 0.9 * SILENCE / 1000:
+        if self._is_stream and now - requested_at > 0.9 * SILENCE / 1000:
             return None  # what the decoder still held when the stream fell silent
         return Frame(grey(image), self._captured_at(now), now)
 

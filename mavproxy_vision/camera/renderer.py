@@ -159,8 +159,8 @@ class Renderer:
             ]
         )
         size = (width * fine, height * fine)
-        shown = picture if not self.look.occlusion else covered(picture, self.look.occlusion)
-        drawn: Any = cv2.warpPerspective(shown, zoom @ to_pixel, size, flags=cv2.INTER_LINEAR)
+        visible = picture if not self.look.occlusion else covered(picture, self.look.occlusion)
+        drawn: Any = cv2.warpPerspective(visible, zoom @ to_pixel, size, flags=cv2.INTER_LINEAR)
         full = np.full_like(picture, 255)
         mask: Any = cv2.warpPerspective(full, zoom @ to_pixel, size, flags=cv2.INTER_LINEAR)
         if fine > 1:
@@ -188,9 +188,9 @@ class Renderer:
 
 def covered(picture: Image, share: float) -> Image:
     """The tag's picture with a dark hand over `share` of it."""
-    shown: Image = picture.copy()
-    shown[:, : round(share * picture.shape[1])] = 60
-    return shown
+    picture_copy: Image = picture.copy()
+    picture_copy[:, : round(share * picture.shape[1])] = 60
+    return picture_copy
 
 
 @functools.lru_cache(maxsize=2)
@@ -212,11 +212,11 @@ def ground_texture(seed: int) -> Image:
 
 def pyramid(texture: Image, levels: int = 6) -> list[Image]:
     """The texture at full, half, quarter … size, against aliasing from high above."""
-    found = [texture]
+    textures = [texture]
     for _ in range(levels - 1):
-        half = found[-1].shape[0] // 2
-        found.append(np.asarray(cv2.resize(found[-1], (half, half), interpolation=cv2.INTER_AREA), np.uint8))
-    return found
+        half = textures[-1].shape[0] // 2
+        textures.append(np.asarray(cv2.resize(textures[-1], (half, half), interpolation=cv2.INTER_AREA), np.uint8))
+    return textures
 
 
 def distortion_maps(model: CameraModel) -> tuple[Any, Any]:

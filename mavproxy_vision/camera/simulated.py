@@ -105,7 +105,7 @@ def parse_placed(text: str, family: str) -> tuple[PlacedTag, ...]:
     Raises:
         SettingError: it is no such list.
     """
-    found = []
+    tags = []
     for word in re.split(r"[\s;]+", text.strip()):
         if not word:
             continue
@@ -117,5 +117,5 @@ def parse_placed(text: str, family: str) -> tuple[PlacedTag, ...]:
         require_size("sim_tags", tag.size)
         if not (max(abs(tag.north), abs(tag.east)) <= FARTHEST and abs(tag.heading) <= 360):
             raise SettingError(f"sim_tags: {word!r} lies too far away, or heads beyond 360 degrees", "sim_tags")
-        found.append(tag)
-    return tuple(found)
+        tags.append(tag)
+    return tuple(tags)

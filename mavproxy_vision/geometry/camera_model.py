@@ -9,9 +9,9 @@ import numpy as np
 
 from mavproxy_vision.geometry.frames import Matrix
 
-PIXELS_PER_CELL = 2.4  # measured: fewer pixels per cell of a tag, and less than 90 % of frames show it
+PIXELS_PER_CELL = 2.4  # measured: with fewer pixels per cell a tag is found in less than 90 % of the frames
 CLIP_MARGIN = 1.25  # of a tag's side, with its white border, that must fit into the view
-SAME_SHAPE = 0.02  # by which the ratio of width to height may differ: a lens that is scaled keeps its pixels square
+SAME_SHAPE = 0.02  # largest relative difference of the aspect ratio: scaled frames keep square pixels
 
 
 @dataclass(frozen=True)
@@ -43,11 +43,11 @@ class CameraModel:
     @property
     def coefficients(self) -> Matrix:
         """Distortion coefficients as OpenCV takes them, shape (5,) or longer."""
-        given = self.distortion or (0.0,) * 5
-        return np.array(given, dtype=np.float64)
+        coefficients = self.distortion or (0.0,) * 5
+        return np.array(coefficients, dtype=np.float64)
 
     def misfit(self, width: int, height: int) -> str:
-        """Why frames of that size (px) are not this lens's, scaled, in a sentence; empty when they may be."""
+        """Why frames of that size (px) cannot be scaled frames of this lens, in a sentence; empty if they can."""
         if abs(width * self.height / (height * self.width) - 1.0) <= SAME_SHAPE:
             return ""
         return f"asked for is {self.width}x{self.height} px or another size of that shape, and {width}x{height} came"
@@ -72,9 +72,9 @@ class CameraModel:
         return height * min(self.width / self.fx, self.height / self.fy)
 
     def detection_range(self, size: float, cells: int) -> float:
-        """The range (m) up to which a tag of `size` m and `cells` cells along its black side is dependable."""
+        """The range (m) up to which a tag of `size` m with `cells` cells along its black side is found reliably."""
         return max(self.fx, self.fy) * size / (cells * PIXELS_PER_CELL)
 
     def clip_height(self, size: float, beside: float = 0.0) -> float:
-        """The height (m) below which a tag of `size` m, `beside` m from right underneath, is not wholly in view."""
+        """The height (m) below which a tag of `size` m, `beside` m from straight below, is not completely in view."""
         return CLIP_MARGIN * (size + 2 * beside) / min(self.width / self.fx, self.height / self.fy)

@@ -60,13 +60,13 @@ class Attitude:
 
 @dataclass(frozen=True)
 class Mount:
-    """How the camera sits on the vehicle.
+    """The camera's position and orientation on the vehicle.
 
     Attributes:
-        roll, pitch, yaw: degrees by which the camera is turned in the body's frame from looking straight down
-            with the top of its image forward; `yaw` 90 has the top of the image to the right.
+        roll, pitch, yaw: degrees by which the camera is turned in the body frame, from a view straight down with the
+        top of its image forward; with `yaw` 90 the top of the image points to the right.
         offset: of the lens from the vehicle's centre: forward, right, down, in m.
-        gimbal: whether a gimbal keeps it level, so that of the attitude only the heading counts.
+        gimbal: whether a gimbal keeps it level; then only the heading of the attitude counts.
     """
 
     roll: float = 0.0
@@ -91,7 +91,7 @@ class Mount:
         return attitude.matrix @ np.array(self.offset, dtype=np.float64)
 
     def sighted(self, in_camera: Any, attitude: Attitude) -> Vector:
-        """Where a point lies from the vehicle's centre (NED m) that is at `in_camera` (m) in the camera's frame."""
+        """The position from the vehicle's centre (NED m) of a point at `in_camera` (m) in the camera frame."""
         place: Vector = self.in_ned(attitude) @ np.asarray(in_camera, dtype=np.float64) + self.lens(attitude)
         return place
 
@@ -104,7 +104,7 @@ def heading_frame(ned: Vector, yaw: float) -> tuple[float, float, float]:
     return float(forward), float(right), float(ned[2])
 
 
-def limited(wanted: Vector, length: float) -> Vector:
-    """`wanted`, shortened to `length` when it is longer."""
-    norm = float(np.linalg.norm(wanted))
-    return wanted if norm <= length else wanted * (length / norm)
+def limited(velocity: Vector, length: float) -> Vector:
+    """`velocity`, shortened to `length` if it is longer."""
+    norm = float(np.linalg.norm(velocity))
+    return velocity if norm <= length else velocity * (length / norm)

@@ -1,1 +1,1 @@
-"""FlightJobs: search, landing, mission, and what they tell of themselves."""
+"""Search, landing and mission, and their reports."""

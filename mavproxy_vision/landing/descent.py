@@ -1,4 +1,4 @@
-"""The two ways down onto a target: by velocities, or in ArduPilot's LAND, which is told where it is."""
+"""The two ways to descend onto a target: by velocities, or in ArduPilot's LAND with LANDING_TARGET."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from mavproxy_vision.landing.precision_landing import PrecisionLanding, landing_
 from mavproxy_vision.landing.state_machine import BLIND_BELOW, COAST, REST, Landing, Phase
 
 LOST = 1.2  # s without a detection, or without telemetry, until we take the vehicle back from LAND
-SLOWER = 3.0  # times what a LAND should take, until it is given up low above the target
-HEARD = 3.0  # s until the autopilot must have said that it has a target
+SLOWER = 3.0  # times the expected duration of LAND until it is given up low above the target
+HEARD = 3.0  # s until the autopilot must have reported a target
 
 
 class Descent:
-    """A way down onto the target: by velocities, then the autopilot's LAND.
+    """A descent onto the target: by velocities, then the autopilot's LAND.
 
     Attributes:
         by_velocity: whether the landing's own velocities descend.
@@ -29,13 +29,13 @@ class Descent:
         self.flight = flight
 
     async def prepare(self) -> None:
-        """See whether it can be done, before the vehicle is taken over."""
+        """Check whether the method works, before the vehicle is taken over."""
 
     async def __call__(self, landing: Landing) -> None:
         """Land.
 
         Raises:
-            LandingFailed: it was given up.
+            LandingFailed: the landing was given up.
         """
         flight = self.flight
         order = await flight.fly(landing)
@@ -47,10 +47,10 @@ class Descent:
 
 
 class PrecisionDescent(Descent):
-    """A way down in LAND by LANDING_TARGET: lets LAND fly, and takes the vehicle back when the target is lost.
+    """A descent in LAND with LANDING_TARGET: LAND flies, and the vehicle is taken back when the target is lost.
 
     Args:
-        flight: whose.
+        flight: the flight.
         plnd: the vehicle's precision landing.
     """
 
@@ -61,10 +61,10 @@ class PrecisionDescent(Descent):
         flight.plnd = self.plnd = plnd
 
     async def prepare(self) -> None:
-        """See whether it can be done, before the vehicle is taken over.
+        """Check whether the method works, before the vehicle is taken over.
 
         Raises:
-            NotSupported, Rejected: the autopilot has no precision landing, or has to be rebooted for it.
+            NotSupported, Rejected: the autopilot has no precision landing, or needs a reboot for it.
         """
         await self.plnd.check()
 
@@ -72,9 +72,9 @@ class PrecisionDescent(Descent):
         """Land.
 
         Raises:
-            LandingFailed: it was given up.
-            Rejected: the autopilot does not take its parameters.
-            Superseded, Paused, ModeChanged, NotArmed: somebody else has it; no more parameters are set.
+            LandingFailed: the landing was given up.
+            Rejected: the autopilot refuses its parameters.
+            Superseded, Paused, ModeChanged, NotArmed: somebody else has the vehicle; no more parameters are set.
             TimedOut: it stays low above the target, in LAND.
         """
         flight, vehicle = self.flight, self.flight.vehicle
@@ -87,11 +87,11 @@ class PrecisionDescent(Descent):
             if await self._follow_down(landing):
                 break
         self.plnd.in_use = False
-        with contextlib.suppress(UavApiError):  # it has landed all the same; `FlightJobs` goes on trying
+        with contextlib.suppress(UavApiError):  # it has landed; `FlightJobs` tries again
             await self.plnd.give_back()
 
     async def _be_heard(self, landing: Landing) -> None:
-        """Send targets until the autopilot says that it has one."""
+        """Send targets until the autopilot reports that it has one."""
         flight, tracker = self.flight, self.flight.tracker
         state, began = flight.vehicle.state, tracker.host.clock()
         while tracker.host.clock() - began < max(HEARD / max(state.time_ratio.ratio, 0.1), 1.0):
@@ -100,10 +100,10 @@ class PrecisionDescent(Descent):
             if any("Target Found" in text for text in state.statustexts_since(began - 30.0)):
                 return
             await flight.pause()
-        # It says so once only for a target that it did not lose meanwhile: go on, and see whether it follows.
+        # It reports a target only once unless it loses it: go on, and see whether it follows.
 
     async def _follow_down(self, landing: Landing) -> bool:
-        """Let LAND fly and tell it where the target is: True when it stands disarmed, False when taken back."""
+        """Let LAND fly and send it the target: True when the vehicle stands disarmed, False when it is taken back."""
         flight, vehicle, tracker = self.flight, self.flight.vehicle, self.flight.tracker
         limits = await vehicle.limits()
         touchdown = Touchdown(limits)
@@ -114,7 +114,7 @@ class PrecisionDescent(Descent):
         while not self._stands(touchdown):
             now = tracker.now()
             if now > late and not self._is_high(landing):
-                flight.autopilot = None  # it is almost down: nobody takes it back
+                flight.autopilot = None  # it is almost down; it is not taken back
                 raise TimedOut(f"vehicle {vehicle.state.system} has not landed and disarmed; it is in LAND")
             if self._must_come_back(landing, now):
                 await vehicle.set_mode(flight.job, "GUIDED")
@@ -133,7 +133,7 @@ class PrecisionDescent(Descent):
 
         Raises:
             NotArmed: its motors stopped in flight.
-            ModeChanged: somebody else has it.
+            ModeChanged: somebody else has the vehicle.
         """
         vehicle = self.flight.vehicle
         touchdown.sinks_at((vehicle.state.field("GLOBAL_POSITION_INT", "vz") or 0) / 100.0)
@@ -145,10 +145,10 @@ class PrecisionDescent(Descent):
         return bool(touchdown.is_over(vehicle.clock(), vehicle.state.age("GLOBAL_POSITION_INT", vehicle.clock())))
 
     def _must_come_back(self, landing: Landing, now: float) -> bool:
-        """Whether it may not go down any farther: it takes too long, or the target or the vehicle is lost."""
+        """Whether it must not descend further: it takes too long, or the target or the vehicle is lost."""
         history, target = self.flight.tracker.history, landing.target
         if not self._is_high(landing):
-            return False  # too low to climb away from what may be the ground already
+            return False  # too low to climb away: it may already be on the ground
         if landing.overdue(now) or now - history.newest > LOST:
             return True
         return self.flight.motion(now) is not None and (target.age(now) > LOST or target.contradiction is not None)
@@ -159,7 +159,7 @@ class PrecisionDescent(Descent):
         return place is not None and motion is not None and float(place[2] - motion.travelled[2]) > BLIND_BELOW
 
     async def _tell(self, landing: Landing) -> None:
-        """Tell the autopilot where the target is, if that is known."""
+        """Send the target's position to the autopilot, if it is known."""
         flight, tracker, place = self.flight, self.flight.tracker, landing.target.place
         now = tracker.now()
         motion, attitude = flight.motion(now), tracker.history.attitude(now)

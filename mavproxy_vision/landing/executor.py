@@ -25,45 +25,45 @@ from mavproxy_vision.tracking.stream_rates import FLIGHT
 from mavproxy_vision.tracking.target_filter import Target
 from mavproxy_vision.tracking.tracker import Tracker
 
-PERIOD = 0.05  # s of the vehicle's clock between two setpoints
-SHORTEST = 0.03  # s of ours, whatever the camera's rate and the vehicle's clock
-STALE = 0.5  # s of the vehicle's clock without telemetry until it rests
-UNTOLD = 10.0  # s of it until a landing is given up
+PERIOD = 0.05  # s on the vehicle's clock between two setpoints
+SHORTEST = 0.03  # s of ours, for any camera rate and vehicle clock
+STALE = 0.5  # s on the vehicle's clock without telemetry until it rests
+UNTOLD = 10.0  # s on that clock until a landing is given up
 BLIND = 5.0  # s without a frame until a landing is given up
 FIRST = 3.0  # s of ours for the first telemetry
-SEARCHES = 1000  # attempts of a search, which its leash and its time limit end
+SEARCHES = 1000  # attempts of a search; in practice its leash and time limit end it
 DID = {"rtl": "returned to launch", "land": "landed in place", "hold": "the vehicle holds"}
 
 
 class DescentMethod(Protocol):
-    """A way down onto the target: `descent.py` has them."""
+    """A way to descend onto the target; `descent.py` has them."""
 
     @property
     def by_velocity(self) -> bool:
         """Whether the landing's own velocities descend."""
 
     async def prepare(self) -> None:
-        """See whether it can be done, before the vehicle is taken over."""
+        """Check whether the method works, before the vehicle is taken over."""
 
     async def __call__(self, landing: Landing) -> None:
-        """Land. Raises LandingFailed where it was given up."""
+        """Land. Raises LandingFailed if the landing was given up."""
 
 
 class TagFlight:
-    """A flight that is under way.
+    """A running flight.
 
     Attributes:
-        autopilot: the mode in which the autopilot flies for us just now (LAND, RTL), None in GUIDED.
-        plnd: the vehicle's precision landing, when this flight has touched it.
-        phase: what it is doing.
-        ended: set when it is over, and has sent its last message.
+        autopilot: the mode in which the autopilot flies for us now (LAND, RTL); None in GUIDED.
+        plnd: the vehicle's precision landing, if this flight has used it.
+        phase: its present activity.
+        ended: set when the flight is over and has sent its last message.
 
     Args:
-        tracker: the camera's outcomes, and where the target lies.
-        vehicle: what carries it.
-        job: who flies.
-        report: filled in on the way.
-        replace_running_flight: awaits the end of the flight of ours that had the vehicle.
+        tracker: the detections, and the target's position.
+        vehicle: the vehicle.
+        job: the flight's job.
+        report: filled in during the flight.
+        replace_running_flight: awaits the end of our previous flight of the vehicle.
     """
 
     def __init__(
@@ -86,9 +86,9 @@ class TagFlight:
         self._timed = 0 if tracker.seen is None else tracker.seen.number
 
     async def take_over(self) -> None:
-        """Take the vehicle; a flight of ours that had it has ended then. What flies in GUIDED rests.
+        """Take the vehicle over, after the end of our previous flight of it. A vehicle in GUIDED stops.
 
-        To be called when nothing is left that would refuse the flight.
+        Call it when nothing can refuse the flight any more.
         """
         if self.commands:
             return
@@ -96,11 +96,11 @@ class TagFlight:
         self.job.steers = True
         await self._replace_running_flight(self)
         if self.vehicle.mode == "GUIDED" and self.vehicle.state.armed and not self.vehicle.state.landed:
-            await self.send(REST)  # the setpoint of whoever had it would go on meanwhile
+            await self.send(REST)  # otherwise the previous setpoint would go on
 
     @property
     def commands(self) -> bool:
-        """Whether the vehicle is this flight's: no newer command has it."""
+        """Whether this flight commands the vehicle: no newer command has taken it."""
         return self.vehicle.authority.commander is self.job
 
     # -- verbs ---------------------------------------------------------------------------------------------
@@ -108,13 +108,13 @@ class TagFlight:
     async def land(
         self, number: int | None, method: str, descent_method: Callable[[TagFlight], DescentMethod]
     ) -> None:
-        """Land on the tag from wherever the vehicle is; done when it stands on it, disarmed.
+        """Land on the tag from the present position; done when the vehicle stands on it, disarmed.
 
-        A camera that gives no frames is a refusal at first, and a failure like that of a lost tag later.
+        A camera without frames is a refusal at the start, and later a failure like a lost tag.
 
         Raises:
-            LandingFailed: no tag, or what is seen cannot be believed; the report says what was done instead.
-            ModeChanged, NotArmed, LinkLost: somebody else has the vehicle, or nobody; nothing more was sent.
+            LandingFailed: no tag, or the detections are implausible; the report says what was done instead.
+            ModeChanged, NotArmed, LinkLost: the vehicle has another commander or is lost; nothing more was sent.
         """
         self.vehicle.require_guided_flight()
         if self.report.verb == "land":
@@ -133,7 +133,7 @@ class TagFlight:
             self.report.touchdown_error = self.tracker.touchdown_error(self.report.tag)
 
     async def search(self, number: int | None, leash: float | None) -> None:
-        """Fly an expanding square until the tag is in sight, and stay above where it was seen.
+        """Fly an expanding square until the tag is in sight, then stay above the place where it was seen.
 
         Raises:
             LandingFailed: no tag within leash and time limit; the vehicle holds.
@@ -146,12 +146,12 @@ class TagFlight:
             await self._look_for(tags)
             self.report.tag = next(iter(tags))
             settings = self.tracker.settings
-            given = {"attempts": SEARCHES, "leash": leash or settings.leash}
-            plan = plan_for(settings, tags, self._here(), descend=False, **given)
+            changes = {"attempts": SEARCHES, "leash": leash or settings.leash}
+            plan = plan_for(settings, tags, self._here(), descend=False, **changes)
             with self._lasting(), self.tracker.aimed_at(tags, self._floor) as target:
                 order = await self.fly(Landing(plan, target))
                 if order.phase is Phase.FAILED:
-                    self.report.action = "hold"  # which the end of the job sees to
+                    self.report.action = "hold"  # the end of the job does it
                     raise self._failed(order.reason)
                 self.report.place = self._place_of(target)
             await self.vehicle.rest(self.job)
@@ -193,7 +193,7 @@ class TagFlight:
                 raise Stale(f"vehicle {tracker.system} has not told where it is for {FIRST:g} s")
             await self.pause()
         self._floor = tracker.floor
-        await self.vehicle.limits()  # nothing is to be waited for between the last metre and LAND
+        await self.vehicle.limits()  # so that nothing has to wait between the last metre and LAND
         self.vehicle.held_by("GUIDED")
 
     def _here(self) -> float | None:
@@ -205,13 +205,13 @@ class TagFlight:
         return self._floor - float(motion.position[2])
 
     def motion(self, now: float) -> Motion | None:
-        """Where the vehicle is; None when nobody knows."""
+        """The vehicle's position and motion; None if unknown."""
         if now - self.tracker.history.newest > STALE:
             return None
         return self.tracker.history.motion(now)
 
     async def fly(self, landing: Landing) -> LandingCommand:
-        """Send setpoints as the landing wants them until it is to touch down, or has failed."""
+        """Send the landing's setpoints until it is to touch down, or has failed."""
         tracker, vehicle = self.tracker, self.vehicle
         blind, untold = ConditionTimer(), ConditionTimer()
         if landing.began is None:
@@ -223,7 +223,7 @@ class TagFlight:
             if untold(motion is None, now) > UNTOLD:
                 return landing.fail(f"the vehicle has not told where it is for {UNTOLD:g} s")
             if motion is None:
-                await self.send(REST)  # nobody knows where it is; should it hear us, it shall rest
+                await self.send(REST)  # its position is unknown; if it hears us, it stops
             else:
                 state = tracker.health.state
                 if blind(state not in ("ok", "starting"), now) > BLIND and landing.phase is not Phase.LAST_METRE:
@@ -237,14 +237,14 @@ class TagFlight:
             await self.pause()
 
     def _time_latency(self) -> None:
-        """Note how long the newest frame took from its arrival to the first setpoint that knows it."""
+        """Note the time from the newest frame's arrival to the first setpoint that uses it."""
         seen = self.tracker.seen
         if seen is not None and seen.number != self._timed:
             self._timed = seen.number
             self.tracker.latencies.append(self.tracker.host.clock() - seen.received_at)
 
     async def pause(self) -> None:
-        """Until the next setpoint is due, or a frame was looked at.
+        """Wait until the next setpoint is due, or a frame has been processed.
 
         Raises:
             LinkLost: the vehicle's heartbeats stopped.
@@ -258,7 +258,7 @@ class TagFlight:
             raise LinkLost.since(self.vehicle.state.system, clock() - self.vehicle.state.heartbeat_at)
 
     def note(self, landing: Landing, motion: Motion) -> None:
-        """Write down how far it is."""
+        """Record the distances."""
         report = self.report
         report.attempts, report.last_offset = landing.attempt, landing.offset
         report.phases = dict(landing.phases)
@@ -271,14 +271,14 @@ class TagFlight:
         """Send a velocity (m/s NED) to a vehicle that is still in GUIDED.
 
         Raises:
-            Superseded, Paused, ModeChanged, NotArmed: somebody else has it; nothing is sent.
+            Superseded, Paused, ModeChanged, NotArmed: somebody else has the vehicle; nothing is sent.
         """
         attitude = self.tracker.history.attitude(self.tracker.now())
         self._sent_at = self.tracker.host.clock()
         await self.vehicle.send_setpoint(self.job, setpoint(velocity, None if attitude is None else attitude.yaw))
 
     async def tell(self, message: Any) -> None:
-        """Send the vehicle a message; `pause` sees to it that they do not come too often.
+        """Send the vehicle a message; `pause` limits the rate.
 
         Raises:
             Superseded, Paused: somebody else commands it; nothing is sent.
@@ -288,7 +288,7 @@ class TagFlight:
         await self.vehicle.link.send(message, self.vehicle.state.system)
 
     async def fly_by(self, mode: str, verb: Callable[[Job], Awaitable[None]]) -> None:
-        """Let the autopilot fly in a mode of its own, until that is done."""
+        """Let the autopilot fly in its own mode until it is done."""
         self.autopilot = mode
         await verb(self.job)
         self.autopilot = None
@@ -301,15 +301,15 @@ class TagFlight:
         return LandingFailed(f"{reason}{done}", self.report.told)
 
     async def give_up(self, landing: Landing, reason: str) -> None:
-        """What the settings say for a landing that failed, then the error."""
+        """Apply the setting for a failed landing, then raise the error."""
         action = self.tracker.settings.on_failure
         if landing.refused and self.report.verb == "land":
-            action = "hold"  # nothing was wrong with where it is
+            action = "hold"  # its position is safe
         self.report.action = action
         await self.send(REST)
         if self.plnd is not None:
             try:
-                await self.plnd.switch_off()  # it would act in RTL too
+                await self.plnd.switch_off()  # it would also act in RTL
             except Rejected as error:
                 reason = f"{reason} ({error})"
         self.vehicle.held_by("GUIDED")
@@ -320,22 +320,22 @@ class TagFlight:
                 await self.fly_by("LAND", self.vehicle.land)
         except (Conflict, LinkLost):
             raise
-        except UavApiError as error:  # refused, or it takes very long: then it goes on
+        except UavApiError as error:  # refused, or very slow; it goes on then
             self.autopilot, reason = None, f"{reason} ({error})"
             if self.vehicle.mode == "GUIDED":
-                self.report.action = "hold"  # which the end of the job sees to
+                self.report.action = "hold"  # the end of the job does it
         raise self._failed(reason)
 
 
 class ConditionTimer:
-    """How long something has been so without a break."""
+    """Measures how long a condition has held without a break."""
 
     def __init__(self) -> None:
         self._since: float | None = None
 
-    def __call__(self, so: bool, now: float) -> float:
-        """Seconds for which it has been so, at `now` (s)."""
-        if not so:
+    def __call__(self, holds: bool, now: float) -> float:
+        """Seconds for which the condition has held, at `now` (s)."""
+        if not holds:
             self._since = None
         elif self._since is None:
             self._since = now

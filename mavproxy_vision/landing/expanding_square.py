@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-OVERLAP = 0.7  # of the ground's footprint: the most that two tracks may lie apart
+OVERLAP = 0.7  # share of the footprint: the largest distance of two tracks
 LEGS_PER_RING = 4
 
 
@@ -20,9 +20,9 @@ class Waypoint:
 
 
 def step_for(footprint: float, tag_size: float) -> float:
-    """How far tracks lie apart (m), for a footprint whose shorter side is `footprint` m.
+    """The distance of tracks (m), for a footprint whose shorter side is `footprint` m.
 
-    A tag must be whole to be seen, so that its size is lost at the edge.
+    A tag must be completely in view, so that its size is lost at the edge.
     """
     return max(OVERLAP * footprint - tag_size, 0.2 * footprint)
 

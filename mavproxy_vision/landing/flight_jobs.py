@@ -1,4 +1,4 @@
-"""The flights of this module as jobs: begun at the prompt or by HTTP, one at a time."""
+"""This module's flights as jobs: started at the prompt or by HTTP, one at a time."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from mavproxy_vision.landing.precision_landing import PrecisionLanding
 from mavproxy_vision.landing.report import Report
 from mavproxy_vision.tracking.tracker import Tracker
 
-TIDY_EVERY = 1.0  # s between two tries to give parameters back
+TIDY_EVERY = 1.0  # s between two tries to restore parameters
 TIDY_TRIES = 10
 log = logging.getLogger("vision")
 
 
 class FlightTask:
-    """A flight that is asked for: the body of a job, and what it tells of itself.
+    """A requested flight: the body of a job, and its report.
 
     Args:
-        flights: to which it belongs.
-        copter: what flies.
+        flights: the FlightJobs that it belongs to.
+        copter: the vehicle.
         name: the verb, for the report.
         fly: flies it.
     """
@@ -49,7 +49,7 @@ class FlightTask:
         self.begun = False
 
     async def __call__(self, job: Job) -> None:
-        """Fly it, as that job."""
+        """Run the flight as that job."""
         self.begun = True
         flights = self._flights
         flight = TagFlight(flights.tracker, self._copter, job, self.report, flights.replace_running_flight)
@@ -63,7 +63,7 @@ class FlightTask:
             flights.on_flight_ended(flight)
 
     def result(self) -> str:
-        """One line about the flight, which ended well."""
+        """One line about a flight that ended well."""
         return self.report.line()
 
 
@@ -71,9 +71,9 @@ class MissionTask(FlightTask):
     """A whole mission, with its track.
 
     Args:
-        flights: to which it belongs.
-        copter: what flies.
-        errand: where to.
+        flights: the FlightJobs that it belongs to.
+        copter: the vehicle.
+        errand: the place and kind of the landing.
     """
 
     def __init__(self, flights: FlightJobs, copter: Copter, errand: MissionPlan) -> None:
@@ -82,7 +82,7 @@ class MissionTask(FlightTask):
         self._errand, self._track = errand, FlightLog()
 
     async def __call__(self, job: Job) -> None:
-        """Fly it, and write down its track when it is over."""
+        """Fly the mission, and write its track at its end."""
         listeners = self._flights.tracker.host.listeners
         listeners.append(self._follow)
         try:
@@ -91,8 +91,8 @@ class MissionTask(FlightTask):
             listeners.remove(self._follow)
             home = self._copter.state.messages.get("HOME_POSITION")
             if home is not None:
-                where = home.message.latitude / 1e7, home.message.longitude / 1e7
-                self._track.target = self._errand.place(where)
+                home_place = home.message.latitude / 1e7, home.message.longitude / 1e7
+                self._track.target = self._errand.place(home_place)
             await self._flights.keep(self._track, self.report)
 
     def _follow(self, state: VehicleState, message: Any, _now: float) -> None:
@@ -101,14 +101,14 @@ class MissionTask(FlightTask):
 
 
 class FlightJobs:
-    """What is in flight, and what the last flight told. All methods belong to the asyncio thread.
+    """The running flights, and the report of the last one. All methods belong to the asyncio thread.
 
     Attributes:
-        report: of the flight under way, or the last one.
+        report: of the running flight, or the last one.
 
     Args:
-        tracker: the camera's outcomes, and where the target lies.
-        directory: where tracks and plots go.
+        tracker: the detections, and the target's position.
+        directory: the folder for tracks and plots.
     """
 
     def __init__(self, tracker: Tracker, directory: Callable[[], Path]) -> None:
@@ -116,8 +116,8 @@ class FlightJobs:
         self.report: Report | None = None
         self._directory = directory
         self._flight: TagFlight | None = None
-        self._begun: set[TagFlight] = set()  # that are not over, those too that have no vehicle yet
-        self._unfinished: set[TagFlight] = set()  # of these, those that took over
+        self._begun: set[TagFlight] = set()  # all that are not over, including those without a vehicle yet
+        self._unfinished: set[TagFlight] = set()  # those of them that have taken over the vehicle
         self._plnd: dict[int, PrecisionLanding] = {}
         self._tidying: set[PrecisionLanding] = set()
         self._tasks = HeldTasks()
@@ -144,7 +144,7 @@ class FlightJobs:
         return MissionTask(self, copter, errand)
 
     def descent_method(self, method: str) -> Callable[[TagFlight], Descent]:
-        """What descends by that method."""
+        """The descent of that method."""
         if method != "landing_target":
             return Descent
 
@@ -158,35 +158,35 @@ class FlightJobs:
         return by_plnd
 
     def on_flight_begun(self, flight: TagFlight) -> None:
-        """It is being prepared; the vehicle is somebody else's still."""
+        """The flight is being prepared; it does not have the vehicle yet."""
         self._begun.add(flight)
 
     async def replace_running_flight(self, flight: TagFlight) -> None:
-        """Make it the flight under way, and await the end of those before."""
+        """Make it the running flight, and await the end of the earlier ones."""
         before = self._unfinished - {flight}
         self._flight, self.report = flight, flight.report
         self._unfinished.add(flight)
-        for one in before:
-            if one.job.running:  # of another vehicle; of this one it is superseded already
-                one.job.abort(Aborted(f"{flight.job.verb} took over"))
-            await one.ended.wait()
+        for earlier in before:
+            if earlier.job.running:  # of another vehicle; on this one it is already superseded
+                earlier.job.abort(Aborted(f"{flight.job.verb} took over"))
+            await earlier.ended.wait()
 
     def on_flight_ended(self, flight: TagFlight) -> None:
-        """It has sent its last message."""
+        """The flight has sent its last message."""
         self._begun.discard(flight)
         self._unfinished.discard(flight)
         if self._flight is flight:
             self._flight = None
         flight.ended.set()
         plnd = flight.plnd
-        if plnd is not None and not any(one.plnd is plnd for one in self._unfinished):
+        if plnd is not None and not any(other.plnd is plnd for other in self._unfinished):
             plnd.in_use = False
             if plnd.before and plnd not in self._tidying:
                 self._tasks.start(self._tidy(plnd), "the return of parameters")
         self._leave_host()
 
     async def keep(self, track: FlightLog, report: Report) -> None:
-        """Write track and plot; what cannot be written is said in the report."""
+        """Write track and plot; the report says if that fails."""
         loop = asyncio.get_running_loop()
         try:
             base = self._directory().absolute() / time.strftime("vision_mission_%Y%m%d_%H%M%S")
@@ -196,23 +196,23 @@ class FlightJobs:
             report.plot = str(base.with_suffix(".png"))
         except OSError as error:
             report.track = f"not written: {error.strerror}"
-        except (RuntimeError, ValueError, cv2.error) as error:  # a `~user` that is none, a null in a name, no encoder
+        except (RuntimeError, ValueError, cv2.error) as error:  # an unknown `~user`, a null in a name, no encoder
             report.track = f"not written: {error}"
 
     @property
     def running(self) -> bool:
-        """Whether a flight is under way."""
+        """Whether a flight is running."""
         return self._flight is not None and self._flight.job.running
 
     @property
     def phase(self) -> str:
-        """What it is doing."""
+        """Its present activity."""
         return self._flight.phase if self._flight is not None else "over"
 
     # -- parameters that are still to be given back ----------------------------------------------------------
 
     async def _tidy(self, plnd: PrecisionLanding) -> None:
-        """Give parameters back as soon as the vehicle hears us, and no flight needs them."""
+        """Restore parameters as soon as the vehicle hears us, and no flight needs them."""
         self._tidying.add(plnd)
         tries = 0
         while plnd.before and tries < TIDY_TRIES:
@@ -232,7 +232,7 @@ class FlightJobs:
     def begin(
         self, copter: Copter, sortie: FlightTask, path: str, request: dict[str, Any], tell: Callable[[str], None]
     ) -> Job:
-        """Start a flight that nobody awaits over the network; `tell` is called with one line at its end."""
+        """Start a flight without a network client; `tell` is called with one line at its end."""
 
         async def body(job: Job) -> str:
             await sortie(job)
@@ -250,7 +250,7 @@ class FlightJobs:
             tell(str(error))
 
     def stop(self, reason: str) -> str | None:
-        """End all flights; a vehicle that is ours is told to hold. What was done; None without a flight."""
+        """End all flights; a vehicle that is ours must hold. Returns what was done; None without a flight."""
         return self._end(reason, Ending.ABORTED)
 
     def abort_all(self) -> None:
@@ -260,31 +260,31 @@ class FlightJobs:
         self._leave_host()
 
     def _leave_host(self) -> None:
-        """Have nothing more to say at the host's end, once nothing flies and all parameters are given back."""
+        """Leave the host's last words when nothing flies and all parameters are restored."""
         words = self.tracker.host.last_words
         if self._unloaded and not self._begun and not self.last_words() and self.last_words in words:
             words.remove(self.last_words)
 
     def _end(self, reason: str, ending: Ending) -> str | None:
-        """End those in flight and those that are being prepared; what was done with the former goes first."""
-        told = None
+        """End running flights and those in preparation; the outcome of the running ones has precedence."""
+        outcome = None
         for flight in sorted(self._begun, key=lambda one: one is not self._flight):
             if flight.job.running:
                 error = _ended(self.tracker, flight, reason, ending)
-                told = told or str(error)
+                outcome = outcome or str(error)
                 flight.job.abort(error, ending)
-        return told
+        return outcome
 
     def last_words(self) -> list[tuple[Any, int]]:
-        """The parameters that are still to be given back, as messages, and the systems that they go to."""
+        """The messages that restore the remaining parameters, and the systems that they go to."""
         return [(message, plnd.vehicle.state.system) for plnd in self._plnd.values() for message in plnd.remaining()]
 
 
 def _ended(tracker: Tracker, flight: TagFlight, reason: str, ending: Ending) -> Aborted:
     vehicle = flight.vehicle
     holds = flight.commands and tracker.host.endings.what_follows(vehicle, FIXED[ending], flight.job.modes)
-    left = "the vehicle is told to hold" if holds else f"the vehicle is left alone: it is in {vehicle.mode}"
-    return Aborted(f"{reason}; {left}")
+    outcome = "the vehicle is told to hold" if holds else f"the vehicle is left alone: it is in {vehicle.mode}"
+    return Aborted(f"{reason}; {outcome}")
 
 
 def copter_of(vehicle: Any) -> Copter:

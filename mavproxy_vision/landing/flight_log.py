@@ -1,4 +1,4 @@
-"""The track of a mission: a file of positions, and a plot of it with target and touchdown."""
+"""The track of a mission: a file of positions, and a plot with target and touchdown."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ COLOURS = {"track": (200, 120, 40), "start": (80, 160, 60), "target": (40, 40, 2
 
 @dataclass
 class FlightLog:
-    """Positions as GLOBAL_POSITION_INT told them.
+    """Positions from GLOBAL_POSITION_INT.
 
     Attributes:
         rows: latitude, longitude (degrees), altitude (m above home), time (s since the vehicle's boot).
-        target: latitude and longitude of the target, where known.
+        target: latitude and longitude of the target, if known.
     """
 
     rows: list[tuple[float, float, float, float]] = field(default_factory=list)
@@ -49,13 +49,13 @@ class FlightLog:
             rows.writerows((f"{lat:.7f}", f"{lon:.7f}", f"{alt:.3f}", f"{at:.3f}") for lat, lon, alt, at in self.rows)
 
     def plot(self, file: Path) -> None:
-        """Draw it, north up, in metres from its start.
+        """Plot the track, north up, in metres from its start.
 
         Raises:
             OSError: it cannot be written.
         """
-        good, data = cv2.imencode(".png", self.drawn())
-        if good:
+        encoded, data = cv2.imencode(".png", self.drawn())
+        if encoded:
             file.write_bytes(data.tobytes())
 
     def drawn(self) -> NDArray[np.uint8]:
@@ -103,11 +103,13 @@ def _grid(image: NDArray[np.uint8], middle: tuple[float, float], span: float, pi
             ends = [list(middle), list(middle)]
             for end, sign in zip(ends, (-1, 1), strict=True):
                 end[axis], end[1 - axis] = value, middle[1 - axis] + sign * span / 2
-            one, other = pixel(tuple(ends[0])), pixel(tuple(ends[1]))
-            cv2.line(image, one, other, (225, 225, 225), 1)
+            line_start, line_end = pixel(tuple(ends[0])), pixel(tuple(ends[1]))
+            cv2.line(image, line_start, line_end, (225, 225, 225), 1)
             text = f"{value:g} m {'north' if axis == 0 else 'east'}"
-            where = (one[0] + 4, one[1] - 4) if axis == 0 else (one[0] - 30, one[1] + 16)
-            cv2.putText(image, text, where, cv2.FONT_HERSHEY_SIMPLEX, 0.4, (130, 130, 130), 1, cv2.LINE_AA)
+            label_at = (
+                (line_start[0] + 4, line_start[1] - 4) if axis == 0 else (line_start[0] - 30, line_start[1] + 16)
+            )
+            cv2.putText(image, text, label_at, cv2.FONT_HERSHEY_SIMPLEX, 0.4, (130, 130, 130), 1, cv2.LINE_AA)
 
 
 def _mark(image: NDArray[np.uint8], name: str, at: tuple[int, int]) -> None:
@@ -117,5 +119,5 @@ def _mark(image: NDArray[np.uint8], name: str, at: tuple[int, int]) -> None:
     else:
         cv2.circle(image, at, 8, colour, 2, cv2.LINE_AA)
     shift = {"start": 24, "target": -14, "touchdown": 24}[name]
-    where = (at[0] + 12, at[1] + shift)
-    cv2.putText(image, name, where, cv2.FONT_HERSHEY_SIMPLEX, 0.55, colour, 1, cv2.LINE_AA)
+    label_at = (at[0] + 12, at[1] + shift)
+    cv2.putText(image, name, label_at, cv2.FONT_HERSHEY_SIMPLEX, 0.55, colour, 1, cv2.LINE_AA)

@@ -1,4 +1,4 @@
-"""The whole mission: take off, fly to a place, land there, on the tag or without one."""
+"""The whole mission: take off, fly to a place, and land there, with or without a tag."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from mavproxy_vision.landing.plan import landable
 
 @dataclass(frozen=True)
 class MissionPlan:
-    """Where to go.
+    """The place and kind of the landing.
 
     Attributes:
         alt: m above home.
         north, east: m from home; None with lat and lon.
         lat, lon: degrees; None with north and east.
         tag: id to land on; None for the settings' main tag.
-        on_tag: whether to land on a tag at all.
-        method: how to land on it.
+        on_tag: whether to land on a tag.
+        method: the landing method.
     """
 
     alt: float = 5.0
@@ -37,7 +37,7 @@ class MissionPlan:
     method: str = "velocity"
 
     def place(self, home: tuple[float, float]) -> tuple[float, float]:
-        """Latitude and longitude (degrees), for a home there.
+        """Latitude and longitude (degrees); `home` is latitude and longitude of home.
 
         Raises:
             Invalid: neither metres nor degrees are given.
@@ -54,10 +54,10 @@ class MissionPlan:
 async def fly(flight: TagFlight, errand: MissionPlan, descent_method: Callable[[TagFlight], Descent]) -> None:
     """Arm, take off, fly there, land; done when disarmed there.
 
-    A vehicle that flies already in GUIDED goes there from where it is.
+    A vehicle that already flies in GUIDED starts from its position.
 
     Raises:
-        LandingFailed: not landed on the tag; the settings' `on_failure` was done.
+        LandingFailed: not landed on the tag; the setting `on_failure` was applied.
         UavApiError: as the copter's verbs.
     """
     vehicle, job = flight.vehicle, flight.job

@@ -1,4 +1,4 @@
-"""What the settings make of a target: the tags that tell where it is, and the plan of a landing on it. Pure."""
+"""The tags of a target and the plan of a landing on it, from the settings. Pure."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from mavproxy_vision.landing.expanding_square import step_for
 from mavproxy_vision.landing.state_machine import Plan
 from mavproxy_vision.settings import VisionSettings
 
-FINAL = 1.3  # of the height at which the tag fills the view
+FINAL = 1.3  # times the height at which the tag fills the view
 LOWEST_FINAL = 0.4  # m
-HIGHEST_CLIP = 1.5  # m from which a tag would be landed on without being seen
-DEPENDABLE = 0.85  # of the detection range
+HIGHEST_CLIP = 1.5  # m; below this a landing would not see the tag
+DEPENDABLE = 0.85  # share of the detection range
 
 
 def tags_for(settings: VisionSettings, number: int | None) -> dict[int, Tag]:
-    """The tags that tell where the target is, the main one first; None is that of the settings.
+    """The tags that show the target, the main one first; None means the main tag of the settings.
 
     Raises:
         Invalid: the family has no such id.
@@ -33,10 +33,10 @@ def tags_for(settings: VisionSettings, number: int | None) -> dict[int, Tag]:
 
 
 def landable(settings: VisionSettings, number: int | None) -> dict[int, Tag]:
-    """As `tags_for`, of tags that can be seen from low enough to land on.
+    """As `tags_for`, but only if the tags are visible from low enough for a landing.
 
     Raises:
-        Invalid: the family has no such id, or the smallest of them fills the view too high up.
+        Invalid: the family has no such id, or its smallest tag fills the view too high up.
     """
     tags = tags_for(settings, number)
     clip = clip_height(settings, tags)
@@ -63,11 +63,11 @@ def plan_for(
     """The plan of a landing, or of a search.
 
     Args:
-        settings: the snapshot in force.
-        tags: what tells where the target is.
+        settings: the present settings.
+        tags: the tags that show the target.
         here: m above the target's ground; None while unknown.
-        descend: whether it descends once the tag is found.
-        changes: members of the plan that are not as the settings have them.
+        descend: whether it descends when the tag is found.
+        changes: values that replace those of the settings.
     """
     model, cells = settings.model, FAMILIES[settings.families[0]][0]
     largest = max(tag.size for tag in tags.values())

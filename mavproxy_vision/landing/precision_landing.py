@@ -1,4 +1,4 @@
-"""ArduPilot's own precision landing: its parameters, lent and given back, and LANDING_TARGET."""
+"""ArduPilot's own precision landing: its parameters, set and restored, and LANDING_TARGET."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ TRIES = 3
 AT_BOOT = "PLND_TYPE"
 ENABLE = "PLND_ENABLED"
 DOWNWARDS = 25.0  # MAV_SENSOR_ROTATION_PITCH_270
-# We take it back to GUIDED and search when the target is lost: no retries of its own. Should nobody be there to take
-# it back, strict 1 holds for a while, then lands; 2 would hover until the battery is empty.
+# When the target is lost we go back to GUIDED and search, so the autopilot needs no retries. If nobody takes the
+# vehicle back, strict 1 holds for a while, then lands; 2 would hover until the battery is empty.
 # With ALT_MIN and ALT_MAX other than 0 and no rangefinder ArduPilot just descends when the target is lost.
-# Alignment, orientation and offset of the sensor are in what we tell: it is the vehicle's frame already.
+# Our targets are already in the vehicle's frame, with alignment, orientation and offset of the sensor.
 WANTED = {
     AT_BOOT: 1.0,
     "PLND_STRICT": 1.0,
@@ -42,16 +42,16 @@ WANTED = {
 
 
 def no_check() -> None:
-    """What may be sent whoever has the vehicle: parameters are read, and given back."""
+    """No check: parameters are read and restored even if somebody else has the vehicle."""
 
 
 class PrecisionLanding:
-    """PLND on one vehicle: what it was set to before our landings, until it is that again.
+    """The PLND parameters of one vehicle, and their values from before our landings.
 
     Attributes:
-        vehicle: whose it is.
-        before: the values that are not given back yet, by name.
-        in_use: whether a landing needs it: nothing is given back then.
+        vehicle: the vehicle.
+        before: the values that are not restored yet, by name.
+        in_use: whether a landing needs PLND; nothing is restored then.
     """
 
     def __init__(self, vehicle: Vehicle) -> None:
@@ -61,18 +61,18 @@ class PrecisionLanding:
         self._lock = asyncio.Lock()
 
     async def check(self) -> None:
-        """See whether the autopilot can do it, before anything is flown.
+        """Check whether the autopilot supports it, before anything is flown.
 
         Raises:
             NotSupported: the autopilot has no precision landing.
-            Rejected: the type was another one at boot.
+            Rejected: PLND_TYPE had another value at boot.
         """
         if not mavutil.mavlink20():
             raise NotSupported("LANDING_TARGET has a position in MAVLink 2 only: start MAVProxy without --mav10")
-        told = await self.vehicle.parameters.read((name,) for name in WANTED)
-        if ENABLE not in told:
+        values = await self.vehicle.parameters.read((name,) for name in WANTED)
+        if ENABLE not in values:
             raise NotSupported("the autopilot has no precision landing (no PLND_ENABLED)")
-        if told.get(AT_BOOT, WANTED[AT_BOOT]) != WANTED[AT_BOOT]:
+        if values.get(AT_BOOT, WANTED[AT_BOOT]) != WANTED[AT_BOOT]:
             await self._set(AT_BOOT, WANTED[AT_BOOT])
             raise Rejected("PLND_TYPE is 1 now, but the autopilot reads it at boot: reboot it, then try again")
 
@@ -80,36 +80,36 @@ class PrecisionLanding:
         """Set the parameters and read them back.
 
         Args:
-            check: asked before each sending, and with each heartbeat: what it raises ends this, and no more is set.
+            check: called before each message and with each heartbeat; an error that it raises ends this.
 
         Raises:
-            Rejected: a parameter did not take its value; and whatever `check` raises.
+            Rejected: a parameter did not take its value. Also any error of `check`.
         """
         self.in_use = True
         async with self._lock:
-            told = await self.vehicle.parameters.read((name,) for name in WANTED)
+            values = await self.vehicle.parameters.read((name,) for name in WANTED)
             for name, value in WANTED.items():
-                if name not in told or (told[name] == value and name not in self.before):
+                if name not in values or (values[name] == value and name not in self.before):
                     continue
-                self.before.setdefault(name, told[name])  # of a landing cut short it is still the first value
+                self.before.setdefault(name, values[name])  # after an aborted landing the first value stays
                 await self._set(name, value, check)
 
     async def switch_off(self) -> None:
-        """Give the switch back, without which the others mean nothing: LAND and RTL heed no target then.
+        """Restore the switch, without which the other parameters have no effect: LAND and RTL ignore targets then.
 
         Raises:
-            Rejected: it did not take its value.
+            Rejected: the switch did not take its value.
         """
         async with self._lock:
             await self._give_back(ENABLE)
 
     async def give_back(self) -> None:
-        """Give every parameter the value that it had, the switch first, unless a landing begins that needs them.
+        """Restore every parameter, the switch first, unless a landing begins that needs them.
 
-        What somebody has set to another value meanwhile stays as it is.
+        A value that somebody has changed meanwhile stays.
 
         Raises:
-            Rejected: some did not take it; the others were given back all the same.
+            Rejected: some were refused; the others are restored.
         """
         refused = []
         async with self._lock:
@@ -126,27 +126,29 @@ class PrecisionLanding:
         return sorted(self.before, key=lambda name: name != ENABLE)
 
     async def _give_back(self, name: str) -> None:
-        if name in self.before and await self._told(name) == WANTED[name]:
+        if name in self.before and await self._current_value(name) == WANTED[name]:
             await self._set(name, self.before[name])
         self.before.pop(name, None)
 
     def remaining(self) -> list[Any]:
-        """The PARAM_SETs that give everything back, for when nobody can wait."""
+        """The PARAM_SETs that restore everything, for an end without waiting."""
         return [set_parameter(self.vehicle.address, name, self.before[name]) for name in self._in_order()]
 
-    async def _told(self, name: str) -> float:
-        """The parameter's value now, asked for: somebody may have set it while nobody heard the vehicle."""
-        message = await self._asked(name, read_parameter(self.vehicle.address, name), None)
+    async def _current_value(self, name: str) -> float:
+        """The parameter's present value, requested: somebody may have set it while the link was silent."""
+        message = await self._request(name, read_parameter(self.vehicle.address, name), None)
         if message is None:
             raise Rejected(f"the autopilot does not tell {name}")
         return float(message.param_value)
 
     async def _set(self, name: str, value: float, check: Callable[[], None] = no_check) -> None:
-        if await self._asked(name, set_parameter(self.vehicle.address, name, value), value, check) is None:
+        if await self._request(name, set_parameter(self.vehicle.address, name, value), value, check) is None:
             raise Rejected(f"the autopilot does not take {name} = {value:g}")
 
-    async def _asked(self, name: str, request: Any, value: float | None, check: Callable[[], None] = no_check) -> Any:
-        """The PARAM_VALUE that answers a request, sent up to TRIES times; with `value` only one that tells that."""
+    async def _request(
+        self, name: str, request: Any, value: float | None, check: Callable[[], None] = no_check
+    ) -> Any:
+        """The PARAM_VALUE that answers a request, sent up to TRIES times; with `value` only one with that value."""
         vehicle = self.vehicle
 
         def answer(message: Any) -> Any:
@@ -158,10 +160,10 @@ class PrecisionLanding:
 
         for _ in range(TRIES):
             check()
-            with vehicle.waiting.expecting({"PARAM_VALUE", "HEARTBEAT"}, answer) as told:
+            with vehicle.waiting.expecting({"PARAM_VALUE", "HEARTBEAT"}, answer) as reply:
                 await vehicle.link.send(request, vehicle.state.system)
                 with contextlib.suppress(TimedOut):
-                    return await told.within(READ_BACK, f"answer for {name}")
+                    return await reply.within(READ_BACK, f"answer for {name}")
         return None
 
 
@@ -169,7 +171,7 @@ def landing_target(time: float, relative: Vector, attitude: Attitude) -> Any:
     """LANDING_TARGET in MAV_FRAME_BODY_FRD.
 
     Args:
-        time: s, for the message's time stamp.
+        time: s, for the message's timestamp.
         relative: from the vehicle to the target, m NED.
         attitude: of the vehicle when the message is sent.
     """

@@ -1,4 +1,4 @@
-"""What a flight tells of itself. Pure data."""
+"""The report of a flight. Pure data."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 @dataclass
 class Report:
-    """What a flight tells of itself; see `docs/vision.md`."""
+    """The report of a flight; see `docs/vision.md`."""
 
     verb: str
     method: str = ""
@@ -35,7 +35,7 @@ class Report:
         return f"Landed on tag {self.tag}{off}"
 
     def told(self) -> dict[str, Any]:
-        """As JSON has it; what is not known is left out, lengths in m, times in s of the vehicle's clock."""
+        """The report as a JSON object without unknown values; lengths in m, times in s on the vehicle's clock."""
         rounded = {name: round(value, 2) for name, value in self.phases.items()}
         members = {**vars(self), "phases": rounded, "duration": round(self.duration, 2)}
         for name in ("last_offset", "touchdown_error"):

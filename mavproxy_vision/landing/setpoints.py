@@ -16,10 +16,10 @@ mavlink = mavutil.mavlink
 
 @dataclass(frozen=True)
 class HeadedVelocity(VelocityTarget):
-    """A velocity setpoint, m/s NED, that goes out in BODY_NED: what was seen turns with the vehicle.
+    """A velocity setpoint, m/s NED, sent in BODY_NED, because an observed offset turns with the vehicle.
 
     Attributes:
-        heading: of the vehicle, rad, by which it is turned.
+        heading: the vehicle's heading, rad.
     """
 
     heading: float
@@ -33,6 +33,6 @@ class HeadedVelocity(VelocityTarget):
 
 
 def setpoint(velocity: Vector, heading: float | None) -> VelocityTarget:
-    """A velocity (m/s NED), in BODY_NED where the heading (rad) is known."""
+    """A velocity (m/s NED), in BODY_NED if the heading (rad) is known."""
     x, y, z = (float(part) for part in velocity)
     return VelocityTarget(x, y, z) if heading is None else HeadedVelocity(x, y, z, heading)

@@ -2,12 +2,12 @@
 
     LOOK -> DESCEND -> LAST_METRE -> (done: land)
       ^       | lost for 0.5 s, above BLIND_BELOW: HOLD -> 2 s: CLIMB -> LOOK -> SEARCH -> … -> (failed)
-      |       | lost below BLIND_BELOW: LAST_METRE all the same
+      |       | lost below BLIND_BELOW: LAST_METRE anyway
 
-The last metre is flown by where the tag was and how the vehicle has moved since, because the autopilot's LAND holds a
-position that wanders with its GPS.
+The last metre is flown by the tag's last position and the vehicle's motion since, because the autopilot's LAND holds
+a position that drifts with its GPS.
 
-An attempt is a time of looking: in place, then along one more ring of the expanding square each.
+An attempt is one search: first in place, then along one more ring of the expanding square each.
 Times are on the vehicle's clock (s), velocities m/s NED, places m NED in the frame of `Motion.travelled`.
 """
 
@@ -25,9 +25,9 @@ from mavproxy_vision.landing.expanding_square import Waypoint, expanding_square
 from mavproxy_vision.tracking.pose_history import Motion
 from mavproxy_vision.tracking.target_filter import Target
 
-COAST = 0.5  # s without a detection that change nothing
+COAST = 0.5  # s without a detection that have no effect
 HOLD = 2.0  # s without a detection until it climbs
-BLIND_BELOW = 1.0  # m: a tag that is lost lower than that is landed on all the same
+BLIND_BELOW = 1.0  # m: below this the landing goes on even if the tag is lost
 CLIMB = 1.5  # m above the last measurement
 GAIN = 0.9  # 1/s: velocity for each m of offset
 INTEGRAL = 0.15  # 1/s/s
@@ -37,16 +37,16 @@ CONE = ((3.0, math.radians(20)), (1.0, math.radians(10)))  # height (m) and half
 SLOWDOWN = (0.20, 0.45)  # descent rate: m/s, and 1/s of the height
 SLOWEST = 0.15  # m/s of descent
 LAST_DESCENT = 0.35  # m/s on the last metre
-LAST_GAIN = 1.3  # 1/s: no camera's latency is in what is flown by there
+LAST_GAIN = 1.3  # 1/s: no camera latency affects the last metre
 LAST_SPEED = 0.4  # m/s, horizontally there
-TOUCH = 0.2  # m above the target from which the autopilot's LAND is left alone
-LATE = 1.0  # s longer than the last metre should take: it stands already, on legs that are higher than that
-NEAR = 0.4  # m from a waypoint that count as there
-STEP_TIME = 0.2  # s between two steps at most that are reckoned with
+TOUCH = 0.2  # m above the target below which the autopilot's LAND is not interrupted
+LATE = 1.0  # s beyond the expected end of the last metre: it already stands, on higher legs
+NEAR = 0.4  # m from a waypoint that count as arrived
+STEP_TIME = 0.2  # longest time between two steps that counts, s
 
 
 class Phase(enum.Enum):
-    """What the landing is doing."""
+    """The activity of the landing."""
 
     LOOK = "looking"
     DESCEND = "descending"
@@ -60,11 +60,11 @@ class Phase(enum.Enum):
 
 @dataclass(frozen=True)
 class Plan:
-    """What it may do.
+    """The limits of a landing.
 
     Attributes:
-        attempts: times of looking.
-        look: s of each in place.
+        attempts: number of searches.
+        look: s of each search in place.
         tolerance: m from the target within which it may begin the last metre.
         final: m above the target at which the last metre begins.
         clip: m above the target below which the tag does not fit into the view.
@@ -73,9 +73,9 @@ class Plan:
         climb: m/s, at most.
         acceleration: m/s/s, at most.
         step: m between two tracks of the search.
-        leash: m from where the search began.
-        ceiling: m above the target's ground that the search does not exceed.
-        time_limit: s for all.
+        leash: m, the largest distance from the start of the search.
+        ceiling: highest height of the search above the target's ground, m.
+        time_limit: s in total.
         descend: whether to descend; a search ends when the tag is found.
     """
 
@@ -97,7 +97,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class LandingCommand:
-    """What to do now: the phase, a velocity (m/s NED), and why it failed, if it did."""
+    """The present command: phase, velocity (m/s NED), and the reason of a failure."""
 
     phase: Phase
     velocity: Vector
@@ -114,7 +114,7 @@ class Landing:
         self.plan, self.target = plan, target
         self.phase = Phase.LOOK
         self.attempt = 0
-        self.refused = False  # failed because what is seen makes no sense
+        self.refused = False  # failed because the detections are implausible
         self.offset: float | None = None  # m, horizontally, at the last detection
         self.began: float | None = None
         self.phases: dict[str, float] = {}  # s that each phase took
@@ -122,8 +122,8 @@ class Landing:
         self._last_step: float | None = None
         self._velocity = REST
         self._integral = np.zeros(2)
-        self._anchor: Vector = REST  # where it holds, climbs to, or searches from
-        self._height = 0.0  # m above the ground that it holds there
+        self._anchor: Vector = REST  # where it holds, to which it climbs, or from which it searches
+        self._height = 0.0  # the height above the ground that it holds there, m
         self._corners: Iterator[Waypoint] = iter(())
         self._corner: Waypoint | None = None
         self._down_by = math.inf  # when the last metre should be over
@@ -148,16 +148,16 @@ class Landing:
         failure = self._failure(now)
         if failure:
             return self.fail(failure)
-        wanted = self._wanted(now, motion, height, elapsed)
+        velocity = self._wanted(now, motion, height, elapsed)
         if self.phase in (Phase.LAND, Phase.FAILED):
             self._velocity = REST
             return LandingCommand(self.phase, REST, self._reason)
-        change = limited((wanted - self._velocity)[:2], self.plan.acceleration * elapsed)
-        self._velocity = vector(self._velocity[0] + change[0], self._velocity[1] + change[1], wanted[2])
+        change = limited((velocity - self._velocity)[:2], self.plan.acceleration * elapsed)
+        self._velocity = vector(self._velocity[0] + change[0], self._velocity[1] + change[1], velocity[2])
         return LandingCommand(self.phase, self._velocity)
 
     def begin(self, now: float) -> None:
-        """Its time begins to run."""
+        """Start its clock."""
         self.began = now
 
     def _start_from(self, now: float, motion: Motion, height: float) -> None:
@@ -173,13 +173,13 @@ class Landing:
         self._integral[:] = 0.0
 
     def resume(self, now: float, motion: Motion, height: float) -> None:
-        """The tag was lost while the autopilot landed: hold, climb, look again."""
+        """The tag was lost while the autopilot landed: hold, climb, search again."""
         self._last_step = now
         self._velocity = motion.velocity.copy()
         self._stay(now, Phase.HOLD, motion.travelled, height)
 
     def fail(self, reason: str) -> LandingCommand:
-        """End it for that reason."""
+        """End the landing with that reason."""
         if self.phase is not Phase.FAILED:
             self.phase, self._reason, self._velocity = Phase.FAILED, reason, REST
         return LandingCommand(Phase.FAILED, REST, self._reason)
@@ -198,7 +198,7 @@ class Landing:
         return self.overdue(now)
 
     def overdue(self, now: float) -> str | None:
-        """Why it has to end, when its time is over."""
+        """Why it must end because its time is over; None while it is not."""
         if self.began is None or now - self.began <= self.plan.time_limit:
             return None
         return f"not landed within {self.plan.time_limit:.0f} s"
@@ -226,7 +226,7 @@ class Landing:
         if not self.plan.descend:
             self.phase = Phase.LAND
             return REST
-        lost = self.phase is Phase.CLIMB  # on the way down, and seen again from higher up
+        lost = self.phase is Phase.CLIMB  # lost on the way down, and seen again from higher up
         if lost and not self._next_attempt("the tag was lost again on the way down"):
             return REST
         self.phase, self._since = Phase.DESCEND, now
@@ -298,17 +298,17 @@ class Landing:
             self._next_attempt()
         return self._towards(self._anchor, motion, height)
 
-    def _next_attempt(self, why: str = "no tag in sight") -> bool:
-        """Begin another attempt; false when there is none left, and the landing has failed."""
+    def _next_attempt(self, reason: str = "no tag in sight") -> bool:
+        """Begin another attempt; False if none is left, and the landing has failed."""
         if self.attempt >= self.plan.attempts:
             times = f"{self.attempt} attempt{'' if self.attempt == 1 else 's'}"
-            self.fail(f"{why} after {times}")
+            self.fail(f"{reason} after {times}")
             return False
         self.attempt += 1
         return True
 
     def _look_farther(self, now: float) -> None:
-        """Nothing in sight from here: along the next leg of the search."""
+        """Nothing in sight from here: fly the next leg of the search."""
         corner = next(self._corners, None)
         if corner is None:
             self.fail(f"no tag in sight within {self.plan.leash:g} m")
@@ -320,13 +320,13 @@ class Landing:
 
     def _search(self, now: float, motion: Motion, height: float) -> Vector:
         assert self._corner is not None
-        there = self._anchor + vector(self._corner.north, self._corner.east, 0.0)
-        if np.linalg.norm((there - motion.travelled)[:2]) < NEAR or now - self._since > 60.0:
+        corner_place = self._anchor + vector(self._corner.north, self._corner.east, 0.0)
+        if np.linalg.norm((corner_place - motion.travelled)[:2]) < NEAR or now - self._since > 60.0:
             self._look_farther(now)
-        return self._towards(there, motion, height)
+        return self._towards(corner_place, motion, height)
 
     def _towards(self, place: Vector, motion: Motion, height: float) -> Vector:
-        """To above `place`, at the height that is held."""
+        """The velocity to the point above `place`, at the held height."""
         sideways = limited(GAIN * (place - motion.travelled)[:2], self.plan.speed)
         up = VERTICAL_GAIN * (self._height - height)
         return vector(sideways[0], sideways[1], -min(max(up, -self.plan.descent), self.plan.climb))

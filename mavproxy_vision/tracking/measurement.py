@@ -59,7 +59,7 @@ class TargetMeasurer:
         if attitude is None or motion is None:
             return []
         height = self.wanted.floor - float(motion.position[2])
-        found = []
+        measurements = []
         for detection in seen.detections:
             tag = self.wanted.tags.get(detection.id)
             if tag is None or detection.family != self.wanted.family or not is_sound(detection):
@@ -71,8 +71,10 @@ class TargetMeasurer:
                 north, east = target_from(tag, self._right_of(detection, model, attitude))
                 relative = relative + vector(north, east, 0.0)
             place = motion.travelled + relative
-            found.append(TargetMeasurement(at, place, motion.travelled, detection.distance, height, detection.id))
-        return found
+            measurements.append(
+                TargetMeasurement(at, place, motion.travelled, detection.distance, height, detection.id)
+            )
+        return measurements
 
     def _right_of(self, detection: TagDetection, model: CameraModel, attitude: Attitude) -> tuple[float, float]:
         """North and east components of the tag's right, for a tag that lies level."""

@@ -297,7 +297,9 @@ class Tracker:
         if self.host.clock() - self.truth.newest.at > FRESH:
             return None
         placed = parse_placed(self.settings.sim_tags, self.settings.families[0])
-        errors = [self.truth.distance_to(one.north, one.east) for one in placed if one.id == tag]
+        errors = [
+            self.truth.distance_to(placed_tag.north, placed_tag.east) for placed_tag in placed if placed_tag.id == tag
+        ]
         return min((error for error in errors if error is not None), default=None)
 
     @property
@@ -345,16 +347,16 @@ def in_view(seen: FrameResult | None) -> list[dict[str, Any]]:
 
 
 def _told(seen: FrameResult, detection: Any) -> dict[str, Any]:
-    known = detection.position is not None
+    has_position = detection.position is not None
     return {
         "id": detection.id,
         "family": detection.family,
         "hamming": detection.hamming,
         "corners": [[round(float(value), 2) for value in corner] for corner in detection.corners],
         "size": detection.size or None,
-        "position": [round(float(value), 3) for value in detection.position] if known else None,
-        "distance": round(detection.distance, 3) if known else None,
-        "rotation": [[round(float(v), 4) for v in row] for row in detection.rotation] if known else None,
-        "reprojection_error": round(detection.error, 3) if known else None,
+        "position": [round(float(value), 3) for value in detection.position] if has_position else None,
+        "distance": round(detection.distance, 3) if has_position else None,
+        "rotation": [[round(float(v), 4) for v in row] for row in detection.rotation] if has_position else None,
+        "reprojection_error": round(detection.error, 3) if has_position else None,
         "latency_s": round(seen.latency, 3),
     }

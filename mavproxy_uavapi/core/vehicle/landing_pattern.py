@@ -1,6 +1,6 @@
 """A plane's landing as a mission. Pure.
 
-It has no DO_LAND_START: with that item ArduPlane refuses to arm again, unless RTL_AUTOLAND allows it.
+It has no DO_LAND_START: after that item ArduPlane does not arm again, unless RTL_AUTOLAND allows it.
 """
 
 from __future__ import annotations
@@ -16,22 +16,22 @@ from mavproxy_uavapi.core.vehicle.mission_files import MissionItem
 
 mavlink = mavutil.mavlink
 
-APPROACH = 400.0  # m from the place of a landing at which its descent begins
+APPROACH = 400.0  # m before the landing place at which the descent begins
 APPROACH_HEIGHT = 40.0  # m above that place: a slope of 10 %, as ArduPilot's documentation advises
-NEAR = 50.0  # m; from nearer than that the direction of the approach is no matter
+NEAR = 50.0  # m; below this distance the direction of the approach does not matter
 
 
 def is_in(items: Iterable[MissionItem]) -> bool:
-    """Whether a mission has a landing sequence, which DO_LAND_START begins."""
+    """Whether a mission has a landing sequence, which begins with DO_LAND_START."""
     return any(item.command == mavlink.MAV_CMD_DO_LAND_START for item in items)
 
 
 def pattern(place: GlobalTarget, here: tuple[float, float], *, vtol: bool) -> list[MissionItem]:
-    """A landing at `place`: straight in from `here`, or from north where that is too near.
+    """A landing at `place`: straight in from `here`, or from the north if that is too near.
 
     Args:
-        place: where it touches down; m above home.
-        here: latitude and longitude of the vehicle, degrees.
+        place: the touchdown; m above home.
+        here: the vehicle's latitude and longitude, degrees.
         vtol: whether it lands vertically.
     """
     if vtol:

@@ -1,7 +1,7 @@
-"""The verbs of a plane: it cannot stand still in the air, so it circles where it is to stay.
+"""The verbs of a plane: it cannot stand still in the air, so it circles where it stays.
 
-ArduPlane has no LAND mode: a landing is a sequence of its mission (DO_LAND_START), or QLAND of a QuadPlane. It takes
-off in TAKEOFF, and goes to positions in GUIDED by DO_REPOSITION only.
+ArduPlane has no LAND mode: a landing is a sequence of its mission (DO_LAND_START), or QLAND for a QuadPlane. It takes
+off in TAKEOFF, and flies to positions in GUIDED by DO_REPOSITION only.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from mavproxy_uavapi.core.vehicle.messages import GlobalTarget, NedTarget
 from mavproxy_uavapi.core.vehicle.time_limits import FlightLimits
 
 AUTO, TAKEOFF, RTL, QLAND = "AUTO", "TAKEOFF", "RTL", "QLAND"
-RADIUS = 60.0  # m; WP_LOITER_RAD until the vehicle has told its own
-CIRCLING = 1.5  # radii from the middle of a circle in which a plane that flies it is found, wind and entry included
+RADIUS = 60.0  # m; used until WP_LOITER_RAD is known
+CIRCLING = 1.5  # radii from the centre within which a circling plane stays, including wind and entry
 HEIGHT_TOLERANCE = 10.0  # m
 LEVEL = 2.0  # m/s; a plane that climbs or sinks slower than this has done so
-LOWEST_HANDOVER = 15.0  # m above home; TAKEOFF's own climb is not interrupted below that
+LOWEST_HANDOVER = 15.0  # m above home; TAKEOFF's own climb is not interrupted below it
 # Quantities and their defaults: cruise airspeed, climb and sink rates, m/s.
 CRUISE = (("AIRSPEED_CRUISE", "TRIM_ARSPD_CM"), 12.0)
 CLIMB, SINK = (("TECS_CLMB_MAX",), 5.0), (("TECS_SINK_MAX",), 5.0)
-HEADWIND = 0.5  # share of the airspeed that is left over ground, for deadlines
+HEADWIND = 0.5  # share of the airspeed that remains as ground speed, for deadlines
 CIRCLES = 60.0  # s for circles at both ends of a way, for deadlines
 LANDING = 300.0  # s for a landing pattern and the disarming after it, for deadlines
 
@@ -37,26 +37,26 @@ class Plane(GuidedVehicle):
     holding_mode = "LOITER"
 
     async def limits(self) -> FlightLimits:
-        """Its speeds, for deadlines; asked for where they are not known."""
-        told = await self.parameters.read([CRUISE[0], CLIMB[0], SINK[0]])
-        cruise = told.get("AIRSPEED_CRUISE") or told.get("TRIM_ARSPD_CM", 100 * CRUISE[1]) / 100
-        climb, sink = told.get(*CLIMB[0], CLIMB[1]), told.get(*SINK[0], SINK[1])
+        """Its speeds, for deadlines; it requests those that are unknown."""
+        parameters = await self.parameters.read([CRUISE[0], CLIMB[0], SINK[0]])
+        cruise = parameters.get("AIRSPEED_CRUISE") or parameters.get("TRIM_ARSPD_CM", 100 * CRUISE[1]) / 100
+        climb, sink = parameters.get(*CLIMB[0], CLIMB[1]), parameters.get(*SINK[0], SINK[1])
         return time_limits.limits(
             {"WP_SPD": HEADWIND * cruise, "WP_SPD_UP": climb / 2, "WP_SPD_DN": sink / 2, "LAND_SPD_MS": sink},
             self.speeds.in_force,
         )
 
     async def _radius(self) -> float:
-        """Metres, of its circles."""
-        told = await self.parameters.read([("WP_LOITER_RAD",)])
-        return abs(told.get("WP_LOITER_RAD", RADIUS)) or RADIUS
+        """The radius of its circles in m."""
+        parameters = await self.parameters.read([("WP_LOITER_RAD",)])
+        return abs(parameters.get("WP_LOITER_RAD", RADIUS)) or RADIUS
 
     async def is_vtol(self) -> bool:
-        """Whether it takes off and lands vertically, too."""
+        """Whether it can take off and land vertically."""
         return bool((await self.parameters.read([("Q_ENABLE",)])).get("Q_ENABLE"))
 
     async def arm(self, job: Job, timeout: float | None = None) -> None:
-        """As for every vehicle; its mission is back at the first item: ArduPlane does not arm at a landing's item."""
+        """As for every vehicle; first sets its mission to item 1: ArduPlane does not arm at a landing's item."""
         current = self.state.field("MISSION_CURRENT", "seq") or 0
         if self.state.armed is False and current > 1:
             self.authority.take(job, Rank.ARM)
@@ -66,9 +66,9 @@ class Plane(GuidedVehicle):
     # -- up and down --------------------------------------------------------------------------------------
 
     async def takeoff(self, job: Job, alt: float, *, vtol: bool = False, timeout: float | None = None) -> None:
-        """Take off to `alt` m above home; done when it circles there in GUIDED, within 10 m of it.
+        """Take off to `alt` m above home; done when it circles there in GUIDED, within 10 m of that height.
 
-        It climbs in TAKEOFF, by its own parameters TKOFF_…; with `vtol` a QuadPlane climbs in GUIDED, and hovers.
+        It climbs in TAKEOFF, by its own parameters TKOFF_…; with `vtol` a QuadPlane climbs in GUIDED and hovers.
         """
         self.require_armed()
         self.require_mode(GUIDED)
@@ -103,13 +103,13 @@ class Plane(GuidedVehicle):
         self.authority.shown(job)
 
     async def land(self, job: Job, timeout: float | None = None) -> None:
-        """Land and disarm: a QuadPlane where it is, another by its mission's landing sequence.
+        """Land and disarm: a QuadPlane where it is, another plane by its mission's landing sequence.
 
         Raises:
             Busy: the mission has no landing sequence; `land_at` makes one.
         """
         if self.state.armed is False:
-            self.authority.take(job, Rank.STOP)  # an arm that waits ends
+            self.authority.take(job, Rank.STOP)  # a waiting arm ends
             return
         vertical = await self.is_vtol()
         if not vertical and not landing_pattern.is_in((await self.waypoints.download())[1]):
@@ -120,11 +120,11 @@ class Plane(GuidedVehicle):
         await self.landed_in(job, mode, self.allowed(LANDING, timeout))
 
     async def land_at(self, job: Job, lat: float, lon: float, alt: float = 0.0, *, vtol: bool = False) -> None:
-        """Begin to land at a place; done when it flies the landing. Its mission is replaced by that landing.
+        """Begin to land at a place; done when it flies the landing. The landing replaces its mission.
 
         Raises:
-            NotArmed, Busy: it does not fly.
-            Rejected, TimedOut: the mission was not taken; then the old one is there again, and the mode is as it was.
+            NotArmed, Busy: it is not flying.
+            Rejected, TimedOut: the mission was refused; the old one is back then, and the mode is unchanged.
         """
         self.require_armed()
         if self.state.landed:
@@ -133,21 +133,21 @@ class Plane(GuidedVehicle):
         place = GlobalTarget(lat, lon, alt)
         items = landing_pattern.pattern(place, (here.lat / 1e7, here.lon / 1e7), vtol=vtol)
         self.authority.take(job, Rank.STOP)
-        if self.mode == AUTO:  # a mission in flight is not changed
+        if self.mode == AUTO:  # a mission cannot change while it is flown
             await self.switch_to(job, self.holding_mode)
         mode = self.mode
         await self.waypoints.upload(items, check=self.commanding(job, lambda: self.held_by(mode)))
         await mission_flight.begin(self, job, lambda: self.held_by(mode) if self.mode != AUTO else None)
 
     async def come_down(self, job: Job) -> None:
-        """Land where it can; without a landing sequence it returns, and circles at home."""
+        """Land if it can; without a landing sequence it returns, and circles at home."""
         try:
             await self.land(job)
         except Busy:
             await self.rtl(job)
 
     async def rtl(self, job: Job, timeout: float | None = None) -> None:
-        """Return to launch; done when it circles there, or has landed where its parameters say so."""
+        """Return to launch; done when it circles there, or has landed if its parameters say so."""
         self.authority.take(job, Rank.STOP)
         if await self.is_done_at_home():
             return
@@ -175,13 +175,13 @@ class Plane(GuidedVehicle):
     # -- going and staying --------------------------------------------------------------------------------
 
     async def stop(self, job: Job) -> None:
-        """Circle here, in LOITER; the movement under way ends.
+        """Circle here in LOITER; the present movement ends.
 
         Raises:
             NotArmed: there is nothing to stop.
         """
         if self.authority.on_its_way and not self.state.armed:
-            self.authority.take(job, Rank.STOP)  # an arm that waits ends
+            self.authority.take(job, Rank.STOP)  # a waiting arm ends
         self.require_armed()
         await self.hold(job)
 
@@ -196,10 +196,10 @@ class Plane(GuidedVehicle):
         tolerance: float = TOLERANCE,
         timeout: float | None = None,
     ) -> None:
-        """Fly to a position, and circle there; with `wait`, done when it circles there.
+        """Fly to a position and circle there; with `wait`, done when it circles there.
 
-        It is there within one and a half radii of its circles (WP_LOITER_RAD) and 10 m of altitude, or `tolerance`
-        if that is more. It always looks where it goes.
+        It has arrived within 1.5 radii of its circles (WP_LOITER_RAD) and 10 m of altitude, or within `tolerance` if
+        that is more. It always points in the direction of travel.
         """
         self.require_guided_flight()
         radius = await self._radius()
@@ -227,7 +227,7 @@ class Plane(GuidedVehicle):
         await self.flown(GUIDED, names, arrived, self.allowed(expected, timeout), "arrive")
 
     def _global(self, target: NedTarget | GlobalTarget) -> GlobalTarget:
-        """The same place in degrees and m above home: ArduPlane takes no other."""
+        """The same place in degrees and m above home, the only form that ArduPlane takes."""
         if isinstance(target, GlobalTarget):
             return target
         north, east, up = self.leg_to(target)

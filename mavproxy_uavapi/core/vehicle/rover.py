@@ -1,4 +1,4 @@
-"""The verbs of a rover or boat: it moves in two dimensions, and stops where it is told to."""
+"""The verbs of a rover or boat: it moves in two dimensions, and stops on command."""
 
 from __future__ import annotations
 
@@ -11,40 +11,40 @@ from mavproxy_uavapi.core.vehicle.messages import GlobalTarget, NedTarget, Targe
 from mavproxy_uavapi.core.vehicle.time_limits import FlightLimits
 from mavproxy_uavapi.core.vehicle.travelling import TravellingVehicle
 
-RADIUS = 2.0  # m; WP_RADIUS until the vehicle has told its own
-SPEED = 2.0  # m/s; CRUISE_SPEED until it has told its own
-AT_HOME = 2.0  # waypoint radii from home in which a rover that returned has stopped
+RADIUS = 2.0  # m; used until WP_RADIUS is known
+SPEED = 2.0  # m/s; used until CRUISE_SPEED is known
+AT_HOME = 2.0  # waypoint radii from home within which a returned rover stops
 STOP_TIMEOUT = 20.0  # s from full speed to rest
 
 
 class Rover(TravellingVehicle):
-    """A ground rover or boat. Altitudes mean nothing to it."""
+    """A ground rover or boat. It ignores altitudes."""
 
     holding_mode = "HOLD"
 
     def require_guided_flight(self) -> None:
-        """Raises NotArmed or ModeChanged unless it is armed in GUIDED."""
+        """Raise NotArmed or ModeChanged unless it is armed in GUIDED."""
         self.require_armed()
         self.require_mode(GUIDED)
 
     def leg_to(self, target: NedTarget | GlobalTarget) -> tuple[float, float, float]:
-        """Metres north and east from here to `target`; it lies as high."""
+        """Metres north and east from here to `target`, and 0 down."""
         north, east, _ = super().leg_to(target)
         return north, east, 0.0
 
     @property
     def standstill(self) -> Target:
-        """The place where it is: a velocity of 0 has a direction for a rover, and it might turn."""
+        """Its present place: for a rover even a velocity of 0 has a direction, and it might turn."""
         return self.ned_from_here(0, 0, 0)
 
     async def limits(self) -> FlightLimits:
-        """Its speed, for deadlines; asked for where it is not known."""
-        told = await self.parameters.read([("WP_SPEED",), ("CRUISE_SPEED",)])
-        cruise = told.get("WP_SPEED") or told.get("CRUISE_SPEED") or SPEED
+        """Its speed, for deadlines; it requests it if it is unknown."""
+        parameters = await self.parameters.read([("WP_SPEED",), ("CRUISE_SPEED",)])
+        cruise = parameters.get("WP_SPEED") or parameters.get("CRUISE_SPEED") or SPEED
         return time_limits.limits({"WP_SPD": cruise, "WP_ACC": 1.0}, self.speeds.in_force)
 
     async def _radius(self) -> float:
-        """Metres from a waypoint at which the autopilot calls it reached, and stops."""
+        """The distance (m) from a waypoint at which the autopilot counts it as reached, and stops."""
         return (await self.parameters.read([("WP_RADIUS",)])).get("WP_RADIUS", RADIUS)
 
     async def go_to(
@@ -60,14 +60,15 @@ class Rover(TravellingVehicle):
     ) -> None:
         """Drive to a position; with `wait`, done when it has stopped there.
 
-        It is there within `tolerance` m, or its parameter WP_RADIUS if that is more. It always looks where it goes.
+        It has arrived within `tolerance` m, or WP_RADIUS if that is more. It always points in the direction of
+        travel.
         """
         self.require_guided_flight()
-        there = max(tolerance, await self._radius()) if wait else tolerance
-        await super().go_to(job, target, wait=wait, tolerance=there, timeout=timeout)
+        radius = max(tolerance, await self._radius()) if wait else tolerance
+        await super().go_to(job, target, wait=wait, tolerance=radius, timeout=timeout)
 
     async def rtl(self, job: Job, timeout: float | None = None) -> None:
-        """Return to launch; done when it has stopped there. Disarmed at home there is nothing to do."""
+        """Return to launch; done when it has stopped there. A disarmed rover at home has nothing to do."""
         self.authority.take(job, Rank.STOP)
         if await self.is_done_at_home():
             return
@@ -90,7 +91,7 @@ class Rover(TravellingVehicle):
             NotArmed: there is nothing to stop.
         """
         if self.authority.on_its_way and not self.state.armed:
-            self.authority.take(job, Rank.STOP)  # an arm that waits ends
+            self.authority.take(job, Rank.STOP)  # a waiting arm ends
         self.require_armed()
         await self.hold(job)
         await self.flown(
@@ -113,10 +114,10 @@ class Rover(TravellingVehicle):
             return False
 
     async def set_reverse(self, job: Job, reverse: bool) -> None:
-        """Drive backwards from now on, or forwards again; a change of mode ends it.
+        """Drive backwards, or forwards again; a change of mode ends it.
 
         Raises:
-            Busy: the autopilot would forget it: it is in no mode that drives by itself.
+            Busy: it is in a mode that does not drive by itself, so the autopilot would forget it.
         """
         self.require_armed()
         if self.mode == self.holding_mode:

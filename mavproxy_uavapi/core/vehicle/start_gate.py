@@ -1,6 +1,6 @@
-"""Several verbs that begin together or not at all: each waits before its first message until all of them can send.
+"""Several verbs that begin together or not at all: each waits before its first message until all can send.
 
-By then each has passed its own checks. A verb finds its place at a gate in the context of its task.
+Each has then passed its own checks. A verb finds its place at a gate in the context of its task.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from mavproxy_uavapi.core.errors import Aborted, UavApiError
 
 
 class StartGate:
-    """Opens when every verb has come, and for none of them once one has failed.
+    """Opens when every verb has arrived; stays closed if one has failed.
 
     Args:
         count: how many verbs there are.
@@ -27,10 +27,10 @@ class StartGate:
 
     @contextmanager
     def place(self, name: str) -> Iterator[None]:
-        """A verb's place: what runs in this context, and tasks that begin in it, wait at the gate.
+        """A verb's place: code in this context, and tasks that begin in it, wait at the gate.
 
         Args:
-            name: of the verb's vehicle, for the others' error.
+            name: the verb's vehicle, for the error of the others.
         """
         place = _Place(self)
         token = _place.set(place)
@@ -44,7 +44,7 @@ class StartGate:
             _place.reset(token)
 
     def came(self, failure: str | None) -> None:
-        """One verb has come, or failed before it could."""
+        """One verb has arrived, or has failed before."""
         if self._decided.is_set():
             return
         self._missing -= 1
@@ -53,7 +53,7 @@ class StartGate:
             self._decided.set()
 
     async def passed(self) -> None:
-        """Wait until it is decided.
+        """Wait for the decision.
 
         Raises:
             Aborted: one verb has failed.
@@ -82,7 +82,7 @@ _place: contextvars.ContextVar[_Place | None] = contextvars.ContextVar("place", 
 
 
 async def pass_gate() -> None:
-    """Wait for the others, where the present verb has a place at a gate; to be called before what it checks to send.
+    """Wait for the other verbs, if the present verb has a place at a gate; called before the checks for a message.
 
     Raises:
         Aborted: another verb of the gate has failed.

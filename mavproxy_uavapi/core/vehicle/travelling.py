@@ -19,7 +19,7 @@ REST_TIMEOUT = 10.0  # s
 
 
 class TravellingVehicle(GuidedVehicle):
-    """A vehicle that takes velocities in GUIDED, and can stand still there."""
+    """A vehicle that takes velocities in GUIDED and can stand still there."""
 
     @property
     def standstill(self) -> Target:
@@ -37,8 +37,8 @@ class TravellingVehicle(GuidedVehicle):
     ) -> None:
         """Fly at a velocity: one setpoint, which the autopilot drops after GUID_TIMEOUT.
 
-        `heading` is where to point, degrees clockwise from north.
-        With `duration` (s of the vehicle's clock) the setpoint is repeated for so long, then a stop is sent.
+        `heading` is the direction to point, degrees clockwise from north. With `duration` (s on the vehicle's clock)
+        the setpoint is repeated for that time, then a stop is sent.
         """
         self.require_guided_flight()
         self.authority.take(job, Rank.MOVEMENT)
@@ -56,7 +56,7 @@ class TravellingVehicle(GuidedVehicle):
             await self.send_setpoint(job, velocity if remaining > 0 else self.standstill, yaw)
 
     async def _travelled(self, seconds: float) -> None:
-        """Let `seconds` of the vehicle's clock pass while it stays armed and in GUIDED."""
+        """Let `seconds` on the vehicle's clock pass while it stays armed and in GUIDED."""
         clock = self.state.time_ratio
         ends_at = clock.boot_time(self.clock()) + seconds
         while (remaining := ends_at - clock.boot_time(self.clock())) > 0:
@@ -67,12 +67,12 @@ class TravellingVehicle(GuidedVehicle):
                 )
 
     async def rest(self, job: Job) -> None:
-        """Stop by setpoints in GUIDED, sent until telemetry shows that it stands still.
+        """Stop by setpoints in GUIDED, until telemetry shows that it stands still.
 
         A setpoint may be lost, and a climb begins slowly, so the vehicle must stand still for REST_SHOWN s.
 
         Raises:
-            TimedOut: it goes on moving.
+            TimedOut: it still moves.
         """
         deadline = self.clock() + REST_TIMEOUT
         still_since = self.clock()
@@ -87,7 +87,7 @@ class TravellingVehicle(GuidedVehicle):
 
     @property
     def stands_still(self) -> bool:
-        """Whether fresh telemetry shows that it hardly moves."""
+        """Whether fresh telemetry shows almost no movement."""
         try:
             return self.speed_by(NedTarget(0, 0, 0)) <= ARRIVAL_SPEED
         except Stale:

@@ -20,7 +20,7 @@ class TurningVehicle(TravellingVehicle):
     """A vehicle that turns on the spot."""
 
     async def set_heading(self, job: Job, heading: float, timeout: float | None = None) -> None:
-        """Turn to `heading` degrees clockwise from north, the shorter way round; done when the attitude shows it.
+        """Turn to `heading` degrees clockwise from north by the shorter way; done when the attitude shows it.
 
         A movement goes on.
         """
@@ -35,7 +35,7 @@ class TurningVehicle(TravellingVehicle):
             job.progress = {"degrees_to_go": round(degrees_to_go, 1)}
             return True if degrees_to_go <= HEADING_TOLERANCE else None
 
-        if not self.state.landed:  # on the ground it turns when it has taken off
+        if not self.state.landed:  # on the ground it turns only after takeoff
             allowed = self.allowed(180.0 / SLOWEST_TURN, timeout)
             await self.flown(GUIDED, {"ATTITUDE"}, turned, allowed, f"turn to {heading:g} degrees")
 
@@ -54,8 +54,8 @@ class TurningVehicle(TravellingVehicle):
         least, share = RATE_TOLERANCE
 
         def turns() -> bool | None:
-            shown = math.degrees(self.fresh("ATTITUDE").yawspeed)
-            return True if abs(shown - rate) <= max(least, share * abs(rate)) else None
+            yaw_rate = math.degrees(self.fresh("ATTITUDE").yawspeed)
+            return True if abs(yaw_rate - rate) <= max(least, share * abs(rate)) else None
 
         allowed = self.allowed(abs(rate) / SLOWEST_TURN, timeout)
         await self.flown(GUIDED, {"ATTITUDE"}, turns, allowed, f"turn at {rate:g} deg/s")

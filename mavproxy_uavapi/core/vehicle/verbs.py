@@ -1,4 +1,4 @@
-"""What can be asked of a vehicle that not every type has. A type overrides the verbs that it has."""
+"""The verbs that not every type of vehicle has. A type overrides those that it has."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from mavproxy_uavapi.core.vehicle.messages import GlobalTarget, NedTarget, Veloc
 
 
 class Verbs(BaseVehicle):
-    """The verbs that a type of vehicle may lack: each raises NotSupported until a type overrides it."""
+    """The verbs that a type of vehicle may lack; each raises NotSupported unless the type overrides it."""
 
     @classmethod
     def has(cls, verb: str) -> bool:
@@ -22,7 +22,7 @@ class Verbs(BaseVehicle):
         return NotSupported(f"a {self.kind} does not have `{verb}`")
 
     async def takeoff(self, job: Job, alt: float, *, vtol: bool = False, timeout: float | None = None) -> None:
-        """Climb from the ground to `alt` m above home; with `vtol` vertically, where a plane can do both."""
+        """Climb from the ground to `alt` m above home; with `vtol` vertically, if a plane can do both."""
         raise self.lacks("takeoff")
 
     async def land(self, job: Job, timeout: float | None = None) -> None:
@@ -42,7 +42,7 @@ class Verbs(BaseVehicle):
         raise self.lacks("brake")
 
     async def stop(self, job: Job) -> None:
-        """Stop what it does, and stay."""
+        """Stop the present movement, and stay."""
         raise self.lacks("stop")
 
     async def resume(self, job: Job) -> None:
@@ -64,7 +64,7 @@ class Verbs(BaseVehicle):
         raise self.lacks("go_to")
 
     def require_guided_flight(self) -> None:
-        """Raises NotArmed, ModeChanged or Busy unless it takes movements now."""
+        """Raise NotArmed, ModeChanged or Busy unless it accepts movements now."""
         raise self.lacks("go_to")
 
     def ned_from_here(self, x: float, y: float, z: float) -> NedTarget:
@@ -73,12 +73,12 @@ class Verbs(BaseVehicle):
         return NedTarget(here.x + x, here.y + y, here.z + z)
 
     def body_from_here(self, front: float, right: float, down: float) -> NedTarget:
-        """The target `front`, `right`, `down` m from here, by the heading that the vehicle has now."""
+        """The target `front`, `right`, `down` m from here, by the present heading."""
         north, east = rotate(front, right, self.fresh("ATTITUDE").yaw)
         return self.ned_from_here(north, east, down)
 
     def velocity_by_heading(self, front: float, right: float, down: float) -> VelocityTarget:
-        """The velocity `front`, `right`, `down` in m/s, by the heading that the vehicle has now."""
+        """The velocity `front`, `right`, `down` in m/s, by the present heading."""
         return VelocityTarget(*rotate(front, right, self.fresh("ATTITUDE").yaw), down)
 
     async def travel(
@@ -90,7 +90,7 @@ class Verbs(BaseVehicle):
         heading: float | None = None,
         duration: float | None = None,
     ) -> None:
-        """Move at a velocity, for `duration` s of the vehicle's clock."""
+        """Move at a velocity, for `duration` s on the vehicle's clock."""
         raise self.lacks("travel")
 
     async def set_heading(self, job: Job, heading: float, timeout: float | None = None) -> None:
@@ -102,5 +102,5 @@ class Verbs(BaseVehicle):
         raise self.lacks("set_yaw_rate")
 
     async def set_reverse(self, job: Job, reverse: bool) -> None:
-        """Drive backwards from now on, or forwards again."""
+        """Drive backwards, or forwards again."""
         raise self.lacks("set_reverse")
