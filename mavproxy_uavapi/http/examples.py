@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from mavproxy_uavapi.http import requests
-from mavproxy_uavapi.http.fleet import FleetRequest
 from mavproxy_uavapi.http.parameters import NewValue
 from mavproxy_uavapi.http.telemetry_views import SENSORS
 
@@ -59,7 +58,6 @@ REQUESTS: Mapping[type[requests.Request], Mapping[str, Any]] = {
     requests.Takeoff: {"alt": 10},
     requests.LandAt: {"lat": -35.3629, "long": 149.1652},
     requests.Reverse: {"reverse": True},
-    FleetRequest: {"vehicles": [1], "each": {"1": {}}, "all_or_none": False},
     NewValue: {"value": 500},
     requests.ModeName: {"mode": "LOITER"},
     requests.NewSpeed: {"new_v": 5},

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import functools
 from collections.abc import Iterable, Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from aiohttp import web
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict, Field, create_model
 
 from mavproxy_uavapi.core.errors import Invalid, UavApiError, without_frames
 from mavproxy_uavapi.core.vehicle.start_gate import StartGate
 from mavproxy_uavapi.http.auditing import audited
 from mavproxy_uavapi.http.call import Call
-from mavproxy_uavapi.http.requests import Request, parse
+from mavproxy_uavapi.http.requests import Empty, Request, parse
 from mavproxy_uavapi.http.responses import MULTI_STATUS, dumps, reason
 from mavproxy_uavapi.http.route import POST, Route
 from mavproxy_uavapi.http.router import Match
@@ -30,6 +31,7 @@ class FleetRequest(Request):
     """
 
     model_config = ConfigDict(extra="allow", allow_inf_nan=False)
+    verb: ClassVar[type[Request]] = Empty  # what the verb itself takes
     vehicles: Annotated[list[System] | Literal["all"], Field(description="system ids, or all")] = "all"
     each: Annotated[dict[str, dict[str, Any]], Field(description="by system id: other values for one vehicle")] = {}
     all_or_none: Annotated[bool, Field(description="nothing is sent unless every vehicle can begin")] = False
@@ -38,6 +40,14 @@ class FleetRequest(Request):
 def fleet_routes(routes: Iterable[Route]) -> list[Route]:
     """A route /fleet/… for each verb of the vehicles."""
     return [_fleet_route(route) for route in routes if route.job]
+
+
+@functools.cache
+def _model_for(verb: type[Request]) -> type[FleetRequest]:
+    """The fleet's request for a verb with such parameters."""
+    model = create_model(f"Fleet{verb.__name__}", __base__=FleetRequest, __doc__=FleetRequest.__doc__)
+    model.verb = verb
+    return model
 
 
 def _fleet_route(route: Route) -> Route:
@@ -51,7 +61,7 @@ def _fleet_route(route: Route) -> Route:
     200 if every vehicle has done it, else 207; `vehicles` has the answer of each.
     """
     # The call of each vehicle is in the audit trail.
-    return Route(f"/fleet/{name}", action, FleetRequest, POST, stops=route.stops, trail=False)
+    return Route(f"/fleet/{name}", action, _model_for(route.model), POST, stops=route.stops, trail=False)
 
 
 async def _command(call: Call, route: Route) -> web.StreamResponse:

@@ -18,6 +18,7 @@ from mavproxy_uavapi.core import errors
 from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.vehicle.registry import CLASSES
 from mavproxy_uavapi.http import examples, requests
+from mavproxy_uavapi.http.fleet import FleetRequest
 from mavproxy_uavapi.http.route import Route
 
 ABOUT = """\
@@ -234,6 +235,8 @@ def errors_of(route: Route) -> list[type[UavApiError]]:
 
 def example_of(model: type[requests.Request]) -> dict[str, Any]:
     """Example values that the model accepts."""
+    if issubclass(model, FleetRequest):
+        return {"vehicles": [1], **example_of(model.verb)}
     example = examples.REQUESTS.get(model)
     if example is not None:
         return dict(example)
