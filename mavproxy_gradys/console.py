@@ -1,4 +1,4 @@
-"""What the prompt shows. Pure: it makes text of the report that `GET /gradys/status` answers."""
+"""The texts at the prompt, made from the report of `GET /gradys/status`. Pure."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def status(report: Report) -> str:
 
 
 def station_lines(station: Report) -> list[str]:
-    """A ground station, and each vehicle that it is told of."""
+    """A ground station, and each vehicle whose positions it gets."""
     dropped = station["dropped_by_station"]
     lines = [
         f"ground station {station['station']}: {station['sent']} sent, {station['acknowledged']} acknowledged"
@@ -40,7 +40,7 @@ def station_lines(station: Report) -> list[str]:
 
 
 def vehicle_line(vehicle: Report) -> str:
-    """What became of one vehicle's updates."""
+    """The outcome of one vehicle's updates."""
     if vehicle["why_not"]:
         return f"nothing to say: {vehicle['why_not']} (next is {vehicle['seq']})"
     age = vehicle["acknowledged_age_s"]
@@ -49,7 +49,7 @@ def vehicle_line(vehicle: Report) -> str:
 
 
 def error_lines(report: Report) -> list[str]:
-    """The last error of a station or sink, and when it is tried again."""
+    """The last error of a station or sink, and the time to the next try."""
     lines = []
     if report["last_error"]:
         age = report.get("last_error_age_s")
@@ -84,7 +84,7 @@ def readings_lines(report: Report) -> list[str]:
 
 
 def spool_lines(spool: Report) -> list[str]:
-    """What is to be said of the spool."""
+    """The state of the spool."""
     lines = [f"  kept in {spool['file']}"]
     if spool["problem"]:
         lines.append(f"  NOT KEPT just now: {spool['problem']}")
@@ -96,14 +96,14 @@ def spool_lines(spool: Report) -> list[str]:
 
 
 def trips(summary: Mapping[str, float] | None) -> str:
-    """Round-trip times, as the tail of a line."""
+    """Round-trip times, as the end of a line."""
     if summary is None:
         return ""
     return f"; round trip {summary['last']:.1f} ms (median {summary['median']:.1f}, p95 {summary['p95']:.1f})"
 
 
 def stats(report: Report) -> str:
-    """A table: one row for each station and vehicle."""
+    """A table with one row per station and vehicle."""
     head = ("station", "vehicle", "sent", "acked", "dropped", "failed", "withheld", "seq")
     rows = [
         (

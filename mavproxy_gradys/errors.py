@@ -1,7 +1,7 @@
 """The errors of this module, branches of the one tree in `mavproxy_uavapi.core.errors`.
 
 Unavailable                503
-|- NoFix                   503 no_fix        the vehicle does not know where it is
+|- NoFix                   503 no_fix        the vehicle does not know its position
 |- NotStored               503 not_stored    the spool cannot take readings just now
 `- NotDelivered            503 not_delivered a station, receiver or broker did not take what was sent
 """
@@ -12,7 +12,7 @@ from mavproxy_uavapi.core.errors import Unavailable
 
 
 class NoFix(Unavailable):
-    """The vehicle has no position fix: there is nothing to tell."""
+    """The vehicle has no position fix, so there is nothing to send."""
 
     code = "no_fix"
 
@@ -24,12 +24,12 @@ class NotStored(Unavailable):
 
 
 class NotDelivered(Unavailable):
-    """What was sent was not taken.
+    """The data sent was not accepted.
 
     Attributes:
-        reached: whether somebody answered at all; if not, the next one need not be tried either.
-        too_large: whether it was refused for its size.
-        for_content: whether something else, or less of it, may be taken.
+        reached: whether anybody answered; if not, there is no need to try the next one.
+        too_large: whether it was refused because of its size.
+        for_content: whether other or less data may be accepted.
     """
 
     code = "not_delivered"

@@ -1,4 +1,4 @@
-"""What the module answers over HTTP while uavapi is loaded: /gradys/status, /gradys/readings, /mission/fly-track."""
+"""The module's endpoints while uavapi is loaded: /gradys/status, /gradys/readings, /mission/fly-track."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from mavproxy_uavapi.core.errors import Invalid, NoVehicle
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.http.extension import EITHER, POST, Answer, Call, Empty, Request, Route
 
-MOST_READINGS = 1000  # in one request
+MOST_READINGS = 1000  # readings in one request
 LONGEST_LIST = 64
-VEHICLE = re.compile(rf"{device_of(0)[:-1]}[0-9]+")  # what vehicles are called as devices
+VEHICLE = re.compile(rf"{device_of(0)[:-1]}[0-9]+")  # the device names of vehicles
 Name = Annotated[str, Field(pattern=rf"^{NAME}$", description="letters, digits, _ . -")]
 
 
 def checked(value: Any) -> Value:
-    """A measured value, as it came.
+    """A measured value, unchanged.
 
     Raises:
-        ValueError: none that can be told.
+        ValueError: the value cannot be sent.
     """
     if isinstance(value, bool) or is_number(value) or (isinstance(value, str) and len(value) <= LONGEST_TEXT):
         return value  # type: ignore[no-any-return]
@@ -42,14 +42,14 @@ def checked(value: Any) -> Value:
 
 
 def is_number(value: Any) -> bool:
-    """Whether that is a finite number, and an integer one of 64 bits."""
+    """Whether the value is a finite number; an integer must fit into 64 bits."""
     if isinstance(value, float):
         return math.isfinite(value)
     return isinstance(value, int) and not isinstance(value, bool) and -(2**63) <= value < 2**63
 
 
 class OneReading(Request):
-    """A measurement; `time` is s since 1970, by default now; `sysid` the vehicle that it belongs to."""
+    """A measurement; `time` is s since 1970, by default now; `sysid` is the vehicle that it belongs to."""
 
     quantity: Name
     value: Annotated[Any, BeforeValidator(checked)]
@@ -60,25 +60,25 @@ class OneReading(Request):
 
 
 class Readings(Request):
-    """One measurement, or `readings`: several."""
+    """One measurement, or several in `readings`."""
 
     readings: Annotated[list[OneReading], Field(min_length=1, max_length=MOST_READINGS)]
 
     @model_validator(mode="before")
     @classmethod
-    def one_or_several(cls, given: Any) -> Any:
-        """Take a single measurement for a list of one."""
-        return given if not isinstance(given, dict) or "readings" in given else {"readings": [given]}
+    def one_or_several(cls, value: Any) -> Any:
+        """Treat a single measurement as a list of one."""
+        return value if not isinstance(value, dict) or "readings" in value else {"readings": [value]}
 
 
 class GradysHandlers:
-    """Answers, by the module's service."""
+    """The actions of the routes."""
 
     def __init__(self, gradys: Gradys) -> None:
         self._gradys = gradys
 
     def routes(self) -> list[Route]:
-        """The routes that uavapi is to serve."""
+        """The routes."""
         return [
             Route("/gradys/status", self.status, Empty),
             Route("/gradys/readings", self.readings, Readings, POST),
@@ -87,7 +87,7 @@ class GradysHandlers:
         ]
 
     async def status(self, call: Call) -> dict[str, Any]:
-        """What was pushed and spooled, and what became of it."""
+        """The counts of pushes and readings, and their outcomes."""
         return {"device": "uav", "id": self._id(call), "result": "Success", "info": self._gradys.report()}
 
     async def flush(self, call: Call) -> dict[str, Any]:
@@ -96,10 +96,10 @@ class GradysHandlers:
         return {"device": "uav", "id": self._id(call), "result": "Everything is tried now"}
 
     async def readings(self, call: Call) -> dict[str, Any]:
-        """Keep measurements of a program on the companion computer; answered when they are on the disk."""
+        """Store measurements of a program on the companion computer; answers when they are on the disk."""
         now = time.time()
-        found = [self._reading(call, given, now) for given in call.params(Readings).readings]
-        numbers = await self._gradys.pipeline.keep(found)
+        readings = [self._reading(call, reading, now) for reading in call.params(Readings).readings]
+        numbers = await self._gradys.pipeline.keep(readings)
         plural = "" if len(numbers) == 1 else "s"
         return {
             "device": "uav",
@@ -110,23 +110,23 @@ class GradysHandlers:
 
     async def fly_track(self, call: Call) -> Answer:
         """Take off, fly through a track's places, return and land."""
-        given = call.params(TrackRequest)
-        call.remembered = TrackFile.of(given)
-        places = await asyncio.to_thread(places_of, given.track, given.ground)
-        flight = flight_of(call.vehicle, places, given.reach, given.transit)
+        track_request = call.params(TrackRequest)
+        call.remembered = TrackFile.of(track_request)
+        places = await asyncio.to_thread(places_of, track_request.track, track_request.ground)
+        flight = flight_of(call.vehicle, places, track_request.reach, track_request.transit)
 
         async def verb(job: Job) -> None:
             await self._gradys.tracks.fly(flight, job)
 
         return await call.fly(flight.copter, verb, lambda: flight.result)
 
-    def _reading(self, call: Call, given: OneReading, now: float) -> Reading:
-        system = given.sysid or call.seen.state.system
-        at = now if given.time is None else given.time
-        device = given.device or device_of(system)
-        if given.quantity in self._gradys.pipeline.reserved and VEHICLE.fullmatch(device):
-            raise Invalid(f"{given.quantity} of {device} is told by the vehicle itself", "quantity")
-        return Reading(device, system, given.quantity, given.representation, given.value, at)
+    def _reading(self, call: Call, request: OneReading, now: float) -> Reading:
+        system = request.sysid or call.seen.state.system
+        at = now if request.time is None else request.time
+        device = request.device or device_of(system)
+        if request.quantity in self._gradys.pipeline.reserved and VEHICLE.fullmatch(device):
+            raise Invalid(f"{request.quantity} of {device} is told by the vehicle itself", "quantity")
+        return Reading(device, system, request.quantity, request.representation, request.value, at)
 
     def _id(self, call: Call) -> str | None:
         try:

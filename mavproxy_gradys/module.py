@@ -25,7 +25,7 @@ from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 NAME = "gradys"
 log = logging.getLogger("gradys.spool")
-LONGEST_END = 3.0  # s that MAVProxy waits for it to end
+LONGEST_END = 3.0  # s that MAVProxy waits for the module's end
 COMPLETIONS = [
     "<status|stats|start|stop|flush|config|help>",
     "set (GRADYSSETTING)",
@@ -67,7 +67,7 @@ class GradysModule(SharedModule[GradysSettings]):
         )
         self.gradys = Gradys(self.host)
         self._background = BackgroundCommands(self.host, NAME)
-        self._lost = ""  # what the end found unwritten
+        self._lost = ""  # what was still unwritten at the end
         self._track = TrackConsole(self.host, self.gradys.tracks)
         self._routes = GradysHandlers(self.gradys).routes()
         self.remembered.keep(self.module_settings.shown)
@@ -80,7 +80,7 @@ class GradysModule(SharedModule[GradysSettings]):
         self._start()
 
     async def end(self) -> None:
-        """End it."""
+        """Stop pushing and sensing."""
         for route in self._routes:
             if self.host.extensions.get(route.path) is route:
                 del self.host.extensions[route.path]
@@ -97,7 +97,7 @@ class GradysModule(SharedModule[GradysSettings]):
         await self._background.close()
 
     def unload(self) -> None:
-        """Give back what is ours alone, then the rest; say what is lost."""
+        """Release our own resources, then the shared ones; print what is lost."""
         try:
             super().unload()
         finally:
@@ -105,14 +105,14 @@ class GradysModule(SharedModule[GradysSettings]):
                 print(f"gradys: {self._lost}")
 
     def command(self, args: list[str]) -> None:
-        """The module's command at the prompt; most of it needs the asyncio thread."""
+        """The module's command at the prompt; most commands need the asyncio thread."""
         if self._begun or args[:1] in (["set"], ["config"], ["help"]):
             super().command(args)
         else:
             print("gradys: MAVProxy is still starting")
 
     def _show(self, tell: Callable[[dict[str, Any]], str]) -> None:
-        """Print what `tell` makes of the report; the state belongs to the asyncio thread."""
+        """Print the text that `tell` makes of the report; the state belongs to the asyncio thread."""
 
         async def report() -> dict[str, Any]:
             return self.gradys.report()
@@ -146,7 +146,7 @@ class GradysModule(SharedModule[GradysSettings]):
         self._track.command(args)
 
     def use_settings(self, name: str, before: GradysSettings, after: GradysSettings) -> None:
-        """Push and sense with them."""
+        """Push and sense with the new settings."""
 
         async def restart() -> str:
             return told(after) if await self.gradys.restart(after) else ""
@@ -155,7 +155,7 @@ class GradysModule(SharedModule[GradysSettings]):
 
 
 def told(settings: GradysSettings) -> str:
-    """Which stations are told."""
+    """A line with the stations that get positions."""
     urls = ", ".join(station.url for station in settings.gs)
     return f"telling {urls}" if urls else "no ground station is set; `gradys set gs HOST:PORT`"
 
@@ -164,8 +164,8 @@ def init(mpstate: Any, **kwargs: Any) -> GradysModule:
     """MAVProxy calls this on `module load gradys`, or `gradys:{"gs":"10.0.0.5:8000"}`.
 
     Raises:
-        ImportError: a setting that does not exist or a value that it does not take; MAVProxy reports this
-            kind of error in one line, and goes on.
+        ImportError: a setting does not exist or its value is wrong; MAVProxy reports this kind of error in one line,
+        and goes on.
     """
     try:
         return GradysModule(mpstate, kwargs)

@@ -1,4 +1,4 @@
-"""Where a vehicle is, where that can be told at all. Pure: the clock is an argument."""
+"""The position of a vehicle, if it is known. Pure: the clock is an argument."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ RECEIVERS = ("GPS_RAW_INT", "GPS2_RAW")
 
 @dataclass(frozen=True)
 class Position:
-    """Where a vehicle is: degrees, m above home, and the age of that (s)."""
+    """A vehicle's position: degrees, m above home, and its age (s)."""
 
     lat: float
     lng: float
@@ -28,17 +28,17 @@ class Position:
 def position_of(
     state: VehicleState, now: float, *, max_age: float, link_timeout: float, has_position: bool
 ) -> Position:
-    """The vehicle's position, if there is one to tell.
+    """The vehicle's position, if it is known.
 
     Args:
-        state: the vehicle's.
-        now: on the clock of arrivals (s).
-        max_age: s after which a position is too old to be told as new.
+        state: the vehicle's state.
+        now: s, on the clock of arrivals.
+        max_age: s after which a position is too old to be sent as new.
         link_timeout: s without a heartbeat after which the link is lost.
-        has_position: its estimator's word, for a vehicle without a satellite receiver.
+        has_position: whether the estimator has a position, for a vehicle without a satellite receiver.
 
     Raises:
-        LinkLost, Stale, NoFix: there is none; the text says why.
+        LinkLost, Stale, NoFix: there is no position; the text gives the reason.
     """
     silent_for = now - state.heartbeat_at
     if silent_for >= link_timeout:
@@ -50,17 +50,17 @@ def position_of(
     if age > max_age:
         raise Stale(f"the position of vehicle {state.system} is {age:.1f} s old")
     require_fix(state, now, max_age, has_position)
-    told = received.message
-    if not (told.lat or told.lon) or abs(told.lat) > 90e7 or abs(told.lon) > 180e7:
+    message = received.message
+    if not (message.lat or message.lon) or abs(message.lat) > 90e7 or abs(message.lon) > 180e7:
         raise NoFix(f"vehicle {state.system} does not know where it is")
-    return Position(told.lat / 1e7, told.lon / 1e7, told.relative_alt / 1000, age)
+    return Position(message.lat / 1e7, message.lon / 1e7, message.relative_alt / 1000, age)
 
 
 def require_fix(state: VehicleState, now: float, max_age: float, has_position: bool) -> None:
-    """Raises NoFix unless a receiver that tells has a 3D fix, or there is none and the estimator has a position."""
+    """Raise NoFix unless a receiver reports a 3D fix, or without a receiver the estimator has a position."""
     ages = {name: state.age(name, now) for name in RECEIVERS}
-    told = [state.field(name, "fix_type") for name, age in ages.items() if age is not None and age <= max_age]
-    fixes = [fix for fix in told if fix not in (None, mavlink.GPS_FIX_TYPE_NO_GPS)]
+    fix_types = [state.field(name, "fix_type") for name, age in ages.items() if age is not None and age <= max_age]
+    fixes = [fix for fix in fix_types if fix not in (None, mavlink.GPS_FIX_TYPE_NO_GPS)]
     fixed = max(fixes) >= mavlink.GPS_FIX_TYPE_3D_FIX if fixes else has_position
     if not fixed:
         raise NoFix(f"vehicle {state.system} has no position fix")

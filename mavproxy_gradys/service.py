@@ -1,4 +1,4 @@
-"""The module as one thing that is started and stopped: its pushers, its pipeline, its senders."""
+"""The module as a whole: its pushers, its pipeline, its senders."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from mavproxy_uavapi.core.host import Host
 
 
 class Gradys:
-    """Everything of gradys that lives in the asyncio thread; so do all its methods.
+    """The part of gradys in the asyncio thread; all its methods belong to that thread.
 
     Attributes:
-        stations: what became of the updates, by station; it outlives a stop and a start.
+        stations: the outcomes of the updates, by station; kept across a stop and a start.
         pipeline: readings, their spool and their sinks.
-        tracks: what is recorded, and what is flown.
+        tracks: the recordings and the flights of tracks.
     """
 
     def __init__(self, host: Host) -> None:
@@ -35,7 +35,7 @@ class Gradys:
         self.settings: GradysSettings | None = None
         self._pushers: list[Pusher] = []
         self._tasks = HeldTasks()
-        self._changing = asyncio.Lock()  # a start waits for the stop before it, which may take its time
+        self._changing = asyncio.Lock()  # a start waits for the previous stop, which may take long
 
     @property
     def running(self) -> bool:
@@ -43,7 +43,7 @@ class Gradys:
         return self.settings is not None
 
     async def start(self, settings: GradysSettings) -> None:
-        """Push and sense as the settings say; does nothing when it does so already.
+        """Push and sense according to the settings; does nothing if it already does.
 
         Raises:
             NotDelivered: the CA file cannot be used.
@@ -69,15 +69,15 @@ class Gradys:
         return tally
 
     async def stop(self) -> None:
-        """End it; what is not acknowledged stays in the spool."""
+        """Stop; unacknowledged readings stay in the spool."""
         async with self._changing:
             await self._stop()
 
     async def restart(self, settings: GradysSettings) -> bool:
-        """Take up other settings, if it runs; whether it does.
+        """Use other settings if it runs; returns whether it runs.
 
         Raises:
-            NotDelivered: as `start`; then it is stopped.
+            NotDelivered: as `start`; it is stopped then.
         """
         async with self._changing:
             if not self.running:
@@ -89,17 +89,17 @@ class Gradys:
     async def _stop(self, stop_pipeline: Callable[[], Awaitable[None]] | None = None) -> None:
         self.settings = None
         await self._tasks.end()
-        for pusher in self._pushers:  # also those that had not begun
+        for pusher in self._pushers:  # including those that had not begun
             await pusher.close()
         await (stop_pipeline or self.pipeline.stop)()
 
     async def close(self) -> None:
-        """End it for good; what the spool did not take is tried once more."""
+        """End it finally; readings that the spool has not taken are tried once more."""
         async with self._changing:
             await self._stop(self.pipeline.close)
 
     def flush(self) -> None:
-        """End all pauses after failures: everything is tried now."""
+        """End all pauses after failures, so that everything is tried now."""
         for tally in self.stations.values():
             tally.backoff.hurry()
             for vehicle in tally.vehicles.values():
@@ -107,7 +107,7 @@ class Gradys:
         self.pipeline.flush()
 
     def report(self) -> dict[str, Any]:
-        """What `GET /gradys/status` says."""
+        """The body of `GET /gradys/status`."""
         now = self.host.clock()
         current = [] if self.settings is None else [station.url for station in self.settings.gs]
         tallies = [self.stations[url] for url in current]

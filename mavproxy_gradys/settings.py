@@ -26,16 +26,16 @@ class GradysSettings:
     """A snapshot of the settings.
 
     Attributes:
-        gs: ground stations that are told where the vehicles are.
-        ip: HOST or HOST:PORT at which stations reach our API; empty for what is found out.
+        gs: ground stations that get the vehicles' positions.
+        ip: HOST or HOST:PORT at which stations reach our API; empty to find it out.
         period: s between updates.
-        max_age: s after which a position or a message is too old to be told as new.
-        timeout: s for an answer.
+        max_age: s after which a position or a message is too old to be sent as new.
+        timeout: s to wait for an answer.
         token: bearer token for stations and HTTP sinks; empty for none.
-        ca_file: certificates that TLS is checked by; empty for the system's.
-        sink: where readings go.
-        quantities: what is sampled.
-        spool: file in which readings are kept until they are acknowledged.
+        ca_file: certificates to check TLS with; empty for the system's.
+        sink: the receivers of readings.
+        quantities: the sampled quantities.
+        spool: file that keeps readings until they are acknowledged.
         spool_mb: its largest size (MB of readings); beyond it the oldest are dropped.
         spool_hours: age (h) after which readings are dropped.
     """
@@ -55,15 +55,15 @@ class GradysSettings:
 
 
 def default_spool() -> str:
-    """Where readings are kept when nothing else is said."""
+    """The default path of the spool."""
     return str(state_directory() / "gradys.db")
 
 
 def header_value(text: str) -> str:
-    """The text, if an HTTP header can hold it.
+    """The text, if it is valid in an HTTP header.
 
     Raises:
-        SettingError: it cannot.
+        SettingError: it is not.
     """
     if not (text.isascii() and (text.isprintable() or not text)):
         raise SettingError("it takes printable ASCII")
@@ -74,7 +74,7 @@ def spool_path(text: str) -> Path:
     """The spool's file; empty for the default.
 
     Raises:
-        SettingError: no file is called so.
+        SettingError: it is not a valid file name.
     """
     if not text.isprintable():
         raise SettingError("it takes a file's name in printable letters")
@@ -82,7 +82,7 @@ def spool_path(text: str) -> Path:
 
 
 class GradysModuleSettings(ModuleSettings[GradysSettings]):
-    """The settings of the loaded module; [api] of an INI file has the station, too, as `gradys_gs`."""
+    """The settings of the loaded module; [api] of an INI file may also have the station, as `gradys_gs`."""
 
     module = "gradys"
     secrets = frozenset({"token", "sink"})
@@ -123,10 +123,10 @@ class GradysModuleSettings(ModuleSettings[GradysSettings]):
         return GradysSettings(**values)
 
     def check(self, settings: GradysSettings, changed: Set[str]) -> None:
-        """Refuse certificates that TLS cannot be checked by.
+        """Refuse certificates that cannot check TLS.
 
         Raises:
-            SettingError: the file is missing, or holds something else.
+            SettingError: the file is missing, or is not a certificate file.
         """
         if "ca_file" in changed and settings.ca_file:
             try:
@@ -142,5 +142,5 @@ class GradysModuleSettings(ModuleSettings[GradysSettings]):
         yield from super().settings_in(ini)
 
     def shown(self, name: str) -> str:
-        """As any setting; of the sinks, all but their passwords."""
+        """As any setting; the sinks without their passwords."""
         return ",".join(map(str, self.snapshot().sink)) if name == "sink" else super().shown(name)

@@ -146,7 +146,7 @@ class ReadingPipeline:
         if sampler.quantity.name != POSITION or sampler.quantity.message:
             return sampler.sample(state, now, wall, max_age)
         try:
-            where = position_of(
+            position = position_of(
                 state,
                 now,
                 max_age=max_age,
@@ -157,7 +157,7 @@ class ReadingPipeline:
             sampler.skip(state.system, str(nothing))
             return None
         told_at = state.messages["GLOBAL_POSITION_INT"].at
-        return sampler.take(state.system, [where.lat, where.lng, where.alt], told_at, wall - where.age)
+        return sampler.take(state.system, [position.lat, position.lng, position.alt], told_at, wall - position.age)
 
     # -- what the status says -------------------------------------------------------------------------------
 

@@ -113,12 +113,12 @@ def parse_quantities(text: str) -> tuple[Quantity, ...]:
         SettingError: one cannot be read, or two have one name.
     """
     parts = [part for part in re.split(r"[,;\s]+(?![^\[\]]*\])", text.strip()) if part]
-    found = [parse_quantity(part) for part in parts]
-    names = [quantity.name for quantity in found]
+    quantities = [parse_quantity(part) for part in parts]
+    names = [quantity.name for quantity in quantities]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise SettingError(f"{', '.join(twice)} is there twice")
-    return tuple(found)
+    return tuple(quantities)
 
 
 def parse_quantity(text: str) -> Quantity:
@@ -130,9 +130,9 @@ def parse_quantity(text: str) -> Quantity:
     match = GRAMMAR.fullmatch(text)
     if match is None:
         raise SettingError(f"{text!r} is not NAME=MESSAGE.field*SCALE+OFFSET@PERIOD[REPRESENTATION]")
-    given = match.groupdict()
+    groups = match.groupdict()
     try:
-        numbers = [float(given[name] or default) for name, default in (("scale", 1), ("offset", 0), ("period", 1))]
+        numbers = [float(groups[name] or default) for name, default in (("scale", 1), ("offset", 0), ("period", 1))]
     except ValueError as error:
         raise SettingError(f"{text!r}: {error}") from error
     scale, offset, period = numbers
@@ -140,15 +140,15 @@ def parse_quantity(text: str) -> Quantity:
         raise SettingError(f"{text!r}: scale and offset are finite numbers")
     if not SHORTEST_PERIOD <= period <= LONGEST_PERIOD:
         raise SettingError(f"{text!r}: a period is {SHORTEST_PERIOD:g} to {LONGEST_PERIOD:g} s")
-    if given["message"] is None:
-        if given["name"] != POSITION:
+    if groups["message"] is None:
+        if groups["name"] != POSITION:
             raise SettingError(f"{text!r} names no message; {POSITION} alone is built in")
         return Quantity(POSITION, period=period, representation=POSITION_REPRESENTATION)
-    instance = "" if given["instance"] is None else f"[{given['instance']}]"
-    index = None if given["index"] is None else int(given["index"])
-    message, attribute = given["message"] + instance, given["attribute"]
-    representation = given["representation"] or ""
-    return Quantity(given["name"], message, attribute, index, scale, offset, period, representation)
+    instance = "" if groups["instance"] is None else f"[{groups['instance']}]"
+    index = None if groups["index"] is None else int(groups["index"])
+    message, attribute = groups["message"] + instance, groups["attribute"]
+    representation = groups["representation"] or ""
+    return Quantity(groups["name"], message, attribute, index, scale, offset, period, representation)
 
 
 @dataclass
@@ -211,18 +211,18 @@ class Sampler:
         self.why_not[system] = why
 
     def _value(self, message: Any) -> float | int | str | None:
-        found = getattr(message, self.quantity.attribute, None)
+        value = getattr(message, self.quantity.attribute, None)
         if self.quantity.index is not None:
-            found = _element(found, self.quantity.index)
-        if isinstance(found, str):
-            return found
-        if isinstance(found, bool) or not isinstance(found, int | float) or not math.isfinite(found):
+            value = _element(value, self.quantity.index)
+        if isinstance(value, str):
+            return value
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
             return None
         if self.quantity.scale == 1.0 and self.quantity.offset == 0.0:
-            return found
-        scaled = float(f"{found * self.quantity.scale + self.quantity.offset:.12g}")  # without 20.123000000000001
+            return value
+        scaled = float(f"{value * self.quantity.scale + self.quantity.offset:.12g}")  # without 20.123000000000001
         return scaled if math.isfinite(scaled) else None
 
 
-def _element(found: Any, index: int) -> Any:
-    return found[index] if isinstance(found, list | tuple) and index < len(found) else None
+def _element(values: Any, index: int) -> Any:
+    return values[index] if isinstance(values, list | tuple) and index < len(values) else None

@@ -51,8 +51,8 @@ def sink_addresses(text: str) -> tuple[SinkAddress, ...]:
     Raises:
         SettingError: one is no URL of a scheme that we know, no topic, or has an option that there is not.
     """
-    found = [sink_address(part.strip()) for part in text.split(",") if part.strip()]
-    return tuple({sink.name: sink for sink in found}.values())
+    addresses = [sink_address(part.strip()) for part in text.split(",") if part.strip()]
+    return tuple({sink.name: sink for sink in addresses}.values())
 
 
 def sink_address(text: str) -> SinkAddress:

@@ -150,9 +150,9 @@ class Spool:
 
     def _set_aside_damaged(self) -> None:
         """Move the rows that could not be read to a table of their own, of which the newest are kept."""
-        found, moved = sorted(self.damaged), 0
+        damaged_rows, moved = sorted(self.damaged), 0
         with self._transaction():
-            for seq in found:
+            for seq in damaged_rows:
                 moved += self._db.execute(
                     f"INSERT OR REPLACE INTO damaged SELECT {COLUMNS} FROM readings WHERE seq = ?", (seq,)
                 ).rowcount
@@ -179,18 +179,18 @@ class Spool:
 
     def _drop(self, cause: str, condition: str, limit: float) -> int:
         with self._transaction():
-            gone = self._db.execute(
+            dropped = self._db.execute(
                 "DELETE FROM readings WHERE seq IN (SELECT seq FROM readings ORDER BY seq LIMIT ?)"
                 f" AND {condition} RETURNING seq, CAST(size AS INTEGER)",
                 (DROPPED_AT_ONCE, limit),
             ).fetchall()
-            if gone:
-                self._db.execute("DELETE FROM acknowledged WHERE seq <= ?", (max(seq for seq, _ in gone),))
-                self._count_dropped(cause, len(gone))
-        if gone:
-            self._forget(size for _, size in gone)
-            self.dropped[cause] = self.dropped.get(cause, 0) + len(gone)
-        return len(gone)
+            if dropped:
+                self._db.execute("DELETE FROM acknowledged WHERE seq <= ?", (max(seq for seq, _ in dropped),))
+                self._count_dropped(cause, len(dropped))
+        if dropped:
+            self._forget(size for _, size in dropped)
+            self.dropped[cause] = self.dropped.get(cause, 0) + len(dropped)
+        return len(dropped)
 
     def _count_dropped(self, cause: str, count: int) -> None:
         self._db.execute(

@@ -117,19 +117,19 @@ def check(db: sqlite3.Connection) -> None:
     Raises:
         sqlite3.DatabaseError: it is not.
     """
-    for (found,) in db.execute("PRAGMA quick_check(1000)"):
-        if found != "ok" and not ROW_DAMAGE.match(found):
-            raise sqlite3.DatabaseError(found)
+    for (problem,) in db.execute("PRAGMA quick_check(1000)"):
+        if problem != "ok" and not ROW_DAMAGE.match(problem):
+            raise sqlite3.DatabaseError(problem)
 
 
 def newest_number(path: Path) -> int:
     """The highest number that a corrupt file is known to have given, as far as it can be read; 0 if it cannot."""
-    found = [0]
+    numbers = [0]
     with contextlib.closing(sqlite3.connect(path, timeout=0)) as db:
         for table in ("sqlite_sequence", "readings"):
             with contextlib.suppress(sqlite3.Error):  # it is corrupt, we know
-                found += [seq for (seq,) in db.execute(f"SELECT max(seq) FROM {table}") if isinstance(seq, int)]
-    return max(found)
+                numbers += [seq for (seq,) in db.execute(f"SELECT max(seq) FROM {table}") if isinstance(seq, int)]
+    return max(numbers)
 
 
 def make_place(path: Path) -> None:

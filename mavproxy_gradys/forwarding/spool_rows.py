@@ -42,10 +42,14 @@ def stored_of(row: Sequence[Any]) -> Stored | None:
     if not isinstance(system, int) or not isinstance(value, str) or len(value) > LONGEST_JSON or not value.isascii():
         return None
     try:
-        found = json.loads(value)
+        value_read = json.loads(value)
     except (ValueError, RecursionError):
         return None
-    return Stored(seq, Reading(device, system, quantity, representation, found, time)) if is_value(found) else None
+    return (
+        Stored(seq, Reading(device, system, quantity, representation, value_read, time))
+        if is_value(value_read)
+        else None
+    )
 
 
 def is_storable(reading: Reading) -> bool:
@@ -71,11 +75,11 @@ def is_time(cell: Any) -> bool:
     return isinstance(cell, float) and math.isfinite(cell)
 
 
-def is_value(found: Any) -> bool:
+def is_value(value: Any) -> bool:
     """Whether that is a value, of what JSON can say."""
-    return isinstance(found, str) or all(map(is_number, found if isinstance(found, list) else [found]))
+    return isinstance(value, str) or all(map(is_number, value if isinstance(value, list) else [value]))
 
 
-def is_number(found: Any) -> bool:
+def is_number(value: Any) -> bool:
     """Whether that is a finite number, true or false."""
-    return isinstance(found, float) and math.isfinite(found) or isinstance(found, int) and abs(found) < 2**64
+    return isinstance(value, float) and math.isfinite(value) or isinstance(value, int) and abs(value) < 2**64

@@ -170,9 +170,9 @@ class SpoolThread:
         cursor = self._cursors[sink]
         while True:
             cursor.news.clear()
-            found = await self._batch(sink, cursor, limit)
-            if found:
-                return found
+            batch = await self._batch(sink, cursor, limit)
+            if batch:
+                return batch
             with contextlib.suppress(asyncio.TimeoutError):
                 await wait_with_timeout(TRIM_EVERY, cursor.news.wait())
 
@@ -180,8 +180,8 @@ class SpoolThread:
         if cursor.unnoted:
             await self._note(sink, cursor, set())
         look = limit + cursor.passed_over
-        found = await self._do(lambda spool: spool.batch(sink, cursor.after, look), writes=False)
-        return cursor.choose(found, limit)
+        batch = await self._do(lambda spool: spool.batch(sink, cursor.after, look), writes=False)
+        return cursor.choose(batch, limit)
 
     async def acknowledge(self, sink: str, batch: Sequence[Stored], numbers: set[int]) -> None:
         """Remove what a sink has acknowledged: those of `batch` that are in `numbers`, and no others."""

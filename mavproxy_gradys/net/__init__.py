@@ -1,1 +1,1 @@
-"""Addresses, names, HTTP, and how often to try."""
+"""Addresses, names, HTTP, and the schedule of tries."""

@@ -1,4 +1,4 @@
-"""Addresses: the stations' as a person writes them, and ours as a station needs it. Pure, but for `own_address`."""
+"""The stations' addresses as a person writes them, and ours as a station needs it. Pure, except `own_address`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class StationAddress:
     """A ground station.
 
     Attributes:
-        url: scheme, host and port, without a slash at the end: what it is called in the status.
+        url: scheme, host and port, without a trailing slash; the status shows it.
         host: name or IP address, without brackets.
         port: TCP port.
     """
@@ -29,25 +29,25 @@ class StationAddress:
 
     @property
     def update_url(self) -> str:
-        """Where it takes positions; the slash at the end belongs to it."""
+        """The URL that takes positions; its trailing slash is necessary."""
         return f"{self.url}/update-info/"
 
 
 def stations(text: str) -> tuple[StationAddress, ...]:
-    """The stations of a list by comma: HOST:PORT, [IPV6]:PORT, or http(s)://HOST:PORT.
+    """The stations in a comma-separated list: HOST:PORT, [IPV6]:PORT, or http(s)://HOST:PORT.
 
     Raises:
-        SettingError: one of them cannot be read.
+        SettingError: one of them is not valid.
     """
-    found = [station(part.strip()) for part in text.split(",") if part.strip()]
-    return tuple(dict.fromkeys(found))
+    addresses = [station(part.strip()) for part in text.split(",") if part.strip()]
+    return tuple(dict.fromkeys(addresses))
 
 
 def station(text: str) -> StationAddress:
     """One station.
 
     Raises:
-        SettingError: it cannot be read.
+        SettingError: it is not valid.
     """
     parts, port = split_url(text if "://" in text else f"http://{text}", ("http", "https"))
     if parts.path not in ("", "/") or parts.query or parts.fragment or parts.username:
@@ -58,10 +58,10 @@ def station(text: str) -> StationAddress:
 
 
 def split_url(text: str, schemes: tuple[str, ...]) -> tuple[SplitResult, int]:
-    """An address and its port, after a look at both.
+    """An address and its port, both checked.
 
     Raises:
-        SettingError: no such scheme, no host, or no such port.
+        SettingError: the scheme, the host or the port is not valid.
     """
     shown = masked(text)
     try:
@@ -86,24 +86,24 @@ async def own_address(names: Resolver, host: str, port: int) -> str:
     """Our address on the interface that reaches `host`; nothing is sent.
 
     Raises:
-        OSError: there is no such host, or no way there.
+        OSError: there is no such host, or no route to it.
     """
-    found = await names.look_up(host, port, kind=socket.SOCK_DGRAM)
-    family, kind, protocol, _, peer = found[0]
+    infos = await names.look_up(host, port, kind=socket.SOCK_DGRAM)
+    family, kind, protocol, _, peer = infos[0]
     with socket.socket(family, kind, protocol) as probe:
         probe.connect(peer)
         return str(probe.getsockname()[0])
 
 
-def ip_field(given: str, own: str, api: tuple[str, int] | None) -> str:
-    """The form's `ip`: where a station reaches our API, without a scheme and with a slash at the end.
+def ip_field(setting: str, own: str, api: tuple[str, int] | None) -> str:
+    """The form's `ip`: the address of our API for a station, without a scheme and with a trailing slash.
 
     Args:
-        given: the setting; empty for none. Its port counts, or else the API's.
+        setting: the setting `ip`; empty for none. Its port has precedence over the API's.
         own: our address on the interface that reaches the station.
-        api: where the API listens; None while it does not, and then the field names no port.
+        api: the address on which the API listens; None while it does not; the field has no port then.
     """
-    name = given.partition("://")[2] if "://" in given else given
+    name = setting.partition("://")[2] if "://" in setting else setting
     name = name.rstrip("/") or bracketed(own)
     if api is None or has_port(name):
         return f"{name}/"
@@ -111,32 +111,32 @@ def ip_field(given: str, own: str, api: tuple[str, int] | None) -> str:
 
 
 def has_port(name: str) -> bool:
-    """Whether HOST or HOST:PORT ends in a port."""
+    """Whether HOST or HOST:PORT has a port."""
     return name.rpartition("]")[2].rpartition(":")[2].isdigit() and ":" in name.rpartition("]")[2]
 
 
-def checked_ip(given: str) -> str:
-    """The same `ip`, if a station can call it; empty for none.
+def checked_ip(setting: str) -> str:
+    """The same `ip`, if a station can use it; empty for none.
 
     Raises:
         SettingError: it has a path, a space, or no host.
     """
-    name = given.partition("://")[2] if "://" in given else given
+    name = setting.partition("://")[2] if "://" in setting else setting
     name = name.rstrip("/")
-    if not given:
-        return given
+    if not setting:
+        return setting
     split_url(f"http://{name}", ("http",))
     if "/" in name:
-        raise SettingError(f"{given!r}: it takes HOST or HOST:PORT")
-    return given
+        raise SettingError(f"{setting!r}: it takes HOST or HOST:PORT")
+    return setting
 
 
 def api_note(api: tuple[str, int] | None, host: str) -> str:
-    """What the status says of the API that `ip` names; empty when a station can reach it.
+    """The status's note on the API that `ip` names; empty if a station can reach it.
 
     Args:
-        api: where it listens, None while it does not.
-        host: the station's.
+        api: the address on which it listens; None while it does not.
+        host: the station's host.
     """
     if api is None:
         return "uavapi is not listening: ip names no API, and the station cannot command the vehicles"

@@ -13,32 +13,32 @@ import aiohttp
 from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.net.resolver import Resolver
 
-CONNECTIONS = 8  # to one receiver at a time
-LARGEST_ANSWER = 1024 * 1024  # bytes; a receiver that says more is not heard out
-LONGEST_TOLD = 200  # letters of what a receiver says
+CONNECTIONS = 8  # connections to one receiver at once
+LARGEST_ANSWER = 1024 * 1024  # bytes; a longer answer is not read to its end
+LONGEST_TOLD = 200  # letters of a receiver's text that are shown
 FORM = "application/x-www-form-urlencoded"
 JSON = "application/json"
-# Answers about the address, the sender or the moment; all others are taken for answers about what was sent.
+# Statuses about the address, the sender or the time; all others count as answers about the content.
 NOT_FOR_CONTENT = {401, 403, 404, 405, 407, 408, 425, 429, 502, 503, 504}
 
 
 class Poster(Protocol):
-    """What the push and the HTTP sink need of a client."""
+    """The client interface for the push and the HTTP sink."""
 
     async def post(self, url: str, body: bytes, content_type: str) -> Any:
         """See `Client.post`."""
 
     async def close(self) -> None:
-        """Close what is open."""
+        """Close the connections."""
 
 
 class Client:
     """Posts to one receiver; belongs to the asyncio thread.
 
     Args:
-        timeout: s from the first byte of the request to the last of the answer.
+        timeout: s from the first byte of the request to the last byte of the answer.
         token: sent as a bearer token; empty for none.
-        ca_file: certificates that a TLS receiver is trusted by; empty for the system's own.
+        ca_file: certificates to check TLS receivers with; empty for the system's own.
 
     Raises:
         NotDelivered: the CA file cannot be used.
@@ -63,12 +63,12 @@ class Client:
         await self._session.close()
 
     async def post(self, url: str, body: bytes, content_type: str) -> Any:
-        """POST `body`; the JSON of a 200's body, None when that is not JSON.
+        """POST `body`; returns the JSON of a 200, None if its body is not JSON.
 
-        A connection that the receiver closed while it was idle is replaced once.
+        A connection that the receiver closed while it was idle is reopened once.
 
         Raises:
-            NotDelivered: nobody answered in time, or not with 200.
+            NotDelivered: no answer in time, or not a 200.
         """
         try:
             try:
@@ -81,13 +81,13 @@ class Client:
     async def _post(self, url: str, body: bytes, content_type: str) -> Any:
         headers = {"Content-Type": content_type}
         async with self._session.post(url, data=body, headers=headers, allow_redirects=False) as answer:
-            said = await read_up_to(answer.content, LARGEST_ANSWER)
+            text = await read_up_to(answer.content, LARGEST_ANSWER)
             if answer.status != 200:
                 raise refusal(answer.status, answer.headers.get("Location", ""))
         try:
-            return json.loads(said)
+            return json.loads(text)
         except (ValueError, RecursionError):
-            return None  # a 200 is an acknowledgement, whatever it says
+            return None  # a 200 is an acknowledgement, with any body
 
 
 async def read_up_to(stream: aiohttp.StreamReader, limit: int) -> bytes:
@@ -96,12 +96,12 @@ async def read_up_to(stream: aiohttp.StreamReader, limit: int) -> bytes:
     Raises:
         NotDelivered: it is longer than `limit` bytes.
     """
-    said = bytearray()
+    content = bytearray()
     async for piece in stream.iter_any():
-        said += piece
-        if len(said) > limit:
+        content += piece
+        if len(content) > limit:
             raise NotDelivered(f"it answers with more than {limit} bytes", reached=True)
-    return bytes(said)
+    return bytes(content)
 
 
 def refusal(status: int, location: str) -> NotDelivered:
@@ -115,12 +115,12 @@ def refusal(status: int, location: str) -> NotDelivered:
 
 
 def printable(text: str) -> str:
-    """What somebody else said, fit for a terminal."""
+    """A receiver's text, safe for a terminal."""
     return "".join(letter if letter.isprintable() else "?" for letter in text[:LONGEST_TOLD])
 
 
 def tls_context(ca_file: str) -> ssl.SSLContext | bool:
-    """What a TLS receiver's certificate is checked by; True is aiohttp's own check by the system's certificates.
+    """The TLS context for receivers; True is aiohttp's own check by the system's certificates.
 
     Raises:
         NotDelivered: the file cannot be read, or holds no certificate.
@@ -129,12 +129,12 @@ def tls_context(ca_file: str) -> ssl.SSLContext | bool:
         return True
     try:
         return ssl.create_default_context(cafile=ca_file)
-    except OSError as error:  # ssl.SSLError is one
+    except OSError as error:  # includes ssl.SSLError
         raise NotDelivered(f"ca_file {ca_file}: {error.strerror or error}") from error
 
 
 def explain(error: BaseException, timeout: float) -> str:
-    """Why nobody answered, in a few words."""
+    """Why there is no answer, in a few words."""
     if isinstance(error, asyncio.TimeoutError):
         return f"no answer within {timeout:g} s"
     if isinstance(error, aiohttp.InvalidURL):

@@ -1,4 +1,4 @@
-"""What is said of failures: one line when they begin, one when they are over, never one for each."""
+"""Logs failures: one line when they begin and one when they end, not one for each."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ DROPS_EVERY = 60.0  # s between lines about drops
 
 
 class Outage:
-    """Whether something fails.
+    """Whether something fails at present.
 
     Args:
-        log: where the lines go.
-        began, ended: what they say; `began` is followed by the reason.
+        log: the logger.
+        began, ended: the texts; `began` is followed by the reason.
     """
 
     def __init__(self, log: logging.Logger, began: str, ended: str) -> None:
@@ -22,7 +22,7 @@ class Outage:
         self.lasts = False
 
     def now(self, why: str) -> None:
-        """What is wrong just now; empty when it works."""
+        """Set the present failure; empty if there is none."""
         if why and not self.lasts:
             self._log.warning("%s: %s", self._began, why)
         elif self.lasts and not why:
@@ -31,47 +31,47 @@ class Outage:
 
 
 class Defects:
-    """Mistakes of ours, of which each kind is told to the loop's exception handler once.
+    """Our own defects; each kind is reported to the loop's exception handler once.
 
     Args:
-        where: what it is that failed.
+        where: the part that failed.
     """
 
     def __init__(self, where: str) -> None:
         self._where = where
-        self._told: list[str] = []
+        self._reported: list[str] = []
 
     def tell(self, error: Exception) -> None:
-        """Take one."""
-        if repr(error) not in self._told:
-            self._told = [*self._told[-9:], repr(error)]
+        """Report a defect."""
+        if repr(error) not in self._reported:
+            self._reported = [*self._reported[-9:], repr(error)]
             context = {"message": f"gradys: a defect in {self._where}", "exception": error}
             asyncio.get_running_loop().call_exception_handler(context)
 
 
 class Drops:
-    """How many readings were dropped, told at once and then at most once a minute.
+    """The number of dropped readings, logged at once and then at most once a minute.
 
     Args:
-        log: where the lines go.
+        log: the logger.
         clock: s.
     """
 
     def __init__(self, log: logging.Logger, clock: Callable[[], float]) -> None:
         self._log, self._clock = log, clock
-        self._told: dict[str, int] = {}
-        self._told_at = -DROPS_EVERY
+        self._reported: dict[str, int] = {}
+        self._reported_at = -DROPS_EVERY
 
     def known(self, counts: Mapping[str, int]) -> None:
-        """Take counts by cause that are no news."""
-        self._told = {**self._told, **counts}
+        """Set counts by cause that are already reported."""
+        self._reported = {**self._reported, **counts}
 
     def tell(self, counts: Mapping[str, int], at_once: bool = False) -> None:
-        """Take the counts by cause, and say what is new."""
-        if not at_once and self._clock() - self._told_at < DROPS_EVERY:
+        """Take the counts by cause, and log the new ones."""
+        if not at_once and self._clock() - self._reported_at < DROPS_EVERY:
             return
-        news = {cause: count - self._told.get(cause, 0) for cause, count in sorted(counts.items())}
+        news = {cause: count - self._reported.get(cause, 0) for cause, count in sorted(counts.items())}
         if any(news.values()):
-            self._told, self._told_at = {**self._told, **counts}, self._clock()
-            told = ", ".join(f"{count} by {cause}" for cause, count in news.items() if count)
-            self._log.warning("readings were dropped: %s", told)
+            self._reported, self._reported_at = {**self._reported, **counts}, self._clock()
+            summary = ", ".join(f"{count} by {cause}" for cause, count in news.items() if count)
+            self._log.warning("readings were dropped: %s", summary)

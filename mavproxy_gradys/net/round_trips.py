@@ -1,4 +1,4 @@
-"""How long answers take. Pure."""
+"""The times until answers arrive. Pure."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class RoundTrips:
         self._last: deque[float] = deque(maxlen=ROUND_TRIPS_KEPT)
 
     def add(self, seconds: float) -> None:
-        """Take one (s)."""
+        """Add a time (s)."""
         self._last.append(seconds)
 
     def summary(self) -> dict[str, float] | None:
@@ -22,10 +22,10 @@ class RoundTrips:
         if not self._last:
             return None
         ordered = sorted(self._last)
-        found = {
+        summary = {
             "last": self._last[-1],
             "median": ordered[len(ordered) // 2],
             "p95": ordered[min(len(ordered) - 1, round(0.95 * len(ordered)))],
             "max": ordered[-1],
         }
-        return {name: round(1000 * seconds, 1) for name, seconds in found.items()}
+        return {name: round(1000 * seconds, 1) for name, seconds in summary.items()}

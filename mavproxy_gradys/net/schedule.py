@@ -1,4 +1,4 @@
-"""When the next turn is due: a fixed ticker, and the pauses after failures. Pure: the clock is an argument."""
+"""The time of the next turn: a fixed ticker, and pauses after failures. Pure: the clock is an argument."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from collections.abc import Callable
 
 FIRST_PAUSE = 1.0  # s
 LONGEST_PAUSE = 30.0  # s
-LONGEST_OF_SINKS = 20.0  # s: all readings are to be there within 30 s of a receiver's return
+LONGEST_OF_SINKS = 20.0  # s: all readings must arrive within 30 s of a receiver's return
 
 
 class Ticker:
-    """Turns at `start`, `start + period`, …: a turn that comes late does not move the later ones.
+    """Turns at `start`, `start + period`, …: a late turn does not shift the later ones.
 
     Args:
         period: s between turns.
@@ -24,16 +24,16 @@ class Ticker:
         self._turn = -1
 
     def wait(self, now: float) -> float:
-        """Seconds from `now` to the next turn; turns that were slept through are left out."""
+        """Seconds from `now` to the next turn; missed turns are skipped."""
         missed = math.ceil((now - self._start) / self.period - 1e-9)
         self._turn = max(self._turn + 1, missed)
         return max(self._start + self._turn * self.period - now, 0.0)
 
 
 class Backoff:
-    """Pauses after failures in a row: 1, 2, 4 … s up to the longest, each shortened by up to a half at random.
+    """Pauses after failures in a row: 1, 2, 4 … s up to the longest, each shortened at random by up to a half.
 
-    The chance keeps a fleet that lost its station from coming back all at once.
+    The randomness keeps a fleet that lost its station from returning all at once.
 
     Args:
         random: numbers from 0 to 1.
@@ -55,14 +55,14 @@ class Backoff:
         return pause
 
     def succeeded(self) -> None:
-        """Forget the failures."""
+        """Reset the failures."""
         self.failures = 0
         self.until = -math.inf
 
     def hurry(self) -> None:
-        """End the pause, but remember the failures."""
+        """End the pause, but keep the failure count."""
         self.until = -math.inf
 
     def waits(self, now: float) -> bool:
-        """Whether the pause is not over yet."""
+        """Whether the pause still lasts."""
         return now < self.until

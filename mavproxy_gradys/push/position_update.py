@@ -20,22 +20,22 @@ SPEED_DIGITS = 3  # more than a float of the link carries at these magnitudes
 
 
 def form(
-    state: VehicleState, where: Position, now: float, *, seq: int, ip: str, ready: bool, max_age: float
+    state: VehicleState, position: Position, now: float, *, seq: int, ip: str, ready: bool, max_age: float
 ) -> dict[str, str]:
     """The form's fields as text, in the order in which the station's own clients send them.
 
     Args:
         state, now, max_age: as for `position_of`.
-        where: what `position_of` gave.
+        position: what `position_of` gave.
         seq: number of this update; it advances when the station has acknowledged.
         ip: HOST:PORT/ of the API.
         ready: whether the vehicle is ready to be armed.
     """
     return {
         "id": str(state.system),
-        "lat": str(where.lat),
-        "lng": str(where.lng),
-        "alt": str(where.alt),
+        "lat": str(position.lat),
+        "lng": str(position.lng),
+        "alt": str(position.alt),
         **motion(state, now, max_age),
         **battery(state, now, max_age),
         "ready_to_arm": str(ready),
@@ -54,11 +54,11 @@ def motion(state: VehicleState, now: float, max_age: float) -> dict[str, str]:
         speeds = {"ground_speed": hud.groundspeed, "air_speed": hud.airspeed}
         known = {name: str(round(speed, SPEED_DIGITS)) for name, speed in speeds.items() if math.isfinite(speed)}
         return {**known, "heading": str(hud.heading)}
-    told = state.messages["GLOBAL_POSITION_INT"].message
-    found = {"ground_speed": str(round(math.hypot(told.vx, told.vy) / 100, SPEED_DIGITS))}
-    if told.hdg != 65535:
-        found["heading"] = str(round(told.hdg / 100))
-    return found
+    message = state.messages["GLOBAL_POSITION_INT"].message
+    fields = {"ground_speed": str(round(math.hypot(message.vx, message.vy) / 100, SPEED_DIGITS))}
+    if message.hdg != 65535:
+        fields["heading"] = str(round(message.hdg / 100))
+    return fields
 
 
 def battery(state: VehicleState, now: float, max_age: float) -> dict[str, str]:

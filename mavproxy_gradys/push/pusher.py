@@ -95,7 +95,7 @@ class Pusher:
     def _where(self, state: VehicleState, vehicle: VehicleTally) -> Position | None:
         """Where it is now; None when that is unknown or too old, and then the tally says why."""
         try:
-            where = position_of(
+            position = position_of(
                 state,
                 self._host.clock(),
                 max_age=self._settings.max_age,
@@ -106,15 +106,15 @@ class Pusher:
             vehicle.withhold(str(nothing))
             return None
         vehicle.why_not = ""
-        return where
+        return position
 
     async def _push(self, state: VehicleState, vehicle: VehicleTally) -> None:
         try:
             self.tally.ip = await self._ip()
-            where = self._where(state, vehicle)  # finding our own address may have taken its time
-            if where is None:
+            position = self._where(state, vehicle)  # finding our own address may have taken its time
+            if position is None:
                 return
-            body = position_update.encode(self._form(state, vehicle, where))
+            body = position_update.encode(self._form(state, vehicle, position))
             vehicle.sent += 1
             started = self._host.clock()
             answer = await self._poster.post(self.station.update_url, body, FORM)
@@ -148,10 +148,10 @@ class Pusher:
             self.tally.backoff.failed(now)
             self._own_at = -ADDRESS_KEPT
 
-    def _form(self, state: VehicleState, vehicle: VehicleTally, where: Position) -> dict[str, str]:
+    def _form(self, state: VehicleState, vehicle: VehicleTally, position: Position) -> dict[str, str]:
         return position_update.form(
             state,
-            where,
+            position,
             self._host.clock(),
             seq=vehicle.seq,
             ip=self.tally.ip,

@@ -52,8 +52,8 @@ def between(low: float, high: float) -> Callable[[str], float]:
 
 def words() -> argparse.ArgumentParser:
     """What may follow `gradys track`."""
-    made = Words(prog="gradys track", add_help=False)
-    verbs = made.add_subparsers(dest="verb", parser_class=Words)
+    parser = Words(prog="gradys track", add_help=False)
+    verbs = parser.add_subparsers(dest="verb", parser_class=Words)
     record = verbs.add_parser("record", add_help=False)
     record.add_argument("file", type=Path)
     record.add_argument("seconds", type=float, nargs="?", default=5.0)
@@ -68,7 +68,7 @@ def words() -> argparse.ArgumentParser:
     fly.add_argument("--transit", type=between(LOWEST_TRANSIT, HIGHEST_TAKEOFF), default=TRANSIT)
     fly.add_argument("--sysid", type=int, default=0)
     verbs.add_parser("help", add_help=False)
-    return made
+    return parser
 
 
 class TrackConsole:
@@ -87,13 +87,13 @@ class TrackConsole:
     def command(self, args: list[str]) -> None:
         """What was typed. Main loop only."""
         try:
-            given = words().parse_args(args)
-            if given.verb == "record" and not 0.1 <= given.seconds <= 86400:
+            options = words().parse_args(args)
+            if options.verb == "record" and not 0.1 <= options.seconds <= 86400:
                 raise BadRequest("SECONDS are from 0.1 to 86400")
         except BadRequest as error:
             print(f"gradys: {error}")
             return
-        if given.verb == "help":
+        if options.verb == "help":
             print(HELP)
             return
         verbs: dict[str | None, Callable[[argparse.Namespace], Coroutine[Any, Any, str]]] = {
@@ -102,29 +102,29 @@ class TrackConsole:
             "stop": self._stop,
             "fly": self._fly,
         }
-        self._background.send(lambda: verbs[given.verb](given))
+        self._background.send(lambda: verbs[options.verb](options))
 
     async def _show(self, _given: argparse.Namespace) -> str:
         return shown(self._tracks.report())
 
-    async def _record(self, given: argparse.Namespace) -> str:
-        file = given.file.expanduser()
-        latest = None if given.latest is None else given.latest.expanduser()
-        style = given.format or style_of(file.name)
+    async def _record(self, options: argparse.Namespace) -> str:
+        file = options.file.expanduser()
+        latest = None if options.latest is None else options.latest.expanduser()
+        style = options.format or style_of(file.name)
         recorder = await self._tracks.record(
-            file, style=style, period=given.seconds, latest=latest, system=given.sysid
+            file, style=style, period=options.seconds, latest=latest, system=options.sysid
         )
-        return f"recording vehicle {recorder.system} every {given.seconds:g} s into {file} ({style})"
+        return f"recording vehicle {recorder.system} every {options.seconds:g} s into {file} ({style})"
 
     async def _stop(self, _given: argparse.Namespace) -> str:
         recorder = await self._tracks.stop_recording()
         return "nothing is recorded" if recorder is None else f"{recorder.written} readings are in {recorder.file}"
 
-    async def _fly(self, given: argparse.Namespace) -> str:
-        vehicle = self._host.registry.commandable(given.sysid)
-        places = await asyncio.to_thread(read, given.file.expanduser(), given.ground)
-        flight = flight_of(vehicle, places, given.reach, given.transit)
-        request = {**{name: str(value) for name, value in vars(given).items()}, "digest": hash(tuple(places))}
+    async def _fly(self, options: argparse.Namespace) -> str:
+        vehicle = self._host.registry.commandable(options.sysid)
+        places = await asyncio.to_thread(read, options.file.expanduser(), options.ground)
+        flight = flight_of(vehicle, places, options.reach, options.transit)
+        request = {**{name: str(value) for name, value in vars(options).items()}, "digest": hash(tuple(places))}
         job = self._host.jobs.begin(vehicle, VERB, request, lambda job: self._tracks.fly(flight, job))
         self._background.say(
             f"flying {len(places)} legs with vehicle {vehicle.state.system}; `gradys track` tells how far it is"
@@ -158,6 +158,6 @@ def shown(report: Mapping[str, Any]) -> str:
             lines.append(f"  {recording['problem']}")
     for flight in report["flights"]:
         to_go = f", {flight['distance_to_go']:.0f} m to go" if "distance_to_go" in flight else ""
-        how = flight["error"] or f"{flight['stage']}, leg {flight['leg']} of {flight['legs']}{to_go}"
-        lines.append(f"track flight {flight['state']}, vehicle {flight['vehicle']}: {how}")
+        progress = flight["error"] or f"{flight['stage']}, leg {flight['leg']} of {flight['legs']}{to_go}"
+        lines.append(f"track flight {flight['state']}, vehicle {flight['vehicle']}: {progress}")
     return "\n".join(lines) or "no track is recorded or flown"

@@ -101,13 +101,13 @@ def parse(text: str) -> list[GpsReading]:
     Raises:
         Invalid: a line is no reading, or there is none.
     """
-    found = []
+    points = []
     for number, line in enumerate(text.splitlines(), 1):
         if line.strip() and not line.lstrip().startswith("#"):
-            found.append(parse_line(line.strip(), number))
-    if not found:
+            points.append(parse_line(line.strip(), number))
+    if not points:
         raise Invalid("the track holds no reading", "track")
-    return found
+    return points
 
 
 def parse_line(line: str, number: int) -> GpsReading:
@@ -176,10 +176,10 @@ def waypoints(track: Sequence[GpsReading], ground: float | None = None) -> list[
     if not all(place.alt <= HIGHEST for place in places):
         highest = max(place.alt for place in places)
         raise Invalid(f"the track leads {highest:.0f} m above its ground; {HIGHEST:g} are the most", "track")
-    found = list(thinned(places))
-    if len(found) > MOST_WAYPOINTS:
-        raise Invalid(f"the track leads through {len(found)} places; {MOST_WAYPOINTS} are the most", "track")
-    return found
+    thinned_places = list(thinned(places))
+    if len(thinned_places) > MOST_WAYPOINTS:
+        raise Invalid(f"the track leads through {len(thinned_places)} places; {MOST_WAYPOINTS} are the most", "track")
+    return thinned_places
 
 
 def thinned(places: Iterable[TrackWaypoint]) -> Iterable[TrackWaypoint]:
