@@ -10,7 +10,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 # Compiling all of pymavlink's dialects takes longer than the rest; what is imported is compiled then.
 LOCKED := install --no-compile --no-deps --require-hashes --only-binary :all: -r
 
-.PHONY: demo demo-fleet test test-sitl lint format bench soak lock clean help
+.PHONY: demo demo-fleet test test-all test-sitl lint format bench soak lock clean help
 
 demo: $(MODULES)  ## fly a simulated copter: MAVProxy with uavapi and vision; ARGS go to mavproxy-uavapi
 	@echo "== a simulated copter, and MAVProxy with the API; Ctrl-C ends both"
@@ -20,7 +20,10 @@ demo-fleet: $(INSTALLED)  ## a broker, a database, a station of two workers and 
 	@$(BIN)/python benchmarks/demo_fleet.py --vehicles $(or $(VEHICLES),100)
 
 test: $(INSTALLED)  ## run the tests; ARGS="-k name" picks some
-	$(BIN)/python -m pytest -m "not sitl" -n 4 --dist loadfile --no-loadscope-reorder --reruns 2 -rR $(ARGS)
+	$(BIN)/python -m pytest -m "not sitl and not long" -n 3 --dist loadfile --no-loadscope-reorder --reruns 2 -rR $(ARGS)
+
+test-all: $(INSTALLED)  ## run the tests that take long, too
+	$(BIN)/python -m pytest -m "not sitl" -n 2 --dist loadfile --no-loadscope-reorder $(ARGS)
 
 test-sitl: $(INSTALLED)  ## run the tests that need ArduPilot's SITL, built in ARDUPILOT_HOME
 	@test -n "$(ARDUPILOT_HOME)" || { echo "set ARDUPILOT_HOME to a built copy of ArduPilot"; exit 2; }

@@ -23,9 +23,10 @@ def rig(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 
 
 @pytest.fixture(scope="module")
-def embedded_rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
-    """A rig with the embedded vehicle, for tests that need its back door."""
-    made = embedded(tmp_path_factory.mktemp("embedded"))
+def embedded_rig(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
+    """A rig with the embedded vehicle, for tests that need its back door; at the speed-up RIG_SPEEDUP of its file."""
+    speedup = getattr(request.module, "RIG_SPEEDUP", processes.SPEEDUP)
+    made = embedded(tmp_path_factory.mktemp("embedded"), speedup=speedup)
     yield made
     made.stop()
 

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 import requests
 
+RIG_SPEEDUP = 2  # nobody flies far here, and each message costs processor time
 TOKEN = "a-long-and-secret-word"
 
 
@@ -231,6 +232,7 @@ def descriptors_of(rig) -> int:
     return len(list(Path(f"/proc/{rig.mavproxy.pid}/fd").iterdir()))
 
 
+@pytest.mark.long
 def test_idle_strangers_leave_mavproxy_the_descriptors_to_connect_again(harness, tmp_path):
     """With a limit of 160 descriptors there is no room for as many connections as may be open."""
     rig = harness.Rig(tmp_path, harness.free_port())

@@ -55,6 +55,7 @@ def test_square_is_flown(embedded_rig: Any) -> None:
     assert on_the_ground(embedded_rig)
 
 
+@pytest.mark.long
 def test_velocities_and_a_log_beside_them(embedded_rig: Any, tmp_path: Path) -> None:
     log = tmp_path / "sweep.csv"
     status, out, err = end(begin(embedded_rig, EXAMPLES / "sweep.py", "--output", str(log)))
@@ -100,6 +101,7 @@ def test_script_that_dies_in_flight_brings_its_vehicle_home(embedded_rig: Any, s
     assert on_the_ground(embedded_rig)
 
 
+@pytest.mark.long
 def test_script_that_is_stopped_lands_its_vehicle(embedded_rig: Any, script: Any) -> None:
     process = begin(embedded_rig, script("import asyncio; await asyncio.sleep(600)"), "--on-exit", "land")
     assert process.stdout is not None and process.stdout.readline() == "under way\n"
@@ -109,6 +111,7 @@ def test_script_that_is_stopped_lands_its_vehicle(embedded_rig: Any, script: Any
     assert on_the_ground(embedded_rig)
 
 
+@pytest.mark.long
 def test_killed_script_leaves_no_velocity_behind(embedded_rig: Any, script: Any) -> None:
     process = begin(embedded_rig, script("import time; time.sleep(600)"))
     assert process.stdout is not None and process.stdout.readline() == "under way\n"
@@ -135,6 +138,7 @@ def proxy() -> Iterator[None]:
     made.communicate(timeout=10)
 
 
+@pytest.mark.long
 def test_runners_talk_by_zmq(embedded_rig: Any, proxy: None) -> None:
     names = ["--zmq-proxy-server", "127.0.0.1", "--zmq-identifier"]
     flyer = begin(embedded_rig, EXAMPLES / "answer.py", *names, "flyer")

@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 
+RIG_SPEEDUP = 2  # nobody flies far here, and each message costs processor time
 pytestmark = pytest.mark.needs("chromium")
 
 EVIL = "evil.example"  # a name that the browser is told to find at 127.0.0.1

@@ -6,11 +6,13 @@ import asyncio
 import time
 
 import aiohttp
+import pytest
 
 WAITING = 180  # max_connections is 200, and a few are kept for callers who have passed the door
 READS = 50
 
 
+@pytest.mark.long
 def test_almost_two_hundred_waiting_calls_do_not_hold_up_a_read(embedded_rig):
     rig = embedded_rig
     rig.in_the_air(10)

@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 from aiohttp import ClientSession
 
+RIG_SPEEDUP = 2  # nobody flies far here, and each message costs processor time
 CHROMIUM = "chromium"
 QUIET = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--disable-background-networking"]
 QUIET += ["--disable-component-update", "--disable-sync", "--no-first-run", "--remote-debugging-port=0"]
@@ -132,6 +133,7 @@ async def tried(devtools, url, picture, script):
             return result, page.refused
 
 
+@pytest.mark.long
 @pytest.mark.needs("chromium")
 def test_page_shows_all_endpoints_without_internet_and_one_can_be_tried(embedded_rig, tmp_path):
     described = embedded_rig.ok(embedded_rig.get("/openapi.json"))

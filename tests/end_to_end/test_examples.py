@@ -42,6 +42,7 @@ def leader(harness, tmp_path_factory):
     rig.stop()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("program", ["follower_ned.py", "follower_gps.py"])
 def test_follower_keeps_behind_its_leader(embedded_rig, leader, program):
     leader.in_the_air(12)

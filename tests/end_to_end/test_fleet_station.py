@@ -35,6 +35,7 @@ def fleet(tmp_path: Path) -> Iterator[Fleet]:
         made.stop()
 
 
+@pytest.mark.long
 @BROKER
 @DATABASE
 def test_each_reading_is_one_row_whoever_dies(tmp_path: Path) -> None:
@@ -79,6 +80,7 @@ def test_readings_of_a_mavproxy_reach_the_database(fleet: Fleet, harness: Any, t
         rig.stop()
 
 
+@pytest.mark.long
 @BROKER
 @DATABASE
 def test_a_worker_ends_at_a_signal_and_its_session_waits_for_it(fleet: Fleet) -> None:

@@ -191,6 +191,7 @@ def test_a_captive_portal_takes_nothing(rig, harness, receiver, portal, tmp_path
         rig.mavproxy.ask("module unload gradys", "Unloaded module gradys")
 
 
+@pytest.mark.long
 def test_kill_9_loses_nothing_that_was_acknowledged(harness, tmp_path):
     """MAVProxy is killed at random moments while readings are posted; what was answered with 200 arrives."""
     rig = harness.Rig(tmp_path, harness.free_port())

@@ -129,6 +129,7 @@ def test_gpx(rig, harness, tmp_path):
     assert file.read_text().endswith("</gpx>\n")
 
 
+@pytest.mark.long
 def test_both_example_programs(rig, harness, tmp_path):
     file = tmp_path / "example.track"
     rig.in_the_air(8)

@@ -78,6 +78,7 @@ def importable(python: Path) -> str:
     ).stdout.strip()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("editable", [False, True], ids=["install", "editable"])
 def test_install_and_uninstall_leave_mavproxy_healthy(python, harness, tmp_path, editable):
     assert importable(python) == "[] True"

@@ -8,6 +8,8 @@ import stat
 import pytest
 import requests
 
+RIG_SPEEDUP = 2  # nobody flies far here, and each message costs processor time
+
 
 @pytest.fixture(scope="module")
 def rig(harness, tmp_path_factory):

@@ -153,6 +153,7 @@ def test_lost_and_foreign_acks(faulty_rig):
     rig.control.ask("clear")
 
 
+@pytest.mark.long
 def test_arm_says_why_it_cannot(harness, tmp_path):
     rig = harness.embedded(tmp_path, "--ready-after=100000")
     try:

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 import requests
 
+RIG_SPEEDUP = 2  # nobody flies far here, and each message costs processor time
 OPEN = 100
 
 

@@ -249,6 +249,7 @@ def test_a_frozen_camera_ends_the_landing(scene: Scene) -> None:
     assert body["info"]["action"] == "rtl"
 
 
+@pytest.mark.long
 def test_link_silence_of_four_seconds_is_rested_out(scene: Scene) -> None:
     tag = scene.tag()
     scene.settings(attempts=3)  # it may have to climb to find it again
