@@ -178,7 +178,7 @@ class Judge:
             return None if sent.mode in SPEED_MODES else f"{sent.message} in {sent.mode} by {flight}"
         if sent.mode in (flight.mode, wanted_mode(flight)) or flight.mode == "UNKNOWN":
             return None
-        if flight.verb == "hold" and sent.mode in self._modes_on_their_way(flight):
+        if sent.mode in self._modes_on_their_way(flight):  # ours, and older than this flight: nobody took the vehicle
             return None
         return f"{sent.message} by {flight}, which began in {flight.mode}, in {sent.mode}"
 

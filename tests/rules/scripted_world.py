@@ -259,6 +259,7 @@ class ScriptedWorld:
         """The script that began those flights dies; the task that sees to the vehicle."""
         for flight in flights:
             flight.job.script = "session"
+            flight.job._goes_on_for_others = False  # it was the script that did not wait
         run = SimpleNamespace(session="session", script="mission.py")
         return self.loop.create_task(on_exit.after_death(self.host, 0, run, []))
 

@@ -185,7 +185,9 @@ class Authority(RuleBasedStateMachine):
             last_words = {message.get_type() for message in self.world.unload()}
             assert last_words <= {"COMMAND_LONG", "SET_POSITION_TARGET_LOCAL_NED"}
         self.then(later)
-        left = [one for one in flights if one.job.running and one.verb not in ("land", "rtl")]
+        # What somebody else waits for goes on: the clients here are no scripts.
+        others = [one for one in flights if one.job._clients]
+        left = [one for one in flights if one.job.running and one.verb not in ("land", "rtl") and one not in others]
         assert not left, f"{left[0]} outlives its script"
 
     # -- the pilot and other stations -------------------------------------------------------------------------

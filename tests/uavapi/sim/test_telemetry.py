@@ -18,7 +18,7 @@ def test_every_message_survives_the_wire(flying):
     flying.local((20.0, 0.0, -10.0))
     flying.run(2.0)
     encoder, telemetry = mavlink.MAVLink(None, srcSystem=1), flying.simulator.telemetry
-    names = list(telemetry._builders)
+    names = [name for name in telemetry._builders if name != "WIND"]  # a plane's
     assert len(names) > 20
     for name in names:
         message = telemetry.build(name)
