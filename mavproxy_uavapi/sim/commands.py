@@ -56,6 +56,8 @@ class CommandInt:
     y: int
     z: float
     sender: tuple[int, int]
+    long: bool = False
+    """Whether it came as COMMAND_LONG."""
 
 
 def from_message(message: Any) -> CommandInt | None:
@@ -78,7 +80,7 @@ def from_message(message: Any) -> CommandInt | None:
         return None
     scale = 1e7 if message.command in LOCATION_COMMANDS else 1.0
     x, y = int(_finite(message.param5) * scale), int(_finite(message.param6) * scale)
-    return CommandInt(message.command, frame, *parameters, x, y, message.param7, sender)
+    return CommandInt(message.command, frame, *parameters, x, y, message.param7, sender, long=True)
 
 
 def _finite(value: float) -> float:

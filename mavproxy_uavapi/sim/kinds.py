@@ -12,11 +12,14 @@ from .copter.commands import CopterCommands
 from .copter.copter import SimulatedCopter
 from .parameter_tables import copter as copter_parameters
 from .parameter_tables import plane as plane_parameters
+from .parameter_tables import quadplane as quadplane_parameters
 from .parameter_tables import rover as rover_parameters
 from .parameter_tables.blocks import Blocks
 from .plane import setpoints as plane_setpoints
 from .plane.commands import PlaneCommands
 from .plane.plane import SimulatedPlane
+from .plane.vtol.commands import QuadPlaneCommands
+from .plane.vtol.quadplane import SimulatedQuadPlane
 from .rover import setpoints as rover_setpoints
 from .rover.commands import RoverCommands
 from .rover.rover import SimulatedRover
@@ -54,6 +57,15 @@ KINDS: Mapping[str, Kind] = {
         SimulatedPlane,
         PlaneCommands,
         plane_parameters.BLOCKS,
+        {
+            "SET_POSITION_TARGET_LOCAL_NED": plane_setpoints.apply_local,
+            "SET_POSITION_TARGET_GLOBAL_INT": plane_setpoints.apply_global,
+        },
+    ),
+    "quadplane": Kind(
+        SimulatedQuadPlane,
+        QuadPlaneCommands,
+        quadplane_parameters.BLOCKS,
         {
             "SET_POSITION_TARGET_LOCAL_NED": plane_setpoints.apply_local,
             "SET_POSITION_TARGET_GLOBAL_INT": plane_setpoints.apply_global,

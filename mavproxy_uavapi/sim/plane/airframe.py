@@ -117,11 +117,14 @@ class Airframe(Vehicle):
         return 0.82 * self.parameters["AIRSPEED_CRUISE"]
 
     def _detect_flight(self) -> None:
+        self.detector.update(self.now, self._moves() and self.estimator.ready, self.armed)
+
+    def _moves(self) -> bool:
+        """Whether it looks like flight now."""
         body = self.body
         moving = math.hypot(body.velocity_north, body.velocity_east) >= MOVING
         in_air = self.airspeed >= 0.75 * max(self.parameters["AIRSPEED_MIN"], 2.0)
-        moves = (moving or (in_air and body.airborne)) if self.armed else (moving and in_air)
-        self.detector.update(self.now, moves and self.estimator.ready, self.armed)
+        return (moving or (in_air and body.airborne)) if self.armed else (moving and in_air)
 
     # What the modes ask of the plane that has them.
 

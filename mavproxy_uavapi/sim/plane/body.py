@@ -12,8 +12,6 @@ from dataclasses import dataclass
 from ..geodesy import wrap_pi
 from ..physics import GRAVITY, Body
 
-TURN_SHARE = 0.74
-"""Of the rate of a coordinated turn; SITL's plane slips."""
 ROLL_TIME = 0.35
 """Time constant of the bank, seconds."""
 ROLL_RATE = math.radians(90)
@@ -40,10 +38,15 @@ STEEPEST = 0.7
 
 @dataclass
 class PlaneBody(Body):
-    """airspeed is the true one, m/s along the nose; airborne says whether the wheels have left the ground."""
+    """A plane's motion.
+
+    airspeed is the true one, m/s along the nose; airborne says whether the wheels have left the ground. turn_share is
+    the share of a coordinated turn's rate that a bank gives; SITL's planes slip.
+    """
 
     airspeed: float = 0.0
     airborne: bool = False
+    turn_share: float = 0.74
 
     def fly(self, bank: float, climb: float, airspeed: float, dt: float) -> None:
         """Fly for dt seconds towards a bank (rad), a climb rate and a true airspeed (m/s)."""
@@ -55,7 +58,7 @@ class PlaneBody(Body):
         now = -self.velocity_down
         lift = max(-VERTICAL_ACCELERATION, min(VERTICAL_ACCELERATION, (climb - now) / CLIMB_TIME))
         steepest = STEEPEST * self.airspeed
-        self.yaw_rate = TURN_SHARE * GRAVITY * math.tan(self.roll) / max(self.airspeed, 5.0)
+        self.yaw_rate = self.turn_share * GRAVITY * math.tan(self.roll) / max(self.airspeed, 5.0)
         self._move(max(-steepest, min(steepest, now + lift * dt)), dt)
 
     def run(self, throttle: float, course: float | None, dt: float) -> None:

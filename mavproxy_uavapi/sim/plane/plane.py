@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import ClassVar
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -27,9 +28,9 @@ RESET_AIRSPEED = -2.0
 class SimulatedPlane(Airframe):
     """A plane with its modes and what chooses among them: the ground station, the pilot's switch, failsafes."""
 
-    mav_type: int = mavlink.MAV_TYPE_FIXED_WING  # type: ignore[misc]
+    mav_type = mavlink.MAV_TYPE_FIXED_WING
     version = (4, 7, 0, mavlink.FIRMWARE_VERSION_TYPE_DEV)
-    banner = ("ArduPlane V4.7.0-dev (embedded)",)
+    banner: ClassVar[tuple[str, ...]] = ("ArduPlane V4.7.0-dev (embedded)",)
     mission_commands = ALL_ITEMS
     streams = PLANE_GROUPS
     tells_wind = True

@@ -155,6 +155,7 @@ class Auto(NavigatingMode, MissionMode):
         self._passed = False
         if item.command == mavlink.MAV_CMD_NAV_LAND:
             self.submode = AutoSubmode.LAND
+            plane.in_landing_sequence = True
             self._landing = Landing(plane, start, target)
             return
         slope = plane.altitude > 20 or target.down > plane.estimator.position.down

@@ -1,0 +1,38 @@
+"""The QuadPlane without its radio: a plane that also hovers."""
+
+from __future__ import annotations
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from ..modes import Mode, build
+from .auto import QuadAuto
+from .frame import LiftFrame
+from .guided import QuadGuided
+from .modes import QHover, QLand, QLoiter, QRtl, QStabilize
+from .transition import Stage
+
+VTOL_STATES = {
+    Stage.HOVER: mavlink.MAV_VTOL_STATE_MC,
+    Stage.ACCELERATING: mavlink.MAV_VTOL_STATE_TRANSITION_TO_FW,
+    Stage.TIMER: mavlink.MAV_VTOL_STATE_TRANSITION_TO_FW,
+    Stage.WING: mavlink.MAV_VTOL_STATE_FW,
+}
+
+
+class SimulatedQuadPlane(LiftFrame):
+    """Says that it is a fixed wing (Q_MAV_TYPE 0); EXTENDED_SYS_STATE tells whether it hovers."""
+
+    banner = ("ArduPlane V4.7.0-dev (embedded)", "QuadPlane Frame: QUAD/X")
+
+    def build_modes(self) -> dict[int, Mode]:
+        kinds = (QStabilize, QHover, QLoiter, QLand, QRtl, QuadGuided, QuadAuto)
+        return build(self) | {kind.number: kind(self) for kind in kinds}
+
+    @property
+    def vtol_state(self) -> int:
+        guided = self.mode is self.guided and isinstance(self.guided, QuadGuided) and self.guided.climbing
+        if guided:
+            return int(mavlink.MAV_VTOL_STATE_TRANSITION_TO_MC)
+        if self.mode.vtol and not self.mode.navigates:
+            return int(mavlink.MAV_VTOL_STATE_MC)
+        return int(VTOL_STATES[self.transition.stage])
