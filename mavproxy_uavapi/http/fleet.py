@@ -70,7 +70,8 @@ async def _command(call: Call, route: Route) -> web.StreamResponse:
     if p.all_or_none and call.is_async:
         raise Invalid("a call that does not wait cannot say whether all or none began", "all_or_none")
     known = call.service.host.fleet.vehicles
-    systems = sorted(known) if p.vehicles == "all" else list(dict.fromkeys(p.vehicles))
+    every = [call.named_system] if call.named_system else sorted(known)  # a path that names a vehicle means no other
+    systems = every if p.vehicles == "all" else list(dict.fromkeys(p.vehicles))
     common = p.model_extra or {}
     params = {system: parse(route.model, "body", {**common, **p.each.get(str(system), {})}) for system in systems}
     gate = StartGate(len(systems)) if p.all_or_none else None

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from mavproxy_uavapi.core.errors import Busy, Invalid, Stale
+from mavproxy_uavapi.core.errors import Busy, Invalid, ModeChanged, Stale
 from mavproxy_uavapi.core.vehicle import landing_pattern, messages, mission_flight, time_limits
 from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_uavapi.core.vehicle.geodesy import moved
@@ -60,8 +60,13 @@ class Plane(GuidedVehicle):
         current = self.state.field("MISSION_CURRENT", "seq") or 0
         if self.state.armed is False and current > 1:
             self.authority.take(job, Rank.ARM)
-            await self.commands.send(messages.set_mission_current(1), self.commanding(job))
+            await self.commands.send(messages.set_mission_current(1), self.commanding(job, self._require_disarmed))
         await super().arm(job, timeout)
+
+    def _require_disarmed(self) -> None:
+        """Raises ModeChanged unless it is disarmed: the mission of a vehicle that somebody armed is left alone."""
+        if self.state.armed is not False:
+            raise ModeChanged(f"the vehicle is armed in {self.mode} now: whoever armed it has it")
 
     # -- up and down --------------------------------------------------------------------------------------
 

@@ -37,6 +37,12 @@ def test_verb_for_some_leaves_the_others_alone(three: Any, api: Any) -> None:
     assert set(answer.body["vehicles"]) == {"1", "3"}
 
 
+def test_all_under_a_vehicles_path_is_that_vehicle_alone(three: Any, api: Any) -> None:
+    answer = api.post("/vehicles/2/fleet/brake", {})
+    assert set(answer.body["vehicles"]) == {"2"}
+    assert [drone.mode for drone in three] == ["GUIDED", "BRAKE", "GUIDED"]
+
+
 def test_what_one_cannot_do_is_in_its_answer_and_the_others_do_it(three: Any, api: Any) -> None:
     three[1].pilot("LOITER")
     api.loop.settle()
