@@ -211,10 +211,7 @@ class MotionMessages(MessageSource):
             self._microseconds(),
         )
 
-    def _build_wind(self) -> Any | None:
-        """What a plane estimates; others send nothing."""
-        if not self.vehicle.tells_wind:
-            return None
+    def _build_wind(self) -> Any:
         body = self.vehicle.body
         speed = math.hypot(body.wind_north, body.wind_east)
         direction = math.degrees(math.atan2(-body.wind_east, -body.wind_north)) if speed > 0 else 180.0

@@ -21,6 +21,8 @@ class Telemetry(MotionMessages, SystemMessages, TruthMessages):
             for name in dir(self)
             if name.startswith("_build_")
         }
+        if not vehicle.tells_wind:
+            del self._builders["WIND"]
 
     def knows(self, name: str) -> bool:
         """Whether the vehicle can send this message at all."""

@@ -74,9 +74,10 @@ class Landing:
     def _approach_speed(self) -> float:
         """TECS_LAND_ARSPD, or the middle between AIRSPEED_MIN and AIRSPEED_CRUISE."""
         parameters = self._vehicle.parameters
+        slowest, fastest = self._vehicle.navigator.airspeed_range
         speed = parameters["TECS_LAND_ARSPD"]
-        middle = (parameters["AIRSPEED_MIN"] + parameters["AIRSPEED_CRUISE"]) / 2
-        return speed if speed > 0 else middle
+        middle = (slowest + parameters["AIRSPEED_CRUISE"]) / 2
+        return max(slowest, min(fastest, speed if speed > 0 else middle))
 
     @property
     def height(self) -> float:
@@ -124,12 +125,12 @@ class Landing:
             vehicle.say(mavlink.MAV_SEVERITY_INFO, text)
 
     def _flare(self, line: Demand, dt: float) -> Demand:
-        parameters = self._vehicle.parameters
-        least = parameters["TECS_LAND_SINK"]
+        vehicle, parameters = self._vehicle, self._vehicle.parameters
+        least = max(0.05, min(3.0, parameters["TECS_LAND_SINK"]))
         self._flare_sink += (least - self._flare_sink) * dt / FLARE_TIME
-        most = math.radians(parameters["LEVEL_ROLL_LIMIT"])
+        most = math.radians(max(0.0, min(45.0, parameters["LEVEL_ROLL_LIMIT"])))
         bank = max(-most, min(most, line.bank))
-        return Demand(bank, -max(self._flare_sink, least), parameters["AIRSPEED_MIN"], Throttle.IDLE)
+        return Demand(bank, -max(self._flare_sink, least), vehicle.navigator.airspeed_range[0], Throttle.IDLE)
 
     def _roll_out(self, course: float) -> Demand:
         vehicle = self._vehicle

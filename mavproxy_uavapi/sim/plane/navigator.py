@@ -22,6 +22,12 @@ HEIGHT_TIME = 3.0
 """Seconds: the climb rate is the height error divided by it, within the limits."""
 CROSSTRACK_FROM = 3.0
 """Loiter radii from the target beyond which the way there is a line."""
+SLOWEST, FASTEST = 5.0, 120.0
+"""m/s that an airspeed can be."""
+FASTEST_CLIMB = 30.0
+"""m/s."""
+FLATTEST, STEEPEST = 3.0, 80.0
+"""Degrees that ROLL_LIMIT_DEG can be."""
 DEFAULT_RADIUS = 60.0
 """Metres where WP_LOITER_RAD is nearly 0."""
 
@@ -117,7 +123,14 @@ class Navigator:
             along = self._estimator.velocity.north * math.cos(body.yaw)
             along += self._estimator.velocity.east * math.sin(body.yaw)
             speed = max(speed, (least - (along - body.airspeed)) / self.air_factor)
-        return max(parameters["AIRSPEED_MIN"], min(parameters["AIRSPEED_MAX"], speed))
+        slowest, fastest = self.airspeed_range
+        return max(slowest, min(fastest, speed))
+
+    @property
+    def airspeed_range(self) -> tuple[float, float]:
+        """AIRSPEED_MIN and AIRSPEED_MAX, as far as they make sense."""
+        slowest = max(SLOWEST, min(FASTEST, self._parameters["AIRSPEED_MIN"]))
+        return slowest, max(slowest, min(FASTEST, self._parameters["AIRSPEED_MAX"]))
 
     def radius(self, radius: float = 0.0) -> float:
         """Metres of the circle that is flown for a radius; WP_LOITER_RAD for 0. It grows with the thin air."""
@@ -161,13 +174,18 @@ class Navigator:
     def climb_to(self, down: float) -> float:
         """The climb rate towards a height."""
         error = self._estimator.position.down - down
-        most = CLIMB_SHARE * self._parameters["TECS_CLMB_MAX"]
-        least = -CLIMB_SHARE * self._parameters["TECS_SINK_MAX"]
+        most = CLIMB_SHARE * max(0.1, min(FASTEST_CLIMB, self._parameters["TECS_CLMB_MAX"]))
+        least = -CLIMB_SHARE * max(0.1, min(FASTEST_CLIMB, self._parameters["TECS_SINK_MAX"]))
         return max(least, min(most, error / HEIGHT_TIME))
+
+    @property
+    def steepest_bank(self) -> float:
+        """ROLL_LIMIT_DEG in rad, as far as it makes sense."""
+        return math.radians(max(FLATTEST, min(STEEPEST, self._parameters["ROLL_LIMIT_DEG"])))
 
     def bank(self, acceleration: float) -> float:
         """The bank (rad) for a lateral acceleration, within ROLL_LIMIT_DEG."""
-        most = math.radians(self._parameters["ROLL_LIMIT_DEG"])
+        most = self.steepest_bank
         return max(-most, min(most, math.atan(acceleration / GRAVITY)))
 
     def _demand(self, acceleration: float) -> Demand:
@@ -175,7 +193,8 @@ class Navigator:
 
     def _guidance(self) -> Guidance:
         here, velocity = self._estimator.position, self._estimator.velocity
-        period, damping = max(self._parameters["NAVL1_PERIOD"], 1.0), self._parameters["NAVL1_DAMPING"]
+        period = max(1.0, min(60.0, self._parameters["NAVL1_PERIOD"]))
+        damping = max(0.1, min(2.0, self._parameters["NAVL1_DAMPING"]))
         return Guidance((here.north, here.east), (velocity.north, velocity.east), period, damping)
 
     def _aside(self, end: Ned) -> float:

@@ -41,7 +41,7 @@ class TakeoffRun:
         climb = vehicle.body.airspeed * math.sin(STEEPEST_CLIMB)
         course = vehicle.body.yaw if self.course is None else self.course
         level = vehicle.navigator.hold_course(course)
-        most = math.radians(vehicle.parameters["LEVEL_ROLL_LIMIT"])
+        most = math.radians(max(0.0, min(45.0, vehicle.parameters["LEVEL_ROLL_LIMIT"])))
         return Demand(max(-most, min(most, level.bank)), climb, CLIMB_AIRSPEED, Throttle.FULL, course)
 
     @property

@@ -15,10 +15,8 @@ from ..parameters import ParameterStore
 from ..vehicle import Vehicle
 from .body import CarBody
 from .drive import COAST, Drive
-from .navigator import Navigator, grip
+from .navigator import FASTEST, Navigator, grip
 
-FASTEST = 30.0
-"""m/s; more is not believed."""
 HOME_MOVES_AFTER = 0.5
 """Metres from home at which a disarmed rover takes its new place for home."""
 PATH_SPACING = 2.0
@@ -47,7 +45,7 @@ class Chassis(Vehicle):
             return min(parameters["SPEED_MAX"], FASTEST)
         share = parameters["CRUISE_THROTTLE"] / 100
         cruise = parameters["CRUISE_SPEED"]
-        return min(cruise / share if 0.05 <= share <= 1 else cruise, FASTEST)
+        return max(0.0, min(cruise / share if 0.05 <= share <= 1 else cruise, FASTEST))
 
     @property
     def throttle_share(self) -> float:

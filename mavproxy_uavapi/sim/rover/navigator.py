@@ -8,9 +8,12 @@ from .. import shaping
 from ..estimator import Estimator
 from ..geodesy import Ned, wrap_pi
 from ..parameters import ParameterStore
+from ..physics import GRAVITY
 from .body import CarBody, Grip
 from .drive import STOP, Drive
 
+FASTEST = 30.0
+"""m/s; more is not believed."""
 SLOWEST = 0.05
 """m/s; ArduPilot refuses a lower speed."""
 HEADING_P = 2.0
@@ -29,14 +32,19 @@ SLOWEST_TURN = 0.3
 
 def grip(parameters: ParameterStore) -> Grip:
     """What the vehicle can do by its parameters."""
-    acceleration = parameters["ATC_ACCEL_MAX"] or 5.0
+
+    def positive(name: str, most: float, otherwise: float) -> float:
+        value = parameters[name]
+        return min(value, most) if value > 0 else otherwise
+
+    acceleration = positive("ATC_ACCEL_MAX", 20.0, 5.0)
     return Grip(
         acceleration,
-        parameters["ATC_DECEL_MAX"] or acceleration,
-        parameters["ATC_TURN_MAX_G"] * 9.80665,
-        max(parameters["TURN_RADIUS"], 0.1),
-        math.radians(parameters["ATC_STR_RAT_MAX"] or 180.0),
-        math.radians(parameters["ATC_STR_ACC_MAX"] or 180.0),
+        positive("ATC_DECEL_MAX", 20.0, acceleration),
+        positive("ATC_TURN_MAX_G", 10.0, 0.1) * GRAVITY,
+        max(positive("TURN_RADIUS", 1000.0, 0.1), 0.1),
+        math.radians(positive("ATC_STR_RAT_MAX", 1000.0, 180.0)),
+        math.radians(positive("ATC_STR_ACC_MAX", 1000.0, 180.0)),
     )
 
 
@@ -57,7 +65,7 @@ class Navigator:
 
     def start(self, speed: float = 0.0) -> None:
         """Forget the target; speed is the limit in m/s, WP_SPEED with 0."""
-        self.speed_limit = speed if speed > 0 else self._parameters["WP_SPEED"]
+        self.speed_limit = min(speed if speed > 0 else self._parameters["WP_SPEED"], FASTEST)
         self.target, self.reached, self.reversed, self._following = None, False, False, None
         self._acceleration = 0.0
 
@@ -65,7 +73,7 @@ class Navigator:
         """Change the limit in m/s; False for one that is too low."""
         if not speed >= SLOWEST:
             return False
-        self.speed_limit = speed
+        self.speed_limit = min(speed, FASTEST)
         return True
 
     def go_to(self, target: Ned, following: Ned | None = None) -> None:
@@ -118,7 +126,7 @@ class Navigator:
 
     def _speed(self, distance: float, error: float, dt: float) -> float:
         limit = grip(self._parameters)
-        jerk = self._parameters["WP_JERK"] or limit.acceleration
+        jerk = self._parameters["WP_JERK"] if 0 < self._parameters["WP_JERK"] < 100 else limit.acceleration
         now = abs(self._body.speed)
         rest = self._corner_speed() if self._following is not None else 0.0
         braking = shaping.square_root_speed(distance, APPROACH, BRAKING_SHARE * limit.acceleration)

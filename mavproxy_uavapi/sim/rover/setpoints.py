@@ -72,10 +72,10 @@ def _drive(rover: SimulatedRover, message: Any, in_body: bool) -> None:
     mask = message.type_mask
     has_velocity, has_yaw = not mask & VELOCITY_IGNORE, not mask & YAW_IGNORE
     has_rate = not mask & YAW_RATE_IGNORE
-    asked = [message.vx, message.vy] if has_velocity else []
-    asked += [message.yaw] if has_yaw else []
-    asked += [message.yaw_rate] if has_rate else []
-    if not asked or not all(map(math.isfinite, asked)):
+    values = [message.vx, message.vy] if has_velocity else []
+    values += [message.yaw] if has_yaw else []
+    values += [message.yaw_rate] if has_rate else []
+    if not values or not all(map(math.isfinite, values)):
         return
     speed, heading = 0.0, 0.0
     if has_velocity:

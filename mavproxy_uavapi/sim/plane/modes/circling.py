@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from ..demand import Demand
 from .base import Mode, NavigatingMode
 
@@ -24,7 +22,7 @@ class Circle(Mode):
     def step(self, dt: float) -> Demand:
         del dt
         plane = self.plane
-        bank = math.radians(plane.parameters["ROLL_LIMIT_DEG"]) / 3
+        bank = plane.navigator.steepest_bank / 3
         if plane.throttle_suppressed and not plane.flying:
             return Demand()
         return Demand(bank, plane.navigator.climb_to(self._down), plane.navigator.airspeed)

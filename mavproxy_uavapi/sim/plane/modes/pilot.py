@@ -26,20 +26,19 @@ class PilotMode(Mode):
     def step(self, dt: float) -> Demand:
         del dt
         plane = self.plane
-        sticks, now, parameters = plane.sticks, plane.now, plane.parameters
+        sticks, now = plane.sticks, plane.now
         throttle = sticks.throttle(now)
-        most = math.radians(parameters["ROLL_LIMIT_DEG"]) if self.limits_bank else MANUAL_BANK
+        most = plane.navigator.steepest_bank if self.limits_bank else MANUAL_BANK
         bank = sticks.axis(ROLL_STICK, now) * most
         climb = -sticks.axis(PITCH_STICK, now) * STICK_CLIMB
         if throttle <= 0.0:
-            return Demand(bank, climb + GLIDE, parameters["AIRSPEED_MIN"], Throttle.IDLE)
+            return Demand(bank, climb + GLIDE, plane.navigator.airspeed_range[0], Throttle.IDLE)
         if not plane.body.airborne:
             return Demand(bank, climb, CLIMB_AIRSPEED, Throttle.FULL if throttle > 0.5 else Throttle.IDLE)
         return Demand(bank, climb, self._airspeed(throttle))
 
     def _airspeed(self, throttle: float) -> float:
-        parameters = self.plane.parameters
-        slowest, fastest = parameters["AIRSPEED_MIN"], parameters["AIRSPEED_MAX"]
+        slowest, fastest = self.plane.navigator.airspeed_range
         return slowest + (fastest - slowest) * throttle
 
 
@@ -66,7 +65,7 @@ class Training(PilotMode):
 
 
 class Acro(PilotMode):
-    """Sticks as rates, which are not told from angles here."""
+    """Sticks as rates; here they are angles."""
 
     name = "ACRO"
     number = 4
@@ -107,14 +106,14 @@ class FlyByWireB(PilotMode):
         stick = -plane.sticks.axis(PITCH_STICK, plane.now)
         if self._down is None or stick != 0.0:
             self._down = plane.estimator.position.down
-        climb = stick * plane.parameters["FBWB_CLIMB_RATE"]
+        climb = stick * max(0.1, min(30.0, plane.parameters["FBWB_CLIMB_RATE"]))
         if stick == 0.0:
             climb = plane.navigator.climb_to(self._down)
         return Demand(self._bank(), climb, self._airspeed(plane.sticks.throttle(plane.now)))
 
     def _bank(self) -> float:
         plane = self.plane
-        return plane.sticks.axis(ROLL_STICK, plane.now) * math.radians(plane.parameters["ROLL_LIMIT_DEG"])
+        return plane.sticks.axis(ROLL_STICK, plane.now) * plane.navigator.steepest_bank
 
 
 class Cruise(FlyByWireB):

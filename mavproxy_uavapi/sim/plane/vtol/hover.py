@@ -51,13 +51,17 @@ class Hover:
     def start(self) -> None:
         """Take over the vehicle as it flies."""
         parameters = self._parameters
+
+        def within(name: str, scale: float, least: float, most: float) -> float:
+            return max(least, min(most, parameters[name] / scale))
+
         self.control.limits = Limits(
-            speed=max(parameters["Q_WP_SPEED"] / 100, 0.5),
-            speed_up=max(parameters["Q_WP_SPEED_UP"] / 100, 0.1),
-            speed_down=max(parameters["Q_WP_SPEED_DN"] / 100, 0.1),
-            acceleration=max(parameters["Q_WP_ACCEL"] / 100, 0.1),
-            acceleration_z=max(parameters["Q_PILOT_ACCEL_Z"], 0.1),
-            lean=math.radians(max(10.0, parameters["Q_ANGLE_MAX"] / 100)),
+            speed=within("Q_WP_SPEED", 100, 0.5, 30.0),
+            speed_up=within("Q_WP_SPEED_UP", 100, 0.1, 20.0),
+            speed_down=within("Q_WP_SPEED_DN", 100, 0.1, 20.0),
+            acceleration=within("Q_WP_ACCEL", 100, 0.1, 10.0),
+            acceleration_z=within("Q_PILOT_ACCEL_Z", 1, 0.1, 10.0),
+            lean=math.radians(within("Q_ANGLE_MAX", 100, 10.0, 60.0)),
         )
         self.control.start_at(self._estimator.position, self._estimator.velocity)
 
@@ -97,7 +101,7 @@ class Hover:
     def descend(self, above_ground: float, dt: float, place: Ned | None = None) -> HoverDemand:
         """Sink towards the ground: fast above, with Q_LAND_FINAL_SPD below Q_LAND_FINAL_ALT."""
         control, parameters = self.control, self._parameters
-        final, fast = parameters["Q_LAND_FINAL_SPD"], control.limits.speed_down
+        final, fast = max(0.1, min(2.0, parameters["Q_LAND_FINAL_SPD"])), control.limits.speed_down
         share = (above_ground - parameters["Q_LAND_FINAL_ALT"]) / SLOW_ABOVE_FINAL
         if place is None:
             self.brake(dt)

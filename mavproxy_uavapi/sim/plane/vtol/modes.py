@@ -42,8 +42,8 @@ class VtolMode(Mode):
     def climb_rate(self) -> float:
         """m/s that the throttle stick asks for."""
         parameters = self.plane.parameters
-        up = parameters["Q_PILOT_SPD_UP"]
-        down = parameters["Q_PILOT_SPD_DN"] or up
+        up = max(0.1, min(20.0, parameters["Q_PILOT_SPD_UP"]))
+        down = min(20.0, parameters["Q_PILOT_SPD_DN"]) if parameters["Q_PILOT_SPD_DN"] > 0 else up
         offset = self.throttle - 0.5
         if abs(offset) <= THROTTLE_DEADZONE:
             return 0.0
@@ -58,7 +58,7 @@ class VtolMode(Mode):
     def lean(self) -> tuple[float, float]:
         """Horizontal acceleration north, east (m/s/s) that the sticks ask for."""
         plane = self.plane
-        most = GRAVITY * math.tan(math.radians(plane.parameters["Q_ANGLE_MAX"] / 100))
+        most = GRAVITY * math.tan(self.quadplane.hover.control.limits.lean)
         forward = -plane.sticks.axis(PITCH_STICK, plane.now) * most
         right = plane.sticks.axis(ROLL_STICK, plane.now) * most
         return rotate_to_ne(forward, right, plane.body.yaw)
@@ -66,7 +66,9 @@ class VtolMode(Mode):
     def yaw_rate(self) -> float:
         """rad/s that the yaw stick asks for."""
         plane = self.plane
-        return plane.sticks.axis(YAW_STICK, plane.now) * math.radians(plane.parameters["Q_PLT_Y_RATE"])
+        return plane.sticks.axis(YAW_STICK, plane.now) * math.radians(
+            max(1.0, min(360.0, plane.parameters["Q_PLT_Y_RATE"]))
+        )
 
 
 class QStabilize(VtolMode):
@@ -117,7 +119,7 @@ class QLoiter(VtolMode):
         if forward == 0 == right:
             hover.brake(dt)
         else:
-            speed = plane.parameters["Q_LOIT_SPEED"] / 100
+            speed = max(0.2, min(30.0, plane.parameters["Q_LOIT_SPEED"] / 100))
             hover.control.fly_at(*rotate_to_ne(forward * speed, right * speed, plane.body.yaw), dt)
         hover.control.climb_at(-self.climb_rate(), dt)
         return HoverDemand(thrust=hover.demand(dt).thrust, yaw_rate=self.yaw_rate())
