@@ -217,6 +217,7 @@ def test_unloaded_in_flight_the_vehicle_holds(seeing: Any, harness: Any) -> None
     seeing.on_the_ground()
 
 
+@pytest.mark.long
 def test_without_uavapi_the_prompt_is_all_it_takes(harness: Any, tmp_path: Path) -> None:
     rig = harness.Rig(tmp_path, harness.free_port())
     try:
