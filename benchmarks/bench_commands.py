@@ -148,9 +148,9 @@ class Peer:
                 self._send(self._parameter(index))
         elif name == "PARAM_REQUEST_READ":
             names = [one for one, _ in self._parameters]
-            wanted = message.param_id if message.param_index < 0 else names[message.param_index]
-            if wanted in names:
-                self._send(self._parameter(names.index(wanted)))
+            expected = message.param_id if message.param_index < 0 else names[message.param_index]
+            if expected in names:
+                self._send(self._parameter(names.index(expected)))
         elif name == "COMMAND_LONG":
             if message.command == mavlink.MAV_CMD_DO_SET_MODE:
                 self._mode = int(message.param2)
@@ -192,7 +192,7 @@ class Peer:
         ms = int((time.monotonic() - self._began) * 1000)
         good = 0xFFFFFFFF >> 1
         estimator = mavlink.EKF_ATTITUDE | mavlink.EKF_POS_HORIZ_ABS | mavlink.EKF_POS_VERT_ABS
-        told = [
+        reported = [
             mavlink.MAVLink_attitude_message(ms, 0, 0, 0, 0, 0, 0),
             mavlink.MAVLink_local_position_ned_message(ms, 0, 0, -10, 0, 0, 0),
             mavlink.MAVLink_global_position_int_message(ms, -353632610, 1491652300, 594000, 10000, 0, 0, 0, 0),
@@ -204,8 +204,8 @@ class Peer:
             self._landed_state(),
             mavlink.MAVLink_system_time_message(int(time.time() * 1e6), ms),
         ]
-        assert len(told) == BURST
-        return told
+        assert len(reported) == BURST
+        return reported
 
 
 def _run_peer(pipe: Any) -> None:
@@ -507,8 +507,8 @@ def verdict(times: dict[tuple[str, str, str], list[float]]) -> tuple[bool, str]:
     medians = [percentile(took, 0.5) * 1e3 for took in ours]
     worst = [percentile(took, 0.99) * 1e3 for took in ours]
     in_time = max(medians) <= MEDIAN_GOAL and max(worst) <= WORST_GOAL
-    told = f"{len(ours)} cases: medians up to {max(medians):.2f} ms, 99th percentiles up to {max(worst):.2f} ms"
-    return in_time, f"{told} (goals: {MEDIAN_GOAL:g} and {WORST_GOAL:g} ms): {'reached' if in_time else 'missed'}"
+    reported = f"{len(ours)} cases: medians up to {max(medians):.2f} ms, 99th percentiles up to {max(worst):.2f} ms"
+    return in_time, f"{reported} (goals: {MEDIAN_GOAL:g} and {WORST_GOAL:g} ms): {'reached' if in_time else 'missed'}"
 
 
 @contextlib.contextmanager

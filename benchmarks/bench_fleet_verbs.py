@@ -77,9 +77,9 @@ def latencies(rig: Any, control: Any, tries: int) -> list[float]:
     found = []
     with requests.Session() as session:
         for number in range(tries):
-            mark, asked = control.ask("received", since=0)["last"], time.time()
+            mark, requested = control.ask("received", since=0)["last"], time.time()
             session.get(f"{rig.url}/vehicles/2/command/{MODES[number % 2]}", timeout=30)
-            found.append(1000 * (heard_at(control, mark) - asked))
+            found.append(1000 * (heard_at(control, mark) - requested))
     return found
 
 

@@ -69,14 +69,14 @@ class Bench:
             if name in (LOAD, ELSEWHERE):
                 self.cases[name].reads += len(self._clients.end())
 
-    def _load_module(self, wanted: bool) -> None:
-        if wanted and not self._loaded:
+    def _load_module(self, expected: bool) -> None:
+        if expected and not self._loaded:
             given = f'{{"port":{self._rig.port},"max_rate":{self._rate}}}'
             self._rig.mavproxy.ask(f"module load uavapi:{given}", "listening on")
             self._rig.wait_until_up()
-        elif self._loaded and not wanted:
+        elif self._loaded and not expected:
             self._rig.mavproxy.ask("module unload uavapi", "Unloaded")
-        self._loaded = wanted
+        self._loaded = expected
 
     def _measure(self, case: Case) -> None:
         pid = self._rig.mavproxy.pid

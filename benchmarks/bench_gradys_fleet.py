@@ -41,14 +41,14 @@ def generate(port: int, vehicles: int) -> None:
         turn += 1
         boot, lat = 1000 * second, round(-35.36e7 + 1e4 * number + 1e3 * math.sin(second / 10))
         flags = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
-        told = [
+        reported = [
             mavlink.MAVLink_heartbeat_message(2, mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA, flags, 0, 3, 3),
             mavlink.MAVLink_gps_raw_int_message(boot * 1000, 3, lat, 1491652300, 584000, 121, 200, 0, 0, 10),
             mavlink.MAVLink_sys_status_message(0, 0, 0, 0, 12600, 0, 97, 0, 0, 0, 0, 0, 0),
             mavlink.MAVLink_vfr_hud_message(1.5, 1.25, 270, 0, 604.0, 0.0),
             mavlink.MAVLink_global_position_int_message(boot, lat, 1491652300, 604000, 20000, 0, 0, 0, 27000),
         ]
-        packets = b"".join(message.pack(speakers[number]) for message in told)
+        packets = b"".join(message.pack(speakers[number]) for message in reported)
         try:
             out.sendto(packets, ("127.0.0.1", port))
         except ConnectionRefusedError:

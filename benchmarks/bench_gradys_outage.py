@@ -59,8 +59,8 @@ def run(tools: Any, directory: Path, seconds: float) -> int:
         taken = status["quantities"][0]["taken"]
         back = time.monotonic()
         rig.start("station", command).says("listening on")
-        wanted = len(posted) + taken
-        found = tools.eventually(lambda: arrived(url, wanted), 120, "everything's arrival")
+        expected = len(posted) + taken
+        found = tools.eventually(lambda: arrived(url, expected), 120, "everything's arrival")
         took = time.monotonic() - back
     finally:
         rig.stop()
@@ -68,17 +68,17 @@ def run(tools: Any, directory: Path, seconds: float) -> int:
     times = [reading["received"] for reading in found["readings"]]
     lost = set(posted) - set(numbers)
     in_order = times == sorted(times)
-    print(f"outage {seconds:g} s: {len(posted)} posted and {taken} positions = {wanted} readings")
+    print(f"outage {seconds:g} s: {len(posted)} posted and {taken} positions = {expected} readings")
     print(f"  arrived {len(numbers)}, lost {len(lost)}, once each: {len(numbers) == len(set(numbers))}", end="")
     print(f" (repeats that the receiver dropped: {found['repeats']}), in order: {in_order}")
     print(f"  all there {took:.1f} s after the receiver's start")
     return int(bool(lost) or not in_order or took > 30)
 
 
-def arrived(url: str, wanted: int) -> dict[str, Any] | None:
+def arrived(url: str, expected: int) -> dict[str, Any] | None:
     """What the receiver has, once it has that many readings."""
     try:
-        if requests.get(url, params={"limit": 1}, timeout=5).json()["count"] < wanted:
+        if requests.get(url, params={"limit": 1}, timeout=5).json()["count"] < expected:
             return None
         found: dict[str, Any] = requests.get(url, params={"limit": 1_000_000}, timeout=30).json()
     except requests.ConnectionError:

@@ -79,21 +79,21 @@ def fly(program: Path, vehicle: Launched, leader: Launched | None) -> str:
         command += ["--leader-url", f"127.0.0.1:{leader.port}"]
     running = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     assert running.stdout is not None
-    said = ""
+    printed = ""
     if leader is not None:
         for line in running.stdout:
-            said += line
+            printed += line
             if "FOLLOWING" in line:
                 break
         time.sleep(FOLLOWS_FOR)
         running.send_signal(signal.SIGINT)
     try:
-        said += running.communicate(timeout=LONGEST)[0]
+        printed += running.communicate(timeout=LONGEST)[0]
     except subprocess.TimeoutExpired:
         running.kill()
         return f"not done within {LONGEST:g} s: {running.communicate()[0][-200:]}"
-    if running.returncode or any(word in said.lower() for word in FAILURES):
-        return f"status {running.returncode}: {' | '.join(said.strip().splitlines()[-3:])} {last_error(vehicle)}"
+    if running.returncode or any(word in printed.lower() for word in FAILURES):
+        return f"status {running.returncode}: {' | '.join(printed.strip().splitlines()[-3:])} {last_error(vehicle)}"
     status = vehicle.status()
     return "" if not status["armed"] else f"it left the vehicle armed, {status['landed_state']} in {status['mode']}"
 

@@ -172,13 +172,13 @@ class Station:
         """Type, base mode, mode, status."""
         self.last.pop("HEARTBEAT", None)
         self.wait(lambda: "HEARTBEAT" in self.last)
-        said = self.last["HEARTBEAT"]
-        return said.type, said.base_mode, said.custom_mode, said.system_status
+        output = self.last["HEARTBEAT"]
+        return output.type, output.base_mode, output.custom_mode, output.system_status
 
     @property
     def landed_state(self) -> tuple[int, int]:
-        said = self.last["EXTENDED_SYS_STATE"]
-        return said.vtol_state, said.landed_state
+        output = self.last["EXTENDED_SYS_STATE"]
+        return output.vtol_state, output.landed_state
 
     def away(self, north: float, east: float) -> float:
         return math.dist(self.position, (north, east))

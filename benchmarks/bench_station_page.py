@@ -64,7 +64,7 @@ async def measure(directory: Path, options: argparse.Namespace) -> list[list[str
     over = asyncio.Event()
     try:
         station.says("listening on")
-        telling = asyncio.ensure_future(tell(url, options.vehicles, over))
+        sending = asyncio.ensure_future(tell(url, options.vehicles, over))
         async with chromium(directory) as page:
             await page.ask("Page.navigate", url=url)
             await page.until(SHOWN % options.vehicles)
@@ -77,7 +77,7 @@ async def measure(directory: Path, options: argparse.Namespace) -> list[list[str
             await page.evaluate(SCROLL)
             rows.append(await frames(page, "scrolling", options, station.pid))
         over.set()
-        await telling
+        await sending
     finally:
         station.stop()
     return rows

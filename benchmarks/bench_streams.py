@@ -1,10 +1,14 @@
-"""What stream clients cost others: reads of one client, while many streams are open that nobody reads."""
+"""What stream clients cost others, and what they get.
+
+Reads of one client, while many streams are open that nobody reads; then how long messages take to clients that read.
+"""
 
 from __future__ import annotations
 
 import argparse
 import asyncio
 import contextlib
+import re
 import socket
 import sys
 import time
@@ -67,13 +71,70 @@ def case(made: Any, paths: list[str], seconds: float) -> list[str]:
     return [*millis, f"{share * 100:.0f} %", f"{memory:.0f}"]
 
 
+SIZES = ((100, 10), (20, 50))  # clients, and Hz of each
+WATCHED = "/telemetry/stream?view=attitude&events=*&rate={}"
+STAMPED = re.compile(rb'"time": ([0-9.]+)')
+
+
+async def listen(port: int, rate: int, until: float) -> list[float]:
+    """Read a stream until then (s since 1970); how long (s) after its arrival each message was here."""
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    writer.write(f"GET {WATCHED.format(rate)} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n".encode())
+    delays, begun = [], time.time() + 2.0  # what was known before comes first
+    while (now := time.time()) < until:
+        data = await reader.read(65536)
+        now = time.time()
+        delays += [now - float(stamp) for stamp in STAMPED.findall(data) if now > begun]
+    writer.close()
+    return delays
+
+
+async def all_listen(port: int, sizes: tuple[tuple[int, int], ...], seconds: float) -> list[list[float]]:
+    """The delays of each size's clients together, all at once."""
+    until = time.time() + 2.0 + seconds
+    rates = [rate for count, rate in sizes for _ in range(count)]
+    delays = await asyncio.gather(*(listen(port, rate, until) for rate in rates))
+    return [[one for d, r in zip(delays, rates, strict=True) if r == rate for one in d] for _, rate in sizes]
+
+
+def await_rate(made: Any, rate: float) -> None:
+    """Wait until ATTITUDE comes so often (Hz): MAVProxy asks for its rate every 15 s."""
+    before = None
+    while True:
+        count = made.get("/telemetry/message/ATTITUDE").json()["info"]["count"]
+        if before is not None and count - before >= rate:
+            return
+        before = count
+        time.sleep(1.0)
+
+
+def delays(seconds: float) -> list[list[str]]:
+    """A row for each size: how long messages take, while clients of all sizes listen."""
+    rows = []
+    with rig(streamrate=50) as (made, _):
+        await_rate(made, 40)
+        cpu, began = cpu_seconds(made.mavproxy.pid), time.monotonic()
+        measured = asyncio.run(all_listen(made.port, SIZES, seconds))
+        share = (cpu_seconds(made.mavproxy.pid) - cpu) / (time.monotonic() - began)
+        for (count, rate), times in zip(SIZES, measured, strict=True):
+            millis = [f"{percentile(times, one) * 1e3:.1f}" for one in (0.5, 0.99, 1.0)]
+            rows.append([f"{count} at {rate} Hz", str(len(times)), *millis, f"{share * 100:.0f} %"])
+    return rows
+
+
 def main() -> int:
     """Run and print."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=10.0, help="of each case")
+    parser.add_argument("--delays", action="store_true", help="only these")
     parser.add_argument("--clients", type=int, nargs="*", default=[0, 100, 300])
     options = parser.parse_args()
     print(f"streams: {machine()}")
+    head = ["clients, all at once", "messages", "p50 ms", "p99 ms", "most ms", "MAVProxy's CPU"]
+    print(table(head, delays(options.seconds)))
+    print()
+    if options.delays:
+        return 0
     rows = []
     with rig(streamrate=10) as (made, _):
         made.get("/telemetry/gps")  # the first one asks the vehicle for the message

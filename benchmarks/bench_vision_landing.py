@@ -54,7 +54,7 @@ def fly(seed: int, method: str) -> dict[str, Any]:
     try:
         rig.start(chance.uniform(5, 7))
         outcome = rig.outcome(rig.land(method=method))
-        report = rig.flights.report.told()
+        report = rig.flights.report.as_dict()
     finally:
         rig.close()
     case["error"] = report.get("touchdown_error", math.inf)
@@ -105,8 +105,8 @@ def main() -> int:
             began = time.monotonic()
             case = fly(seed, method)
             cases.append(case)
-            said = case.get("failed") or f"{case['error']:.3f} m"
-            print(f"{method} {seed}: {said} ({time.monotonic() - began:.0f} s)", file=sys.stderr, flush=True)
+            output = case.get("failed") or f"{case['error']:.3f} m"
+            print(f"{method} {seed}: {output} ({time.monotonic() - began:.0f} s)", file=sys.stderr, flush=True)
             if chosen.json:
                 with chosen.json.open("a", encoding="utf-8") as stream:
                     stream.write(json.dumps(case) + "\n")

@@ -29,9 +29,9 @@ def land(made: Any, number: int) -> list[str]:
         made.mavproxy.ask("vision set sim_tags 0:0.30@0.8,-0.6", "looking for")
     harness.eventually(lambda: made.ok(made.get("/vision/status"))["info"]["in_view"], 30, "the tag's being in view")
     report = made.ok(made.post("/vision/land"))["info"]
-    told = made.ok(made.get("/vision/status"))["info"]
-    times = told["setpoint_ms"]
-    figures = [times["median"], times["p99"], told["detector_ms"], told["rate"]]
+    reported = made.ok(made.get("/vision/status"))["info"]
+    times = reported["setpoint_ms"]
+    figures = [times["median"], times["p99"], reported["detector_ms"], reported["rate"]]
     return [str(number + 1), *(f"{one:.1f}" for one in figures), f"{report['touchdown_error']:.3f}"]
 
 

@@ -79,8 +79,8 @@ class Notes:
         """All as a table."""
         rows = []
         for kind, counts in sorted(self.outcomes.items()):
-            told = ", ".join(f"{outcome} {count}" for outcome, count in counts.most_common())
-            rows.append([kind, str(sum(counts.values())), f"{self.slowest[kind]:.1f}", told])
+            reported = ", ".join(f"{outcome} {count}" for outcome, count in counts.most_common())
+            rows.append([kind, str(sum(counts.values())), f"{self.slowest[kind]:.1f}", reported])
         happened = ", ".join(f"{name} {count}" for name, count in sorted(self.events.items()))
         return f"{table(['requests', 'count', 'slowest s', ''], rows)}\nmeanwhile: {happened}"
 
@@ -233,11 +233,11 @@ class Clients:
     async def _hang_up(self) -> None:
         """A verb whose client goes away."""
         method, path, options, _ = self._some_verb()
-        asked = asyncio.ensure_future(self._session.request(method, self._url + path, **options))
+        requested = asyncio.ensure_future(self._session.request(method, self._url + path, **options))
         await asyncio.sleep(self._dice.uniform(0, 0.5))
-        asked.cancel()
+        requested.cancel()
         with contextlib.suppress(asyncio.CancelledError, aiohttp.ClientError, ConnectionError):
-            (await asked).close()
+            (await requested).close()
         self._notes.events["hang-ups"] += 1
 
     async def _garbage(self) -> None:

@@ -218,16 +218,16 @@ class Owner:
         began = time.time()
         await self._ask("/movement/travel_at_ned?wait=false", new, target)
         await asyncio.sleep(CYCLE)
-        asked = time.time()
-        flown = [at for at in self._wire.setpoints if began < at < asked]
-        self.gaps += [after - before for before, after in zip(flown, [*flown[1:], asked], strict=True)]
+        requested = time.time()
+        flown = [at for at in self._wire.setpoints if began < at < requested]
+        self.gaps += [after - before for before, after in zip(flown, [*flown[1:], requested], strict=True)]
         if not flown:
             self._notes.fail("a movement sent no setpoint")
         await self._ask(path, new)
         for _ in range(100):  # the tap's thread may be a moment behind
-            at = self._wire.first(command, asked)
+            at = self._wire.first(command, requested)
             if at is not None:
-                self.delays["new connection" if new else "kept connection"].append(at - asked)
+                self.delays["new connection" if new else "kept connection"].append(at - requested)
                 return
             await asyncio.sleep(0.02)
         self._notes.fail(f"{path} was answered, and nothing was sent")
@@ -321,10 +321,13 @@ def main() -> int:
         measure(made, tap, options.minutes * 60, notes)
         output = made.mavproxy.output()
         look_for_bad_words(output, notes)
-        told = [line for line in output.splitlines() if "refused" in line or "was closed for" in line]
-        print(f"{len(told)} lines of the log are about strangers" + "".join(f"\n  {line[:140]}" for line in told[:6]))
-        if len(told) > 20 * (options.minutes + 3):
-            notes.fail(f"{len(told)} lines of the log are about strangers")
+        reported = [line for line in output.splitlines() if "refused" in line or "was closed for" in line]
+        print(
+            f"{len(reported)} lines of the log are about strangers"
+            + "".join(f"\n  {line[:140]}" for line in reported[:6])
+        )
+        if len(reported) > 20 * (options.minutes + 3):
+            notes.fail(f"{len(reported)} lines of the log are about strangers")
     print(f"{len(notes.failures)} failures" if notes.failures else "all is well")
     return 1 if notes.failures else 0
 

@@ -78,21 +78,21 @@ class Api:
             sys.exit(f"{path}: {error}")
         if answer.status_code != 200:
             sys.exit(f"{path}: {answer.status_code}: {detail(answer)}")
-        said: dict[str, Any] = answer.json()
+        output: dict[str, Any] = answer.json()
         if self.verbose and path.startswith(("/command", "/movement")):
-            print(said["result"], flush=True)
-        return said
+            print(output["result"], flush=True)
+        return output
 
 
 def detail(answer: requests.Response) -> str:
     """Why the server refused, in its words."""
     try:
-        said = answer.json()["detail"]
+        output = answer.json()["detail"]
     except (ValueError, KeyError, TypeError):
         return answer.text.strip() or answer.reason
-    if isinstance(said, list):
-        return "; ".join(f"{'.'.join(map(str, part['loc']))}: {part['msg']}" for part in said)
-    return str(said)
+    if isinstance(output, list):
+        return "; ".join(f"{'.'.join(map(str, part['loc']))}: {part['msg']}" for part in output)
+    return str(output)
 
 
 def parser(description: str | None, altitude: float | None = 10.0) -> argparse.ArgumentParser:

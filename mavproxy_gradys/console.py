@@ -28,7 +28,7 @@ def station_lines(station: Report) -> list[str]:
         f" {station['failed']} failed{trips(station['round_trip_ms'])}"
     ]
     if station["ip"]:
-        lines.append(f"  it is told that we are at {station['ip']}")
+        lines.append(f"  our address for it: {station['ip']}")
     if station["note"]:
         lines.append(f"  {station['note']}")
     lines += error_lines(station)
@@ -42,7 +42,7 @@ def station_lines(station: Report) -> list[str]:
 def vehicle_line(vehicle: Report) -> str:
     """The outcome of one vehicle's updates."""
     if vehicle["why_not"]:
-        return f"nothing to say: {vehicle['why_not']} (next is {vehicle['seq']})"
+        return f"nothing to send: {vehicle['why_not']} (next is {vehicle['seq']})"
     age = vehicle["acknowledged_age_s"]
     newest = "none acknowledged yet" if age is None else f"last one acknowledged {age:.1f} s ago"
     return f"next is {vehicle['seq']}, {newest}"

@@ -27,7 +27,7 @@ class NotDelivered(Unavailable):
     """The data sent was not accepted.
 
     Attributes:
-        reached: whether anybody answered; if not, there is no need to try the next one.
+        reached: whether the receiver answered; if not, there is no need to try the next one.
         too_large: whether it was refused because of its size.
         for_content: whether other or less data may be accepted.
     """

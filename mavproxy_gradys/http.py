@@ -13,7 +13,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from mavproxy_gradys.forwarding.readings import LONGEST_TEXT, NAME, Reading, Value, device_of
 from mavproxy_gradys.service import Gradys
 from mavproxy_gradys.tracks.flight import VERB, flight_of
-from mavproxy_gradys.tracks.formats import places_of
+from mavproxy_gradys.tracks.formats import waypoints_of
 from mavproxy_gradys.tracks.request import TrackFile, TrackRequest
 from mavproxy_uavapi.core.errors import Invalid, NoVehicle
 from mavproxy_uavapi.core.vehicle.jobs import Job
@@ -112,7 +112,7 @@ class GradysHandlers:
         """Take off, fly through a track's places, return and land."""
         track_request = call.params(TrackRequest)
         call.remembered = TrackFile.of(track_request)
-        places = await asyncio.to_thread(places_of, track_request.track, track_request.ground)
+        places = await asyncio.to_thread(waypoints_of, track_request.track, track_request.ground)
         flight = flight_of(call.vehicle, places, track_request.reach, track_request.transit)
 
         async def verb(job: Job) -> None:
@@ -121,15 +121,15 @@ class GradysHandlers:
         return await call.fly(flight.copter, verb, lambda: flight.result)
 
     def _reading(self, call: Call, request: OneReading, now: float) -> Reading:
-        system = request.sysid or call.seen.state.system
+        system = request.sysid or call.known_vehicle.state.system
         at = now if request.time is None else request.time
         device = request.device or device_of(system)
         if request.quantity in self._gradys.pipeline.reserved and VEHICLE.fullmatch(device):
-            raise Invalid(f"{request.quantity} of {device} is told by the vehicle itself", "quantity")
+            raise Invalid(f"{request.quantity} of {device} comes from the vehicle itself only", "quantity")
         return Reading(device, system, request.quantity, request.representation, request.value, at)
 
     def _id(self, call: Call) -> str | None:
         try:
-            return str(call.seen.state.system)
+            return str(call.known_vehicle.state.system)
         except NoVehicle:
             return None

@@ -111,20 +111,20 @@ class GradysModule(SharedModule[GradysSettings]):
         else:
             print("gradys: MAVProxy is still starting")
 
-    def _show(self, tell: Callable[[dict[str, Any]], str]) -> None:
-        """Print the text that `tell` makes of the report; the state belongs to the asyncio thread."""
+    def _show(self, make_text: Callable[[dict[str, Any]], str]) -> None:
+        """Print the text that `make_text` makes of the report; the state belongs to the asyncio thread."""
 
         async def report() -> dict[str, Any]:
             return self.gradys.report()
 
-        print(tell(self.host.bridge.run(report())))
+        print(make_text(self.host.bridge.run(report())))
 
     def _start(self) -> None:
         settings = self.module_settings.snapshot()
 
         async def start() -> str:
             await self.gradys.start(settings)
-            return told(settings)
+            return push_summary(settings)
 
         self._background.send(start, "starting")
 
@@ -137,7 +137,7 @@ class GradysModule(SharedModule[GradysSettings]):
 
     def _flush(self) -> None:
         self.host.bridge.call_soon(self.gradys.flush)
-        print("gradys: everything is tried now; `gradys status` tells what comes of it")
+        print("gradys: everything is tried now; `gradys status` shows the result")
 
     def _fly(self, args: list[str]) -> None:
         self._track.command(["fly", *args])
@@ -149,15 +149,15 @@ class GradysModule(SharedModule[GradysSettings]):
         """Push and sense with the new settings."""
 
         async def restart() -> str:
-            return told(after) if await self.gradys.restart(after) else ""
+            return push_summary(after) if await self.gradys.restart(after) else ""
 
         self._background.send(restart, "taking up the setting")
 
 
-def told(settings: GradysSettings) -> str:
+def push_summary(settings: GradysSettings) -> str:
     """A line with the stations that get positions."""
     urls = ", ".join(station.url for station in settings.gs)
-    return f"telling {urls}" if urls else "no ground station is set; `gradys set gs HOST:PORT`"
+    return f"pushing to {urls}" if urls else "no ground station is set; `gradys set gs HOST:PORT`"
 
 
 def init(mpstate: Any, **kwargs: Any) -> GradysModule:

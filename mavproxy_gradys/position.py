@@ -45,7 +45,7 @@ def position_of(
         raise LinkLost.since(state.system, silent_for)
     received = state.messages.get("GLOBAL_POSITION_INT")
     if received is None:
-        raise Stale(f"vehicle {state.system} has not told its position yet")
+        raise Stale(f"vehicle {state.system} has not reported its position yet")
     age = now - received.at
     if age > max_age:
         raise Stale(f"the position of vehicle {state.system} is {age:.1f} s old")

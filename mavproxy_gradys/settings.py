@@ -102,7 +102,7 @@ class GradysModuleSettings(ModuleSettings[GradysSettings]):
             MPSetting("gs", str, "", "ground stations, HOST:PORT by comma", tab="Gradys"),
             MPSetting("ip", str, "", "HOST[:PORT] at which they reach our API; empty: found out"),
             MPSetting("period", float, 1.0, "s between updates", range=(0.1, 3600)),
-            MPSetting("max_age", float, 5.0, "s after which a position is not told any more", range=(0.1, 3600)),
+            MPSetting("max_age", float, 5.0, "s after which a position is no longer sent", range=(0.1, 3600)),
             MPSetting("timeout", float, 3.0, "s for an answer", range=(0.1, 60)),
             MPSetting("token", str, "", "bearer token for stations and HTTP sinks"),
             MPSetting("ca_file", str, "", "certificates that TLS is checked by; empty: the system's"),

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from mavproxy_uavapi.core import memory
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.vehicle.endings import Policy
 from mavproxy_uavapi.core.vehicle.stream_requester import StreamRequester
+from mavproxy_uavapi.envelope_file import EnvelopeFile
 from mavproxy_uavapi.http.app import ApiServer
 from mavproxy_uavapi.http.call import Service
 from mavproxy_uavapi.settings import ApiSettings
@@ -18,6 +20,7 @@ class Api:
         self.host = host
         self._server: ApiServer | None = None
         self._tasks = HeldTasks()
+        self._envelope = EnvelopeFile(host.envelopes, host.warn)
 
     @property
     def listening(self) -> bool:
@@ -32,7 +35,8 @@ class Api:
         """
         if self._server is not None:
             return
-        self._take_up(settings)
+        apply(settings, self.host)
+        self.use_envelope(settings.envelope)
         server = ApiServer(Service(self.host, settings))
         try:
             await server.start()
@@ -42,21 +46,23 @@ class Api:
         self._server = server
         self.host.api_address = settings.host, settings.port
         self._tasks.start(StreamRequester(self.host.registry, settings.sysid).run(), "the watch over the telemetry")
+        self._tasks.start(self._envelope.watch(), "the watch over the envelope's file")
+        self._tasks.start(memory.give_back(), "the return of freed memory")
         self._tasks.start(server.service.scripts.start(), "the search for running scripts")
 
     async def renew(self, settings: ApiSettings) -> None:
         """Apply settings that do not need another port (`ApiSettings.listens_as`); calls in flight go on."""
         if self._server is None:
             return
-        self._take_up(settings)
+        apply(settings, self.host)
+        self.use_envelope(settings.envelope)
         service = self._server.service
         service.settings = settings
         service.scripts.renew(settings)
 
-    def _take_up(self, settings: ApiSettings) -> None:
-        self.host.link_watch.timeout = settings.link_timeout
-        self.host.endings.on_disconnect = Policy.HOLD if settings.on_disconnect == "hold" else Policy.NOTHING
-        self.host.endings.on_script_exit = Policy(settings.on_script_exit)
+    def use_envelope(self, name: str) -> None:
+        """Take up the setting `envelope`, whether the API listens or not."""
+        self._envelope.use(name)
 
     async def stop(self) -> None:
         """Close the port and end the calls in flight."""
@@ -71,3 +77,11 @@ class Api:
     def filenos(self) -> list[int]:
         """Descriptors that a forked child must close."""
         return [] if self._server is None else self._server.filenos()
+
+
+def apply(settings: ApiSettings, host: Host) -> None:
+    """Set what the vehicles do by these settings, whoever commands them."""
+    host.link_watch.timeout = settings.link_timeout
+    host.endings.on_disconnect = Policy.HOLD if settings.on_disconnect == "hold" else Policy.NOTHING
+    host.endings.on_lease_end = Policy(settings.on_lease_end)
+    host.endings.on_script_exit = Policy(settings.on_script_exit)

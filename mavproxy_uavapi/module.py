@@ -55,7 +55,7 @@ class UavApiModule(SharedModule[ApiSettings]):
             "start": lambda _: self._start(),
             "stop": lambda _: self._stop(),
             "log": self._log,
-            "vehicles": lambda _: self._tell(vehicles),
+            "vehicles": lambda _: self._print_text(vehicles),
             "fly": self._fly,
             "fleet": self._fleet,
             "help": lambda _: print(HELP),
@@ -81,6 +81,8 @@ class UavApiModule(SharedModule[ApiSettings]):
             print(f"uavapi: {note}")
         if self._should_listen:
             self._start()
+        else:
+            self.host.bridge.call_soon(self.api.use_envelope, self.module_settings.snapshot().envelope)
 
     async def end(self) -> None:
         """Stop listening, or trying to."""
@@ -97,15 +99,15 @@ class UavApiModule(SharedModule[ApiSettings]):
 
     def _status(self, _args: list[str]) -> None:
         settings = self.module_settings.snapshot()
-        self._tell(lambda api: report(api, settings))
+        self._print_text(lambda api: report(api, settings))
 
-    def _tell(self, tell: Callable[[Api], str]) -> None:
-        """Print the text that `tell` makes of the state, which belongs to the asyncio thread."""
+    def _print_text(self, make_text: Callable[[Api], str]) -> None:
+        """Print the text that `make_text` makes of the state, which belongs to the asyncio thread."""
 
-        async def told() -> str:
-            return tell(self.api)
+        async def text() -> str:
+            return make_text(self.api)
 
-        print(self.host.bridge.run(told()) if self._begun else tell(self.api))
+        print(self.host.bridge.run(text()) if self._begun else make_text(self.api))
 
     def _start(self) -> None:
         self._should_listen = True
@@ -134,7 +136,7 @@ class UavApiModule(SharedModule[ApiSettings]):
                 return f"cannot open {error.filename}: {reason}"
             return f"cannot listen on {address}: {reason}; `uavapi set port N` takes another port"
         if settings.allow_open and not settings.is_local:
-            self._background.say("WARNING: allow_open is set: anybody who reaches this port can fly the vehicle")
+            self._background.say("WARNING: allow_open is set: everybody who reaches this port can fly the vehicle")
         return f"listening on {address}"
 
     async def _open_logs(self, settings: ApiSettings) -> None:
@@ -178,6 +180,8 @@ class UavApiModule(SharedModule[ApiSettings]):
 
     def use_settings(self, name: str, before: ApiSettings, after: ApiSettings) -> None:
         """Listen again if the address or the access changes; otherwise calls in flight go on."""
+        if name == "envelope":
+            self.host.bridge.call_soon(self.api.use_envelope, after.envelope)
         if self._should_listen:
             take_up = self._renew if after.listens_as(before) else self._restart
             self._background.send(lambda: take_up(after), "taking up the setting")

@@ -10,6 +10,7 @@ from typing import Any
 
 from MAVProxy.modules.lib.mp_settings import MPSetting
 
+from mavproxy_uavapi import envelope_file
 from mavproxy_uavapi.core.addresses import is_loopback, local_url_of, url_of
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.ini_file import IniFile
@@ -60,7 +61,8 @@ class ApiSettings:
         on_disconnect: what the vehicle does when the client of a waiting verb hangs up: continue or hold.
         allow_from: networks that may call without a token.
         allow_scripts_from: networks among these that may also run scripts.
-        allow_open: whether anybody may call without a token, from anywhere.
+        allow_open: whether everybody may call without a token, from anywhere.
+        allow_raw: whether /message sends any MAVLink message.
         cors_origins: origins of the web pages that may call.
         certfile, keyfile: PEM files for TLS; empty for none.
         max_jobs: verbs that may be in flight at once.
@@ -73,6 +75,8 @@ class ApiSettings:
         script_grace: s from Ctrl-C to the kill of a script that is stopped.
         script_size: kB of one script.
         script_quota: MB of all scripts together.
+        envelope: file with where vehicles may fly; `vehicle` for their own fences, empty for none.
+        on_lease_end: what the vehicle does when its client's lease runs out: hold, land or rtl.
         on_script_exit: what the vehicle does when its script dies in flight: nothing, hold, land or rtl.
         log_console, debug: components (COPTER, API, GRADYS_GS, SCRIPT) that log to the console, in detail.
         log_path: the log file, or its folder; empty for none.
@@ -86,9 +90,11 @@ class ApiSettings:
     link_timeout: float
     max_age: float
     on_disconnect: str
+    on_lease_end: str
     allow_from: tuple[Network, ...]
     allow_scripts_from: tuple[Network, ...]
     allow_open: bool
+    allow_raw: bool
     cors_origins: tuple[str, ...]
     certfile: str
     keyfile: str
@@ -102,6 +108,7 @@ class ApiSettings:
     script_grace: float
     script_size: int
     script_quota: int
+    envelope: str
     on_script_exit: str
     log_console: frozenset[str]
     log_path: str
@@ -133,14 +140,14 @@ class ApiSettings:
         return all(getattr(self, name) == getattr(other, name) for name in LISTENING)
 
     def check(self) -> None:
-        """Refuse combinations that let anybody fly the vehicle, or that cannot work.
+        """Refuse combinations that let everybody fly the vehicle, or that cannot work.
 
         Raises:
             SettingError: with the reason.
         """
         if not self.is_local and not (self.token or self.allow_from or self.allow_open):
             raise SettingError(
-                f"host = {self.host}: anybody on that network could fly the vehicle; set a token, or name the "
+                f"host = {self.host}: everybody on that network could fly the vehicle; set a token, or name the "
                 "networks that may call without one (allow_from), or set allow_open on purpose",
                 "host",
             )
@@ -242,9 +249,12 @@ class ApiModuleSettings(ModuleSettings[ApiSettings]):
             MPSetting("link_timeout", float, 5.0, "s without heartbeat until the link is lost", range=(1, 60)),
             MPSetting("max_age", float, 5.0, "s after which telemetry is stale", range=(0.1, 3600)),
             MPSetting("on_disconnect", str, "continue", "when a client hangs up", choice=["continue", "hold"]),
+            MPSetting("on_lease_end", str, "hold", "when a client's lease ends", choice=["hold", "land", "rtl"]),
+            MPSetting("envelope", str, "", "where vehicles may fly: a file, or `vehicle`"),
             MPSetting("allow_from", str, "", "networks that may call without a token", tab="Access"),
             MPSetting("allow_scripts_from", str, "", "networks among these that may run scripts, too"),
-            MPSetting("allow_open", bool, False, "let anybody call without a token"),
+            MPSetting("allow_open", bool, False, "let everybody call without a token"),
+            MPSetting("allow_raw", bool, False, "let callers send any MAVLink message (/message)"),
             MPSetting("cors_origins", str, "", "origins of web pages that may call"),
             MPSetting("certfile", str, "", "TLS certificate (PEM)"),
             MPSetting("keyfile", str, "", "TLS key (PEM)"),
@@ -270,8 +280,10 @@ class ApiModuleSettings(ModuleSettings[ApiSettings]):
         return ApiSettings(**values, local_rate=values["max_rate"] if is_set else 0.0)
 
     def check(self, settings: ApiSettings, changed: Set[str]) -> None:
-        """As `ApiSettings.check`."""
+        """As `ApiSettings.check`; a file that is named must be readable."""
         settings.check()
+        if "envelope" in changed:
+            envelope_file.check(settings.envelope)
 
     def settings_in(self, ini: IniFile) -> Iterator[tuple[str, str]]:
         """The settings among the keys of the original service's sections; a note reports each other key.

@@ -17,7 +17,7 @@ vision tags                        the tags in view
 vision land [ID] [METHOD]          land on the tag from here (velocity or landing_target)
 vision search [ID]                 fly an expanding square until the tag is in sight
 vision mission [ALT NORTH EAST [ID|none]]   take off, fly there (m from home), land on the tag
-vision abort                       end what is in flight; a vehicle that it flew is told to hold
+vision abort                       end what is in flight; a vehicle that it flew is commanded to hold
 vision calibrate FOLDER BOARD [FILE]        charuco:7x5:0.03:0.022 or chessboard:9x6:0.025
 vision snapshot FILE               write the newest frame, with its tags drawn in
 vision tag FILE.pdf [--family F] [--id N] [--size M]   a tag to scale, for printing
@@ -27,7 +27,7 @@ vision help                        this"""
 def status(tracker: Tracker, flights: FlightJobs) -> dict[str, Any]:
     """The camera and the flight as a JSON object."""
     health, settings = tracker.health, tracker.settings
-    seen = tracker.fresh_seen
+    result = tracker.fresh_result
     body: dict[str, Any] = {
         "source": settings.shown_source or None,
         "camera": health.state,
@@ -39,9 +39,9 @@ def status(tracker: Tracker, flights: FlightJobs) -> dict[str, Any]:
         "reconnects": health.reconnects,
         "families": list(settings.families),
         "tags": [vars(tag) for tag in settings.tag_list],
-        "in_view": [detection["id"] for detection in in_view(seen)],
-        "frame_age_s": None if seen is None else round(tracker.host.clock() - seen.captured_at, 3),
-        "detector_ms": None if seen is None else round(1000 * (seen.done_at - seen.received_at), 1),
+        "in_view": [detection["id"] for detection in in_view(result)],
+        "frame_age_s": None if result is None else round(tracker.host.clock() - result.captured_at, 3),
+        "detector_ms": None if result is None else round(1000 * (result.done_at - result.received_at), 1),
     }
     if tracker.latencies:
         body["setpoint_ms"] = {
@@ -49,7 +49,7 @@ def status(tracker: Tracker, flights: FlightJobs) -> dict[str, Any]:
             "p99": percentile(tracker.latencies, 0.99),
         }
     if flights.report is not None:
-        body["flight"] = {"running": flights.running, "phase": flights.phase, **flights.report.told()}
+        body["flight"] = {"running": flights.running, "phase": flights.phase, **flights.report.as_dict()}
     return body
 
 
@@ -80,13 +80,13 @@ def report(tracker: Tracker, flights: FlightJobs) -> str:
 
 def tags(tracker: Tracker) -> str:
     """A line for each tag in view."""
-    seen = tracker.fresh_seen
-    if seen is None:
+    result = tracker.fresh_result
+    if result is None:
         return f"vision: no frames: {tracker.health.state}"
-    if not seen.detections:
+    if not result.detections:
         return "vision: no tags in view"
     lines = []
-    for tag in in_view(seen):
+    for tag in in_view(result):
         if tag["position"] is None:
             lines.append(f"{tag['family']} {tag['id']}: of unknown size (`tags` does not list it)")
             continue

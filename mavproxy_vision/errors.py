@@ -22,17 +22,17 @@ class LandingFailed(Aborted):
 
     Args:
         sentence: why.
-        tell: returns what was tried and what was done instead; it is complete once the flight is over.
+        report: returns what was tried and what was done instead; it is complete once the flight is over.
     """
 
-    def __init__(self, sentence: str, tell: Callable[[], dict[str, Any]]) -> None:
+    def __init__(self, sentence: str, report: Callable[[], dict[str, Any]]) -> None:
         super().__init__(sentence)
-        self._tell = tell
+        self._report = report
 
     @property
     def report(self) -> dict[str, Any]:
         """What was tried, and what was done instead."""
-        return self._tell()
+        return self._report()
 
     def extras(self) -> dict[str, Any]:
         """`info`: the report."""

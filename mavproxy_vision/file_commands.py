@@ -42,15 +42,15 @@ def calibrated(args: list[str]) -> str:
     )
 
 
-def snapshot(args: list[str], seen: FrameResult | None, image: Image | None) -> str:
+def snapshot(args: list[str], result: FrameResult | None, image: Image | None) -> str:
     """`FILE`: write the newest frame, with its tags drawn in."""
     if len(args) != 1:
         raise SettingError("snapshot FILE.png")
-    if seen is None or image is None:
+    if result is None or image is None:
         return "there is no frame yet"
     file = path_of(args[0], "FILE")
     try:
-        encoded, data = cv2.imencode(file.suffix or ".png", annotated(image, seen, []))
+        encoded, data = cv2.imencode(file.suffix or ".png", annotated(image, result, []))
     except cv2.error:  # the supported formats depend on OpenCV's build
         encoded = False
     if not encoded:

@@ -125,11 +125,11 @@ class VisionHandlers:
     async def tags(self, _call: Call) -> dict[str, Any]:
         """The tags in view."""
         self.tracker.require_camera()
-        seen = self.tracker.fresh_seen
-        if seen is None:
-            raise NoCamera("no frame was looked at in the last second")
-        age = self.tracker.host.clock() - seen.captured_at
-        return self._answer("Success", info={"tags": in_view(seen), "frame": seen.number}, age_s=round(age, 3))
+        result = self.tracker.fresh_result
+        if result is None:
+            raise NoCamera("no frame was processed in the last second")
+        age = self.tracker.host.clock() - result.captured_at
+        return self._answer("Success", info={"tags": in_view(result), "frame": result.number}, age_s=round(age, 3))
 
     async def frame(self, _call: Call) -> web.StreamResponse:
         """The newest frame with its tags drawn in."""
@@ -149,21 +149,21 @@ class VisionHandlers:
         Raises:
             NoCamera: there is none yet, or it is too old; only frames of a folder do not age.
         """
-        seen, image, worker = self.tracker.seen, self.tracker.image, self.tracker.worker
-        if seen is None or image is None or worker is None:
+        result, image, worker = self.tracker.result, self.tracker.image, self.tracker.worker
+        if result is None or image is None or worker is None:
             raise NoCamera("there is no frame yet")
-        age = self.tracker.host.clock() - seen.received_at
+        age = self.tracker.host.clock() - result.received_at
         if age > FRESH and worker.source.live:
             raise NoCamera(f"the newest frame is {age:.1f} s old; the camera: {self.tracker.health.state}")
-        return seen, image
+        return result, image
 
     async def _picture(self) -> bytes:
         """The newest frame with its tags; drawn once for all callers, one frame at a time."""
-        seen, image = self._newest()
-        if self._drawing is None or (self._drawing[1].done() and self._drawing[0] is not seen):
+        result, image = self._newest()
+        if self._drawing is None or (self._drawing[1].done() and self._drawing[0] is not result):
             lines = caption(self.tracker, self.flights)
-            work = self._encoding.run(lambda: jpeg(annotated(image, seen, lines)))
-            self._drawing = seen, asyncio.get_running_loop().create_task(work)
+            work = self._encoding.run(lambda: jpeg(annotated(image, result, lines)))
+            self._drawing = result, asyncio.get_running_loop().create_task(work)
         return await asyncio.shield(self._drawing[1])
 
     async def stream(self, call: Call) -> web.StreamResponse:
@@ -202,8 +202,8 @@ class VisionHandlers:
     async def land(self, call: Call) -> Any:
         """Land on a tag from here; answers when the vehicle stands on it."""
         p = call.params(LandRequest)
-        sortie = self.flights.landing(call.copter, p.id, p.method or self.tracker.settings.method)
-        return await self._fly(call, sortie)
+        task = self.flights.landing(call.copter, p.id, p.method or self.tracker.settings.method)
+        return await self._fly(call, task)
 
     async def search(self, call: Call) -> Any:
         """Fly an expanding square until the tag is in sight."""
@@ -214,19 +214,19 @@ class VisionHandlers:
         """Take off, fly to a place, land on the tag or without one; return if there is none."""
         p = call.params(MissionRequest)
         method = p.method or self.tracker.settings.method
-        errand = MissionPlan(p.alt, p.north, p.east, p.lat, p.long, p.id, p.tag, method)
-        return await self._fly(call, self.flights.errand(call.copter, errand))
+        plan = MissionPlan(p.alt, p.north, p.east, p.lat, p.long, p.id, p.tag, method)
+        return await self._fly(call, self.flights.mission(call.copter, plan))
 
     async def stop(self, _call: Call) -> dict[str, Any]:
         """End the landing, search or mission in flight; the vehicle holds where it is."""
         done = self.flights.stop("stopped")
         return self._answer("Nothing was in flight" if done is None else done.capitalize())
 
-    async def _fly(self, call: Call, sortie: FlightTask) -> Any:
-        answer = await call.fly(call.copter, sortie, sortie.result, outlives_client=True)
-        report = sortie.report if sortie.begun else self.flights.report  # of the running flight that it joined
+    async def _fly(self, call: Call, task: FlightTask) -> Any:
+        answer = await call.fly(call.copter, task, task.result, outlives_client=True)
+        report = task.report if task.begun else self.flights.report  # of the running flight that it joined
         if isinstance(answer, dict) and report is not None:
-            answer["info"] = report.told()
+            answer["info"] = report.as_dict()
         return answer
 
     def _answer(self, result: str, **members: Any) -> dict[str, Any]:

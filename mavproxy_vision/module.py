@@ -47,10 +47,10 @@ class VisionModule(SharedModule[VisionSettings]):
         remembered = RememberedSettings(mpstate, NAME, keywords)
         settings = VisionModuleSettings(remembered.combined)
         actions: dict[str, Callable[[list[str]], None]] = {
-            "status": lambda _: self._tell(lambda: console.report(self.tracker, self.flights)),
+            "status": lambda _: self._print_text(lambda: console.report(self.tracker, self.flights)),
             "start": lambda _: self._start(),
             "stop": lambda _: self._stop(),
-            "tags": lambda _: self._tell(lambda: console.tags(self.tracker)),
+            "tags": lambda _: self._print_text(lambda: console.tags(self.tracker)),
             "land": self._land,
             "search": self._search,
             "mission": self._mission,
@@ -129,13 +129,13 @@ class VisionModule(SharedModule[VisionSettings]):
     def _run(self, coroutine: Any) -> Any:
         return self.host.bridge.run(coroutine)
 
-    def _tell(self, tell: Callable[[], str]) -> None:
-        """Print the text that `tell` makes of the state, which belongs to the asyncio thread."""
+    def _print_text(self, make_text: Callable[[], str]) -> None:
+        """Print the text that `make_text` makes of the state, which belongs to the asyncio thread."""
 
-        async def told() -> str:
-            return tell()
+        async def text() -> str:
+            return make_text()
 
-        print(self._run(told()) if self._begun else tell())
+        print(self._run(text()) if self._begun else make_text())
 
     def _start(self) -> None:
         settings = self.module_settings.snapshot()
@@ -235,12 +235,12 @@ class VisionModule(SharedModule[VisionSettings]):
             return
         method = self.module_settings.snapshot().method
         request = {"alt": alt, "north": north, "east": east, "id": number, "tag": tag != "none", "method": method}
-        self._fly("/vision/mission", request, self._errand)
+        self._fly("/vision/mission", request, self._mission_task)
 
-    def _errand(self, request: dict[str, Any]) -> FlightTask:
+    def _mission_task(self, request: dict[str, Any]) -> FlightTask:
         r = request
-        errand = MissionPlan(r["alt"], r["north"], r["east"], None, None, r["id"], r["tag"], r["method"])
-        return self.flights.errand(self.flights.copter(), errand)
+        plan = MissionPlan(r["alt"], r["north"], r["east"], None, None, r["id"], r["tag"], r["method"])
+        return self.flights.mission(self.flights.copter(), plan)
 
     def _fly(self, path: str, request: dict[str, Any], make: Callable[[dict[str, Any]], FlightTask]) -> None:
         """Begin a flight and print that; print its end when it comes."""
@@ -264,7 +264,7 @@ class VisionModule(SharedModule[VisionSettings]):
         self._in_background(lambda: file_commands.calibrated(args))
 
     def _snapshot(self, args: list[str]) -> None:
-        self._in_background(lambda: file_commands.snapshot(args, self.tracker.seen, self.tracker.image))
+        self._in_background(lambda: file_commands.snapshot(args, self.tracker.result, self.tracker.image))
 
     def _tag(self, args: list[str]) -> None:
         settings = self.module_settings.snapshot()
@@ -273,7 +273,7 @@ class VisionModule(SharedModule[VisionSettings]):
     def _in_background(self, work: Callable[[], str]) -> None:
         """Run slow work or disk access in the background, and print its result."""
 
-        def said() -> str:
+        def result() -> str:
             try:
                 return work()
             except OSError as error:
@@ -284,7 +284,7 @@ class VisionModule(SharedModule[VisionSettings]):
                 return str(error.err)
 
         def done() -> None:
-            text = said()
+            text = result()
             self.host.bridge.post(lambda: print(f"vision: {text}"))
 
         self.host.bridge.loop.call_soon_threadsafe(self.host.bridge.loop.run_in_executor, None, done)

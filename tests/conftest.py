@@ -177,15 +177,15 @@ def asked_for() -> dict[str, list[Requirement]]:
         project = tomllib.load(file)["project"]
     extras = project["optional-dependencies"]
 
-    def asked(extra: str) -> Iterator[Requirement]:
+    def requested(extra: str) -> Iterator[Requirement]:
         for line in map(Requirement, extras[extra]):
             if line.name == project["name"]:
                 for other in sorted(line.extras):
-                    yield from asked(other)
+                    yield from requested(other)
             else:
                 yield line
 
-    return {"": [*map(Requirement, project["dependencies"])], **{extra: [*asked(extra)] for extra in extras}}
+    return {"": [*map(Requirement, project["dependencies"])], **{extra: [*requested(extra)] for extra in extras}}
 
 
 @pytest.fixture

@@ -1,12 +1,12 @@
 """The MQTT sink: each reading to its topic with QoS 1; the broker's PUBACK is the acknowledgement.
 
-The URL's path is the topic, in which {sysid}, {device} and {quantity} stand for the reading's:
-`mqtt://broker/fleet/{sysid}/{quantity}`. Positions are retained, so that a new subscriber has the last one at
-once. Beside them a retained `status` says `online`, and by the broker's own hand `offline` when we are gone: the
-last will. A connection has one will, so each topic of that kind has a connection of its own.
+The URL's path is the topic; {sysid}, {device} and {quantity} stand for the reading's values:
+`mqtt://broker/fleet/{sysid}/{quantity}`. Positions are retained, so that a new subscriber gets the last one at once.
+Beside them a retained topic `status` has `online`; by our last will the broker sets it to `offline` when the
+connection breaks. A connection has one will, so each status topic has its own connection.
 
-With `#ack=station` at the end of the URL the station's word is the acknowledgement; see `confirmations.py`. What it
-does not confirm is published again, so the broker need not keep it for longer than EXPIRY, the last position neither.
+With `#ack=station` at the end of the URL the station's confirmation is the acknowledgement; see `confirmations.py`.
+Unconfirmed readings are published again, so they expire at the broker after EXPIRY, retained positions too.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ from mavproxy_gradys.net.resolver import Resolver
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
-KEEP_ALIVE = 15  # s; the broker gives a silent connection up after one and a half of it
-WINDOW = 20  # readings on their way at once, on one connection
-GOODBYE = 1.0  # s
-CONFIRMED_WITHIN = 20.0  # s for a station's word; under load it may take long, and sending again would add to that
+KEEP_ALIVE = 15  # s; the broker closes a silent connection after 1.5 times this
+WINDOW = 20  # readings in flight at once on one connection
+CLOSE_TIMEOUT = 1.0  # s
+CONFIRMATION_TIMEOUT = 20.0  # s for a station's confirmation; long, because sending again would add to its load
 EXPIRY = 60  # s
 DEFAULT_TOPIC = "fleet/{sysid}/{quantity}"
 ONLINE, OFFLINE = "online", "offline"
@@ -50,7 +50,7 @@ class MqttSink:
         url: mqtt(s)://[USER:PASSWORD@]HOST[:PORT]/TOPIC.
         timeout: s for an answer of the broker.
         ca_file: as for `Client`.
-        station_confirms: whether the station's word acknowledges, not the broker's.
+        station_confirms: whether the station acknowledges, not the broker.
     """
 
     def __init__(self, url: str, timeout: float, ca_file: str, station_confirms: bool = False) -> None:
@@ -65,7 +65,7 @@ class MqttSink:
         self._names = Resolver()
         self._connecting: defaultdict[str, asyncio.Lock] = defaultdict(asyncio.Lock)
         self._tasks = HeldTasks()
-        self._leaving: dict[str, asyncio.Task[None]] = {}  # attempts that were given up, by status topic
+        self._leaving: dict[str, asyncio.Task[None]] = {}  # abandoned attempts to connect, by status topic
 
     async def send(self, batch: Sequence[Stored]) -> set[int]:
         """See `Sink.send`; in order on each connection."""
@@ -89,7 +89,7 @@ class MqttSink:
         return taken
 
     async def _reach(self, status: str) -> None:
-        """One connection finds out whether the broker is there; if not, the others need not try."""
+        """Check on one connection whether the broker answers; if not, the others need not try."""
         try:
             await self._client(status)
         except aiomqtt.MqttError as error:
@@ -103,16 +103,16 @@ class MqttSink:
             return late
         confirmations.expect(numbers)
         published = await self._publish_all(status, batch)
-        confirmed = await confirmations.wait(published, CONFIRMED_WITHIN)
+        confirmed = await confirmations.wait(published, CONFIRMATION_TIMEOUT)
         if not confirmed:
-            raise NotDelivered(f"{self._where}: published, but no station says that it keeps it", reached=True)
+            raise NotDelivered(f"{self._broker_name}: published, but no station has confirmed it", reached=True)
         return confirmed
 
     async def _publish_all(self, status: str, batch: Sequence[Stored]) -> set[int]:
-        """The numbers of those that the broker has.
+        """Publish readings; the numbers of those that the broker has acknowledged.
 
         Raises:
-            NotDelivered: it has none.
+            NotDelivered: it has acknowledged none.
         """
         try:
             client = await self._client(status)
@@ -141,7 +141,7 @@ class MqttSink:
             await client.publish(topic, payload, qos=1, retain=is_position(stored.reading), properties=properties)
 
     def _properties(self, status: str) -> Properties | None:
-        """What goes with a reading: where the station is to confirm it."""
+        """The properties of a reading: the topic for the station's confirmation, and the expiry."""
         if not self._station_confirms:
             return None
         properties = Properties(PacketTypes.PUBLISH)  # type: ignore[no-untyped-call]
@@ -153,10 +153,10 @@ class MqttSink:
         return self._reply_topics.setdefault(status, f"{CONFIRMED_TOPIC}{uuid.uuid4().hex}")
 
     async def _client(self, status: str) -> aiomqtt.Client:
-        """The connection whose last will is for that topic, made if need be.
+        """The connection whose last will is for that topic; opened if necessary.
 
         Raises:
-            aiomqtt.MqttError: the broker does not take it.
+            aiomqtt.MqttError: the broker does not accept it.
         """
         async with self._connecting[status]:
             if status not in self._clients:
@@ -164,14 +164,15 @@ class MqttSink:
             return self._clients[status]
 
     async def _connect(self, status: str) -> aiomqtt.Client:
-        """A connection that has said `online`. One that comes too late is closed, not forgotten.
+        """Open a connection and publish `online`. One that opens too late is closed.
 
         Raises:
-            aiomqtt.MqttError: the broker does not take it in time.
+            aiomqtt.MqttError: the broker does not accept it in time.
         """
         if status in self._leaving:
-            raise aiomqtt.MqttError("the attempt to connect before has not ended yet")
-        await self._within(self._names.look_up(self._parts.hostname or "", self._port))  # no thread that others need
+            raise aiomqtt.MqttError("the last attempt to connect has not ended yet")
+        # The name is looked up in a thread of its own, not in the pool that other work needs.
+        await self._within(self._names.look_up(self._parts.hostname or "", self._port))
         client = self._make(status)
         connecting = asyncio.ensure_future(client.__aenter__())
         try:
@@ -180,17 +181,17 @@ class MqttSink:
             if self._station_confirms:
                 await client.subscribe(self._reply_topic(status), qos=0)
                 self._confirmations[status].begin()
-                self._tasks.start(listen(client, self._confirmations[status]), "the listening to confirmations")
+                self._tasks.start(listen(client, self._confirmations[status]), "the reading of confirmations")
         except BaseException:
             leaving = self._leaving[status] = self._tasks.start(
-                leave(client, connecting), f"the leaving of {self._port}"
+                leave(client, connecting), f"the closing of a connection to {self._broker_name}"
             )
             leaving.add_done_callback(lambda _: self._leaving.pop(status))
             raise
         return client
 
     async def _within(self, answer: Awaitable[object]) -> None:
-        """Await that for as long as the setting says.
+        """Wait for an answer, at most for the setting `timeout`.
 
         Raises:
             aiomqtt.MqttError: it took longer, or failed.
@@ -220,33 +221,33 @@ class MqttSink:
         return context if isinstance(context, ssl.SSLContext) else ssl.create_default_context()
 
     def _explain(self, error: BaseException | None) -> str:
-        return f"{self._where}: {str(error) or type(error).__name__}"
+        return f"{self._broker_name}: {str(error) or type(error).__name__}"
 
     @property
-    def _where(self) -> str:
+    def _broker_name(self) -> str:
         return f"broker {self._parts.hostname}:{self._port}"
 
     async def _drop(self, status: str) -> None:
-        """Give a connection up; the next batch makes a new one."""
+        """Close a connection; the next batch opens a new one."""
         client = self._clients.pop(status, None)
         if client is not None:
             await disconnect(client)
 
     async def close(self) -> None:
-        """Say `offline` ourselves, since the broker keeps the will for those who go without a word."""
+        """Publish `offline` and close: after an orderly close the broker does not publish the will."""
 
-        async def say(status: str, client: aiomqtt.Client) -> None:
+        async def go_offline(status: str, client: aiomqtt.Client) -> None:
             with contextlib.suppress(aiomqtt.MqttError, asyncio.TimeoutError):
-                await wait_with_timeout(GOODBYE, client.publish(status, OFFLINE, qos=1, retain=True))
+                await wait_with_timeout(CLOSE_TIMEOUT, client.publish(status, OFFLINE, qos=1, retain=True))
             await self._drop(status)
 
         if self._leaving:
-            await asyncio.wait(self._leaving.values(), timeout=GOODBYE)
-        await asyncio.gather(*(say(status, client) for status, client in list(self._clients.items())))
+            await asyncio.wait(self._leaving.values(), timeout=CLOSE_TIMEOUT)
+        await asyncio.gather(*(go_offline(status, client) for status, client in list(self._clients.items())))
 
 
 async def listen(client: aiomqtt.Client, confirmations: Confirmations) -> None:
-    """Hear the station until the connection is over."""
+    """Read the station's confirmations until the connection ends."""
     try:
         async for message in client.messages:
             confirmations.take(message.payload)
@@ -257,23 +258,23 @@ async def listen(client: aiomqtt.Client, confirmations: Confirmations) -> None:
 
 
 async def leave(client: aiomqtt.Client, connecting: asyncio.Future[aiomqtt.Client]) -> None:
-    """Close a connection once the attempt to make it has ended, which nobody can hurry."""
+    """Close a connection once the attempt to open it has ended; the attempt cannot be aborted."""
     await asyncio.gather(connecting, return_exceptions=True)
     await disconnect(client)
 
 
 async def disconnect(client: aiomqtt.Client) -> None:
-    """Take leave; a broker that does not answer finds the connection closed."""
+    """Disconnect in order; if the broker does not answer, close the connection anyway."""
     with contextlib.suppress(aiomqtt.MqttError, asyncio.TimeoutError):
-        await wait_with_timeout(GOODBYE, client.__aexit__(None, None, None))
-    left = client._client.socket()  # aiomqtt itself leaves it open when the broker was too slow
-    if isinstance(left, socket.socket):
+        await wait_with_timeout(CLOSE_TIMEOUT, client.__aexit__(None, None, None))
+    open_socket = client._client.socket()  # aiomqtt leaves it open if the broker was too slow
+    if isinstance(open_socket, socket.socket):
         with contextlib.suppress(OSError):
-            left.shutdown(socket.SHUT_RDWR)
+            open_socket.shutdown(socket.SHUT_RDWR)
 
 
 def is_position(reading: Reading) -> bool:
-    """Whether that is where a vehicle is, which new subscribers are to learn at once."""
+    """Whether the reading is a vehicle's own position, which is retained for new subscribers."""
     return reading.quantity == POSITION and reading.device == device_of(reading.system)
 
 
@@ -283,14 +284,14 @@ def topic_of(template: str, reading: Reading) -> str:
 
 
 def status_topic(template: str, reading: Reading) -> str:
-    """The topic that says whether its vehicle is online: beside its readings'."""
+    """The topic for `online` and `offline` of the reading's vehicle, beside the topics of its readings."""
     if "{quantity}" in template:
         return fill(template, reading, STATUS)
     return f"{fill(template, reading, '')}/{STATUS}"
 
 
 def fill(template: str, reading: Reading, quantity: str) -> str:
-    """The template with the reading's names in it."""
+    """The template with the reading's names filled in."""
     names = {"{sysid}": str(reading.system), "{device}": reading.device, "{quantity}": quantity}
     for name, value in names.items():
         template = template.replace(name, value)

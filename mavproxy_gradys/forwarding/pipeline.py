@@ -1,4 +1,4 @@
-"""ReadingPipeline with store and forward: samplers, the spool, and a sender for each sink."""
+"""Store and forward of readings: samplers, the spool, and a sender for each sink."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MEGABYTE = 1e6
 
 
 class ReadingPipeline:
-    """Samples the quantities while there is a sink, and keeps what is posted even while there is none.
+    """Samples the quantities while there is a sink; keeps posted readings even without a sink.
 
     Args:
         host: the vehicles.
@@ -37,7 +37,7 @@ class ReadingPipeline:
         self._settings: GradysSettings | None = None
         self.spool_thread: SpoolThread | None = None
         self._settings_before: GradysSettings | None = None  # of the last start
-        self._left: list[Reading] = []  # what the disk did not take before the last stop
+        self._left: list[Reading] = []  # readings that were not on the disk at the last stop
         self._why_left = ""
         self._senders: list[Sender] = []
         self._samplers: list[Sampler] = []
@@ -47,24 +47,29 @@ class ReadingPipeline:
         """Sample and send, if there is a sink."""
         self._settings = self._settings_before = settings
         if settings.sink or self._left:
-            self._kept()
+            self._started_thread()
         for address in settings.sink:
-            sender = Sender(address, self._kept(), self._host.clock)
+            sender = Sender(
+                address,
+                self._started_thread(),
+                self._host.clock,
+                tell=lambda info: self._host.tell("delivered", 0, info),
+            )
             self._senders.append(sender)
             self._tasks.start(sender.run(settings), f"the delivery to {address}")
         for quantity in settings.quantities if settings.sink else ():
             sampler = Sampler(quantity)
             self._samplers.append(sampler)
-            self._tasks.start(self._sample(sampler, self._kept()), f"the sampling of {quantity.name}")
+            self._tasks.start(self._sample(sampler, self._started_thread()), f"the sampling of {quantity.name}")
 
     async def stop(self) -> None:
-        """End it, and close the spool; what the disk does not take is kept in memory until the next start."""
+        """Stop, and close the spool; readings that cannot be written stay in memory until the next start."""
         self._settings = None
         self._samplers.clear()
         self._senders.clear()
         try:
             if self.spool_thread is not None:
-                await self.spool_thread.save()  # before the sinks' goodbyes, which may take long
+                await self.spool_thread.save()  # before the sinks close, which may take long
             await self._tasks.end()
         finally:
             await self._end_thread()
@@ -80,21 +85,21 @@ class ReadingPipeline:
             self.spool_thread = None
 
     async def close(self) -> None:
-        """End it for good: what an earlier stop left in memory is tried once more."""
+        """Stop for good; readings that an earlier stop left in memory get one more attempt."""
         if self._settings is None and self._left and self._settings_before is not None:
-            self._kept(self._settings_before)
+            self._started_thread(self._settings_before)
         await self.stop()
 
     @property
     def lost(self) -> str:
-        """What is lost if nothing more is written: how many readings, and why; empty when none is."""
-        spool_thread = self.spool_thread  # it is there when its end was not waited for
+        """What is lost if nothing more is written: the number of readings and the reason; empty if none is lost."""
+        spool_thread = self.spool_thread  # it exists if its end was not awaited
         count = len(self._left) if spool_thread is None else spool_thread.waiting
         why = (self._why_left if spool_thread is None else spool_thread.problem) or "they were not written in time"
         return f"{count} {'reading is' if count == 1 else 'readings are'} lost: {why}" if count else ""
 
-    def _kept(self, settings: GradysSettings | None = None) -> SpoolThread:
-        """The spool's thread, started if need be."""
+    def _started_thread(self, settings: GradysSettings | None = None) -> SpoolThread:
+        """The spool's thread; started if necessary."""
         settings = settings or self._settings
         if settings is None:
             raise NotStored("gradys is stopped: `gradys start`")
@@ -108,16 +113,16 @@ class ReadingPipeline:
         return self.spool_thread
 
     async def keep(self, readings: Sequence[Reading]) -> list[int]:
-        """Keep what was posted; the sequence numbers, when it is on the disk.
+        """Keep posted readings; returns their sequence numbers once they are on the disk.
 
         Raises:
-            NotStored: it is not.
+            NotStored: they are not.
         """
-        return await self._kept().keep(readings)
+        return await self._started_thread().keep(readings)
 
     @property
     def reserved(self) -> set[str]:
-        """The quantities that only a vehicle itself tells: those that are sampled, and whether it is online."""
+        """The quantities that come from a vehicle itself only: the sampled ones, its position and its status."""
         sampled = () if self._settings is None else self._settings.quantities
         return {POSITION, STATUS, *(quantity.name for quantity in sampled)}
 
@@ -153,16 +158,17 @@ class ReadingPipeline:
                 link_timeout=self._host.link_watch.timeout,
                 has_position=self._host.registry.find(state.system).has_position,
             )
-        except Unavailable as nothing:
-            sampler.skip(state.system, str(nothing))
+        except Unavailable as error:
+            sampler.skip(state.system, str(error))
             return None
-        told_at = state.messages["GLOBAL_POSITION_INT"].at
-        return sampler.take(state.system, [position.lat, position.lng, position.alt], told_at, wall - position.age)
+        received_at = state.messages["GLOBAL_POSITION_INT"].at
+        value = [position.lat, position.lng, position.alt]
+        return sampler.take(state.system, value, received_at, wall - position.age)
 
-    # -- what the status says -------------------------------------------------------------------------------
+    # -- status -----------------------------------------------------------------------------------------------
 
     def report(self) -> dict[str, Any]:
-        """spooled, oldest unsent, the spool, the sinks, the quantities."""
+        """The report for the status: spooled, oldest unsent, the spool, the sinks, the quantities."""
         spool_thread = self.spool_thread
         oldest = None if spool_thread is None else spool_thread.oldest_age
         return {
@@ -184,12 +190,12 @@ class ReadingPipeline:
 
 
 def spooled(spool_thread: SpoolThread) -> int | None:
-    """How many readings are kept; None while nobody knows."""
+    """The number of kept readings; None while unknown."""
     return None if spool_thread.count is None else spool_thread.count + spool_thread.waiting
 
 
 def quantity_report(sampler: Sampler) -> dict[str, Any]:
-    """What the status says of one quantity."""
+    """The report of one quantity, for the status."""
     quantity: Quantity = sampler.quantity
     why_not = {str(system): why for system, why in sorted(sampler.why_not.items())}
     return {"quantity": quantity.name, "period_s": quantity.period, "taken": sampler.taken, "why_not": why_not}

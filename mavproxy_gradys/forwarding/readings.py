@@ -1,12 +1,12 @@
-"""Quantities that are sampled, and the readings that come of it. Pure: the clock is an argument.
+"""Sampled quantities, and the readings that they give. Pure: the clock is an argument.
 
 A quantity is written `NAME=MESSAGE.field*SCALE+OFFSET@PERIOD[REPRESENTATION]`:
 
     alt=GLOBAL_POSITION_INT.relative_alt*0.001@1[m]
     cell1=BATTERY_STATUS[0].voltages[0]*0.001@10[V]
 
-Scale, offset, period (s, 1 by default) and representation (a unit or a type, for whoever reads it) may be left
-out. `position@1` is built in: [degrees, degrees, m above home].
+Scale, offset, period (s, default 1) and representation (a unit or a type, for readers) are optional.
+`position@1` is built in: [degrees, degrees, m above home].
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.mavlink.vehicle_state import Received, VehicleState
 
 POSITION = "position"
-STATUS = "status"  # the MQTT sink's word on whether a vehicle is online
-CONFIRMED_TOPIC = "confirmed/"  # below it a station says which readings it has kept
+STATUS = "status"  # the quantity in which the MQTT sink reports whether a vehicle is online
+CONFIRMED_TOPIC = "confirmed/"  # below it a station confirms the readings that it has stored
 POSITION_REPRESENTATION = "degrees, degrees, m above home"
-NAME = r"[A-Za-z0-9_.-]{1,64}"  # fits into an MQTT topic
-LONGEST_TEXT = 4096  # letters of a value or a representation
+NAME = r"[A-Za-z0-9_.-]{1,64}"  # valid in an MQTT topic
+LONGEST_TEXT = 4096  # characters of a value or a representation
 NUMBER = r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?"
 GRAMMAR = re.compile(
     rf"(?P<name>{NAME})"
@@ -40,15 +40,15 @@ Value = float | int | str | bool | list[float]
 
 @dataclass(frozen=True)
 class Quantity:
-    """What is sampled of every vehicle.
+    """A quantity that is sampled for every vehicle.
 
     Attributes:
-        name: what it is called; unique.
-        message: MAVLink message, with `[instance]` where several devices send it; empty for `position`.
-        attribute, index: the field, and which element of an array.
+        name: its unique name.
+        message: MAVLink message, with `[instance]` if several devices send it; empty for `position`.
+        attribute, index: the field, and the index if it is an array.
         scale, offset: the value is field * scale + offset.
         period: s between samples.
-        representation: unit or type, for whoever reads it.
+        representation: unit or type, for readers.
     """
 
     name: str
@@ -66,10 +66,10 @@ class Reading:
     """One measurement.
 
     Attributes:
-        device: who measured, `uav-1`.
-        system: MAVLink system id of the vehicle that it belongs to.
-        quantity, representation, value: what.
-        time: when, s since 1970 on this machine's clock.
+        device: the device that measured it, such as `uav-1`.
+        system: MAVLink system id of its vehicle.
+        quantity, representation, value: the measurement.
+        time: s since 1970 on this machine's clock.
     """
 
     device: str
@@ -88,7 +88,7 @@ class Stored:
     reading: Reading
 
     def body(self) -> dict[str, Any]:
-        """As it is sent."""
+        """The JSON object that is sent."""
         reading = self.reading
         return {
             "device": reading.device,
@@ -102,30 +102,30 @@ class Stored:
 
 
 def device_of(system: int) -> str:
-    """What a vehicle is called as a device."""
+    """The device name of a vehicle."""
     return f"uav-{system}"
 
 
 def parse_quantities(text: str) -> tuple[Quantity, ...]:
-    """The quantities of a list by comma, semicolon or white space (not within brackets).
+    """Parse a list of quantities, separated by comma, semicolon or white space (not within brackets).
 
     Raises:
-        SettingError: one cannot be read, or two have one name.
+        SettingError: one is malformed, or two have the same name.
     """
     parts = [part for part in re.split(r"[,;\s]+(?![^\[\]]*\])", text.strip()) if part]
     quantities = [parse_quantity(part) for part in parts]
     names = [quantity.name for quantity in quantities]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
-        raise SettingError(f"{', '.join(twice)} is there twice")
+        raise SettingError(f"{', '.join(twice)} occurs twice")
     return tuple(quantities)
 
 
 def parse_quantity(text: str) -> Quantity:
-    """One quantity.
+    """Parse one quantity.
 
     Raises:
-        SettingError: it cannot be read.
+        SettingError: it is malformed.
     """
     match = GRAMMAR.fullmatch(text)
     if match is None:
@@ -142,7 +142,7 @@ def parse_quantity(text: str) -> Quantity:
         raise SettingError(f"{text!r}: a period is {SHORTEST_PERIOD:g} to {LONGEST_PERIOD:g} s")
     if groups["message"] is None:
         if groups["name"] != POSITION:
-            raise SettingError(f"{text!r} names no message; {POSITION} alone is built in")
+            raise SettingError(f"{text!r} names no message; only {POSITION} is built in")
         return Quantity(POSITION, period=period, representation=POSITION_REPRESENTATION)
     instance = "" if groups["instance"] is None else f"[{groups['instance']}]"
     index = None if groups["index"] is None else int(groups["index"])
@@ -153,13 +153,13 @@ def parse_quantity(text: str) -> Quantity:
 
 @dataclass
 class Sampler:
-    """Takes one quantity of every vehicle.
+    """Samples one quantity of every vehicle.
 
-    A message is sampled once: what has not been told anew since the last sample is no new measurement.
+    A message is sampled once; a further reading needs a new message.
 
     Attributes:
-        taken: readings that were taken.
-        why_not: why there was none at the last turn, by system id.
+        taken: number of readings.
+        why_not: why the last turn gave none, by system id.
     """
 
     quantity: Quantity
@@ -168,13 +168,13 @@ class Sampler:
     _sampled_at: dict[int, float] = field(default_factory=dict)
 
     def sample(self, state: VehicleState, now: float, wall: float, max_age: float) -> Reading | None:
-        """One reading of a message; None when there is nothing new, and then `why_not` says so.
+        """A reading from the newest message; None if there is nothing new, and then `why_not` has the reason.
 
         Args:
-            state: the vehicle's.
-            now: on the clock of arrivals (s).
+            state: the vehicle's state.
+            now: s on the clock of arrivals.
             wall: the same moment in s since 1970.
-            max_age: s after which a message is too old to be a measurement.
+            max_age: s after which a message is too old for a measurement.
         """
         received = state.newest(self.quantity.message)
         value, why = self._read(received, now, max_age)
@@ -186,28 +186,31 @@ class Sampler:
     def _read(self, received: Received | None, now: float, max_age: float) -> tuple[Value | None, str]:
         """The value, or why there is none."""
         if received is None:
-            return None, "has not come yet"
+            return None, "has not arrived yet"
         if now - received.at > max_age:
             return None, f"is {now - received.at:.1f} s old"
         return self._value(received.message), "has no such number"
 
-    def take(self, system: int, value: Value, told_at: float, at: float) -> Reading | None:
-        """A reading of `value`, measured at `at` (s since 1970); None when it has been taken already.
+    def take(self, system: int, value: Value, received_at: float, at: float) -> Reading | None:
+        """A reading of `value`, measured at `at` (s since 1970); None if its message was sampled before.
 
         Args:
-            told_at: when its message came, on the clock of arrivals (s).
+            system: the vehicle's system id.
+            value: the measurement.
+            received_at: arrival of its message, s on the clock of arrivals.
+            at: see above.
         """
-        if self._sampled_at.get(system) == told_at:
-            self.skip(system, f"{self.quantity.message or self.quantity.name} has not come anew")
+        if self._sampled_at.get(system) == received_at:
+            self.skip(system, f"no new {self.quantity.message or self.quantity.name} has arrived")
             return None
-        self._sampled_at[system] = told_at
+        self._sampled_at[system] = received_at
         self.why_not.pop(system, None)
         self.taken += 1
         quantity = self.quantity
         return Reading(device_of(system), system, quantity.name, quantity.representation, value, at)
 
     def skip(self, system: int, why: str) -> None:
-        """Say why there was nothing to take."""
+        """Note why there is no reading."""
         self.why_not[system] = why
 
     def _value(self, message: Any) -> float | int | str | None:

@@ -1,4 +1,4 @@
-"""The delivery: one task for each sink, which sends the oldest readings until they are acknowledged."""
+"""Delivers readings: one task per sink sends the oldest readings until they are acknowledged."""
 
 from __future__ import annotations
 
@@ -24,21 +24,22 @@ log = logging.getLogger("gradys.delivery")
 
 
 class Sender:
-    """Empties the spool into one sink; belongs to the asyncio thread.
+    """Sends the spool's readings to one sink; belongs to the asyncio thread.
 
     Attributes:
-        address: the sink's.
-        batches: how many were sent.
-        sent: readings that went out, repeats included.
-        acknowledged: readings that were acknowledged.
-        put_last: readings that were refused by themselves, and are sent when there is nothing else.
+        address: the sink's address.
+        batches: number of sent batches.
+        sent: number of sent readings, repeats included.
+        acknowledged: number of acknowledged readings.
+        put_last: number of readings that were refused in a batch of their own; they are sent when nothing else waits.
         last_error: why the newest failed batch failed; empty since the last success.
 
     Args:
-        address: the sink's.
+        address: the sink's address.
         spool_thread: the spool.
         clock: monotonic seconds.
         chance: numbers from 0 to 1.
+        tell: gets the sink and the count of readings that it has taken.
     """
 
     def __init__(
@@ -47,7 +48,10 @@ class Sender:
         spool_thread: SpoolThread,
         clock: Callable[[], float],
         chance: Callable[[], float] = random.random,
+        *,
+        tell: Callable[[dict[str, Any]], None] = lambda info: None,
     ) -> None:
+        self._tell = tell
         self.address = address
         self._name = address.name
         self.batches = self.sent = self.acknowledged = self.put_last = 0
@@ -56,7 +60,7 @@ class Sender:
         self.spool_thread = spool_thread
         self._clock = clock
         self._backoff = Backoff(chance, LONGEST_OF_SINKS)
-        self._batch: list[Stored] = []  # on its way, or the last one
+        self._batch: list[Stored] = []  # the batch in flight, or the last one
         self._size = self._largest = BATCH
         self._outage = Outage(log, f"{address} takes no readings", f"{address} takes readings again")
         self._defects = Defects(f"the delivery to {address}")
@@ -72,12 +76,12 @@ class Sender:
                         sink = make_sink(self.address, settings)
                     await self._turn(sink)
                     continue
-                except NotStored as error:  # the spool says so itself
+                except NotStored as error:  # the spool logs it
                     self.last_error = str(error)
                 except NotDelivered as error:
                     self._failed(error)
                 except Exception as error:  # noqa: BLE001  a defect must not end the delivery for ever
-                    self._defects.tell(error)
+                    self._defects.report(error)
                     self._failed(NotDelivered(f"{type(error).__name__}: {error}", for_content=True))
                 await self._pause()
         finally:
@@ -88,7 +92,7 @@ class Sender:
         """Send one batch.
 
         Raises:
-            NotDelivered, NotStored: it came to nothing.
+            NotDelivered, NotStored: it failed.
         """
         self._batch = []
         self._batch = batch = await self.spool_thread.batch(self._name, self._size)
@@ -99,17 +103,19 @@ class Sender:
         self.round_trips.add(self._clock() - started)
         self.acknowledged += len(taken)
         await self.spool_thread.acknowledge(self._name, batch, taken)
+        if taken:
+            self._tell({"sink": self._name, "count": len(taken)})
         if not taken:
             raise NotDelivered("it acknowledges nothing", reached=True, for_content=True)
         self.last_error = ""
-        self._outage.now("")
+        self._outage.update("")
         self._backoff.succeeded()
         self._size = min(self._largest, self._size * 2)
 
     def _failed(self, error: NotDelivered) -> None:
-        """Look for the reading that is refused: by halves, and once it is alone it is sent last."""
+        """Find a refused reading by halving the batch; once it is alone, it is sent last."""
         self.last_error = str(error)
-        self._outage.now(self.last_error)
+        self._outage.update(self.last_error)
         count = len(self._batch)
         if not error.for_content or not count:
             return
@@ -118,7 +124,7 @@ class Sender:
             self.put_last += 1
             return
         self._size = count // 2
-        self._backoff.succeeded()  # a smaller one is another one
+        self._backoff.succeeded()  # a smaller batch is a new attempt
         if error.too_large:
             self._largest = self._size
 
@@ -136,7 +142,7 @@ class Sender:
         self._hurry.set()
 
     def report(self) -> dict[str, Any]:
-        """What the status says."""
+        """The report for the status."""
         now = self._clock()
         waits = self._backoff.waits(now)
         return {

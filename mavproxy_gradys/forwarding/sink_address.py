@@ -1,4 +1,4 @@
-"""Where readings go, as the setting `sink` names it: URL, options, and what may be shown and stored of it. Pure."""
+"""The address of a sink, as in the setting `sink`: its URL, its options, and its name without secrets. Pure."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from mavproxy_uavapi.core.addresses import masked
 from mavproxy_uavapi.core.errors import SettingError
 
 SCHEMES = tuple(PORTS)
-STATUS_COUNTS = "ack=status"  # of an HTTP sink
-STATION_CONFIRMS = "ack=station"  # of an MQTT sink
+STATUS_COUNTS = "ack=status"  # option of an HTTP sink
+STATION_CONFIRMS = "ack=station"  # option of an MQTT sink
 
 
 @dataclass(frozen=True)
@@ -20,9 +20,9 @@ class SinkAddress:
     """One sink.
 
     Attributes:
-        url: what to connect to. It may hold a password: it is neither shown nor stored.
-        status_counts: whether a 200 acknowledges all that was sent though it names no numbers.
-        station_confirms: whether the station's word acknowledges, not the broker's.
+        url: the URL to connect to. It may have a password, so it is neither shown nor stored.
+        status_counts: whether a 200 without numbers acknowledges the whole batch.
+        station_confirms: whether the station acknowledges, not the broker.
     """
 
     url: str
@@ -30,15 +30,15 @@ class SinkAddress:
     station_confirms: bool = False
 
     def __str__(self) -> str:
-        """As it may be shown."""
+        """The URL without its password, with the option."""
         option = STATUS_COUNTS if self.status_counts else STATION_CONFIRMS if self.station_confirms else ""
         return masked(self.url) + (f"#{option}" if option else "")
 
     @property
     def name(self) -> str:
-        """What the spool's file calls it, from which no secret can be read.
+        """The sink's name in the spool's file; it reveals no secret.
 
-        With another password or other options it is still the same sink.
+        Another password or another option does not change it.
         """
         parts, port = split_url(self.url, SCHEMES)
         whole = f"{parts.scheme}://{parts.username or ''}@{parts.hostname}:{port}{parts.path}?{parts.query}"
@@ -46,17 +46,17 @@ class SinkAddress:
 
 
 def sink_addresses(text: str) -> tuple[SinkAddress, ...]:
-    """The sinks of a list by comma.
+    """Parse a list of sinks, separated by commas.
 
     Raises:
-        SettingError: one is no URL of a scheme that we know, no topic, or has an option that there is not.
+        SettingError: a URL has an unknown scheme, an invalid topic, or an unknown option.
     """
     addresses = [sink_address(part.strip()) for part in text.split(",") if part.strip()]
     return tuple({sink.name: sink for sink in addresses}.values())
 
 
 def sink_address(text: str) -> SinkAddress:
-    """One sink.
+    """Parse one sink.
 
     Raises:
         SettingError: as `sink_addresses`.
@@ -65,7 +65,7 @@ def sink_address(text: str) -> SinkAddress:
     if text.startswith("mqtt"):
         url = text.removesuffix(f"#{STATION_CONFIRMS}")
         if set("+#?") & set(unquote(url.partition("://")[2].partition("/")[2])):
-            raise SettingError(f"{masked(text)}: a topic holds none of + # ?; the option is #{STATION_CONFIRMS}")
+            raise SettingError(f"{masked(text)}: a topic has none of + # ?; the only option is #{STATION_CONFIRMS}")
         return SinkAddress(url, station_confirms=url != text)
     url, _, option = text.partition("#")
     if option not in ("", STATUS_COUNTS):

@@ -1,4 +1,4 @@
-"""Where readings go: HTTP JSON here, MQTT in `mqtt.py`."""
+"""Sinks of readings: the protocol of all sinks, and JSON over HTTP. `mqtt_sink.py` has MQTT."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ class Sink(Protocol):
     """Takes batches of readings."""
 
     async def send(self, batch: Sequence[Stored]) -> set[int]:
-        """Send a batch; the sequence numbers that were acknowledged.
+        """Send a batch; returns the sequence numbers that were acknowledged.
 
         Raises:
-            NotDelivered: none was.
+            NotDelivered: none was acknowledged.
         """
 
     async def close(self) -> None:
-        """Say good-bye."""
+        """Close the connections."""
 
 
 def make_sink(address: SinkAddress, settings: GradysSettings) -> Sink:
     """The sink for an address.
 
     Raises:
-        NotDelivered: MQTT without its library, or the CA file went away.
+        NotDelivered: MQTT's library is not installed, or the CA file was removed.
     """
     if address.url.startswith(("http://", "https://")):
         return HttpSink(address, Client(settings.timeout, settings.token, settings.ca_file))
@@ -46,8 +46,8 @@ class HttpSink:
     """POSTs `{"readings": [...]}`.
 
     Args:
-        address: the receiver's.
-        client: made for it alone.
+        address: the receiver's address.
+        client: the HTTP client, used for this sink only.
     """
 
     def __init__(self, address: SinkAddress, client: Poster) -> None:
@@ -55,7 +55,7 @@ class HttpSink:
         self._client = client
 
     async def send(self, batch: Sequence[Stored]) -> set[int]:
-        """See `Sink.send`; acknowledged is what the answer's JSON names."""
+        """See `Sink.send`; the answer's JSON names the acknowledged numbers."""
         body = json.dumps({"readings": [stored.body() for stored in batch]}, allow_nan=False).encode()
         answer = await self._client.post(self._address.url, body, JSON)
         return acknowledged(answer, {stored.seq for stored in batch}, self._address.status_counts)
@@ -66,20 +66,20 @@ class HttpSink:
 
 
 def acknowledged(answer: Any, sent: set[int], status_counts: bool = False) -> set[int]:
-    """The numbers, of those sent, that the answer to a 200 acknowledges.
+    """The sent numbers that a 200 answer acknowledges.
 
     Args:
-        answer: its JSON; None when it is none.
+        answer: its JSON; None if it has none.
         sent: the numbers of the batch.
-        status_counts: whether an answer that names no numbers acknowledges all.
+        status_counts: whether an answer without numbers acknowledges all.
 
     Raises:
-        NotDelivered: it names no numbers: a captive portal answers 200 too.
+        NotDelivered: it names no numbers; a captive portal answers 200 too.
     """
     if not isinstance(answer, dict) or "acknowledged" not in answer:
         if status_counts:
             return sent
-        why = f"it answers 200 but names no numbers (a login page?); #{STATUS_COUNTS} takes that for enough"
+        why = f"it answers 200 but names no numbers (a login page?); #{STATUS_COUNTS} accepts any 200"
         raise NotDelivered(why, reached=True)
     numbers = answer["acknowledged"]
     if not isinstance(numbers, list) or not all(isinstance(n, int) and not isinstance(n, bool) for n in numbers):

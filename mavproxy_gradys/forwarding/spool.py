@@ -1,11 +1,11 @@
 """The spool: readings in an SQLite file until every sink has acknowledged them.
 
-Blocking; one thread uses it at a time (`spool_thread.py` has a thread for it). A transaction is on the disk when a
-call returns (WAL, synchronous=FULL), so that neither `kill -9` nor a flat battery loses what was kept.
+Calls block; one thread uses it at a time (`spool_thread.py` has a thread for it). When a call returns, its
+transaction is on the disk (WAL, synchronous=FULL): neither `kill -9` nor a power failure loses stored readings.
 
-A sequence number is given once, even after the file was lost: a new file begins at the milliseconds since
-1970, above whatever a former one can have reached at less than a thousand readings a second, and above what a
-corrupt one is known to have given, should the clock have been set back.
+A sequence number is used once, even after a loss of the file. A new file begins at the milliseconds since 1970: above
+the numbers of an earlier file with less than a thousand readings a second. If the clock was set back, a new file
+begins above the numbers that can be read from a corrupt one.
 """
 
 from __future__ import annotations
@@ -28,37 +28,37 @@ CAUSES = ("size", "age", "damage")
 
 
 def uptime() -> float:
-    """Seconds since this machine was started, sleep included: no clock jump moves it."""
+    """Seconds since this machine was started, sleep included; setting the clock does not change it."""
     return time.clock_gettime(time.CLOCK_BOOTTIME)
 
 
 def boot_id() -> str:
-    """Which start of this machine `uptime` counts from."""
+    """The id of the machine's start from which `uptime` counts."""
     return Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
 
 
 class Spool:
     """Readings on the disk.
 
-    Ages are reckoned by the machine's uptime, so that a clock that is set does not make everything old. What
-    is left from before a restart of the machine ages from when it was found again.
+    Ages are by the machine's uptime, so that setting the clock does not make all readings old. After a restart of the
+    machine the age of older readings begins at 0 when the file is opened.
 
     Attributes:
-        count, size: readings, and their bytes.
-        dropped: how many readings were dropped, by cause (`size`, `age`, `damage`), over the file's whole life.
-        damaged: numbers of rows that could not be read, and that `trim` is to set aside.
-        set_aside: the corrupt file that this one replaced; None when there was none.
+        count, size: number of readings, and their bytes.
+        dropped: number of dropped readings by cause (`size`, `age`, `damage`), over the file's whole life.
+        damaged: numbers of unreadable rows, which `trim` moves to a table of their own.
+        set_aside: the corrupt file that this one replaced; None without one.
 
     Args:
-        path: the file; made if need be.
+        path: the file; created if necessary.
         largest: bytes of readings beyond which the oldest are dropped.
         longest: age (s) after which a reading is dropped.
         clock: uptime (s).
-        boot: which start of the machine that counts from.
+        boot: the id of the machine's start from which `clock` counts.
         wall: s since 1970.
 
     Raises:
-        NotStored: the file cannot be opened: no room, no permission, another MAVProxy has it, or another program.
+        NotStored: the file cannot be opened: no space, no permission, or another MAVProxy or program uses it.
     """
 
     def __init__(
@@ -83,22 +83,23 @@ class Spool:
         except (sqlite3.Error, OSError) as error:
             raise NotStored(f"{path}: {error}{_hint(error)}") from error
         try:
-            self._find()
+            self._adopt()
         except BaseException as error:
             self._db.close()
             if isinstance(error, sqlite3.Error):
                 raise NotStored(f"{path}: {error}") from error
             raise
 
-    def _find(self) -> None:
+    def _adopt(self) -> None:
+        """Restart the age of readings from before a restart of the machine."""
         with self._transaction():
             now = self._clock()
             self._db.execute(
                 "UPDATE readings SET boot = ?, uptime = ? WHERE boot != ?", (self._boot, now, self._boot)
             )
-        self._look()
+        self._update_counts()
 
-    def _look(self) -> None:
+    def _update_counts(self) -> None:
         self.count, self.size = self._db.execute(
             "SELECT count(*), coalesce(sum(CAST(size AS INTEGER)), 0) FROM readings"
         ).fetchone()
@@ -115,10 +116,10 @@ class Spool:
     # -- in -----------------------------------------------------------------------------------------------
 
     def append(self, readings: Sequence[Reading]) -> list[int]:
-        """Keep readings; their sequence numbers.
+        """Store readings; returns their sequence numbers.
 
         Raises:
-            sqlite3.Error: nothing was kept.
+            sqlite3.Error: nothing was stored.
         """
         now, numbers, added = self._clock(), [], 0
         with self._transaction():
@@ -136,7 +137,7 @@ class Spool:
         return numbers
 
     def trim(self) -> None:
-        """Set aside what is damaged; drop what is too old, then the oldest of what is too much.
+        """Move damaged rows away; drop readings that are too old, then the oldest beyond the size limit.
 
         Raises:
             sqlite3.Error: as `append`.
@@ -149,7 +150,7 @@ class Spool:
             pass
 
     def _set_aside_damaged(self) -> None:
-        """Move the rows that could not be read to a table of their own, of which the newest are kept."""
+        """Move unreadable rows to a table of their own, which keeps the newest."""
         damaged_rows, moved = sorted(self.damaged), 0
         with self._transaction():
             for seq in damaged_rows:
@@ -164,7 +165,7 @@ class Spool:
             )
             self._count_dropped("damage", moved)
         self.damaged.clear()
-        self._look()
+        self._update_counts()
 
     def _drop_excess(self) -> int:
         oldest = self._db.execute(
@@ -206,21 +207,21 @@ class Spool:
     # -- out ----------------------------------------------------------------------------------------------
 
     def batch(self, sink: str, after: int, limit: int) -> list[Stored]:
-        """The oldest readings after number `after` that a sink has not acknowledged, in their order.
+        """The oldest readings after number `after` that a sink has not acknowledged, in order.
 
-        Rows that are damaged are passed over, until `trim` sets them aside.
+        Damaged rows are skipped, until `trim` moves them.
 
         Raises:
             sqlite3.Error: the file cannot be read.
         """
         while True:
-            good, newest = self._look_through(sink, after, limit)
+            good, newest = self._read_rows(sink, after, limit)
             if good or newest is None:
                 return good
             after = newest
 
-    def _look_through(self, sink: str, after: int, limit: int) -> tuple[list[Stored], int | None]:
-        """The sound ones of so many rows, and the last row's number; None when there are no rows."""
+    def _read_rows(self, sink: str, after: int, limit: int) -> tuple[list[Stored], int | None]:
+        """The undamaged readings among the next `limit` rows, and the last row's number; None without rows."""
         good, newest = [], None
         rows = self._db.execute(
             f"SELECT {COLUMNS} FROM readings WHERE seq > ? AND NOT EXISTS (SELECT 1 FROM acknowledged"
@@ -236,10 +237,10 @@ class Spool:
         return good, newest
 
     def acknowledge(self, sink: str, numbers: Sequence[int]) -> None:
-        """Note that a sink has acknowledged just these; what all sinks have is removed.
+        """Note that a sink has acknowledged these numbers; readings that all sinks have acknowledged are removed.
 
         Raises:
-            sqlite3.Error: nothing was noted; the readings are sent again some time.
+            sqlite3.Error: nothing was noted; the readings will be sent again.
         """
         others = [other for other in self.sinks if other != sink]
         with self._transaction():
@@ -247,10 +248,10 @@ class Spool:
         self._forget(gone)
 
     def _acknowledge(self, sink: str, number: int, others: Sequence[str]) -> list[int]:
-        """Note one acknowledgement; the size of the reading if nobody else waits for it."""
+        """Note one acknowledgement; returns the reading's size if it was removed, because no other sink needs it."""
         marks = ", ".join("?" * len(others))
-        held = f"SELECT count(*) FROM acknowledged WHERE seq = ? AND sink IN ({marks})"
-        (by_others,) = self._db.execute(held, (number, *others)).fetchone()
+        count_others = f"SELECT count(*) FROM acknowledged WHERE seq = ? AND sink IN ({marks})"
+        (by_others,) = self._db.execute(count_others, (number, *others)).fetchone()
         if by_others < len(others):
             self._db.execute("INSERT OR IGNORE INTO acknowledged VALUES (?, ?)", (sink, number))
             return []
@@ -264,7 +265,7 @@ class Spool:
         ]
 
     def use_sinks(self, sinks: Sequence[str]) -> None:
-        """From now on readings are kept for these; what all of them have acknowledged already is removed.
+        """Store readings for these sinks from now on; readings that all of them have acknowledged are removed.
 
         Raises:
             sqlite3.Error: as `append`.
@@ -280,13 +281,14 @@ class Spool:
                     (len(sinks),),
                 )
                 self._db.execute("DELETE FROM acknowledged WHERE seq NOT IN (SELECT seq FROM readings)")
-        self._look()
+        self._update_counts()
 
     def oldest_since(self) -> float | None:
-        """The uptime (s) at which the oldest reading was kept; None when there is none."""
+        """The uptime (s) at which the oldest reading was stored; None without readings."""
         row = self._db.execute("SELECT CAST(uptime AS REAL) FROM readings ORDER BY seq LIMIT 1").fetchone()
         return None if row is None else float(row[0])
 
 
 def _hint(error: BaseException) -> str:
-    return " (another MAVProxy uses it; `gradys set spool FILE` takes another)" if "locked" in str(error) else ""
+    locked = "locked" in str(error)
+    return " (another MAVProxy uses it; `gradys set spool FILE` chooses another file)" if locked else ""

@@ -1,4 +1,4 @@
-"""The spool seen from the asyncio thread: it blocks nobody, and readings outlast a disk that is full for a while."""
+"""Runs the spool in its own thread: calls do not block asyncio, and readings survive a temporarily full disk."""
 
 from __future__ import annotations
 
@@ -24,24 +24,24 @@ from mavproxy_uavapi.core.timeout import wait_with_timeout
 T = TypeVar("T")
 log = logging.getLogger("gradys.spool")
 
-COMMIT_EVERY = 0.5  # s that sampled readings wait for one transaction
+COMMIT_EVERY = 0.5  # s between transactions for sampled readings
 TRIM_EVERY = 10.0  # s
-HELD = 5000  # sampled readings held in memory while the disk takes none; then the oldest are dropped
+HELD = 5000  # sampled readings held in memory while they cannot be written; beyond it the oldest are dropped
 
 
 class SpoolThread:
-    """Keeps readings; all methods belong to the asyncio thread, all work on the disk is done in another.
+    """Stores readings. All methods belong to the asyncio thread; another thread does all work on the disk.
 
     Attributes:
-        count: readings in the spool; None until it was opened.
-        problem: why the spool takes nothing just now; empty when it does.
+        count: number of readings in the spool; None until it is open.
+        problem: why the spool cannot write now; empty without a problem.
         set_aside: corrupt files that were replaced.
-        dropped: readings that were dropped, by cause: `size`, `age`, `disk`, `damage` (of the
-            file; set aside in it), `value` (none that can be told).
+        dropped: number of dropped readings by cause: `size`, `age`, `disk` (not written), `damage` (a damaged row),
+            `value` (a value that cannot be stored).
 
     Args:
         make: opens the spool; may raise NotStored.
-        clock: uptime (s), the spool's own.
+        clock: uptime (s), the spool's own clock.
     """
 
     def __init__(self, make: Callable[[], Spool], clock: Callable[[], float] = uptime) -> None:
@@ -50,14 +50,14 @@ class SpoolThread:
         self._spool: Spool | None = None
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="gradys-spool")
         self._waiting: deque[Reading] = deque()
-        self._in_hand = 0  # readings that the other thread is writing
+        self._being_written = 0  # readings that the other thread is writing
         self._cursors: dict[str, SinkCursor] = {}
         self._tasks = HeldTasks()
         self._writer: asyncio.Task[None] | None = None
         self._stopping = asyncio.Event()
         self._closed = False
         self._outage = Outage(log, "the spool fails", "the spool works again")
-        self._takes_none = False  # the newest attempt to write failed
+        self._write_failed = False  # whether the newest attempt to write failed
         self._defects = Defects("the spool")
         self._drops = Drops(log, clock)
         self._oldest_since: float | None = None
@@ -67,35 +67,35 @@ class SpoolThread:
         self.dropped: dict[str, int] = {}
 
     def start(self, sinks: Sequence[str]) -> None:
-        """Begin to open the spool for these sinks; until it is open `problem` says why, and it is tried again."""
+        """Begin to open the spool for these sinks, with retries; until it is open, `problem` has the reason."""
         self._cursors = {sink: SinkCursor() for sink in sinks}
         self.problem = "it is being opened"
         self._writer = self._tasks.start(self._write(), "the spool")
 
     async def stop(self) -> None:
-        """Keep what still waits, and close the file; what the disk does not take is `left`."""
-        self._stopping.set()  # not cancelled: a transaction in flight must not be forgotten
+        """Write the waiting readings and close the file; readings that cannot be written are in `left`."""
+        self._stopping.set()  # the writer is not cancelled: the result of a transaction in flight must not be lost
         try:
             if self._writer is not None:
                 await asyncio.gather(self._writer, return_exceptions=True)
             await self.save()
         finally:
             self._closed = True
-            closing = self._thread.submit(self._close)  # also when nobody waits for it any more
+            closing = self._thread.submit(self._close)  # it runs even if this task is cancelled
             self._thread.shutdown(wait=False)
         await asyncio.wrap_future(closing)
         self._thread.shutdown()  # it has nothing left to do
-        self._drops.tell(self.dropped, at_once=True)
+        self._drops.report(self.dropped, at_once=True)
 
     @property
     def left(self) -> list[Reading]:
-        """The readings that the disk did not take."""
+        """The readings that were not written."""
         return list(self._waiting)
 
     # -- in -----------------------------------------------------------------------------------------------
 
     def put(self, reading: Reading) -> None:
-        """Take a sampled reading; it is on the disk within COMMIT_EVERY."""
+        """Take a sampled reading; it is written within COMMIT_EVERY."""
         if not is_storable(reading):
             self._count_drop("value")
             return
@@ -108,17 +108,17 @@ class SpoolThread:
             self._count_drop("disk")
 
     async def keep(self, readings: Sequence[Reading]) -> list[int]:
-        """Take readings; their sequence numbers, when they are on the disk.
+        """Store readings; returns their sequence numbers once they are on the disk.
 
         Raises:
-            NotStored: the disk took none of them.
+            NotStored: none of them was written.
         """
         numbers = await self._do(lambda spool: spool.append(readings))
-        self._tell()
+        self._notify_senders()
         return numbers
 
     async def _write(self) -> None:
-        with contextlib.suppress(NotStored):  # `problem` has it; the readings wait for the next time
+        with contextlib.suppress(NotStored):  # `problem` has the reason; the readings wait for the next attempt
             await self._trim()
         trimmed = self._clock()
         while not self._stopping.is_set():
@@ -129,40 +129,40 @@ class SpoolThread:
                 if self._clock() - trimmed >= TRIM_EVERY:
                     trimmed = self._clock()
                     await self._trim()
-            self._drops.tell(self.dropped)
+            self._drops.report(self.dropped)
 
     async def _trim(self) -> None:
-        # It may find nothing to delete, and shows nothing then; where no reading waits, that will do.
+        # If nothing was deleted, a success does not prove that writing works. Only waiting readings need the proof.
         await self._do(lambda spool: None, trim=True, writes=not self._waiting)
 
     async def save(self) -> None:
-        """Write what waits now, if the disk takes it."""
-        with contextlib.suppress(NotStored):  # `problem` has it
+        """Write the waiting readings, if possible."""
+        with contextlib.suppress(NotStored):  # `problem` has the reason
             await self._commit()
 
     async def _commit(self) -> None:
         if not self._waiting:
             return
         readings = [self._waiting.popleft() for _ in range(len(self._waiting))]
-        self._in_hand += len(readings)
+        self._being_written += len(readings)
         try:
             await self._do(lambda spool: spool.append(readings))
         except BaseException:
             self._waiting.extendleft(reversed(readings))
-            self._drop_excess()  # others may have come meanwhile
+            self._drop_excess()  # new readings may have arrived meanwhile
             raise
         finally:
-            self._in_hand -= len(readings)
-        self._tell()
+            self._being_written -= len(readings)
+        self._notify_senders()
 
-    def _tell(self) -> None:
+    def _notify_senders(self) -> None:
         for cursor in self._cursors.values():
             cursor.news.set()
 
     # -- out ----------------------------------------------------------------------------------------------
 
     async def batch(self, sink: str, limit: int) -> list[Stored]:
-        """The oldest readings that a sink has not acknowledged; waits until there are some.
+        """The oldest readings that a sink has not acknowledged; waits until there is at least one.
 
         Raises:
             NotStored: the file cannot be read.
@@ -179,67 +179,68 @@ class SpoolThread:
     async def _batch(self, sink: str, cursor: SinkCursor, limit: int) -> list[Stored]:
         if cursor.unnoted:
             await self._note(sink, cursor, set())
-        look = limit + cursor.passed_over
-        batch = await self._do(lambda spool: spool.batch(sink, cursor.after, look), writes=False)
+        count = limit + cursor.most_skipped
+        batch = await self._do(lambda spool: spool.batch(sink, cursor.after, count), writes=False)
         return cursor.choose(batch, limit)
 
     async def acknowledge(self, sink: str, batch: Sequence[Stored], numbers: set[int]) -> None:
-        """Remove what a sink has acknowledged: those of `batch` that are in `numbers`, and no others."""
+        """Note that a sink has acknowledged those of `batch` that are in `numbers`, and no others."""
         cursor, taken = self._cursors[sink], {stored.seq for stored in batch} & numbers
         cursor.take(batch, taken)
         await self._note(sink, cursor, taken)
 
     async def _note(self, sink: str, cursor: SinkCursor, numbers: set[int]) -> None:
-        cursor.unnoted |= numbers  # they are not sent again while we remember, also on a full disk
+        cursor.unnoted |= numbers  # so that they are not sent again, even on a full disk
         noted = sorted(cursor.unnoted)
         with contextlib.suppress(NotStored):
             await self._do(lambda spool: spool.acknowledge(sink, noted))
             cursor.unnoted.difference_update(noted)
 
     def put_last(self, sink: str, refused: Stored) -> None:
-        """Have a reading that a sink refuses by itself sent to it when there is nothing else."""
+        """Send a reading that a sink refuses in a batch of its own when nothing else waits."""
         self._cursors[sink].put_last(refused.seq)
 
     def flush(self) -> None:
-        """Have waiting senders look at once."""
-        self._tell()
+        """Make waiting senders check for readings at once."""
+        self._notify_senders()
 
     # -- the other thread ---------------------------------------------------------------------------------
 
     async def _do(self, work: Callable[[Spool], T], *, trim: bool = False, writes: bool = True) -> T:
-        """Do `work` on the spool in the other thread, opening it if need be.
+        """Do `work` on the spool in the other thread; it is opened if necessary.
 
         Args:
             work: what to do.
             trim: whether to trim the spool afterwards.
-            writes: whether success shows that the disk takes readings: a full one can still be read.
+            writes: whether a success proves that writing works; a full disk can still be read.
 
         Raises:
-            NotStored: it failed; `problem` says why until something succeeds, after a failed write a write.
+            NotStored: it failed. `problem` has the reason until something succeeds; after a failed write only a
+                successful write clears it.
         """
         if self._closed:
             raise NotStored("gradys is stopping")
         try:
             result, problem = await asyncio.get_running_loop().run_in_executor(self._thread, self._work, work, trim)
         except NotStored as error:
-            self._outage.now(self._note_problem(str(error), writes))
+            self._outage.update(self._note_problem(str(error), writes))
             raise
         except Exception as error:
-            self._defects.tell(error)
+            self._defects.report(error)
             raise NotStored(self._note_problem(f"{type(error).__name__}: {error}", writes)) from error
-        self._outage.now(self._note_problem(problem, writes))
+        self._outage.update(self._note_problem(problem, writes))
         return result
 
     def _note_problem(self, problem: str, writes: bool) -> str:
-        """What is wrong just now, after an attempt to write or to read that ended so."""
-        if not problem and not writes and self._takes_none:
+        """Update `problem` after an attempt to write or to read that ended with `problem`, and return it."""
+        if not problem and not writes and self._write_failed:
             return self.problem
-        self._takes_none = bool(problem) and (writes or self._takes_none)
+        self._write_failed = bool(problem) and (writes or self._write_failed)
         self.problem = problem
         return problem
 
     def _work(self, work: Callable[[Spool], T], trim: bool) -> tuple[T, str]:
-        """The outcome, and what is wrong although it is done."""
+        """The result, and a problem that occurred after the work."""
         spool = self._spool or self._open()
         try:
             result = work(spool)
@@ -251,7 +252,7 @@ class SpoolThread:
         try:
             if trim or spool.damaged or spool.size > spool.largest:
                 spool.trim()
-            self._look(spool)
+            self._update_counts(spool)
         except sqlite3.Error as error:
             return result, f"{spool.path}: {error}"
         return result, ""
@@ -279,7 +280,7 @@ class SpoolThread:
         if spool is not None:
             spool.close()
 
-    def _look(self, spool: Spool) -> None:
+    def _update_counts(self, spool: Spool) -> None:
         self.count = spool.count
         self.dropped.update(spool.dropped)
         self._oldest_since = spool.oldest_since()
@@ -289,10 +290,10 @@ class SpoolThread:
 
     @property
     def waiting(self) -> int:
-        """Readings that are not on the disk yet."""
-        return len(self._waiting) + self._in_hand
+        """The number of readings that are not on the disk yet."""
+        return len(self._waiting) + self._being_written
 
     @property
     def oldest_age(self) -> float | None:
-        """Age (s) of the oldest reading that not every sink has acknowledged; None when there is none."""
+        """Age (s) of the oldest reading that some sink has not acknowledged; None without one."""
         return None if self._oldest_since is None else max(self._clock() - self._oldest_since, 0.0)

@@ -1,4 +1,4 @@
-"""The schema of the spool's file, and the steps from each older one."""
+"""The schema of the spool's file, and the migrations from older ones."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from mavproxy_gradys.forwarding.transaction import Transaction
 from mavproxy_uavapi.core.errors import SettingError
 
 VERSION = 3  # PRAGMA user_version
-USABLE = 2  # files of this version are as good; the steps from there can wait for room on the disk
+USABLE = 2  # files from this version on are usable; later migrations may wait for space on the disk
 DAMAGED = "CREATE TABLE damaged (seq INTEGER PRIMARY KEY, device, system, quantity, representation, value, time)"
 SCHEMA = f"""
 CREATE TABLE readings (
@@ -27,7 +27,7 @@ log = logging.getLogger("gradys.spool")
 
 
 def make(db: sqlite3.Connection, first: int) -> None:
-    """The tables of this version, within the caller's transaction; numbers begin after `first`."""
+    """Create the tables of this version within the caller's transaction; numbers begin after `first`."""
     for statement in SCHEMA.split(";"):
         db.execute(statement)
     db.execute("INSERT INTO sqlite_sequence (name, seq) VALUES ('readings', ?)", (first,))
@@ -35,24 +35,24 @@ def make(db: sqlite3.Connection, first: int) -> None:
 
 
 def migrate(db: sqlite3.Connection) -> None:
-    """Bring an older file to this version, a step at a time; each is done, and noted, or not begun.
+    """Migrate an older file to this version step by step; each step is atomic.
 
     Raises:
-        sqlite3.Error: a step without which the file cannot be used failed.
+        sqlite3.Error: a necessary step failed.
     """
-    (found,) = db.execute("PRAGMA user_version").fetchone()
-    for version in range(found, VERSION):
+    (current,) = db.execute("PRAGMA user_version").fetchone()
+    for version in range(current, VERSION):
         try:
             STEPS[version](db)
         except sqlite3.OperationalError as error:
             if version < USABLE:
                 raise
-            log.warning("the file of the readings stays of version %d for now: %s", version, error)
+            log.warning("the file of the readings keeps version %d for now: %s", version, error)
             return
 
 
 def name_sinks(db: sqlite3.Connection) -> None:
-    """1 to 2: sinks have names instead of their URLs, which held passwords; damaged rows have a table."""
+    """1 to 2: names replace the sinks' URLs, which had passwords; damaged rows get a table."""
     with Transaction(db):
         db.create_function("name_of", 1, functools.cache(name_of))
         db.execute("UPDATE OR REPLACE acknowledged SET sink = name_of(coalesce(CAST(sink AS BLOB), X''))")
@@ -62,7 +62,7 @@ def name_sinks(db: sqlite3.Connection) -> None:
 
 
 def name_of(url: bytes) -> str:
-    """The name of the sink that a setting of version 1 named; empty when no setting can."""
+    """The name of a sink of version 1; empty if its URL is not valid any more."""
     try:
         return sink_address(url.decode(errors="replace")).name
     except SettingError:
@@ -70,7 +70,7 @@ def name_of(url: bytes) -> str:
 
 
 def leave_no_traces(db: sqlite3.Connection) -> None:
-    """2 to 3: written anew, so that no freed page and no log holds a password; needs as much room again."""
+    """2 to 3: rewrite the file, so that no free page and no log has a password; this needs the same space again."""
     db.execute("VACUUM")
     db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
     db.execute("PRAGMA user_version=3")

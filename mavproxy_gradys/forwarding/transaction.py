@@ -1,4 +1,4 @@
-"""A transaction of SQLite, as a context."""
+"""An SQLite transaction as a context manager."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import sqlite3
 
 
 class Transaction:
-    """BEGIN IMMEDIATE … COMMIT, or ROLLBACK when anything was raised."""
+    """BEGIN IMMEDIATE … COMMIT, or ROLLBACK after an exception."""
 
     def __init__(self, db: sqlite3.Connection) -> None:
         self._db = db

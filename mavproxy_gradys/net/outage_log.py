@@ -21,7 +21,7 @@ class Outage:
         self._log, self._began, self._ended = log, began, ended
         self.lasts = False
 
-    def now(self, why: str) -> None:
+    def update(self, why: str) -> None:
         """Set the present failure; empty if there is none."""
         if why and not self.lasts:
             self._log.warning("%s: %s", self._began, why)
@@ -41,7 +41,7 @@ class Defects:
         self._where = where
         self._reported: list[str] = []
 
-    def tell(self, error: Exception) -> None:
+    def report(self, error: Exception) -> None:
         """Report a defect."""
         if repr(error) not in self._reported:
             self._reported = [*self._reported[-9:], repr(error)]
@@ -66,7 +66,7 @@ class Drops:
         """Set counts by cause that are already reported."""
         self._reported = {**self._reported, **counts}
 
-    def tell(self, counts: Mapping[str, int], at_once: bool = False) -> None:
+    def report(self, counts: Mapping[str, int], at_once: bool = False) -> None:
         """Take the counts by cause, and log the new ones."""
         if not at_once and self._clock() - self._reported_at < DROPS_EVERY:
             return

@@ -50,7 +50,7 @@ class Resolver(AbstractResolver):
                 answer.set_result(infos)
             else:
                 answer.set_exception(error)
-                answer.exception()  # perhaps nobody waits for it any more
+                answer.exception()  # read it, because perhaps no caller waits any more
 
         def ask() -> None:
             infos: list[Info] = []

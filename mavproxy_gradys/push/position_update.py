@@ -1,9 +1,8 @@
-"""State -> the fields of the form that the ground station takes. Pure: the clock is an argument.
+"""Makes the form that the ground station takes from a vehicle's state. Pure: the clock is an argument.
 
-Field names, order and units are those of the GrADyS ground station (its POST /update-info/): lat and
-lng in degrees, alt in m above home, speeds in m/s, heading in degrees. The station answers 500 to a field that
-is no number, and passes NaN on as invalid JSON: what is unknown is left out, and without a position nothing is
-said at all.
+Field names, order and units are those of the GrADyS ground station (its POST /update-info/): lat and lng in degrees,
+alt in m above home, speeds in m/s, heading in degrees. The station answers 500 to a field that is not a number, and
+passes NaN on as invalid JSON. So unknown fields are left out, and without a position nothing is sent.
 """
 
 from __future__ import annotations
@@ -15,8 +14,8 @@ from mavproxy_gradys.position import Position
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 
 DEVICE = "uav"
-LOCATION = 102  # the station's number for "where a vehicle is"
-SPEED_DIGITS = 3  # more than a float of the link carries at these magnitudes
+LOCATION = 102  # the station's type number of a position update
+SPEED_DIGITS = 3  # a single-precision float has fewer at these magnitudes
 
 
 def form(
@@ -26,10 +25,10 @@ def form(
 
     Args:
         state, now, max_age: as for `position_of`.
-        position: what `position_of` gave.
+        position: the result of `position_of`.
         seq: number of this update; it advances when the station has acknowledged.
         ip: HOST:PORT/ of the API.
-        ready: whether the vehicle is ready to be armed.
+        ready: whether the vehicle is ready to arm.
     """
     return {
         "id": str(state.system),
@@ -47,7 +46,7 @@ def form(
 
 
 def motion(state: VehicleState, now: float, max_age: float) -> dict[str, str]:
-    """ground_speed, air_speed, heading by VFR_HUD; without it, what GLOBAL_POSITION_INT knows of them."""
+    """ground_speed, air_speed and heading from VFR_HUD; without it, those that GLOBAL_POSITION_INT has."""
     age = state.age("VFR_HUD", now)
     if age is not None and age <= max_age:
         hud = state.messages["VFR_HUD"].message
@@ -62,7 +61,7 @@ def motion(state: VehicleState, now: float, max_age: float) -> dict[str, str]:
 
 
 def battery(state: VehicleState, now: float, max_age: float) -> dict[str, str]:
-    """battery_percent by SYS_STATUS; none where the autopilot does not measure it, which MAVLink tells as -1."""
+    """battery_percent from SYS_STATUS; none if the autopilot does not measure it (-1 in MAVLink)."""
     age = state.age("SYS_STATUS", now)
     if age is None or age > max_age:
         return {}

@@ -1,4 +1,4 @@
-"""The push: one task for each ground station, which tells it where every vehicle is."""
+"""Pushes the position of every vehicle to ground stations, in one task per station."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
-DROPPED = 101  # the station's `type` when it received an update but no browser took it; 103 when one did
+DROPPED = 101  # `type` in the station's answer if no browser watches, so that it dropped the update; otherwise 103
 log = logging.getLogger("gradys.push")
-ADDRESS_KEPT = 30.0  # s for which our own address is not looked up again
+ADDRESS_KEPT = 30.0  # s until our own address is looked up again
 
 
 class Pusher:
-    """Tells one station where the vehicles are; belongs to the asyncio thread.
+    """Sends the vehicles' positions to one station; belongs to the asyncio thread.
 
     Args:
-        station: whom to tell.
+        station: the station.
         host: the vehicles, and the clock.
         settings: the snapshot in force.
-        tally: what became of it.
-        poster: how it is told; closed at the end.
+        tally: counts the updates and their outcomes.
+        poster: sends them; closed at the end.
     """
 
     def __init__(
@@ -71,9 +71,9 @@ class Pusher:
         await self._poster.close()
 
     def turn(self) -> None:
-        """Begin an update for every vehicle that has one to tell.
+        """Begin an update for every vehicle with a position.
 
-        While a station does not answer one vehicle's update is enough to find out that it is back.
+        While a station does not answer, the update of one vehicle is enough to find out that it is back.
         """
         now = self._host.clock()
         if self.tally.backoff.waits(now):
@@ -84,7 +84,7 @@ class Pusher:
                 continue
             if self.tally.backoff.failures and self._in_flight:
                 return
-            if self._where(state, vehicle) is not None:
+            if self._position(state, vehicle) is not None:
                 self._begin(state, vehicle)
 
     def _begin(self, state: VehicleState, vehicle: VehicleTally) -> None:
@@ -92,8 +92,8 @@ class Pusher:
         self._in_flight[state.system] = task
         task.add_done_callback(lambda _: self._in_flight.pop(state.system, None))
 
-    def _where(self, state: VehicleState, vehicle: VehicleTally) -> Position | None:
-        """Where it is now; None when that is unknown or too old, and then the tally says why."""
+    def _position(self, state: VehicleState, vehicle: VehicleTally) -> Position | None:
+        """The vehicle's position; None if it is unknown or too old, and then the tally has the reason."""
         try:
             position = position_of(
                 state,
@@ -102,8 +102,8 @@ class Pusher:
                 link_timeout=self._host.link_watch.timeout,
                 has_position=self._host.registry.find(state.system).has_position,
             )
-        except Unavailable as nothing:
-            vehicle.withhold(str(nothing))
+        except Unavailable as error:
+            vehicle.withhold(str(error))
             return None
         vehicle.why_not = ""
         return position
@@ -111,7 +111,7 @@ class Pusher:
     async def _push(self, state: VehicleState, vehicle: VehicleTally) -> None:
         try:
             self.tally.ip = await self._ip()
-            position = self._where(state, vehicle)  # finding our own address may have taken its time
+            position = self._position(state, vehicle)  # the lookup of our own address may have taken long
             if position is None:
                 return
             body = position_update.encode(self._form(state, vehicle, position))
@@ -125,8 +125,8 @@ class Pusher:
         self.tally.round_trips.add(now - started)
         self.tally.backoff.succeeded()
         vehicle.answered(was_dropped(answer), now)
-        self._outage.now("")
-        self._refusal(state.system).now("")
+        self._outage.update("")
+        self._refusal(state.system).update("")
 
     def _refusal(self, system: int) -> Outage:
         began, ended = (
@@ -139,12 +139,12 @@ class Pusher:
         now = self._host.clock()
         vehicle.refused(str(error))
         self.tally.failed(str(error), now)
-        self._outage.now("" if error.reached else str(error))
+        self._outage.update("" if error.reached else str(error))
         if error.reached:
-            self._refusal(system).now(str(error))
+            self._refusal(system).update(str(error))
             self.tally.backoff.succeeded()
             vehicle.backoff.failed(now)
-        elif not self.tally.backoff.waits(now):  # several updates that fail together are one failure
+        elif not self.tally.backoff.waits(now):  # several updates that fail together count as one failure
             self.tally.backoff.failed(now)
             self._own_at = -ADDRESS_KEPT
 
@@ -163,7 +163,7 @@ class Pusher:
         """The form's `ip`.
 
         Raises:
-            NotDelivered: there is no way to the station.
+            NotDelivered: there is no route to the station.
         """
         api: tuple[str, int] | None = getattr(self._host, "api_address", None)
         self.tally.note = api_note(api, self.station.host)
@@ -175,13 +175,13 @@ class Pusher:
             try:
                 self._own = await wait_with_timeout(self._settings.timeout, look_up)
             except asyncio.TimeoutError as error:
-                raise NotDelivered(f"no answer about the name {self.station.host}") from error
+                raise NotDelivered(f"the name server did not answer for {self.station.host}") from error
             except OSError as error:
-                raise NotDelivered(f"no way to {self.station.host}: {error.strerror or error}") from error
+                raise NotDelivered(f"no route to {self.station.host}: {error.strerror or error}") from error
             self._own_at = now
         return ip_field("", self._own, api)
 
 
 def was_dropped(answer: Any) -> bool:
-    """Whether the station's answer says that it received the update but dropped it."""
+    """Whether the station dropped the update, by its answer."""
     return isinstance(answer, dict) and str(answer.get("type")) == str(DROPPED)

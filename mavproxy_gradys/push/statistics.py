@@ -1,4 +1,4 @@
-"""What was sent and what became of it, for each station and vehicle. Pure: the clock is an argument."""
+"""Counts updates and their outcomes, for each station and vehicle. Pure: the clock is an argument."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ class VehicleTally:
 
     Attributes:
         seq: number of the next update.
-        sent: updates that went out.
+        sent: number of updates that were sent.
         acknowledged: those that the station answered with 200, `dropped` included.
-        dropped: those that the station said it received but dropped (its type 101: no browser watches).
+        dropped: those that the station received but dropped (its type 101: no browser watches).
         failed: those without an acknowledgement.
-        withheld: turns at which there was nothing to say.
-        why_not: why the last turn said nothing; empty when it spoke.
+        withheld: number of turns without a position to send.
+        why_not: why the last turn sent nothing; empty if it sent an update.
         last_error: why the last failed update failed.
-        acknowledged_at: when the newest acknowledgement came (s).
-        backoff: pauses after the station refused this vehicle.
+        acknowledged_at: when the newest acknowledgement arrived (s).
+        backoff: the pauses after the station refused this vehicle.
     """
 
     backoff: Backoff
@@ -39,7 +39,7 @@ class VehicleTally:
     acknowledged_at: float | None = None
 
     def withhold(self, why: str) -> None:
-        """Count a turn at which there was nothing to say."""
+        """Count a turn without a position to send."""
         self.withheld += 1
         self.why_not = why
 
@@ -57,7 +57,7 @@ class VehicleTally:
         self.last_error = why
 
     def report(self, now: float) -> dict[str, Any]:
-        """What the status says."""
+        """The report for the status."""
         age = None if self.acknowledged_at is None else round(now - self.acknowledged_at, 3)
         return {
             "seq": self.seq,
@@ -74,14 +74,18 @@ class VehicleTally:
 
 @dataclass
 class StationTally:
-    """All that is known of one station; it outlives a stop and a start.
+    """The counts of one station; they outlive a stop and a start.
 
     Attributes:
-        url: the station's.
-        ip: what the form tells it as our address; empty before the first update.
-        note: what is wrong with that, for a pilot.
-        last_error: why the newest failed update failed, and when (s).
-        backoff: pauses after nobody answered.
+        url: the station's URL.
+        random: numbers from 0 to 1 for the pauses.
+        vehicles: the tallies of the vehicles, by system id.
+        round_trips: the times from an update to its answer.
+        ip: our address in the form; empty before the first update.
+        note: what is wrong with that address, for a pilot.
+        last_error: why the newest failed update failed.
+        last_error_at: when that was (s).
+        backoff: the pauses after the station did not answer.
     """
 
     url: str
@@ -98,13 +102,13 @@ class StationTally:
         self.backoff = Backoff(self.random)
 
     def vehicle(self, system: int) -> VehicleTally:
-        """The tally of one vehicle, made at its first update."""
+        """The tally of one vehicle; created at its first update."""
         if system not in self.vehicles:
             self.vehicles[system] = VehicleTally(Backoff(self.random))
         return self.vehicles[system]
 
     def failed(self, why: str, now: float) -> None:
-        """Remember why an update failed."""
+        """Note why an update failed."""
         self.last_error, self.last_error_at = why, now
 
     def total(self, name: str) -> int:
@@ -112,7 +116,7 @@ class StationTally:
         return sum(getattr(vehicle, name) for vehicle in self.vehicles.values())
 
     def report(self, now: float) -> dict[str, Any]:
-        """What the status says."""
+        """The report for the status."""
         waits = self.backoff.waits(now)
         return {
             "station": self.url,

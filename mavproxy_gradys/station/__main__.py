@@ -15,7 +15,7 @@ from mavproxy_uavapi.core.errors import SettingError
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Serve until SIGINT or SIGTERM; the exit status (1 when it cannot listen or store)."""
+    """Serve until SIGINT or SIGTERM; returns the exit status (1 if it cannot listen or store)."""
     options = parser().parse_args(arguments)
     logging.basicConfig(format="station: %(message)s", level=logging.INFO)
     try:
@@ -28,21 +28,21 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def failed(why: str) -> int:
-    """Say why it does not start."""
+    """Print why it does not start; returns the exit status."""
     print(f"station: {why}", file=sys.stderr)
     return 1
 
 
 async def run(options: argparse.Namespace) -> None:
-    """Serve until a signal comes.
+    """Serve until a signal arrives.
 
     Raises:
         OSError, NotStored, ExtraMissing, SettingError: as `serve`.
     """
-    over = asyncio.Event()
+    stop = asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
-        asyncio.get_running_loop().add_signal_handler(number, over.set)
-    await serve(options, over)
+        asyncio.get_running_loop().add_signal_handler(number, stop.set)
+    await serve(options, stop)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Who may call the station, and what a browser may make of its answers."""
+"""Access checks of the station, and the headers that restrict what a browser does with its answers."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from urllib.parse import urlsplit
 from aiohttp import web
 from aiohttp.typedefs import Handler, Middleware
 
-# Nothing but our own files runs or loads: what a device is called is text, whatever it holds.
+# Only our own files run or load: a device's name stays text, whatever it contains.
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data:; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -22,21 +22,21 @@ HEADERS = {
 
 
 async def add_headers(_request: web.Request, response: web.StreamResponse) -> None:
-    """Put HEADERS on every answer; a signal of aiohttp's, so that streams have them too."""
+    """Add HEADERS to every answer; an aiohttp signal, so that streams have them, too."""
     response.headers.update(HEADERS)
 
 
 @web.middleware
-async def from_here(request: web.Request, handler: Handler) -> web.StreamResponse:
-    """Refuse what a page of another site sends."""
+async def same_origin(request: web.Request, handler: Handler) -> web.StreamResponse:
+    """Refuse requests from pages of other sites."""
     origin = request.headers.get("Origin")
     if origin is not None and urlsplit(origin).netloc != request.host:
         return web.json_response({"detail": "a page of another site may not call"}, status=403)
     return await handler(request)
 
 
-def only_with_token(token: str) -> Middleware:
-    """Refuse a POST without that bearer token; all may post when it is empty."""
+def require_token(token: str) -> Middleware:
+    """Refuse a POST without that bearer token; an empty token allows all."""
 
     @web.middleware
     async def check(request: web.Request, handler: Handler) -> web.StreamResponse:

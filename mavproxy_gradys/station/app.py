@@ -1,16 +1,16 @@
-"""The station's HTTP side.
+"""The station's HTTP API.
 
-POST /update-info/       a device's position, as the GrADyS ground station takes it: form fields; answers
-                         type 103, or 101 when no browser watches: then the update was received but dropped
+POST /update-info/       a device's position, as for the GrADyS ground station: form fields; answers type 103, or
+                         type 101 if no browser watches: then the update was received but dropped
 POST /readings           {"readings": [...]} -> {"acknowledged": [seq, ...]}
-GET  /devices            what update-info told, JSON; /devices.csv
+GET  /devices            the newest update of each device, JSON; /devices.csv
 GET  /fleet              every vehicle, from readings and updates
 GET  /readings           JSON; /readings.csv; /readings.parquet;
                          ?device= &quantity= &from= &to= (s since 1970) &after=SEQ &limit=1000
 GET  /history            a quantity for a plot; ?device= &quantity= &element= &from= &to= &parts=800
-GET  /alarms             what is wrong
-GET  /watch              every second what is new, as Server-Sent Events: the page watches by it
-GET  /metrics, /health   for Prometheus, and for whoever restarts it
+GET  /alarms             the alarms
+GET  /watch              the changes, every second, as Server-Sent Events; the page uses it
+GET  /metrics, /health   for Prometheus, and for a supervisor
 GET  /                   the page
 """
 
@@ -27,7 +27,7 @@ from aiohttp import web
 from aiohttp.typedefs import Handler, Middleware
 
 from mavproxy_gradys.errors import NotStored
-from mavproxy_gradys.station.access import add_headers, from_here, only_with_token
+from mavproxy_gradys.station.access import add_headers, require_token, same_origin
 from mavproxy_gradys.station.exports import ParquetMissing, csv_readings, csv_text, parquet_readings
 from mavproxy_gradys.station.fleet import FleetVehicle
 from mavproxy_gradys.station.fleet_watch import FleetWatch
@@ -40,7 +40,7 @@ from mavproxy_gradys.station.updates import DEVICE_COLUMNS, Updates, newest_of_u
 
 RECEIVED, DROPPED = 103, 101
 LARGEST_BODY = 16 * 1024 * 1024  # bytes
-READ = 64 * 1024  # bytes of a file at once
+CHUNK = 64 * 1024  # bytes of a file that are sent at once
 PAGE = Path(__file__).parent / "page"
 FILES = ("fleet.js", "map.js", "plot.js", "style.css")
 
@@ -49,11 +49,11 @@ class Station:
     """The handlers.
 
     Args:
-        intake: the store, and the way into it.
+        intake: stores readings, and counts them.
         watch: the fleet.
-        health: whether broker and database are there.
+        health: the state of broker and database.
         watched: whether to answer as if a browser always watched.
-        token: bearer token that senders must know; empty for none.
+        token: bearer token that senders must send; empty for none.
         clock: s since 1970.
     """
 
@@ -79,7 +79,7 @@ class Station:
 
     def app(self) -> web.Application:
         """The application."""
-        middlewares: list[Middleware] = [from_here, only_with_token(self._token), mistakes]
+        middlewares: list[Middleware] = [same_origin, require_token(self._token), errors_as_answers]
         app = web.Application(client_max_size=LARGEST_BODY, middlewares=middlewares)
         app.on_response_prepare.append(add_headers)
         for path in ("/update-info/", "/update-info"):
@@ -109,7 +109,7 @@ class Station:
     # -- in -----------------------------------------------------------------------------------------------
 
     async def update(self, request: web.Request) -> web.Response:
-        """Take a position. What the ground station cannot read it answers with 500, and so does this."""
+        """Take a position. A malformed one is answered with 500, as the ground station does."""
         now = self._clock()
         try:
             device = parse({name: str(value) for name, value in (await request.post()).items()})
@@ -124,18 +124,18 @@ class Station:
         return web.json_response({"id": 1, "type": kind, "seq": 0, "lat": 0, "lng": 0, "alt": 0, "DATA": "0"})
 
     async def take(self, request: web.Request) -> web.Response:
-        """Keep readings; acknowledged are just those that are on the disk."""
+        """Store readings; exactly those on the disk are acknowledged."""
         try:
             rows = [reading_row(reading) for reading in json.loads(await request.read())["readings"]]
         except (KeyError, TypeError, RecursionError) as error:
-            raise ValueError(f"no readings: {error!r:.80}") from error
+            raise ValueError(f"not a list of readings: {error!r:.80}") from error
         await self._intake.keep(rows)
         return web.json_response({"acknowledged": [row.seq for row in rows]})
 
     # -- out ----------------------------------------------------------------------------------------------
 
     async def devices(self, _request: web.Request) -> web.Response:
-        """Every device that was told of by update-info."""
+        """Every device that has sent an update."""
         return web.json_response({"devices": self._updates.devices()})
 
     async def devices_csv(self, _request: web.Request) -> web.Response:
@@ -148,7 +148,7 @@ class Station:
         return web.json_response({"now": self._watch.now, "vehicles": list(map(vars, self._watch.vehicles))})
 
     async def alarms(self, _request: web.Request) -> web.Response:
-        """What is wrong."""
+        """The present alarms."""
         return web.json_response({"alarms": [alarm._asdict() for alarm in self._watch.alarms]})
 
     async def readings(self, request: web.Request) -> web.Response:
@@ -164,7 +164,7 @@ class Station:
         return web.json_response({"count": counts.stored, "repeats": counts.repeats, "readings": readings})
 
     async def readings_csv(self, request: web.Request) -> web.StreamResponse:
-        """Readings as CSV, as they come out of the store."""
+        """Readings as CSV, in the order of the store."""
         query = reading_query(request.query, 1000, MOST_EXPORTED)
         response = download("text/csv; charset=utf-8", "readings.csv")
         try:
@@ -177,7 +177,7 @@ class Station:
             if not response.prepared:
                 raise
             if request.transport is not None:
-                request.transport.abort()  # so that nobody takes the part for the whole
+                request.transport.abort()  # so that the client does not take a part for the whole
         return response
 
     async def readings_parquet(self, request: web.Request) -> web.StreamResponse:
@@ -191,7 +191,7 @@ class Station:
         with file:
             response = download("application/vnd.apache.parquet", "readings.parquet")
             await response.prepare(request)
-            while part := file.read(READ):
+            while part := file.read(CHUNK):
                 await response.write(part)
         return response
 
@@ -202,7 +202,7 @@ class Station:
         return web.json_response({"from": query.start, "to": query.end, **view})
 
     async def watch(self, request: web.Request) -> web.StreamResponse:
-        """The fleet, once a second, while somebody looks: first all of it, then what is new."""
+        """The fleet, once a second: first all vehicles, then the changed ones."""
         response = web.StreamResponse(headers={"Content-Type": "text/event-stream", "Cache-Control": "no-store"})
         await response.prepare(request)
         self._watchers += 1
@@ -212,7 +212,7 @@ class Station:
                 news = [vars(vehicle) for vehicle in self._watch.vehicles if known.get(vehicle.device) != vehicle]
                 known = {vehicle.device: vehicle for vehicle in self._watch.vehicles}
                 await response.write(f"data: {json.dumps(self._event(news))}\n\n".encode())
-                await self._watch.next_look()
+                await self._watch.next_update()
         except ConnectionResetError:
             return response
         finally:
@@ -230,7 +230,7 @@ class Station:
         }
 
     async def metrics(self, _request: web.Request) -> web.Response:
-        """For Prometheus."""
+        """Metrics for Prometheus."""
         try:
             from mavproxy_gradys.station.metrics import StationCollector, exposition  # noqa: PLC0415  an extra
         except ModuleNotFoundError as missing:
@@ -240,7 +240,7 @@ class Station:
         return web.Response(body=text, headers={"Content-Type": "text/plain; version=0.0.4; charset=utf-8"})
 
     async def health(self, _request: web.Request) -> web.Response:
-        """Whether it works."""
+        """Whether broker and database can be reached."""
         return web.json_response(self._health.report(), status=200 if self._health.is_good else 503)
 
     async def page(self, _request: web.Request) -> web.FileResponse:
@@ -253,8 +253,8 @@ class Station:
 
 
 @web.middleware
-async def mistakes(request: web.Request, handler: Handler) -> web.StreamResponse:
-    """A query that means nothing is the client's mistake; a database that is away is none of its."""
+async def errors_as_answers(request: web.Request, handler: Handler) -> web.StreamResponse:
+    """Answer 400 to an invalid query, and the error's own status if the database cannot be reached."""
     try:
         return await handler(request)
     except ValueError as error:

@@ -1,7 +1,7 @@
-"""A connection to an MQTT 5 broker: paho's client, driven by the asyncio loop, with acknowledgements by hand.
+"""A connection to an MQTT 5 broker: paho's client, run by the asyncio loop, with manual acknowledgements.
 
-A shared subscription gives each message to one of its workers. The session outlasts a connection: what was not
-acknowledged comes again. The receive maximum bounds what is on its way to us.
+A shared subscription delivers each message to one of its workers. The session outlasts a connection: unacknowledged
+messages are delivered again. The receive maximum limits the number of messages in flight to us.
 """
 
 from __future__ import annotations
@@ -34,24 +34,24 @@ from mavproxy_uavapi.core.timeout import wait_with_timeout
 KEEP_ALIVE = 15  # s
 CONNECT_TIMEOUT = 5.0  # s
 LONGEST_PAUSE = 5.0  # s between attempts
-MISC_EVERY = 1.0  # s between looks at the keep-alive
+MISC_EVERY = 1.0  # s between checks of the keep-alive
 AT_ONCE = 200  # packets read in one turn of the loop
-LARGEST_PACKET = 128 * 1024  # bytes; the broker keeps larger ones back
+LARGEST_PACKET = 128 * 1024  # bytes; the broker does not deliver larger ones
 log = logging.getLogger("station.broker")
 
 
 @dataclass(frozen=True)
 class BrokerAddress:
-    """Where the messages come from.
+    """The broker, and the subscription.
 
     Attributes:
         url: mqtt(s)://[USER:PASSWORD@]HOST[:PORT]
-        topic: filter of the topics.
-        group: of the workers that share them.
-        name: of this worker; the session's.
-        session: s for which the broker keeps what comes for a worker that is away.
-        receive_maximum: messages on their way to us.
-        ca_file: certificates that TLS is checked by; empty for the system's.
+        topic: the topic filter.
+        group: the name of the group of workers that share the subscription.
+        name: the name of this worker and of its session.
+        session: s for which the broker keeps messages for a disconnected worker.
+        receive_maximum: largest number of messages in flight to us.
+        ca_file: certificates to check TLS with; empty for the system's.
     """
 
     url: str
@@ -64,19 +64,19 @@ class BrokerAddress:
 
 
 class BrokerConnection:
-    """Connects, again and again.
+    """Keeps a connection to the broker.
 
     Attributes:
-        connected: whether messages may come just now.
-        problem: why not; empty while they may.
+        connected: whether it is connected and subscribed.
+        problem: why it is not; empty while connected.
 
     Args:
-        address: where to.
+        address: the broker.
         take: called with each message.
 
     Raises:
-        SettingError: the URL cannot be read.
-        NotDelivered: the CA file cannot.
+        SettingError: the URL is malformed.
+        NotDelivered: the CA file cannot be read.
     """
 
     def __init__(self, address: BrokerAddress, take: Callable[[Message], None]) -> None:
@@ -84,8 +84,8 @@ class BrokerConnection:
         self._parts, self._port = split_url(address.url, ("mqtt", "mqtts"))
         self._context = ssl_context(address.ca_file) if self._parts.scheme == "mqtts" else None
         self._take = take
-        self._client: mqtt.Client | None = None  # of this attempt
-        self._over = asyncio.Event()
+        self._client: mqtt.Client | None = None  # of the present attempt
+        self._ended = asyncio.Event()
         self._loop = asyncio.get_running_loop()
         self._thread = threading.get_ident()
         self._outage = Outage(log, "no messages from the broker", "messages from the broker again")
@@ -98,7 +98,7 @@ class BrokerConnection:
         backoff = Backoff(random.random, LONGEST_PAUSE)
         while True:
             client = self._client = self._make()
-            self._over.clear()
+            self._ended.clear()
             try:
                 await self._connect(client)
                 await self._attend(client, backoff)
@@ -112,7 +112,7 @@ class BrokerConnection:
     def _failed(self, why: str) -> None:
         self.connected = False
         self.problem = f"{self._parts.hostname}:{self._port}: {why}"
-        self._outage.now(self.problem)
+        self._outage.update(self.problem)
 
     def _make(self) -> mqtt.Client:
         address, parts = self._address, self._parts
@@ -138,42 +138,42 @@ class BrokerConnection:
         return client
 
     async def _connect(self, client: mqtt.Client) -> None:
-        """Open the connection, in a thread: it looks up a name and waits.
+        """Open the connection in a thread, because it looks up a name and waits.
 
         Raises:
             OSError, ValueError: it cannot be opened.
             asyncio.TimeoutError: it takes too long.
         """
-        asked = Properties(PacketTypes.CONNECT)  # type: ignore[no-untyped-call]
-        asked.SessionExpiryInterval = self._address.session
-        asked.ReceiveMaximum = self._address.receive_maximum
-        asked.MaximumPacketSize = LARGEST_PACKET
+        properties = Properties(PacketTypes.CONNECT)  # type: ignore[no-untyped-call]
+        properties.SessionExpiryInterval = self._address.session
+        properties.ReceiveMaximum = self._address.receive_maximum
+        properties.MaximumPacketSize = LARGEST_PACKET
         host = self._parts.hostname or ""
         connecting = self._loop.run_in_executor(
-            None, lambda: client.connect(host, self._port, KEEP_ALIVE, clean_start=False, properties=asked)
+            None, lambda: client.connect(host, self._port, KEEP_ALIVE, clean_start=False, properties=properties)
         )
         await wait_with_timeout(2 * CONNECT_TIMEOUT, connecting)
 
     async def _attend(self, client: mqtt.Client, backoff: Backoff) -> None:
-        """See to the keep-alive until the connection is over."""
+        """Handle the keep-alive until the connection ends."""
         began = time.monotonic()
-        while not self._over.is_set():
+        while not self._ended.is_set():
             client.loop_misc()
             if self.connected:
                 backoff.succeeded()
             elif time.monotonic() - began > CONNECT_TIMEOUT:
                 raise asyncio.TimeoutError
             try:
-                await wait_with_timeout(MISC_EVERY, self._over.wait())
+                await wait_with_timeout(MISC_EVERY, self._ended.wait())
             except asyncio.TimeoutError:
                 continue
 
-    # -- what paho tells ----------------------------------------------------------------------------------
+    # -- paho's callbacks ---------------------------------------------------------------------------------
 
     def _on_connect(self, client: mqtt.Client, _data: Any, _flags: Any, code: Any, _properties: Any) -> None:
         if code.is_failure:
             self._failed(str(code))
-            self._over.set()
+            self._ended.set()
             return
         topic = f"$share/{self._address.group}/{self._address.topic}"
         client.subscribe(topic, options=SubscribeOptions(qos=1))
@@ -181,16 +181,16 @@ class BrokerConnection:
     def _on_subscribe(self, _client: mqtt.Client, _data: Any, _mid: int, codes: Any, _properties: Any) -> None:
         if any(code.is_failure for code in codes):
             self._failed(f"it refuses the subscription: {codes[0]}")
-            self._over.set()
+            self._ended.set()
             return
         self.connected, self.problem = True, ""
-        self._outage.now("")
+        self._outage.update("")
         log.info("connected to %s:%d", self._parts.hostname, self._port)
 
     def _on_disconnect(self, client: mqtt.Client, _data: Any, _flags: Any, code: Any, _properties: Any) -> None:
         if client is self._client:
             self._failed(str(code))
-            self._over.set()
+            self._ended.set()
 
     def _on_message(self, client: mqtt.Client, _data: Any, message: mqtt.MQTTMessage) -> None:
         self._taken += 1
@@ -201,30 +201,30 @@ class BrokerConnection:
             topic = "?"
         self._take(Message(client, message.mid, topic, bytes(message.payload), reply_to))
 
-    # -- what we tell -------------------------------------------------------------------------------------
+    # -- to the broker ------------------------------------------------------------------------------------
 
     def acknowledge(self, messages: Iterable[Message]) -> None:
-        """Tell the broker that these are kept; what came over a former connection comes again."""
+        """Acknowledge stored messages; those of an earlier connection cannot be acknowledged and will come again."""
         for message in messages:
             if message.connection is self._client and self._client is not None:
                 self._client.ack(message.mid, 1)
 
-    def tell(self, topic: str, payload: str) -> None:
-        """Publish something that may be lost; nothing while there is no connection."""
+    def publish(self, topic: str, payload: str) -> None:
+        """Publish a message that may be lost; without a connection nothing is sent."""
         if self.connected and self._client is not None:
             self._client.publish(topic, payload, qos=0)
 
     # -- the sockets, in the loop -------------------------------------------------------------------------
 
     def _in_loop(self, work: Callable[..., Any], *args: Any) -> None:
-        """Do that in the loop's thread; paho connects in another."""
+        """Call `work` in the loop's thread; paho connects in another thread."""
         if threading.get_ident() == self._thread:
             work(*args)
         else:
             self._loop.call_soon_threadsafe(work, *args)
 
     def _watch(self, client: mqtt.Client, sock: Any) -> None:
-        if client is not self._client:  # it comes too late: the attempt was given up
+        if client is not self._client:  # the attempt was abandoned
             sock.close()
         elif sock.fileno() >= 0:
             self._loop.add_reader(sock, self._read, client)
@@ -239,7 +239,7 @@ class BrokerConnection:
             self._loop.add_writer(sock, client.loop_write)
 
     def _read(self, client: mqtt.Client) -> None:
-        """Read what is there; TLS may hold more than the socket shows."""
+        """Read all available packets; TLS may hold more than the socket shows."""
         for _ in range(AT_ONCE):
             before = self._taken
             client.loop_read()
@@ -248,20 +248,20 @@ class BrokerConnection:
         self._loop.call_soon(self._read, client)
 
     def _leave(self, client: mqtt.Client) -> None:
-        """Take leave if there is a connection, and close its socket."""
+        """Disconnect, and close the socket."""
         client.disconnect()
         client.loop_write()
-        left = client.socket()
-        if isinstance(left, socket.socket):
-            self._unwatch(left)
-            left.close()
+        open_socket = client.socket()
+        if isinstance(open_socket, socket.socket):
+            self._unwatch(open_socket)
+            open_socket.close()
 
 
 def ssl_context(ca_file: str) -> ssl.SSLContext:
-    """What a broker's certificate is checked by.
+    """The TLS context that checks the broker's certificate.
 
     Raises:
-        NotDelivered: the file cannot be read, or holds no certificate.
+        NotDelivered: the file cannot be read, or has no certificate.
     """
     context = tls_context(ca_file)
     return context if isinstance(context, ssl.SSLContext) else ssl.create_default_context()

@@ -1,4 +1,4 @@
-"""From the broker into the store: batches, and acknowledgements after the commit."""
+"""Stores messages of the broker in batches, and acknowledges them after the commit."""
 
 from __future__ import annotations
 
@@ -25,24 +25,24 @@ log = logging.getLogger("station.consumer")
 
 
 class Broker(Protocol):
-    """What the consumer tells the broker; see `BrokerConnection`."""
+    """The broker, as the consumer uses it; see `BrokerConnection`."""
 
     def acknowledge(self, messages: Sequence[Message]) -> None:
-        """These are kept."""
+        """Acknowledge stored messages."""
 
-    def tell(self, topic: str, payload: str) -> None:
-        """Publish that."""
+    def publish(self, topic: str, payload: str) -> None:
+        """Publish a message."""
 
 
 class Consumer:
-    """Stores what is in the inbox.
+    """Stores the readings of the inbox.
 
     Args:
         inbox: the messages.
-        intake: the store.
-        broker: whom to tell.
-        size: messages in a batch, at most.
-        seconds: s that a batch waits for more.
+        intake: stores readings.
+        broker: gets acknowledgements and confirmations.
+        size: largest number of messages in a batch.
+        seconds: s that a batch waits for more messages.
         clock: monotonic seconds.
     """
 
@@ -69,17 +69,17 @@ class Consumer:
     async def run(self) -> None:
         """Store batch by batch, until cancelled."""
         while True:
-            await self._keep(await self._inbox.batch(self._size, self._seconds))
+            await self._process(await self._inbox.batch(self._size, self._seconds))
 
-    async def _keep(self, messages: Sequence[Message]) -> None:
-        """Store a batch, however long that takes; then acknowledge it."""
+    async def _process(self, messages: Sequence[Message]) -> None:
+        """Store a batch, with retries until it succeeds; then acknowledge it."""
         readings = [(message, row) for message in messages if (row := self._row(message)) is not None]
-        kept = await self._store(readings)
+        stored = await self._store(readings)
         self._broker.acknowledge(messages)
-        self._confirm(kept)
+        self._confirm(stored)
 
     def _row(self, message: Message) -> ReadingRow | None:
-        """The reading that a message holds; None for a vehicle's status, and for what is none."""
+        """The reading in a message; None for a vehicle's status, and for an invalid message."""
         if message.topic.rpartition("/")[2] == STATUS:
             return None
         try:
@@ -93,13 +93,13 @@ class Consumer:
         self._refusals.add(message.topic, why)
 
     async def _store(self, readings: Sequence[tuple[Message, ReadingRow]]) -> Sequence[tuple[Message, ReadingRow]]:
-        """Store readings; those that the database did not refuse. It is looked for by halves what it refuses."""
+        """Store readings; returns those that the database accepts. Halving the batch isolates a refused reading."""
         backoff = Backoff(random.random, LONGEST_PAUSE)
         while True:
             try:
                 await self._intake.keep([row for _, row in readings])
             except NotStored as error:
-                self._outage.now(str(error))
+                self._outage.update(str(error))
             except ValueError as error:
                 if len(readings) == 1:
                     self._refuse(readings[0][0], str(error))
@@ -107,24 +107,24 @@ class Consumer:
                 half = len(readings) // 2
                 return [*await self._store(readings[:half]), *await self._store(readings[half:])]
             except Exception as error:  # noqa: BLE001  a defect must not end the storing for ever
-                self._defects.tell(error)
-                self._outage.now(f"{type(error).__name__}: {error}")
+                self._defects.report(error)
+                self._outage.update(f"{type(error).__name__}: {error}")
             else:
-                self._outage.now("")
+                self._outage.update("")
                 return readings
             await asyncio.sleep(backoff.failed(self._clock()))
 
     def _confirm(self, readings: Sequence[tuple[Message, ReadingRow]]) -> None:
-        """Tell the senders that want to know which of their readings are kept."""
+        """Confirm stored readings to the senders that requested it."""
         numbers = defaultdict(list)
         for message, row in readings:
             if is_reply_topic(message.reply_to):
                 numbers[message.reply_to].append(row.seq)
-        for topic, kept in numbers.items():
-            self._broker.tell(topic, json.dumps({"acknowledged": kept}))
-            self._intake.statistics.confirmed += len(kept)
+        for topic, stored in numbers.items():
+            self._broker.publish(topic, json.dumps({"acknowledged": stored}))
+            self._intake.statistics.confirmed += len(stored)
 
 
 def is_reply_topic(topic: str) -> bool:
-    """Whether we publish there: a sender must not have us write into topics of others."""
+    """Whether we publish to that topic: a sender must not make us write to other topics."""
     return topic.startswith(CONFIRMED_TOPIC) and len(topic) <= LONGEST_NAME and not set("+#\0") & set(topic)

@@ -1,4 +1,4 @@
-"""Readings as files: CSV row by row, Parquet by way of a temporary file."""
+"""Exports readings: CSV row by row, Parquet through a temporary file."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typing import Any, BinaryIO
 from mavproxy_gradys.station.reading_row import COLUMNS, number_of
 
 Chunks = AsyncIterator[Sequence[tuple[Any, ...]]]
-FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet calculates what begins so
+FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet evaluates a text that begins with one of these
 VALUE, TIMES = COLUMNS.index("value"), [COLUMNS.index(name) for name in ("time", "received")]
 
 
@@ -26,11 +26,11 @@ def csv_text(rows: Iterable[Sequence[Any]]) -> bytes:
     """Rows as CSV."""
     text = io.StringIO()
     csv.writer(text).writerows([csv_cell(cell) for cell in row] for row in rows)
-    return text.getvalue().encode("utf-8", "replace")  # JSON may name half a letter, which UTF-8 has not
+    return text.getvalue().encode("utf-8", "replace")  # JSON may have unpaired surrogates, which UTF-8 cannot encode
 
 
 def csv_cell(cell: Any) -> Any:
-    """A cell; a text is never a formula."""
+    """A cell; a text that looks like a formula gets an apostrophe."""
     if isinstance(cell, list | dict):
         return json.dumps(cell)
     return f"'{cell}" if isinstance(cell, str) and cell.startswith(FORMULA) else cell
@@ -44,7 +44,7 @@ async def csv_readings(chunks: Chunks) -> AsyncIterator[bytes]:
 
 
 async def parquet_readings(chunks: Chunks) -> BinaryIO:
-    """Rows of COLUMNS, and the value as a number where it is one, as a Parquet file; its place is its beginning.
+    """Rows of COLUMNS and a column `number` as a Parquet file, positioned at its beginning.
 
     Raises:
         ParquetMissing: pyarrow is not installed.
@@ -59,7 +59,7 @@ async def parquet_readings(chunks: Chunks) -> BinaryIO:
     schema = pyarrow.schema(
         [*((name, types.get(name, pyarrow.string())) for name in COLUMNS), ("number", pyarrow.float64())]
     )
-    file = tempfile.TemporaryFile()  # noqa: SIM115  who asked closes it
+    file = tempfile.TemporaryFile()  # noqa: SIM115  the caller closes it
     try:
         with parquet.ParquetWriter(file, schema, compression="zstd") as writer:
             async for rows in chunks:
@@ -74,6 +74,6 @@ async def parquet_readings(chunks: Chunks) -> BinaryIO:
 
 
 def parquet_row(row: Sequence[Any]) -> tuple[Any, ...]:
-    """A row of COLUMNS with moments for times, and with its number."""
+    """A row of COLUMNS with its times as datetimes, and its number."""
     cells = [datetime.fromtimestamp(cell, timezone.utc) if n in TIMES else cell for n, cell in enumerate(row)]
     return (*cells, number_of(json.loads(row[VALUE])))

@@ -1,4 +1,4 @@
-"""The fleet as it is now, and what is wrong with it. Pure."""
+"""The present state of the fleet, and its alarms. Pure."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from mavproxy_gradys.station.newest import Newest
 from mavproxy_gradys.station.reading_row import number_of
 from mavproxy_gradys.station.store import FleetNow
 
-FORGOTTEN = 24 * 3600.0  # s after which a vehicle that is not heard of leaves the table
-BATTERY = ("battery_percent", "battery")  # quantities, in %; the first that there is
+FORGOTTEN = 24 * 3600.0  # s after its last reading until a vehicle leaves the table
+BATTERY = ("battery_percent", "battery")  # quantities in %, in order of preference
 SPEED = ("ground_speed", "speed")  # m/s
 SILENT, LOW_BATTERY = "silent", "battery"
 
@@ -25,11 +25,11 @@ class FleetVehicle:
 
     Attributes:
         device, id: its names.
-        lat, lng, alt: degrees, m above home; None when it does not tell.
-        heading, speed, battery: degrees, m/s, %; None when it does not tell.
+        lat, lng, alt: degrees, m above home; None if not reported.
+        heading, speed, battery: degrees, m/s, %; None if not reported.
         time: when its newest reading was measured, s since 1970 by its own clock.
-        received: when it was last heard of, s since 1970 by the store's clock.
-        quantities: what it tells, with units.
+        received: when its last reading was stored, s since 1970 by the store's clock.
+        quantities: the reported quantities and their units.
     """
 
     device: str
@@ -47,11 +47,11 @@ class FleetVehicle:
 
 @dataclass(frozen=True)
 class AlarmLimits:
-    """When there is an alarm.
+    """The limits of the alarms.
 
     Attributes:
         silent: s without a reading.
-        battery: %; below that.
+        battery: smallest %.
     """
 
     silent: float
@@ -59,20 +59,20 @@ class AlarmLimits:
 
 
 class Alarm(NamedTuple):
-    """Something that is wrong with a vehicle: `kind` is SILENT or LOW_BATTERY."""
+    """An alarm of a vehicle: `kind` is SILENT or LOW_BATTERY."""
 
     device: str
     kind: str
 
 
 def vehicles(fleet: FleetNow) -> list[FleetVehicle]:
-    """The vehicles that were heard of in the last FORGOTTEN s, by name."""
-    everyone = [vehicle(list(readings)) for _, readings in groupby(fleet.newest, lambda newest: newest.device)]
-    return [one for one in everyone if fleet.now - one.received < FORGOTTEN]
+    """The vehicles with a reading in the last FORGOTTEN s, by name."""
+    known = [vehicle(list(readings)) for _, readings in groupby(fleet.newest, lambda newest: newest.device)]
+    return [one for one in known if fleet.now - one.received < FORGOTTEN]
 
 
 def vehicle(readings: Sequence[Newest]) -> FleetVehicle:
-    """The vehicle that has told these, one of each quantity."""
+    """The vehicle that sent these readings, one per quantity."""
     values = {newest.quantity: json.loads(newest.value) for newest in readings}
     lat, lng, alt = place_of(values.get(POSITION))
     return FleetVehicle(
@@ -91,7 +91,7 @@ def vehicle(readings: Sequence[Newest]) -> FleetVehicle:
 
 
 def place_of(value: Any) -> tuple[float | None, float | None, float | None]:
-    """Latitude, longitude (degrees) and height of a position; None for each when it is none on Earth."""
+    """Latitude, longitude (degrees) and height of a position; all None if it is invalid."""
     if not isinstance(value, list) or len(value) < 2 or not all(isinstance(one, int | float) for one in value):
         return None, None, None
     lat, lng, alt = (*map(float, value), None)[:3]
@@ -101,12 +101,12 @@ def place_of(value: Any) -> tuple[float | None, float | None, float | None]:
 
 
 def first_number(values: dict[str, Any], quantities: Iterable[str]) -> float | None:
-    """The number of the first quantity that there is."""
+    """The number of the first quantity that is reported."""
     return next((number_of(values[quantity]) for quantity in quantities if quantity in values), None)
 
 
 def alarms(fleet_vehicles: Iterable[FleetVehicle], now: float, limits: AlarmLimits) -> list[Alarm]:
-    """What is wrong at `now` (s since 1970, the store's clock)."""
+    """The alarms at `now` (s since 1970, the store's clock)."""
     raised = []
     for one in fleet_vehicles:
         if now - one.received > limits.silent:

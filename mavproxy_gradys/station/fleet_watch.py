@@ -1,4 +1,4 @@
-"""Looks at the fleet once a second, and says what is wrong with it."""
+"""Reads the state of the fleet once a second, and logs its alarms."""
 
 from __future__ import annotations
 
@@ -12,64 +12,64 @@ from mavproxy_gradys.station.fleet import Alarm, AlarmLimits, FleetVehicle, alar
 from mavproxy_gradys.station.store import Store, StoreCounts
 
 EVERY = 1.0  # s
-LINES = 5  # of alarms at once
+LINES = 5  # log lines for new alarms at once
 log = logging.getLogger("station.fleet")
 
 
 class FleetWatch:
-    """The fleet at the newest look.
+    """The newest state of the fleet.
 
     Attributes:
-        now: the store's clock then, s since 1970.
-        vehicles, alarms, counts: what was there.
-        problem: why the newest look failed; empty when it did not.
+        now: the store's clock at that time, s since 1970.
+        vehicles, alarms, counts: the state.
+        problem: why the newest read failed; empty if it succeeded.
 
     Args:
-        store: where the fleet is.
-        limits: when there is an alarm.
+        store: the store of the readings.
+        limits: the limits of the alarms.
     """
 
     def __init__(self, store: Store, limits: AlarmLimits) -> None:
         self._store = store
         self._limits = limits
-        self._outage = Outage(log, "the fleet cannot be seen", "the fleet is seen again")
-        self._defects = Defects("the look at the fleet")
-        self._looked = asyncio.Condition()
+        self._outage = Outage(log, "the fleet's state cannot be read", "the fleet's state is read again")
+        self._defects = Defects("the reading of the fleet's state")
+        self._updated = asyncio.Condition()
         self.now = 0.0
         self.vehicles: Sequence[FleetVehicle] = ()
         self.alarms: Sequence[Alarm] = ()
         self.counts = StoreCounts(0, 0)
-        self.problem = "not looked yet"
+        self.problem = "not read yet"
 
     async def run(self) -> None:
-        """Look, until cancelled."""
+        """Update the state every second, until cancelled."""
         while True:
-            await self.look()
+            await self.update()
             await asyncio.sleep(EVERY)
 
-    async def look(self) -> None:
-        """Look now."""
+    async def update(self) -> None:
+        """Update the state now."""
         try:
             fleet, self.counts = await self._store.fleet(), await self._store.counts()
         except NotStored as error:
             self.problem = str(error)
         except Exception as error:  # noqa: BLE001  a defect must not end the watch for ever
-            self._defects.tell(error)
+            self._defects.report(error)
             self.problem = f"{type(error).__name__}: {error}"
         else:
             self.now, self.vehicles, self.problem = fleet.now, vehicles(fleet), ""
             self._raise(alarms(self.vehicles, self.now, self._limits))
-        self._outage.now(self.problem)
-        async with self._looked:
-            self._looked.notify_all()
+        self._outage.update(self.problem)
+        async with self._updated:
+            self._updated.notify_all()
 
-    async def next_look(self) -> None:
-        """Wait until it has looked again."""
-        async with self._looked:
-            await self._looked.wait()
+    async def next_update(self) -> None:
+        """Wait for the next update."""
+        async with self._updated:
+            await self._updated.wait()
 
     def _raise(self, raised: Sequence[Alarm]) -> None:
-        """Say what is new."""
+        """Log the alarms that have begun or ended."""
         for word, news in (("alarm", set(raised) - set(self.alarms)), ("over", set(self.alarms) - set(raised))):
             for alarm in sorted(news)[:LINES]:
                 log.warning("%s: %a %s", word, alarm.device, alarm.kind)

@@ -1,4 +1,4 @@
-"""Whether a worker reaches what it needs."""
+"""Whether a worker reaches its broker and its database."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from mavproxy_gradys.station.inbox import Inbox
 
 
 class Connection(Protocol):
-    """A connection; `problem` says why there is none, and is empty while there is one."""
+    """A connection; `problem` is the reason while it is down, otherwise empty."""
 
     problem: str
 
 
 class Health:
-    """Broker and database, as they were a second ago at most.
+    """The state of broker and database, at most a second old.
 
     Args:
-        watch: asks the database once a second.
-        inbox, broker: of a worker that consumes; None for one that does not.
+        watch: queries the database once a second.
+        inbox, broker: of a worker that consumes messages; otherwise None.
     """
 
     def __init__(self, watch: FleetWatch, inbox: Inbox | None = None, broker: Connection | None = None) -> None:
@@ -29,31 +29,31 @@ class Health:
 
     @property
     def database(self) -> str:
-        """What is wrong with the database; empty when nothing is."""
+        """The database's problem; empty without one."""
         return self._watch.problem
 
     @property
     def broker(self) -> str | None:
-        """What is wrong with the broker; empty when nothing is, None when there is none."""
+        """The broker's problem; empty without one, None without a broker."""
         return None if self._broker is None else self._broker.problem
 
     @property
     def waiting(self) -> int:
-        """Messages that are not stored yet."""
+        """The number of messages that are not stored yet."""
         return 0 if self._inbox is None else len(self._inbox)
 
     @property
     def dropped(self) -> int:
-        """Messages of former connections that the inbox had no room for."""
+        """The number of messages of earlier connections that the inbox dropped."""
         return 0 if self._inbox is None else self._inbox.dropped
 
     @property
     def is_good(self) -> bool:
-        """Whether nothing is wrong."""
+        """Whether there is no problem."""
         return not self.database and not self.broker
 
     def report(self) -> dict[str, Any]:
-        """What `/health` says."""
+        """The body of `/health`."""
         return {
             "status": "ok" if self.is_good else "failing",
             "database": self.database or "ok",

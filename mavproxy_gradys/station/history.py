@@ -1,4 +1,4 @@
-"""A history as the page draws it: its parts, the gaps in it, and what came late. Pure."""
+"""A history for the page's plot: its parts, its gaps, and late readings. Pure."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from typing import Any
 
 from mavproxy_gradys.station.store import Bucket
 
-GAP = 3.5  # times the usual distance between readings
+GAP = 3.5  # times the usual interval between readings
 SHORTEST_GAP = 2.0  # s
-LATE = 10.0  # s from sampling to row
+LATE = 10.0  # s from measurement to storage
 
 
 def spacing(buckets: Sequence[Bucket], width: float) -> float:
-    """The usual distance between readings (s); the width of a part where there is one reading in each.
+    """The usual interval between readings (s); the width of a part if each part has one reading.
 
     Args:
-        buckets: the parts that have readings.
+        buckets: the parts with readings.
         width: s of one part.
     """
     within = [(bucket.last - bucket.first) / (bucket.readings - 1) for bucket in buckets if bucket.readings > 1]
@@ -28,7 +28,7 @@ def spacing(buckets: Sequence[Bucket], width: float) -> float:
 
 
 def gaps(buckets: Sequence[Bucket], width: float) -> list[tuple[float, float]]:
-    """From when to when there are no readings though there should be (s since 1970)."""
+    """The start and end of each gap (s since 1970)."""
     shortest = max(GAP * spacing(buckets, width), SHORTEST_GAP)
     return [
         (before.last, after.first)
@@ -38,7 +38,7 @@ def gaps(buckets: Sequence[Bucket], width: float) -> list[tuple[float, float]]:
 
 
 def history_view(buckets: Sequence[Bucket], width: float) -> dict[str, Any]:
-    """What the page gets."""
+    """The JSON object for the page."""
     return {
         "parts": [list(bucket) for bucket in buckets],
         "gaps": gaps(buckets, width),

@@ -1,4 +1,4 @@
-"""Messages that have arrived and are not stored yet."""
+"""The queue of messages that have arrived and are not stored yet."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 
 class Message(NamedTuple):
-    """What the broker has sent.
+    """A message of the broker.
 
     Attributes:
-        connection: over which it came; an acknowledgement is worth nothing on another one.
-        mid: its packet identifier there.
-        topic, payload: what and where.
-        reply_to: topic on which its sender wants to hear that it is kept; empty for none.
+        connection: the connection that it came by; an acknowledgement is valid on that connection only.
+        mid: its packet identifier on that connection.
+        topic, payload: its topic and content.
+        reply_to: topic for a confirmation to its sender; empty for none.
     """
 
     connection: object
@@ -28,16 +28,16 @@ class Message(NamedTuple):
 
 
 class Inbox:
-    """Holds messages, and gives them out in batches.
+    """Holds messages, and returns them in batches.
 
-    Over one connection no more come than the receive maximum. What is beyond `most` came over former ones: the
-    oldest are dropped then, since the broker or their sender sends them again.
+    One connection delivers at most the receive maximum. So more than `most` messages include some of earlier
+    connections. Then the oldest are dropped, because the broker or their sender sends them again.
 
     Attributes:
-        dropped: how many were.
+        dropped: number of dropped messages.
 
     Args:
-        most: messages.
+        most: largest number of messages.
         clock: monotonic seconds.
     """
 
@@ -46,31 +46,31 @@ class Inbox:
         self._most = most
         self._clock = clock
         self._news = asyncio.Event()
-        self._wanted = 1
+        self._awaited_count = 1
         self.dropped = 0
 
     def __len__(self) -> int:
         return len(self._messages)
 
     def put(self, message: Message) -> None:
-        """Take a message."""
+        """Add a message."""
         self._messages.append(message)
         if len(self._messages) > self._most:
             self._messages.popleft()
             self.dropped += 1
-        if len(self._messages) >= self._wanted:
+        if len(self._messages) >= self._awaited_count:
             self._news.set()
 
     async def batch(self, size: int, seconds: float) -> list[Message]:
-        """The oldest messages: as soon as there are `size`, or `seconds` after there is one."""
+        """The oldest messages: as soon as there are `size` of them, or `seconds` after the first one."""
         await self._until(1, None)
         await self._until(size, seconds)
         return [self._messages.popleft() for _ in range(min(size, len(self._messages)))]
 
     async def _until(self, count: int, seconds: float | None) -> None:
-        """Wait until there are so many, but no longer than that."""
+        """Wait until there are `count` messages, at most `seconds`."""
         deadline = None if seconds is None else self._clock() + seconds
-        self._wanted = count
+        self._awaited_count = count
         while len(self._messages) < count:
             self._news.clear()
             try:

@@ -1,4 +1,4 @@
-"""The way into a store, counted."""
+"""Stores readings and counts them."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from mavproxy_gradys.station.store import Store
 
 
 class Intake:
-    """Keeps readings.
+    """Stores readings and counts them.
 
     Args:
-        store: where.
-        statistics: what counts.
+        store: the store.
+        statistics: the counts.
         clock: s since 1970.
         stopwatch: monotonic seconds.
     """
@@ -33,7 +33,7 @@ class Intake:
         self._stopwatch = stopwatch
 
     async def keep(self, rows: Sequence[ReadingRow]) -> None:
-        """Keep rows, once each; they are on the disk when it returns.
+        """Store rows, each once; they are on the disk when it returns.
 
         Raises:
             ValueError, NotStored: as `Store.add`.

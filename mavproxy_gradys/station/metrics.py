@@ -1,4 +1,4 @@
-"""What Prometheus reads at `/metrics`."""
+"""The metrics for Prometheus at `/metrics`."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from mavproxy_gradys.station.statistics import Histogram, Statistics
 
 
 class StationCollector(Collector):
-    """One worker's numbers.
+    """The metrics of one worker.
 
     Args:
-        statistics: what it has done.
-        watch: the fleet as it sees it.
-        health: whether it reaches broker and database.
+        statistics: its counts.
+        watch: the state of the fleet.
+        health: the state of broker and database.
     """
 
     def __init__(self, statistics: Statistics, watch: FleetWatch, health: Health) -> None:
@@ -30,20 +30,20 @@ class StationCollector(Collector):
         self._health = health
 
     def collect(self) -> Iterable[Metric]:
-        """All of them."""
+        """All metrics."""
         statistics = self._statistics
         counts = (
-            ("readings_stored", "readings that this worker has kept", statistics.stored),
-            ("readings_repeated", "readings that came again", statistics.repeats),
-            ("readings_confirmed", "readings whose senders were told", statistics.confirmed),
-            ("messages_refused", "messages that are no readings", statistics.refused),
-            ("messages_dropped", "messages of former connections, beyond the inbox", self._health.dropped),
+            ("readings_stored", "readings that this worker has stored", statistics.stored),
+            ("readings_repeated", "readings that arrived again", statistics.repeats),
+            ("readings_confirmed", "readings that were confirmed to their senders", statistics.confirmed),
+            ("messages_refused", "messages that are not readings", statistics.refused),
+            ("messages_dropped", "messages of earlier connections that the inbox dropped", self._health.dropped),
             ("batches", "transactions", statistics.batches),
         )
         for name, text, count in counts:
             yield CounterMetricFamily(f"station_{name}", text, value=count)
-        yield histogram("station_commit_seconds", "s of a transaction", statistics.commit)
-        yield histogram("station_delay_seconds", "s from sampling to row", statistics.delay)
+        yield histogram("station_commit_seconds", "duration of a transaction, s", statistics.commit)
+        yield histogram("station_delay_seconds", "s from measurement to storage", statistics.delay)
         yield from self._gauges()
 
     def _gauges(self) -> Iterable[Metric]:
@@ -61,7 +61,7 @@ class StationCollector(Collector):
 
 
 def histogram(name: str, text: str, values: Histogram) -> Metric:
-    """A histogram as Prometheus wants it: counts of all values up to each bound."""
+    """A Prometheus histogram: cumulative counts up to each bound."""
     total, buckets = 0, []
     for bound, count in zip((*map(str, values.bounds), "+Inf"), values.counts, strict=True):
         total += count
@@ -70,7 +70,7 @@ def histogram(name: str, text: str, values: Histogram) -> Metric:
 
 
 def exposition(collector: Collector) -> bytes:
-    """The text that Prometheus reads."""
+    """The metrics in Prometheus's text format."""
     registry = CollectorRegistry(auto_describe=False)
     registry.register(collector)
     return generate_latest(registry)

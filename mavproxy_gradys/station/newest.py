@@ -1,4 +1,4 @@
-"""The newest reading of each quantity of each device: what the fleet's table shows. Pure."""
+"""The newest reading of each quantity of each device, for the fleet's table. Pure."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Newest(NamedTuple):
     Attributes:
         device, id, quantity, representation, value: as in `ReadingRow`.
         time: when it was measured, s since 1970 by the vehicle's clock.
-        received: when the device's last one of this quantity was kept, s since 1970 by the store's clock.
+        received: when the device's last reading of this quantity was stored, s since 1970 by the store's clock.
     """
 
     device: str
@@ -27,10 +27,10 @@ class Newest(NamedTuple):
 
 
 class NewestReadings:
-    """The newest of all that was put in.
+    """The newest readings.
 
     Attributes:
-        changed: those that are new since `take_changed`.
+        changed: those that have changed since the last `take_changed`.
     """
 
     def __init__(self) -> None:
@@ -38,7 +38,7 @@ class NewestReadings:
         self.changed: dict[tuple[str, str], Newest] = {}
 
     def put(self, readings: Iterable[Newest]) -> None:
-        """Take readings; what a vehicle sends late replaces nothing, but shows that it is there."""
+        """Add readings; a late one replaces no newer value, but updates `received`."""
         for reading in readings:
             key = reading.device, reading.quantity
             known = self._all.get(key)
@@ -47,20 +47,20 @@ class NewestReadings:
             self._all[key] = self.changed[key] = reading
 
     def take_changed(self) -> list[Newest]:
-        """Those that are new since the last call, by device and quantity."""
+        """Those that have changed since the last call, by device and quantity."""
         changed, self.changed = self.changed, {}
         return [changed[key] for key in sorted(changed)]
 
     def put_back(self, readings: Iterable[Newest]) -> None:
-        """Take back what `take_changed` gave: it could not be told."""
+        """Put back the result of `take_changed`, because it could not be written."""
         self.changed = {**{(reading.device, reading.quantity): reading for reading in readings}, **self.changed}
 
     def all(self) -> list[Newest]:
-        """All, by device and quantity."""
+        """All readings, by device and quantity."""
         return [self._all[key] for key in sorted(self._all)]
 
 
 def newest_of(rows: Iterable[ReadingRow], received: float) -> Iterable[Newest]:
-    """Rows that were kept at that time, as they are shown."""
+    """The newest readings of rows that were stored at `received`."""
     for row in rows:
         yield Newest(row.device, row.id, row.quantity, row.representation, row.value, row.time, received)

@@ -1,4 +1,4 @@
-"""Partitions of the table of readings, made when the first reading of a day comes."""
+"""Partitions of the table of readings; each is created when the first reading of its day arrives."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from mavproxy_gradys.station.postgres_schema import (
 
 
 def day_of(moment: datetime) -> date:
-    """The day (UTC)."""
+    """The day (UTC) of a moment."""
     return moment.astimezone(timezone.utc).date()
 
 
 class Partitions:
-    """Makes tables; several workers may at once.
+    """Creates tables and partitions; several workers may do so at once.
 
-    A table `readings` that was made otherwise (a hypertable, say) is left as it is.
+    A table `readings` that we did not create (such as a hypertable) is left as it is.
 
     Args:
         clock: s since 1970.
@@ -39,7 +39,7 @@ class Partitions:
         self._ours = True
 
     async def make_tables(self, connection: Any) -> None:
-        """Make what is missing, and today's partition."""
+        """Create missing tables, and today's partition."""
         async with connection.transaction():
             await connection.execute("SELECT pg_advisory_xact_lock($1)", SCHEMA_LOCK)
             await connection.execute(TABLES)
@@ -50,7 +50,7 @@ class Partitions:
         await self.make(connection, [self._today()])
 
     async def make(self, connection: Any, days: Iterable[date]) -> None:
-        """Have a partition for each of these days, but for those far from today."""
+        """Create the missing partitions for these days; days far from today get none."""
         if not self._ours:
             return
         today = self._today()
@@ -62,8 +62,8 @@ class Partitions:
     async def _make(self, connection: Any, day: date) -> None:
         async with connection.transaction():
             await connection.execute("SELECT pg_advisory_xact_lock($1)", SCHEMA_LOCK)
-            there = {row[0] for row in await connection.fetch(DAYS)}
-            if partition_name(day) not in there:
+            existing = {row[0] for row in await connection.fetch(DAYS)}
+            if partition_name(day) not in existing:
                 await connection.execute(make_partition(day))
 
     def _today(self) -> date:

@@ -1,4 +1,4 @@
-"""A connection to PostgreSQL that is made again after it failed."""
+"""A connection to PostgreSQL that is reopened after a failure."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ REFUSALS = (asyncpg.DataError, asyncpg.IntegrityConstraintViolationError, asyncp
 FAILURES = (
     asyncpg.PostgresError,
     asyncpg.InterfaceError,
-    asyncpg.InternalClientError,  # of a connection that broke in the middle of a transaction
+    asyncpg.InternalClientError,  # a connection that broke within a transaction
     OSError,
     asyncio.TimeoutError,
 )
 
 
 class PostgresConnection:
-    """One connection, for one thing at a time.
+    """One connection, for one operation at a time.
 
-    No pool: a connection that failed in any way is thrown away, and nobody tries to mend it.
+    It is not a pool: a connection that failed in any way is closed and replaced.
 
     Args:
-        url: as libpq knows it.
-        name: what the database calls it.
+        url: a URL for libpq.
+        name: its name in the database.
         prepare: called with each new connection.
-        longest: s that anything may take.
+        longest: s that an operation may take.
     """
 
     def __init__(
@@ -47,11 +47,11 @@ class PostgresConnection:
         self._turn = asyncio.Lock()
 
     async def do(self, work: Callable[[Any], Awaitable[T]]) -> T:
-        """What `work` makes of the connection.
+        """Call `work` with the connection and return its result.
 
         Raises:
-            NotStored: the database is away, or fails, or is too slow.
-            ValueError: it refuses what it was given; nothing of it is kept.
+            NotStored: the database cannot be reached, fails, or is too slow.
+            ValueError: it refuses the data; none of it is stored.
         """
         async with self._turn:
             try:
@@ -86,7 +86,7 @@ class PostgresConnection:
         return connection
 
     def terminate(self) -> None:
-        """Hang up; whoever waits for an answer hears of it."""
+        """Close the connection at once; a running operation fails."""
         if self._connection is not None:
             self._connection.terminate()
             self._connection = None

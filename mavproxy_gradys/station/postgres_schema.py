@@ -1,18 +1,18 @@
 """The tables in PostgreSQL.
 
-readings   partitioned by the day (UTC) in which a reading was measured; unique on device, time and number
+readings   partitioned by the day (UTC) of the measurement; unique on device, time and number
 newest     the newest reading of each quantity of each device
-workers    what each worker has counted, in the transactions that it counts
+workers    the counts of each worker, updated in the counted transactions
 """
 
 from __future__ import annotations
 
 from datetime import date, timedelta
 
-SCHEMA_LOCK = 7_301_001  # of pg_advisory_xact_lock; one worker at a time makes tables
+SCHEMA_LOCK = 7_301_001  # for pg_advisory_xact_lock: one worker at a time creates tables
 PARTITIONED = "p"  # relkind
 DEFAULT_PARTITION = "readings_other"
-PAST, FUTURE = 30, 2  # days around today that get a partition of their own
+PAST, FUTURE = 30, 2  # days before and after today that get a partition of their own
 
 TABLES = """
 CREATE TABLE IF NOT EXISTS readings (
@@ -41,17 +41,17 @@ SELECT inhrelid::regclass::text FROM pg_inherits WHERE inhparent = 'readings'::r
 
 
 def partition_name(day: date) -> str:
-    """What the partition of a day is called."""
+    """The name of the partition of a day."""
     return f"readings_{day:%Y_%m_%d}"
 
 
 def has_partition(day: date, today: date) -> bool:
-    """Whether that day gets a partition of its own: vehicles' clocks may be wrong by years."""
+    """Whether that day gets a partition of its own; clocks of vehicles may be wrong by years."""
     return today - timedelta(PAST) <= day <= today + timedelta(FUTURE)
 
 
 def make_partition(day: date) -> str:
-    """SQL that makes the partition of a day, in one transaction; what waits among other days moves there."""
+    """SQL that creates the partition of a day in one transaction; its rows move there from the default partition."""
     name, within = partition_name(day), f"time >= '{day} 00:00Z' AND time < '{day + timedelta(1)} 00:00Z'"
     return f"""
 LOCK TABLE {DEFAULT_PARTITION} IN ACCESS EXCLUSIVE MODE;

@@ -1,4 +1,4 @@
-"""Readings in PostgreSQL: any number of workers at once."""
+"""Stores readings in PostgreSQL, for any number of workers at once."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from mavproxy_gradys.station.reading_row import COLUMNS, ReadingRow
 from mavproxy_gradys.station.store import CHUNK, Bucket, FleetNow, HistoryQuery, ReadingQuery, StoreCounts
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 
-EXPORTS = 4  # at once
+EXPORTS = 4  # running at once
 SHOW_EVERY = 1.0  # s between the updates of the fleet's table
 INSERT = """
 WITH fresh AS (
@@ -53,7 +53,7 @@ FROM (SELECT time, received, {number} AS number FROM readings
       WHERE device = $1 AND quantity = $2 AND time >= $3 AND time < $4) AS numbers
 WHERE number IS NOT NULL GROUP BY floor(extract(epoch FROM time - $3) / $5::float8) ORDER BY 1
 """
-# A text is not looked into: PostgreSQL finds no NUL and no half a letter in it. A list has numbers only.
+# Texts are not parsed: PostgreSQL's JSON functions fail on a NUL and on unpaired surrogates. A list has numbers only.
 ELEMENT = """
 CASE WHEN value::text LIKE '[%' THEN
     CASE WHEN json_typeof(value->{0:d}) = 'number' THEN (value->>{0:d})::float8 END END
@@ -61,11 +61,11 @@ CASE WHEN value::text LIKE '[%' THEN
 
 
 class PostgresStore:
-    """See `Store`; it connects when it is first asked, and again after the database was away.
+    """See `Store`; it connects at first use, and again after a failure.
 
     Args:
-        url: postgresql://[USER[:PASSWORD]@]HOST[:PORT]/DATABASE; further parameters as libpq knows them.
-        worker: its name, under which it counts.
+        url: postgresql://[USER[:PASSWORD]@]HOST[:PORT]/DATABASE; with libpq's parameters.
+        worker: the worker's name, for its counts.
         clock: s since 1970.
     """
 
@@ -85,14 +85,14 @@ class PostgresStore:
         await connection.execute(STAGING)
 
     async def add(self, rows: Sequence[ReadingRow]) -> int:
-        """See `Store.add`; a device, a time and a number are one reading."""
+        """See `Store.add`; device, time and number identify a reading."""
         self._start_showing()
         new, received = await self._writing.do(lambda connection: self._insert(connection, rows))
         self._newest.put(newest_of(rows, received))
         return new
 
     async def _insert(self, connection: Any, rows: Sequence[ReadingRow]) -> tuple[int, float]:
-        """How many were new, and when that was by the database's clock."""
+        """The number of new rows, and the time of storage by the database's clock."""
         records = [(*row[:7], utc(row.time)) for row in rows]
         await self._partitions.make(connection, {day_of(record[7]) for record in records})
         async with connection.transaction():
@@ -111,7 +111,7 @@ class PostgresStore:
             self._showing = self._tasks.start(self._show_changes(), "the update of the fleet's table")
 
     async def _show_changes(self) -> None:
-        """Bring the fleet's table up to date, again and again: as often whether few readings come or many."""
+        """Update the fleet's table at a fixed rate, whatever the number of readings."""
         while True:
             await asyncio.sleep(SHOW_EVERY)
             with contextlib.suppress(NotStored):
@@ -142,7 +142,7 @@ class PostgresStore:
         return StoreCounts(*await self._looking.do(lambda connection: connection.fetchrow(COUNTS)))
 
     async def readings(self, query: ReadingQuery) -> AsyncGenerator[Sequence[tuple[Any, ...]], None]:
-        """See `Store.readings`; in a transaction and over a connection of its own."""
+        """See `Store.readings`; it has a transaction and a connection of its own."""
         conditions = query.conditions()
         where = " AND ".join(f"{column} {operator} ${n}" for n, (column, operator, _) in enumerate(conditions, 1))
         columns = ", ".join(map(expression, COLUMNS))
@@ -172,7 +172,7 @@ class PostgresStore:
                 connection.terminate()
 
     async def close(self) -> None:
-        """See `Store.close`; the fleet's table is brought up to date first."""
+        """See `Store.close`; the fleet's table is updated first."""
         await self._tasks.end()
         with contextlib.suppress(NotStored):
             await self._show(self._newest.take_changed())
@@ -181,17 +181,17 @@ class PostgresStore:
 
 
 async def begin(connection: Any) -> None:
-    """Begin a transaction that only reads."""
+    """Begin a read-only transaction."""
     await connection.execute("BEGIN READ ONLY")
 
 
 def utc(seconds: float) -> datetime:
-    """A moment, from s since 1970."""
+    """The datetime of s since 1970."""
     return datetime.fromtimestamp(seconds, timezone.utc)
 
 
 def expression(column: str) -> str:
-    """SQL of a column as it is answered."""
+    """The SQL expression of a column in an answer."""
     if column in ("time", "received"):
         return f"extract(epoch FROM {column})::float8"
     return "value::text" if column == "value" else column

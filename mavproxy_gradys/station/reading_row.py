@@ -1,4 +1,4 @@
-"""A reading as it comes from outside, checked, as a row of a store. Pure."""
+"""Checks a received reading and makes a row for a store. Pure."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from mavproxy_gradys.forwarding.readings import LONGEST_TEXT
 from mavproxy_gradys.forwarding.spool_rows import LONGEST_JSON, is_value
 
-LONGEST_NAME = 200  # letters of a device, an id or a quantity: an index takes no more than 2700 bytes
+LONGEST_NAME = 200  # characters of a device, an id or a quantity; an index entry is limited to 2700 bytes
 LATEST = 253402300800.0  # s since 1970 of the year 10000
 COLUMNS = ("device", "seq", "id", "quantity", "representation", "value", "time", "received")
 
@@ -19,10 +19,10 @@ class ReadingRow(NamedTuple):
     """One reading.
 
     Attributes:
-        device, id, quantity, representation: as it was sent.
-        seq: its number, of 64 bits.
-        value: JSON, in ASCII.
-        number: the value as a number; None when it is a text or a list.
+        device, id, quantity, representation: as received.
+        seq: its number, 64 bits.
+        value: JSON in ASCII.
+        number: the value as a number; None for a text or a list.
         time: when it was measured, s since 1970.
     """
 
@@ -37,10 +37,10 @@ class ReadingRow(NamedTuple):
 
 
 def reading_row(reading: Any) -> ReadingRow:
-    """The row of what JSON gave.
+    """The row of a decoded JSON value.
 
     Raises:
-        ValueError: it is no reading.
+        ValueError: it is not a reading.
     """
     if not isinstance(reading, Mapping):
         raise ValueError(f"not a reading: {type(reading).__name__}")
@@ -51,9 +51,9 @@ def reading_row(reading: Any) -> ReadingRow:
     except (KeyError, TypeError, OverflowError) as error:
         raise ValueError(f"not a reading: {error!r:.80}") from error
     if not isinstance(seq, int) or isinstance(seq, bool):
-        raise ValueError(f"seq {seq!r:.40} is no number")
+        raise ValueError(f"seq {seq!r:.40} is not a number")
     if not 0 <= at < LATEST:
-        raise ValueError(f"{at:g} is no time")
+        raise ValueError(f"{at:g} is not a valid time")
     device, quantity = names
     representation = text(reading.get("representation", ""), LONGEST_TEXT)
     return ReadingRow(
@@ -72,10 +72,10 @@ def value_json(value: Any) -> str:
     """A value as JSON.
 
     Raises:
-        ValueError: it is none: see docs/gradys.md.
+        ValueError: it is not a valid value; see docs/gradys.md.
     """
     if not is_value(value):
-        raise ValueError("its value is no finite number, text, true, false, or list of numbers")
+        raise ValueError("its value is not a finite number, a text, true, false, or a list of numbers")
     encoded = json.dumps(value, allow_nan=False)
     if len(encoded) > LONGEST_JSON:
         raise ValueError(f"its value is longer than {LONGEST_JSON} bytes")
@@ -83,28 +83,28 @@ def value_json(value: Any) -> str:
 
 
 def number_of(value: Any) -> float | None:
-    """A value as a number; None when it is a text or a list."""
+    """A value as a number; None for a text or a list."""
     return float(value) if isinstance(value, int | float) else None
 
 
 def text(cell: Any, longest: int) -> str:
-    """A text that every store takes.
+    """A text that every store accepts.
 
     Raises:
-        ValueError: it is too long, has a NUL, or half a letter.
+        ValueError: it is too long, or has a NUL or an unpaired surrogate.
     """
-    letters = str(cell)
-    if len(letters) > longest or "\0" in letters:
-        raise ValueError(f"{letters!r:.40} is longer than {longest} letters, or has a NUL")
-    letters.encode()
-    return letters
+    characters = str(cell)
+    if len(characters) > longest or "\0" in characters:
+        raise ValueError(f"{characters!r:.40} is longer than {longest} characters, or has a NUL")
+    characters.encode()
+    return characters
 
 
 def whole(number: Any) -> int:
-    """An integer of 64 bits.
+    """A 64-bit integer.
 
     Raises:
-        ValueError: it is none.
+        ValueError: it is not an integer, or too large.
     """
     integer = int(number)
     if not -(2**63) <= integer < 2**63:
@@ -113,10 +113,10 @@ def whole(number: Any) -> int:
 
 
 def finite(number: Any) -> float:
-    """A number.
+    """A finite number.
 
     Raises:
-        ValueError: it is none, NaN, or infinite.
+        ValueError: it is not a number, NaN, or infinite.
     """
     real = float(number)
     if not math.isfinite(real):

@@ -1,4 +1,4 @@
-"""What is said of messages that are no readings: one line a minute at most."""
+"""Logs messages that are not readings: at most one line a minute."""
 
 from __future__ import annotations
 
@@ -7,28 +7,28 @@ import math
 from collections.abc import Callable
 
 EVERY = 60.0  # s
-LONGEST = 200  # letters of a topic or a reason
+LONGEST = 200  # characters of a topic or a reason
 
 
 class RefusalLog:
-    """Counts refusals between two lines.
+    """Counts refused messages between two log lines.
 
     Args:
-        log: where the lines go.
+        log: the logger.
         clock: monotonic seconds.
     """
 
     def __init__(self, log: logging.Logger, clock: Callable[[], float]) -> None:
         self._log = log
         self._clock = clock
-        self._untold = 0
-        self._told_at = -math.inf
+        self._unlogged = 0
+        self._logged_at = -math.inf
 
     def add(self, topic: str, why: str) -> None:
-        """Count one, and say so if it is time; control characters are spelled out."""
-        self._untold += 1
+        """Count a message, and log a line if one is due; control characters are escaped."""
+        self._unlogged += 1
         now = self._clock()
-        if now - self._told_at < EVERY:
+        if now - self._logged_at < EVERY:
             return
-        self._log.warning("%d messages are no readings; on %a: %a", self._untold, topic[:LONGEST], why[:LONGEST])
-        self._untold, self._told_at = 0, now
+        self._log.warning("%d messages are not readings; on %a: %a", self._unlogged, topic[:LONGEST], why[:LONGEST])
+        self._unlogged, self._logged_at = 0, now

@@ -1,4 +1,4 @@
-"""Readings in an SQLite file: one laptop, one station."""
+"""Stores readings in an SQLite file, for one station on one computer."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ WHERE number IS NOT NULL GROUP BY CAST((time - :start) / :width AS INTEGER) ORDE
 
 
 class SqliteStore:
-    """See `Store`; all work on the file is done in a thread of its own.
+    """See `Store`; a thread of its own does all work on the file.
 
     Args:
-        file: SQLite database; `:memory:` forgets.
+        file: SQLite database; `:memory:` stores nothing on the disk.
         clock: s since 1970.
 
     Raises:
@@ -64,7 +64,7 @@ class SqliteStore:
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="station-store")
 
     async def _do(self, work: Callable[[], T]) -> T:
-        """Do that in the other thread.
+        """Call `work` in the other thread.
 
         Raises:
             NotStored: the file cannot be used.
@@ -75,7 +75,7 @@ class SqliteStore:
             raise NotStored(f"{type(error).__name__}: {error}") from error
 
     async def add(self, rows: Sequence[ReadingRow]) -> int:
-        """See `Store.add`; a device and a number are one reading."""
+        """See `Store.add`; device and number identify a reading."""
         received = self._clock()
         new = await self._do(lambda: self._insert(rows, received))
         self._repeats += len(rows) - new
@@ -114,7 +114,7 @@ class SqliteStore:
 
     async def history(self, query: HistoryQuery) -> list[Bucket]:
         """See `Store.history`."""
-        asked = {
+        parameters = {
             "device": query.device,
             "quantity": query.quantity,
             "path": "$" if query.element is None else f"$[{query.element:d}]",
@@ -122,7 +122,7 @@ class SqliteStore:
             "end": query.end,
             "width": query.width,
         }
-        rows = await self._do(lambda: self._db.execute(HISTORY, asked).fetchall())
+        rows = await self._do(lambda: self._db.execute(HISTORY, parameters).fetchall())
         return [Bucket(*row) for row in rows]
 
     async def close(self) -> None:

@@ -1,4 +1,4 @@
-"""What one worker has done since its start. Pure."""
+"""Counts what one worker has done since its start. Pure."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ class Histogram:
     """Counts values by size.
 
     Attributes:
-        bounds: upper bounds of all parts but the last.
-        counts: how many values each part has; one more than bounds.
-        sum: of all values.
+        bounds: upper bounds of all parts except the last.
+        counts: the number of values in each part; one more than bounds.
+        sum: the sum of all values.
     """
 
     def __init__(self, bounds: Sequence[float]) -> None:
@@ -34,12 +34,12 @@ class Statistics:
     """One worker's counts.
 
     Attributes:
-        stored, repeats: readings that were new, and that had been kept before.
-        refused: messages that are no readings.
-        confirmed: readings whose senders were told that they are kept.
+        stored, repeats: readings that were new, and that had been stored before.
+        refused: messages that are not readings.
+        confirmed: readings that were confirmed to their senders.
         batches: transactions.
-        commit: s that each of them took.
-        delay: s from a reading's sampling, by the vehicle's clock, to its row.
+        commit: duration of each transaction (s).
+        delay: s from a reading's measurement, by the vehicle's clock, to its storage.
     """
 
     def __init__(self) -> None:
@@ -52,9 +52,9 @@ class Statistics:
 
         Args:
             times: when its readings were measured, s since 1970.
-            new: how many of them were new.
+            new: number of new readings.
             now: s since 1970.
-            took: s that it took.
+            took: its duration (s).
         """
         self.batches += 1
         self.stored += new

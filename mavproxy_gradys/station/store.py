@@ -1,4 +1,4 @@
-"""What a station asks of its store; `sqlite_store.py` and `postgres_store.py` are two."""
+"""The protocol of a station's store; `sqlite_store.py` and `postgres_store.py` implement it."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from typing import Any, NamedTuple, Protocol
 from mavproxy_gradys.station.newest import Newest
 from mavproxy_gradys.station.reading_row import ReadingRow
 
-CHUNK = 2000  # rows that are in memory at once
+CHUNK = 2000  # rows in memory at once
 
 
 @dataclass(frozen=True)
 class ReadingQuery:
-    """Which readings.
+    """A selection of readings.
 
     Attributes:
-        device, quantity: of these alone; empty for all.
-        after: with larger numbers than this, in the order of the numbers; -1 for all, by device and time.
-        start, end: measured from then on, before then (s since 1970).
-        limit: no more than so many.
+        device, quantity: of these only; empty for all.
+        after: with larger numbers than this, in order of the numbers; -1 for all, in order of device and time.
+        start, end: measured at `start` or later and before `end` (s since 1970).
+        limit: the largest number of readings.
     """
 
     device: str = ""
@@ -33,14 +33,14 @@ class ReadingQuery:
 
     def conditions(self) -> list[tuple[str, str, Any]]:
         """Column, operator and operand of each condition."""
-        asked = (
+        filters = (
             ("device", "=", self.device, ""),
             ("quantity", "=", self.quantity, ""),
             ("seq", ">", self.after, -1),
             ("time", ">=", self.start, -math.inf),
             ("time", "<", self.end, math.inf),
         )
-        return [(column, operator, operand) for column, operator, operand, default in asked if operand != default]
+        return [(column, operator, operand) for column, operator, operand, default in filters if operand != default]
 
     @property
     def order(self) -> str:
@@ -50,13 +50,13 @@ class ReadingQuery:
 
 @dataclass(frozen=True)
 class HistoryQuery:
-    """Which history.
+    """A selection of a history.
 
     Attributes:
-        device, quantity: of what.
-        element: which one, where the value is a list; None where it is a number.
-        start, end: measured from then on, before then (s since 1970).
-        buckets: of so many equal parts of that time.
+        device, quantity: of these.
+        element: the index if the value is a list; None if it is a number.
+        start, end: measured at `start` or later and before `end` (s since 1970).
+        buckets: the number of equal parts of that time.
     """
 
     device: str
@@ -68,7 +68,7 @@ class HistoryQuery:
 
     @property
     def width(self) -> float:
-        """s of one part."""
+        """The duration of one part (s)."""
         return (self.end - self.start) / self.buckets
 
 
@@ -78,8 +78,8 @@ class Bucket(NamedTuple):
     Attributes:
         first, last: when the first and the last one were measured, s since 1970.
         low, high: the smallest and the largest value.
-        readings: how many.
-        delay: s from sampling to row, the longest.
+        readings: their number.
+        delay: the longest time (s) from measurement to storage.
     """
 
     first: float
@@ -91,11 +91,11 @@ class Bucket(NamedTuple):
 
 
 class StoreCounts(NamedTuple):
-    """What a store has counted, of all workers.
+    """The counts of a store, of all workers.
 
     Attributes:
-        stored: readings that were kept.
-        repeats: readings that came again.
+        stored: readings that were stored.
+        repeats: readings that arrived again.
     """
 
     stored: int
@@ -107,7 +107,7 @@ class FleetNow(NamedTuple):
 
     Attributes:
         now: the store's clock, s since 1970.
-        newest: by device and quantity.
+        newest: the readings by device and quantity.
     """
 
     now: float
@@ -115,32 +115,32 @@ class FleetNow(NamedTuple):
 
 
 class Store(Protocol):
-    """Keeps readings, once each.
+    """Stores each reading once.
 
     Every method raises NotStored while the database cannot be reached.
     """
 
     async def add(self, rows: Sequence[ReadingRow]) -> int:
-        """Keep rows; how many were new. They are on the disk when it returns.
+        """Store rows; returns the number of new ones. They are on the disk when it returns.
 
         Raises:
-            ValueError: the database refuses what one holds; none is kept.
+            ValueError: the database refuses one; none is stored.
         """
 
     async def show(self, newest: Iterable[Newest]) -> None:
-        """Have the fleet's table show these, which are not kept."""
+        """Show readings in the fleet's table without storing them."""
 
     async def fleet(self) -> FleetNow:
         """The newest reading of each quantity of each device."""
 
     async def counts(self) -> StoreCounts:
-        """How many readings there are."""
+        """The counts of readings."""
 
     def readings(self, query: ReadingQuery) -> AsyncGenerator[Sequence[tuple[Any, ...]], None]:
         """Readings as rows of COLUMNS, in chunks; times are s since 1970, the value is JSON."""
 
     async def history(self, query: HistoryQuery) -> list[Bucket]:
-        """The parts of a history that have readings, in order of time."""
+        """The parts of a history with readings, in order of time."""
 
     async def close(self) -> None:
         """Close it."""

@@ -1,4 +1,4 @@
-"""Positions as a GrADyS ground station is told them: form fields, kept in memory."""
+"""Position updates in the form of the GrADyS ground station; they are kept in memory."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ SHOWN = {"heading": "deg", "ground_speed": "m/s", "battery_percent": "%"}  # qua
 
 
 def parse(form: Mapping[str, str]) -> dict[str, Any]:
-    """A device's update, with numbers for numbers.
+    """Parse a device's update; number fields become numbers.
 
     Raises:
-        ValueError: what should be a number is none.
+        ValueError: a number field is not a number.
         KeyError: `device` or `id` is missing.
     """
     device: dict[str, Any] = dict(form)
@@ -32,7 +32,7 @@ def parse(form: Mapping[str, str]) -> dict[str, Any]:
 
 
 def newest_of_update(device: Mapping[str, Any], now: float) -> Iterator[Newest]:
-    """What the fleet's table shows of an update that came at `now` (s since 1970).
+    """The readings for the fleet's table, of an update that arrived at `now` (s since 1970).
 
     Raises:
         ValueError: its names are too long.
@@ -43,7 +43,7 @@ def newest_of_update(device: Mapping[str, Any], now: float) -> Iterator[Newest]:
         position = {**named, "quantity": POSITION, "representation": POSITION_REPRESENTATION, "value": where}
         yield from newest_of([reading_row(position)], now)
     for quantity, unit in SHOWN.items():
-        with contextlib.suppress(KeyError, ValueError):  # it is not told, or is no number
+        with contextlib.suppress(KeyError, ValueError):  # it is missing, or not a number
             value = finite(device[quantity])
             row = reading_row({**named, "quantity": quantity, "representation": unit, "value": value})
             yield from newest_of([row], now)
@@ -61,7 +61,7 @@ class Updates:
         self._devices: dict[int, dict[str, Any]] = {}
 
     def put(self, device: dict[str, Any]) -> None:
-        """Take what `parse` made of an update."""
+        """Add the result of `parse`."""
         self._devices[device["id"]] = {**device, "received": self._clock()}
 
     def devices(self) -> list[dict[str, Any]]:
@@ -75,5 +75,5 @@ class Updates:
 
 
 def status_of(age: float) -> str:
-    """What a device is called that was last heard of so many seconds ago."""
+    """The status of a device whose last update is `age` s old."""
     return "active" if age < ACTIVE else "on_hold" if age < INACTIVE else "inactive"

@@ -1,4 +1,4 @@
-"""One worker: a store, the HTTP side, and what comes from a broker."""
+"""One worker: a store, the HTTP API, and optionally a consumer of a broker's messages."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from mavproxy_gradys.station.store import Store
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
-FORMER = 2  # times the receive maximum: messages of a former connection may wait beside those of this one
+INBOX_FACTOR = 2  # times the receive maximum, because messages of an earlier connection may still wait
 
 
 class ExtraMissing(Exception):
-    """A library that is an extra is not installed."""
+    """An optional library is not installed."""
 
 
 def make_store(options: argparse.Namespace) -> Store:
@@ -49,24 +49,24 @@ def make_store(options: argparse.Namespace) -> Store:
 
 
 def extra_missing(what: str, missing: ModuleNotFoundError) -> ExtraMissing:
-    """What to do about it."""
+    """The error that names the library and how to install it."""
     return ExtraMissing(f"{what} needs {missing.name}: pip install 'mavproxy-uavapi[fleet]'")
 
 
 @contextlib.asynccontextmanager
 async def worker(options: argparse.Namespace) -> AsyncIterator[web.Application]:
-    """The application, while the rest of the worker runs.
+    """The application; the other parts of the worker run within the context.
 
     Raises:
-        NotStored, ExtraMissing: as `make_store`; MQTT needs an extra, too.
-        SettingError: the broker's address cannot be read.
+        NotStored, ExtraMissing: as `make_store`; MQTT needs an optional library, too.
+        SettingError: the broker's address is malformed.
     """
     tasks, store = HeldTasks(), make_store(options)
     try:
         intake = Intake(store, Statistics())
         watch = FleetWatch(store, AlarmLimits(options.silent, options.battery))
         health = start_consumer(options, intake, watch, tasks) if options.broker else Health(watch)
-        tasks.start(watch.run(), "the look at the fleet")
+        tasks.start(watch.run(), "the reading of the fleet's state")
         yield Station(intake, watch, health, watched=options.watched, token=options.token).app()
     finally:
         await tasks.end()
@@ -74,7 +74,7 @@ async def worker(options: argparse.Namespace) -> AsyncIterator[web.Application]:
 
 
 def start_consumer(options: argparse.Namespace, intake: Intake, watch: FleetWatch, tasks: HeldTasks) -> Health:
-    """Begin to consume.
+    """Begin to consume messages.
 
     Raises:
         ExtraMissing, SettingError: as `worker`.
@@ -87,7 +87,7 @@ def start_consumer(options: argparse.Namespace, intake: Intake, watch: FleetWatc
     except ModuleNotFoundError as missing:
         raise extra_missing("MQTT", missing) from missing
     receive_maximum = 2 * options.batch  # one batch is stored while the next one comes
-    inbox = Inbox(FORMER * receive_maximum, time.monotonic)
+    inbox = Inbox(INBOX_FACTOR * receive_maximum, time.monotonic)
     address = BrokerAddress(
         options.broker,
         options.topic,
@@ -104,8 +104,8 @@ def start_consumer(options: argparse.Namespace, intake: Intake, watch: FleetWatc
     return Health(watch, inbox, broker)
 
 
-async def serve(options: argparse.Namespace, over: asyncio.Event) -> None:
-    """Work until `over`.
+async def serve(options: argparse.Namespace, stop: asyncio.Event) -> None:
+    """Serve until `stop` is set.
 
     Raises:
         OSError: the port is taken, there is no such address, or the certificate cannot be read.
@@ -122,7 +122,7 @@ async def serve(options: argparse.Namespace, over: asyncio.Event) -> None:
             await web.TCPSite(runner, options.host, options.port, ssl_context=context, reuse_address=True).start()
             scheme = "http" if context is None else "https"
             print(f"station: listening on {scheme}://{options.host}:{options.port}", flush=True)
-            await over.wait()
+            await stop.wait()
         finally:
             with contextlib.suppress(asyncio.TimeoutError):
                 await wait_with_timeout(5.0, runner.cleanup())

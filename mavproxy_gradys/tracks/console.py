@@ -1,4 +1,4 @@
-"""`gradys track …` at the prompt: its words, and what it shows. Pure, but for `TrackConsole`."""
+"""`gradys track …` at the prompt: its arguments and its output. Pure, except for `TrackConsole`."""
 
 from __future__ import annotations
 
@@ -17,30 +17,30 @@ from mavproxy_gradys.tracks.flight import (
     VERB,
     flight_of,
 )
-from mavproxy_gradys.tracks.formats import FORMATS, GROUND, TrackWaypoint, places_of, style_of
+from mavproxy_gradys.tracks.formats import FORMATS, GROUND, TrackWaypoint, style_of, waypoints_of
 from mavproxy_gradys.tracks.service import Tracking
 from mavproxy_uavapi.core.background import BackgroundCommands
 from mavproxy_uavapi.core.errors import BadRequest
 from mavproxy_uavapi.core.host import Host
 
 HELP = """\
-gradys track                            what is recorded, and what is flown
+gradys track                            the recording and the track flights
 gradys track record FILE [SECONDS=5] [--format text|tuple|gpx] [--latest FILE] [--sysid N]
 gradys track stop                       end the recording
 gradys track fly FILE [--ground M] [--reach M] [--transit M] [--sysid N]
                                         take off, fly through the track, return and land"""
 
 
-class Words(argparse.ArgumentParser):
+class ArgumentParser(argparse.ArgumentParser):
     """A parser that neither prints nor ends the program."""
 
     def error(self, message: str) -> NoReturn:
-        """Raises BadRequest."""
+        """Raise BadRequest."""
         raise BadRequest(f"{message}\n{HELP}")
 
 
 def between(low: float, high: float) -> Callable[[str], float]:
-    """What reads an option's number, which must lie between both."""
+    """A function that parses a number of an option and checks its range."""
 
     def number(text: str) -> float:
         if not low <= float(text) <= high:
@@ -50,10 +50,10 @@ def between(low: float, high: float) -> Callable[[str], float]:
     return number
 
 
-def words() -> argparse.ArgumentParser:
-    """What may follow `gradys track`."""
-    parser = Words(prog="gradys track", add_help=False)
-    verbs = parser.add_subparsers(dest="verb", parser_class=Words)
+def argument_parser() -> argparse.ArgumentParser:
+    """The parser of the arguments of `gradys track`."""
+    parser = ArgumentParser(prog="gradys track", add_help=False)
+    verbs = parser.add_subparsers(dest="verb", parser_class=ArgumentParser)
     record = verbs.add_parser("record", add_help=False)
     record.add_argument("file", type=Path)
     record.add_argument("seconds", type=float, nargs="?", default=5.0)
@@ -72,11 +72,11 @@ def words() -> argparse.ArgumentParser:
 
 
 class TrackConsole:
-    """The command. MAVProxy does not wait for it: what comes of it is printed when it comes.
+    """The command. MAVProxy does not wait for it: its result is printed later.
 
     Args:
-        host: the vehicles, and the way into the main loop.
-        tracks: what is recorded and flown.
+        host: the vehicles, and access to the main loop.
+        tracks: the recording and the flights.
     """
 
     def __init__(self, host: Host, tracks: Tracking) -> None:
@@ -85,9 +85,9 @@ class TrackConsole:
         self._background = BackgroundCommands(host, "gradys")
 
     def command(self, args: list[str]) -> None:
-        """What was typed. Main loop only."""
+        """Run the typed command. Main loop only."""
         try:
-            options = words().parse_args(args)
+            options = argument_parser().parse_args(args)
             if options.verb == "record" and not 0.1 <= options.seconds <= 86400:
                 raise BadRequest("SECONDS are from 0.1 to 86400")
         except BadRequest as error:
@@ -104,8 +104,8 @@ class TrackConsole:
         }
         self._background.send(lambda: verbs[options.verb](options))
 
-    async def _show(self, _given: argparse.Namespace) -> str:
-        return shown(self._tracks.report())
+    async def _show(self, _options: argparse.Namespace) -> str:
+        return report_text(self._tracks.report())
 
     async def _record(self, options: argparse.Namespace) -> str:
         file = options.file.expanduser()
@@ -116,7 +116,7 @@ class TrackConsole:
         )
         return f"recording vehicle {recorder.system} every {options.seconds:g} s into {file} ({style})"
 
-    async def _stop(self, _given: argparse.Namespace) -> str:
+    async def _stop(self, _options: argparse.Namespace) -> str:
         recorder = await self._tracks.stop_recording()
         return "nothing is recorded" if recorder is None else f"{recorder.written} readings are in {recorder.file}"
 
@@ -127,26 +127,26 @@ class TrackConsole:
         request = {**{name: str(value) for name, value in vars(options).items()}, "digest": hash(tuple(places))}
         job = self._host.jobs.begin(vehicle, VERB, request, lambda job: self._tracks.fly(flight, job))
         self._background.say(
-            f"flying {len(places)} legs with vehicle {vehicle.state.system}; `gradys track` tells how far it is"
+            f"flying {len(places)} legs with vehicle {vehicle.state.system}; `gradys track` shows the progress"
         )
         return await job.outcome()
 
 
 def read(file: Path, ground: float | None) -> list[TrackWaypoint]:
-    """The places that a file's track leads through.
+    """The waypoints of the track in a file.
 
     Raises:
-        BadRequest: it cannot be read.
-        Invalid: as `places_of`.
+        BadRequest: the file cannot be read.
+        Invalid: as `waypoints_of`.
     """
     try:
-        return places_of(file.read_text(encoding="utf-8"), ground)
+        return waypoints_of(file.read_text(encoding="utf-8"), ground)
     except (OSError, UnicodeDecodeError) as error:
         raise BadRequest(f"{file}: {error}") from error
 
 
-def shown(report: Mapping[str, Any]) -> str:
-    """What is recorded and flown, in a few lines."""
+def report_text(report: Mapping[str, Any]) -> str:
+    """The recording and the flights in a few lines."""
     recording = report["recording"]
     lines = []
     if recording is not None:

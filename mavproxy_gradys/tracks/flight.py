@@ -1,4 +1,4 @@
-"""Flying a track: a job made of the copter's own verbs, and so by the rules of the air."""
+"""Flies a track: a job that uses the copter's own verbs, with all their checks."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 VERB = "/mission/fly-track"
 TOLERANCE = 1.0  # m
-REACH = 10_000.0  # m from here within which a track must lie
+REACH = 10_000.0  # m; the largest distance of a waypoint from the vehicle's position at the start
 LARGEST_REACH = 100_000.0  # m
-TRANSIT = 10.0  # m above home, at least, on the way to a first place that is not near
+TRANSIT = 10.0  # m above home; the lowest altitude on the way to a first waypoint that is not near
 LOWEST_TRANSIT = 2.0  # m
 HIGHEST_TAKEOFF = 500.0  # m above home, as for `takeoff`
 NEAR = 5.0  # m
 
 
 class TrackFlight:
-    """A track that is flown.
+    """The flight of a track.
 
     Attributes:
-        leg: number of the leg that is flown, from 1; 0 before the first.
+        leg: number of the present leg, from 1; 0 before the first.
         stage: `arming`, `taking off`, `approaching`, `flying`, `returning`, `done`.
 
     Args:
-        copter: who flies.
-        places: where to.
-        transit: m above home, at least, on the way to a first place that is not near.
+        copter: the vehicle.
+        places: the waypoints.
+        transit: m above home; the lowest altitude on the way to a first waypoint that is not near.
     """
 
     def __init__(self, copter: Copter, places: Sequence[TrackWaypoint], transit: float = TRANSIT) -> None:
@@ -46,7 +46,7 @@ class TrackFlight:
         self.job: Job | None = None
 
     async def fly(self, job: Job) -> str:
-        """Take off if need be, fly every leg, return and land; the result's text.
+        """Take off if necessary, fly every leg, return and land; returns the result text.
 
         Raises:
             UavApiError: as the verbs `arm`, `takeoff`, `go_to` and `rtl`; nothing more is sent then.
@@ -56,7 +56,7 @@ class TrackFlight:
         if self.copter.state.armed is False or self.copter.state.landed:
             await self.copter.arm(job)
             self._enter("taking off")
-            await self.copter.takeoff(job, min(self._height_there(), HIGHEST_TAKEOFF))
+            await self.copter.takeoff(job, min(self._approach_height(), HIGHEST_TAKEOFF))
         await self._approach(job)
         for place in self.places:
             self.leg += 1
@@ -69,16 +69,16 @@ class TrackFlight:
 
     @property
     def result(self) -> str:
-        """The text of its success."""
+        """The result text of a success."""
         return f"Flew {len(self.places)} legs and landed at home"
 
     async def _approach(self, job: Job) -> None:
-        """Fly above the first place; a recording begins on the ground, and the way there may lead through trees."""
+        """Fly above the first waypoint: a recording begins on the ground, and there may be trees on the way."""
         if self._is_near():
             return
         self._enter("approaching")
         here, first = self.copter.fresh("GLOBAL_POSITION_INT"), self.places[0]
-        height = max(self._height_there(), self.copter.height)
+        height = max(self._approach_height(), self.copter.height)
         if height - self.copter.height > TOLERANCE:
             await self._go_to(job, here.lat / 1e7, here.lon / 1e7, height)
         await self._go_to(job, first.lat, first.lon, height)
@@ -86,13 +86,13 @@ class TrackFlight:
     async def _go_to(self, job: Job, lat: float, lon: float, alt: float) -> None:
         await self.copter.go_to(job, GlobalTarget(lat, lon, alt), wait=True, tolerance=TOLERANCE)
 
-    def _height_there(self) -> float:
-        """Height (m above home) of the way to the first place."""
+    def _approach_height(self) -> float:
+        """The height (m above home) of the flight to the first waypoint."""
         first = self.places[0].alt
         return first if self._is_near() else max(first, self.transit)
 
     def _is_near(self) -> bool:
-        return away(self.copter, self.places[0]) <= NEAR
+        return distance_to(self.copter, self.places[0]) <= NEAR
 
     def _enter(self, stage: str) -> None:
         self.stage = stage
@@ -101,11 +101,11 @@ class TrackFlight:
 
     @property
     def running(self) -> bool:
-        """Whether it is under way."""
+        """Whether it is in flight."""
         return self.job is not None and self.job.running
 
     def report(self) -> dict[str, Any]:
-        """What the status says."""
+        """The report for the status."""
         job = self.job
         state = "waiting" if job is None else "running" if job.running else "failed" if job.error else "done"
         return {
@@ -123,33 +123,35 @@ class TrackFlight:
 def flight_of(
     vehicle: Vehicle, places: Sequence[TrackWaypoint], reach: float, transit: float = TRANSIT
 ) -> TrackFlight:
-    """A flight through those places, looked at before anything is sent.
+    """A flight through those waypoints; they are checked before anything is sent.
 
     Args:
-        vehicle: who flies.
-        places: where to.
-        reach: m from here within which the places must lie.
+        vehicle: the vehicle.
+        places: the waypoints.
+        reach: the largest distance (m) of a waypoint from the vehicle.
         transit: as for `TrackFlight`.
 
     Raises:
-        NotSupported: the vehicle is no copter.
-        Invalid: a place lies farther away.
-        Stale: the vehicle does not tell where it is.
+        NotSupported: the vehicle is not a copter.
+        Invalid: a waypoint is farther away.
+        OutsideEnvelope: a leg leaves the envelope.
+        Stale: the vehicle does not report its position.
     """
     if not isinstance(vehicle, Copter):
         raise NotSupported(f"a {vehicle.kind} does not fly tracks")
     for number, place in enumerate(places, 1):
-        metres = away(vehicle, place)
+        metres = distance_to(vehicle, place)
         if not metres <= reach:
             raise Invalid(f"waypoint {number} of the track is {metres:.0f} m away; `reach` is {reach:g} m", "track")
+    vehicle.require_route([GlobalTarget(place.lat, place.lon, place.alt) for place in places])
     return TrackFlight(vehicle, places, transit)
 
 
-def away(vehicle: Vehicle, place: TrackWaypoint) -> float:
-    """Metres from a vehicle to a place, over the ground.
+def distance_to(vehicle: Vehicle, place: TrackWaypoint) -> float:
+    """Horizontal metres from a vehicle to a waypoint.
 
     Raises:
-        Stale: the vehicle does not tell where it is.
+        Stale: the vehicle does not report its position.
     """
     here = vehicle.fresh("GLOBAL_POSITION_INT")
     return math.hypot(*offset(here.lat / 1e7, here.lon / 1e7, place.lat, place.lon))

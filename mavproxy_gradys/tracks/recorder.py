@@ -1,4 +1,4 @@
-"""Recording a track: GPS_RAW_INT readings into a file, and the latest one into another."""
+"""Records a track: writes GPS_RAW_INT readings to a file, and the latest one to another file."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 
-MAX_AGE = 5.0  # s after which a reading is not recorded as new
+MAX_AGE = 5.0  # s; older readings are not recorded
 
 
 class Recorder:
-    """Records the readings of one vehicle; belongs to the asyncio thread, writes in another.
+    """Records the readings of one vehicle; belongs to the asyncio thread, writes in another thread.
 
     Attributes:
-        file: where the track goes; an older file of that name is replaced.
-        written: how many readings are in it.
-        problem: why nothing is written just now; empty when it is.
+        file: the track's file; an older file of that name is replaced.
+        written: number of readings in it.
+        problem: why nothing is written at present; empty without a problem.
 
     Args:
         host: the vehicles.
         system: the vehicle's system id.
         file: see above.
-        style: the format, `tracks.FORMATS`.
+        style: the format, one of `FORMATS`.
         period: s between readings.
-        latest: a file that always holds the newest reading alone; None for none.
+        latest: a file that always holds only the newest reading; None for none.
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class Recorder:
         self._recorded_at = -1.0
 
     async def start(self) -> None:
-        """Begin.
+        """Start the recording.
 
         Raises:
             NotStored: the file cannot be written.
@@ -66,7 +66,7 @@ class Recorder:
             self._host.listeners.append(self._heard)
 
     async def stop(self) -> None:
-        """End it; what was heard last is in its file."""
+        """Stop the recording; the last reading is written before."""
         if self._heard in self._host.listeners:
             self._host.listeners.remove(self._heard)
         await self._tasks.end()
@@ -86,7 +86,7 @@ class Recorder:
             received = None if state is None else state.messages.get("GPS_RAW_INT")
             now = self._host.clock()
             if received is None or received.at == self._recorded_at or now - received.at > MAX_AGE:
-                self.problem = f"vehicle {self.system} tells no GPS_RAW_INT"
+                self.problem = f"vehicle {self.system} sends no GPS_RAW_INT"
                 continue
             self._recorded_at = received.at
             await self._write(GpsReading.of(received.message))
@@ -105,7 +105,7 @@ class Recorder:
         if state.system != self.system or message.get_type() != "GPS_RAW_INT":
             return
         self._newest = GpsReading.of(message)
-        if self._replacing is None or self._replacing.done():  # a slow disk gets the newest, not all
+        if self._replacing is None or self._replacing.done():  # on a slow disk some readings are skipped
             self._replacing = self._host.bridge.loop.create_task(self._write_latest())
 
     async def _write_latest(self) -> None:
@@ -117,7 +117,7 @@ class Recorder:
             self.problem = f"{self.latest}: {error.strerror}"
 
     def report(self) -> dict[str, Any]:
-        """What the status says."""
+        """The report for the status."""
         return {
             "file": str(self.file),
             "latest": None if self.latest is None else str(self.latest),
@@ -136,7 +136,7 @@ def append(file: Path, text: str, tail: str) -> None:
 
 
 def replace(file: Path, text: str) -> None:
-    """Make `text` the file's content, so that a reader sees the old or the new one and nothing between."""
-    beside = file.with_name(file.name + ".new")
-    beside.write_text(text, encoding="ascii")
-    os.replace(beside, file)
+    """Replace the file's content atomically: a reader sees the old or the new text."""
+    new_file = file.with_name(file.name + ".new")
+    new_file.write_text(text, encoding="ascii")
+    os.replace(new_file, file)

@@ -1,4 +1,4 @@
-"""What is asked for when a track is to be flown: by whom it is read, and how it is remembered."""
+"""The request to fly a track, and its short form for the job list and the audit trail."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from mavproxy_uavapi.http.extension import Request
 
 
 class TrackLimits(Request):
-    """How a track is to be flown.
+    """How to fly a track.
 
-    `ground` is the AMSL altitude (m) that heights count from, by default the track's lowest; every waypoint must
-    lie within `reach` m of here; a first one that is not near is approached at `transit` m above home or higher.
+    `ground` is the altitude (m AMSL) from which heights count, by default the track's lowest. Every waypoint must be
+    within `reach` m of the vehicle. A first waypoint that is not near is approached `transit` m above home or higher.
     """
 
     ground: Annotated[float | None, Field(ge=GROUND[0], le=GROUND[1], description="m AMSL")] = None
@@ -31,14 +31,14 @@ class TrackRequest(TrackLimits):
 
 
 class TrackFile(TrackLimits):
-    """What is remembered of a track that was to be flown: enough to tell one from another."""
+    """The short form of a request: a digest identifies the track."""
 
     digest: str
     size: int
 
     @classmethod
-    def of(cls, given: TrackRequest) -> TrackFile:
-        """What stands for `given`."""
-        data = given.track.encode("utf-8", "surrogatepass")
-        limits = given.model_dump(exclude={"track"})
+    def of(cls, request: TrackRequest) -> TrackFile:
+        """The short form of `request`."""
+        data = request.track.encode("utf-8", "surrogatepass")
+        limits = request.model_dump(exclude={"track"})
         return cls(digest=hashlib.sha256(data).hexdigest(), size=len(data), **limits)

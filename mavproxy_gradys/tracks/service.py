@@ -1,4 +1,4 @@
-"""Tracks as one thing: what is recorded, and what is flown."""
+"""The recording of a track, and the track flights."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ class Tracking:
     def __init__(self, host: Host) -> None:
         self._host = host
         self._recorder: Recorder | None = None
-        self._flights: list[TrackFlight] = []  # those under way, and each vehicle's newest
+        self._flights: list[TrackFlight] = []  # the running ones, and each vehicle's newest
 
     async def record(
         self, file: Path, *, style: str, period: float, latest: Path | None, system: int = 0
     ) -> Recorder:
-        """Record the track of a vehicle; 0 is MAVProxy's current one.
+        """Record the track of a vehicle; system id 0 is MAVProxy's current vehicle.
 
         Raises:
-            Busy: another one is being recorded.
+            Busy: a recording is running.
             NoVehicle: there is no such vehicle yet.
             NotStored: the file cannot be written.
         """
         if self._recorder is not None:
-            raise Busy(f"{self._recorder.file} is being recorded; `gradys track stop` ends that")
+            raise Busy(f"{self._recorder.file} is being recorded; `gradys track stop` ends the recording")
         number = self._host.registry.find(system).state.system
         recorder = Recorder(self._host, number, file, style=style, period=period, latest=latest)
-        self._recorder = recorder  # before the disk answers: another one is refused from now on
+        self._recorder = recorder  # at once, so that a second recording is refused while the file is opened
         try:
             await recorder.start()
         except BaseException:
@@ -43,31 +43,31 @@ class Tracking:
         return recorder
 
     async def stop_recording(self) -> Recorder | None:
-        """End the recording; what was recorded, None when nothing was."""
+        """End the recording and return it; None without a recording."""
         recorder, self._recorder = self._recorder, None
         if recorder is not None:
             await recorder.stop()
         return recorder
 
     async def fly(self, flight: TrackFlight, job: Job) -> str:
-        """Fly a track, by `Flight.fly`."""
-        self._flights = [*self._told(), flight]
+        """Fly a track; see `TrackFlight.fly`."""
+        self._flights = [*self._reported_flights(), flight]
         return await flight.fly(job)
 
-    def _told(self) -> list[TrackFlight]:
+    def _reported_flights(self) -> list[TrackFlight]:
         newest = {flight.copter: flight for flight in self._flights}
         return [flight for flight in self._flights if flight.running or newest[flight.copter] is flight]
 
     async def close(self) -> None:
-        """End the recording and the flights: the vehicles hold."""
+        """End the recording and the flights; the vehicles hold."""
         for flight in self._flights:
             if flight.job is not None and flight.job.running:
                 flight.job.abort(Aborted(f"{VERB}: gradys is unloaded"), Ending.UNLOADED)
         await self.stop_recording()
 
     def report(self) -> dict[str, Any]:
-        """What the status says."""
+        """The report for the status."""
         return {
             "recording": None if self._recorder is None else self._recorder.report(),
-            "flights": [flight.report() for flight in self._told()],
+            "flights": [flight.report() for flight in self._reported_flights()],
         }

@@ -1,4 +1,4 @@
-"""A host for aerpawlib's scripts, which fly by the HTTP API: `python -m mavproxy_uavapi.aerpaw --script FILE …`.
+"""Runs aerpawlib's scripts through the HTTP API: `python -m mavproxy_uavapi.aerpaw --script FILE …`.
 
-aerpawlib is AERPAW's experiment API. Its names are served here, in a process that asked for it (`names.serve`).
+aerpawlib is AERPAW's experiment API. This package provides its module names, in a process that calls `names.serve`.
 """

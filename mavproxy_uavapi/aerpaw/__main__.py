@@ -8,7 +8,7 @@ from mavproxy_uavapi.aerpaw import host, names, options, script
 
 
 def main() -> int:
-    """Run a script; the exit status."""
+    """Run a script; returns the exit status."""
     chosen, rest = options.parse(sys.argv[1:])
     try:
         names.serve(real=chosen.real)

@@ -1,4 +1,4 @@
-"""`aerpawlib.v1.constants`: those that scripts look at, with the values that they have there. Times in s."""
+"""`aerpawlib.v1.constants`: the constants that scripts use, with aerpawlib's values. Times in s."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What scripts write above the methods of their runners. A mark is an attribute of the function."""
+"""The decorators for the methods of a script's runner. A mark is an attribute of the function."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ class StateMark:
     """One state of a StateMachine.
 
     Attributes:
-        name: what other states return to come to it.
+        name: its name; other states return it to make it the next state.
         first: whether the machine begins with it.
-        duration: s that it lasts at least; None for as long as it takes.
-        loop: whether its method is called over and over for so long.
+        duration: the least time (s) that it lasts; None for no least time.
+        loop: whether its method is called repeatedly during that time.
     """
 
     name: str
@@ -43,7 +43,7 @@ def entrypoint(func: F) -> F:
 
 
 def background(func: F) -> F:
-    """A method that runs over and over beside the states."""
+    """A method that is called repeatedly while the states run."""
     return _marked(func, BACKGROUND)
 
 
@@ -53,12 +53,12 @@ def at_init(func: F) -> F:
 
 
 def state(name: str, first: bool = False) -> Callable[[F], F]:
-    """A state, which returns the name of the next one, or None at the end."""
+    """A state; its method returns the name of the next one, or None at the end."""
     return _state(StateMark(name, first))
 
 
 def timed_state(name: str, duration: float, loop: bool = False, first: bool = False) -> Callable[[F], F]:
-    """A state that lasts `duration` s at least; with `loop` its method is called over and over for so long."""
+    """A state that lasts at least `duration` s; with `loop` its method is called repeatedly during that time."""
     return _state(StateMark(name, first, duration, loop))
 
 
@@ -68,19 +68,19 @@ def _state(mark: StateMark) -> Callable[[F], F]:
 
     def decorate(func: F) -> F:
         if hasattr(func, STATE):
-            raise StateMachineError("A method is one state only")
+            raise StateMachineError("A method can be one state only")
         return _marked(func, STATE, mark)
 
     return decorate
 
 
 def expose_zmq(name: str) -> Callable[[F], F]:
-    """A state that other runners may bring about by that name."""
+    """A state that other runners may request by that name."""
     return _exposed(EXPOSED_STATE, name)
 
 
 def expose_field_zmq(name: str) -> Callable[[F], F]:
-    """A method whose value other runners may ask for by that name."""
+    """A method whose result other runners may query by that name."""
     return _exposed(EXPOSED_FIELD, name)
 
 

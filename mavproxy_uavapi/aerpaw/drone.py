@@ -1,4 +1,4 @@
-"""A copter, as aerpawlib's scripts fly it."""
+"""The `Drone` of aerpawlib's scripts: a copter."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from mavproxy_uavapi.aerpaw.moving import MovingVehicle
 from mavproxy_uavapi.client.drone import Drone as Client
 from mavproxy_uavapi.client.places import Position
 
-CLIMBED_WITHIN = 30.0  # s after a take-off to the share of the altitude that the script wants
+CLIMB_TIMEOUT = 30.0  # s after the takeoff's answer for the rest of the climb
 
 
 class Drone(MovingVehicle):
@@ -32,12 +32,12 @@ class Drone(MovingVehicle):
     hovers = True
 
     async def takeoff(self, target_alt: float, min_alt_tolerance: float = DEFAULT_TAKEOFF_ALTITUDE_TOLERANCE) -> None:
-        """Arm it where it is not armed, and climb to `target_alt` m above home.
+        """Arm it if necessary, and climb to `target_alt` m above home.
 
-        The script goes on from `min_alt_tolerance` of it on; the next movement waits for the end of the climb.
+        Returns at the share `min_alt_tolerance` of that altitude; the next movement waits for the end of the climb.
 
         Raises:
-            TakeoffError.
+            TakeoffError: it did not reach that altitude.
         """
         self._log_event("command", type="takeoff", altitude_m=target_alt)
 
@@ -51,27 +51,27 @@ class Drone(MovingVehicle):
         early = min_alt_tolerance < DEFAULT_TAKEOFF_ALTITUDE_TOLERANCE
         await self._until(climb(), high_enough if early else lambda: False)
         loop = asyncio.get_running_loop()
-        deadline = loop.time() + CLIMBED_WITHIN
+        deadline = loop.time() + CLIMB_TIMEOUT
         while not high_enough():
             if loop.time() > deadline:
-                raise TakeoffError(f"it hovers at {self.position.alt:.1f} m, and {target_alt} m were wanted")
+                raise TakeoffError(f"it hovers at {self.position.alt:.1f} m instead of {target_alt} m")
             await asyncio.sleep(0.05)
 
     async def land(self) -> None:
-        """Land where it is; done when it has disarmed.
+        """Land where it is; returns when it has disarmed.
 
         Raises:
-            LandingError.
+            LandingError: the landing failed.
         """
         self._log_event("command", type="land")
         async with self._turn():
             await self._command(LandingError, lambda drone: drone.land())
 
     async def return_to_launch(self) -> None:
-        """Return to where it was armed and land there, by the autopilot's RTL; done when it has disarmed.
+        """Return to launch and land there, in the autopilot's RTL; returns when it has disarmed.
 
         Raises:
-            RTLError.
+            RTLError: the return failed.
         """
         self._log_event("command", type="return_to_launch")
         async with self._turn():
@@ -84,11 +84,13 @@ class Drone(MovingVehicle):
         target_heading: float | None = None,
         timeout: float = DEFAULT_GOTO_TIMEOUT_S,
     ) -> None:
-        """Fly to a place; done within `tolerance` m of it. It points to `target_heading`, or to where it goes.
+        """Fly to a position; returns within `tolerance` m of it.
+
+        It points to `target_heading`, or in the direction of travel.
 
         Raises:
-            ValueError: the tolerance is none.
-            NavigationError: it did not arrive, within `timeout` s.
+            ValueError: the tolerance is invalid.
+            NavigationError: it did not arrive within `timeout` s.
         """
         validate_tolerance(tolerance, "tolerance")
         if target_heading is not None:
@@ -112,22 +114,22 @@ class Drone(MovingVehicle):
         """Turn to `heading` degrees, the shorter way round.
 
         Args:
-            heading: clockwise from north, any number; None forgets the one that is locked in.
-            blocking: turn, and wait for it; else it only turns with the next movement.
-            lock_in: have the next movement keep it.
+            heading: clockwise from north, any number; None clears the heading for the next movement.
+            blocking: whether to turn now and wait for it; otherwise it turns with the next movement.
+            lock_in: whether the next movement keeps this heading.
 
         Raises:
-            HeadingError.
+            HeadingError: it did not turn.
         """
         if heading is None:
             self._current_heading = None
             return
-        wanted = normalize_heading(heading)
+        degrees = normalize_heading(heading)
         if not blocking:
             if lock_in:
-                self._current_heading = wanted
+                self._current_heading = degrees
             return
         async with self._turn():
             if lock_in:
-                self._current_heading = wanted
-            await self._command(HeadingError, lambda drone: drone.turn_to(wanted))
+                self._current_heading = degrees
+            await self._command(HeadingError, lambda drone: drone.turn_to(degrees))

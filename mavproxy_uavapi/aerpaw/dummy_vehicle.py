@@ -1,4 +1,4 @@
-"""No vehicle, for scripts that need none (`--vehicle none`)."""
+"""The stand-in for a vehicle, for scripts that need none (`--vehicle none`)."""
 
 from __future__ import annotations
 
@@ -6,22 +6,22 @@ from typing import Any
 
 
 class DummyVehicle:
-    """It is closed, and nothing else."""
+    """A vehicle that does nothing; it can only be closed."""
 
     def __init__(self, connection_string: str = "", mavsdk_server_port: int = 50051, *_: Any, **__: Any) -> None:
         self.closed = False
 
     def initialize(self, should_arm: bool = True) -> None:
-        """There is nothing to wait for."""
+        """Do nothing."""
 
     _preflight_wait = initialize
 
     async def _arm_vehicle(self) -> None:
-        """There is nothing to arm."""
+        """Do nothing."""
 
     def set_event_log(self, event_log: object) -> None:
-        """There is nothing to tell."""
+        """Do nothing: it has no events."""
 
     def close(self) -> None:
-        """Be closed."""
+        """Mark it as closed."""
         self.closed = True

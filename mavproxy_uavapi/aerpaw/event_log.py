@@ -1,4 +1,4 @@
-"""`--structured-log`: what happens, a line of JSON each."""
+"""The log of `--structured-log`: one line of JSON per event."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from typing import Any
 
 
 class EventLog:
-    """Events in a file, which is begun anew, with the time (s since 1970); written as they come."""
+    """Writes events with their time (s since 1970) to a file at once; an existing file is overwritten."""
 
     def __init__(self, path: Path) -> None:
         self._file = path.open("w", encoding="utf-8")
 
     def log_event(self, event: str, **members: Any) -> None:
-        """Write one."""
+        """Write an event."""
         self._file.write(json.dumps({"timestamp": time.time(), "event": event, **members}) + "\n")
         self._file.flush()
 

@@ -1,4 +1,4 @@
-"""`aerpawlib.v1.exceptions`: what scripts catch. `original_error` is the API's own, where there was one."""
+"""`aerpawlib.v1.exceptions`: the errors that scripts catch. `original_error` is the API's error, if there was one."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from collections.abc import Iterable
 
 
 class AerpawlibError(Exception):
-    """Base of them all.
+    """The base of all errors.
 
     Attributes:
-        message: a sentence.
-        original_error: what it came from.
+        message: the text.
+        original_error: its cause; None without one.
     """
 
     def __init__(self, message: str, original_error: Exception | None = None) -> None:
@@ -23,7 +23,7 @@ class AerpawConnectionError(AerpawlibError):
 
 
 class ConnectionTimeoutError(AerpawConnectionError):
-    """Not connected within so many s."""
+    """No connection within the timeout."""
 
     def __init__(self, timeout_seconds: float, message: str | None = None) -> None:
         self.timeout_seconds = timeout_seconds
@@ -31,7 +31,7 @@ class ConnectionTimeoutError(AerpawConnectionError):
 
 
 class HeartbeatLostError(AerpawConnectionError):
-    """The vehicle is not heard any more."""
+    """The vehicle's heartbeats have stopped."""
 
     def __init__(self, last_heartbeat_age: float = 0.0, message: str | None = None) -> None:
         self.last_heartbeat_age = last_heartbeat_age
@@ -39,7 +39,7 @@ class HeartbeatLostError(AerpawConnectionError):
 
 
 class PortInUseError(AerpawConnectionError):
-    """A port is taken."""
+    """A port is in use."""
 
     def __init__(self, port: int, message: str | None = None) -> None:
         self.port = port
@@ -47,11 +47,11 @@ class PortInUseError(AerpawConnectionError):
 
 
 class AERPAWPlatformError(AerpawlibError):
-    """The AERPAW platform does not do what was asked."""
+    """A request to the AERPAW platform failed."""
 
 
 class NotInAERPAWEnvironmentError(AERPAWPlatformError):
-    """There is no platform."""
+    """There is no AERPAW platform."""
 
     def __init__(self, feature: str) -> None:
         super().__init__(f"{feature} is only available in the AERPAW environment")
@@ -67,84 +67,84 @@ class CommandError(AerpawlibError):
 
 
 class ArmError(CommandError):
-    """It was not armed."""
+    """Arming failed."""
 
     what = "Failed to arm vehicle"
 
 
 class DisarmError(CommandError):
-    """It was not disarmed."""
+    """Disarming failed."""
 
     what = "Failed to disarm vehicle"
 
 
 class TakeoffError(CommandError):
-    """It did not take off."""
+    """The takeoff failed."""
 
     what = "Takeoff failed"
 
 
 class LandingError(CommandError):
-    """It did not land."""
+    """The landing failed."""
 
     what = "Landing failed"
 
 
 class NavigationError(CommandError):
-    """It did not arrive."""
+    """The vehicle did not arrive."""
 
     what = "Navigation failed"
 
 
 class VelocityError(CommandError):
-    """It does not fly at a velocity."""
+    """A velocity was refused."""
 
     what = "Set velocity failed"
 
 
 class HeadingError(CommandError):
-    """It did not turn."""
+    """The vehicle did not turn."""
 
     what = "Set heading failed"
 
 
 class RTLError(CommandError):
-    """It did not return."""
+    """The return to launch failed."""
 
     what = "Return to launch failed"
 
 
 class StateError(AerpawlibError):
-    """The vehicle's state stands against it."""
+    """The vehicle's state does not allow the command."""
 
 
 class NotArmableError(StateError):
-    """It cannot be armed just now."""
+    """The vehicle cannot be armed now."""
 
     def __init__(self, reason: str = "Vehicle not in armable state") -> None:
         super().__init__(f"Cannot arm: {reason}")
 
 
 class NotConnectedError(StateError):
-    """The vehicle does not tell, or has not told of late."""
+    """The vehicle's telemetry is missing or too old."""
 
     def __init__(self, message: str = "Vehicle is not connected") -> None:
         super().__init__(message)
 
 
 class AbortedError(StateError):
-    """It was ended."""
+    """The operation was aborted."""
 
     def __init__(self, message: str = "Operation was aborted") -> None:
         super().__init__(message)
 
 
 class ValidationError(AerpawlibError):
-    """A value makes no sense."""
+    """A value is invalid."""
 
 
 class InvalidToleranceError(ValidationError, ValueError):
-    """A tolerance (m) that no flight can keep, or that is none."""
+    """A tolerance (m) is out of range."""
 
     def __init__(self, value: float, min_val: float, max_val: float, param_name: str = "tolerance") -> None:
         self.value, self.min_val, self.max_val = value, min_val, max_val
@@ -153,39 +153,39 @@ class InvalidToleranceError(ValidationError, ValueError):
 
 
 class InvalidAltitudeError(ValidationError):
-    """An altitude (m) out of bounds."""
+    """An altitude (m) is out of range."""
 
     def __init__(self, value: float, min_val: float, max_val: float) -> None:
         super().__init__(f"Altitude must be between {min_val} m and {max_val} m, got {value}")
 
 
 class InvalidSpeedError(ValidationError):
-    """A speed (m/s) out of bounds."""
+    """A speed (m/s) is out of range."""
 
     def __init__(self, value: float, min_val: float, max_val: float) -> None:
         super().__init__(f"Speed must be between {min_val} m/s and {max_val} m/s, got {value}")
 
 
 class NotImplementedForVehicleError(AerpawlibError):
-    """This type of vehicle does not do that."""
+    """This type of vehicle does not have the feature."""
 
     def __init__(self, feature: str, vehicle_type: str) -> None:
         super().__init__(f"'{feature}' is not implemented for {vehicle_type} vehicles")
 
 
 class StateMachineError(AerpawlibError):
-    """A runner that makes no sense."""
+    """A runner is invalid."""
 
 
 class NoEntrypointError(StateMachineError):
-    """A BasicRunner without a beginning."""
+    """A BasicRunner has no entrypoint."""
 
     def __init__(self) -> None:
         super().__init__("No @entrypoint declared")
 
 
 class InvalidStateError(StateMachineError):
-    """A state that there is not."""
+    """There is no such state."""
 
     def __init__(self, state_name: str, available_states: Iterable[str]) -> None:
         self.state_name = state_name
@@ -193,21 +193,21 @@ class InvalidStateError(StateMachineError):
 
 
 class NoInitialStateError(StateMachineError):
-    """No state is the first."""
+    """No state is marked as the first."""
 
     def __init__(self) -> None:
         super().__init__("There is no initial state")
 
 
 class MultipleInitialStatesError(StateMachineError):
-    """Two states are the first."""
+    """Several states are marked as the first."""
 
     def __init__(self) -> None:
         super().__init__("There may only be one initial state")
 
 
 class InvalidStateNameError(StateMachineError):
-    """A state without a name."""
+    """A state has no name."""
 
     def __init__(self) -> None:
         super().__init__("State name cannot be empty string")

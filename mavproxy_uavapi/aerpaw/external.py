@@ -1,4 +1,4 @@
-"""`aerpawlib.v1.external`: programs beside a script."""
+"""`aerpawlib.v1.external`: programs that a script starts."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ import shlex
 from collections.abc import Sequence
 from re import Pattern
 
-TERMINATED_WITHIN = 5.0  # s from SIGTERM to SIGKILL
+TERMINATE_TIMEOUT = 5.0  # s from SIGTERM to SIGKILL
 
 
 class ExternalProcess:
-    """A program, run by the shell as the script spells it.
+    """A program that the shell runs.
 
     Args:
         executable: the command.
-        params: what follows it, with blanks between; the shell reads them too.
+        params: its arguments; the shell interprets them, too.
         stdin, stdout: files instead of pipes.
 
     Attributes:
-        process: the shell, once it was started.
+        process: the shell; None before `start`.
     """
 
     def __init__(
@@ -37,7 +37,7 @@ class ExternalProcess:
         self.process: asyncio.subprocess.Process | None = None
 
     async def start(self) -> None:
-        """Run it."""
+        """Start it."""
         line = " ".join([self._executable, *self._params])
         line += f" < {shlex.quote(self._stdin)}" if self._stdin else ""
         line += f" > {shlex.quote(self._stdout)}" if self._stdout else ""
@@ -53,14 +53,14 @@ class ExternalProcess:
         return self.process
 
     async def read_line(self) -> str | None:
-        """The next line that it writes; None at its end, or when a file gets them."""
+        """The next line of its output; None at the end, or if a file gets the output."""
         if self._running.stdout is None:
             return None
         line = await self._running.stdout.readline()
         return line.decode("utf-8", "replace").rstrip() if line else None
 
     async def send_input(self, data: str) -> None:
-        """Write to it.
+        """Write to its input.
 
         Raises:
             RuntimeError: it reads from a file.
@@ -76,7 +76,7 @@ class ExternalProcess:
         await self._running.wait()
 
     async def wait_until_output(self, output_regex: str | Pattern[str]) -> list[str]:
-        """Its lines up to the first that the expression is found in; all that came when it ends before."""
+        """Its lines up to the first one that matches the expression; all lines if it ends before."""
         lines: list[str] = []
         while (line := await self.read_line()) is not None:
             lines.append(line)
@@ -85,12 +85,12 @@ class ExternalProcess:
         return lines
 
     async def aclose(self) -> None:
-        """End it, if it has not ended."""
+        """End it, if it still runs."""
         if self.process is None or self.process.returncode is not None:
             return
         with contextlib.suppress(ProcessLookupError):  # it has just ended
             self.process.terminate()
         waiting = asyncio.ensure_future(self.process.wait())
-        if not (await asyncio.wait({waiting}, timeout=TERMINATED_WITHIN))[0]:
+        if not (await asyncio.wait({waiting}, timeout=TERMINATE_TIMEOUT))[0]:
             self.process.kill()
             await waiting

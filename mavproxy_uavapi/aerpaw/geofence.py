@@ -1,4 +1,4 @@
-"""Geofences: polygons of KML files, and what lies in them. Points are `{"lat": degrees, "lon": degrees}`."""
+"""Geofences: polygons from KML files, and geometry for them. Points are `{"lat": degrees, "lon": degrees}`."""
 
 # ruff: noqa: PLR0917 - the signatures are aerpawlib's
 
@@ -6,7 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from xml.etree import ElementTree
+
+from mavproxy_uavapi.core.envelope import kml
 
 Point = dict[str, float]
 
@@ -18,18 +19,16 @@ def read_geofence(file_path: str) -> list[Point]:
         ValueError: the file has none.
     """
     try:
-        root = ElementTree.parse(Path(file_path)).getroot()
-    except ElementTree.ParseError as error:
-        raise ValueError(f"{file_path} is no KML: {error}") from error
-    text = root.findtext(".//{*}Polygon/{*}outerBoundaryIs/{*}LinearRing/{*}coordinates")
-    if not text:
+        polygons = kml.polygons(Path(file_path).read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise ValueError(f"{file_path}: {error}") from error
+    if not polygons:
         raise ValueError(f"{file_path} has no polygon")
-    corners = [corner.split(",") for corner in text.split()]
-    return [{"lon": float(lon), "lat": float(lat)} for lon, lat, *_ in corners]
+    return [{"lon": lon, "lat": lat} for lat, lon in polygons[0].rings[0]]
 
 
 def inside(lon: float, lat: float, geofence: Sequence[Point]) -> bool:
-    """Whether a point lies in a polygon: a ray from it to the east crosses an odd number of its sides."""
+    """Whether a point is in a polygon: a ray from it to the east crosses an odd number of its sides."""
     is_inside = False
     for a, b in zip(geofence, [*geofence[1:], *geofence[:1]], strict=True):
         if (a["lat"] > lat) != (b["lat"] > lat):
@@ -39,12 +38,12 @@ def inside(lon: float, lat: float, geofence: Sequence[Point]) -> bool:
 
 
 def lies_on_segment(px: float, py: float, qx: float, qy: float, rx: float, ry: float) -> bool:
-    """Whether q, which is in line with p and r, lies between them."""
+    """Whether q is between p and r; q must be on the line through them."""
     return min(px, rx) <= qx <= max(px, rx) and min(py, ry) <= qy <= max(py, ry)
 
 
 def orientation(px: float, py: float, qx: float, qy: float, rx: float, ry: float) -> int:
-    """How one turns at q on the way from p to r: 0 not at all, 1 clockwise, 2 counterclockwise."""
+    """The turn at q on the way from p to r: 0 none, 1 clockwise, 2 counterclockwise."""
     turn = (qy - py) * (rx - qx) - (qx - px) * (ry - qy)
     return 0 if turn == 0 else 1 if turn > 0 else 2
 

@@ -1,4 +1,4 @@
-"""aerpawlib's places and vectors. Unlike there, all of them agree with each other and with the autopilot's metres."""
+"""aerpawlib's coordinates and vectors. Unlike aerpawlib's, they are consistent with the autopilot's metres."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ import math
 
 from mavproxy_uavapi.client.places import Ned, Position
 
-# Peers that run aerpawlib itself send and get these by ZMQ, pickled by the name that they have there.
+# Peers with the real aerpawlib exchange these by ZMQ, pickled under the name of this module.
 MODULE = "aerpawlib.v1.util.geometry"
-EARTH_RADIUS = 6378100.0  # m; of the sphere on which ArduPilot reckons distances
+EARTH_RADIUS = 6378100.0  # m; the sphere that ArduPilot uses for distances
 
 Waypoint = tuple[int, float, float, float, int, float]  # command, latitude, longitude, altitude, id, speed
 
 
 class VectorNED:
-    """North, east, down: m of a displacement, m/s of a velocity."""
+    """North, east, down: m for a displacement, m/s for a velocity."""
 
     def __init__(self, north: float, east: float, down: float = 0) -> None:
         self.north, self.east, self.down = north, east, down
@@ -26,7 +26,7 @@ class VectorNED:
         return VectorNED(self.north * cos + self.east * sin, self.east * cos - self.north * sin, self.down)
 
     def cross_product(self, o: VectorNED) -> VectorNED:
-        """The vector that stands on both."""
+        """The cross product."""
         o = _vector(o)
         return VectorNED(
             self.east * o.down - self.down * o.east,
@@ -35,15 +35,15 @@ class VectorNED:
         )
 
     def hypot(self, ignore_down: bool = False) -> float:
-        """Its length, in space or on the ground."""
+        """Its length, in three dimensions or horizontally."""
         return math.hypot(self.north, self.east, 0 if ignore_down else self.down)
 
     def magnitude(self) -> float:
-        """Its length in space."""
+        """Its length in three dimensions."""
         return self.hypot()
 
     def norm(self) -> VectorNED:
-        """Its direction, of length 1; nothing stays nothing."""
+        """Its direction as a vector of length 1; the zero vector stays zero."""
         length = self.hypot()
         return self * (1 / length) if length else VectorNED(0, 0, 0)
 
@@ -76,18 +76,18 @@ class Coordinate:
         self.lat, self.lon, self.alt = lat, lon, alt
 
     def ground_distance(self, other: Coordinate) -> float:
-        """Metres on the ground."""
+        """Horizontal metres."""
         lat, other_lat = math.radians(self.lat), math.radians(_coordinate(other).lat)
         half_lat, half_lon = (other_lat - lat) / 2, math.radians(other.lon - self.lon) / 2
         haversine = math.sin(half_lat) ** 2 + math.cos(lat) * math.cos(other_lat) * math.sin(half_lon) ** 2
         return 2 * EARTH_RADIUS * math.asin(min(math.sqrt(haversine), 1.0))
 
     def distance(self, other: Coordinate) -> float:
-        """Metres in space."""
+        """Metres in three dimensions."""
         return math.hypot(self.ground_distance(other), other.alt - self.alt)
 
     def bearing(self, other: Coordinate, wrap_360: bool = True) -> float:
-        """The direction to `other`, degrees clockwise from north: 0 to 360, or else -90 to 270."""
+        """The direction to `other`, degrees clockwise from north: 0 to 360; without `wrap_360` -90 to 270."""
         way = _position(_coordinate(other)) - _position(self)
         if not wrap_360 and way.bearing > 270:
             return way.bearing - 360
@@ -111,7 +111,7 @@ class Coordinate:
         return f"Coordinate{self}"
 
     def to_json(self) -> str:
-        """Its three numbers by name."""
+        """A JSON object with lat, lon and alt."""
         return json.dumps({"lat": self.lat, "lon": self.lon, "alt": self.alt})
 
     toJson = to_json
@@ -123,13 +123,13 @@ def _position(of: Coordinate) -> Position:
 
 def _vector(value: VectorNED) -> VectorNED:
     if not isinstance(value, VectorNED):
-        raise TypeError(f"{value!r} is no VectorNED")
+        raise TypeError(f"{value!r} is not a VectorNED")
     return value
 
 
 def _coordinate(value: Coordinate) -> Coordinate:
     if not isinstance(value, Coordinate):
-        raise TypeError(f"{value!r} is no Coordinate")
+        raise TypeError(f"{value!r} is not a Coordinate")
     return value
 
 

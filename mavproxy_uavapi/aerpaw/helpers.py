@@ -1,4 +1,4 @@
-"""`aerpawlib.v1.helpers`."""
+"""`aerpawlib.v1.helpers`: waits and checks."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ async def wait_for_condition(
     poll_interval: float = POLLING_DELAY_S,
     timeout_message: str = "Operation timed out",
 ) -> bool:
-    """Wait until it holds.
+    """Wait until `condition` holds.
 
     Raises:
-        TimeoutError: not within `timeout` s.
+        TimeoutError: it did not hold within `timeout` s.
     """
     began = time.monotonic()
     while not condition():
@@ -35,7 +35,7 @@ async def wait_for_condition(
 
 
 def validate_tolerance(tolerance: float, param_name: str = "tolerance") -> float:
-    """The tolerance (m) itself.
+    """Check a tolerance (m) and return it.
 
     Raises:
         ValueError: it is not finite, too small, or too large.
@@ -48,7 +48,7 @@ def validate_tolerance(tolerance: float, param_name: str = "tolerance") -> float
 
 
 def normalize_heading(heading: float) -> float:
-    """Degrees from 0 to less than 360."""
+    """The heading from 0 to less than 360 degrees."""
     return heading % 360
 
 

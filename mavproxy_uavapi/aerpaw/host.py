@@ -1,4 +1,4 @@
-"""Runs one script: connects its vehicle, waits for it, ends it, and sees to the vehicle afterwards."""
+"""Runs one script: connects its vehicle, waits for the script's end, and applies `--on-exit` to the vehicle."""
 
 from __future__ import annotations
 
@@ -28,37 +28,37 @@ log = logging.getLogger("aerpawlib")
 
 CLASSES: dict[str, type[Vehicle]] = {"drone": Drone, "rover": Rover, "generic": Vehicle}
 BY_TYPE = {"copter": "drone", "rover": "rover"}
-LOOK_EVERY = 0.2  # s
-TELEMETRY_EVERY = 5.0  # s, in the structured log
+CHECK_PERIOD = 0.2  # s between checks of the heartbeat
+TELEMETRY_PERIOD = 5.0  # s between telemetry events in the structured log
 STOPPED = 130  # exit status after Ctrl-C
 
 
 class Stopped(Exception):
-    """Somebody has ended the script by a signal."""
+    """A signal has ended the script."""
 
 
 class Host:
     """One script's run.
 
     Args:
-        options: of the command line.
-        runner: the script's.
+        options: the options of the command line.
+        runner: the script's runner.
     """
 
     def __init__(self, options: argparse.Namespace, runner: Runner) -> None:
         self._options, self._runner = options, runner
         self._policy = "nothing" if options.skip_rtl else options.on_exit
-        self._seen_to = True  # whether nothing is left to be done for the vehicle
+        self._policy_applied = True  # whether `--on-exit` succeeded
 
     def run(self) -> int:
-        """Run it; the exit status."""
+        """Run it; returns the exit status."""
         try:
             vehicle = self._connect()
         except (AerpawlibError, UavApiError) as error:
             log.error("could not connect: %s", error)
             return 1
         try:
-            return self._fly(vehicle) or int(not self._seen_to)
+            return self._fly(vehicle) or int(not self._policy_applied)
         finally:
             vehicle.close()
 
@@ -95,12 +95,12 @@ class Host:
         return 0
 
     async def _run(self, vehicle: Vehicle | DummyVehicle) -> None:
-        """Run the script, and see to the vehicle: before what the script has left behind ends with this loop."""
+        """Run the script and apply `--on-exit`, before tasks that the script left behind end with this loop."""
         try:
             await self._script(vehicle)
         finally:
             if isinstance(vehicle, Vehicle):
-                self._seen_to = await on_exit.see_to(vehicle, self._policy)
+                self._policy_applied = await on_exit.apply_policy(vehicle, self._policy)
 
     async def _script(self, vehicle: Vehicle | DummyVehicle) -> None:
         if not self._options.skip_init:
@@ -132,26 +132,26 @@ class Host:
                     one.result()
 
     async def _watch(self, vehicle: Vehicle | DummyVehicle) -> None:
-        """Look after the vehicle while the script runs.
+        """Watch the heartbeat while the script runs, and log telemetry.
 
         Raises:
-            HeartbeatLostError: it is not heard any more.
+            HeartbeatLostError: no heartbeat arrives any more.
         """
-        told_at = 0.0
+        logged_at = 0.0
         while True:
-            await asyncio.sleep(LOOK_EVERY)
+            await asyncio.sleep(CHECK_PERIOD)
             if not isinstance(vehicle, Vehicle):
                 continue
             if vehicle.heartbeat_age > self._options.heartbeat_timeout:
                 raise HeartbeatLostError(vehicle.heartbeat_age)
-            if time.monotonic() - told_at > TELEMETRY_EVERY:
-                told_at = time.monotonic()
+            if time.monotonic() - logged_at > TELEMETRY_PERIOD:
+                logged_at = time.monotonic()
                 vehicle.log_telemetry()
 
 
 @contextlib.contextmanager
 def _stopping(stopped: asyncio.Future[None]) -> Iterator[None]:
-    """Have SIGINT and SIGTERM end the script between two of its steps; a second one, wherever it is."""
+    """Within the context SIGINT or SIGTERM ends the script at its next await; a second signal ends it at once."""
     loop = asyncio.get_running_loop()
 
     def stop(*_: Any) -> None:
@@ -169,7 +169,7 @@ def _stopping(stopped: asyncio.Future[None]) -> Iterator[None]:
 
 
 def set_up_logging(options: argparse.Namespace) -> None:
-    """Have what is said go to stderr, and to a file where one is wanted."""
+    """Log to stderr, and to a file if the options name one."""
     level = logging.DEBUG if options.verbose else logging.WARNING if options.quiet else logging.INFO
     handlers: list[logging.Handler] = []
     if not options.no_aerpawlib_stdout:
@@ -186,7 +186,7 @@ def set_up_logging(options: argparse.Namespace) -> None:
 
 
 def run(options: argparse.Namespace, rest: Sequence[str], load: Callable[[str], type[Runner]]) -> int:
-    """Load the script, give it its arguments, and run it; the exit status."""
+    """Load the script, pass its arguments, and run it; returns the exit status."""
     set_up_logging(options)
     if options.no_aerpaw_environment:
         AERPAW_Platform._connected = False

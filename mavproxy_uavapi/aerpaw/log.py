@@ -54,7 +54,7 @@ def configure_logging(
     log_file: str | None = None,
     root_name: str = "aerpawlib.v1",
 ) -> None:
-    """Have the loggers below `root_name` write to stderr, and to a file too. There are no colours."""
+    """Make the loggers below `root_name` write to stderr, and to `log_file` if there is one. There are no colours."""
     root = logging.getLogger(root_name)
     handlers: list[logging.Handler] = [logging.StreamHandler(sys.stderr)]
     if log_file:
@@ -67,6 +67,6 @@ def configure_logging(
 
 
 def set_level(level: LogLevel | str | int, component: LogComponent | str | None = None) -> None:
-    """Set the level of a component, or of them all."""
+    """Set the level of a component; None means all."""
     number = level.value if isinstance(level, LogLevel) else level.upper() if isinstance(level, str) else level
     get_logger(component or LogComponent.ROOT).setLevel(number)

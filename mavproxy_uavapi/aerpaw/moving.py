@@ -11,31 +11,31 @@ from mavproxy_uavapi.aerpaw.vehicle import Vehicle
 from mavproxy_uavapi.client.drone import Drone as Client
 from mavproxy_uavapi.client.places import Ned
 
-REFUSED_WITHIN = 0.1  # s; a velocity that is not refused by then is flown
-SLIGHTLY = 1e-6  # s; the API takes equal velocities for one
+REFUSAL_TIMEOUT = 0.1  # s; a velocity that is not refused within this time is flown
+SLIGHTLY = 1e-6  # s; makes durations differ, because the API joins equal requests to one job
 
 
 class MovingVehicle(Vehicle):
-    """A vehicle that moves at a velocity for as long as its script lives, or until its next movement."""
+    """A vehicle that moves at a velocity until its next movement or the end of its script."""
 
     def __init__(self, connection_string: str, mavsdk_server_port: int = 50051) -> None:
         super().__init__(connection_string, mavsdk_server_port)
-        self._velocity: tuple[object, ...] | None = None  # what `_travelling` flies at until it is superseded
+        self._velocity: tuple[object, ...] | None = None  # the velocity of `_travelling`, if it has no duration
         self._travelling: asyncio.Task[None] | None = None
         self._numbers = itertools.count(1)
 
     async def set_velocity(
         self, velocity_vector: VectorNED, global_relative: bool = True, duration: float | None = None
     ) -> None:
-        """Move at a velocity (m/s) from now on: for `duration` s, or until the next movement, or the script's end.
+        """Move at a velocity (m/s) for `duration` s, or until the next movement or the script's end.
 
         Args:
             velocity_vector: north, east, down; or front, right, down.
-            global_relative: whether it is the former; the latter is by the heading that it has now.
-            duration: s of the vehicle's clock; it stops then.
+            global_relative: True for north, east, down; False for front, right, down by the present heading.
+            duration: s on the vehicle's clock; then it stops.
 
         Raises:
-            VelocityError: it does not.
+            VelocityError: the velocity was refused.
         """
         v, heading = self._velocity_of(velocity_vector), self._current_heading
         kept = (v.north, v.east, v.down, heading) if global_relative and duration is None else None
@@ -55,17 +55,17 @@ class MovingVehicle(Vehicle):
             await self._unless_refused(self._travelling)
 
     def _velocity_of(self, vector: VectorNED) -> VectorNED:
-        """What of a velocity this type of vehicle can do."""
+        """The part of a velocity that this type of vehicle can fly."""
         return vector
 
     async def _unless_refused(self, task: asyncio.Task[None]) -> None:
-        """Leave the verb to itself, unless it fails at once."""
+        """Let the verb go on in the background, unless it fails at once."""
         try:
-            done, _ = await asyncio.wait({task}, timeout=REFUSED_WITHIN)
+            done, _ = await asyncio.wait({task}, timeout=REFUSAL_TIMEOUT)
         except asyncio.CancelledError:
             task.cancel()
             raise
         if done:
             task.result()
         else:
-            self._leave(task)
+            self._continue_in_background(task)

@@ -1,6 +1,6 @@
-"""The names of aerpawlib, served by an import hook: only in a process that asks for it (`serve`).
+"""Provides aerpawlib's module names by an import hook, only in a process that calls `serve`.
 
-Where the real package is installed nothing is served, unless it is wanted so; then its `util` may be the real one.
+If the real package is installed, nothing is served, unless `real` is set; then `util` is the real one.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from types import ModuleType
 
 PACKAGE = "aerpawlib"
 OURS = "mavproxy_uavapi.aerpaw"
-# By aerpawlib's module, ours that have its names.
+# Our modules that provide the names of each of aerpawlib's modules.
 V1: Mapping[str, Sequence[str]] = {
     "aerpaw": ("platform",),
     "constants": ("constants",),
@@ -41,7 +41,7 @@ V1: Mapping[str, Sequence[str]] = {
     "vehicle.rover": ("vehicles",),
     "zmqutil": ("zmq_proxy",),
 }
-LEGACY = ("aerpaw", "external", "log", "runner", "safetyChecker", "util", "vehicle", "zmqutil")  # without v1, too
+LEGACY = ("aerpaw", "external", "log", "runner", "safetyChecker", "util", "vehicle", "zmqutil")  # also without `v1.`
 ALL = tuple(dict.fromkeys(name for names in V1.values() for name in names))
 
 
@@ -56,10 +56,10 @@ def _served() -> dict[str, Sequence[str]]:
 
 
 class Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
-    """Finds aerpawlib's modules among ours; what it does not serve is not there.
+    """Maps aerpawlib's modules to ours; modules that it does not serve cannot be imported.
 
     Args:
-        real_util: whether the real package's `util` is served instead of ours.
+        real_util: whether to serve the real package's `util` instead of ours.
     """
 
     def __init__(self, real_util: bool = False) -> None:
@@ -79,11 +79,11 @@ class Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
         return spec
 
     def create_module(self, spec: importlib.machinery.ModuleSpec) -> ModuleType | None:
-        """The usual one."""
+        """Use the default module."""
         return None
 
     def exec_module(self, module: ModuleType) -> None:
-        """Fill it with the public names of ours."""
+        """Copy the public names of our modules into it."""
         for ours in self._served[module.__name__]:
             source = self._real.get(ours) or importlib.import_module(f"{OURS}.{ours}")
             vars(module).update(_public(source))
@@ -100,7 +100,7 @@ def _public(module: ModuleType) -> Iterator[tuple[str, object]]:
 
 
 def _real_util() -> dict[str, ModuleType]:
-    """The real `util`, by our module's name; the real package is forgotten otherwise."""
+    """The real `util`, by our module's name; all other modules of the real package are unloaded."""
     real = importlib.import_module(f"{PACKAGE}.v1.util")
     for name in [name for name in sys.modules if name == PACKAGE or name.startswith(f"{PACKAGE}.")]:
         del sys.modules[name]
@@ -108,7 +108,7 @@ def _real_util() -> dict[str, ModuleType]:
 
 
 def is_installed() -> bool:
-    """Whether the real package is installed; a copy in the current folder is not."""
+    """Whether the real package is installed; a copy in the current folder does not count."""
     try:
         importlib.metadata.distribution(PACKAGE)
     except importlib.metadata.PackageNotFoundError:
@@ -120,15 +120,15 @@ def serve(*, real: bool = False) -> None:
     """Serve aerpawlib's names from now on.
 
     Args:
-        real: serve them though the real package is installed, with its `util`.
+        real: serve them even if the real package is installed, with its `util`.
 
     Raises:
-        AlreadyInstalled: it is, and that was not wanted.
+        AlreadyInstalled: it is installed and `real` is not set.
     """
     if any(isinstance(finder, Finder) for finder in sys.meta_path):
         return
     if is_installed() and not real:
         raise AlreadyInstalled(
-            "aerpawlib itself is installed here, and is left alone; --real flies its scripts here, with its own util"
+            "aerpawlib itself is installed here and is not replaced; --real runs its scripts here, with its own util"
         )
     sys.meta_path.insert(0, Finder(real_util=real and is_installed()))

@@ -1,4 +1,4 @@
-"""What a vehicle does when its script has ended, or died."""
+"""Applies `--on-exit`: what a vehicle does when its script has ended or failed."""
 
 from __future__ import annotations
 
@@ -12,38 +12,39 @@ from mavproxy_uavapi.core.errors import UavApiError
 log = logging.getLogger("aerpawlib")
 
 GUIDED = "GUIDED"
-HELD_FOR = 1.0  # s of zero velocities; in GUIDED it stays where they end
+HOLD_DURATION = 1.0  # s of zero velocities; afterwards it stays there in GUIDED
 
 
-async def see_to(vehicle: Vehicle, policy: str) -> bool:
-    """Do as `policy` says (rtl, land, hold, nothing) with an armed vehicle that the script has commanded.
+async def apply_policy(vehicle: Vehicle, policy: str) -> bool:
+    """Apply `policy` (rtl, land, hold, nothing) to an armed vehicle that the script has commanded.
 
-    In another mode than GUIDED it is its pilot's, or on its way down, and left alone; on the ground it is disarmed.
+    In another mode than GUIDED the pilot has the vehicle, or it is landing, so nothing is done. A vehicle on the
+    ground is disarmed.
 
     Returns:
-        Whether nothing is left to be done.
+        Whether it succeeded.
     """
     if policy == "nothing" or not vehicle.has_commanded:
         return True
     try:
-        return await vehicle.run_last(lambda drone: _see_to(vehicle, drone, policy))
+        return await vehicle.run_last(lambda drone: _apply(vehicle, drone, policy))
     except (UavApiError, OSError) as error:
         log.error("the script has ended, and %s failed: %s", policy, error)
         return False
 
 
-async def _see_to(vehicle: Vehicle, drone: Drone, policy: str) -> bool:
+async def _apply(vehicle: Vehicle, drone: Drone, policy: str) -> bool:
     status = await drone.status()
     if not status.armed:
         return True
     if status.mode != GUIDED:
-        log.warning("the script has ended; the vehicle is in %s, and is left alone", status.mode)
+        log.warning("the script has ended; the vehicle is in %s, so nothing is done", status.mode)
         return True
     if vehicle.hovers and status.landed_state == "on_ground":
         log.warning("the script has ended; the vehicle is disarmed")
         await drone.disarm()
         return True
-    log.warning("the script has ended with the vehicle under way: %s", policy)
+    log.warning("the script has ended while the vehicle moves: %s", policy)
     if policy == "rtl":
         await drone.rtl(outlive=True)
     elif not vehicle.hovers:
@@ -51,5 +52,5 @@ async def _see_to(vehicle: Vehicle, drone: Drone, policy: str) -> bool:
     elif policy == "land":
         await drone.land(outlive=True)
     else:
-        await drone.travel(Ned(), HELD_FOR)
+        await drone.travel(Ned(), HOLD_DURATION)
     return True

@@ -1,4 +1,4 @@
-"""QGroundControl's .plan files: their take-offs, waypoints and returns, each with the speed in force there."""
+"""QGroundControl's .plan files: their takeoffs, waypoints and returns, each with the speed in force there."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ PARAMETERS = 7
 
 
 def read_from_plan_complete(path: str, default_speed: float = DEFAULT_WAYPOINT_SPEED) -> list[dict[str, Any]]:
-    """Each place as `id`, `command`, `pos` [degrees, degrees, m above home], `wait_for` s and `speed` m/s.
+    """Each waypoint as `id`, `command`, `pos` [degrees, degrees, m above home], `wait_for` s and `speed` m/s.
 
     Raises:
-        ValueError: it is no .plan file, or an item has too few parameters.
+        ValueError: it is not a .plan file, or an item has too few parameters.
     """
     with Path(path).open(encoding="utf-8") as file:
         plan = json.load(file)
@@ -45,7 +45,7 @@ def read_from_plan_complete(path: str, default_speed: float = DEFAULT_WAYPOINT_S
 
 
 def _simple(items: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
-    """The items; those of a survey or a corridor as QGroundControl made them."""
+    """The simple items; a survey or a corridor gives the items that QGroundControl generated."""
     for item in items:
         if "command" in item:
             yield item
@@ -54,11 +54,11 @@ def _simple(items: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
 
 
 def read_from_plan(path: str, default_speed: float = DEFAULT_WAYPOINT_SPEED) -> list[Waypoint]:
-    """Each place as command, latitude, longitude, altitude, id and speed; errors as `read_from_plan_complete`."""
+    """Each waypoint as command, latitude, longitude, altitude, id and speed; errors as `read_from_plan_complete`."""
     places = read_from_plan_complete(path, default_speed)
     return [(place["command"], *place["pos"], place["id"], place["speed"]) for place in places]
 
 
 def get_location_from_waypoint(waypoint: Waypoint) -> Coordinate:
-    """Where a waypoint of `read_from_plan` is."""
+    """The coordinate of a waypoint of `read_from_plan`."""
     return Coordinate(*waypoint[1:4])

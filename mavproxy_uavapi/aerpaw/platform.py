@@ -1,4 +1,4 @@
-"""`aerpawlib.v1.aerpaw`: AERPAW's own console and checkpoints, where AP_EXPENV_OEOCVM_XM says that there are any."""
+"""`aerpawlib.v1.aerpaw`: AERPAW's console and checkpoints, if the variable AP_EXPENV_OEOCVM_XM names a platform."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ LEVELS = {
 
 
 class AERPAW:
-    """The platform at an address; without one nothing is ever sent.
+    """The platform at an address; without an address nothing is sent.
 
     Raises, in all methods of checkpoints:
         NotInAERPAWEnvironmentError: there is no platform.
-        AERPAWPlatformError: it does not answer as it should.
+        AERPAWPlatformError: the platform does not answer, or its answer is invalid.
     """
 
     def __init__(
@@ -48,7 +48,7 @@ class AERPAW:
         self._connected = bool(forw_addr) and self.attach_to_aerpaw_platform()
 
     def attach_to_aerpaw_platform(self) -> bool:
-        """Whether it answers."""
+        """Whether the platform answers."""
         try:
             self._ask("POST", "/ping", timeout=PING_TIMEOUT)
         except AERPAWPlatformError:
@@ -68,13 +68,13 @@ class AERPAW:
     def log_to_oeo(
         self, msg: str, severity: str = OEO_MSG_SEV_INFO, agent_id: str | None = DEFAULT_HUMAN_READABLE_AGENT_ID
     ) -> None:
-        """Say something to the experiment's operators, and to the log.
+        """Send a message to the experiment's operators and to the log.
 
         Raises:
             ValueError: no such severity.
         """
         if severity not in OEO_MSG_SEVS:
-            raise ValueError(f"severity {severity!r} is none of {', '.join(OEO_MSG_SEVS)}")
+            raise ValueError(f"severity {severity!r} is not one of {', '.join(OEO_MSG_SEVS)}")
         text = msg if msg.startswith(("[aerpawlib]", "[experiment]")) else f"[experiment] {msg}"
         if not self._no_stdout:
             log.log(LEVELS[severity], text)
@@ -83,12 +83,12 @@ class AERPAW:
             try:
                 self._ask("POST", f"/oeo_msg/{severity}/{_base64(text)}{agent}")
             except AERPAWPlatformError as error:
-                log.error("that was not told: %s", error)
+                log.error("the message was not sent: %s", error)
 
     def publish_user_oeo_topic(
         self, value: object, topic: str, agent_id: str | None = DEFAULT_HUMAN_READABLE_AGENT_ID
     ) -> bool:
-        """Publish a value; whether it was."""
+        """Publish a value; returns whether it succeeded."""
         if not self._connected:
             return False
         agent = f"/{_base64(agent_id)}" if agent_id else ""
@@ -107,38 +107,38 @@ class AERPAW:
         return self._ask(method, f"/checkpoint/{path}")
 
     def checkpoint_reset_server(self) -> None:
-        """Forget all of them."""
+        """Clear all checkpoints."""
         self._checkpoint("POST", "reset")
 
     def checkpoint_set(self, checkpoint_name: str) -> None:
-        """Set one."""
+        """Set a checkpoint."""
         self._checkpoint("POST", f"bool/{_quoted(checkpoint_name)}")
 
     def checkpoint_check(self, checkpoint_name: str) -> bool:
-        """Whether it is set."""
-        told = self._checkpoint("GET", f"bool/{_quoted(checkpoint_name)}")
-        if told not in ("True", "False"):
-            raise AERPAWPlatformError(f"checkpoint {checkpoint_name} is {told!r}")
-        return told == "True"
+        """Whether a checkpoint is set."""
+        answer = self._checkpoint("GET", f"bool/{_quoted(checkpoint_name)}")
+        if answer not in ("True", "False"):
+            raise AERPAWPlatformError(f"checkpoint {checkpoint_name} is {answer!r}")
+        return answer == "True"
 
     def checkpoint_increment_counter(self, counter_name: str) -> None:
-        """Count one more."""
+        """Increment a counter."""
         self._checkpoint("POST", f"int/{_quoted(counter_name)}")
 
     def checkpoint_check_counter(self, counter_name: str) -> int:
-        """How many there are."""
-        told = self._checkpoint("GET", f"int/{_quoted(counter_name)}")
+        """The value of a counter."""
+        answer = self._checkpoint("GET", f"int/{_quoted(counter_name)}")
         try:
-            return int(told)
+            return int(answer)
         except ValueError as error:
-            raise AERPAWPlatformError(f"counter {counter_name} is {told!r}") from error
+            raise AERPAWPlatformError(f"counter {counter_name} is {answer!r}") from error
 
     def checkpoint_set_string(self, string_name: str, value: str) -> None:
         """Set a text."""
         self._checkpoint("POST", f"string/{_quoted(string_name)}?val={_quoted(value)}")
 
     def checkpoint_check_string(self, string_name: str) -> str:
-        """The text."""
+        """The value of a text."""
         return self._checkpoint("GET", f"string/{_quoted(string_name)}")
 
 

@@ -1,4 +1,4 @@
-"""What a vehicle tells, as aerpawlib's scripts read it: attributes, and texts that loggers take apart."""
+"""The telemetry types of aerpawlib's scripts: attributes, and texts that loggers parse."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Battery:
-    """V, A, %."""
+    """Voltage in V, current in A, level in %."""
 
     voltage: float = 0.0
     current: float = 0.0
@@ -19,7 +19,7 @@ class Battery:
 
 @dataclass(frozen=True)
 class GPSInfo:
-    """The fix (0, 1: none; 2: 2-D; 3: 3-D and better) and how many satellites are seen."""
+    """The fix (0, 1: none; 2: 2-D; 3: 3-D and better) and the number of satellites."""
 
     fix_type: int = 0
     satellites_visible: int = 0
@@ -30,7 +30,7 @@ class GPSInfo:
 
 @dataclass(frozen=True)
 class Attitude:
-    """rad; yaw clockwise from north."""
+    """Pitch, yaw and roll in rad; yaw clockwise from north."""
 
     pitch: float = 0.0
     yaw: float = 0.0
@@ -42,7 +42,7 @@ class Attitude:
 
 @dataclass(frozen=True)
 class Version:
-    """The autopilot's version, which the API does not tell."""
+    """The autopilot's version; always empty, because the API does not report it."""
 
     major: int | None = None
     minor: int | None = None

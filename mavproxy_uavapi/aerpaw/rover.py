@@ -1,4 +1,4 @@
-"""A ground vehicle, as aerpawlib's scripts drive it."""
+"""The `Rover` of aerpawlib's scripts: a ground vehicle."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mavproxy_uavapi.client.places import Position
 
 
 class Rover(MovingVehicle):
-    """A rover or boat: it moves on the ground, and altitudes do not count."""
+    """A rover or boat; altitudes are ignored."""
 
     kind = "Rover"
 
@@ -22,11 +22,11 @@ class Rover(MovingVehicle):
         target_heading: float | None = None,
         timeout: float = DEFAULT_GOTO_TIMEOUT_S,
     ) -> None:
-        """Drive to a place; done within `tolerance` m of it on the ground. `target_heading` counts for nothing.
+        """Drive to a position; returns within `tolerance` m of it. `target_heading` is ignored.
 
         Raises:
-            ValueError: the tolerance is none.
-            NavigationError: it did not arrive, within `timeout` s.
+            ValueError: the tolerance is invalid.
+            NavigationError: it did not arrive within `timeout` s.
         """
         validate_tolerance(tolerance, "tolerance")
         self._log_event("command", type="goto_coordinates", lat=coordinates.lat, lon=coordinates.lon)

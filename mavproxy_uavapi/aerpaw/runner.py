@@ -1,4 +1,4 @@
-"""`aerpawlib.v1.runner` but for ZMQ: what scripts derive their experiments from."""
+"""`aerpawlib.v1.runner` without ZMQ: the base classes of scripts' experiments."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from mavproxy_uavapi.aerpaw.exceptions import (
 log = logging.getLogger("aerpawlib.v1.runner")
 
 Method = Callable[..., Awaitable[Any]]
-AGAIN_AFTER = 0.5  # s from a background method's failure to its next call
-BREATH = 0.001  # s between two of its calls
-ASIDE = "_script_s_run"  # where a script's own method `run` goes: the runner has one
+RETRY_AFTER = 0.5  # s from a background method's failure to its next call
+CALL_PAUSE = 0.001  # s between two of its calls
+MOVED_RUN = "_script_run"  # new name of a script's own method `run`, because the runner has a method `run`
 
 
 async def call(method: Method, vehicle: Any) -> Any:
-    """Call a script's method with the vehicle, or without, as it wants."""
+    """Call a script's method; the vehicle is passed if the method has a parameter."""
     return await (method(vehicle) if inspect.signature(method).parameters else method())
 
 
@@ -39,19 +39,19 @@ class Runner:
         super().__init_subclass__(**kwargs)
         own = cls.__dict__.get("run")
         if any(hasattr(own, mark) for mark in MARKS):
-            setattr(cls, ASIDE, own)
+            setattr(cls, MOVED_RUN, own)
             del cls.run
 
     def marked(self, mark: str) -> list[tuple[Any, Method]]:
-        """The methods with that mark, and its values, in the order of their names."""
+        """The mark's value and the method, for each method with that mark, by name."""
         methods = [(name, getattr(type(self), name)) for name in dir(type(self)) if not name.startswith("__")]
         return [(getattr(func, mark), getattr(self, name)) for name, func in methods if hasattr(func, mark)]
 
     def initialize_args(self, extra_args: Sequence[str]) -> None:
-        """Take the script's own arguments; before anything else."""
+        """Receive the script's own arguments; called first."""
 
     def cleanup(self) -> None:
-        """Close what is open; at the end, however that comes."""
+        """Release resources; called at the end, after a failure, too."""
 
     async def run(self, vehicle: Any) -> None:
         """Run the experiment."""
@@ -78,18 +78,18 @@ class BasicRunner(Runner):
 
 
 class StateMachine(Runner):
-    """Goes from state to state; each returns the name of the next one, or None at the end."""
+    """Runs states; each returns the name of the next one, or None at the end."""
 
     _running = False
 
     def _build(self) -> None:
-        """Find its states.
+        """Collect its states.
 
         Raises:
-            NoInitialStateError, MultipleInitialStatesError, StateMachineError: it makes no sense.
+            NoInitialStateError, MultipleInitialStatesError, StateMachineError: the states are inconsistent.
         """
         self._states: dict[str, tuple[StateMark, Method]] = {}
-        self._overrides: deque[str] = deque()  # states that came from elsewhere, and go before what a state returns
+        self._overrides: deque[str] = deque()  # states that others requested; they override a state's return value
         for mark, method in self.marked(STATE):
             if mark.name in self._states:
                 raise StateMachineError(f"There are two states '{mark.name}'")
@@ -105,62 +105,63 @@ class StateMachine(Runner):
         """Run from the first state to the last.
 
         Raises:
-            InvalidStateError: a state returned what is none.
+            InvalidStateError: a state returned the name of no state.
             StateMachineError: see `_build`.
         """
         self._build()
         self._running = True
-        beside: list[asyncio.Task[None]] = []
+        background: list[asyncio.Task[None]] = []
         try:
             await asyncio.gather(*(call(method, vehicle) for _, method in self.marked(AT_INIT)))
-            beside = [asyncio.create_task(self._beside(method, vehicle)) for _, method in self.marked(BACKGROUND)]
-            await self._go(vehicle)
+            methods = [method for _, method in self.marked(BACKGROUND)]
+            background = [asyncio.create_task(self._call_repeatedly(method, vehicle)) for method in methods]
+            await self._run_states(vehicle)
         finally:
             self._running = False
-            for task in beside:
+            for task in background:
                 task.cancel()
-            await asyncio.gather(*beside, return_exceptions=True)
+            await asyncio.gather(*background, return_exceptions=True)
             self.cleanup()
 
-    async def _go(self, vehicle: Any) -> None:
+    async def _run_states(self, vehicle: Any) -> None:
         current: str | None = self._entrypoint
         while self._running and current is not None:
             if current not in self._states:
                 raise InvalidStateError(current, self._states)
             log.debug("state %s", current)
-            following = await self._last(*self._states[current], vehicle)
+            following = await self._run_state(*self._states[current], vehicle)
             await asyncio.sleep(STATE_MACHINE_DELAY_S)
             current = self._overrides.popleft() if self._overrides else following
 
-    async def _last(self, mark: StateMark, method: Method, vehicle: Any) -> str | None:
-        """Be in a state until it is over; the name of the next one."""
+    async def _run_state(self, mark: StateMark, method: Method, vehicle: Any) -> str | None:
+        """Run a state to its end; returns the name of the next one."""
         if mark.duration is None:
             return _name(await call(method, vehicle))
         loop = asyncio.get_running_loop()
-        over = loop.time() + mark.duration
+        ends_at = loop.time() + mark.duration
         following = _name(await call(method, vehicle))
-        while mark.loop and loop.time() < over:
+        while mark.loop and loop.time() < ends_at:
             await asyncio.sleep(STATE_MACHINE_DELAY_S)
             following = _name(await call(method, vehicle))
-        await asyncio.sleep(max(over - loop.time(), 0))
+        await asyncio.sleep(max(ends_at - loop.time(), 0))
         return following
 
-    async def _beside(self, method: Method, vehicle: Any) -> None:
-        """Call a background method over and over; one that fails does not end the flight."""
+    async def _call_repeatedly(self, method: Method, vehicle: Any) -> None:
+        """Call a background method repeatedly; a failure of it does not end the flight."""
         while self._running:
             try:
                 await call(method, vehicle)
             except Exception:
-                log.exception("%s failed, and is called again", getattr(method, "__name__", method))
-                await asyncio.sleep(AGAIN_AFTER)
-            await asyncio.sleep(BREATH)  # it may never wait itself
+                log.exception("%s failed; it is called again", getattr(method, "__name__", method))
+                await asyncio.sleep(RETRY_AFTER)
+            await asyncio.sleep(CALL_PAUSE)  # the method itself may never wait
 
     def stop(self) -> None:
-        """End after the state that it is in."""
+        """End after the present state."""
         self._running = False
 
 
 def _name(returned: Any) -> str | None:
     if returned is None or isinstance(returned, str):
         return returned
-    raise StateMachineError(f"A state returned {returned!r}, which is no name of a state")
+    raise StateMachineError(f"A state returned {returned!r}, which is not the name of a state")

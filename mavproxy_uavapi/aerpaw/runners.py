@@ -1,4 +1,4 @@
-"""`aerpawlib.v1.runner`."""
+"""`aerpawlib.v1.runner`: the runners, their decorators, and helpers."""
 
 import asyncio
 

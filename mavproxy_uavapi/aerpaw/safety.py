@@ -1,4 +1,4 @@
-"""`aerpawlib.v1.safety`: the client of AERPAW's safety checker, which says whether a command is allowed."""
+"""`aerpawlib.v1.safety`: the client of AERPAW's safety checker, which decides whether a command is allowed."""
 
 from __future__ import annotations
 
@@ -21,37 +21,37 @@ Verdict = tuple[bool, str]
 
 
 def serialize_msg(raw_json: str) -> bytes:
-    """A text for the wire."""
+    """Encode a text."""
     return zlib.compress(raw_json.encode())
 
 
 def serialize_request(request_function: str, params: list[Any]) -> bytes:
-    """A question for the wire."""
+    """Encode a request."""
     return serialize_msg(json.dumps({"request_function": request_function, "params": params}))
 
 
 def serialize_response(request_function: str, *, result: bool, message: str = "") -> bytes:
-    """An answer for the wire."""
+    """Encode a response."""
     return serialize_msg(json.dumps({"request_function": request_function, "result": result, "message": message}))
 
 
 def deserialize_msg(compressed_msg: bytes) -> dict[str, Any]:
-    """What came by the wire.
+    """Decode a message.
 
     Raises:
-        ValueError: it makes no sense.
+        ValueError: it is malformed.
     """
     try:
         message = json.loads(zlib.decompress(compressed_msg))
     except zlib.error as error:
         raise ValueError(f"Failed to decompress message: {error}") from error
     if not isinstance(message, dict):
-        raise ValueError(f"{message!r} is no message")
+        raise ValueError(f"{message!r} is not a message")
     return message
 
 
 class SafetyCheckerClient:
-    """A safety checker at an address. Each question blocks, for `timeout_s` at most."""
+    """A safety checker at an address. Each request blocks, at most for `timeout_s`."""
 
     def __init__(self, addr: str, port: int, timeout_s: float = SAFETY_CHECKER_REQUEST_TIMEOUT_S) -> None:
         import zmq  # noqa: PLC0415 - an extra
@@ -82,48 +82,48 @@ class SafetyCheckerClient:
         self.close()
 
     def send_request(self, msg: bytes) -> dict[str, Any]:
-        """The answer to a question.
+        """Send a request and return the response.
 
         Raises:
-            TimeoutError: there is none.
-            ValueError: it makes no sense.
+            TimeoutError: there is no response.
+            ValueError: it is malformed.
         """
         try:
             self.socket.send(msg)
             answer = self.socket.recv()
         except self._zmq.Again as error:
             self.socket.close()
-            self._connect()  # the old socket waits for that answer for ever
+            self._connect()  # the old socket would wait for the missing answer
             raise TimeoutError(
                 f"the safety checker at {self._url} did not answer within {self._timeout:g} s"
             ) from error
         return deserialize_msg(answer)
 
     def parse_response(self, response: dict[str, Any]) -> Verdict:
-        """Whether it is allowed, and else why not."""
+        """Whether it is allowed, and if not, the reason."""
         return response["result"], response["message"]
 
     def _ask(self, function: str, *params: Any) -> Verdict:
         return self.parse_response(self.send_request(serialize_request(function, list(params))))
 
     def check_server_status(self) -> Verdict:
-        """Whether it works."""
+        """Whether the server works."""
         return self._ask(SERVER_STATUS_REQ)
 
     def validate_waypoint_command(self, current_location: Coordinate, next_location: Coordinate) -> Verdict:
-        """Whether the way between two places is allowed."""
+        """Whether the flight between two positions is allowed."""
         return self._ask(VALIDATE_WAYPOINT_REQ, current_location.to_json(), next_location.to_json())
 
     def validate_change_speed_command(self, new_speed: float) -> Verdict:
-        """Whether a speed (m/s) is."""
+        """Whether a speed (m/s) is allowed."""
         return self._ask(VALIDATE_CHANGE_SPEED_REQ, new_speed)
 
     def validate_takeoff_command(self, takeoff_alt: float, current_lat: float, current_lon: float) -> Verdict:
-        """Whether a take-off to that altitude (m) is."""
+        """Whether a takeoff to that altitude (m) is allowed."""
         return self._ask(VALIDATE_TAKEOFF_REQ, takeoff_alt, current_lat, current_lon)
 
     def validate_landing_command(self, current_lat: float, current_lon: float) -> Verdict:
-        """Whether a landing there is."""
+        """Whether a landing there is allowed."""
         return self._ask(VALIDATE_LANDING_REQ, current_lat, current_lon)
 
     sendRequest, parseResponse, checkServerStatus = send_request, parse_response, check_server_status

@@ -1,4 +1,4 @@
-"""A script's file -> its runner."""
+"""Loads a script and finds its runner."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ BASES = (Runner, BasicRunner, StateMachine, ZmqStateMachine)
 
 
 def load(script: str) -> ModuleType:
-    """The module of a script: a file, with or without `.py`, or a dotted name.
+    """Import a script: a file, with or without `.py`, or a dotted name.
 
     Raises:
-        FileNotFoundError: there is none.
-        Exception: what the script itself raises.
+        FileNotFoundError: there is no such file.
+        Exception: an error of the script itself.
     """
     path = Path(script)
     if path.suffix != ".py":
@@ -31,7 +31,7 @@ def load(script: str) -> ModuleType:
             raise FileNotFoundError(f"there is no script {script}")
         return importlib.import_module(script)
     path = path.resolve()
-    sys.path.insert(0, str(path.parent))  # what lies beside it can be imported
+    sys.path.insert(0, str(path.parent))  # so that it can import modules beside it
     spec = importlib.util.spec_from_file_location(path.stem, path)
     assert spec is not None and spec.loader is not None
     module = sys.modules[path.stem] = importlib.util.module_from_spec(spec)
@@ -40,15 +40,15 @@ def load(script: str) -> ModuleType:
 
 
 def runner_of(module: ModuleType) -> type[Runner]:
-    """The one runner of a script: what others of it derive from does not count.
+    """The only runner class of a script; base classes of other runners do not count.
 
     Raises:
         StateMachineError: it has none, or more than one.
     """
     classes = dict.fromkeys(value for value in vars(module).values() if isinstance(value, type))
-    there = [one for one in classes if issubclass(one, Runner) and one not in BASES]
-    last = [one for one in there if not any(one in other.__mro__[1:] for other in there)]
-    if len(last) != 1:
-        names = ", ".join(one.__name__ for one in last) or "none"
+    runners = [one for one in classes if issubclass(one, Runner) and one not in BASES]
+    leaves = [one for one in runners if not any(one in other.__mro__[1:] for other in runners)]
+    if len(leaves) != 1:
+        names = ", ".join(one.__name__ for one in leaves) or "none"
         raise StateMachineError(f"{module.__name__} must define one runner; it has {names}")
-    return last[0]
+    return leaves[0]

@@ -1,4 +1,4 @@
-"""`aerpawlib.v1.util`."""
+"""`aerpawlib.v1.util`: coordinates, geofences, .plan files and ports."""
 
 from __future__ import annotations
 

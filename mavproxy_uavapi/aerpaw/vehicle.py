@@ -1,4 +1,4 @@
-"""`aerpawlib.v1.vehicle`: what every vehicle tells, waits for and does."""
+"""`aerpawlib.v1.vehicle`: telemetry, waits and verbs of all types of vehicles."""
 
 from __future__ import annotations
 
@@ -38,23 +38,23 @@ from mavproxy_uavapi.core.errors import Rejected, Stale, Superseded, UavApiError
 log = logging.getLogger("aerpawlib.v1.vehicle")
 T = TypeVar("T")
 
-HEARTBEAT_AGE = 3.0  # s; a vehicle that is silent for longer is not connected
-LOOK_EVERY = 0.05  # s between looks at whether the script may go on
-MOST_SPEED = 50.0  # m/s that the API takes
+HEARTBEAT_AGE = 3.0  # s; without a heartbeat for longer the vehicle is not connected
+CHECK_PERIOD = 0.05  # s between checks whether the script may go on
+MOST_SPEED = 50.0  # m/s, the API's limit
 SCHEMES = ("http://", "https://")
 
 
 class Vehicle:
-    """A vehicle of any type: it tells, and is armed. Its subclasses move.
+    """A vehicle of any type: telemetry and arming. Its subclasses move.
 
-    Movements wait for those before them; each ends, at the latest after its timeout.
+    Movements wait for earlier ones; each ends after its timeout at the latest.
 
     Args:
         connection_string: the address of the vehicle's API, `http://127.0.0.1:8000`.
-        mavsdk_server_port: nothing; there is no MAVSDK here.
+        mavsdk_server_port: ignored; MAVSDK is not used.
 
     Raises:
-        AerpawConnectionError: nothing answers there, or it is no such address.
+        AerpawConnectionError: nothing answers there, or it is not such an address.
     """
 
     kind = "generic Vehicle"
@@ -63,25 +63,26 @@ class Vehicle:
     def __init__(self, connection_string: str, mavsdk_server_port: int = 50051) -> None:
         if not connection_string.startswith(SCHEMES):
             raise AerpawConnectionError(
-                f"{connection_string!r} is no address of an HTTP API; scripts fly by http://127.0.0.1:8000 here, "
-                "and MAVProxy has the MAVLink connection"
+                f"{connection_string!r} is not the address of an HTTP API; use http://127.0.0.1:8000, because "
+                "MAVProxy has the MAVLink connection"
             )
         self._closed = False
         self._will_arm = True
-        self._is_ours = False  # it was in GUIDED for us; from then on another mode is its pilot's
+        self._is_ours = False  # it was in GUIDED for us; in another mode it belongs to its pilot from then on
         self._has_commanded = False
-        self._current_heading: float | None = None  # degrees, locked in for the next movement
-        self._moves: list[asyncio.Future[None]] = []  # movements under way or waiting, oldest first
-        self._left: set[asyncio.Task[None]] = set()  # verbs that the script has left behind; a newer one ends them
+        self._current_heading: float | None = None  # degrees, for the next movement
+        self._moves: list[asyncio.Future[None]] = []  # running and waiting movements, oldest first
+        self._background: set[asyncio.Task[None]] = set()  # verbs that still run; a newer one ends them
         self._readying: asyncio.Task[None] | None = None
         self._mission_start_time: float | None = None
         self._events: EventLog | None = None
         self._thread = VehicleThread(connection_string, CONNECTION_TIMEOUT_S)
 
-    # -- what it tells ------------------------------------------------------------------------------------
+    # -- telemetry ----------------------------------------------------------------------------------------
 
     @contextlib.contextmanager
-    def _telling(self) -> Iterator[Client]:
+    def _telemetry(self) -> Iterator[Client]:
+        """The client, for its properties; within the context Stale becomes NotConnectedError."""
         try:
             yield self._thread.drone
         except Stale as error:
@@ -89,13 +90,13 @@ class Vehicle:
 
     @property
     def connected(self) -> bool:
-        """Whether its heartbeats come."""
+        """Whether its heartbeats arrive."""
         age = self._thread.drone.telemetry.age("HEARTBEAT")
         return not self._closed and age is not None and age <= HEARTBEAT_AGE
 
     @property
     def heartbeat_age(self) -> float:
-        """Seconds since it was last heard."""
+        """Seconds since its last heartbeat."""
         age = self._thread.drone.telemetry.age("HEARTBEAT")
         return math.inf if age is None else age
 
@@ -106,75 +107,75 @@ class Vehicle:
 
     @property
     def armable(self) -> bool:
-        """Whether it could be armed now."""
+        """Whether it is ready to arm."""
         status = self._thread.status
         return status is not None and status.ready_to_arm
 
     @property
     def ekf_ready(self) -> bool:
-        """Whether its estimator knows where it is."""
+        """Whether its estimator has a position."""
         status = self._thread.status
         return status is not None and status.ekf_ok
 
     @property
     def position(self) -> Coordinate:
-        """Where it is.
+        """Its position.
 
         Raises:
-            NotConnectedError: it has not told of late, as of all that follows.
+            NotConnectedError: its telemetry is too old; so for all properties that follow.
         """
-        with self._telling() as told:
-            return Coordinate(told.position.lat, told.position.lon, told.position.alt)
+        with self._telemetry() as drone:
+            return Coordinate(drone.position.lat, drone.position.lon, drone.position.alt)
 
     @property
     def velocity(self) -> VectorNED:
-        """m/s."""
-        with self._telling() as told:
-            return VectorNED(told.velocity.north, told.velocity.east, told.velocity.down)
+        """Its velocity, m/s."""
+        with self._telemetry() as drone:
+            return VectorNED(drone.velocity.north, drone.velocity.east, drone.velocity.down)
 
     @property
     def heading(self) -> float:
-        """Degrees clockwise from north, from 0 to less than 360."""
-        with self._telling() as told:
-            return told.heading
+        """Its heading, degrees clockwise from north, from 0 to less than 360."""
+        with self._telemetry() as drone:
+            return drone.heading
 
     @property
     def attitude(self) -> Attitude:
-        """rad."""
-        with self._telling() as told:
-            lies = told.attitude
-            return Attitude(lies.pitch, lies.yaw, lies.roll)
+        """Its attitude, rad."""
+        with self._telemetry() as drone:
+            attitude = drone.attitude
+            return Attitude(attitude.pitch, attitude.yaw, attitude.roll)
 
     @property
     def battery(self) -> Battery:
-        """V, A, %; 0 for what it does not know."""
-        with self._telling() as told:
-            battery = told.battery
+        """Its battery: V, A, %; unknown values are 0."""
+        with self._telemetry() as drone:
+            battery = drone.battery
             return Battery(battery.voltage or 0.0, battery.current or 0.0, battery.level or 0)
 
     @property
     def gps(self) -> GPSInfo:
-        """Its receiver; without a fix before it tells of any."""
+        """Its GPS receiver; no fix before the first report."""
         if self._thread.drone.telemetry.age("GPS_RAW_INT") is None:
             return GPSInfo()
-        with self._telling() as told:
-            return GPSInfo(told.gps.fix_type, told.gps.satellites or 0)
+        with self._telemetry() as drone:
+            return GPSInfo(drone.gps.fix_type, drone.gps.satellites or 0)
 
     @property
     def armed(self) -> bool:
-        """Whether its motors may turn."""
-        with self._telling() as told:
-            return told.armed
+        """Whether it is armed."""
+        with self._telemetry() as drone:
+            return drone.armed
 
     @property
     def mode(self) -> str:
-        """The name of its flight mode, ArduPilot's."""
-        with self._telling() as told:
-            return told.mode
+        """The name of its flight mode in ArduPilot."""
+        with self._telemetry() as drone:
+            return drone.mode
 
     @property
     def home_coords(self) -> Coordinate | None:
-        """Home; None before it has one."""
+        """The home position; None before it has one."""
         home = self._thread.home
         return None if home is None else Coordinate(home[0].lat, home[0].lon, 0)
 
@@ -185,43 +186,44 @@ class Vehicle:
 
     @property
     def autopilot_info(self) -> Version:
-        """Nothing: the API does not tell it."""
+        """An empty version: the API does not report it."""
         return Version()
 
     def debug_dump(self) -> str:
-        """All of it in a line, with the time in ns first."""
-        told = [self.armed, self.attitude, self.autopilot_info, self.battery, self.gps, self.heading]
-        return ",".join(map(str, [time.time_ns(), *told, self.home_coords, self.position, self.velocity, self.mode]))
+        """All telemetry in a line, with the time in ns first."""
+        values = [self.armed, self.attitude, self.autopilot_info, self.battery, self.gps, self.heading]
+        values += [self.home_coords, self.position, self.velocity, self.mode]
+        return ",".join(map(str, [time.time_ns(), *values]))
 
-    # -- whose turn it is ---------------------------------------------------------------------------------
+    # -- the order of movements ---------------------------------------------------------------------------
 
     def done_moving(self) -> bool:
-        """Whether it is heard, and no movement is under way."""
+        """Whether it is connected, and no movement runs or waits."""
         return self.connected and not self._moves
 
     async def await_ready_to_move(self) -> None:
-        """Wait until it is armed, and the movements so far are over.
+        """Wait until it is armed, and the present movements have ended.
 
         Raises:
             NotArmableError, ArmError: it is not armed.
-            TimeoutError: they take too long.
+            TimeoutError: the movements take too long.
         """
         before = list(self._moves)
         await self._get_ready()
-        await self._over(before)
+        await self._ended(before)
 
-    async def _over(self, moves: list[asyncio.Future[None]]) -> None:
+    async def _ended(self, moves: list[asyncio.Future[None]]) -> None:
         if moves and (await asyncio.wait(moves, timeout=DEFAULT_GOTO_TIMEOUT_S))[1]:
-            raise TimeoutError(f"the movements before are not over within {DEFAULT_GOTO_TIMEOUT_S:g} s")
+            raise TimeoutError(f"the earlier movements have not ended within {DEFAULT_GOTO_TIMEOUT_S:g} s")
 
     @contextlib.asynccontextmanager
     async def _turn(self) -> AsyncIterator[None]:
-        """The turn of a movement, after those before it; `done_moving` is false from now until its end."""
+        """The context of a movement; it waits for earlier ones. `done_moving` is false from now until its end."""
         mine, before = asyncio.get_running_loop().create_future(), list(self._moves)
         self._moves.append(mine)
         try:
             await self._get_ready()
-            await self._over(before)
+            await self._ended(before)
             if self._mission_start_time is None:
                 self._mission_start_time = time.time()
             yield
@@ -230,38 +232,38 @@ class Vehicle:
             mine.cancel()
 
     async def _until(self, verb: Awaitable[None], reached: Callable[[], bool]) -> None:
-        """Wait until the verb is done, or that is reached; then it goes on until a newer one ends it."""
+        """Wait until the verb has ended, or `reached` holds; then the verb goes on until a newer one ends it."""
 
         async def running() -> None:
             await verb
 
         task = asyncio.ensure_future(running())
         try:
-            while not (await asyncio.wait({task}, timeout=LOOK_EVERY))[0]:
+            while not (await asyncio.wait({task}, timeout=CHECK_PERIOD))[0]:
                 if reached():
-                    self._leave(task)
+                    self._continue_in_background(task)
                     return
         except asyncio.CancelledError:
             task.cancel()
             raise
         task.result()
 
-    def _leave(self, task: asyncio.Task[None]) -> None:
-        self._left.add(task)
-        task.add_done_callback(self._left_ended)
+    def _continue_in_background(self, task: asyncio.Task[None]) -> None:
+        self._background.add(task)
+        task.add_done_callback(self._background_ended)
 
-    def _left_ended(self, task: asyncio.Task[None]) -> None:
-        self._left.discard(task)
+    def _background_ended(self, task: asyncio.Task[None]) -> None:
+        self._background.discard(task)
         if task.cancelled() or (error := task.exception()) is None:
             return
         cause = getattr(error, "original_error", None) or error
         level = logging.DEBUG if isinstance(cause, Superseded) else logging.WARNING
-        log.log(level, "what was left behind ended: %s", error)
+        log.log(level, "a movement in the background ended: %s", error)
 
     # -- arming -------------------------------------------------------------------------------------------
 
     def initialize(self, should_arm: bool = True) -> None:
-        """Wait until it could be armed, ARMABLE_TIMEOUT_S at most. It blocks."""
+        """Wait until it is ready to arm, at most ARMABLE_TIMEOUT_S. It blocks."""
         self._will_arm = should_arm
         deadline = time.monotonic() + ARMABLE_TIMEOUT_S
         while not (self.armable and self.home_coords) and time.monotonic() < deadline:
@@ -273,10 +275,10 @@ class Vehicle:
 
     def _why_not(self) -> str:
         status = self._thread.status
-        return "nothing is known of it" if status is None else "; ".join(status.why_not) or "it is armed"
+        return "its status is unknown" if status is None else "; ".join(status.why_not) or "it is armed"
 
     async def _get_ready(self) -> None:
-        """Arm it where it is not armed, once for all who wait for it; and take it over at the first command."""
+        """Arm it if necessary and switch it to GUIDED at the first command; all callers share one attempt."""
         if self._readying is None or self._readying.done():
             self._readying = asyncio.ensure_future(self._arm_vehicle())
             self._readying.add_done_callback(lambda task: task.cancelled() or task.exception())
@@ -285,28 +287,28 @@ class Vehicle:
     async def _arm_vehicle(self) -> None:
         """Arm it and switch it to GUIDED. In AERPAW's environment its safety pilot arms it.
 
-        A vehicle that was ours and is in another mode now has another master: that is left to the API to refuse.
+        A vehicle that was ours and has left GUIDED belongs to its pilot; the API then refuses the command.
         """
         if not self.armed and self._will_arm:
             if AERPAW_Platform._connected:
                 await asyncio.to_thread(AERPAW_Platform.log_to_oeo, "[aerpawlib] Waiting for safety pilot to arm")
                 while not self.armed:  # noqa: ASYNC110 - a property of another thread
-                    await asyncio.sleep(LOOK_EVERY)
+                    await asyncio.sleep(CHECK_PERIOD)
                 self._is_ours = False
             else:
                 await self.set_armed(True)
                 self._is_ours = True
-            await self._thread.run(self._thread.look_home)
+            await self._thread.run(self._thread.update_home)
         if not self._is_ours and self.mode != "GUIDED":
             await self._command(ArmError, lambda drone: drone.guided())
         self._is_ours = True
 
     async def set_armed(self, value: bool) -> None:
-        """Arm or disarm it; done when it shows.
+        """Arm or disarm it; returns when telemetry shows it.
 
         Raises:
-            NotArmableError: it could not be armed now.
-            ArmError, DisarmError: it was not.
+            NotArmableError: it is not ready to arm.
+            ArmError, DisarmError: the command failed.
         """
         if not value:
             await self._command(DisarmError, lambda drone: drone.disarm())
@@ -318,13 +320,14 @@ class Vehicle:
     # -- verbs --------------------------------------------------------------------------------------------
 
     async def _command(self, kind: type[CommandError], verb: Callable[[Client], Awaitable[None]]) -> None:
-        """A verb of the client; its error as one of that kind."""
+        """Run a verb of the client; its error becomes an error of class `kind`."""
         self._has_commanded = True
         try:
             await self._thread.run(lambda: verb(self._thread.drone))
         except UavApiError as error:
-            said = f" ({'; '.join(error.statustext)})" if isinstance(error, Rejected) and error.statustext else ""
-            raise kind(f"{error}{said}", error) from error
+            texts = error.statustext if isinstance(error, Rejected) else ()
+            reasons = f" ({'; '.join(texts)})" if texts else ""
+            raise kind(f"{error}{reasons}", error) from error
 
     async def goto_coordinates(
         self,
@@ -332,20 +335,20 @@ class Vehicle:
         tolerance: float = DEFAULT_POSITION_TOLERANCE_M,
         target_heading: float | None = None,
     ) -> None:
-        """Not for a generic vehicle."""
+        """Raise NotImplementedForVehicleError: a generic vehicle does not move."""
         raise NotImplementedForVehicleError("goto_coordinates", self.kind)
 
     async def set_velocity(
         self, velocity_vector: VectorNED, global_relative: bool = True, duration: float | None = None
     ) -> None:
-        """Not for a generic vehicle."""
+        """Raise NotImplementedForVehicleError: a generic vehicle does not move."""
         raise NotImplementedForVehicleError("set_velocity", self.kind)
 
     async def set_groundspeed(self, velocity: float) -> None:
-        """Set the speed (m/s) at which it goes to places.
+        """Set the ground speed (m/s) for flights to positions.
 
         Raises:
-            InvalidSpeedError: it is not above 0, or more than the API takes.
+            InvalidSpeedError: it is not above 0, or above the API's limit.
         """
         speed = float(velocity)
         if not 0 < speed <= MOST_SPEED:
@@ -353,15 +356,15 @@ class Vehicle:
         self._log_event("command", type="set_groundspeed", speed_m_s=speed)
         try:
             await self._command(CommandError, lambda drone: drone.set_speed(speed))
-        except CommandError as error:  # not all autopilots take it, and scripts do not expect that
+        except CommandError as error:  # some autopilots refuse it, and scripts do not expect that
             log.warning("the ground speed was not set: %s", error)
 
     async def _stop(self) -> None:
-        """End what the script has left behind; the vehicle stops."""
-        for task in list(self._left):
+        """End the verbs in the background; the vehicle stops."""
+        for task in list(self._background):
             task.cancel()
 
-    # -- its end ------------------------------------------------------------------------------------------
+    # -- the end of the script ----------------------------------------------------------------------------
 
     @property
     def has_commanded(self) -> bool:
@@ -369,14 +372,14 @@ class Vehicle:
         return self._has_commanded
 
     async def run_last(self, verb: Callable[[Client], Awaitable[T]]) -> T:
-        """A verb of the client, when the script has ended; its errors are the API's."""
+        """Run a verb of the client after the script's end; its errors are the API's."""
         return await self._thread.run(lambda: verb(self._thread.drone))
 
     def log_telemetry(self) -> None:
-        """Write into the log where it is and how it is."""
+        """Write its telemetry to the event log."""
         if self._events is None:
             return
-        with contextlib.suppress(NotConnectedError):  # it tells nothing just now
+        with contextlib.suppress(NotConnectedError):  # there is no telemetry now
             here, v, battery, gps = self.position, self.velocity, self.battery, self.gps
             place = {"lat": here.lat, "lon": here.lon, "alt_m": here.alt, "heading_deg": self.heading}
             motion = {"vel_n_m_s": v.north, "vel_e_m_s": v.east, "vel_d_m_s": v.down}
@@ -385,7 +388,7 @@ class Vehicle:
             self._log_event("telemetry", **place, **motion, **state, **power)
 
     def set_event_log(self, event_log: EventLog | None) -> None:
-        """Write what it is told into that log."""
+        """Write commands and telemetry to that log."""
         self._events = event_log
 
     def _log_event(self, event: str, **members: Any) -> None:
@@ -393,7 +396,7 @@ class Vehicle:
             self._events.log_event(event, **members)
 
     def close(self) -> None:
-        """End the connection; a movement that is under way ends, and the vehicle stops."""
+        """Close the connection; a running movement ends, and the vehicle stops."""
         if not self._closed:
             self._closed = True
             self._thread.close()

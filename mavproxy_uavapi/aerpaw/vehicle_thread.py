@@ -1,4 +1,4 @@
-"""The client's own thread: a vehicle goes on telling while its script blocks, and a script may have many loops."""
+"""Runs the client in its own thread: telemetry goes on while a script blocks, and a script may use several loops."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ from mavproxy_uavapi.core.errors import NotFound, UavApiError
 log = logging.getLogger("aerpawlib.v1.connection")
 T = TypeVar("T")
 
-STATUS_EVERY = 0.5  # s
-HOME_EVERY = 5.0  # s
-FIRST_MESSAGES = 5.0  # s in which a vehicle that is heard tells the rest
+STATUS_PERIOD = 0.5  # s
+HOME_PERIOD = 5.0  # s
+FIRST_MESSAGES_TIMEOUT = 5.0  # s from the first heartbeat to the FIRST_MESSAGES
 CLOSE_TIMEOUT = 5.0  # s
-WANTED = ("GLOBAL_POSITION_INT", "ATTITUDE", "SYS_STATUS", "GPS_RAW_INT")
+FIRST_MESSAGES = ("GLOBAL_POSITION_INT", "ATTITUDE", "SYS_STATUS", "GPS_RAW_INT")
 
 
 class VehicleThread:
-    """One vehicle of the API, in a thread with a loop of its own.
+    """One vehicle of the API, in a thread with its own loop.
 
     Attributes:
-        drone: the client's side of it.
-        status: what the API last said of it; None while it cannot say.
-        home: its home, and the altitude of that in m AMSL; None before it has one.
+        drone: the client.
+        status: the vehicle's newest status; None while unknown.
+        home: its home position and the altitude of home (m AMSL); None before it has one.
 
     Args:
-        url: of the API.
+        url: the API's address.
         timeout: s until it must be connected.
 
     Raises:
-        ConnectionTimeoutError, AerpawConnectionError: it is not.
+        ConnectionTimeoutError, AerpawConnectionError: the connection failed.
     """
 
     drone: Drone
@@ -52,7 +52,7 @@ class VehicleThread:
         self._error: UavApiError | None = None
         self._thread = threading.Thread(target=self._run, name=f"vehicle {url}", daemon=True)
         self._thread.start()
-        if not self._connected.wait(timeout + 2 * FIRST_MESSAGES):
+        if not self._connected.wait(timeout + 2 * FIRST_MESSAGES_TIMEOUT):
             self.close()
             raise ConnectionTimeoutError(timeout)
         if self._error is not None:
@@ -61,42 +61,46 @@ class VehicleThread:
     def _run(self) -> None:
         asyncio.set_event_loop(self._loop)
         try:
-            self._main = self._loop.create_task(self._live())
+            self._main = self._loop.create_task(self._stay_connected())
             with contextlib.suppress(asyncio.CancelledError):
                 self._loop.run_until_complete(self._main)
-            left = asyncio.all_tasks(self._loop)
-            for task in left:
+            tasks = asyncio.all_tasks(self._loop)
+            for task in tasks:
                 task.cancel()
-            self._loop.run_until_complete(asyncio.gather(*left, return_exceptions=True))
+            self._loop.run_until_complete(asyncio.gather(*tasks, return_exceptions=True))
         finally:
             self._connected.set()
             self._loop.close()
 
-    async def _live(self) -> None:
+    async def _stay_connected(self) -> None:
         try:
             async with connect(self._url, timeout=self._timeout) as self.drone:
-                await asyncio.gather(self._look(), self.look_home())
-                told = self.drone.telemetry
-                await told.shows(lambda: all(told.age(name) is not None for name in WANTED), FIRST_MESSAGES)
+                await asyncio.gather(self._update_status(), self.update_home())
+                telemetry = self.drone.telemetry
+                await telemetry.shows(
+                    lambda: all(telemetry.age(name) is not None for name in FIRST_MESSAGES), FIRST_MESSAGES_TIMEOUT
+                )
                 self._connected.set()
-                await asyncio.gather(self._every(STATUS_EVERY, self._look), self._every(HOME_EVERY, self.look_home))
+                await asyncio.gather(
+                    self._repeat(STATUS_PERIOD, self._update_status), self._repeat(HOME_PERIOD, self.update_home)
+                )
         except UavApiError as error:
             self._error = error
 
-    async def _every(self, seconds: float, look: Callable[[], Awaitable[None]]) -> None:
+    async def _repeat(self, seconds: float, update: Callable[[], Awaitable[None]]) -> None:
         while True:
-            await look()
-            await asyncio.sleep(seconds if self.home else STATUS_EVERY)
+            await update()
+            await asyncio.sleep(seconds if self.home else STATUS_PERIOD)
 
-    async def _look(self) -> None:
+    async def _update_status(self) -> None:
         try:
             self.status = await self.drone.status()
         except UavApiError as error:
             log.debug("no status: %s", error)
             self.status = None
 
-    async def look_home(self) -> None:
-        """Ask where home is: it moves when the vehicle is armed."""
+    async def update_home(self) -> None:
+        """Request the home position; arming changes it."""
         try:
             self.home = await self.drone.home()
         except NotFound:
@@ -105,7 +109,7 @@ class VehicleThread:
             log.debug("no home: %s", error)
 
     async def run(self, verb: Callable[[], Awaitable[T]]) -> T:
-        """What a verb of the client gives, for a script's own loop; a cancellation goes through.
+        """Run a verb of the client from a script's own loop; a cancellation is passed on.
 
         Raises:
             NotConnectedError: the vehicle was closed.
@@ -119,7 +123,7 @@ class VehicleThread:
         return await asyncio.wrap_future(asyncio.run_coroutine_threadsafe(running(), self._loop))
 
     def close(self) -> None:
-        """End the thread; what is in flight ends on the vehicle."""
+        """End the thread; running verbs end on the vehicle."""
         if self._thread.is_alive() and self._main is not None:
             with contextlib.suppress(RuntimeError):  # the loop has just ended
                 self._loop.call_soon_threadsafe(self._main.cancel)

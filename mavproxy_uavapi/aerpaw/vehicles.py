@@ -1,4 +1,4 @@
-"""`aerpawlib.v1.vehicle`."""
+"""`aerpawlib.v1.vehicle`: the classes of vehicles."""
 
 from mavproxy_uavapi.aerpaw.drone import Drone
 from mavproxy_uavapi.aerpaw.dummy_vehicle import DummyVehicle

@@ -1,4 +1,4 @@
-"""What runners send each other: pickles, as aerpawlib has them, but none that runs anything here."""
+"""The messages between runners: pickles, as in aerpawlib, but only of types that cannot run code."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 from mavproxy_uavapi.aerpaw import geometry
 
-# Data of the standard library and numpy, and aerpawlib's own, by the name that they have in a pickle.
+# The data types of the standard library, numpy and aerpawlib, by their names in a pickle.
 PLAIN = {
     "builtins": {"bytearray", "complex", "frozenset", "range", "set", "slice"},
     "collections": {"OrderedDict", "deque"},
@@ -24,7 +24,7 @@ OURS = {"Coordinate": geometry.Coordinate, "VectorNED": geometry.VectorNED}
 
 
 class _Unpickler(pickle.Unpickler):
-    """Finds data types only, and the classes of the script that runs."""
+    """Allows only data types, and the classes of the running script."""
 
     def __init__(self, data: bytes, module: str) -> None:
         super().__init__(io.BytesIO(data))
@@ -38,28 +38,28 @@ class _Unpickler(pickle.Unpickler):
         one = getattr(sys.modules.get(module), name, None) if module == self._module else None
         if isinstance(one, type) and one.__module__ == module:
             return one
-        raise pickle.UnpicklingError(f"{module}.{name} is not taken from the network")
+        raise pickle.UnpicklingError(f"{module}.{name} is not accepted from the network")
 
 
 def read(data: bytes, module: str) -> dict[str, Any]:
-    """A message.
+    """Decode a message.
 
     Args:
-        data: as it came.
-        module: of the script; its own classes are taken.
+        data: the received bytes.
+        module: the script's module; its own classes are accepted.
 
     Raises:
-        ValueError: it is none, or holds what is not taken.
+        ValueError: it is not a message, or has a type that is not accepted.
     """
     try:
         message = _Unpickler(data, module).load()
     except (pickle.UnpicklingError, EOFError, AttributeError, ImportError, IndexError, KeyError, TypeError) as error:
-        raise ValueError(str(error) or "no pickle") from error
+        raise ValueError(str(error) or "not a pickle") from error
     if not isinstance(message, dict):
-        raise ValueError(f"{type(message).__name__} is no message")
+        raise ValueError(f"{type(message).__name__} is not a message")
     return message
 
 
 def written(message: dict[str, Any]) -> bytes:
-    """A message for the network."""
+    """Encode a message."""
     return pickle.dumps(message)

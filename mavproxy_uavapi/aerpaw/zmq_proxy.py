@@ -16,9 +16,9 @@ __all__ = ["check_zmq_proxy_reachable", "main", "run_zmq_proxy"]
 def run_zmq_proxy(
     in_port: int | str = ZMQ_PROXY_IN_PORT, out_port: int | str = ZMQ_PROXY_OUT_PORT, host: str = "127.0.0.1"
 ) -> None:
-    """Pass on what runners publish to `in_port` to all that listen at `out_port`, until Ctrl-C.
+    """Forward messages that runners publish to `in_port` to all listeners at `out_port`, until Ctrl-C.
 
-    Anybody who reaches the ports may bring runners into states: `host` is this machine unless it is said otherwise.
+    Everybody who reaches the ports can change the states of runners, so the default `host` is this machine.
     """
     import zmq  # noqa: PLC0415 - an extra
 

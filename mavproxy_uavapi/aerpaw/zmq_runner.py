@@ -1,6 +1,6 @@
-"""ZmqStateMachine: runners that bring each other into states and ask each other for values, over a proxy.
+"""ZmqStateMachine: runners that change each other's states and query each other's values, through a proxy.
 
-pyzmq is imported when a runner is bound to its proxy: scripts without it need none.
+pyzmq is imported when a runner is bound to its proxy; other scripts do not need it.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 log = logging.getLogger("aerpawlib.v1.zmq")
 
-SUBSCRIBED_WITHIN = 2.0  # s; what is published before the proxy has subscribed is lost
-LINGER = 500  # ms that the last messages get
+SUBSCRIBE_TIMEOUT = 2.0  # s for the proxy to subscribe; messages that are published before are lost
+LINGER = 500  # ms to send the last messages
 
 
 def check_zmq_proxy_reachable(proxy_addr: str, timeout_s: float = ZMQ_PROXY_CHECK_TIMEOUT_S) -> bool:
-    """Whether a proxy listens there."""
+    """Whether a proxy listens at that address."""
     try:
         with socket.create_connection((proxy_addr, int(ZMQ_PROXY_OUT_PORT)), timeout=timeout_s):
             return True
@@ -43,13 +43,13 @@ def check_zmq_proxy_reachable(proxy_addr: str, timeout_s: float = ZMQ_PROXY_CHEC
 
 
 class ZmqStateMachine(StateMachine):
-    """A StateMachine that other runners reach by its identifier."""
+    """A StateMachine that other runners address by its identifier."""
 
     _identifier: str | None = None
     _proxy = ""
 
     def _initialize_zmq_bindings(self, vehicle_identifier: str, proxy_server_addr: str) -> None:
-        """Be reached by that name over that proxy.
+        """Make it reachable under that identifier through that proxy.
 
         Raises:
             ConnectionError: there is no proxy.
@@ -68,7 +68,7 @@ class ZmqStateMachine(StateMachine):
         self._context = zmq.asyncio.Context()
         self._identifier, self._proxy = vehicle_identifier, proxy_server_addr
         self._outgoing: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
-        self._asked: dict[tuple[str, str], list[asyncio.Future[Any]]] = {}
+        self._queries: dict[tuple[str, str], list[asyncio.Future[Any]]] = {}  # by runner and field
 
     def _build(self) -> None:
         super()._build()
@@ -77,14 +77,14 @@ class ZmqStateMachine(StateMachine):
         for name, method in self.marked(EXPOSED_STATE):
             mark = getattr(method, STATE, None)
             if mark is None:
-                raise StateMachineError("@expose_zmq is for states only")
+                raise StateMachineError("@expose_zmq needs a state")
             self._aliases[name] = mark.name
 
     async def run(self, vehicle: Any) -> None:
-        """As a StateMachine's.
+        """Run from the first state to the last.
 
         Raises:
-            StateMachineError: it has no identifier and no proxy.
+            StateMachineError: it has no identifier and no proxy; see also `StateMachine.run`.
         """
         if self._identifier is None:
             raise StateMachineError("ZMQ runners need --zmq-identifier NAME --zmq-proxy-server ADDRESS")
@@ -93,10 +93,10 @@ class ZmqStateMachine(StateMachine):
         finally:
             self._context.destroy(LINGER)
 
-    # -- what scripts call --------------------------------------------------------------------------------
+    # -- for scripts --------------------------------------------------------------------------------------
 
     async def transition_runner(self, identifier: str, state: str) -> None:
-        """Have another runner go to a state when the one that it is in is over."""
+        """Make another runner change to a state when its present state ends."""
         self._send(ZMQ_TYPE_TRANSITION, identifier, next_state=state)
 
     async def query_field(self, identifier: str, field: str, timeout: float = ZMQ_QUERY_FIELD_TIMEOUT_S) -> Any:
@@ -106,7 +106,7 @@ class ZmqStateMachine(StateMachine):
             asyncio.TimeoutError: it did not answer within `timeout` s.
         """
         answer: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
-        waiting = self._asked.setdefault((identifier, field), [])
+        waiting = self._queries.setdefault((identifier, field), [])
         waiting.append(answer)
         self._send(ZMQ_TYPE_FIELD_REQUEST, identifier, field=field)
         try:
@@ -122,12 +122,12 @@ class ZmqStateMachine(StateMachine):
 
     @background
     async def _publish(self) -> None:
-        # An XPUB is a PUB that is told of its subscribers: the proxy, as soon as anybody listens there.
+        # An XPUB socket is notified of its subscriber, the proxy, once it has a listener itself.
         publisher = self._context.socket(self._zmq.XPUB)
         publisher.linger = LINGER
         try:
             publisher.connect(f"tcp://{self._proxy}:{ZMQ_PROXY_IN_PORT}")
-            await publisher.poll(SUBSCRIBED_WITHIN * 1000)
+            await publisher.poll(SUBSCRIBE_TIMEOUT * 1000)
             await publisher.send(wire.written({"msg_type": ZMQ_TYPE_HELLO, "from": self._identifier}))
             while True:
                 await publisher.send(wire.written(await self._outgoing.get()))
@@ -148,7 +148,7 @@ class ZmqStateMachine(StateMachine):
                 try:
                     message = wire.read(await subscriber.recv(), type(self).__module__)
                 except ValueError as error:
-                    log.warning("a message was not taken: %s", error)
+                    log.warning("a message was ignored: %s", error)
                     continue
                 if message.get("identifier") == self._identifier:
                     answer = asyncio.create_task(self._take(message, vehicle))
@@ -160,17 +160,17 @@ class ZmqStateMachine(StateMachine):
     async def _take(self, message: dict[str, Any], vehicle: Any) -> None:
         kind, sender, field = message.get("msg_type"), str(message.get("from")), str(message.get("field"))
         if kind == ZMQ_TYPE_TRANSITION:
-            wanted = str(message.get("next_state"))
-            log.info("%s wants state %s", sender, wanted)
-            self._overrides.append(self._aliases.get(wanted, wanted))
+            state = str(message.get("next_state"))
+            log.info("%s requests state %s", sender, state)
+            self._overrides.append(self._aliases.get(state, state))
         elif kind == ZMQ_TYPE_FIELD_REQUEST:
             self._send(ZMQ_TYPE_FIELD_CALLBACK, sender, field=field, value=await self._value(field, vehicle))
         elif kind == ZMQ_TYPE_FIELD_CALLBACK:
-            for answer in self._asked.get((sender, field), []):
+            for answer in self._queries.get((sender, field), []):
                 if not answer.done():
                     answer.set_result(message.get("value"))
         else:
-            log.warning("a message of %s was not taken: its type is %r", sender, kind)
+            log.warning("a message of %s was ignored: its type is %r", sender, kind)
 
     async def _value(self, field: str, vehicle: Any) -> Any:
         if field not in self._fields:

@@ -1,4 +1,4 @@
-"""One vehicle behind an API: its verbs, and what it tells."""
+"""One vehicle behind an API: its verbs and its telemetry."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from mavproxy_uavapi.core.timeout import wait_with_timeout
 T = TypeVar("T")
 
 MAX_AGE = 5.0  # s
-SILENT = 20.0  # s without a heartbeat after which nobody waits for an answer; the API itself gives up before that
+SILENT = 20.0  # s without a heartbeat after which an answer is no longer awaited; the API itself gives up earlier
 ANSWER_TIMEOUT = 5.0  # s for the first answer of an API
-LOOK_EVERY = 0.2  # s between looks at a job that outlives its client
+POLL_PERIOD = 0.2  # s between requests for the state of a job
 ABORT_TIMEOUT = 5.0  # s that a cancelled landing waits for the vehicle to stop
-TURNED = 5.0  # degrees
-SHOWN = 2.0  # s in which the stream shows what a verb's answer has told already
-KEPT = 3600.0  # s; as long as the API repeats a velocity for one call
+TURN_TOLERANCE = 5.0  # degrees
+SHOWN_WITHIN = 2.0  # s until the stream must show the effect that a verb's answer reports
+LONGEST_TRAVEL = 3600.0  # s for which the API repeats a velocity in one call
 ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
 UNKNOWN_HEADING = 65535
 
@@ -43,7 +43,7 @@ class Attitude:
 
 @dataclass(frozen=True)
 class Battery:
-    """V, A and %; None where the vehicle does not know."""
+    """Voltage in V, current in A, level in %; None if unknown."""
 
     voltage: float | None
     current: float | None
@@ -52,7 +52,7 @@ class Battery:
 
 @dataclass(frozen=True)
 class Gps:
-    """The receiver's fix (3: 3-D and better) and how many satellites it sees."""
+    """The receiver's fix (3: 3-D and better) and its number of satellites; None if unknown."""
 
     fix_type: int
     satellites: int | None
@@ -60,7 +60,7 @@ class Gps:
 
 @dataclass(frozen=True)
 class Status:
-    """What the API says of the vehicle: see /telemetry/status."""
+    """The vehicle's status by the API; see /telemetry/status."""
 
     kind: str
     mode: str
@@ -77,15 +77,15 @@ def _scaled(value: float | None, divisor: float) -> float | None:
 
 
 class Drone:
-    """One vehicle. Its properties are what it last told; they raise `Stale` when that is too old.
+    """One vehicle. Its properties are its newest telemetry; they raise `Stale` if that is too old.
 
-    Each verb is done when telemetry shows it, and raises what the API answers otherwise (`UavApiError`). A verb whose
-    task is cancelled, or whose program dies, ends on the vehicle too: it stops and holds. A landing or a return ends
-    by a cancellation only; when the program dies it goes on.
+    Each verb returns when telemetry shows its effect, and otherwise raises the API's error (`UavApiError`). If its
+    task is cancelled or its program dies, the verb ends on the vehicle, too: the vehicle stops and holds. Only a
+    cancellation ends a landing or a return; if the program dies, it continues.
 
     Attributes:
         id: its MAVLink system id.
-        telemetry: all messages that it tells.
+        telemetry: all messages from it.
     """
 
     def __init__(self, http: Http, system: int, telemetry: Telemetry) -> None:
@@ -93,29 +93,29 @@ class Drone:
         self.telemetry = telemetry
         self._http = http
 
-    # -- what it tells ------------------------------------------------------------------------------------
+    # -- telemetry ----------------------------------------------------------------------------------------
 
     @property
     def position(self) -> Position:
-        """Where it is."""
+        """Its position."""
         here = self.telemetry.fields("GLOBAL_POSITION_INT")
         return Position(here["lat"] / 1e7, here["lon"] / 1e7, here["relative_alt"] / 1000.0)
 
     @property
     def velocity(self) -> Ned:
-        """m/s north, east, down."""
+        """Its velocity, m/s north, east, down."""
         here = self.telemetry.fields("GLOBAL_POSITION_INT")
         return Ned(here["vx"] / 100.0, here["vy"] / 100.0, here["vz"] / 100.0)
 
     @property
     def ned(self) -> Ned:
-        """Where it is, m from its EKF origin."""
+        """Its position, m from its EKF origin."""
         here = self.telemetry.fields("LOCAL_POSITION_NED")
         return Ned(here["x"], here["y"], here["z"])
 
     @property
     def heading(self) -> float:
-        """Degrees clockwise from north, from 0 to less than 360."""
+        """Its heading, degrees clockwise from north, from 0 to less than 360."""
         heading = self.telemetry.fields("GLOBAL_POSITION_INT")["hdg"]
         if heading in (None, UNKNOWN_HEADING):
             return math.degrees(self.attitude.yaw) % 360.0
@@ -123,37 +123,37 @@ class Drone:
 
     @property
     def attitude(self) -> Attitude:
-        """How it lies in the air."""
-        told = self.telemetry.fields("ATTITUDE")
-        return Attitude(told["roll"], told["pitch"], told["yaw"])
+        """Its attitude."""
+        fields = self.telemetry.fields("ATTITUDE")
+        return Attitude(fields["roll"], fields["pitch"], fields["yaw"])
 
     @property
     def armed(self) -> bool:
-        """Whether its motors may turn."""
+        """Whether it is armed."""
         return bool(self.telemetry.fields("HEARTBEAT")["base_mode"] & ARMED)
 
     @property
     def mode(self) -> str:
         """The name of its flight mode."""
-        beat = self.telemetry.fields("HEARTBEAT")
-        return mode_name(beat["type"], beat["custom_mode"])
+        heartbeat = self.telemetry.fields("HEARTBEAT")
+        return mode_name(heartbeat["type"], heartbeat["custom_mode"])
 
     @property
     def battery(self) -> Battery:
-        """The battery that its autopilot watches."""
-        told = self.telemetry.fields("SYS_STATUS")
-        voltage, current = _scaled(told["voltage_battery"], 1000.0), _scaled(told["current_battery"], 100.0)
-        return Battery(voltage, current, told["battery_remaining"])
+        """The battery that its autopilot monitors."""
+        fields = self.telemetry.fields("SYS_STATUS")
+        voltage, current = _scaled(fields["voltage_battery"], 1000.0), _scaled(fields["current_battery"], 100.0)
+        return Battery(voltage, current, fields["battery_remaining"])
 
     @property
     def gps(self) -> Gps:
-        """Its first receiver."""
-        told = self.telemetry.fields("GPS_RAW_INT")
-        return Gps(told["fix_type"], told["satellites_visible"])
+        """Its first GPS receiver."""
+        fields = self.telemetry.fields("GPS_RAW_INT")
+        return Gps(fields["fix_type"], fields["satellites_visible"])
 
     @property
     def is_connected(self) -> bool:
-        """Whether its heartbeats come."""
+        """Whether its heartbeats arrive."""
         try:
             self.telemetry.fields("HEARTBEAT")
         except Stale:
@@ -161,7 +161,7 @@ class Drone:
         return True
 
     async def status(self) -> Status:
-        """Whether it can be flown, and why not."""
+        """Its status: whether it can be flown, and why not."""
         info = (await self._http.get("/telemetry/status"))["info"]
         return Status(
             kind=info["vehicle_type"],
@@ -175,15 +175,15 @@ class Drone:
         )
 
     async def home(self) -> tuple[Position, float]:
-        """Home, and its altitude in m AMSL.
+        """The home position, and its altitude in m AMSL.
 
         Raises:
-            NotFound: it has none yet.
+            NotFound: it has no home yet.
         """
-        told = await self._http.get("/telemetry/home_info")
-        return Position(told["lat"], told["lon"], 0.0), float(told["altitude"])
+        body = await self._http.get("/telemetry/home_info")
+        return Position(body["lat"], body["lon"], 0.0), float(body["altitude"])
 
-    # -- up and down --------------------------------------------------------------------------------------
+    # -- arming, takeoff, landing -------------------------------------------------------------------------
 
     async def arm(self, timeout: float | None = None) -> None:
         """Wait until it is ready, switch to GUIDED and arm."""
@@ -191,7 +191,7 @@ class Drone:
         await self._shows(lambda: self.armed)
 
     async def disarm(self, force: bool = False) -> None:
-        """Disarm; in flight only with `force`: it falls."""
+        """Disarm; in flight only with `force`: then it falls."""
         await self._command("/command/disarm", force=force)
         await self._shows(lambda: not self.armed)
 
@@ -200,13 +200,13 @@ class Drone:
         await self._fly("GET", "/command/takeoff", {"alt": alt, "timeout": timeout})
 
     async def land(self, timeout: float | None = None, *, outlive: bool = False) -> None:
-        """Land where it is, and disarm; with `outlive` a cancellation leaves it landing."""
-        await self._outliving("/command/land", timeout, outlive)
+        """Land where it is, and disarm; with `outlive` it goes on landing after a cancellation."""
+        await self._fly_to_the_end("/command/land", timeout, outlive)
         await self._shows(lambda: not self.armed)
 
     async def rtl(self, timeout: float | None = None, *, outlive: bool = False) -> None:
-        """Return to launch, land there and disarm; with `outlive` a cancellation leaves it returning."""
-        await self._outliving("/command/rtl", timeout, outlive)
+        """Return to launch, land there and disarm; with `outlive` it goes on returning after a cancellation."""
+        await self._fly_to_the_end("/command/rtl", timeout, outlive)
         await self._shows(lambda: not self.armed)
 
     # -- modes and speeds ---------------------------------------------------------------------------------
@@ -216,7 +216,7 @@ class Drone:
         await self._command("/command/brake")
 
     async def guided(self) -> None:
-        """Switch to GUIDED, in which it takes movements."""
+        """Switch to GUIDED, in which it accepts movements."""
         await self.set_mode("GUIDED")
 
     async def set_mode(self, mode: str) -> None:
@@ -239,14 +239,14 @@ class Drone:
         tolerance: float = 1.0,
         timeout: float | None = None,
     ) -> None:
-        """Fly to a place; done on arrival.
+        """Fly to a position; returns on arrival.
 
         Args:
-            target: where to.
-            heading: degrees to point to on the way.
-            look_at_target: point to where it goes; `heading` is stronger.
+            target: the position.
+            heading: the direction to point on the way, degrees.
+            look_at_target: whether to point in the direction of travel; `heading` overrides it.
             tolerance: m, horizontally and vertically.
-            timeout: s that it may take.
+            timeout: s that the flight may take.
         """
         body = {"lat": target.lat, "long": target.lon, "alt": target.alt}
         more = {"heading": heading, "look_at_target": look_at_target, "tolerance": tolerance, "timeout": timeout}
@@ -261,13 +261,13 @@ class Drone:
         tolerance: float = 1.0,
         timeout: float | None = None,
     ) -> None:
-        """As `go_to`, to a place in m from its EKF origin."""
+        """As `go_to`, to a position in m from its EKF origin."""
         body = {"x": target.north, "y": target.east, "z": target.down}
         more = {"heading": heading, "look_at_target": look_at_target, "tolerance": tolerance, "timeout": timeout}
         await self._fly("POST", "/movement/go_to_ned_wait", body={**body, **more})
 
     async def travel(self, velocity: Ned, duration: float | None = None, *, heading: float | None = None) -> None:
-        """Fly at a velocity for `duration` s of its clock, then stop; without one until the task is cancelled."""
+        """Fly at a velocity for `duration` s on its clock, then stop; None means until the task is cancelled."""
         body = {"vx": velocity.north, "vy": velocity.east, "vz": velocity.down, "heading": heading}
         await self._travel("/movement/travel_at_ned", body, duration)
 
@@ -280,101 +280,101 @@ class Drone:
         *,
         heading: float | None = None,
     ) -> None:
-        """As `travel`, by the heading that it has at the beginning."""
+        """As `travel`, in the body's frame; the heading at the beginning counts."""
         body = {"front": front, "right": right, "down": down, "heading": heading}
         await self._travel("/movement/travel_at_body", body, duration)
 
     async def _travel(self, path: str, body: dict[str, Any], duration: float | None) -> None:
         while duration is None:
-            await self._fly("POST", path, body={**body, "duration": KEPT})
+            await self._fly("POST", path, body={**body, "duration": LONGEST_TRAVEL})
         await self._fly("POST", path, body={**body, "duration": duration})
 
     async def turn_to(self, heading: float) -> None:
         """Turn to `heading` degrees clockwise from north, the shorter way round."""
         await self._fly("GET", "/movement/set_heading", {"heading": heading % 360.0})
-        await self._shows(lambda: abs((self.heading - heading + 180.0) % 360.0 - 180.0) <= TURNED)
+        await self._shows(lambda: abs((self.heading - heading + 180.0) % 360.0 - 180.0) <= TURN_TOLERANCE)
 
     async def stop(self) -> None:
         """Hold still until `resume`."""
         await self._command("/movement/stop")
 
     async def resume(self) -> None:
-        """Go on with what `stop` interrupted."""
+        """Continue the movement that `stop` interrupted."""
         await self._command("/movement/resume")
 
-    # -- how it is asked ----------------------------------------------------------------------------------
+    # -- requests -----------------------------------------------------------------------------------------
 
     async def _fly(
         self, method: str, path: str, query: dict[str, Any] | None = None, body: dict[str, Any] | None = None
     ) -> None:
-        """A verb that ends when we hang up, which a cancellation does; the vehicle stops then."""
-        await self._heard(self._http.ask(method, path, {**(query or {}), "on_disconnect": "hold"}, body))
+        """Run a verb that ends when we hang up, as a cancellation does; then the vehicle stops."""
+        await self._answer(self._http.ask(method, path, {**(query or {}), "on_disconnect": "hold"}, body))
 
     async def _command(self, path: str, **query: Any) -> None:
-        """A verb that goes on when we hang up, and is short."""
-        await self._heard(self._http.get(path, **query))
+        """Run a short verb that goes on when we hang up."""
+        await self._answer(self._http.get(path, **query))
 
-    async def _outliving(self, path: str, timeout: float | None, outlive: bool) -> None:
-        """A verb that goes on when we hang up: a cancellation has to say so."""
+    async def _fly_to_the_end(self, path: str, timeout: float | None, outlive: bool) -> None:
+        """Run a verb that goes on when we hang up, so a cancellation must abort its job, unless `outlive`."""
         begun = asyncio.ensure_future(self._http.get(path, wait=False, timeout=timeout))
         try:
-            job = (await self._heard(asyncio.shield(begun)))["job"]
-            told = await self._heard(self._ended(job))
+            number = (await self._answer(asyncio.shield(begun)))["job"]
+            job = await self._answer(self._ended(number))
         except asyncio.CancelledError:
             if not outlive:
-                with contextlib.suppress(UavApiError, asyncio.TimeoutError):  # it has just ended; it takes its time
+                with contextlib.suppress(UavApiError, asyncio.TimeoutError):  # it has just ended, or stops slowly
                     await wait_with_timeout(ABORT_TIMEOUT, self._abort(begun))
             raise
-        if told["error"] is not None:
-            raise error_of(told["error"]["status"], told["error"])
+        if job["error"] is not None:
+            raise error_of(job["error"]["status"], job["error"])
 
-    async def _ended(self, job: str) -> dict[str, Any]:
-        """A job, once it has an outcome."""
+    async def _ended(self, number: str) -> dict[str, Any]:
+        """The job as the API reports it, once it has ended."""
         while True:
-            told = await self._http.get(f"/jobs/{job}")
-            if told["state"] != "running":
-                return told
-            await asyncio.sleep(LOOK_EVERY)
+            job = await self._http.get(f"/jobs/{number}")
+            if job["state"] != "running":
+                return job
+            await asyncio.sleep(POLL_PERIOD)
 
     async def _abort(self, begun: asyncio.Future[dict[str, Any]]) -> None:
         await self._http.ask("DELETE", f"/jobs/{(await begun)['job']}", {})
 
-    async def _heard(self, answer: Awaitable[T]) -> T:
-        """An answer; the API ends each wait itself, unless its machine or the network dies without a word.
+    async def _answer(self, answer: Awaitable[T]) -> T:
+        """Wait for an answer. The API ends each wait itself, unless its machine or the network fails.
 
         Raises:
-            LinkLost: nothing is heard any more.
+            LinkLost: no heartbeat arrives any more.
         """
         asking = asyncio.ensure_future(answer)
         try:
             while not (await asyncio.wait({asking}, timeout=1.0))[0]:
                 silent_for = self.telemetry.age("HEARTBEAT") or 0.0
                 if silent_for > SILENT:
-                    raise LinkLost(f"nothing was heard of vehicle {self.id} or its API for {silent_for:.0f} s")
+                    raise LinkLost(f"no heartbeat of vehicle {self.id} has arrived for {silent_for:.0f} s")
         finally:
             asking.cancel()
         return asking.result()
 
     async def _shows(self, condition: Callable[[], bool]) -> None:
-        """The stream may come later than the answer; the answer is the proof."""
-        await self.telemetry.shows(condition, SHOWN)
+        """Wait until the stream, which may be later than the answer, shows it, too; the answer is the proof."""
+        await self.telemetry.shows(condition, SHOWN_WITHIN)
 
 
 @contextlib.asynccontextmanager
 async def connect(
     url: str, token: str | None = None, *, timeout: float = 30.0, max_age: float = MAX_AGE
 ) -> AsyncIterator[Drone]:
-    """A vehicle's API, and the stream of what it tells.
+    """Connect to a vehicle's API, and to its telemetry stream.
 
     Args:
-        url: of the API; `http://host:8000/vehicles/2` for one of several vehicles.
-        token: where the API wants one; by default the environment's UAVAPI_TOKEN.
-        timeout: s until the API must answer and the vehicle be heard.
+        url: the API's address; `http://host:8000/vehicles/2` for one of several vehicles.
+        token: the API's token, if it needs one; by default the environment variable UAVAPI_TOKEN.
+        timeout: s until the API must answer and a heartbeat must arrive.
         max_age: s after which properties raise `Stale`.
 
     Raises:
-        Unreachable, NoVehicle, LinkLost: not within `timeout`.
-        Unauthorized, Forbidden.
+        Unreachable, NoVehicle, LinkLost: no connection within `timeout`.
+        Unauthorized, Forbidden: the API refuses the client.
     """
     clock = asyncio.get_running_loop().time
     deadline = clock() + timeout
@@ -385,7 +385,7 @@ async def connect(
         drone = Drone(http, system, telemetry)
         try:
             if not await telemetry.shows(lambda: drone.is_connected, max(deadline - clock(), 1.0)):
-                raise LinkLost(f"vehicle {system} was not heard within {timeout:g} s")
+                raise LinkLost(f"no heartbeat of vehicle {system} has arrived within {timeout:g} s")
             yield drone
         finally:
             listening.cancel()
@@ -404,4 +404,4 @@ async def _system(http: Http, deadline: float) -> int:
                 if isinstance(error, asyncio.TimeoutError):
                     raise Unreachable(f"{http.url} does not answer") from error
                 raise
-        await asyncio.sleep(LOOK_EVERY)
+        await asyncio.sleep(POLL_PERIOD)

@@ -1,4 +1,4 @@
-"""An answer of the API that is no success -> the error that the server had raised, of the same tree."""
+"""Makes the server's error, of the same class, from an error answer of the API."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from mavproxy_uavapi.core.errors import Invalid, Rejected, TimedOut, UavApiError
 
 
 class Unreachable(errors.Unavailable):
-    """Nothing answers at the API's address, or what answers is no API."""
+    """Nothing answers at the API's address, or the answer is not the API's."""
 
     code = "unreachable"
 
@@ -21,7 +21,7 @@ def _tree(base: type[UavApiError]) -> Iterator[type[UavApiError]]:
         yield from _tree(child)
 
 
-# A class comes before its children here: of a code that both have, the parent's counts.
+# A class comes before its children here: if both have the same code, the parent is used.
 BY_CODE: dict[str, type[UavApiError]] = {}
 for _error in _tree(UavApiError):
     if _error.__module__ == errors.__name__:
@@ -29,7 +29,7 @@ for _error in _tree(UavApiError):
 
 
 def error_of(status: int, body: Mapping[str, Any]) -> UavApiError:
-    """The error that a status and its body tell; one that is not in the tree is a UavApiError."""
+    """The error for a status and its body; an unknown code gives a UavApiError."""
     detail, kind = body.get("detail"), BY_CODE.get(str(body.get("code")))
     sentence = str(detail) if detail else f"the API answered {status}"
     statustext = body.get("statustext", [])

@@ -1,4 +1,4 @@
-"""Several vehicles."""
+"""Connections to several vehicles."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Fleet(Mapping[int, Drone]):
     def __init__(self, drones: Sequence[Drone]) -> None:
         self._drones = {drone.id: drone for drone in drones}
         if len(self._drones) < len(drones):
-            raise ValueError(f"two of the addresses are of the same vehicle: {sorted(d.id for d in drones)}")
+            raise ValueError(f"two addresses are of the same vehicle: {sorted(d.id for d in drones)}")
 
     def __getitem__(self, system: int) -> Drone:
         return self._drones[system]
@@ -30,7 +30,7 @@ class Fleet(Mapping[int, Drone]):
 async def connect_fleet(
     *urls: str, token: str | None = None, timeout: float = 30.0, max_age: float = MAX_AGE
 ) -> AsyncIterator[Fleet]:
-    """The vehicles behind several addresses: of several APIs, or of one with a path for each (`…/vehicles/2`).
+    """Connect to several vehicles: of several APIs, or of one API with a path for each (`…/vehicles/2`).
 
     Raises:
         ValueError: two addresses are of the same vehicle.

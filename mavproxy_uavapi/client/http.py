@@ -1,4 +1,4 @@
-"""Requests to one vehicle's API, and the errors of its answers."""
+"""Sends requests to one vehicle's API, and raises the errors of its answers."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ import aiohttp
 
 from mavproxy_uavapi.client.errors import Unreachable, error_of
 
-CONNECT_TIMEOUT = 5.0  # s to the TCP connection; a verb's answer may take as long as its flight
-ALIVE_EVERY = 10.0  # s between two looks at whether a silent stream is alive
+CONNECT_TIMEOUT = 5.0  # s for the TCP connection; a verb's answer may take as long as its flight
+PING_PERIOD = 10.0  # s between pings that check whether a silent stream is alive
 
 
 def _as_text(values: Mapping[str, Any]) -> dict[str, str]:
@@ -25,16 +25,16 @@ class Http:
     """One API: its address and its connections.
 
     Args:
-        url: of the API, with or without a path before its own (`http://host:8000/vehicles/2`).
-        token: where it wants one.
+        url: the API's address, optionally with a prefix for its paths (`http://host:8000/vehicles/2`).
+        token: the API's token, if it needs one.
     """
 
     def __init__(self, url: str, token: str = "") -> None:
         self.url = (url if "://" in url else f"http://{url}").rstrip("/")
         headers = {"Authorization": f"Bearer {token}"} if token else {}
         timeout = aiohttp.ClientTimeout(total=None, sock_connect=CONNECT_TIMEOUT)
-        # The vehicle is on this machine or this network: no proxy of the environment is in between. Each verb in
-        # flight has a connection of its own, so there is no limit.
+        # The vehicle is on this machine or this network, so proxy settings of the environment are ignored. Each verb
+        # in flight needs a connection of its own, so their number is not limited.
         connector = aiohttp.TCPConnector(limit=0)
         self._session = aiohttp.ClientSession(headers=headers, timeout=timeout, connector=connector, trust_env=False)
 
@@ -47,17 +47,17 @@ class Http:
         await self._session.close()
 
     async def get(self, path: str, **query: Any) -> dict[str, Any]:
-        """As `ask`, of a reading or a command."""
+        """Send a GET; see `ask`."""
         return await self.ask("GET", path, query)
 
     async def ask(
         self, method: str, path: str, query: Mapping[str, Any], body: Mapping[str, Any] | None = None
     ) -> dict[str, Any]:
-        """The body of a success. What is None in query and body is left out.
+        """Send a request and return the body of its success. Values in query and body that are None are left out.
 
         Raises:
-            UavApiError: what the API answered, by its code.
-            Unreachable: nothing answers, or no JSON.
+            UavApiError: the error of the API's answer.
+            Unreachable: nothing answers, or the answer is not JSON.
         """
         content = None if body is None else {name: value for name, value in body.items() if value is not None}
         url = self.url + path
@@ -77,4 +77,4 @@ class Http:
     def stream(self, path: str, **query: Any) -> aiohttp.client._WSRequestContextManager:
         """A WebSocket, as a context manager."""
         url, query = self.url + path, _as_text(query)
-        return self._session.ws_connect(url, params=query, compress=0, max_msg_size=1 << 20, heartbeat=ALIVE_EVERY)
+        return self._session.ws_connect(url, params=query, compress=0, max_msg_size=1 << 20, heartbeat=PING_PERIOD)

@@ -1,4 +1,4 @@
-"""Places and offsets, on the flat patch of Earth that ArduPilot reckons with. Pure."""
+"""Positions and offsets, with the flat-Earth approximation that ArduPilot uses. Pure."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mavproxy_uavapi.core.vehicle.geodesy import METRES_PER_DEGREE, offset
 
 @dataclass(frozen=True)
 class Ned:
-    """North, east, down: m of an offset, m/s of a velocity."""
+    """North, east, down: m for an offset, m/s for a velocity."""
 
     north: float = 0.0
     east: float = 0.0
@@ -33,17 +33,17 @@ class Ned:
 
     @property
     def horizontal(self) -> float:
-        """Its length on the ground."""
+        """Its horizontal length."""
         return math.hypot(self.north, self.east)
 
     @property
     def length(self) -> float:
-        """Its length in space."""
+        """Its length in three dimensions."""
         return math.hypot(self.north, self.east, self.down)
 
     @property
     def bearing(self) -> float:
-        """Where it points, degrees clockwise from north, from 0 to less than 360."""
+        """Its direction, degrees clockwise from north, from 0 to less than 360."""
         return math.degrees(math.atan2(self.east, self.north)) % 360.0
 
 
@@ -74,7 +74,7 @@ class Position:
         return Ned(north, east, other.alt - self.alt)
 
     def distance(self, other: Position) -> float:
-        """Metres in space."""
+        """Metres in three dimensions."""
         return (other - self).length
 
     def bearing(self, other: Position) -> float:

@@ -1,4 +1,4 @@
-"""What the vehicle last told, by the API's stream, with its age."""
+"""The newest telemetry of a vehicle, from the API's stream, with its age."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ NAMES = (
     "SYS_STATUS",
     "EXTENDED_SYS_STATE",
 )
-AGAIN_AFTER = 0.5  # s from a stream that ended to the next attempt
+RETRY_AFTER = 0.5  # s from the end of a stream to the next attempt
 NO_AUTOPILOT = 8  # MAV_AUTOPILOT_INVALID: a gimbal, a companion, a ground station
 
 
-class Told(NamedTuple):
-    """A message's fields as MAVLink has them, and when it arrived here (s)."""
+class StreamedMessage(NamedTuple):
+    """A message's fields as MAVLink has them, and its time of arrival here (s)."""
 
     fields: dict[str, Any]
     at: float
@@ -42,7 +42,7 @@ class Telemetry:
     Args:
         http: the API.
         system: the vehicle's system id.
-        max_age: s after which a message is not served any more.
+        max_age: s after which a message is too old.
         clock: monotonic s.
     """
 
@@ -51,7 +51,7 @@ class Telemetry:
         self._system = system
         self._max_age = max_age
         self._clock = clock
-        self._messages: dict[str, Told] = {}
+        self._messages: dict[str, StreamedMessage] = {}
         self._component: int | None = None
         self._news: list[asyncio.Event] = []
 
@@ -63,18 +63,19 @@ class Telemetry:
         """
         age = self.age(name)
         if age is None:
-            raise Stale(f"vehicle {self._system} has not told {name} yet")
+            raise Stale(f"vehicle {self._system} has not reported {name} yet")
         if age > self._max_age:
-            raise Stale(f"vehicle {self._system} last told {name} {age:.1f} s ago (max_age is {self._max_age:g} s)")
+            limit = f"max_age is {self._max_age:g} s"
+            raise Stale(f"vehicle {self._system} last reported {name} {age:.1f} s ago ({limit})")
         return self._messages[name].fields
 
     def age(self, name: str) -> float | None:
-        """Seconds since the newest message of that name arrived; None where there is none."""
-        told = self._messages.get(name)
-        return None if told is None else self._clock() - told.at
+        """Seconds since the newest message of that name arrived; None without one."""
+        message = self._messages.get(name)
+        return None if message is None else self._clock() - message.at
 
     async def shows(self, condition: Callable[[], bool], within: float) -> bool:
-        """Wait until that holds; it is looked at with each message. Whether it came to hold within so many s."""
+        """Wait up to `within` s until `condition` holds; each message checks it again. Returns whether it holds."""
         news = asyncio.Event()
         self._news.append(news)
 
@@ -92,13 +93,13 @@ class Telemetry:
         return True
 
     async def run(self) -> None:
-        """Listen for ever; a stream that ends is opened again."""
+        """Read the stream until cancelled; a stream that ends is reopened."""
         while True:
             try:
                 await self._listen()
             except (aiohttp.ClientError, asyncio.TimeoutError, OSError, ValueError, KeyError, TypeError) as error:
                 log.info("the stream of %s ended: %s", self._http.url, str(error) or type(error).__name__)
-            await asyncio.sleep(AGAIN_AFTER)
+            await asyncio.sleep(RETRY_AFTER)
 
     async def _listen(self) -> None:
         async with self._http.stream("/telemetry/stream", names=",".join(NAMES), sysid=self._system) as socket:
@@ -109,11 +110,11 @@ class Telemetry:
                 self.hear(event["name"], event["component"], event["fields"])
 
     def hear(self, name: str, component: int, fields: dict[str, Any]) -> None:
-        """Take a message of one of the system's components; only its autopilot's count."""
+        """Process a message of one of the system's components; only the autopilot's are kept."""
         if name == "HEARTBEAT" and fields["autopilot"] != NO_AUTOPILOT:
             self._component = component
         if component != self._component:
             return
-        self._messages[name] = Told(fields, self._clock())
+        self._messages[name] = StreamedMessage(fields, self._clock())
         for news in self._news:
             news.set()

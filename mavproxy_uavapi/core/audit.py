@@ -1,4 +1,4 @@
-"""The audit trail: every command, who asked for it, what reached the vehicle, and how it ended."""
+"""The audit trail: every command, its client, the messages that were sent, and its outcome."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ class Audit:
         self.file = None if directory is None else directory / FILE
         self.entries: deque[Entry] = deque(maxlen=KEPT)
         self._refusals = Refusals()
-        self._telling: asyncio.TimerHandle | None = None
+        self._report_timer: asyncio.TimerHandle | None = None
         # A disk may stall; the asyncio loop must not. So one thread writes, in order.
         self._writer = ThreadPoolExecutor(1, "uavapi-audit")
         self._room = threading.BoundedSemaphore(WAITING)
@@ -124,11 +124,11 @@ class Audit:
             code: of the error.
         """
         self._refusals.add(client, code)
-        if self._telling is None:
-            self._telling = asyncio.get_running_loop().call_later(COUNTED_FOR, self._tell_refusals)
+        if self._report_timer is None:
+            self._report_timer = asyncio.get_running_loop().call_later(COUNTED_FOR, self._report_refusals)
 
-    def _tell_refusals(self) -> None:
-        self._telling = None
+    def _report_refusals(self) -> None:
+        self._report_timer = None
         for client, codes in self._refusals.take().items():
             detail = f"{sum(codes.values())} requests were refused"
             self.add(Entry(utc_now(), client, "refused", codes, 0, "refused", detail, COUNTED_FOR, ()))
@@ -153,16 +153,16 @@ class Audit:
 
     def close(self) -> None:
         """Write what is left. Any thread, when the asyncio thread has ended."""
-        if self._telling is not None:
-            self._telling.cancel()
-        self._tell_refusals()
+        if self._report_timer is not None:
+            self._report_timer.cancel()
+        self._report_refusals()
         self._writer.shutdown()
         if self._lines is not None:
             self._lines.close()
 
 
 def _lines_in(file: Path) -> RotatingFile:
-    def tell(text: str) -> None:
+    def report(text: str) -> None:
         log.error("%s", text)
 
-    return RotatingFile(file, FILE_BYTES, OLDER_FILES, tell, private=True, delay=True)
+    return RotatingFile(file, FILE_BYTES, OLDER_FILES, report, private=True, delay=True)

@@ -50,7 +50,7 @@ class BackgroundCommands:
 
     async def _run(self, command: Command, doing: str) -> None:
         loop = asyncio.get_running_loop()
-        slow = loop.call_later(SLOW, self.say, f"still {doing}; a line tells when that is done") if doing else None
+        slow = loop.call_later(SLOW, self.say, f"still {doing}; a line follows when it is done") if doing else None
         try:
             self.say(await command())
         except UavApiError as error:

@@ -12,6 +12,7 @@
     |  |- Busy                 409 busy           the state forbids it now
     |  |- Paused               409 paused         `stop` holds the vehicle
     |  |- NotArmed             409 not_armed
+    |  |- OutsideEnvelope      409 outside_envelope
     |  `- Aborted              409 aborted
     |- Invalid                 422 invalid        nothing was sent
     |  `- SettingError         422 invalid        an unknown setting, or a value that it refuses
@@ -30,7 +31,7 @@ else uses the statuses.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 SOURCES = (["query"], ["body"])
@@ -102,7 +103,7 @@ class Superseded(Conflict):
 
 
 class ModeChanged(Conflict):
-    """The vehicle left the mode that the verb needs; whoever switched it has it now."""
+    """The vehicle left the mode that the verb needs: the pilot or a failsafe has it now."""
 
     code = "mode_changed"
 
@@ -114,7 +115,7 @@ class Busy(Conflict):
 
 
 class Paused(Conflict):
-    """`stop` holds the vehicle still until somebody resumes it."""
+    """`stop` holds the vehicle still until `resume`."""
 
     code = "paused"
 
@@ -123,6 +124,23 @@ class NotArmed(Conflict):
     """The verb needs an armed vehicle."""
 
     code = "not_armed"
+
+
+class OutsideEnvelope(Conflict):
+    """It would leave the envelope; nothing was sent.
+
+    `outside` says `what` it breaks, `at` which place (`lat`, `long` degrees, `alt` m above home), and `by` how much.
+    """
+
+    code = "outside_envelope"
+
+    def __init__(self, sentence: str, outside: Mapping[str, Any] | None = None) -> None:
+        super().__init__(sentence)
+        self.outside = dict(outside or {})
+
+    def extras(self) -> dict[str, Any]:
+        """`outside`, where something is."""
+        return {"outside": self.outside} if self.outside else {}
 
 
 class Aborted(Conflict):
@@ -135,7 +153,7 @@ class Invalid(UavApiError):
     """A value of the wrong type or out of range; nothing was sent.
 
     `problems` are `{"loc": [...], "msg": str, "type": str}`, as web clients of typed APIs know them; `loc` is the
-    path to the value. For a value that came by HTTP, `came_by` puts query or body before it.
+    path to the value. For a value that came by HTTP, `set_source` puts query or body before it.
     """
 
     status, code = 422, "invalid"
@@ -149,7 +167,7 @@ class Invalid(UavApiError):
     def __str__(self) -> str:
         return "; ".join(": ".join(filter(None, (".".join(map(str, p["loc"])), p["msg"]))) for p in self.problems)
 
-    def came_by(self, source: str) -> None:
+    def set_source(self, source: str) -> None:
         """Note which part of a request had the values, unless that is known."""
         for problem in self.problems:
             if problem["loc"][:1] not in SOURCES:
@@ -189,7 +207,7 @@ class TooManyRequests(UavApiError):
 
 
 class Rejected(UavApiError):
-    """The autopilot refused: `ack` is the MAV_RESULT name, `statustext` what it said since it was asked."""
+    """The autopilot refused: `ack` is the MAV_RESULT name, `statustext` its messages since the request."""
 
     status, code = 500, "rejected"
 
@@ -242,7 +260,7 @@ class NoVehicle(Unavailable):
 
 
 class Stale(Unavailable):
-    """The data asked for is older than its limit."""
+    """The requested data is older than its limit."""
 
     code = "stale"
 

@@ -5,23 +5,29 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from mavproxy_uavapi.core.audit import Audit, Entry, utc_now
-from mavproxy_uavapi.core.errors import LinkLost
+from mavproxy_uavapi.core.envelope import formats
+from mavproxy_uavapi.core.envelope.store import OPERATOR, Envelopes, missing
+from mavproxy_uavapi.core.errors import LinkLost, UavApiError
 from mavproxy_uavapi.core.mainloop.bridge import Bridge
+from mavproxy_uavapi.core.mavlink.fence_watch import FenceWatch
 from mavproxy_uavapi.core.mavlink.link import Link, MavproxyLink
 from mavproxy_uavapi.core.mavlink.link_watch import LinkWatch
 from mavproxy_uavapi.core.mavlink.parameter_watch import ParameterWatch
 from mavproxy_uavapi.core.mavlink.pending_waits import PendingWaits
 from mavproxy_uavapi.core.mavlink.vehicle_state import Fleet, VehicleState
 from mavproxy_uavapi.core.vehicle.endings import FlightEndings
+from mavproxy_uavapi.core.vehicle.envelope_watch import EnvelopeWatch
 from mavproxy_uavapi.core.vehicle.jobs import Job, JobBook
+from mavproxy_uavapi.core.vehicle.leases import Leases
 from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
 
-ATTRIBUTE = "uavapi_host"  # on MAVProxy's state, so that a module loaded anew finds it
+ATTRIBUTE = "uavapi_host"  # attribute of MAVProxy's state, so that a reloaded module finds it
 
 
 class Host:
@@ -31,18 +37,22 @@ class Host:
 
     Attributes:
         audit: the trail of commands.
+        envelopes: where vehicles may fly.
+        leases: for how long a client counts as alive without a call.
+        envelope_watch: stops those of ours that would leave.
         listeners: called with each vehicle message, after the state has taken it and the waits have seen it.
+        observers: called with what happens besides: name, system id, s ago, and what; see `tell`.
         api_address: where `uavapi` listens; None while it does not.
         extensions: HTTP routes of the other modules, by path; `uavapi` serves them while it is loaded.
         commands: words after `uavapi` at the prompt that other modules serve.
-        last_words: called before the host ends: the messages to be sent then, and the systems that they go to.
+        closing_messages: called before the host ends: the messages to be sent then, and the systems that they go to.
         newest_frame: gives the newest camera frame as JPEG; None while no module has a camera.
 
     Args:
         mpstate: MAVProxy's state.
         clock: monotonic seconds.
         link: sends messages, in place of MAVProxy's links.
-        loop: an asyncio loop that somebody else runs, in place of the host's own thread.
+        loop: an asyncio loop that the caller runs, in place of the host's own thread.
     """
 
     def __init__(
@@ -59,21 +69,28 @@ class Host:
         self._mavproxy_link = MavproxyLink(self.bridge, mpstate)
         self.link = link or self._mavproxy_link
         self.link_watch = LinkWatch(self.pending, clock, self.bridge.loop)
-        self.registry = VehicleRegistry(self.fleet, self.link, self.link_watch, self.pending, clock)
+        self.envelopes = Envelopes()
+        self.registry = VehicleRegistry(
+            self.fleet, self.link, self.link_watch, self.pending, clock, envelopes=self.envelopes
+        )
         self.audit = Audit(log_directory(mpstate))
         self.jobs = JobBook()
         self.jobs.on_ended.append(self._leave_trace)
         self.endings = FlightEndings(self.jobs)
+        self.leases = Leases(self.endings, self.link_watch, clock, self.bridge.loop, self.warn)
+        self.envelope_watch = EnvelopeWatch(self.registry, self.jobs, self.envelopes, self.warn)
         self.listeners: list[Callable[[VehicleState, Any, float], None]] = []
+        self.observers: list[Callable[[str, int, float, Mapping[str, Any]], None]] = []
         self.extensions: dict[str, Any] = {}
         self.commands: dict[str, Callable[[list[str]], None]] = {}
         self.newest_frame: Callable[[], Awaitable[bytes]] | None = None
         self.api_address: tuple[str, int] | None = None
         self.members: list[Any] = []
-        self.last_words: list[Callable[[], list[tuple[Any, int]]]] = [self.endings.last_words]
+        self.closing_messages: list[Callable[[], list[tuple[Any, int]]]] = [self.endings.closing_messages]
         self._mpstate = mpstate
-        self._told_target = 0
+        self._announced_target = 0
         self._parameters = ParameterWatch()
+        self._fences = FenceWatch()
 
     # -- MAVProxy's main loop ---------------------------------------------------------------------------
 
@@ -89,28 +106,31 @@ class Host:
         if not self.bridge.running:
             self.bridge.start()
         target = self._mpstate.settings.target_system
-        if target != self._told_target:
-            self._told_target = target
+        if target != self._announced_target:
+            self._announced_target = target
             self.bridge.call_soon(setattr, self.registry, "current", target)
-        self._tell_parameters()
+        self._share_parameters()
+        self._share_fences()
         self.bridge.turn()
 
     def end(self) -> None:
-        """Send the last words, and end the asyncio thread.
+        """Send the closing messages, and end the asyncio thread.
 
         MAVProxy's main loop waits for us, or has ended, and sends nothing. So this thread sends, only here.
         """
 
         async def collect() -> list[tuple[Any, int]]:
-            return [word for words in self.last_words for word in words()]
+            self.leases.close()
+            await self.envelope_watch.close()
+            return [message for messages in self.closing_messages for message in messages()]
 
         if self.bridge.running:
             for message, system in self.bridge.run(collect()):
-                with contextlib.suppress(LinkLost):  # there is nobody to hear us
+                with contextlib.suppress(LinkLost):  # the vehicle does not hear us
                     self._mavproxy_link.write(message, system)
         self.bridge.stop()
 
-    def _tell_parameters(self) -> None:
+    def _share_parameters(self) -> None:
         """Hand over the parameters that MAVProxy has learnt, in order with the messages: a later PARAM_VALUE wins.
 
         With `--continue` MAVProxy's tables hold a file of an earlier session, not the vehicle's own values.
@@ -121,6 +141,15 @@ class Host:
         if changes:
             self.bridge.feed_call(lambda: self.fleet.learn(changes))
 
+    def _share_fences(self) -> None:
+        """Hand over the fences that MAVProxy has loaded, where they are the vehicles' envelopes."""
+        if not self.envelopes.expects_fences:
+            self._fences.forget()
+            return
+        changes = self._fences.changes(self._mpstate.public_modules, self.clock())
+        if changes:
+            self.bridge.feed_call(lambda: self._take_fences(changes))
+
     # -- the asyncio thread -----------------------------------------------------------------------------
 
     def _receive(self, message: Any) -> None:
@@ -130,8 +159,32 @@ class Host:
             return
         self.pending.feed(state.system, message.get_type(), message)
         self.link_watch.watch(state)
+        self.envelope_watch.listen(state, message)
         for listener in list(self.listeners):
             listener(state, message, now)
+
+    def tell(self, name: str, system: int, info: Mapping[str, Any]) -> None:
+        """Tell the observers that something has happened; the asyncio thread only."""
+        for observer in list(self.observers):
+            observer(name, system, 0.0, info)
+
+    def _take_fences(self, fences: dict[int, list[Any]]) -> None:
+        for system, items in fences.items():
+            source = f"the fence of vehicle {system}"
+            try:
+                self.envelopes.put(OPERATOR, system, formats.of_fence(items, source, partial(self._home_of, system)))
+            except UavApiError as error:
+                self.envelopes.put(OPERATOR, system, missing(f"{source}: {error}", source))
+                self.warn(f"{source} cannot be its envelope: {error}")
+
+    def _home_of(self, system: int) -> tuple[float, float] | None:
+        state = self.fleet.vehicles.get(system)
+        home = None if state is None else state.messages.get("HOME_POSITION")
+        return None if home is None else (home.message.latitude / 1e7, home.message.longitude / 1e7)
+
+    def warn(self, sentence: str) -> None:
+        """Print a sentence at the prompt, loudly. Any thread."""
+        self.bridge.post(lambda: print(f"\a*** {sentence}"))
 
     def _leave_trace(self, job: Job) -> None:
         """Write a job that ended to the trail, unless the HTTP call that began it does."""
@@ -146,7 +199,7 @@ class Host:
             outcome="ok" if job.error is None else job.error.code,
             detail=(job.result or "") if job.error is None else str(job.error),
             seconds=round(job.ended_at - job.began_at, 3),
-            sent=job.sent.tell(),
+            sent=job.sent.summary(),
         )
         self.audit.add(entry)
 

@@ -83,7 +83,7 @@ class _Console(logging.Handler):
 
 
 class _Formatter(logging.Formatter):
-    """Makes one line of each record, whatever a client put into it; a traceback keeps its lines."""
+    """Makes one line of each record, even if a client put line breaks into it; a traceback keeps its lines."""
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802  logging's own name
         return escaped(super().formatMessage(record))
@@ -138,7 +138,7 @@ class Logs:
         return RotatingFile(log_file(path, system), FILE_BYTES, FILES_KEPT, lambda text: self._say(f"API: {text}"))
 
     def _to_file(self, writer: logging.Handler) -> logging.Handler:
-        """A handler that only queues; a thread of its own writes, so that a slow disk delays nobody."""
+        """A handler that only queues; a thread of its own writes, so that a slow disk delays no other thread."""
         writer.setFormatter(logging.Formatter(FORMAT))
         records: queue.SimpleQueue[logging.LogRecord] = queue.SimpleQueue()
         handler = logging.handlers.QueueHandler(records)

@@ -91,10 +91,10 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
             if not self._begun:
                 self._begun = True
                 self.begin()
-        except Exception as error:  # noqa: BLE001  nobody else reports it
-            self._tell_failure(error)
+        except Exception as error:  # noqa: BLE001  MAVProxy does not report it
+            self._report_failure(error)
 
-    def _tell_failure(self, error: Exception) -> None:
+    def _report_failure(self, error: Exception) -> None:
         """Print why an idle task failed: once, not several hundred times a second."""
         failure = f"{type(error).__name__}: {error}"
         if failure != self._told_failure:

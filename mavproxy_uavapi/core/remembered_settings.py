@@ -12,7 +12,7 @@ UNSHOWN = {"origins"}  # keywords that are no settings
 class RememberedSettings:
     """The keywords of one module's `module load`, and what was set at the prompt since.
 
-    A load without keywords takes over those of the load before; a load with keywords begins anew. The INI file that
+    A load without keywords uses those of the load before; a load with keywords replaces them. The INI file that
     the keyword `config` names is read again.
 
     Args:

@@ -21,7 +21,7 @@ class RotatingFile(logging.handlers.RotatingFileHandler):
         file: its path.
         size: bytes after which it is renamed, and a new one begins.
         older: number of renamed files that are kept.
-        tell: called with one line when the file cannot be written.
+        report: called with one line when the file cannot be written.
         private: whether only its owner may read it.
         delay: whether it is opened with the first line, not at once.
 
@@ -34,12 +34,12 @@ class RotatingFile(logging.handlers.RotatingFileHandler):
         file: Path,
         size: int,
         older: int,
-        tell: Callable[[str], None],
+        report: Callable[[str], None],
         *,
         private: bool = False,
         delay: bool = False,
     ) -> None:
-        self._tell, self._private = tell, private
+        self._report, self._private = report, private
         self._failing = self._failed = False
         super().__init__(file, maxBytes=size, backupCount=older, encoding="utf-8", delay=delay)
 
@@ -47,7 +47,7 @@ class RotatingFile(logging.handlers.RotatingFileHandler):
         mode = PRIVATE if self._private else PUBLIC
         descriptor = os.open(self.baseFilename, os.O_WRONLY | os.O_APPEND | os.O_CREAT, mode)
         if self._private:
-            with contextlib.suppress(OSError):  # a file system without modes, or somebody else's file
+            with contextlib.suppress(OSError):  # a file system without modes, or a file of another user
                 os.fchmod(descriptor, PRIVATE)
         if _is_torn(Path(self.baseFilename)):
             os.write(descriptor, b"\n")
@@ -60,16 +60,16 @@ class RotatingFile(logging.handlers.RotatingFileHandler):
         self._failed = self._failing
 
     def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802  logging's own name
-        """Report once, and drop what the disk did not take: the next line opens the file anew."""
+        """Report once, and drop what the disk did not take: the next line reopens the file."""
         self._failing = True
         if not self._failed:
-            self._tell(f"cannot write {self.baseFilename}: {sys.exc_info()[1]}")
+            self._report(f"cannot write {self.baseFilename}: {sys.exc_info()[1]}")
         stream, self.stream = self.stream, None
         _close(stream)
 
     def close(self) -> None:
         """Write what is left, if the disk takes it."""
-        with contextlib.suppress(OSError):  # it was told of
+        with contextlib.suppress(OSError):  # it was reported
             super().close()
 
 

@@ -31,7 +31,7 @@ class SentNames:
         else:
             self._more += 1
 
-    def tell(self) -> tuple[str, ...]:
+    def summary(self) -> tuple[str, ...]:
         """The names; three or more of one name in a row appear once, with their number: `NAME x240`."""
         self.in_trail = True
         names = [
@@ -63,7 +63,7 @@ def noting_sent() -> Iterator[SentNames]:
 
 
 @contextmanager
-def noting_sent_if_nobody_does() -> Iterator[SentNames | None]:
+def noting_sent_unless_noted() -> Iterator[SentNames | None]:
     """As `noting_sent`; None within an HTTP call, which notes them itself."""
     sent = _sent.get()
     if sent is not None and not sent.in_trail:

@@ -18,7 +18,7 @@ from mavproxy_uavapi.core.text import escaped, nearest
 from mavproxy_uavapi.core.values import converted, is_unset, path_of
 
 CONFIG_VARIABLE = "UAVAPI_CONFIG"  # names the INI file where no keyword `config` does
-DEFAULT = "default"  # the origin of a value that nobody set
+DEFAULT = "default"  # the origin of a value that was never set
 ENVIRONMENT = "environment"
 KEYWORD = "module load"
 
@@ -41,7 +41,7 @@ class Change:
 
 
 class ModuleSettings(ABC, Generic[Snapshot]):
-    """The settings of a loaded module, validated wherever they come from.
+    """The settings of a loaded module, validated for every source.
 
     MPSettings is not used: it accepts NaN, and prints its own lines about values that it refuses.
 
@@ -50,7 +50,7 @@ class ModuleSettings(ABC, Generic[Snapshot]):
         secrets: settings whose values errors and listings do not show.
         parsers: make the snapshot's value of a setting that is written as text; they raise SettingError.
         notes: remarks about the INI file for the prompt, a line each.
-        origins: where the value of each setting came from that somebody set.
+        origins: the source of each setting's value, for settings that were set.
 
     Args:
         keywords: of `module load`. `config` names an INI file, and `origins` says by setting where the launcher

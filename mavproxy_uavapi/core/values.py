@@ -55,7 +55,7 @@ def converted(kind: type, value: object) -> Any:
 
 
 def path_of(text: str, name: str = "") -> Path:
-    """The path, with `~` and `~somebody` expanded; errors begin with `name`, the setting's or the argument's.
+    """The path, with `~` and `~user` expanded; errors begin with `name`, the setting's or the argument's.
 
     Raises:
         SettingError: no user has that name, or no path can be written so.
@@ -66,4 +66,4 @@ def path_of(text: str, name: str = "") -> Path:
     try:
         return Path(text).expanduser()
     except RuntimeError as error:  # as pathlib reports it
-        raise SettingError(f"{place}{text!r}: nobody here has that name, or has a home", *loc) from error
+        raise SettingError(f"{place}{text!r}: no such user, or the user has no home folder", *loc) from error

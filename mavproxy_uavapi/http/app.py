@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import functools
 import logging
 import socket
@@ -16,19 +17,19 @@ from aiohttp.http_exceptions import HttpProcessingError
 from mavproxy_uavapi.core.errors import NotFound
 from mavproxy_uavapi.http.auditing import audited
 from mavproxy_uavapi.http.bodies import invite
-from mavproxy_uavapi.http.call import SERVICE, Call, Service, parameters
+from mavproxy_uavapi.http.call import SERVICE, Call, Service, holder_of, parameters
 from mavproxy_uavapi.http.connection import IDLE_TIMEOUT, LINGER, headers_are_here
-from mavproxy_uavapi.http.cors import TRUSTED, name_the_trusted
+from mavproxy_uavapi.http.cors import TRUSTED_ORIGIN, add_cors_headers
 from mavproxy_uavapi.http.error_answers import errors_as_answers
 from mavproxy_uavapi.http.listener import Listener, listening_socket
-from mavproxy_uavapi.http.rate_limits import at_a_bearable_rate, yield_to_main_loop
+from mavproxy_uavapi.http.rate_limits import limit_rate, yield_to_main_loop
 from mavproxy_uavapi.http.responses import Handler, success
 from mavproxy_uavapi.http.router import MATCH, Router
-from mavproxy_uavapi.http.routes import ROUTES
+from mavproxy_uavapi.http.routes import PAGE, ROUTES
 from mavproxy_uavapi.http.security import door
 
 log = logging.getLogger("uavapi.http.server")
-MIDDLEWARES = (headers_are_here, errors_as_answers, door, at_a_bearable_rate, yield_to_main_loop)
+MIDDLEWARES = (headers_are_here, errors_as_answers, door, limit_rate, yield_to_main_loop)
 WITH_BODY = ("POST", "PUT")
 SHUTDOWN_TIMEOUT = 1.0  # s for unfinished answers when the server stops
 
@@ -40,17 +41,17 @@ def make_handler(service: Service, system: int = 0) -> Handler:
         service: the objects that the handlers work with.
         system: the system id for paths that name none; 0 for the one in the settings.
     """
-    router = Router(ROUTES, service.host.extensions, system)
+    router = Router([*ROUTES, *PAGE], service.host.extensions, system)
 
     async def handle(request: web.BaseRequest) -> web.StreamResponse:
         request[SERVICE] = service
         request[MATCH] = router.find(request.method, request.path)
         origin = request.headers.get("Origin")
         if origin in service.settings.cors_origins:
-            request[TRUSTED] = origin
+            request[TRUSTED_ORIGIN] = origin
         response = await _behind_the_door(request)
         if not response.prepared:
-            name_the_trusted(request, response)
+            add_cors_headers(request, response)
         return response
 
     return handle
@@ -77,6 +78,7 @@ async def _answer(request: web.BaseRequest) -> web.StreamResponse:
     route = match.route
     if route is None:
         raise web.HTTPMethodNotAllowed(request.method, match.allowed)
+    request[SERVICE].host.leases.renew(holder_of(request))
     await invite(request)
     params = await parameters(request, route.model, body=request.method in WITH_BODY and not route.raw)
     call = Call(request[SERVICE], request, params, match)
@@ -95,8 +97,10 @@ _behind_the_door = _guarded(_answer)
 
 
 def is_ours(record: logging.LogRecord) -> bool:
-    """Whether an aiohttp log line is about us; lines about clients that speak no HTTP or have gone are not."""
-    return record.exc_info is None or not isinstance(record.exc_info[1], HttpProcessingError | ConnectionError)
+    """Whether an aiohttp log line is about us, not about a client that speaks no HTTP, has gone, or reads nothing."""
+    error = None if record.exc_info is None else record.exc_info[1]
+    unread = isinstance(error, OSError) and error.errno == errno.ETIMEDOUT  # the kernel closed the connection
+    return not (unread or isinstance(error, HttpProcessingError | ConnectionError))
 
 
 log.addFilter(is_ours)

@@ -45,7 +45,7 @@ class Trace:
         self._clock = call.service.host.clock
         self._began = self._clock()
         try:
-            self._system = call.seen.state.system
+            self._system = call.known_vehicle.state.system
         except NoVehicle:
             self._system = 0
 
@@ -76,11 +76,11 @@ class Trace:
             time=utc_now(),
             client=self._call.client,
             verb=self._call.path,
-            request=self._call.asked,
+            request=self._call.recorded_parameters,
             system=self._system,
             outcome=outcome,
             detail=detail,
             seconds=round(self._clock() - self._began, 3),
-            sent=self._sent.tell(),
+            sent=self._sent.summary(),
         )
         self._call.service.host.audit.add(entry)

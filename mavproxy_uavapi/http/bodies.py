@@ -29,5 +29,5 @@ async def invite(request: web.BaseRequest) -> None:
         try:
             await request.writer.write(CONTINUE)
         except ConnectionError as error:
-            raise BadRequest("the client hung up before its body was asked for") from error
+            raise BadRequest("the client hung up before its body was requested") from error
         request.writer.output_size = 0  # the answer's first byte is still to come

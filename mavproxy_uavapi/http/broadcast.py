@@ -1,121 +1,131 @@
-"""Passes each arriving message to all subscribers, encoded once and only when somebody reads it. Pure."""
+"""Passes what arrives to all clients of streams: messages, views of them, and events."""
 
 from __future__ import annotations
 
 import asyncio
 import time
-from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from functools import cached_property
 from typing import Any
 
+from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
-from mavproxy_uavapi.http.responses import dumps
-from mavproxy_uavapi.http.telemetry_views import fields
+from mavproxy_uavapi.http.stream_event import Event, of_info, of_message
+from mavproxy_uavapi.http.stream_news import NewsWatch
+from mavproxy_uavapi.http.stream_views import BY_MESSAGE, OF_A_MESSAGE, OF_A_VEHICLE
+from mavproxy_uavapi.http.subscription import Subscription
 
-QUEUED = 1000  # messages; a client that reads slower than that loses the oldest
-TOGETHER = 100  # messages that a client gets at once
-
-Listener = Callable[[VehicleState, Any, float], None]
-
-
-class Event:
-    """A message on its way to its subscribers.
-
-    Args:
-        message: the MAVLink message.
-        at: its arrival, s since 1970.
-    """
-
-    def __init__(self, message: Any, at: float) -> None:
-        self.message, self._at = message, at
-        self.name: str = message.get_type()
-
-    @cached_property
-    def _members(self) -> str:
-        members = {
-            "system": self.message.get_srcSystem(),
-            "component": self.message.get_srcComponent(),
-            "name": self.name,
-            "time": round(self._at, 3),
-            "fields": fields(self.message),
-        }
-        return dumps(members)[1:]
-
-    def json(self, dropped: int) -> str:
-        """The event as JSON, for a client that has lost `dropped` messages so far."""
-        return f'{{"dropped": {dropped}, {self._members}'
-
-
-class Subscription:
-    """One client's filter, and its messages that are not yet read.
-
-    Args:
-        names: of the wanted messages; empty for all.
-        system: the system id; None for all.
-        rate: highest rate of each name of each component in Hz; None for all messages.
-
-    Attributes:
-        dropped: messages lost because the client reads too slowly.
-    """
-
-    def __init__(self, names: frozenset[str], system: int | None, rate: float | None) -> None:
-        self._names = names
-        self._system = system
-        self._interval = 1.0 / rate if rate else 0.0
-        self._last: dict[tuple[int, int, str], float] = {}
-        self._queue: deque[Event] = deque(maxlen=QUEUED)
-        self._news = asyncio.Event()
-        self.dropped = 0
-
-    def offer(self, state: VehicleState, event: Event, now: float) -> None:
-        """Queue a message that arrived at `now` (s), if it is wanted; a full queue loses its oldest."""
-        if (self._names and event.name not in self._names) or self._system not in (None, state.system):
-            return
-        if self._interval:
-            key = state.system, event.message.get_srcComponent(), event.name
-            if now - self._last.get(key, -self._interval) < self._interval:
-                return
-            self._last[key] = now
-        if len(self._queue) == QUEUED:
-            self.dropped += 1
-        self._queue.append(event)
-        self._news.set()
-
-    async def next(self) -> list[Event]:
-        """The next events, at least one."""
-        while not self._queue:
-            self._news.clear()
-            await self._news.wait()
-        return [self._queue.popleft() for _ in range(min(len(self._queue), TOGETHER))]
+TICK = 0.5  # s from one summary of a vehicle to the next
 
 
 class TelemetryBroadcast:
-    """Passes arriving messages to every subscription.
+    """Passes what arrives to every subscription.
 
     Args:
-        listeners: the host's; the broadcast is in it while there is a subscription.
+        host: its listeners call the broadcast while there is a subscription.
     """
 
-    def __init__(self, listeners: list[Listener]) -> None:
-        self._listeners = listeners
+    def __init__(self, host: Host) -> None:
+        self._host = host
         self._subscriptions: list[Subscription] = []
+        self._wishes: dict[tuple[str, str], bool] = {}  # whether anybody wants that, as far as it was asked
+        self._watch = NewsWatch(host)
+        self._ticks: asyncio.TimerHandle | None = None
 
     @contextmanager
     def heard_by(self, subscription: Subscription) -> Iterator[Subscription]:
-        """Offer all messages to a subscription for as long as the context lasts."""
+        """Offer everything to a subscription for as long as the context lasts; first what is known already."""
         if not self._subscriptions:
-            self._listeners.append(self._offer)
+            self._host.listeners.append(self._take)
+            self._host.observers.append(self._tell)
         self._subscriptions.append(subscription)
+        self._wishes.clear()
         try:
+            self._tell_first(subscription)
+            if subscription.wishes.needs_ticks and self._ticks is None:
+                self._watch.everything()
+                self._tick()
             yield subscription
         finally:
+            subscription.close()
             self._subscriptions.remove(subscription)
+            self._wishes.clear()
             if not self._subscriptions:
-                self._listeners.remove(self._offer)
+                self._host.listeners.remove(self._take)
+                self._host.observers.remove(self._tell)
 
-    def _offer(self, state: VehicleState, message: Any, now: float) -> None:
-        event = Event(message, time.time())
+    def _offer(self, event: Event) -> None:
+        now = self._host.clock()
         for subscription in self._subscriptions:
-            subscription.offer(state, event, now)
+            subscription.offer(event, now)
+
+    def _wanted(self, kind: str, name: str) -> bool:
+        wanted = self._wishes.get((kind, name))
+        if wanted is None:
+            wanted = any(name in getattr(subscription.wishes, kind) for subscription in self._subscriptions)
+            self._wishes[kind, name] = wanted
+        return wanted
+
+    def _take(self, state: VehicleState, message: Any, _now: float) -> None:
+        """A message has arrived."""
+        at, name = time.time(), message.get_type()
+        if self._wanted("name", name):
+            self._offer(of_message(message, at))
+        for view in BY_MESSAGE.get(name, ()):
+            newest = state.newest(name)
+            # Another component's message is no view where the autopilot tells the same.
+            if newest is not None and newest.message is message and self._wanted("view", view):
+                self._offer(_view_of(view, state.system, message, at))
+        if self._ticks is not None:
+            changes = self._watch.of_vehicle(state)
+            for change in [*changes, *(self._watch.of_jobs() if changes else ())]:
+                self._tell(*change)
+            if changes:
+                self._summarize(state.system)
+
+    def _tick(self) -> None:
+        """Twice a second: what no message announces, such as silence."""
+        if not any(subscription.wishes.needs_ticks for subscription in self._subscriptions):
+            self._ticks = None
+            return
+        self._ticks = asyncio.get_running_loop().call_later(TICK, self._tick)
+        self._offer(self._alive())
+        for change in self._watch.everything():
+            self._tell(*change)
+        for system in list(self._host.fleet.vehicles):
+            self._summarize(system)
+
+    def _alive(self) -> Event:
+        systems = sorted(self._host.fleet.vehicles)
+        return of_info("event", "alive", 0, time.time(), {"vehicles": systems})
+
+    def _tell(self, name: str, system: int, ago: float, info: Mapping[str, Any]) -> None:
+        """Pass an event on; it happened `ago` s ago."""
+        if self._wanted("event", name):
+            self._offer(of_info("event", name, system, time.time() - ago, info))
+
+    def _summarize(self, system: int) -> None:
+        vehicle = self._host.registry.find(system)
+        for name, make in OF_A_VEHICLE.items():
+            info = make(self._host, vehicle) if self._wanted("view", name) else None
+            if info is not None:
+                self._offer(of_info("view", name, system, time.time(), info))
+
+    def _tell_first(self, subscription: Subscription) -> None:
+        """Offer what was known before it came, with the time of its arrival."""
+        now, wall = self._host.clock(), time.time()
+        subscription.offer(self._alive(), now)  # its time shows how old the others are
+        if subscription.wishes.view:
+            for system, state in self._host.fleet.vehicles.items():
+                for view, (name, _) in OF_A_MESSAGE.items():
+                    newest = state.newest(name)
+                    if newest is not None:
+                        subscription.offer(_view_of(view, system, newest.message, wall - (now - newest.at)), now)
+        if subscription.wishes.event:
+            for event, system, ago, info in self._watch.first():
+                subscription.offer(of_info("event", event, system, wall - ago, info), now)
+
+
+def _view_of(view: str, system: int, message: Any, at: float) -> Event:
+    make = OF_A_MESSAGE[view][1]
+    return Event("view", view, system, at, lambda: {"info": make(message)})

@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import math
+import re
 from collections.abc import Awaitable, Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, TypeVar, cast
@@ -33,6 +35,8 @@ T = TypeVar("T")
 
 WAITS = {"true", "1", "yes"}  # values of the query's `wait`
 HURRIES = {"false", "0", "no"}
+LONGEST_LEASE = 3600.0  # s
+CLIENT_NAME = re.compile(r"[\w.:-]{1,64}", re.ASCII)  # the query's `client`
 ON_DISCONNECT = {"continue": "nothing", "hold": "hold"}  # the query's `on_disconnect`: the policy's value
 
 
@@ -62,7 +66,7 @@ class Service:
 
     def __post_init__(self) -> None:
         self.scripts = Scripts(self.host, self.settings)
-        self.broadcast = TelemetryBroadcast(self.host.listeners)
+        self.broadcast = TelemetryBroadcast(self.host)
         self.throttle = LogThrottle(self.host.clock, log.warning)
 
 
@@ -98,7 +102,7 @@ class Call:
         return self.named_system or self.service.settings.sysid
 
     @property
-    def seen(self) -> Vehicle:
+    def known_vehicle(self) -> Vehicle:
         """The vehicle, whether its link is alive or not."""
         return self.service.host.registry.find(self.system)
 
@@ -128,7 +132,7 @@ class Call:
 
     def answer(self, result: str, **members: Any) -> dict[str, Any]:
         """A success body."""
-        return envelope(self.seen.state.system, result, **members)
+        return envelope(self.known_vehicle.state.system, result, **members)
 
     async def fly(
         self,
@@ -151,7 +155,12 @@ class Call:
             identity: what identifies the request, if the parameters do not.
         """
         params = self.remembered = identity or self.remembered
-        is_async, on_disconnect = self.is_async, self.on_disconnect
+        is_async, on_disconnect, lease, holder = (
+            self.is_async,
+            self.on_disconnect,
+            self.lease,
+            holder_of(self.request),
+        )
 
         async def body(job: Job) -> str:
             with self.naming_source():
@@ -172,6 +181,9 @@ class Call:
             timeout=getattr(params, "timeout", None),
         )
         job.on_disconnect = on_disconnect or job.on_disconnect
+        job.holder = holder
+        if lease is not None:
+            self.service.host.leases.take(vehicle, holder, lease)
         script = None
         if is_async or (outlives_client and not urgent):  # other jobs end with their client, or stop the vehicle
             self.job = job
@@ -190,7 +202,7 @@ class Call:
         return await job.outcome(script)
 
     @property
-    def asked(self) -> dict[str, Any]:
+    def recorded_parameters(self) -> dict[str, Any]:
         """The parameters that were sent or have a default, or `remembered`."""
         return self.remembered.model_dump(exclude_none=True)
 
@@ -200,7 +212,7 @@ class Call:
         try:
             yield
         except Invalid as error:
-            error.came_by("query" if self.request.method == "GET" else "body")
+            error.set_source("query" if self.request.method == "GET" else "body")
             raise
 
     @property
@@ -232,11 +244,35 @@ class Call:
             raise Invalid(f"{action!r} is none of {', '.join(ON_DISCONNECT)}", "query", "on_disconnect")
         return None if action is None else ON_DISCONNECT[action]
 
+    @property
+    def lease(self) -> float | None:
+        """For how many s the client counts as alive without another call, if the query says so; 0 ends that."""
+        text = self.request.query.get("lease")
+        try:
+            seconds = None if text is None else float(text)
+        except ValueError:
+            seconds = math.nan
+        if seconds is not None and not 0 <= seconds <= LONGEST_LEASE:
+            raise Invalid(f"{text!r} is no number of seconds up to {LONGEST_LEASE:g}", "query", "lease")
+        return seconds
+
     def accepted(self, job: Job) -> web.Response:
         """202: the job goes on; the answer says where to find it."""
         self.job = job
         body = self.answer(f"Job {job.id} accepted", job=job.id)
         return web.json_response(body, status=202, headers={"Location": f"/jobs/{job.id}"})
+
+
+def holder_of(request: web.BaseRequest) -> str:
+    """The name under which a client holds leases: its address, and what the query's `client` adds to it.
+
+    Raises:
+        Invalid: `client` is no short word.
+    """
+    name, address = request.query.get("client"), request.remote or "unknown"
+    if name is not None and not CLIENT_NAME.fullmatch(name):
+        raise Invalid(f"{name!r} is no word of up to 64 letters, digits, `_`, `.`, `:` and `-`", "query", "client")
+    return address if name is None else f"{name}@{address}"
 
 
 BODY_TIMEOUT = 10.0  # s from the headers to the end of the body

@@ -169,7 +169,7 @@ class Connection(asyncio.Protocol):
 
 
 async def headers_are_here(request: web.BaseRequest, handler: Handler) -> web.StreamResponse:
-    """Mark a request as begun and later as answered; close its connection if nobody read the body."""
+    """Mark a request as begun and later as answered; close its connection if the body was not read."""
     connection = Connection.of(request)
     if connection is not None:
         connection.began()

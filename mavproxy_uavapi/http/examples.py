@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from mavproxy_uavapi.http import requests
+from mavproxy_uavapi.http.message import RawMessage
 from mavproxy_uavapi.http.parameters import NewValue
 from mavproxy_uavapi.http.telemetry_views import SENSORS
 
@@ -56,6 +57,7 @@ QGC WPL 110
 
 REQUESTS: Mapping[type[requests.Request], Mapping[str, Any]] = {
     requests.Takeoff: {"alt": 10},
+    RawMessage: {"name": "STATUSTEXT", "fields": {"severity": "MAV_SEVERITY_INFO", "text": "hello"}},
     requests.LandAt: {"lat": -35.3629, "long": 149.1652},
     requests.Reverse: {"reverse": True},
     NewValue: {"value": 500},
@@ -92,6 +94,7 @@ VEHICLE = {
     "heading": 90.1,
     "age_s": 0.12,
     "current": True,
+    "paused": False,
     "commanded_by": {"job": "7", "verb": "/movement/go_to_ned_wait", "client": "127.0.0.1"},
 }
 
@@ -263,4 +266,23 @@ BODIES: Mapping[str, Mapping[str, Any]] = {
     "/jobs": {"jobs": [JOB]},
     "GET /jobs/{id}": JOB,
     "DELETE /jobs/{id}": {**JOB, "state": "aborted", "error": ABORTED},
+}
+ENVELOPE = {
+    "type": "FeatureCollection",
+    "features": [
+        {
+            "type": "Feature",
+            "properties": {"kind": "inclusion", "name": "field", "ceiling": 60},
+            "geometry": {
+                "type": "Polygon",
+                "coordinates": [[[149.16, -35.367], [149.17, -35.367], [149.17, -35.359], [149.16, -35.359]]],
+            },
+        },
+        {
+            "type": "Feature",
+            "properties": {"kind": "exclusion", "name": "mast", "radius": 25, "ceiling": 40},
+            "geometry": {"type": "Point", "coordinates": [149.1665, -35.3625]},
+        },
+    ],
+    "limits": {"height": 60, "distance": 400, "speed": 8},
 }

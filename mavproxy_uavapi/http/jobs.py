@@ -8,28 +8,7 @@ from typing import Any
 from mavproxy_uavapi.core.errors import Aborted, Busy, NotFound, UavApiError
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.http.call import Call
-
-
-def describe(job: Job, now: float) -> dict[str, Any]:
-    """A job as an answer body; times in s."""
-    return {
-        "job": job.id,
-        "verb": job.verb,
-        "request": job.request,
-        "client": job.client,
-        "state": job.outcome_name,
-        "progress": {**job.stage, **job.progress},
-        "seconds": round((job.ended_at or now) - job.began_at, 3),
-        "result": job.result,
-        "error": None if job.error is None else error_of(job),
-    }
-
-
-def error_of(job: Job) -> dict[str, Any]:
-    """Why the job failed, as in the answer of the blocking call."""
-    assert job.error is not None
-    error = job.error
-    return {"status": error.status, "code": error.code, "detail": error.detail, **error.extras()}
+from mavproxy_uavapi.http.reports import report_of_job
 
 
 def _job(call: Call) -> Job:
@@ -47,12 +26,12 @@ def _is_meant(call: Call, job: Job) -> bool:
 async def list_jobs(call: Call) -> dict[str, Any]:
     """All running jobs and the last ones that ended; under /vehicles/{sysid} only those of that vehicle."""
     host = call.service.host
-    return {"jobs": [describe(job, host.clock()) for job in host.jobs.all() if _is_meant(call, job)]}
+    return {"jobs": [report_of_job(job, host.clock()) for job in host.jobs.all() if _is_meant(call, job)]}
 
 
 async def show_job(call: Call) -> dict[str, Any]:
     """One job: its state, progress, and result or error."""
-    return describe(_job(call), call.service.host.clock())
+    return report_of_job(_job(call), call.service.host.clock())
 
 
 async def abort_job(call: Call) -> dict[str, Any]:
@@ -63,7 +42,7 @@ async def abort_job(call: Call) -> dict[str, Any]:
     job.abort(Aborted(f"{job.verb} was aborted by DELETE /jobs/{job.id}"))
     closing = host.endings.closing(job)
     if closing is None:
-        return {**describe(job, host.clock()), "then": "nothing is sent"}
+        return {**report_of_job(job, host.clock()), "then": "nothing is sent"}
     with contextlib.suppress(UavApiError):  # the job that follows reports it
         await closing.outcome()
-    return {**describe(job, host.clock()), "then": closing.result or str(closing.error)}
+    return {**report_of_job(job, host.clock()), "then": closing.result or str(closing.error)}

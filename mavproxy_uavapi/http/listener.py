@@ -136,7 +136,7 @@ class Listener:
             except (BlockingIOError, InterruptedError, ConnectionAbortedError):
                 return
             except OSError as error:
-                self._throttle.tell("accept", f"no connection can be accepted: {error.strerror}")
+                self._throttle.log("accept", f"no connection can be accepted: {error.strerror}")
                 self._loop.remove_reader(port)
                 self._resuming[port] = self._loop.call_later(AFTER_FAILURE, self._resume, port)
                 return
@@ -151,14 +151,14 @@ class Listener:
         try:
             going = to_replace(self._connections, group, is_local, self._most(), scarce)
             if going is not None:
-                self._throttle.tell("replaced", f"an idle connection of {going.group} was closed for one of {group}")
+                self._throttle.log("replaced", f"an idle connection of {going.group} was closed for one of {group}")
                 going.abort()
             if scarce:
                 near = lowest(near)
             if near.fileno() > highest:
                 raise NoRoom("descriptors", "MAVProxy needs the descriptors that are left")
         except NoRoom as error:
-            self._throttle.tell(error.cause, f"a connection of {group} was refused: {error}")
+            self._throttle.log(error.cause, f"a connection of {group} was refused: {error}")
             near.close()
             return
         near.setblocking(False)

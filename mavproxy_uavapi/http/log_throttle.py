@@ -21,7 +21,7 @@ class LogThrottle:
         self._write = write
         self._causes: dict[str, tuple[float, int]] = {}  # cause -> (last written at, left out since)
 
-    def tell(self, cause: str, line: str) -> None:
+    def log(self, cause: str, line: str) -> None:
         """Write `line`, unless one of that cause was written within the last minute.
 
         Args:

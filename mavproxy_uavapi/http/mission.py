@@ -28,10 +28,10 @@ async def upload(call: Call) -> Answer:
     async def verb(job: Job) -> None:
         _require_no_flown_mission(vehicle)
 
-        def told(done: int, of: int) -> None:
+        def report_progress(done: int, of: int) -> None:
             job.progress = {"item": done, "items": of}
 
-        await vehicle.waypoints.upload(items, told, check=lambda: _require_no_flown_mission(vehicle))
+        await vehicle.waypoints.upload(items, report_progress, check=lambda: _require_no_flown_mission(vehicle))
 
     # A client that hangs up must not leave half a mission behind.
     result = f"Mission of {len(items)} items uploaded"
@@ -69,14 +69,14 @@ async def start(call: Call) -> Answer:
 
 async def progress(call: Call) -> Answer:
     """The current item, the number of items, the item reached last, and the distance (m) to the current one."""
-    vehicle = call.seen
+    vehicle = call.known_vehicle
     info = mission_flight.progress(vehicle)
     age = vehicle.state.newest("MISSION_CURRENT")
     assert age is not None
     seconds = max(vehicle.clock() - age.at, 0.0)
     limit = call.params(Read).max_age or call.service.settings.max_age
     if seconds > limit:
-        raise Stale(f"vehicle {vehicle.state.system} last told MISSION_CURRENT {seconds:.1f} s ago")
+        raise Stale(f"vehicle {vehicle.state.system} last reported MISSION_CURRENT {seconds:.1f} s ago")
     return call.answer("Success", info=info, age_s=round(seconds, 3))
 
 

@@ -34,6 +34,8 @@ TAGS = {
     "jobs": "The running verbs and the last ones that ended.",
     "mission": "Scripts, each in its own tmux session; and the mission that the autopilot itself flies.",
     "parameters": "The autopilot's parameters; each new value is read back.",
+    "envelope": "Where vehicles may fly. Nothing that leads out of it is sent, whoever asks for it.",
+    "message": "Any MAVLink message, for what has no verb. Off unless the setting `allow_raw` is true.",
     "vehicles": "All known vehicles. The prefix `/vehicles/{sysid}` of any path means that vehicle; without it the "
     "setting `sysid` decides, or MAVProxy's current vehicle is meant.",
     "fleet": "One verb for several vehicles, with an answer for each.",
@@ -45,7 +47,15 @@ TAGS = {
 EVERYWHERE = (errors.Unauthorized, errors.Forbidden, errors.Invalid, errors.TooManyRequests)
 OF_A_VEHICLE = (errors.LinkLost, errors.NoVehicle)
 OF_A_COMMAND = (*OF_A_VEHICLE, errors.NotSupported, errors.Rejected, errors.TimedOut, errors.Busy)
-OF_A_FLIGHT = (*OF_A_COMMAND, errors.Superseded, errors.ModeChanged, errors.Paused, errors.NotArmed, errors.Aborted)
+OF_A_FLIGHT = (
+    *OF_A_COMMAND,
+    errors.Superseded,
+    errors.ModeChanged,
+    errors.Paused,
+    errors.NotArmed,
+    errors.Aborted,
+    errors.OutsideEnvelope,
+)
 OF_A_SCRIPT = (errors.BadRequest, errors.NotFound, errors.ToolFailed)
 BY_TAG: Mapping[str, tuple[type[UavApiError], ...]] = {
     "command": OF_A_FLIGHT,
@@ -53,13 +63,14 @@ BY_TAG: Mapping[str, tuple[type[UavApiError], ...]] = {
     "telemetry": (*OF_A_VEHICLE, errors.Stale, errors.NotFound),
     "jobs": (errors.NotFound, errors.Busy),
     "mission": OF_A_SCRIPT,
+    "envelope": (errors.NotFound, errors.BadRequest),
     "vehicles": (errors.NotFound,),
-    "parameters": (*OF_A_VEHICLE, errors.NotFound, errors.TimedOut),
+    "parameters": (*OF_A_VEHICLE, errors.NotFound, errors.TimedOut, errors.OutsideEnvelope),
     "fleet": (),
     "docs": (errors.NotFound,),
 }
 BY_PATH: Mapping[str, tuple[type[UavApiError], ...]] = {
-    "/mission/waypoints": (*OF_A_COMMAND, errors.BadRequest, errors.Aborted),
+    "/mission/waypoints": (*OF_A_COMMAND, errors.BadRequest, errors.Aborted, errors.OutsideEnvelope),
     "/mission/start": OF_A_FLIGHT,
     "/mission/progress": (errors.NoVehicle, errors.Stale),
     "/peripherical/servo_output": OF_A_COMMAND,
@@ -76,6 +87,10 @@ RAW_BODIES: Mapping[str, Mapping[str, Any]] = {
     "/parameters": {
         "text/plain": {"schema": {"type": "string"}, "example": "WPNAV_SPEED 500"},
         "application/json": {"schema": {"type": "object"}, "example": {"parameters": {"WPNAV_SPEED": 500}}},
+    },
+    "/envelope": {
+        "application/geo+json": {"schema": {"type": "object"}, "example": examples.ENVELOPE},
+        "application/vnd.google-earth.kml+xml": {"schema": {"type": "string"}},
     },
     "/mission/waypoints": {
         "text/plain": {"schema": {"type": "string"}, "example": examples.WPL},
@@ -125,6 +140,7 @@ FAILURE = {
         "code": {"type": "string"},
         "ack": {"type": "string", "description": "MAV_RESULT or MAV_MISSION_RESULT, if the autopilot refused"},
         "statustext": {"type": "array", "items": {"type": "string"}, "description": "the autopilot's texts since"},
+        "outside": {"type": "object", "description": "what it would break (`what`), where (`at`), and `by` how much"},
         "stderr": {"type": "string", "description": "the error output of the program that failed"},
     },
 }
@@ -144,6 +160,20 @@ HURRY = [
         "required": False,
         "schema": {"type": "string", "enum": ["continue", "hold"]},
         "description": "what the vehicle does when the client hangs up; it overrides the setting of that name",
+    },
+    {
+        "name": "lease",
+        "in": "query",
+        "required": False,
+        "schema": {"type": "number", "minimum": 0, "maximum": 3600},
+        "description": "s without a call of this client until `on_lease_end` is done; 0 gives the lease back",
+    },
+    {
+        "name": "client",
+        "in": "query",
+        "required": False,
+        "schema": {"type": "string", "pattern": "^[A-Za-z0-9_.:-]{1,64}$"},
+        "description": "tells clients of one address apart, for leases",
     },
     {
         "name": "Prefer",
@@ -280,7 +310,7 @@ def _body(route: Route) -> dict[str, Any]:
 
 def _success(route: Route, method: str) -> dict[str, Any]:
     if route.path in KINDS:
-        return {"description": "What was asked for.", "content": dict(KINDS[route.path])}
+        return {"description": "The requested content.", "content": dict(KINDS[route.path])}
     body = example_answer(route.path, method)
     usual = "device" in body
     schema = {"$ref": "#/components/schemas/Success"} if usual else {"type": "object"}

@@ -52,7 +52,7 @@ async def parameter_file(call: Call) -> web.StreamResponse:
 
 
 def _known(call: Call) -> dict[str, float]:
-    known, pattern = call.seen.state.parameters, call.params(ParameterFilter).match.upper()
+    known, pattern = call.known_vehicle.state.parameters, call.params(ParameterFilter).match.upper()
     return {name: known[name] for name in sorted(known) if fnmatch.fnmatchcase(name, pattern)}
 
 

@@ -31,13 +31,13 @@ async def yield_to_main_loop(request: web.BaseRequest, handler: Handler) -> web.
     return await handler(request)
 
 
-def _whose(caller: Caller, request: web.BaseRequest) -> str:
+def _rate_key(caller: Caller, request: web.BaseRequest) -> str:
     """The key under which requests are counted: the caller and the vehicle. Unknown vehicles count as one."""
     system = request[MATCH].system
     return f"{caller.group} {system if system in request[SERVICE].host.fleet.vehicles else 0}"
 
 
-async def at_a_bearable_rate(request: web.BaseRequest, handler: Handler) -> web.StreamResponse:
+async def limit_rate(request: web.BaseRequest, handler: Handler) -> web.StreamResponse:
     """Refuse a caller that asks more often than it may."""
     service = request[SERVICE]
     caller: Caller | None = request.get(CALLER)  # None for a reader of the documentation, counted by the door check
@@ -45,7 +45,7 @@ async def at_a_bearable_rate(request: web.BaseRequest, handler: Handler) -> web.
         return await handler(request)
     rate = service.settings.local_rate if caller.is_local else service.settings.max_rate
     if rate:
-        wait = service.callers.take(_whose(caller, request), rate, service.host.clock())
+        wait = service.callers.take(_rate_key(caller, request), rate, service.host.clock())
         if wait:
             raise TooManyRequests(f"more than {rate:g} requests a second", math.ceil(wait))
     return await handler(request)

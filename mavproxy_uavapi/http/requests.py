@@ -243,11 +243,18 @@ class Read(Request):
 
 
 class StreamFilter(Request):
-    """The contents of a telemetry stream: message names by comma, a system id, and at most `rate` Hz per name."""
+    """What a stream tells: names by comma, with `*` and `?`.
 
-    names: Annotated[str, Field(description="message names by comma; empty for all")] = ""
+    With none of `names`, `view` and `events` it tells all messages.
+    """
+
+    names: Annotated[str, Field(description="messages, such as ATTITUDE,GPS*")] = ""
+    view: Annotated[str, Field(description="payloads of this API, such as gps,attitude,status")] = ""
+    events: Annotated[str, Field(description="mode, armed, job …; * for all")] = ""
     sysid: Annotated[int | None, Field(ge=1, le=255, description="system id; omitted for all"), Written] = None
-    rate: Annotated[float | None, Field(gt=0, le=1000, description="highest rate of each name in Hz"), Written] = None
+    rate: Annotated[
+        float | None, Field(gt=0, le=1000, description="Hz of each name; the newest is kept"), Written
+    ] = None
 
 
 def parse(model: type[Request], source: str, values: dict[str, Any]) -> Request:

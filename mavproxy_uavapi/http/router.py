@@ -58,6 +58,8 @@ class Router:
     def find(self, method: str, path: str) -> Match:
         """The route of a request; a trailing slash of its path makes no difference."""
         path, system = path.rstrip("/"), self._system
+        if not path and method == "GET":
+            path = "/"  # the page; to any other method there is nothing
         named = OF_A_VEHICLE.fullmatch(path)
         if named is not None and int(named["system"]) <= LARGEST_SYSTEM:
             path, system = named["path"], int(named["system"])

@@ -7,9 +7,12 @@ from typing import Any
 from mavproxy_uavapi.http import (
     command,
     docs_page,
+    envelope,
     jobs,
+    message,
     mission,
     movement,
+    page,
     parameters,
     peripherical,
     photo,
@@ -122,6 +125,13 @@ PARAMETERS = [
     Route("/parameters/{name}", parameters.set_parameter, parameters.NewValue, ("PUT",)),
 ]
 
+ENVELOPE = [
+    Route("/envelope", envelope.show, requests.Empty),
+    Route("/envelope", envelope.put, requests.Empty, ("PUT",), raw=True),
+    Route("/envelope", envelope.remove, requests.Empty, ("DELETE",)),
+]
+MESSAGE = [Route("/message", message.send_message, message.RawMessage, POST, job=True)]
+
 VEHICLES = [
     Route("/vehicles", vehicles.list_vehicles, requests.Empty),
     Route("/vehicles/{sysid}", vehicles.show_vehicle, requests.Empty),
@@ -133,4 +143,22 @@ DOCS = [
     Route("/docs/{file}", docs_page.asset, requests.Empty),
 ]
 
-ROUTES = [*COMMAND, *MOVEMENT, *TELEMETRY, *JOBS, *MISSION, *PERIPHERICAL, *PARAMETERS, *VEHICLES, *FLEET, *DOCS]
+PAGE = [  # no part of the API, and not described
+    Route("/", page.index, requests.Empty),
+    Route("/page/{file}", page.asset, requests.Empty),
+]
+
+ROUTES = [
+    *COMMAND,
+    *MOVEMENT,
+    *TELEMETRY,
+    *JOBS,
+    *MISSION,
+    *PERIPHERICAL,
+    *PARAMETERS,
+    *ENVELOPE,
+    *MESSAGE,
+    *VEHICLES,
+    *FLEET,
+    *DOCS,
+]

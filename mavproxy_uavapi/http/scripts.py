@@ -10,9 +10,9 @@ from typing import Any
 
 from aiohttp import web
 
-from mavproxy_uavapi.core.errors import Forbidden, NotFound
+from mavproxy_uavapi.core.errors import NotFound
+from mavproxy_uavapi.http.access import require_owner
 from mavproxy_uavapi.http.call import Call
-from mavproxy_uavapi.http.caller import CALLER, Caller
 from mavproxy_uavapi.http.forms import file_of
 from mavproxy_uavapi.http.requests import ExecuteScript, ScriptLog, ScriptName
 from mavproxy_uavapi.http.responses import dumps, envelope
@@ -101,9 +101,7 @@ def _scripts(call: Call) -> Scripts:
     Raises:
         Forbidden: the caller has no token, is not a program of this machine, and its network is not in the settings.
     """
-    caller: Caller = call.request[CALLER]
-    if not (caller.has_token or caller.is_local or caller.is_in(call.service.settings.allow_scripts_from)):
-        raise Forbidden("scripts run on this machine: call with the token, or from here, or set allow_scripts_from")
+    require_owner(call, "scripts run on this machine")
     return call.service.scripts
 
 

@@ -23,7 +23,8 @@ from mavproxy_uavapi.core.errors import Forbidden, TooManyRequests, UavApiError,
 from mavproxy_uavapi.http.call import SERVICE
 from mavproxy_uavapi.http.caller import CALLER, Caller, address_of, group_of
 from mavproxy_uavapi.http.connection import Connection
-from mavproxy_uavapi.http.cors import TRUSTED
+from mavproxy_uavapi.http.cors import TRUSTED_ORIGIN
+from mavproxy_uavapi.http.page import wants_page
 from mavproxy_uavapi.http.responses import Handler, failure
 from mavproxy_uavapi.http.router import MATCH
 from mavproxy_uavapi.settings import ApiSettings
@@ -32,8 +33,10 @@ log = logging.getLogger("uavapi.http.door")
 OURSELVES = {"same-origin", "none"}  # Sec-Fetch-Site of our own page and of a typed address
 # What a browser accepts for a page, picture, style, script or film; programs ask for JSON or for anything.
 BROWSERS_WANT = ("text/html", "application/xhtml", "image/", "text/css", "javascript", "video/", "audio/")
+DOCUMENTATION = ("/docs", "/openapi.json")
 PROXIES_SAY = ("Forwarded", "X-Forwarded-For", "X-Real-IP", "Via")
 STRANGERS_RATE = 10.0  # requests/s of one address that fail the door check
+READERS_RATE = 50.0  # files/s of the page that one address may read without the token
 REFUSED_LATE = 1.0  # s by which the answer is delayed if its address was refused too often
 
 
@@ -172,12 +175,12 @@ async def door(request: web.BaseRequest, handler: Handler) -> web.StreamResponse
     connection = Connection.of(request)
     try:
         check_origin(request.headers, settings.cors_origins)
-        if TRUSTED in request and request.method == "OPTIONS":
+        if TRUSTED_ORIGIN in request and request.method == "OPTIONS":
             return web.Response(status=204)
         caller = admitted(request, settings)
     except Unauthorized as error:
-        # A browser has no token before it has the page that asks for one; the page shows nothing of the vehicle.
-        if not is_documentation(request[MATCH].path) or _wait_of_stranger(request):
+        # A browser has no token before it has the page that asks for one; the files show nothing of the vehicle.
+        if not is_open(request[MATCH].path, request.headers) or _wait_of_reader(request):
             return await _refused(request, connection, error)
         return await handler(request)
     except Forbidden as error:
@@ -191,7 +194,7 @@ async def door(request: web.BaseRequest, handler: Handler) -> web.StreamResponse
 async def _refused(request: web.BaseRequest, connection: Connection | None, error: UavApiError) -> web.StreamResponse:
     """The answer to a request that fails the door check, delayed if that happens often. It ends the connection."""
     service, group = request[SERVICE], group_of(address_of(request.remote))
-    service.throttle.tell(error.code, f"a request of {group} was refused: {ascii(str(error))[1:-1]}")
+    service.throttle.log(error.code, f"a request of {group} was refused: {ascii(str(error))[1:-1]}")
     if connection is not None:
         connection.judged(False)
     wait = _wait_of_stranger(request)
@@ -206,10 +209,23 @@ async def _refused(request: web.BaseRequest, connection: Connection | None, erro
 
 def _wait_of_stranger(request: web.BaseRequest) -> float:
     """Count a request that fails the door check; 0, or the seconds to wait if there were too many."""
+    return _wait(request, "", STRANGERS_RATE)
+
+
+def _wait_of_reader(request: web.BaseRequest) -> float:
+    """The same for a file that needs no token; the page consists of many."""
+    if request[MATCH].path.startswith(DOCUMENTATION):
+        return _wait_of_stranger(request)
+    return _wait(request, " reads", READERS_RATE)
+
+
+def _wait(request: web.BaseRequest, what: str, rate: float) -> float:
     service, group = request[SERVICE], group_of(address_of(request.remote))
-    return service.strangers.take(group, STRANGERS_RATE, service.host.clock())
+    return service.strangers.take(f"{group}{what}", rate, service.host.clock())
 
 
-def is_documentation(path: str) -> bool:
-    """Whether a path is the documentation's, which needs no token."""
-    return path.rstrip("/") in ("/docs", "/openapi.json") or path.startswith("/docs/")
+def is_open(path: str, headers: Mapping[str, str]) -> bool:
+    """Whether a path needs no token: the documentation's, and the page's."""
+    if path == "/":
+        return wants_page(headers.get("Accept", ""))
+    return path in DOCUMENTATION or path.startswith(("/docs/", "/page/"))

@@ -7,8 +7,8 @@ from contextlib import suppress
 
 from aiohttp import WSCloseCode, WSMsgType, web
 
-from mavproxy_uavapi.core.timeout import wait_with_timeout
-from mavproxy_uavapi.http.broadcast import Subscription
+from mavproxy_uavapi.core.errors import Invalid
+from mavproxy_uavapi.http import stream_news, stream_views
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import StreamFilter
 from mavproxy_uavapi.http.streaming import (
@@ -21,13 +21,14 @@ from mavproxy_uavapi.http.streaming import (
     limit_kernel,
     while_read,
 )
+from mavproxy_uavapi.http.subscription import Names, Subscription, Wishes
 
 MOST_SAID = 4096  # bytes of a message from a WebSocket's client; no message is expected
 HEARD_EVERY = 0.1  # s between two of its messages; more of them wait on its side
 
 
 async def stream(call: Call) -> web.StreamResponse:
-    """Messages as they arrive, filtered by name, system and rate."""
+    """Messages, views and events as they arrive, filtered by name, system and rate."""
     with call.service.streams.one_more(), call.service.broadcast.heard_by(_subscription(call)) as subscription:
         if call.request.headers.get("Upgrade", "").lower() == "websocket":
             return await _websocket(call.request, subscription)
@@ -35,9 +36,21 @@ async def stream(call: Call) -> web.StreamResponse:
 
 
 def _subscription(call: Call) -> Subscription:
-    wishes = call.params(StreamFilter)
-    names = frozenset(name.strip().upper() for name in wishes.names.split(",") if name.strip())
-    return Subscription(names, wishes.sysid or call.named_system or None, wishes.rate)
+    asked = call.params(StreamFilter)
+    name, view, event = Names(asked.names.upper()), Names(asked.view), Names(asked.events)
+    _require_some("view", view, stream_views.NAMES)
+    _require_some("events", event, stream_news.NAMES)
+    if not (name or view or event):
+        name = Names("*")
+    system = asked.sysid or call.named_system or None
+    return Subscription(Wishes(name, view, event, system, asked.rate), asyncio.get_running_loop().call_later)
+
+
+def _require_some(parameter: str, asked: Names, known: tuple[str, ...]) -> None:
+    """Raise Invalid if a name that was asked for can never come."""
+    for pattern in asked.patterns:
+        if not any(one in Names(pattern) for one in known):
+            raise Invalid(f"{pattern!r} is none of {', '.join(known)}", "query", parameter)
 
 
 async def _websocket(request: web.BaseRequest, subscription: Subscription) -> web.StreamResponse:
@@ -62,11 +75,9 @@ async def _send_all(socket: web.WebSocketResponse, request: web.BaseRequest, sub
     transport = request.transport
     try:
         while transport is not None and not socket.closed:
-            try:
-                events = await wait_with_timeout(KEEP_ALIVE, subscription.next())
-            except asyncio.TimeoutError:
+            events = await subscription.next(KEEP_ALIVE)
+            if not events:
                 await while_read(transport, 0, socket.ping())
-                continue
             for event in events:
                 text = event.json(subscription.dropped)
                 await while_read(transport, len(text), socket.send_str(text))
@@ -81,11 +92,7 @@ async def _events(request: web.BaseRequest, subscription: Subscription) -> web.S
     with suppress(ConnectionError):  # the client has gone or reads no more; a stream ends so
         await response.prepare(request)
         while True:
-            try:
-                events = await wait_with_timeout(KEEP_ALIVE, subscription.next())
-            except asyncio.TimeoutError:
-                await response.write(COMMENT)
-            else:
-                texts = [f"event: {event.name}\ndata: {event.json(subscription.dropped)}\n\n" for event in events]
-                await response.write("".join(texts).encode())
+            events = await subscription.next(KEEP_ALIVE)
+            dropped = subscription.dropped
+            await response.write(b"".join([event.sse(dropped) for event in events]) or COMMENT)
     return response

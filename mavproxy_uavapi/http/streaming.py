@@ -14,11 +14,11 @@ from aiohttp import web
 from aiohttp.abc import AbstractStreamWriter
 
 from mavproxy_uavapi.core.errors import TooManyRequests
-from mavproxy_uavapi.http.cors import name_the_trusted
+from mavproxy_uavapi.http.cors import add_cors_headers
 
 log = logging.getLogger("uavapi.http")
 
-MOST_OPEN = 100  # streams at once, of all kinds
+MOST_OPEN = 120  # streams at once, of all kinds
 KEEP_ALIVE = 15.0  # s; silence after which a comment or ping is sent, to notice dead connections
 UNREAD = 30.0  # s without reading after which a client is dropped
 LINGER = 30.0  # s that it then has to read the reason
@@ -39,7 +39,7 @@ class Slots:
 
     Args:
         most: the limit.
-        what: a phrase for the refusal: `streams are open`.
+        phrase: ends the text of the refusal, such as `streams are open`.
 
     Attributes:
         count: the number now open.
@@ -70,19 +70,19 @@ class StreamingResponse(web.StreamResponse):
 
     Args:
         content_type: of the data.
-        last_words: sent last to a client that stopped reading, in case it reads on.
+        end_event: sent last to a client that stopped reading, in case it reads on.
     """
 
-    def __init__(self, content_type: str, last_words: bytes = b"") -> None:
+    def __init__(self, content_type: str, end_event: bytes = b"") -> None:
         super().__init__(headers={"Content-Type": content_type, "Cache-Control": "no-store"})
-        self._last_words = last_words
+        self._end_event = end_event
         self._transport: Any = None
 
     async def prepare(self, request: web.BaseRequest) -> AbstractStreamWriter | None:
         """Send the headers."""
         self._transport = request.transport
         limit_kernel(self._transport)
-        name_the_trusted(request, self)
+        add_cors_headers(request, self)
         return await super().prepare(request)
 
     async def write(self, data: bytes | bytearray | memoryview) -> None:
@@ -95,7 +95,7 @@ class StreamingResponse(web.StreamResponse):
         try:
             await while_read(self._transport, len(data), super().write(data))
         except NotRead:
-            await super().write(self._last_words)
+            await super().write(self._end_event)
             self._transport.close()  # after it has sent its buffer
             abort_later(self._transport)
             raise

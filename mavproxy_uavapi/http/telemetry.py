@@ -25,17 +25,17 @@ async def _newest(call: Call, name: str) -> Received:
     Raises:
         Stale: it is too old, or did not come.
     """
-    vehicle = call.seen
+    vehicle = call.known_vehicle
     max_age = call.params(Read).max_age or call.service.settings.max_age
     received = vehicle.state.newest(name)
     if received is None:
         await _ask_for(call, name)
         received = vehicle.state.newest(name)
         if received is None:  # it came with the news of a reboot, so it is outdated
-            raise Stale(f"vehicle {vehicle.state.system} has not told {name} since it rebooted")
+            raise Stale(f"vehicle {vehicle.state.system} has not reported {name} since it rebooted")
     age = vehicle.clock() - received.at
     if age > max_age:
-        raise Stale(f"vehicle {vehicle.state.system} last told {name} {age:.1f} s ago (max_age is {max_age:g} s)")
+        raise Stale(f"vehicle {vehicle.state.system} last reported {name} {age:.1f} s ago (max_age is {max_age:g} s)")
     return received
 
 
@@ -44,7 +44,7 @@ async def _ask_for(call: Call, name: str) -> None:
     try:
         await wait_with_timeout(FIRST_TIMEOUT, vehicle.request(name))
     except (Rejected, TimedOut, asyncio.TimeoutError) as error:
-        raise Stale(f"vehicle {vehicle.state.system} has not told {name} yet") from error
+        raise Stale(f"vehicle {vehicle.state.system} has not reported {name} yet") from error
 
 
 def _age(call: Call, received: Received) -> float:
@@ -105,7 +105,7 @@ async def error_info(call: Call) -> dict[str, Any]:
 
 async def compass(call: Call) -> dict[str, Any]:
     """The result of the last compass calibration since MAVProxy started."""
-    messages = call.seen.state.messages
+    messages = call.known_vehicle.state.messages
     newest = messages.get("MAG_CAL_REPORT")
     if newest is None:
         raise NotFound("no compass calibration was reported; MAG_CAL_REPORT comes during a calibration only")
@@ -115,20 +115,20 @@ async def compass(call: Call) -> dict[str, Any]:
 
 
 async def home_info(call: Call) -> dict[str, Any]:
-    """The home position, asked of the vehicle: degrees, m AMSL; x, y, z m north, east, down of the EKF origin."""
+    """Request the home position: degrees, m AMSL; x, y, z m north, east, down of the EKF origin."""
     vehicle = call.vehicle
     age = vehicle.state.age("HOME_POSITION", vehicle.clock())
     if age is None or age > HOME_AGE:
         await vehicle.home()
     received = vehicle.state.messages.get("HOME_POSITION")
     if received is None:
-        raise Stale(f"vehicle {vehicle.state.system} has not told its home since it rebooted")
+        raise Stale(f"vehicle {vehicle.state.system} has not reported its home since it rebooted")
     return call.answer("Success", **views.home(received.message), age_s=_age(call, received))
 
 
 async def status(call: Call) -> dict[str, Any]:
     """Whether the vehicle is flyable, and why not."""
-    vehicle, host = call.seen, call.service.host
+    vehicle, host = call.known_vehicle, call.service.host
     now = host.clock()
     info = status_of(vehicle, host.link_watch.is_alive(vehicle.state), now)
     return call.answer("Success", info=info, age_s=round(max(now - vehicle.state.heartbeat_at, 0.0), 3))
@@ -139,7 +139,7 @@ async def message(call: Call) -> dict[str, Any]:
     name = call.names["name"].upper()
     if name.partition("[")[0] not in MESSAGE_IDS:
         raise NotFound(f"there is no MAVLink message {name}")
-    state = call.seen.state
+    state = call.known_vehicle.state
     if state.newest(name) is None:
         raise NotFound(f"vehicle {state.system} has not sent {name}")
     received = await _newest(call, name)

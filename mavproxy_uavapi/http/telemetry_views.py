@@ -173,3 +173,13 @@ def compass(m: Any, fitness: list[float | None]) -> dict[str, Any]:
         "autosaved": bool(m.autosaved),
         "fitness": {"x": x, "y": y, "z": z},
     }
+
+
+IGNORE_POSITION = 0b111  # POSITION_TARGET_TYPEMASK: x, y, z
+
+
+def target(m: Any) -> dict[str, Any]:
+    """POSITION_TARGET_GLOBAL_INT: where the autopilot flies to, degrees and m AMSL; None if that is no place."""
+    if m.type_mask & IGNORE_POSITION or (m.lat_int, m.lon_int) == (0, 0):
+        return {"position": None}
+    return {"position": {"lat": m.lat_int / 1e7, "lon": m.lon_int / 1e7, "alt": known(m, "alt")}}

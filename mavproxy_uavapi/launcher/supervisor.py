@@ -165,7 +165,7 @@ class Supervisor:
     async def _vehicle_ready(self, process: Process, log: Path) -> None:
         """Wait for the line that the embedded vehicle prints when its port is open."""
         deadline = asyncio.get_running_loop().time() + VEHICLE_START_S
-        while not has_said(log, _READY):
+        while not has_logged(log, _READY):
             if process.returncode is not None:
                 raise LaunchError(f"the vehicle did not start: {last_line(log)} (log: {log})")
             if asyncio.get_running_loop().time() > deadline:
@@ -319,14 +319,14 @@ def complain(problem: str) -> None:
     print(f"\nmavproxy-uavapi: {problem}", file=sys.stderr)
 
 
-def has_said(log: Path, words: bytes) -> bool:
+def has_logged(log: Path, words: bytes) -> bool:
     """Whether the log contains the words."""
     return words in log.read_bytes()
 
 
 def last_line(log: Path) -> str:
     """The last line that is not empty, for an error that fits one line."""
-    return next((line for line in reversed(read_lines(log)) if line), "it said nothing")
+    return next((line for line in reversed(read_lines(log)) if line), "it logged nothing")
 
 
 def read_lines(log: Path) -> list[str]:

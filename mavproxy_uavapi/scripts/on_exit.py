@@ -14,7 +14,7 @@ GOES_ON = {"/command/land", "/command/rtl", "/mission/waypoints"}
 
 
 async def after_death(host: Host, sysid: int, run: Run, others: list[str]) -> str:
-    """End the jobs that only this script requested, and apply the setting if nobody else flies the vehicle.
+    """End the jobs that only this script requested, and apply the setting if no other client flies the vehicle.
 
     Args:
         host: the vehicles and the jobs.

@@ -136,11 +136,11 @@ class Runner:
                 ended_at = ended_at or time.monotonic()
             if ended_at is not None and time.monotonic() > ended_at + LAST_OUTPUT:
                 return  # a child of the script keeps its output open
-            self._stop_if_wanted(child)
+            self._stop_if_requested(child)
             for key, _ in selector.select(self._patience(ended_at)):
                 self._pass_on(selector, key)
         while child.poll() is None:  # it has closed its outputs, but still runs
-            self._stop_if_wanted(child)
+            self._stop_if_requested(child)
             for key, _ in selector.select(self._patience(None)):
                 self._pass_on(selector, key)
 
@@ -163,7 +163,7 @@ class Runner:
         else:
             selector.unregister(key.fileobj)
 
-    def _stop_if_wanted(self, child: subprocess.Popen[bytes]) -> None:
+    def _stop_if_requested(self, child: subprocess.Popen[bytes]) -> None:
         if self._stop_wanted and self._kill_at is None:
             self._kill_at = time.monotonic() + self._record["grace"]
             self._note(stopping_at=time.time())

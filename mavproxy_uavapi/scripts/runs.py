@@ -176,7 +176,7 @@ def refreshed(run: Run) -> Run:
     """The present state of the run."""
     try:
         return load(run.path)
-    except (OSError, ValueError):  # somebody removed the record
+    except (OSError, ValueError):  # the record was removed
         return replace(run, alive=_is_locked(run.out_log))
 
 

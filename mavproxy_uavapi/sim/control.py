@@ -214,4 +214,4 @@ def _seconds(request: Mapping[str, Any]) -> float:
 def _as_json(value: Any) -> Any:
     if isinstance(value, (bytes, bytearray)):
         return list(value)
-    raise TypeError(f"cannot tell {type(value).__name__} as JSON")
+    raise TypeError(f"cannot write {type(value).__name__} as JSON")

@@ -109,7 +109,7 @@ class MissionProtocol:
         return True
 
     def _foreign_upload(self, link: PeerLink, message: Any) -> bool:
-        """Somebody else's upload must not be disturbed; the own one may be started anew."""
+        """Another station's upload must not be disturbed; a station may restart its own."""
         if self._upload is not None and self._upload.sender != _sender(message):
             return self._busy(link, message)
         self._upload = None
@@ -133,7 +133,7 @@ class MissionProtocol:
         items = list(self.items(message.mission_type))
         first, last = message.start_index, message.end_index
         if not 0 <= first <= last < len(items):
-            self.vehicle.tell(StatusTextEvent(mavlink.MAV_SEVERITY_WARNING, "Flight plan update rejected"))
+            self.vehicle.emit(StatusTextEvent(mavlink.MAV_SEVERITY_WARNING, "Flight plan update rejected"))
             self._ack(link, message, mavlink.MAV_MISSION_ERROR)
             return
         self._begin(Upload(link, _sender(message), message.mission_type, first, last, items))

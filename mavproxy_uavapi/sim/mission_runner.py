@@ -63,7 +63,7 @@ class Flyer(Protocol):
         """Whether a condition holds that counts since that many seconds after boot."""
 
     def item_restarts(self) -> bool:
-        """Whether a changed mission starts the current item anew."""
+        """Whether a changed mission restarts the current item."""
 
     def mission_ended(self) -> None:
         """Nothing is left to do."""
@@ -72,7 +72,7 @@ class Flyer(Protocol):
 class MissionRunner:
     """Runs the mission of one vehicle from its marker on.
 
-    With reports_all MISSION_ITEM_REACHED tells of immediate items, too, and of several at once the last one only.
+    With reports_all MISSION_ITEM_REACHED reports immediate items, too, and of several at once only the last one.
     """
 
     def __init__(self, vehicle: Vehicle, flyer: Flyer, *, reports_all: bool = False) -> None:
@@ -104,7 +104,7 @@ class MissionRunner:
             self._watch_for_changes()
             self._update()
         if self._reports_all and self._reached is not None:
-            self._vehicle.tell(ItemReached(self._reached))
+            self._vehicle.emit(ItemReached(self._reached))
         self._reached = None
 
     def _start_or_resume(self) -> None:
@@ -173,7 +173,7 @@ class MissionRunner:
     def _begin(self, seq: int, item: Item) -> bool:
         self._vehicle.mission.current = seq
         self._announce(seq, item)
-        self._vehicle.tell(Broadcast("MISSION_CURRENT"))
+        self._vehicle.emit(Broadcast("MISSION_CURRENT"))
         return self._flyer.begin_item(item)
 
     def _do(self, seq: int, item: Item) -> None:
@@ -190,7 +190,7 @@ class MissionRunner:
             return
         self._reached = mission.current
         if not self._reports_all:
-            vehicle.tell(ItemReached(mission.current))
+            vehicle.emit(ItemReached(mission.current))
         self.run_from(mission.current + 1)
 
     def _start_condition(self, item: Item) -> None:

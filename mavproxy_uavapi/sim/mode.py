@@ -38,5 +38,5 @@ class MissionMode(Mode):
 
     @property
     def holding_mission(self) -> bool:
-        """Whether the mission is paused, which MISSION_CURRENT tells."""
+        """Whether the mission is paused, which MISSION_CURRENT reports."""
         return False

@@ -1,7 +1,7 @@
 """The truth: a body pushed by its thrust, gravity and the wind over flat ground.
 
 Everything is NED metres from the place the vehicle stood at boot, with down = 0 on the ground, radians and
-seconds. Attitude follows from the thrust that is asked for: a multicopter leans to accelerate.
+seconds. Attitude follows from the requested thrust: a multicopter leans to accelerate.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ class Body:
         return math.sqrt(lift * lift + self.thrust_north**2 + self.thrust_east**2) / GRAVITY
 
     def step(self, thrust: Ned, yaw_rate: float, dt: float) -> None:
-        """Advance by dt seconds with the asked-for thrust (m/s/s beyond weight) and yaw rate (rad/s)."""
+        """Advance by dt seconds with the requested thrust (m/s/s beyond weight) and yaw rate (rad/s)."""
         share = min(1.0, dt / THRUST_LAG)
         self.thrust_north += (thrust.north - self.thrust_north) * share
         self.thrust_east += (thrust.east - self.thrust_east) * share

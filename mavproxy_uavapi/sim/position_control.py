@@ -75,7 +75,7 @@ class PositionController:
         self._integral = [0.0, 0.0, 0.0]
 
     def follow_horizontally(self, position: Ned, velocity: Ned) -> None:
-        """Take the horizontal state as it is: nobody commands it (manual flight, ground)."""
+        """Take the horizontal state as it is: no mode commands it (manual flight, ground)."""
         self.position[:2], self.velocity[:2] = position[:2], velocity[:2]
         self.acceleration[:2] = [0.0, 0.0]
         self._integral[:2] = [0.0, 0.0]

@@ -1,4 +1,4 @@
-"""What a vehicle tells about its navigation, before it becomes a message."""
+"""What a vehicle reports about its navigation, before it becomes a message."""
 
 from __future__ import annotations
 

@@ -141,7 +141,7 @@ class Simulator:
         vehicle.step(STEP)
         self.missions.step()
         while vehicle.events:
-            self._transmitter.tell(vehicle.events.popleft())
+            self._transmitter.emit(vehicle.events.popleft())
         self._transmitter.send_planned()
         for link in self.links:
             for name in link.streams.due(vehicle.now):
@@ -234,7 +234,7 @@ class Simulator:
             link.send(self._parameter_value(parameter, index))
 
     def _parameter_set(self, link: PeerLink, message: Any) -> None:
-        """An unknown name is not answered; a new value is told to all links."""
+        """An unknown name is not answered; a new value is sent to all links."""
         del link
         value = message.param_value
         if not math.isfinite(value):

@@ -47,7 +47,7 @@ PLANE_GROUPS: Groups = {
     **GROUPS,
     mavlink.MAV_DATA_STREAM_EXTRA3: (*GROUPS[mavlink.MAV_DATA_STREAM_EXTRA3], "WIND"),
 }
-"""A plane tells the wind, too."""
+"""A plane reports the wind, too."""
 
 RATE_PARAMETERS: Mapping[int, str] = {
     mavlink.MAV_DATA_STREAM_RAW_SENSORS: "RAW_SENS",

@@ -21,7 +21,7 @@ class Telemetry(MotionMessages, SystemMessages, TruthMessages):
             for name in dir(self)
             if name.startswith("_build_")
         }
-        if not vehicle.tells_wind:
+        if not vehicle.reports_wind:
             del self._builders["WIND"]
 
     def knows(self, name: str) -> bool:

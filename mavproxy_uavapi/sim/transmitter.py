@@ -46,7 +46,7 @@ class Transmitter:
         for link in self._links:
             self.send(link, name)
 
-    def tell(self, event: Event) -> None:
+    def emit(self, event: Event) -> None:
         """Queue what the flight code reports, for all links."""
         if isinstance(event, Broadcast):
             self.broadcast(event.name)

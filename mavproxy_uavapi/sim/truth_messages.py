@@ -1,4 +1,4 @@
-"""SIM_STATE: the whole truth about the vehicle, as SITL sends it to whoever asks. For simulated cameras."""
+"""SIM_STATE: the true state of the vehicle, which SITL sends on request. For simulated cameras."""
 
 from __future__ import annotations
 

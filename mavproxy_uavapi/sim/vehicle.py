@@ -1,4 +1,4 @@
-"""What all vehicles have in common: senses, home, sticks, outputs, modes, arming, and what they tell the ground."""
+"""The common part of all vehicles: sensors, home, sticks, outputs, modes, arming, and reports to the ground."""
 
 from __future__ import annotations
 
@@ -49,21 +49,21 @@ class Watch(Protocol):
 class Vehicle:
     """All state of one vehicle between two boots.
 
-    Time is `now`, seconds since boot on the simulated clock. The vehicle tells the ground through `events`, which
-    the owner empties. A type of vehicle sets `modes`, `mode` and `failsafes`.
+    Time is `now`, seconds since boot on the simulated clock. The vehicle reports to the ground through `events`; the
+    owner empties it. A type of vehicle sets `modes`, `mode` and `failsafes`.
     """
 
     mav_type: ClassVar[int]
     version: ClassVar[tuple[int, int, int, int]]
     """Major, minor, patch and FIRMWARE_VERSION_TYPE."""
     banner: ClassVar[tuple[str, ...]]
-    """What it says at boot and when it is asked: the firmware, the frame."""
+    """Its texts at boot and on request: the firmware, the frame."""
     rate_prefix: ClassVar[str] = "SR0_"
     """How the parameters with the rates of the streams begin."""
     mission_commands: ClassVar[frozenset[int]] = SUPPORTED
     """The MAV_CMDs that a mission may have."""
     streams: ClassVar[Groups] = GROUPS
-    tells_wind: ClassVar[bool] = False
+    reports_wind: ClassVar[bool] = False
     neutral_sticks: ClassVar[tuple[int, ...]] = NEUTRAL
     """What SITL's radio sends on channels 1 to 8 at first."""
 
@@ -95,9 +95,9 @@ class Vehicle:
         self._boot_texts = deque([*banner, *BOOT_TEXTS])
         mission.reset()
 
-    # What the ground station is told.
+    # Reports to the ground station.
 
-    def tell(self, event: Event) -> None:
+    def emit(self, event: Event) -> None:
         """Queue an event for the ground."""
         self.events.append(event)
 
@@ -162,13 +162,13 @@ class Vehicle:
 
     @property
     def airspeed(self) -> float:
-        """What VFR_HUD tells, m/s."""
+        """What VFR_HUD reports, m/s."""
         body, velocity = self.body, self.estimator.velocity
         return math.hypot(velocity.north - body.wind_north, velocity.east - body.wind_east)
 
     @property
     def throttle_percent(self) -> int:
-        """What VFR_HUD tells."""
+        """What VFR_HUD reports."""
         raise NotImplementedError
 
     def servo_pulses(self) -> list[int]:
@@ -176,11 +176,11 @@ class Vehicle:
         raise NotImplementedError
 
     def navigation(self) -> Navigation | None:
-        """What NAV_CONTROLLER_OUTPUT tells; None where nothing is sent."""
+        """What NAV_CONTROLLER_OUTPUT reports; None where nothing is sent."""
         raise NotImplementedError
 
     def local_target(self) -> LocalTarget | None:
-        """What POSITION_TARGET_LOCAL_NED tells; None where nothing is sent."""
+        """What POSITION_TARGET_LOCAL_NED reports; None where nothing is sent."""
         return None
 
     def mandatory_failures(self) -> list[str]:
@@ -239,8 +239,8 @@ class Vehicle:
         self.home = home
         self.mission.remember_home(home_item(home))
         self.home_locked = self.home_locked or lock
-        self.tell(Broadcast("HOME_POSITION"))
-        self.tell(Broadcast("GPS_GLOBAL_ORIGIN"))
+        self.emit(Broadcast("HOME_POSITION"))
+        self.emit(Broadcast("GPS_GLOBAL_ORIGIN"))
         return True
 
     def set_home_here(self, *, lock: bool) -> bool:
@@ -262,7 +262,7 @@ class Vehicle:
         self.mode.leave()
         self.mode_left()
         self.mode = mode
-        self.tell(Broadcast("HEARTBEAT"))
+        self.emit(Broadcast("HEARTBEAT"))
         return True
 
     def mode_refusal(self, mode: Mode) -> str | None:

@@ -66,8 +66,8 @@ class Detector:
     def __init__(self, model: CameraModel, options: DetectorOptions) -> None:
         self.model, self.options = model, options
         self._sizes = dict(options.sizes or {})
-        wanted: Iterable[int] | None = None if options.any_id or not self._sizes else self._sizes
-        families = [family(name, wanted) for name in options.families]
+        ids: Iterable[int] | None = None if options.any_id or not self._sizes else self._sizes
+        families = [family(name, ids) for name in options.families]
         self._families = [searched for searched in families if searched.ids is None or searched.ids]
         passes = FAR_PASSES if options.far else PASSES
         self._passes = [

@@ -1,4 +1,4 @@
-"""OpenCV's AprilTag families, reduced to the wanted ids."""
+"""OpenCV's AprilTag families, reduced to the selected ids."""
 
 from __future__ import annotations
 
@@ -46,11 +46,12 @@ class Family:
         return inner
 
 
-def family(name: str, wanted: Iterable[int] | None = None) -> Family:
-    """The dictionary of a family with only the wanted ids; None means all."""
+def family(name: str, selected_ids: Iterable[int] | None = None) -> Family:
+    """The dictionary of a family with only the selected ids; None means all."""
     full_dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, NAMES[name]))
     correction = 0.0 if name in NO_CORRECTION else 0.6
-    ids = None if wanted is None else tuple(sorted({number for number in wanted if number < FAMILIES[name][1]}))
+    count = FAMILIES[name][1]
+    ids = None if selected_ids is None else tuple(sorted({number for number in selected_ids if number < count}))
     rows = full_dictionary.bytesList if ids is None else np.ascontiguousarray(full_dictionary.bytesList[list(ids)])
     return Family(name, ids, cv2.aruco.Dictionary(rows, full_dictionary.markerSize, correctable(name)), correction)
 

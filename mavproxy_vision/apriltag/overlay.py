@@ -13,12 +13,12 @@ from mavproxy_vision.apriltag.detection import FrameResult
 GREEN, RED, YELLOW = (80, 220, 80), (60, 60, 230), (60, 220, 230)
 
 
-def annotated(image: NDArray[np.uint8], seen: FrameResult, lines: list[str]) -> NDArray[np.uint8]:
+def annotated(image: NDArray[np.uint8], result: FrameResult, lines: list[str]) -> NDArray[np.uint8]:
     """A colour copy of a grey frame with outlined tags, a marked centre, and lines of text."""
     drawn: Any = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
     height, width = image.shape
     cv2.drawMarker(drawn, (width // 2, height // 2), YELLOW, cv2.MARKER_CROSS, 24, 1, cv2.LINE_AA)
-    for detection in seen.detections:
+    for detection in result.detections:
         corners = np.round(np.asarray(detection.corners) * 8).astype(np.int32).reshape(-1, 1, 2)
         cv2.polylines(drawn, [corners], True, GREEN, 2, cv2.LINE_AA, shift=3)
         first = tuple(int(value) for value in np.round(detection.corners[0]))

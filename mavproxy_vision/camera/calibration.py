@@ -1,4 +1,4 @@
-"""Calibration files, and their making from images of a ChArUco board or a chessboard."""
+"""Calibration files; they are made from images of a ChArUco board or a chessboard."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from mavproxy_vision.geometry.camera_model import CameraModel
 FEWEST_VIEWS = 5
 FEWEST_CORNERS = 8
 BOARD = re.compile(rf"(charuco|chessboard):([0-9]{{1,3}})x([0-9]{{1,3}}):({NUMBER})(?::({NUMBER}))?")
-MARKERS = 250  # that the dictionary of ChArUco boards has
-FEWEST_SQUARES = {"charuco": 3, "chessboard": 4}  # of a board, each way
+MARKERS = 250  # in the dictionary of ChArUco boards
+FEWEST_SQUARES = {"charuco": 3, "chessboard": 4}  # of a board, in each direction
 MOST_SQUARES = 50
 SQUARES = (0.001, 2.0)  # m, a square's side
 SIZES = (16, 16384)  # px, of a frame
-FOCAL_LENGTHS = (0.03, 30.0)  # of the frame's width: fields of view from 2 to 173 degrees
-DISTORTIONS = (0, 4, 5, 8, 12, 14)  # coefficients that OpenCV takes
-LARGEST = 1e6  # number in a calibration
+FOCAL_LENGTHS = (0.03, 30.0)  # shares of the frame's width: fields of view from 2 to 173 degrees
+DISTORTIONS = (0, 4, 5, 8, 12, 14)  # numbers of coefficients that OpenCV accepts
+LARGEST = 1e6  # largest number in a calibration
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Board:
         """Read `charuco:COLUMNSxROWS:SQUARE[:MARKER]` or `chessboard:COLUMNSxROWS:SQUARE`.
 
         Raises:
-            SettingError: it is neither, or there can be no such board.
+            SettingError: it is neither, or such a board is impossible.
         """
         match = BOARD.fullmatch(text)
         if match is None:
@@ -60,13 +60,13 @@ class Board:
         return board
 
     def check(self) -> None:
-        """Raises SettingError unless there can be such a board."""
+        """Raise SettingError unless such a board is possible."""
         fewest = FEWEST_SQUARES[self.kind]
         if not fewest <= min(self.columns, self.rows) <= max(self.columns, self.rows) <= MOST_SQUARES:
             raise SettingError(f"a {self.kind} has {fewest} to {MOST_SQUARES} squares each way", "board")
         if not (SQUARES[0] <= self.square <= SQUARES[1] and 0 < self.marker < self.square):
             raise SettingError(
-                f"a board's squares have {SQUARES[0]:g} to {SQUARES[1]:g} m, and its markers less than that", "board"
+                f"a board's squares have {SQUARES[0]:g} to {SQUARES[1]:g} m; its markers are smaller", "board"
             )
         if self.kind == "charuco" and self.columns * self.rows // 2 > MARKERS:
             raise SettingError(f"a ChArUco board has at most {2 * MARKERS} squares", "board")
@@ -74,11 +74,11 @@ class Board:
     @property
     def charuco(self) -> Any:
         """OpenCV's board."""
-        words = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_250)
-        return cv2.aruco.CharucoBoard((self.columns, self.rows), self.square, self.marker, words)
+        dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_250)
+        return cv2.aruco.CharucoBoard((self.columns, self.rows), self.square, self.marker, dictionary)
 
     def points(self, image: Any) -> tuple[Any, Any] | None:
-        """Corners on the board (n, 3) in m and in the image (n, 2) in px; None when it is not to be seen."""
+        """Corners on the board (n, 3) in m and in the image (n, 2) in px; None if the image does not show it."""
         if self.kind == "charuco":
             board = self.charuco
             corners, ids, _, _ = cv2.aruco.CharucoDetector(board).detectBoard(image)
@@ -97,7 +97,7 @@ class Board:
 
 @dataclass(frozen=True)
 class Calibration:
-    """A camera model, the images it was made of, and its error (px, rms)."""
+    """A camera model, the number of images that it was made from, and its error (px, rms)."""
 
     model: CameraModel
     views: int
@@ -105,10 +105,10 @@ class Calibration:
 
 
 def calibrate(folder: Path, board: Board) -> Calibration:
-    """Make a camera model of the images of a folder.
+    """Make a camera model from the images of a folder.
 
     Raises:
-        SettingError: no such folder, or too few of its images show the board, or they make no camera.
+        SettingError: no such folder; too few of its images show the board; or they give no valid camera model.
         OSError: the folder cannot be read.
     """
     if not folder.is_dir():
@@ -120,7 +120,7 @@ def calibrate(folder: Path, board: Board) -> Calibration:
         if image is None or points is None:
             continue
         if size not in (None, image.shape[::-1]):
-            raise SettingError(f"{file.name} has another size than the images before", "folder")
+            raise SettingError(f"{file.name} has a different size than the images before it", "folder")
         size = image.shape[::-1]
         on_boards.append(points[0])
         in_images.append(points[1])
@@ -130,7 +130,7 @@ def calibrate(folder: Path, board: Board) -> Calibration:
 
 
 def _image(file: Path) -> Image | None:
-    """What the file shows, in grey; None when it is no image."""
+    """The image in grey; None if the file is not an image."""
     try:
         return decode_any(file.read_bytes())
     except BadImage:
@@ -141,7 +141,7 @@ def _fitted(on_boards: list[Any], in_images: list[Any], size: tuple[int, int]) -
     try:
         error, matrix, coefficients, _, _ = cv2.calibrateCamera(on_boards, in_images, size, None, None)
     except cv2.error as failed:
-        raise SettingError(f"the images make no camera: {failed.err}", "folder") from failed
+        raise SettingError(f"the images give no camera model: {failed.err}", "folder") from failed
     model = CameraModel(
         *size,
         float(matrix[0, 0]),
@@ -150,10 +150,10 @@ def _fitted(on_boards: list[Any], in_images: list[Any], size: tuple[int, int]) -
         float(matrix[1, 2]),
         tuple(float(value) for value in np.ravel(coefficients)[:5]),
     )
-    why_not = nonsense(model)
+    why_not = why_invalid(model)
     if why_not:
         raise SettingError(
-            f"the images make no camera: {why_not}; they should show the board from many sides", "folder"
+            f"the images give no camera model: {why_not}; they should show the board from many sides", "folder"
         )
     return Calibration(model, len(on_boards), float(error))
 
@@ -171,7 +171,7 @@ def load(file: Path) -> CameraModel:
     """Read a model.
 
     Raises:
-        SettingError: there is none, or it makes no sense.
+        SettingError: the file is missing or invalid.
     """
     try:
         if file.exists() and not file.is_file():
@@ -180,21 +180,21 @@ def load(file: Path) -> CameraModel:
     except OSError as error:
         raise SettingError(f"{file}: {error.strerror}", "calibration") from error
     except (ValueError, RecursionError) as error:
-        raise SettingError(f"{file} is no calibration: {error}", "calibration") from error
-    why_not = nonsense(model)
+        raise SettingError(f"{file} is not a calibration: {error}", "calibration") from error
+    why_not = why_invalid(model)
     if why_not:
-        raise SettingError(f"{file} is no calibration: {why_not}", "calibration")
+        raise SettingError(f"{file} is not a calibration: {why_not}", "calibration")
     return model
 
 
 def _model(values: Any) -> CameraModel:
-    """Raises ValueError: it is not one number for each of a model's, and a list of them for the distortion."""
+    """Raise ValueError unless there is one number per field, and a list of numbers for the distortion."""
     if not isinstance(values, dict):
         raise ValueError("it holds no JSON object")
     names = [field.name for field in fields(CameraModel) if field.name != "distortion"]
     missing, unknown = [name for name in names if name not in values], values.keys() - {*names, "distortion"}
     if missing or unknown:
-        raise ValueError(f"missing are {missing}" if missing else f"nobody knows {sorted(unknown)}")
+        raise ValueError(f"missing: {missing}" if missing else f"unknown: {sorted(unknown)}")
     distortion = values.get("distortion", [])
     if not isinstance(distortion, list):
         raise ValueError(f"distortion: {distortion!r} is not a list")
@@ -211,23 +211,23 @@ def _model(values: Any) -> CameraModel:
 
 
 def _number(name: str, value: Any) -> float:
-    """Raises ValueError unless it is a number of bearable size."""
+    """Raise ValueError unless it is a number up to LARGEST."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= LARGEST:
         raise ValueError(f"{name}: {value!r} is not a number up to {LARGEST:g}")
     return float(value)
 
 
-def nonsense(model: CameraModel) -> str:
-    """What there cannot be about a camera; empty for one that there can be."""
+def why_invalid(model: CameraModel) -> str:
+    """Why no camera can have this model; empty for a valid model."""
     if not SIZES[0] <= min(model.width, model.height) <= max(model.width, model.height) <= SIZES[1]:
-        return f"a size of {model.width}x{model.height} px; there are {SIZES[0]} to {SIZES[1]}"
+        return f"a size of {model.width}x{model.height} px; {SIZES[0]} to {SIZES[1]} are possible"
     least, most = (share * model.width for share in FOCAL_LENGTHS)
     if not (least <= model.fx <= most and least <= model.fy <= most):
-        return f"focal lengths of {model.fx:g} and {model.fy:g} px; with that width there are {least:g} to {most:g}"
+        return f"focal lengths of {model.fx:g} and {model.fy:g} px; {least:g} to {most:g} are possible for that width"
     if not (0 <= model.cx <= model.width and 0 <= model.cy <= model.height):
         return f"the optical axis at {model.cx:g}, {model.cy:g} px is outside the frame"
     if len(model.distortion) not in DISTORTIONS:
-        return f"{len(model.distortion)} coefficients of distortion; OpenCV takes {', '.join(map(str, DISTORTIONS))}"
-    if not all(abs(value) <= LARGEST for value in model.distortion):  # of NaN that is false
-        return f"coefficients of distortion beyond {LARGEST:g}"
+        return f"{len(model.distortion)} distortion coefficients; OpenCV takes {', '.join(map(str, DISTORTIONS))}"
+    if not all(abs(value) <= LARGEST for value in model.distortion):  # false for NaN
+        return f"distortion coefficients beyond {LARGEST:g}"
     return ""

@@ -18,12 +18,12 @@ from mavproxy_vision.camera.source import Frame, masked_source
 from mavproxy_vision.errors import NoCamera
 
 LAUNCH = "gst-launch-1.0"
-PATIENCE = 0.2  # s that a read waits
-ENDING = 1.0  # s that the program gets to end by itself
-PIECE = 1 << 16  # bytes that a pipe holds
-# What each pipeline ends in. A camera that has frames of the size is asked for them. Others come on a canvas that is
-# so high that videoscale, which keeps pixels square, always fills its width; then the canvas is cut to the size.
-ENDED = (
+READ_TIMEOUT = 0.2  # s that a read waits
+END_TIMEOUT = 1.0  # s that the program has to end by itself
+CHUNK = 1 << 16  # bytes, the size of a pipe
+# The end of each pipeline. A camera that supports the size is asked for it. Other frames go onto a canvas that is so
+# high that videoscale, which keeps pixels square, always fills its width; then the canvas is cropped to the size.
+PIPELINE_END = (
     "queue leaky=downstream max-size-buffers=1 "
     "! videoconvert ! video/x-raw,width={width},height={height};video/x-raw "
     "! videoscale ! video/x-raw,format=GRAY8,width={width},height={canvas},pixel-aspect-ratio=1/1 "
@@ -33,14 +33,14 @@ ENDED = (
 
 
 class Pipeline:
-    """What comes out of a GStreamer pipeline, scaled to a width, in grey.
+    """The frames of a GStreamer pipeline, in grey and scaled to a width.
 
-    A frame keeps its whole width, to which the field of view belongs, and its shape: what is then too high is cut off
-    at the top and the bottom, and what is not high enough has black bars there.
+    A frame keeps its full width, because the field of view refers to it, and its aspect ratio. A frame that is then
+    too high is cropped at the top and the bottom; one that is too low gets black bars there.
 
     Args:
-        spec: as for gst-launch-1.0; a last `! appsink …`, as OpenCV wants it, may be there or not.
-        latency: s from light to our having the frame, taken off the time of arrival.
+        spec: as for gst-launch-1.0; a final `! appsink …`, as OpenCV needs it, is optional.
+        latency: s from capture to arrival; it is subtracted from the time of arrival.
         size: width and height, px.
         clock: monotonic seconds.
     """
@@ -51,7 +51,7 @@ class Pipeline:
         self, spec: str, latency: float, size: tuple[int, int], clock: Callable[[], float] = time.monotonic
     ) -> None:
         self._spec, self._latency, self._size, self._clock = spec, latency, size, clock
-        self._stride = -(-size[0] // 4) * 4  # GStreamer's rows begin at multiples of four bytes
+        self._stride = -(-size[0] // 4) * 4  # GStreamer aligns rows to four bytes
         self._process: subprocess.Popen[bytes] | None = None
         self._stderr: IO[bytes] | None = None
         self._received = bytearray()
@@ -60,7 +60,7 @@ class Pipeline:
         """Start the program.
 
         Raises:
-            NoCamera: it is not installed, it cannot be run, or the pipeline cannot be read.
+            NoCamera: it is not installed, it cannot be started, or the pipeline cannot be parsed.
         """
         self._received.clear()
         try:
@@ -70,46 +70,46 @@ class Pipeline:
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=self._stderr,
-                start_new_session=True,  # the pilot's Ctrl-C is for MAVProxy, which then ends it
+                start_new_session=True,  # the pilot's Ctrl-C must reach MAVProxy only, which then ends the program
             )
         except OSError as error:
             self.close()
             if error.filename == LAUNCH and isinstance(error, FileNotFoundError):
-                raise NoCamera(f"a pipeline wants {LAUNCH}: install gstreamer1.0-tools") from error
-            raise NoCamera(f"{LAUNCH} cannot be run: {error.strerror}") from error
+                raise NoCamera(f"a pipeline needs {LAUNCH}: install gstreamer1.0-tools") from error
+            raise NoCamera(f"{LAUNCH} cannot be started: {error.strerror}") from error
         except ValueError as error:  # shlex
             self.close()
-            raise NoCamera(f"the pipeline cannot be read: {error}") from error
+            raise NoCamera(f"the pipeline cannot be parsed: {error}") from error
 
     def read(self) -> Frame | None:
-        """The next frame, if one comes soon.
+        """The next frame; None if none arrives within READ_TIMEOUT.
 
         Raises:
-            NoCamera: the program has ended; its last words.
+            NoCamera: the program has ended; the text is its error message.
         """
         process = self._process
         assert process is not None
         assert process.stdout is not None
         width, height = self._size
         frame_size = self._stride * height
-        until = time.monotonic() + PATIENCE
+        until = time.monotonic() + READ_TIMEOUT
         while len(self._received) < frame_size:
             if not select.select([process.stdout], [], [], max(until - time.monotonic(), 0.0))[0]:
                 return None
-            piece = os.read(process.stdout.fileno(), PIECE)
-            if not piece:
-                raise NoCamera(self._last_words())
-            self._received += piece
+            chunk = os.read(process.stdout.fileno(), CHUNK)
+            if not chunk:
+                raise NoCamera(self._last_error())
+            self._received += chunk
         now = self._clock()
         rows = np.frombuffer(bytes(self._received[:frame_size]), np.uint8).reshape(height, self._stride)
         del self._received[:frame_size]
         return Frame(np.ascontiguousarray(rows[:, :width]), now - self._latency, now)
 
-    def _last_words(self) -> str:
+    def _last_error(self) -> str:
         assert self._process is not None
         assert self._stderr is not None
-        with contextlib.suppress(subprocess.TimeoutExpired):  # it gives no frames, but goes on: `close` ends it
-            self._process.wait(ENDING)
+        with contextlib.suppress(subprocess.TimeoutExpired):  # it closed its output but still runs; `close` ends it
+            self._process.wait(END_TIMEOUT)
         self._stderr.seek(0)
         lines = [line.strip() for line in self._stderr.read().decode(errors="replace").splitlines()]
         problems = [line for line in lines if line.startswith(("ERROR", "WARNING"))] or lines[-1:]
@@ -128,7 +128,7 @@ class Pipeline:
 def _end(process: subprocess.Popen[Any]) -> None:
     process.terminate()
     try:
-        process.wait(ENDING)
+        process.wait(END_TIMEOUT)
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()
@@ -146,5 +146,5 @@ def launch_command(spec: str, size: tuple[int, int]) -> list[str]:
     if stages[-1].split()[:1] == ["appsink"]:
         stages.pop()
     width, height = size
-    last = ENDED.format(width=width, height=height, canvas=height + 2 * width)
+    last = PIPELINE_END.format(width=width, height=height, canvas=height + 2 * width)
     return [LAUNCH, "-q", *shlex.split("!".join(stages)), "!", *shlex.split(last)]

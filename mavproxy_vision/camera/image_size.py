@@ -1,21 +1,23 @@
-"""What a PNG or JPEG costs, before it is decoded: a few kB may fill the memory, or keep a core busy. Pure."""
+"""Checks how much memory and time a PNG or JPEG needs, before it is decoded: a few kB may be enough to fill the
+memory or keep a core busy. Pure.
+"""
 
 from __future__ import annotations
 
 import struct
 
 PNG, JPEG = b"\x89PNG\r\n\x1a\n", b"\xff\xd8"
-# JPEG's markers (ITU T.81, table B.1): SOF0 to SOF15 tell the size; tables, extensions and comments may come before.
+# JPEG markers (ITU T.81, table B.1): SOF0 to SOF15 hold the size; tables, extensions and comments may come before.
 SIZE_OF_FRAME = {*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC}
 BEFORE_IT = {0xC4, 0xCC, 0xDB, 0xDD, *range(0xE0, 0xF0), 0xFE}
-FILL = 0xFF  # may come before a marker, any number of times
-SCAN = b"\xff\xda"  # begins a scan; a progressive JPEG has about 10, each of which goes over the whole picture
+FILL = 0xFF  # any number of these may come before a marker
+SCAN = b"\xff\xda"  # begins a scan; a progressive JPEG has about 10, and each scan covers the whole picture
 MOST_SCANS = 30
-ANIMATION, PIXELS = b"acTL", b"IDAT"  # chunks of a PNG; the one of an animation comes first
+ANIMATION, PIXELS = b"acTL", b"IDAT"  # chunks of a PNG; the animation chunk comes first
 
 
 def size_of(data: bytes) -> tuple[int, int] | None:
-    """Width and height (px); None for what is neither a PNG nor a JPEG."""
+    """Width and height (px); None if the data is neither a PNG nor a JPEG."""
     if data.startswith(PNG) and data[12:16] == b"IHDR" and len(data) >= 24:
         width, height = struct.unpack_from(">II", data, 16)
         return width, height
@@ -23,7 +25,7 @@ def size_of(data: bytes) -> tuple[int, int] | None:
 
 
 def why_costly(data: bytes) -> str | None:
-    """Why decoding takes more than the size tells: an animation's canvases, too many scans; None if it does not."""
+    """Why decoding costs more than the size suggests: an animation, or too many scans; None if it does not."""
     if data.startswith(PNG) and _is_animated(data):
         return "an animated PNG"
     if data.startswith(JPEG) and data.count(SCAN) > MOST_SCANS:

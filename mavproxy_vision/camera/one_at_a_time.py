@@ -1,4 +1,4 @@
-"""Work that takes much memory, one after another."""
+"""Runs work that needs much memory one piece at a time."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class OneAtATime:
         self._turn = asyncio.Lock()
 
     async def run(self, work: Callable[[], T]) -> T:
-        """What `work` gives, in its turn. Work that has begun is waited for, even when nobody wants it any more."""
+        """Run `work` in its turn and return its result. Even when cancelled, wait until work that has begun ends."""
         async with self._turn:
             running = asyncio.get_running_loop().run_in_executor(None, work)
             try:

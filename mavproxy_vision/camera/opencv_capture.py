@@ -1,4 +1,4 @@
-"""Cameras, streams and video files, by OpenCV."""
+"""Cameras, streams and video files, through OpenCV."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-# The state of a camera is told by `vision status`; FFmpeg and OpenCV would write into the pilot's prompt.
+# `vision status` reports the state of a camera; messages of FFmpeg and OpenCV would disturb the pilot's prompt.
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
-os.environ.setdefault("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT", "1")  # s that a read of a silent camera blocks, not 10
+os.environ.setdefault("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT", "1")  # s that a read of a silent camera blocks; default 10
 
 import cv2  # noqa: E402
 
@@ -19,28 +19,28 @@ from mavproxy_vision.camera.source import Frame, grey, masked_source  # noqa: E4
 from mavproxy_vision.errors import NoCamera  # noqa: E402
 
 BEHIND = 1.0  # s; a driver's time stamp that is farther from now is on another clock
-STAMPED = ("rtsp", "rtp", "udp", "srt")  # protocols whose frames have times; of HTTP's MJPEG they are made up
-COMPARED = 100  # frames of a stream, the most punctual of which tells how its clock and ours agree
-JUMP = 5.0  # s between two frames of a stream that are not a pause but another clock
-OPENING, SILENCE = 5000, 3000  # ms that a stream has to open, and to give the next frame
-BACKLOG = 2.0  # s in which a stream that was just opened may give what it had kept
+STAMPED = ("rtsp", "rtp", "udp", "srt")  # protocols with real time stamps; those of MJPEG over HTTP are invented
+COMPARED = 100  # frames of a stream; the least delayed of them sets the offset between its clock and ours
+JUMP = 5.0  # s between two frames of a stream that mean another clock, not a pause
+OPENING, SILENCE = 5000, 3000  # ms that a stream has to open, and to deliver the next frame
+BACKLOG = 2.0  # s in which a newly opened stream may deliver buffered frames
 
 
 def be_silent() -> None:
-    """Have OpenCV write no log; its versions differ in where that is set."""
+    """Switch off OpenCV's log; its versions differ in the function that does it."""
     set_level = getattr(cv2, "setLogLevel", None) or cv2.utils.logging.setLogLevel
     set_level(0)
 
 
 class StreamClock:
-    """When a stream's frames were sent, by their own times: what the network kept comes all at once. Pure."""
+    """When a stream's frames were sent, by their own time stamps; after a delay many arrive at once. Pure."""
 
     def __init__(self) -> None:
-        self._late: deque[float] = deque(maxlen=COMPARED)  # s by which a frame came later than its own time
+        self._late: deque[float] = deque(maxlen=COMPARED)  # s from a frame's own time stamp to its arrival
         self._last = 0.0
 
     def sent(self, arrival: float, stamp: float) -> float:
-        """Host time (s) for a frame stamped `stamp` (s of the stream) that arrived at `arrival` (s)."""
+        """The host time (s) of a frame stamped `stamp` (s of the stream) that arrived at `arrival` (s)."""
         if not 0.0 < stamp - self._last < JUMP:
             self._late.clear()
         self._last = stamp
@@ -52,10 +52,10 @@ class Capture:
     """A camera, a stream or a video file.
 
     Args:
-        spec: `camera:0`, `/dev/video0`, an URL or a file.
-        latency: s from light to our having the frame, taken off the time of arrival.
-        size: width and height to ask a camera for, px.
-        rate: frames per second to ask a camera for, and at which a file is played.
+        spec: `camera:0`, `/dev/video0`, a URL or a file.
+        latency: s from capture to arrival; it is subtracted from the time of arrival.
+        size: width and height that are requested from a camera, px.
+        rate: frames per second that are requested from a camera, or at which a file is played.
         clock: monotonic seconds.
     """
 
@@ -72,14 +72,14 @@ class Capture:
         self._spec, self._latency, self._size, self._rate, self._clock = spec, latency, size, rate, clock
         self._shown = masked_source(spec)
         self._capture: Any = None
-        self._is_file, self._is_stream = os.path.isfile(spec), "://" in spec  # pathlib's raises on a long URL
+        self._is_file, self._is_stream = os.path.isfile(spec), "://" in spec  # Path.is_file raises on a long URL
         self._is_stamped = spec.partition("://")[0].lower() in STAMPED
         self._stream_clock = StreamClock()
         self._next = 0.0
-        self._on_our_clock = False  # whether the driver's time stamps are
+        self._on_our_clock = False  # whether the driver's time stamps are on our clock
 
     def open(self) -> None:
-        """Open it; ask a camera for size and rate, skip what a stream had kept.
+        """Open it; request size and rate from a camera, skip the buffered frames of a stream.
 
         Raises:
             NoCamera: it cannot be opened.
@@ -108,7 +108,7 @@ class Capture:
         return cv2.VideoCapture(self._spec, cv2.CAP_ANY)
 
     def _skip_backlog(self) -> None:
-        """Until a frame had to be waited for: the first ones are as old as the opening took."""
+        """Skip frames until one has to be waited for: the first frames are as old as the opening took."""
         self._stream_clock = StreamClock()
         began = before = self._clock()
         while before - began < BACKLOG and self._capture.grab():
@@ -121,10 +121,10 @@ class Capture:
         """The next frame; a file plays at its rate, and ends.
 
         Raises:
-            NoCamera: what comes is no picture, or cannot be read; or the camera was unplugged.
+            NoCamera: a frame is not a picture or cannot be read, or the camera was unplugged.
         """
         if self._is_file:
-            self._wait_for_its_time()
+            self._wait_until_due()
         requested_at = self._clock()
         try:
             success, image = self._capture.read()
@@ -134,30 +134,30 @@ class Capture:
         if not success:
             if self._is_gone():
                 raise NoCamera(f"{self._shown} is gone")
-            time.sleep(0.02)  # a dead camera answers at once: do not spin
+            time.sleep(0.02)  # a dead camera returns at once: do not spin
             return None
         if self._is_stream and now - requested_at > 0.9 * SILENCE / 1000:
-            return None  # what the decoder still held when the stream fell silent
+            return None  # a frame that the decoder still held when the stream stopped
         return Frame(grey(image), self._captured_at(now), now)
 
     def _is_gone(self) -> bool:
-        """Whether a camera was unplugged: let go at once, it gets its number again when it returns."""
+        """Whether a camera was unplugged; released at once, it gets the same number when it returns."""
         node = self._spec.replace("camera:", "/dev/video", 1)
         return node.startswith("/dev/") and not os.path.exists(node)
 
-    def _wait_for_its_time(self) -> None:
+    def _wait_until_due(self) -> None:
         now = self._clock()
         self._next = max(self._next + 1.0 / self._rate, now - 1.0)
         if self._next > now:
             time.sleep(self._next - now)
 
     def _captured_at(self, now: float) -> float:
-        """V4L2 stamps its frames with the monotonic clock; else when it arrived, or was sent, less the latency."""
+        """The capture time: by V4L2's monotonic time stamp, else the time of sending or arrival less the latency."""
         stamp: float = self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
         if self._is_stamped:
             return self._stream_clock.sent(now, stamp) - self._latency
         if not self._is_file and not self._is_stream and abs(now - stamp) < BEHIND:
-            self._on_our_clock = True  # and stays: a frame that waited for longer is old, not on another clock
+            self._on_our_clock = True  # for good: a later frame with an older stamp is old, not on another clock
         return min(stamp, now) if self._on_our_clock else now - self._latency
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""A frame as a camera would see it: textured ground with tags, through the camera model. Pure but for its noise.
+"""Renders a camera's frame: textured ground with tags, through the camera model. Pure except for its noise.
 
 The ground is the plane down = 0 of a local NED frame whose origin is `home`.
 """
@@ -24,15 +24,15 @@ Image = NDArray[np.uint8]
 TILE = 1024  # pixels of the ground's texture, which repeats
 TILE_METRES = 8.0
 PIXELS_PER_CELL = 16  # of a tag's own image
-FINE = 160  # pixels along a tag's side below which it is drawn larger and averaged down
-NEAREST = 0.02  # m; the lens is never drawn closer to the ground
+FINE = 160  # pixels along a tag's side; a smaller tag is drawn larger and then averaged down
+NEAREST = 0.02  # m; the smallest height of the lens above the ground
 NOISE_FRAMES = 8
 
 
 @dataclass(frozen=True)
 class PlacedTag:
-    """A tag on the ground: family, id, side of its black square (m), north and east of home (m), and the
-    heading (degrees) to which its top points."""
+    """A tag on the ground: family, id, side of its black square (m), position north and east of home (m), and the
+    heading (degrees) in which its top points."""
 
     family: str
     id: int
@@ -44,13 +44,13 @@ class PlacedTag:
 
 @dataclass(frozen=True)
 class Look:
-    """How good the camera is.
+    """The quality of the camera's pictures.
 
     Attributes:
-        noise: standard deviation, of 255.
+        noise: standard deviation, on a scale of 0 to 255.
         blur: sigma in pixels.
-        exposure: factor on the light.
-        occlusion: share (0 to 1) of every tag that something dark covers.
+        exposure: factor for the brightness.
+        occlusion: share (0 to 1) of every tag that is covered.
     """
 
     noise: float = 5.0
@@ -60,14 +60,14 @@ class Look:
 
 
 class Renderer:
-    """Draws frames. One thread at a time.
+    """Renders frames. One thread at a time.
 
     Args:
         model: the camera.
-        mount: how it sits on the vehicle.
-        tags: what lies on the ground.
+        mount: how the camera is mounted on the vehicle.
+        tags: the tags on the ground.
         look: noise, blur, exposure.
-        seed: of the ground and the noise.
+        seed: for the ground and the noise.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class Renderer:
         self._maps = distortion_maps(model) if any(model.distortion) else None
 
     def render(self, position: Vector, attitude: Attitude) -> Image:
-        """The frame (height, width), 0 to 255, from `position` (NED m from home) with that attitude."""
+        """The frame, shape (height, width), 0 to 255, from `position` (m NED from home) with that attitude."""
         lens = position + self.mount.lens(attitude)
         lens[2] = min(lens[2], -NEAREST)
         to_camera = self.mount.in_ned(attitude).T
@@ -103,7 +103,7 @@ class Renderer:
         per_pixel = -lens[2] / self.model.fx
         level = int(np.clip(math.log2(max(per_pixel / (TILE_METRES / TILE), 1e-9)), 0, len(self._ground) - 1))
         texture = self._ground[level]
-        # Near the vehicle, so that single precision is enough far from home too.
+        # The texture's origin is near the vehicle, so that single precision is enough far from home, too.
         base = np.round(lens[:2] / TILE_METRES) * TILE_METRES
         near = lens - np.array([base[0], base[1], 0.0])
         scale = TILE_METRES / texture.shape[0]
@@ -135,7 +135,7 @@ class Renderer:
         scale = tag.size / cells / PIXELS_PER_CELL
         middle = (side - 1) / 2
         c, s = math.cos(math.radians(tag.heading)), math.sin(math.radians(tag.heading))
-        # In the picture x is the tag's right and y its bottom.
+        # In the picture x points to the tag's right and y to its bottom.
         right, bottom = (-s, c), (-c, -s)
         return np.array(
             [
@@ -167,7 +167,7 @@ class Renderer:
             drawn = cv2.resize(drawn, (width, height), interpolation=cv2.INTER_AREA)
             mask = cv2.resize(mask, (width, height), interpolation=cv2.INTER_AREA)
         area = image[low[1] : high[1], low[0] : high[0]]
-        # What the mask leaves out is the ground's; the white is a sheet of paper in daylight, not 255.
+        # Outside the mask the ground stays. White is paper in daylight, not 255.
         blend = area * (1.0 - mask / 255.0) + (0.80 * drawn + 20.0 * (mask / 255.0))
         area[:] = blend.astype(np.uint8)
 
@@ -187,7 +187,7 @@ class Renderer:
 
 
 def covered(picture: Image, share: float) -> Image:
-    """The tag's picture with a dark hand over `share` of it."""
+    """The tag's picture with `share` of it covered in dark grey."""
     picture_copy: Image = picture.copy()
     picture_copy[:, : round(share * picture.shape[1])] = 60
     return picture_copy
@@ -195,7 +195,7 @@ def covered(picture: Image, share: float) -> Image:
 
 @functools.lru_cache(maxsize=2)
 def ground_texture(seed: int) -> Image:
-    """Grass and gravel: noise of several sizes that repeats at the edges, shape (TILE, TILE)."""
+    """Grass and gravel: noise of several scales that repeats at the edges, shape (TILE, TILE)."""
     random = np.random.default_rng(seed)
     total = np.zeros((TILE, TILE), np.float32)
     for octave in range(2, 10):
@@ -211,7 +211,7 @@ def ground_texture(seed: int) -> Image:
 
 
 def pyramid(texture: Image, levels: int = 6) -> list[Image]:
-    """The texture at full, half, quarter … size, against aliasing from high above."""
+    """The texture at full, half, quarter … size; it prevents aliasing from great heights."""
     textures = [texture]
     for _ in range(levels - 1):
         half = textures[-1].shape[0] // 2

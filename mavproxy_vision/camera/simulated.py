@@ -1,4 +1,4 @@
-"""`sim`: a camera that sees what a simulated vehicle's camera would see."""
+"""The source `sim`: it renders the view of a simulated vehicle's camera."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from mavproxy_vision.camera.renderer import PlacedTag, Renderer
 from mavproxy_vision.camera.source import Frame
 from mavproxy_vision.geometry.frames import Attitude, Vector
 
-SHORTEST = 0.01  # s of latency: what is drawn must have been heard of
-FARTHEST = 10_000.0  # m from home that a tag may lie
+SHORTEST = 0.01  # s of latency: the pose for the frame must have arrived
+FARTHEST = 10_000.0  # m from home to a tag
 PATTERN = re.compile(
     rf"(?:(\w+):)?({ID}):({NUMBER})@({NUMBER}),({NUMBER})(?:,({NUMBER}))?"  # family, id, size, north, east, heading
 )
@@ -25,32 +25,32 @@ Where = Callable[[float], tuple[Vector, Attitude] | None]
 
 @dataclass(frozen=True)
 class Timing:
-    """When frames come.
+    """When frames arrive.
 
     Attributes:
         rate: frames per second.
-        latency: s from light to arrival.
+        latency: s from capture to arrival.
         jitter: s, standard deviation of the latency.
         dropout: share of frames (0 to 1) that never arrive.
-        told: the latency (s) that the module believes.
+        assumed_latency: the latency (s) that the module assumes.
     """
 
     rate: float = 20.0
     latency: float = 0.08
     jitter: float = 0.01
     dropout: float = 0.0
-    told: float = 0.08
+    assumed_latency: float = 0.08
 
 
 class SimulatedCamera:
-    """Draws what a camera on the vehicle sees, in step with the wall clock.
+    """Renders the view of a camera on the vehicle, on the wall clock.
 
     Args:
-        renderer: draws.
-        where: position (m NED from home) and attitude at a host time; asked from the worker's thread.
+        renderer: the renderer.
+        where: gives position (m NED from home) and attitude at a host time; called from the worker's thread.
         timing: rate and latency.
         clock: monotonic seconds.
-        seed: of jitter and dropouts.
+        seed: for jitter and dropouts.
     """
 
     live = True
@@ -73,7 +73,7 @@ class SimulatedCamera:
         self._tick = self._clock()
 
     def read(self) -> Frame | None:
-        """The next frame, when its time has come."""
+        """Wait until the next frame is due and return it; None for a dropout or an unknown pose."""
         timing = self.timing
         now = self._clock()
         latency = self.latency()
@@ -82,28 +82,28 @@ class SimulatedCamera:
         if self._random.random() < timing.dropout:
             return None
         frame = self.frame(self._tick, self._clock())
-        return None if frame is None else replace(frame, received_at=self._clock())  # drawing takes its time
+        return None if frame is None else replace(frame, received_at=self._clock())  # rendering takes time
 
     def latency(self) -> float:
         """The next frame's latency, s."""
         return max(self._random.gauss(self.timing.latency, self.timing.jitter), SHORTEST)
 
     def frame(self, light: float, arrival: float) -> Frame | None:
-        """What the camera saw at host time `light` (s), arriving at `arrival`; None when nobody knows."""
+        """The view at host time `light` (s) as a frame that arrives at `arrival`; None if the pose is unknown."""
         pose = self._where(light)
         if pose is None:
             return None
-        return Frame(self.renderer.render(*pose), arrival - self.timing.told, arrival)
+        return Frame(self.renderer.render(*pose), arrival - self.timing.assumed_latency, arrival)
 
     def close(self) -> None:
-        """Nothing to let go."""
+        """Do nothing: there is nothing to release."""
 
 
 def parse_placed(text: str, family: str) -> tuple[PlacedTag, ...]:
-    """Read `[FAMILY:]ID:SIZE@NORTH,EAST[,HEADING]`, separated by spaces or semicolons; empty is no tag.
+    """Parse `[FAMILY:]ID:SIZE@NORTH,EAST[,HEADING]`, separated by spaces or semicolons; empty means no tag.
 
     Raises:
-        SettingError: it is no such list.
+        SettingError: the text is not such a list.
     """
     tags = []
     for word in re.split(r"[\s;]+", text.strip()):

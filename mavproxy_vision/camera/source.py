@@ -1,7 +1,7 @@
-"""Where frames come from: what every source gives, folders of images, and frames that are posted.
+"""Sources of frames: the protocol of all sources, folders of images, and posted frames.
 
-Cameras, streams and video files are in `capture`, GStreamer in `pipeline`, the rendered camera in `simulated`.
-A source is opened, read and closed by one thread, the worker's.
+`opencv_capture.py` has cameras, streams and video files, `gstreamer.py` GStreamer pipelines, `simulated.py` the
+rendered camera. One thread, the worker's, opens, reads and closes a source.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from mavproxy_vision.errors import BadImage, NoCamera
 Image = NDArray[np.uint8]
 
 IMAGES = {".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".pgm"}
-POSTED_KEPT = 2  # posted frames that wait
+POSTED_KEPT = 2  # posted frames in the queue
 MOST_PIXELS = 40_000_000  # of a posted frame
 PIPELINE_PASSWORD = re.compile(r"\b((?:user|proxy)-pw\s*=\s*)(\"[^\"]*\"|'[^']*'|\S+)")  # of GStreamer's elements
 
@@ -35,9 +35,9 @@ class Frame:
     """A frame.
 
     Attributes:
-        image: grey, (height, width).
-        captured_at: when its light fell, as far as the source knows (s, monotonic).
-        received_at: when we had it (s, monotonic).
+        image: grey, shape (height, width).
+        captured_at: its capture time, as far as the source knows it (s, monotonic).
+        received_at: its time of arrival (s, monotonic).
     """
 
     image: Image
@@ -46,7 +46,7 @@ class Frame:
 
 
 class Source(Protocol):
-    """Gives frames.
+    """A source of frames.
 
     Attributes:
         live: whether two equal frames in a row mean that it is frozen.
@@ -55,39 +55,39 @@ class Source(Protocol):
     live: bool
 
     def open(self) -> None:
-        """Get ready. Raises NoCamera."""
+        """Prepare to read. Raises NoCamera."""
 
     def read(self) -> Frame | None:
-        """The next frame; None when there is none just now. Blocks for a fraction of a second at most.
+        """The next frame; None if there is none now. Blocks for a fraction of a second at most.
 
         Raises:
-            NoCamera: it has failed, and must be opened again.
+            NoCamera: it has failed and must be reopened.
         """
 
     def close(self) -> None:
-        """Let go."""
+        """Release the source."""
 
 
 def masked_source(spec: str) -> str:
-    """The setting `source` as it may be shown: without the passwords of a URL or a pipeline."""
+    """The setting `source` without the passwords of a URL or a pipeline."""
     return PIPELINE_PASSWORD.sub(r"\1***", masked(spec) if "://" in spec else spec)
 
 
 def grey(image: Any) -> Image:
-    """A frame as OpenCV gives it, in grey of 8 bits; of 16 bits these are the upper ones.
+    """A frame of OpenCV in 8-bit grey; of 16 bits the upper 8 are used.
 
     Raises:
-        NoCamera: it is no picture.
+        NoCamera: it is not a picture.
     """
     if image.dtype == np.uint16:
         image = (image >> 8).astype(np.uint8)
     channels = 1 if image.ndim == 2 else image.shape[2]
     if image.dtype != np.uint8 or channels > 4:
-        raise NoCamera(f"the camera gives {channels} channels of {image.dtype}: no picture")
+        raise NoCamera(f"the camera sends {channels} channels of {image.dtype}, which is not a picture")
     if channels > 2:
         image = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY if channels == 3 else cv2.COLOR_BGRA2GRAY)
     elif image.ndim == 3:
-        image = image[..., 0]  # of two channels, YUYV, the first is the brightness
+        image = image[..., 0]  # two channels are YUYV; the first is the brightness
     return np.ascontiguousarray(image)
 
 
@@ -95,31 +95,31 @@ def decode(data: bytes) -> Image:
     """A JPEG or PNG of up to MOST_PIXELS, in grey.
 
     Raises:
-        BadImage: it is none.
+        BadImage: it is not one.
     """
     size = size_of(data)
     if size is None or 0 in size:
         raise BadImage("the body is not an image, JPEG or PNG")
     if size[0] * size[1] > MOST_PIXELS:
-        raise BadImage(f"an image of {size[0]}x{size[1]} px; at most {MOST_PIXELS // 1_000_000} megapixels are taken")
+        raise BadImage(f"an image of {size[0]}x{size[1]} px; the limit is {MOST_PIXELS // 1_000_000} megapixels")
     costly = why_costly(data)
     if costly is not None:
-        raise BadImage(f"{costly} is not taken")
+        raise BadImage(f"{costly} is not accepted")
     return decode_any(data)
 
 
 def decode_any(data: bytes) -> Image:
-    """An image of whatever kind OpenCV knows, in grey.
+    """An image of any format that OpenCV knows, in grey.
 
     Raises:
-        BadImage: it is none.
+        BadImage: it is not one.
     """
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE) if data else None
     except cv2.error as error:
         raise BadImage(f"the image cannot be read: {error.err}") from error
     if image is None:
-        raise BadImage("that is not an image")
+        raise BadImage("the data is not an image")
     return np.asarray(image, np.uint8)
 
 
@@ -136,10 +136,10 @@ class Folder:
         self._index = 0
 
     def open(self) -> None:
-        """Look what there is.
+        """List the images.
 
         Raises:
-            NoCamera: no images.
+            NoCamera: there are none.
         """
         try:
             self._files = sorted(file for file in self._folder.iterdir() if file.suffix.lower() in IMAGES)
@@ -149,10 +149,10 @@ class Folder:
             raise NoCamera(f"no images in {self._folder}")
 
     def read(self) -> Frame | None:
-        """The next image; None for a file that holds none.
+        """The next image; None for a file that is not an image.
 
         Raises:
-            NoCamera: the file, or the folder, has gone.
+            NoCamera: the file or the folder was removed.
         """
         time.sleep(1.0 / self._rate)
         file = self._files[self._index % len(self._files)]
@@ -167,11 +167,11 @@ class Folder:
         return Frame(image, now - self._latency, now)
 
     def close(self) -> None:
-        """Nothing to let go."""
+        """Do nothing: there is nothing to release."""
 
 
 class Posted:
-    """Frames that somebody hands over, by HTTP."""
+    """Frames that are posted by HTTP."""
 
     live = True
 
@@ -180,10 +180,10 @@ class Posted:
         self._frames: queue.Queue[Frame] = queue.Queue(POSTED_KEPT)
 
     def open(self) -> None:
-        """Nothing to do."""
+        """Do nothing: frames arrive by `post`."""
 
     def post(self, image: Image, latency: float | None = None) -> None:
-        """Hand a frame over, `latency` s after its light fell. Any thread."""
+        """Hand over a frame, `latency` s after its capture. Any thread."""
         now = self._clock()
         while True:
             try:
@@ -197,11 +197,11 @@ class Posted:
                 return
 
     def read(self) -> Frame | None:
-        """The next posted frame, if one comes soon."""
+        """The next posted frame; None if none arrives within 0.1 s."""
         try:
             return self._frames.get(timeout=0.1)
         except queue.Empty:
             return None
 
     def close(self) -> None:
-        """Nothing to let go."""
+        """Do nothing: there is nothing to release."""

@@ -50,7 +50,7 @@ class CameraModel:
         """Why frames of that size (px) cannot be scaled frames of this lens, in a sentence; empty if they can."""
         if abs(width * self.height / (height * self.width) - 1.0) <= SAME_SHAPE:
             return ""
-        return f"asked for is {self.width}x{self.height} px or another size of that shape, and {width}x{height} came"
+        return f"a frame has {width}x{height} px instead of {self.width}x{self.height} or a size of the same shape"
 
     def scaled_to(self, width: int, height: int) -> CameraModel:
         """The same lens with frames of another size, of the same shape."""

@@ -74,7 +74,7 @@ class PrecisionDescent(Descent):
         Raises:
             LandingFailed: the landing was given up.
             Rejected: the autopilot refuses its parameters.
-            Superseded, Paused, ModeChanged, NotArmed: somebody else has the vehicle; no more parameters are set.
+            Superseded, Paused, ModeChanged, NotArmed: the job no longer has the vehicle; no more parameters are set.
             TimedOut: it stays low above the target, in LAND.
         """
         flight, vehicle = self.flight, self.flight.vehicle
@@ -95,7 +95,7 @@ class PrecisionDescent(Descent):
         flight, tracker = self.flight, self.flight.tracker
         state, began = flight.vehicle.state, tracker.host.clock()
         while tracker.host.clock() - began < max(HEARD / max(state.time_ratio.ratio, 0.1), 1.0):
-            await self._tell(landing)
+            await self._send_target(landing)
             await flight.send(REST)
             if any("Target Found" in text for text in state.statustexts_since(began - 30.0)):
                 return
@@ -123,7 +123,7 @@ class PrecisionDescent(Descent):
                 assert motion is not None
                 landing.resume(now, motion, flight.height(motion))
                 return False
-            await self._tell(landing)
+            await self._send_target(landing)
             await flight.pause()
         flight.autopilot = None
         return True
@@ -133,7 +133,7 @@ class PrecisionDescent(Descent):
 
         Raises:
             NotArmed: its motors stopped in flight.
-            ModeChanged: somebody else has the vehicle.
+            ModeChanged: the pilot or a failsafe has the vehicle.
         """
         vehicle = self.flight.vehicle
         touchdown.sinks_at((vehicle.state.field("GLOBAL_POSITION_INT", "vz") or 0) / 100.0)
@@ -158,7 +158,7 @@ class PrecisionDescent(Descent):
         place, motion = landing.target.place, self.flight.tracker.history.last_motion
         return place is not None and motion is not None and float(place[2] - motion.travelled[2]) > BLIND_BELOW
 
-    async def _tell(self, landing: Landing) -> None:
+    async def _send_target(self, landing: Landing) -> None:
         """Send the target's position to the autopilot, if it is known."""
         flight, tracker, place = self.flight, self.flight.tracker, landing.target.place
         now = tracker.now()
@@ -169,4 +169,4 @@ class PrecisionDescent(Descent):
         landing.offset = float((relative[:2] ** 2).sum() ** 0.5)
         flight.note(landing, motion)
         if landing.target.age(now) <= COAST or relative[2] <= BLIND_BELOW:
-            await flight.tell(landing_target(now, relative, attitude))
+            await flight.send_message(landing_target(now, relative, attitude))

@@ -28,7 +28,7 @@ from mavproxy_vision.tracking.tracker import Tracker
 PERIOD = 0.05  # s on the vehicle's clock between two setpoints
 SHORTEST = 0.03  # s of ours, for any camera rate and vehicle clock
 STALE = 0.5  # s on the vehicle's clock without telemetry until it rests
-UNTOLD = 10.0  # s on that clock until a landing is given up
+POSITION_TIMEOUT = 10.0  # s on that clock until a landing is given up
 BLIND = 5.0  # s without a frame until a landing is given up
 FIRST = 3.0  # s of ours for the first telemetry
 SEARCHES = 1000  # attempts of a search; in practice its leash and time limit end it
@@ -83,7 +83,7 @@ class TagFlight:
         self._floor = 0.0  # of the target's ground, m down of the EKF origin: as it was when the flight began
         self._sent_at = tracker.host.clock()
         # Number of the frame whose way to a setpoint was timed last; what is there before the flight waited for it.
-        self._timed = 0 if tracker.seen is None else tracker.seen.number
+        self._timed = 0 if tracker.result is None else tracker.result.number
 
     async def take_over(self) -> None:
         """Take the vehicle over, after the end of our previous flight of it. A vehicle in GUIDED stops.
@@ -186,11 +186,11 @@ class TagFlight:
             Stale: none came.
         """
         for number in tags:
-            await self.tracker.want(number)
+            await self.tracker.add_tag_id(number)
         tracker, deadline = self.tracker, self.tracker.host.clock() + FIRST
         while tracker.floor is None or tracker.history.motion(tracker.now()) is None:
             if tracker.host.clock() > deadline:
-                raise Stale(f"vehicle {tracker.system} has not told where it is for {FIRST:g} s")
+                raise Stale(f"vehicle {tracker.system} has not reported where it is for {FIRST:g} s")
             await self.pause()
         self._floor = tracker.floor
         await self.vehicle.limits()  # so that nothing has to wait between the last metre and LAND
@@ -213,15 +213,15 @@ class TagFlight:
     async def fly(self, landing: Landing) -> LandingCommand:
         """Send the landing's setpoints until it is to touch down, or has failed."""
         tracker, vehicle = self.tracker, self.vehicle
-        blind, untold = ConditionTimer(), ConditionTimer()
+        blind, unknown = ConditionTimer(), ConditionTimer()
         if landing.began is None:
             landing.begin(tracker.now())
         while True:
             vehicle.held_by("GUIDED")
             now = tracker.now()
             motion = self.motion(now)
-            if untold(motion is None, now) > UNTOLD:
-                return landing.fail(f"the vehicle has not told where it is for {UNTOLD:g} s")
+            if unknown(motion is None, now) > POSITION_TIMEOUT:
+                return landing.fail(f"the vehicle has not reported where it is for {POSITION_TIMEOUT:g} s")
             if motion is None:
                 await self.send(REST)  # its position is unknown; if it hears us, it stops
             else:
@@ -238,10 +238,10 @@ class TagFlight:
 
     def _time_latency(self) -> None:
         """Note the time from the newest frame's arrival to the first setpoint that uses it."""
-        seen = self.tracker.seen
-        if seen is not None and seen.number != self._timed:
-            self._timed = seen.number
-            self.tracker.latencies.append(self.tracker.host.clock() - seen.received_at)
+        result = self.tracker.result
+        if result is not None and result.number != self._timed:
+            self._timed = result.number
+            self.tracker.latencies.append(self.tracker.host.clock() - result.received_at)
 
     async def pause(self) -> None:
         """Wait until the next setpoint is due, or a frame has been processed.
@@ -271,17 +271,17 @@ class TagFlight:
         """Send a velocity (m/s NED) to a vehicle that is still in GUIDED.
 
         Raises:
-            Superseded, Paused, ModeChanged, NotArmed: somebody else has the vehicle; nothing is sent.
+            Superseded, Paused, ModeChanged, NotArmed: the job no longer has the vehicle; nothing is sent.
         """
         attitude = self.tracker.history.attitude(self.tracker.now())
         self._sent_at = self.tracker.host.clock()
         await self.vehicle.send_setpoint(self.job, setpoint(velocity, None if attitude is None else attitude.yaw))
 
-    async def tell(self, message: Any) -> None:
+    async def send_message(self, message: Any) -> None:
         """Send the vehicle a message; `pause` limits the rate.
 
         Raises:
-            Superseded, Paused: somebody else commands it; nothing is sent.
+            Superseded, Paused: another job commands it; nothing is sent.
         """
         self.vehicle.authority.require(self.job)
         self._sent_at = self.tracker.host.clock()
@@ -298,7 +298,7 @@ class TagFlight:
     def _failed(self, reason: str) -> LandingFailed:
         self.report.reason = reason
         done = f"; {DID[self.report.action]}" if self.report.action else ""
-        return LandingFailed(f"{reason}{done}", self.report.told)
+        return LandingFailed(f"{reason}{done}", self.report.as_dict)
 
     async def give_up(self, landing: Landing, reason: str) -> None:
         """Apply the setting for a failed landing, then raise the error."""

@@ -73,13 +73,13 @@ class MissionTask(FlightTask):
     Args:
         flights: the FlightJobs that it belongs to.
         copter: the vehicle.
-        errand: the place and kind of the landing.
+        plan: the place and kind of the landing.
     """
 
-    def __init__(self, flights: FlightJobs, copter: Copter, errand: MissionPlan) -> None:
-        descent_method = flights.descent_method(errand.method)
-        super().__init__(flights, copter, "mission", lambda flight: mission.fly(flight, errand, descent_method))
-        self._errand, self._track = errand, FlightLog()
+    def __init__(self, flights: FlightJobs, copter: Copter, plan: MissionPlan) -> None:
+        descent_method = flights.descent_method(plan.method)
+        super().__init__(flights, copter, "mission", lambda flight: mission.fly(flight, plan, descent_method))
+        self._mission, self._track = plan, FlightLog()
 
     async def __call__(self, job: Job) -> None:
         """Fly the mission, and write its track at its end."""
@@ -92,7 +92,7 @@ class MissionTask(FlightTask):
             home = self._copter.state.messages.get("HOME_POSITION")
             if home is not None:
                 home_place = home.message.latitude / 1e7, home.message.longitude / 1e7
-                self._track.target = self._errand.place(home_place)
+                self._track.target = self._mission.place(home_place)
             await self._flights.keep(self._track, self.report)
 
     def _follow(self, state: VehicleState, message: Any, _now: float) -> None:
@@ -122,7 +122,7 @@ class FlightJobs:
         self._tidying: set[PrecisionLanding] = set()
         self._tasks = HeldTasks()
         self._unloaded = False
-        tracker.host.last_words.append(self.last_words)
+        tracker.host.closing_messages.append(self.closing_messages)
 
     def copter(self) -> Copter:
         """MAVProxy's current vehicle. Raises NoVehicle, LinkLost, NotSupported."""
@@ -139,9 +139,9 @@ class FlightJobs:
         """Find a tag from here."""
         return FlightTask(self, copter, "search", lambda flight: flight.search(number, leash))
 
-    def errand(self, copter: Copter, errand: MissionPlan) -> FlightTask:
+    def mission(self, copter: Copter, plan: MissionPlan) -> FlightTask:
         """A whole mission, with its track."""
-        return MissionTask(self, copter, errand)
+        return MissionTask(self, copter, plan)
 
     def descent_method(self, method: str) -> Callable[[TagFlight], Descent]:
         """The descent of that method."""
@@ -230,24 +230,24 @@ class FlightJobs:
     # -- from the prompt, and at the end ---------------------------------------------------------------------
 
     def begin(
-        self, copter: Copter, sortie: FlightTask, path: str, request: dict[str, Any], tell: Callable[[str], None]
+        self, copter: Copter, task: FlightTask, path: str, request: dict[str, Any], report: Callable[[str], None]
     ) -> Job:
-        """Start a flight without a network client; `tell` is called with one line at its end."""
+        """Start a flight without a network client; `report` is called with one line at its end."""
 
         async def body(job: Job) -> str:
-            await sortie(job)
-            return sortie.result()
+            await task(job)
+            return task.result()
 
         jobs = self.tracker.host.jobs
         job = jobs.begin(copter, path, request, body, client=CONSOLE, outlives_client=True)
-        self._tasks.start(self._tell_end(job, tell), "a flight from the prompt")
+        self._tasks.start(self._report_end(job, report), "a flight from the prompt")
         return job
 
-    async def _tell_end(self, job: Job, tell: Callable[[str], None]) -> None:
+    async def _report_end(self, job: Job, report: Callable[[str], None]) -> None:
         try:
-            tell(await job.outcome())
+            report(await job.outcome())
         except UavApiError as error:
-            tell(str(error))
+            report(str(error))
 
     def stop(self, reason: str) -> str | None:
         """End all flights; a vehicle that is ours must hold. Returns what was done; None without a flight."""
@@ -260,10 +260,10 @@ class FlightJobs:
         self._leave_host()
 
     def _leave_host(self) -> None:
-        """Leave the host's last words when nothing flies and all parameters are restored."""
-        words = self.tracker.host.last_words
-        if self._unloaded and not self._begun and not self.last_words() and self.last_words in words:
-            words.remove(self.last_words)
+        """Leave the host's closing messages when nothing flies and all parameters are restored."""
+        sources = self.tracker.host.closing_messages
+        if self._unloaded and not self._begun and not self.closing_messages() and self.closing_messages in sources:
+            sources.remove(self.closing_messages)
 
     def _end(self, reason: str, ending: Ending) -> str | None:
         """End running flights and those in preparation; the outcome of the running ones has precedence."""
@@ -275,7 +275,7 @@ class FlightJobs:
                 flight.job.abort(error, ending)
         return outcome
 
-    def last_words(self) -> list[tuple[Any, int]]:
+    def closing_messages(self) -> list[tuple[Any, int]]:
         """The messages that restore the remaining parameters, and the systems that they go to."""
         return [(message, plnd.vehicle.state.system) for plnd in self._plnd.values() for message in plnd.remaining()]
 
@@ -283,7 +283,7 @@ class FlightJobs:
 def _ended(tracker: Tracker, flight: TagFlight, reason: str, ending: Ending) -> Aborted:
     vehicle = flight.vehicle
     holds = flight.commands and tracker.host.endings.what_follows(vehicle, FIXED[ending], flight.job.modes)
-    outcome = "the vehicle is told to hold" if holds else f"the vehicle is left alone: it is in {vehicle.mode}"
+    outcome = "the vehicle is commanded to hold" if holds else f"the vehicle is left alone: it is in {vehicle.mode}"
     return Aborted(f"{reason}; {outcome}")
 
 

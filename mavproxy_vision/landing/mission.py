@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from mavproxy_uavapi.core.errors import Invalid
+from mavproxy_uavapi.core.vehicle.copter import Copter
 from mavproxy_uavapi.core.vehicle.geodesy import METRES_PER_DEGREE
 from mavproxy_uavapi.core.vehicle.messages import GlobalTarget
 from mavproxy_vision.landing.descent import Descent
@@ -51,7 +52,16 @@ class MissionPlan:
         return lat + self.north / METRES_PER_DEGREE, (there + 180.0) % 360.0 - 180.0
 
 
-async def fly(flight: TagFlight, errand: MissionPlan, descent_method: Callable[[TagFlight], Descent]) -> None:
+async def _require_inside(vehicle: Copter, plan: MissionPlan, grounded: bool) -> None:
+    """Raise OutsideEnvelope unless the climb and the way there stay in the envelope."""
+    home = await vehicle.home()
+    there = plan.place((home.latitude / 1e7, home.longitude / 1e7))
+    here = vehicle.fresh("GLOBAL_POSITION_INT")
+    climb = [GlobalTarget(here.lat / 1e7, here.lon / 1e7, plan.alt)] if grounded else []
+    vehicle.require_route([*climb, GlobalTarget(*there, plan.alt)])
+
+
+async def fly(flight: TagFlight, plan: MissionPlan, descent_method: Callable[[TagFlight], Descent]) -> None:
     """Arm, take off, fly there, land; done when disarmed there.
 
     A vehicle that already flies in GUIDED starts from its position.
@@ -62,22 +72,24 @@ async def fly(flight: TagFlight, errand: MissionPlan, descent_method: Callable[[
     """
     vehicle, job = flight.vehicle, flight.job
     grounded = not vehicle.state.armed or vehicle.state.landed is not False
-    if errand.on_tag:
+    if plan.on_tag:
         flight.tracker.require_camera()
-        landable(flight.tracker.settings, errand.tag)
+        landable(flight.tracker.settings, plan.tag)
         await descent_method(flight).prepare()
     if not grounded:
         vehicle.require_guided_flight()
+    if vehicle.guard.in_force:
+        await _require_inside(vehicle, plan, grounded)
     await flight.take_over()
     if grounded:
         await vehicle.arm(job)
-        await vehicle.takeoff(job, errand.alt)
+        await vehicle.takeoff(job, plan.alt)
     home = await vehicle.home()
-    lat, lon = errand.place((home.latitude / 1e7, home.longitude / 1e7))
+    lat, lon = plan.place((home.latitude / 1e7, home.longitude / 1e7))
     vehicle.held_by("GUIDED")
-    await vehicle.go_to(job, GlobalTarget(lat, lon, errand.alt), wait=True)
+    await vehicle.go_to(job, GlobalTarget(lat, lon, plan.alt), wait=True)
     vehicle.held_by("GUIDED")
-    if errand.on_tag:
-        await flight.land(errand.tag, errand.method, descent_method)
+    if plan.on_tag:
+        await flight.land(plan.tag, plan.method, descent_method)
     else:
         await flight.fly_by("LAND", vehicle.land)

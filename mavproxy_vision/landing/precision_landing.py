@@ -42,7 +42,7 @@ WANTED = {
 
 
 def no_check() -> None:
-    """No check: parameters are read and restored even if somebody else has the vehicle."""
+    """No check: parameters are read and restored even if the pilot has the vehicle."""
 
 
 class PrecisionLanding:
@@ -106,7 +106,7 @@ class PrecisionLanding:
     async def give_back(self) -> None:
         """Restore every parameter, the switch first, unless a landing begins that needs them.
 
-        A value that somebody has changed meanwhile stays.
+        A value that was changed meanwhile stays.
 
         Raises:
             Rejected: some were refused; the others are restored.
@@ -135,10 +135,10 @@ class PrecisionLanding:
         return [set_parameter(self.vehicle.address, name, self.before[name]) for name in self._in_order()]
 
     async def _current_value(self, name: str) -> float:
-        """The parameter's present value, requested: somebody may have set it while the link was silent."""
+        """Request the parameter's present value: it may have been changed while the link was silent."""
         message = await self._request(name, read_parameter(self.vehicle.address, name), None)
         if message is None:
-            raise Rejected(f"the autopilot does not tell {name}")
+            raise Rejected(f"the autopilot does not report {name}")
         return float(message.param_value)
 
     async def _set(self, name: str, value: float, check: Callable[[], None] = no_check) -> None:

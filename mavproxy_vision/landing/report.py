@@ -34,7 +34,7 @@ class Report:
         off = "" if self.touchdown_error is None else f", {self.touchdown_error:.2f} m off it"
         return f"Landed on tag {self.tag}{off}"
 
-    def told(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, Any]:
         """The report as a JSON object without unknown values; lengths in m, times in s on the vehicle's clock."""
         rounded = {name: round(value, 2) for name, value in self.phases.items()}
         members = {**vars(self), "phases": rounded, "duration": round(self.duration, 2)}

@@ -148,7 +148,7 @@ class Landing:
         failure = self._failure(now)
         if failure:
             return self.fail(failure)
-        velocity = self._wanted(now, motion, height, elapsed)
+        velocity = self._velocity_for(now, motion, height, elapsed)
         if self.phase in (Phase.LAND, Phase.FAILED):
             self._velocity = REST
             return LandingCommand(self.phase, REST, self._reason)
@@ -205,11 +205,11 @@ class Landing:
 
     # -- the phases ----------------------------------------------------------------------------------------
 
-    def _wanted(self, now: float, motion: Motion, height: float, elapsed: float) -> Vector:
+    def _velocity_for(self, now: float, motion: Motion, height: float, elapsed: float) -> Vector:
         target = self.target
-        visible = target.found and target.age(now) <= COAST
+        visible = target.is_confirmed and target.age(now) <= COAST
         if visible and self.phase in (Phase.LOOK, Phase.HOLD, Phase.CLIMB, Phase.SEARCH):
-            return self._found(now, motion, height, elapsed)
+            return self._tag_in_sight(now, motion, height, elapsed)
         if self.phase is Phase.DESCEND:
             return self._descend(now, motion, height, elapsed)
         if self.phase is Phase.LAST_METRE:
@@ -221,7 +221,7 @@ class Landing:
             self._look_farther(now)
         return self._towards(self._anchor, motion, height)
 
-    def _found(self, now: float, motion: Motion, height: float, elapsed: float) -> Vector:
+    def _tag_in_sight(self, now: float, motion: Motion, height: float, elapsed: float) -> Vector:
         """The tag is in sight."""
         if not self.plan.descend:
             self.phase = Phase.LAND

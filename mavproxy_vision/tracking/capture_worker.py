@@ -1,4 +1,4 @@
-"""Two threads: one keeps the newest frame, the other looks for tags in it. Neither is MAVProxy's or asyncio's."""
+"""Two threads: one keeps the newest frame, the other detects tags in it. Neither is MAVProxy's or asyncio's."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ from mavproxy_vision.camera.source import Frame, Image, Source
 log = logging.getLogger("vision")
 
 SILENT_AFTER = 0.5  # s without a new frame until the camera counts as dead or frozen
-RECONNECT_AFTER = 1.5  # s without a new frame until the source is opened anew
-RECONNECT_PAUSE = 1.0  # s between two tries
-FIRST_FRAME = 5.0  # s that a source which was just opened has for its first frame
-JOIN = 2.0  # s that both threads get to end; a driver that hangs is left behind
+RECONNECT_AFTER = 1.5  # s without a new frame until the source is reopened
+RECONNECT_PAUSE = 1.0  # s between two attempts
+FIRST_FRAME = 5.0  # s that a newly opened source has for its first frame
+JOIN = 2.0  # s that both threads have to end; a thread whose driver hangs is abandoned
 
 
 @dataclass(frozen=True)
 class Health:
-    """How the camera does.
+    """The state of the camera.
 
     Attributes:
         state: `starting`, `ok`, `frozen`, `no frames`, `wrong shape`, `closed`.
-        frames: frames that were looked at.
-        repeated: frames that were the one before again, and were not looked at.
-        skipped: frames that a newer one overtook.
-        reconnects: times that the source was opened again.
-        rate: frames per second, lately.
-        error: what is wrong, until a frame comes that is looked at.
+        frames: number of processed frames.
+        repeated: number of frames that equal the frame before; they are not processed.
+        skipped: number of frames that a newer frame replaced before they were processed.
+        reconnects: how often the source was reopened.
+        rate: recent frames per second.
+        error: the present error; the next processed frame clears it.
     """
 
     state: str = "starting"
@@ -49,7 +49,10 @@ class Health:
 
 
 class Watch:
-    """Tells new frames from repeated ones, and a live camera from a dead one. Pure: the clock is an argument."""
+    """Distinguishes new frames from repeated ones, and a live camera from a dead one.
+
+    Pure: the clock is an argument.
+    """
 
     def __init__(self, live: bool, now: float) -> None:
         self._live = live
@@ -59,7 +62,7 @@ class Watch:
         self.any_at = now  # the last frame of any kind
 
     def is_new(self, frame: Frame) -> bool:
-        """Whether the frame is another one than the last."""
+        """Whether the frame differs from the last one."""
         self.any_at = frame.received_at
         mark = zlib.crc32(frame.image[::4, ::4].tobytes())
         if self._live and mark == self._mark:
@@ -68,19 +71,19 @@ class Watch:
         return True
 
     def verdict(self, now: float) -> str:
-        """`ok`, `frozen` or `no frames`; `starting` for a moment before the first one."""
+        """`ok`, `frozen` or `no frames`; at first `starting`, until the first frame is due."""
         if now - self.fresh_at <= SILENT_AFTER:
             return "ok" if self._begun else "starting"
         return "frozen" if now - self.any_at <= SILENT_AFTER else "no frames"
 
 
 class Worker:
-    """Reads a source and looks for tags, until stopped.
+    """Reads a source and detects tags, until stopped.
 
     Args:
-        source: where frames come from.
-        detector: looks; used by one thread only.
-        tell: called from the worker's thread with each outcome and its frame.
+        source: the source of frames.
+        detector: the detector; one thread uses it.
+        deliver: called from the worker's thread with each result and its frame.
         clock: monotonic seconds.
     """
 
@@ -88,18 +91,18 @@ class Worker:
         self,
         source: Source,
         detector: Detector,
-        tell: Callable[[FrameResult, Image], None],
+        deliver: Callable[[FrameResult, Image], None],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.source, self.detector = source, detector
         self._state = "starting"
         self._error = self._defect = ""
-        self._misfit = ""  # why the newest frame is not looked at
-        self._open = False  # then the watch knows the state
-        # Each of these has one thread that writes it.
+        self._misfit = ""  # why the newest frame is not processed
+        self._open = False  # whether the source is open, so that the watch knows the state
+        # Exactly one thread writes each of these.
         self._repeated = self._skipped = self._openings = self._frames = 0
         self._rate = 0.0
-        self._tell, self._clock = tell, clock
+        self._deliver, self._clock = deliver, clock
         self._newest: Frame | None = None
         self._changed = threading.Condition()
         self._stop = threading.Event()
@@ -116,7 +119,7 @@ class Worker:
             thread.start()
 
     def stop(self) -> None:
-        """End both; a driver that hangs in a read is left behind. Any other thread."""
+        """End both threads; a thread whose driver hangs in a read is abandoned. Called from any other thread."""
         atexit.unregister(self.stop)
         self._end()
         until = time.monotonic() + JOIN
@@ -131,7 +134,7 @@ class Worker:
 
     @property
     def health(self) -> Health:
-        """How the camera does. Any thread."""
+        """The state of the camera. Any thread."""
         reconnects = max(self._openings - 1, 0)
         error = self._defect or self._error
         verdict = self.verdict()
@@ -139,7 +142,7 @@ class Worker:
         return Health(verdict, self._frames, self._repeated, self._skipped, reconnects, rate, error)
 
     def verdict(self) -> str:
-        """How the camera does just now, in a word of `Health.state`."""
+        """The present state of the camera, a value of `Health.state`."""
         if self._stop.is_set():
             return "closed"
         if not self._open:
@@ -169,7 +172,7 @@ class Worker:
 
     def _read_until_it_fails(self) -> None:
         opened = self._clock()
-        if not self._openings:  # later on it is not well until it gives a frame
+        if not self._openings:  # a reopened source counts as failed until its first frame
             self._watch.any_at = self._watch.fresh_at = opened
         self._openings += 1
         self._open = True
@@ -178,13 +181,13 @@ class Worker:
             if frame is not None:
                 self._take(frame)
             now = self._clock()
-            patience = RECONNECT_AFTER if self._watch.fresh_at > opened else FIRST_FRAME
-            if now - max(self._watch.fresh_at, opened) > patience:
+            limit = RECONNECT_AFTER if self._watch.fresh_at > opened else FIRST_FRAME
+            if now - max(self._watch.fresh_at, opened) > limit:
                 self._error = f"{self._watch.verdict(now)} for {now - self._watch.fresh_at:.1f} s"
                 return
 
     def _take(self, frame: Frame) -> None:
-        """Keep a frame that is new, unless it is no frame of this lens: what it shows would be placed wrongly."""
+        """Keep a new frame, unless its shape does not fit the camera model: its tags would get wrong positions."""
         if not self._watch.is_new(frame):
             self._repeated += 1
             return
@@ -210,13 +213,13 @@ class Worker:
                 frame, self._newest = self._newest, None
             if self._stop.is_set() or frame is None:
                 return
-            self._tell(self.look_at(frame), frame.image)
+            self._deliver(self.look_at(frame), frame.image)
             now = self._clock()
             gap = gap + 0.1 * (now - last - gap) if gap else now - last
             self._rate, last = 1.0 / max(gap, 1e-3), now
 
     def look_at(self, frame: Frame) -> FrameResult:
-        """Look for tags in a frame."""
+        """Detect tags in a frame."""
         detections = self.detector.detect(frame.image)
         self._frames += 1
         size = (frame.image.shape[1], frame.image.shape[0])

@@ -1,7 +1,7 @@
-"""Where a simulated vehicle truly is, by SIM_STATE, and where its home truly is. Pure.
+"""The true pose of a simulated vehicle (SIM_STATE) and the true position of its home. Pure.
 
-The tags of the simulated world lie where the settings say from home: home is where the vehicle stood when it
-was armed, as the autopilot has it, but without the error of its estimate.
+The settings give the positions of the simulated tags relative to home. Home is the position at which the vehicle was
+armed, as for the autopilot, but without the error of the autopilot's estimate.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from mavproxy_uavapi.core.vehicle.geodesy import offset
 from mavproxy_vision.geometry.frames import Attitude, Vector, vector, wrap
 
 KEPT = 400  # poses
-BEYOND = 0.25  # s that the newest pose is carried on
+BEYOND = 0.25  # s of extrapolation beyond the newest pose
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Pose:
 
 
 class Truth:
-    """The last seconds of the truth. One thread adds, any may ask."""
+    """The true poses of the last seconds. One thread adds, any thread may read."""
 
     def __init__(self) -> None:
         self._poses: list[Pose] = []
@@ -43,12 +43,12 @@ class Truth:
         return self._poses[-1] if self._poses else None
 
     def add(self, pose: Pose, armed: bool | None, height: float) -> None:
-        """Take a pose.
+        """Add a pose.
 
         Args:
-            pose: the truth.
-            armed: whether the vehicle is; None while unknown.
-            height: m above home by its own estimate, for a first pose in the air.
+            pose: the true pose.
+            armed: whether the vehicle is armed; None while unknown.
+            height: m above home by its own estimate; used if the first pose is in the air.
         """
         if self._poses and pose.at <= self._poses[-1].at:
             return
@@ -63,7 +63,7 @@ class Truth:
             self._armed = armed
 
     def at(self, time: float) -> tuple[Vector, Attitude] | None:
-        """Position (m NED from home) and attitude at host time `time` (s); None when unknown."""
+        """Position (m NED from home) and attitude at host time `time` (s); None while unknown."""
         poses = self._poses
         if not poses or self._home is None:
             return None

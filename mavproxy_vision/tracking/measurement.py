@@ -1,4 +1,4 @@
-"""From what a frame shows to where the target lies, with the attitude at the frame's capture time. Pure."""
+"""Computes the target's position from the detections of a frame and the attitude at its capture time. Pure."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from mavproxy_vision.geometry.frames import Attitude, Mount, vector
 from mavproxy_vision.tracking.pose_history import History, VehicleClock
 from mavproxy_vision.tracking.target_filter import TargetMeasurement
 
-WORST_ERROR = 0.03  # of the tag's side in px: a reprojection error beyond it is no square
-LEAST_WORST = 1.0  # px
+WORST_ERROR = 0.03  # share of the tag's side (px); with a larger reprojection error the detection is not a square
+LEAST_WORST = 1.0  # px, for small tags
 
 
 @dataclass(frozen=True)
-class Wanted:
-    """What is landed on.
+class TargetSpec:
+    """The target of a landing.
 
     Attributes:
         family: the tags' family.
-        tags: the tags that tell where the target is, by id.
-        floor: of the target's ground, m down of the EKF origin.
+        tags: the tags that give the target's position, by id.
+        floor: the target's ground, m down of the EKF origin.
     """
 
     family: str
@@ -35,39 +35,39 @@ class Wanted:
 
 
 class TargetMeasurer:
-    """Makes measurements of detections.
+    """Makes measurements from detections.
 
     Args:
         model: the camera.
-        mount: how it sits on the vehicle.
-        wanted: what is landed on.
+        mount: how the camera is mounted on the vehicle.
+        target: the target of the landing.
     """
 
-    def __init__(self, model: CameraModel, mount: Mount, wanted: Wanted) -> None:
-        self.model, self.mount, self.wanted = model, mount, wanted
+    def __init__(self, model: CameraModel, mount: Mount, target: TargetSpec) -> None:
+        self.model, self.mount, self.target = model, mount, target
 
-    def measure(self, seen: FrameResult, history: History, clock: VehicleClock) -> list[TargetMeasurement]:
-        """The measurements of one frame; none when nobody knows where the vehicle was at its capture time.
+    def measure(self, result: FrameResult, history: History, clock: VehicleClock) -> list[TargetMeasurement]:
+        """The measurements of one frame; none if the vehicle's pose at its capture time is unknown.
 
         Args:
-            seen: the frame's outcome.
-            history: of the vehicle.
-            clock: host time to vehicle time.
+            result: the detections of the frame.
+            history: the vehicle's poses.
+            clock: converts host time to vehicle time.
         """
-        at = clock.vehicle(seen.captured_at)
+        at = clock.vehicle(result.captured_at)
         attitude, motion = history.attitude(at), history.motion(at)
         if attitude is None or motion is None:
             return []
-        height = self.wanted.floor - float(motion.position[2])
+        height = self.target.floor - float(motion.position[2])
         measurements = []
-        for detection in seen.detections:
-            tag = self.wanted.tags.get(detection.id)
-            if tag is None or detection.family != self.wanted.family or not is_sound(detection):
+        for detection in result.detections:
+            tag = self.target.tags.get(detection.id)
+            if tag is None or detection.family != self.target.family or not is_sound(detection):
                 continue
             assert detection.position is not None and detection.distance is not None
             relative = self.mount.sighted(detection.position, attitude)
             if tag.right or tag.up:
-                model = self.model.scaled_to(*seen.size)
+                model = self.model.scaled_to(*result.size)
                 north, east = target_from(tag, self._right_of(detection, model, attitude))
                 relative = relative + vector(north, east, 0.0)
             place = motion.travelled + relative
@@ -77,7 +77,7 @@ class TargetMeasurer:
         return measurements
 
     def _right_of(self, detection: TagDetection, model: CameraModel, attitude: Attitude) -> tuple[float, float]:
-        """North and east components of the tag's right, for a tag that lies level."""
+        """North and east components of the direction to the tag's right, for a level tag."""
         corners = np.asarray(detection.corners, np.float64).reshape(-1, 1, 2)
         rays = cv2.undistortPoints(corners, model.matrix, model.coefficients).reshape(4, 2)
         down = (self.mount.in_ned(attitude) @ np.column_stack([rays, np.ones(4)]).T).T
@@ -87,7 +87,7 @@ class TargetMeasurer:
 
 
 def is_sound(detection: TagDetection) -> bool:
-    """Whether a detection has a position, in front of the lens, and fits a square."""
+    """Whether a detection has a position in front of the lens and fits a square."""
     if detection.position is None or detection.position[2] <= 0:
         return False
     side = float(np.linalg.norm(detection.corners[1] - detection.corners[0]))

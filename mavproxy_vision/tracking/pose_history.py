@@ -1,7 +1,7 @@
-"""Where the vehicle was when a frame's light fell. Pure: all times are arguments.
+"""The vehicle's pose at the capture time of a frame. Pure: all times are arguments.
 
-Two clocks: the host's (monotonic s, frames are stamped by it) and the vehicle's (s since its boot, telemetry is
-stamped by it). A simulated vehicle's clock may run faster than ours.
+There are two clocks: the host's (monotonic s; it stamps frames) and the vehicle's (s since its boot; it stamps
+telemetry). The clock of a simulated vehicle may run faster than ours.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ from dataclasses import dataclass
 from mavproxy_vision.geometry.frames import Attitude, Vector, vector, wrap
 
 KEPT = 12.0  # s of the vehicle's clock
-BEYOND = 0.3  # s that the newest telemetry is carried on by its rates
-GAP = 0.6  # s between two messages within which nobody knows what the vehicle did
-SILENCE = 2.0  # s between them from which on two velocities tell less of the way than two positions
+BEYOND = 0.3  # s of extrapolation beyond the newest telemetry, by its rates
+GAP = 0.6  # s between two messages beyond which no interpolation is made
+SILENCE = 2.0  # s between two messages beyond which the positions give a better displacement than the velocities
 CLOCK_WINDOW = 1.5  # s of the faster clock over which the least delayed message sets the clocks' offset
 REBOOT = 3.0  # s that a clock may step back without a reboot
-AFTER = 0.05  # s of the vehicle's clock, at least, that an unstamped message may be younger than a stamped one
-STOPPED = 0.5  # s of ours without a stamped message until it tells nothing
+AFTER = 0.05  # s on the vehicle's clock: an unstamped message may be that much younger than a stamped one, or more
+STOPPED = 0.5  # s on our clock without a stamped message until the last one is too old to date others
 
 
 class VehicleClock:
-    """Host time to vehicle time, by the messages that were least delayed on their way."""
+    """Converts host time to vehicle time, by the least delayed messages."""
 
     def __init__(self) -> None:
         self.ratio = 1.0
@@ -33,11 +33,11 @@ class VehicleClock:
 
     @property
     def known(self) -> bool:
-        """Whether a message was heard."""
+        """Whether a message has arrived."""
         return self._best is not None
 
     def hear(self, host: float, vehicle: float, ratio: float) -> None:
-        """A message stamped `vehicle` arrived at `host`; vehicle seconds per host second are `ratio`."""
+        """Note that a message stamped `vehicle` arrived at `host`; `ratio` is vehicle seconds per host second."""
         self.ratio = ratio
         self._pairs.append((host, vehicle))
         while host - self._pairs[0][0] > CLOCK_WINDOW / max(ratio, 1.0):
@@ -58,9 +58,9 @@ class VehicleClock:
 
 
 class UnstampedClock:
-    """When a message without a time was sent, by a stamped one that comes regularly.
+    """Dates messages without a time stamp by a regular stamped one.
 
-    A busy machine hears many at once: what was heard before a message tells when it was sent, while it comes at all.
+    A busy machine reads many messages at once. The stamped message before an unstamped one limits when it was sent.
     """
 
     def __init__(self) -> None:
@@ -68,11 +68,11 @@ class UnstampedClock:
         self._host = -math.inf
 
     def hear(self, host: float, vehicle: float) -> None:
-        """A message stamped `vehicle` arrived at `host`."""
+        """Note that a message stamped `vehicle` arrived at `host`."""
         self._gap, self._vehicle, self._host = vehicle - self._vehicle, vehicle, host
 
     def sent(self, host: float, clock: VehicleClock) -> float:
-        """Host time at which a message was sent that arrived at `host`."""
+        """The host time at which a message was sent that arrived at `host`."""
         if host - self._host > STOPPED:
             return host
         return min(host, clock.host(self._vehicle + max(1.25 * self._gap, AFTER)))
@@ -86,8 +86,8 @@ class Motion:
         at: vehicle time, s.
         position: m NED from the EKF origin.
         velocity: m/s NED.
-        travelled: m NED, the velocity integrated: what relative measurements are referred to, because it does
-            not jump when the estimator's position does.
+        travelled: m NED, the integrated velocity. Relative measurements refer to it, because it does not jump when
+            the estimator's position does.
     """
 
     at: float
@@ -102,14 +102,14 @@ class Motion:
 
 
 class History:
-    """The last seconds of attitude and motion. One thread adds, any may ask."""
+    """Attitude and motion of the last seconds. One thread adds, any thread may read."""
 
     def __init__(self) -> None:
         self._attitudes: list[tuple[float, Attitude, tuple[float, float, float]]] = []
         self._motions: list[Motion] = []
 
     def add_attitude(self, at: float, attitude: Attitude, rates: tuple[float, float, float]) -> None:
-        """Take ATTITUDE: vehicle time (s), rad, rad/s."""
+        """Add an ATTITUDE: vehicle time (s), rad, rad/s."""
         if self._attitudes and at <= self._attitudes[-1][0]:
             if at > self._attitudes[-1][0] - REBOOT:
                 return
@@ -119,7 +119,7 @@ class History:
             self._attitudes = self._attitudes[len(self._attitudes) // 2 :]
 
     def add_motion(self, at: float, position: Vector, velocity: Vector) -> None:
-        """Take LOCAL_POSITION_NED: vehicle time (s), m, m/s."""
+        """Add a LOCAL_POSITION_NED: vehicle time (s), m, m/s."""
         if self._motions and at <= self._motions[-1].at:
             if at > self._motions[-1].at - REBOOT:
                 return
@@ -134,13 +134,13 @@ class History:
 
     @property
     def newest(self) -> float:
-        """Vehicle time up to which both are known; -inf before."""
+        """The vehicle time up to which both are known; -inf before that."""
         if not self._attitudes or not self._motions:
             return -math.inf
         return min(self._attitudes[-1][0], self._motions[-1].at)
 
     def attitude(self, at: float) -> Attitude | None:
-        """The attitude at vehicle time `at` (s); None when it is not known."""
+        """The attitude at vehicle time `at` (s); None while unknown."""
         attitudes = self._attitudes
         times = [entry[0] for entry in attitudes]
         index = bisect.bisect_right(times, at)
@@ -159,7 +159,7 @@ class History:
         return _moved(attitude, [share * angle for angle in turn])
 
     def motion(self, at: float) -> Motion | None:
-        """Position and velocity at vehicle time `at` (s); None when they are not known."""
+        """Position and velocity at vehicle time `at` (s); None while unknown."""
         motions = self._motions
         times = [motion.at for motion in motions]
         index = bisect.bisect_right(times, at)
@@ -186,10 +186,10 @@ class History:
 
 
 def _moved_between(last: Motion, at: float, position: Vector, velocity: Vector) -> Vector:
-    """The way (m NED) from one message to the next, by the velocities.
+    """The displacement (m NED) from one message to the next, by the velocities.
 
-    After a gap the height is taken from the positions, whose wander is less than what a descent may have done; after
-    a longer silence all of it is.
+    After a gap the height comes from the positions: their drift is smaller than a possible descent. After a longer
+    silence all axes do.
     """
     seconds = at - last.at
     moved = (last.velocity + velocity) * (seconds / 2)

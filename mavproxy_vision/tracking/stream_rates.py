@@ -1,7 +1,7 @@
-"""The telemetry that a flight needs, at the rate that it needs, for as long as it needs it.
+"""Keeps the telemetry that a flight needs at the rate that it needs.
 
-MAVProxy asks for all streams at its own rate every 15 s, which overrides message intervals. So what arrives is
-watched, and asked for again as soon as it has become slow; afterwards the default is asked for.
+Every 15 s MAVProxy requests all streams at its own rate, which overrides message intervals. So we watch what arrives,
+and request a message again as soon as it becomes slow. Afterwards we request the default rate.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ mavlink = mavutil.mavlink
 FLIGHT = {"ATTITUDE": 25.0, "LOCAL_POSITION_NED": 25.0}  # Hz of the vehicle's clock
 TRUTH = {"SIM_STATE": 50.0}
 LOOK_EVERY = 0.1  # s
-SLOW = 2.5  # intervals without a message until it is asked for again
-ASK_AGAIN = 1.0  # s until it is asked for again, twice as long each time that it did not help …
-RARELY = 15.0  # … up to so many s
+SLOW = 2.5  # intervals without a message until it is requested again
+RETRY = 1.0  # s until it is requested again; doubled after each request that did not help …
+LONGEST_RETRY = 15.0  # … up to so many s
 
 
 class Rates:
@@ -33,17 +33,17 @@ class Rates:
     def __init__(self, clock: Any) -> None:
         self._clock = clock
         self._needed: list[dict[str, float]] = []
-        self._asked: dict[tuple[Vehicle, str], float] = {}  # when
-        self._pause: dict[str, float] = {}
+        self._requested_at: dict[tuple[Vehicle, str], float] = {}
+        self._pause: dict[str, float] = {}  # s until the next request of a message
 
     @property
     def needed(self) -> dict[str, float]:
-        """Message names and the rates (Hz) at which they are needed now."""
+        """The rate (Hz) of each message that is needed now, by name."""
         return {name: rate for some in self._needed for name, rate in some.items()}
 
     @contextmanager
     def at(self, rates: dict[str, float]) -> Iterator[None]:
-        """Need these for as long as the context lasts."""
+        """Need these rates for as long as the context lasts."""
         self._needed.append(rates)
         try:
             yield
@@ -51,16 +51,16 @@ class Rates:
             self._needed.remove(rates)
 
     async def run(self, vehicle: Any) -> None:
-        """Ask for what is needed, until cancelled; `vehicle()` gives the vehicle, or raises UavApiError."""
+        """Request what is needed, until cancelled; `vehicle()` returns the vehicle, or raises UavApiError."""
         while True:
             try:
                 await self.look(vehicle())
             except UavApiError:
-                self._asked.clear()  # nobody to ask just now; afterwards anew
+                self._requested_at.clear()  # there is no vehicle now; later everything is requested again
             await asyncio.sleep(LOOK_EVERY)
 
     async def look(self, vehicle: Vehicle) -> None:
-        """Ask for what is too slow, and let go of what is needed no more."""
+        """Request messages that are too slow; restore the default rate of those that are no longer needed."""
         needed, now = self.needed, self._clock()
         ratio = max(vehicle.state.time_ratio.ratio, 0.1)
         for name, rate in needed.items():
@@ -70,22 +70,22 @@ class Rates:
                 received is None or max(age or 0.0, received.interval or 0.0) > SLOW / rate / ratio + LOOK_EVERY / 2
             )
             if not slow:
-                self._pause[name] = ASK_AGAIN
-            elif now - self._asked.get((vehicle, name), -RARELY) >= self._pause.get(name, ASK_AGAIN):
-                if (vehicle, name) in self._asked:  # it did not help: a slow link, or a vehicle that cannot
-                    self._pause[name] = min(2 * self._pause.get(name, ASK_AGAIN), RARELY)
-                self._asked[vehicle, name] = now
+                self._pause[name] = RETRY
+            elif now - self._requested_at.get((vehicle, name), -LONGEST_RETRY) >= self._pause.get(name, RETRY):
+                if (vehicle, name) in self._requested_at:  # a slow link, or a vehicle that cannot send so fast
+                    self._pause[name] = min(2 * self._pause.get(name, RETRY), LONGEST_RETRY)
+                self._requested_at[vehicle, name] = now
                 await self._send(vehicle, set_interval(MESSAGE_IDS[name], rate))
-        for asked, name in [key for key in self._asked if key[0] is not vehicle or key[1] not in needed]:
-            del self._asked[asked, name]
+        for other, name in [key for key in self._requested_at if key[0] is not vehicle or key[1] not in needed]:
+            del self._requested_at[other, name]
             self._pause.pop(name, None)
-            await self._send(asked, default_interval(MESSAGE_IDS[name]))
+            await self._send(other, default_interval(MESSAGE_IDS[name]))
 
     async def _send(self, vehicle: Vehicle, command: Command) -> None:
-        # No ack is awaited: what arrives is the proof.
+        # We wait for no ack: the arriving messages are the proof.
         await vehicle.link.send(command.to(vehicle.address, 0), vehicle.state.system)
 
 
 def default_interval(message_id: int) -> Command:
-    """Ask for a message at the rate of its stream."""
+    """The command that requests a message at the rate of its stream."""
     return Command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, (message_id, 0))

@@ -1,6 +1,6 @@
-"""Where the target lies, from what the camera saw and how the vehicle moved. Pure.
+"""Estimates the target's position from the camera's detections and the vehicle's motion. Pure.
 
-Places are m NED in the frame of `Motion.travelled`, times are on the vehicle's clock (s).
+Positions are m NED in the frame of `Motion.travelled`; times are on the vehicle's clock (s).
 """
 
 from __future__ import annotations
@@ -13,30 +13,30 @@ import numpy as np
 
 from mavproxy_vision.geometry.frames import Vector
 
-WANDER = 0.12  # m/sqrt(s): how fast a place drifts in a frame that is integrated from velocities
-GATE = 0.45  # m, and 8 % of the range: farther off, it is another tag or an outlier
-REJECTED_IN_A_ROW = 12  # then it was the old place that was wrong
-FIXES = 3  # detections that make a target
+DRIFT = 0.12  # m/sqrt(s): drift of a position in a frame that is integrated from velocities
+GATE = 0.45  # m, plus 8 % of the range: a detection farther off is another tag or an outlier
+REJECTED_IN_A_ROW = 12  # rejected detections after which the old position counts as wrong
+FIXES = 3  # detections that confirm a target
 WINDOW = 5.0  # s over which motion and detections are compared
-MOVED = 0.8  # m that the vehicle must have moved for that: a late frame alone moves a place by half of it
-WRONG_WAY = 0.8  # share of its motion that the place of a resting tag may seem to move; 1.4 when turned by 90 degrees
+MOVED = 0.8  # m that the vehicle must have moved for that; a late frame alone moves a position by half of it
+WRONG_WAY = 0.8  # share of the vehicle's motion that a resting tag may seem to move; 1.4 if `mount` is 90 degrees off
 WRONG_TIMES = 4  # detections in a row
-HEIGHT_FROM = 2.0  # m; lower, a barometer says nothing about a tag's size
-HEIGHT_OFF = (0.7, 0.22)  # m, and share of the height, by which range and height may disagree
+HEIGHT_FROM = 2.0  # m; below it the barometer is too inaccurate to check a tag's size
+HEIGHT_OFF = (0.7, 0.22)  # m, and share of the height: the allowed difference between range and height
 HEIGHTS = 10  # detections over which they are compared
 
 
 @dataclass(frozen=True)
 class TargetMeasurement:
-    """One detection, made ready.
+    """The target's position by one detection.
 
     Attributes:
         at: capture time.
-        place: of the target.
-        travelled: of the vehicle then.
+        place: the target's position.
+        travelled: the vehicle's position at that time.
         range: m from the lens to the tag.
-        height: of the vehicle above the target's ground, by its own estimate (m).
-        tag: the id that was seen.
+        height: m of the vehicle above the target's ground, by the vehicle's own estimate.
+        tag: the detected id.
     """
 
     at: float
@@ -48,12 +48,12 @@ class TargetMeasurement:
 
     @property
     def depth(self) -> float:
-        """How far the target lies below the vehicle (m), by the camera."""
+        """m of the target below the vehicle, by the camera."""
         return float(self.place[2] - self.travelled[2])
 
 
 class Target:
-    """The estimate: a Kalman filter with one state for each axis, whose place rests but for drift."""
+    """The estimate: a Kalman filter with one state per axis; the position is constant except for drift."""
 
     def __init__(self) -> None:
         self.place: Vector | None = None
@@ -61,30 +61,30 @@ class Target:
         self.measurements = 0
         self.ambiguous = 0  # frames in a row that showed two tags of the same id
         self.last: TargetMeasurement | None = None
-        self.is_final = False  # no other place is believed any more, whatever is seen
+        self.is_final = False  # whether detections elsewhere no longer move the position
         self._variance = np.zeros(3)
         self._rejected = 0
         self._recent: deque[TargetMeasurement] = deque()
         self._wrong_way = 0
 
     @property
-    def found(self) -> bool:
+    def is_confirmed(self) -> bool:
         """Whether enough detections agree."""
         return self.place is not None and self.measurements >= FIXES
 
     def age(self, now: float) -> float:
-        """Seconds since it was last seen."""
+        """Seconds since its last detection."""
         return now - self.seen_at
 
     def take(self, measurements: list[TargetMeasurement]) -> None:
-        """Take the measurements of one frame. A repeated id means two physical tags."""
+        """Use the measurements of one frame. A repeated id means two physical tags."""
         twice = len({measurement.tag for measurement in measurements}) < len(measurements)
-        self.ambiguous = self.ambiguous + 1 if twice and not self.found else 0
-        if twice and not self.found:
+        self.ambiguous = self.ambiguous + 1 if twice and not self.is_confirmed else 0
+        if twice and not self.is_confirmed:
             return
         for measurement in sorted(measurements, key=self._distance):
             if self._update(measurement) and twice:
-                return  # the other one is not ours
+                return  # the other tag is not the target
 
     def _distance(self, measurement: TargetMeasurement) -> float:
         return 0.0 if self.place is None else float(np.linalg.norm(measurement.place - self.place))
@@ -96,7 +96,7 @@ class Target:
         if self.place is None:
             self._begin(measurement, noise)
             return True
-        self._variance += WANDER**2 * max(measurement.at - self.seen_at, 0.0)
+        self._variance += DRIFT**2 * max(measurement.at - self.seen_at, 0.0)
         if self._distance(measurement) > GATE + 0.08 * measurement.range + math.sqrt(float(self._variance.max())):
             self._rejected += 1
             if self._rejected >= REJECTED_IN_A_ROW and not self.is_final:
@@ -118,7 +118,7 @@ class Target:
         self.seen_at = max(self.seen_at, measurement.at)
         self.last = measurement
 
-    # -- what does not fit together ------------------------------------------------------------------------
+    # -- contradictions ------------------------------------------------------------------------------------
 
     def _watch(self, measurement: TargetMeasurement) -> None:
         self._recent.append(measurement)
@@ -134,7 +134,7 @@ class Target:
 
     @property
     def contradiction(self) -> str | None:
-        """Why these detections cannot be believed; None when they can."""
+        """Why the detections cannot be right; None if they can."""
         if self._wrong_way >= WRONG_TIMES:
             return "the tag does not move in the image as the vehicle moves: is the camera mounted as `mount` says?"
         heights = [measurement for measurement in list(self._recent)[-HEIGHTS:] if measurement.height >= HEIGHT_FROM]

@@ -1,4 +1,4 @@
-"""Everything of the module that lives in the asyncio thread: the camera's outcomes, and the vehicle's history."""
+"""Tracks the tags: combines the camera's results with the vehicle's history, in the asyncio thread."""
 
 from __future__ import annotations
 
@@ -30,28 +30,29 @@ from mavproxy_vision.geometry.frames import Attitude, vector
 from mavproxy_vision.settings import VisionSettings
 from mavproxy_vision.tracking.capture_worker import Health, Worker
 from mavproxy_vision.tracking.ground_truth import Pose, Truth
-from mavproxy_vision.tracking.measurement import TargetMeasurer, Wanted
+from mavproxy_vision.tracking.measurement import TargetMeasurer, TargetSpec
 from mavproxy_vision.tracking.pose_history import History, UnstampedClock, VehicleClock
 from mavproxy_vision.tracking.stream_rates import TRUTH, Rates
+from mavproxy_vision.tracking.tag_watch import TagWatch
 from mavproxy_vision.tracking.target_filter import Target
 
-FRESH = 1.0  # s; older detections are not shown as what is in view
+FRESH = 1.0  # s; older detections do not count as in view
 SOON = 0.06  # s of the vehicle's clock: the longest extrapolation of telemetry to a frame; a later frame waits
 
 
 class Tracker:
-    """The eye. All methods belong to the asyncio thread, but for `deliver`.
+    """The camera, the detections, and the target. All methods except `deliver` belong to the asyncio thread.
 
     Attributes:
         settings: the snapshot in force.
-        history: where the vehicle was; its times are on `clock`.
-        truth: where a simulated vehicle truly is.
-        seen, image: the newest outcome, and its frame.
-        target: what is being landed on; None between landings.
-        changed: set and replaced with each outcome.
+        history: the vehicle's poses; its times are on `clock`.
+        truth: the true poses of a simulated vehicle.
+        result, image: the newest result, and its frame.
+        target: the target of the present landing; None between landings.
+        changed: set and replaced with each result.
 
     Args:
-        host: what our modules share.
+        host: the parts that our modules share.
         settings: the first snapshot.
     """
 
@@ -59,38 +60,37 @@ class Tracker:
         self.host, self.settings = host, settings
         self.history, self.clock, self.truth = History(), VehicleClock(), Truth()
         self.rates = Rates(host.clock)
-        self._unstamped = UnstampedClock()  # SIM_STATE has no time of its own; ATTITUDE tells it
+        self._unstamped = UnstampedClock()  # dates SIM_STATE, which has no time stamp, by ATTITUDE
         self.worker: Worker | None = None
-        self.seen: FrameResult | None = None
+        self.result: FrameResult | None = None
         self.image: Image | None = None
         self.target: Target | None = None
         self.changed = asyncio.Event()
-        self.latencies: deque[float] = deque(maxlen=1000)  # s from a frame's arrival to the setpoint that knows it
+        self.latencies: deque[float] = deque(maxlen=1000)  # s from a frame's arrival to the setpoint that uses it
         self._measurer: TargetMeasurer | None = None
-        self._carrier = 0  # the vehicle that a flight carries it on; 0 for MAVProxy's current one
-        self._unplaced: deque[FrameResult] = deque(
-            maxlen=50
-        )  # newer than the telemetry that tells where they were taken
+        self._carrier = 0  # system id of the vehicle in flight; 0 for MAVProxy's current one
+        self._tags = TagWatch(lambda info: host.tell("tag", self.system, info))
+        self._unplaced: deque[FrameResult] = deque(maxlen=50)  # results that are newer than the telemetry
         self._system = 0
         self._home_down: float | None = None
         self._tasks = HeldTasks()
         self._truth_needed = contextlib.ExitStack()
-        self._extra: set[int] = set()  # ids that `tags` does not name, but a flight
+        self._extra: set[int] = set()  # ids of flights that the setting `tags` does not name
         self._changing = asyncio.Lock()
 
-    # -- life ----------------------------------------------------------------------------------------------
+    # -- start and stop ------------------------------------------------------------------------------------
 
     def listen(self) -> None:
-        """Follow the vehicle's telemetry."""
+        """Begin to use the vehicle's telemetry."""
         self.host.listeners.append(self._hear)
-        self._tasks.start(self.rates.run(self.vehicle), "the watch over the rates")
+        self._tasks.start(self.rates.run(self.vehicle), "the watch over message rates")
 
     async def start(self, settings: VisionSettings) -> None:
-        """Look through the camera that the settings name; what was running ends.
+        """Open the camera that the settings name; an open one is closed first.
 
         Raises:
-            SettingError: they make no sense together.
-            NoCamera: they name no camera.
+            SettingError: the settings contradict each other.
+            NoCamera: the settings name no camera.
         """
         async with self._changing:
             await self._close_camera()
@@ -111,12 +111,12 @@ class Tracker:
     async def _close_camera(self) -> None:
         self._truth_needed.close()
         worker, self.worker = self.worker, None
-        self.seen = self.image = None
+        self.result = self.image = None
         if worker is not None:
             await asyncio.get_running_loop().run_in_executor(None, worker.stop)
 
     async def close(self) -> None:
-        """Give back everything."""
+        """Release everything."""
         if self._hear in self.host.listeners:
             self.host.listeners.remove(self._hear)
         await self._tasks.end()
@@ -126,17 +126,17 @@ class Tracker:
         cv2.setNumThreads(settings.threads)
         detector = Detector(settings.model, self.options(settings))
         source = make_source(settings, self._where, self.host.clock)
-        worker = Worker(source, detector, lambda seen, image: self.deliver(worker, seen, image), self.host.clock)
+        worker = Worker(source, detector, lambda result, image: self.deliver(worker, result, image), self.host.clock)
         return worker
 
     def options(self, settings: VisionSettings) -> DetectorOptions:
-        """How the detector is to look."""
+        """The detector's options for these settings."""
         tags = settings.tag_list
         sizes = dict.fromkeys(self._extra, tags[0].size) | {tag.id: tag.size for tag in tags}
         return DetectorOptions(settings.families, sizes, settings.any_id, settings.far)
 
-    async def want(self, number: int) -> None:
-        """Look for that id too; it has the main tag's size unless `tags` says otherwise."""
+    async def add_tag_id(self, number: int) -> None:
+        """Detect that id, too. Its size is the main tag's, unless the setting `tags` names another."""
         settings = self.settings
         if number in self._extra or any(tag.id == number for tag in settings.tag_list):
             return
@@ -145,28 +145,29 @@ class Tracker:
             loop = asyncio.get_running_loop()
             self.worker.detector = await loop.run_in_executor(None, Detector, settings.model, self.options(settings))
 
-    # -- what comes in -------------------------------------------------------------------------------------
+    # -- results and telemetry -----------------------------------------------------------------------------
 
-    def deliver(self, worker: Worker, seen: FrameResult, image: Image) -> None:
-        """An outcome. The worker's thread."""
+    def deliver(self, worker: Worker, result: FrameResult, image: Image) -> None:
+        """Hand over a result. The worker's thread."""
 
         def arrive() -> None:
-            if worker is self.worker:  # else it comes late, from a camera that was closed
-                self.take(seen, image)
+            if worker is self.worker:  # otherwise its camera was closed meanwhile
+                self.take(result, image)
 
         self.host.bridge.call_soon(arrive)
 
-    def take(self, seen: FrameResult, image: Image) -> None:
-        """An outcome."""
-        self.seen, self.image = seen, image
+    def take(self, result: FrameResult, image: Image) -> None:
+        """Use a result."""
+        self.result, self.image = result, image
+        self._tags.look(result, self.settings.camera_mount, self.history, self.clock)
         if self.target is not None:
-            self._unplaced.append(seen)
+            self._unplaced.append(result)
             self._place()
         self.changed.set()
         self.changed = asyncio.Event()
 
     def _place(self) -> None:
-        """Tell the target what was seen, as far as telemetry says where that was."""
+        """Update the target with the results for which the vehicle's pose is known."""
         while self._unplaced and self.target is not None and self._measurer is not None:
             if self.clock.vehicle(self._unplaced[0].captured_at) > self.history.newest + SOON:
                 return
@@ -178,7 +179,7 @@ class Tracker:
         if name not in HEARD or message.get_srcComponent() != state.component or not self._is_ours(state):
             return
         if not all(math.isfinite(getattr(message, field)) for field in HEARD[name]):
-            return  # it would be in every setpoint from now on
+            return  # it would spoil every later setpoint
         if name == "SIM_STATE":
             self._hear_truth(state, message, now)
             return
@@ -200,12 +201,12 @@ class Tracker:
 
     @property
     def system(self) -> int:
-        """The system id of the vehicle that carries the camera; 0 while there is none."""
+        """The system id of the vehicle with the camera; 0 without a vehicle."""
         return self.host.registry.resolve(self._carrier)
 
     @contextlib.contextmanager
     def carried_by(self, system: int) -> Iterator[None]:
-        """Look from that vehicle for as long as the context lasts, whichever MAVProxy's current one is."""
+        """Within the context the camera is on that vehicle, whichever vehicle is MAVProxy's current one."""
         self._carrier = system
         self._follow_carrier()
         try:
@@ -214,7 +215,7 @@ class Tracker:
             self._carrier = 0
 
     def _follow_carrier(self) -> None:
-        if self.system != self._system:  # another vehicle: what was known is of no use
+        if self.system != self._system:  # another vehicle: the old data is useless
             self._system = self.system
             self.history, self.clock, self.truth = History(), VehicleClock(), Truth()
             self._unstamped, self._home_down = UnstampedClock(), None
@@ -237,25 +238,25 @@ class Tracker:
         newest = self.truth.newest
         if pose is not None or (newest is not None and time - newest.at < FRESH):
             return pose
-        at = self.clock.vehicle(time)  # not a simulation that tells the truth: its own word has to do
+        at = self.clock.vehicle(time)  # without SIM_STATE the vehicle's own estimate is used
         attitude, motion = self.history.attitude(at), self.history.motion(at)
         if attitude is None or motion is None:
             return None
         return motion.position - vector(0.0, 0.0, self._home_down or 0.0), attitude
 
-    # -- what is asked of it -------------------------------------------------------------------------------
+    # -- queries -------------------------------------------------------------------------------------------
 
     def vehicle(self) -> Vehicle:
-        """The vehicle that carries the camera, with a link that is alive."""
+        """The vehicle with the camera; its link must be alive."""
         return self.host.registry.commandable(self._carrier)
 
     @property
     def health(self) -> Health:
-        """How the camera does."""
+        """The state of the camera."""
         return self.worker.health if self.worker is not None else Health("closed")
 
     def require_camera(self) -> None:
-        """Raises NoCamera unless frames come."""
+        """Raise NoCamera unless frames arrive."""
         if self.worker is None:
             raise NoCamera("no camera runs: `vision set source …`, `vision start`")
         health = self.health
@@ -264,15 +265,15 @@ class Tracker:
 
     @contextlib.contextmanager
     def aimed_at(self, tags: dict[int, Tag], floor: float) -> Iterator[Target]:
-        """Keep track of a target, for as long as the context lasts.
+        """Track a target for as long as the context lasts.
 
         Args:
-            tags: what tells where it is, by id.
-            floor: of its ground, m down of the EKF origin.
+            tags: the tags that give its position, by id.
+            floor: its ground, m down of the EKF origin.
         """
         settings = self.settings
         self._measurer = TargetMeasurer(
-            settings.model, settings.camera_mount, Wanted(settings.families[0], tags, floor)
+            settings.model, settings.camera_mount, TargetSpec(settings.families[0], tags, floor)
         )
         self.target = Target()
         self._unplaced.clear()
@@ -282,16 +283,16 @@ class Tracker:
             self.target = self._measurer = None
 
     def now(self) -> float:
-        """The vehicle's time."""
+        """The present time on the vehicle's clock (s)."""
         return self.clock.vehicle(self.host.clock())
 
     @property
     def floor(self) -> float | None:
-        """The target's ground, m down of the EKF origin, by the home and the `ground` of now; None while unknown."""
+        """The target's ground, m down of the EKF origin, by the present home and `ground`; None while unknown."""
         return None if self._home_down is None else self._home_down - self.settings.ground
 
     def touchdown_error(self, tag: int) -> float | None:
-        """Metres from the simulated vehicle to the simulated tag; None where nobody knows the truth."""
+        """Metres from the simulated vehicle to the simulated tag; None without a simulation."""
         if self.settings.source != "sim" or self.truth.newest is None:
             return None
         if self.host.clock() - self.truth.newest.at > FRESH:
@@ -303,14 +304,14 @@ class Tracker:
         return min((error for error in errors if error is not None), default=None)
 
     @property
-    def fresh_seen(self) -> FrameResult | None:
-        """The newest outcome, if it shows what is in view now."""
-        if self.seen is None or self.host.clock() - self.seen.captured_at > FRESH:
+    def fresh_result(self) -> FrameResult | None:
+        """The newest result, unless it is too old to show the present view."""
+        if self.result is None or self.host.clock() - self.result.captured_at > FRESH:
             return None
-        return self.seen
+        return self.result
 
 
-HEARD: dict[str, tuple[str, ...]] = {  # with the fields that must be finite
+HEARD: dict[str, tuple[str, ...]] = {  # the fields that must be finite, by message
     "ATTITUDE": ("roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed"),
     "LOCAL_POSITION_NED": ("x", "y", "z", "vx", "vy", "vz"),
     "GLOBAL_POSITION_INT": (),
@@ -322,7 +323,7 @@ def make_source(settings: VisionSettings, where: Any, clock: Callable[[], float]
     """The source that the settings name.
 
     Raises:
-        SettingError: one of its settings makes no sense.
+        SettingError: one of the source's settings is invalid.
     """
     spec, latency = settings.source, settings.latency / 1000
     if spec == "sim":
@@ -332,7 +333,7 @@ def make_source(settings: VisionSettings, where: Any, clock: Callable[[], float]
     if spec == "http":
         return Posted(latency, clock)
     path = os.path.expanduser(spec)
-    if os.path.isdir(path):  # pathlib's raises on a long pipeline
+    if os.path.isdir(path):  # Path.is_dir raises on a long pipeline
         return Folder(Path(path), latency, settings.fps, clock)
     size = (settings.model.width, settings.model.height)
     is_file = os.path.isfile(path)
@@ -341,12 +342,12 @@ def make_source(settings: VisionSettings, where: Any, clock: Callable[[], float]
     return Capture(path if is_file else spec, latency, size, settings.fps, clock)
 
 
-def in_view(seen: FrameResult | None) -> list[dict[str, Any]]:
-    """The tags of an outcome, as they are told to people."""
-    return [] if seen is None else [_told(seen, detection) for detection in seen.detections]
+def in_view(result: FrameResult | None) -> list[dict[str, Any]]:
+    """The tags of a result, for an answer body."""
+    return [] if result is None else [_tag_report(result, detection) for detection in result.detections]
 
 
-def _told(seen: FrameResult, detection: Any) -> dict[str, Any]:
+def _tag_report(result: FrameResult, detection: Any) -> dict[str, Any]:
     has_position = detection.position is not None
     return {
         "id": detection.id,
@@ -358,5 +359,5 @@ def _told(seen: FrameResult, detection: Any) -> dict[str, Any]:
         "distance": round(detection.distance, 3) if has_position else None,
         "rotation": [[round(float(v), 4) for v in row] for row in detection.rotation] if has_position else None,
         "reprojection_error": round(detection.error, 3) if has_position else None,
-        "latency_s": round(seen.latency, 3),
+        "latency_s": round(result.latency, 3),
     }

@@ -64,7 +64,7 @@ def test_memory_is_bounded(audit: Audit) -> None:
     assert audit.entries[-1].verb == str(2 * KEPT - 1)
 
 
-def test_stalled_disk_holds_nobody_up_and_what_it_lost_is_told(
+def test_stalled_disk_holds_nobody_up_and_what_it_lost_is_reported(
     audit: Audit, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     goes_on = threading.Event()
@@ -100,7 +100,7 @@ def test_trail_in_no_folder_keeps_its_memory_and_says_so_once(
     assert sum("cannot write" in record.getMessage() for record in caplog.records) == 1
 
 
-def test_refusals_are_told_at_the_end_too(loop: Any, tmp_path: Path) -> None:
+def test_refusals_are_reported_at_the_end_too(loop: Any, tmp_path: Path) -> None:
     audit = Audit(tmp_path)
 
     async def refuse() -> None:

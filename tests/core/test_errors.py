@@ -39,6 +39,7 @@ def test_codes_are_the_contracts_each_with_its_status() -> None:
         "paused": 409,
         "not_armed": 409,
         "aborted": 409,
+        "outside_envelope": 409,
         "too_many_requests": 429,
         "tool_failed": 500,
         "invalid": 422,
@@ -77,5 +78,5 @@ def test_invalid_lists_its_problems() -> None:
         (TimedOut("late", ["a"]), {"statustext": ["a"]}),
     ],
 )
-def test_what_the_autopilot_said_goes_along(error: UavApiError, extras: dict[str, object]) -> None:
+def test_the_autopilots_texts_go_along(error: UavApiError, extras: dict[str, object]) -> None:
     assert error.extras() == extras

@@ -32,7 +32,7 @@ def test_task_that_nobody_else_holds_goes_on(loop: Any, tasks: HeldTasks) -> Non
     assert done == [1]
 
 
-def test_defect_is_told_at_once_and_names_the_task(loop: Any, tasks: HeldTasks) -> None:
+def test_defect_is_reported_at_once_and_names_the_task(loop: Any, tasks: HeldTasks) -> None:
     async def fail() -> None:
         raise ZeroDivisionError
 

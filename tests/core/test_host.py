@@ -189,7 +189,7 @@ def test_nothing_is_opened_for_select_before_the_first_idle_task(mpstate: Any) -
         hosts.leave(mpstate, "uavapi")
 
 
-def test_idle_tells_the_asyncio_side_mavproxys_target(mpstate: Any) -> None:
+def test_idle_passes_mavproxys_target_to_the_asyncio_side(mpstate: Any) -> None:
     host = hosts.join(mpstate, "uavapi")
     try:
         host.idle("uavapi")
@@ -256,7 +256,7 @@ def test_idle_sends_what_is_to_be_sent_even_when_select_does_not_wake(mpstate: A
         hosts.leave(mpstate, "uavapi")
 
 
-def test_host_is_made_anew_after_the_last_member_left(mpstate: Any, descriptors: Callable[[], int]) -> None:
+def test_host_is_made_again_after_the_last_member_left(mpstate: Any, descriptors: Callable[[], int]) -> None:
     threads, before, seen = threading.active_count(), descriptors(), set()
     for _ in range(50):
         host = hosts.join(mpstate, "uavapi")

@@ -43,7 +43,7 @@ def test_what_means_nothing_is_one_line_that_begins_with_the_file(file: Path, co
     assert "\n" not in str(caught.value)
 
 
-def test_what_cannot_be_read_is_said(file: Path) -> None:
+def test_what_cannot_be_read_is_reported(file: Path) -> None:
     with pytest.raises(SettingError, match=r"uav\.ini: No such file or directory$"):
         IniFile(file)
     with pytest.raises(SettingError, match="Is a directory$"):

@@ -14,13 +14,13 @@ from mavproxy_uavapi.core.logs import Logs, component_of, components, log_file
 
 
 @pytest.fixture
-def said() -> list[str]:
+def output() -> list[str]:
     return []
 
 
 @pytest.fixture
-def logs(said: list[str]) -> Iterator[Logs]:
-    made = Logs(said.append)
+def logs(output: list[str]) -> Iterator[Logs]:
+    made = Logs(output.append)
     yield made
     made.close()
 
@@ -40,19 +40,19 @@ def test_component_names_are_the_originals_with_aliases() -> None:
         components("ROTOR")
 
 
-def test_console_shows_what_was_asked_for_and_every_warning(logs: Logs, said: list[str]) -> None:
+def test_console_shows_what_was_requested_and_every_warning(logs: Logs, output: list[str]) -> None:
     logs.open(frozenset({"COPTER"}), frozenset(), "", 1)
     logging.getLogger("uavapi.copter").info("climbing")
     logging.getLogger("uavapi.http").info("a request")
     logging.getLogger("uavapi.http").warning("too many of them")
     logging.getLogger("uavapi.copter").debug("in detail")
-    assert said == ["COPTER: climbing", "API: too many of them"]
+    assert output == ["COPTER: climbing", "API: too many of them"]
 
 
-def test_debug_shows_a_component_in_detail(logs: Logs, said: list[str]) -> None:
+def test_debug_shows_a_component_in_detail(logs: Logs, output: list[str]) -> None:
     logs.open(frozenset({"COPTER"}), frozenset({"COPTER"}), "", 1)
     logging.getLogger("uavapi.copter").debug("in detail")
-    assert said == ["COPTER: in detail"]
+    assert output == ["COPTER: in detail"]
 
 
 def test_file_has_all_components_with_time_and_level(logs: Logs, tmp_path: Path) -> None:
@@ -70,34 +70,36 @@ def test_folder_gets_a_file_named_after_the_vehicle(tmp_path: Path) -> None:
     assert log_file(str(tmp_path / "a" / "b.txt"), 7) == tmp_path / "a" / "b.txt"
 
 
-def test_nothing_is_left_behind(logs: Logs, said: list[str], tmp_path: Path) -> None:
+def test_nothing_is_left_behind(logs: Logs, output: list[str], tmp_path: Path) -> None:
     for _ in range(3):
         logs.open(frozenset({"API"}), frozenset(), str(tmp_path / "uav.log"), 1)
     logging.getLogger("uavapi.http").info("once")
-    assert said == ["API: once"]
+    assert output == ["API: once"]
     logs.close()
     logging.getLogger("uavapi.http").warning("after")
-    assert said == ["API: once"]
+    assert output == ["API: once"]
     assert logging.getLogger("uavapi").handlers == []
 
 
-def test_file_that_cannot_be_opened_leaves_the_logs_as_they_were(logs: Logs, said: list[str], tmp_path: Path) -> None:
+def test_file_that_cannot_be_opened_leaves_the_logs_as_they_were(
+    logs: Logs, output: list[str], tmp_path: Path
+) -> None:
     logs.open(frozenset({"API"}), frozenset(), str(tmp_path / "uav.log"), 1)
     (tmp_path / "file").touch()
     with pytest.raises(OSError, match="file"):
         logs.open(frozenset(), frozenset(), str(tmp_path / "file" / "uav.log"), 1)
     logging.getLogger("uavapi.http").info("still here")
     logs.close()
-    assert said == ["API: still here"]
+    assert output == ["API: still here"]
     assert "still here" in (tmp_path / "uav.log").read_text(encoding="utf-8")
 
 
-def test_full_disk_is_told_of_once_and_breaks_nothing(logs: Logs, said: list[str], capsys: Any) -> None:
+def test_full_disk_is_reported_once_and_breaks_nothing(logs: Logs, output: list[str], capsys: Any) -> None:
     logs.open(frozenset(), frozenset(), "/dev/full", 1)
     for _ in range(3):
         logging.getLogger("uavapi.http").info("a request")
     logs.close()
-    assert len(said) == 1 and "cannot write /dev/full: [Errno 28]" in said[0]
+    assert len(output) == 1 and "cannot write /dev/full: [Errno 28]" in output[0]
     assert capsys.readouterr().err == ""
 
 
@@ -114,7 +116,7 @@ def test_file_is_rotated(logs: Logs, tmp_path: Path, monkeypatch: Any) -> None:
 
 
 def test_what_a_client_wrote_is_one_line_on_the_console_and_in_the_file(
-    logs: Logs, said: list[str], tmp_path: Path
+    logs: Logs, output: list[str], tmp_path: Path
 ) -> None:
     logs.open(frozenset({"API"}), frozenset(), str(tmp_path / "uav.log"), 1)
     logging.getLogger("uavapi.http").info("asked for %s", "\x1b[2J\nAPI ERROR forged\u202e")
@@ -124,7 +126,7 @@ def test_what_a_client_wrote_is_one_line_on_the_console_and_in_the_file(
         logging.getLogger("uavapi.http").exception("a defect")
     logs.close()
     text = (tmp_path / "uav.log").read_text(encoding="utf-8")
-    for shown in ("\n".join(said), text):
+    for shown in ("\n".join(output), text):
         assert "asked for \\x1b[2J\\nAPI ERROR forged\\u202e" in shown
         assert "\nValueError: \\x1b[31m" in shown
         assert "\x1b" not in shown

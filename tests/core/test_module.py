@@ -201,7 +201,7 @@ def test_value_is_what_was_typed_without_the_quotation_marks_around_it(words: li
     assert value_of(words) == value
 
 
-def test_idle_task_never_raises_and_tells_of_each_failure_once(demo: Demo, main_loop: Any, capsys: Any) -> None:
+def test_idle_task_never_raises_and_reports_each_failure_once(demo: Demo, main_loop: Any, capsys: Any) -> None:
     def fail() -> None:
         raise OSError("no more threads")
 
@@ -217,7 +217,9 @@ def test_idle_task_never_raises_and_tells_of_each_failure_once(demo: Demo, main_
     assert demo.done == [("begun", True)]
 
 
-def test_beginning_that_fails_is_told_and_the_rest_goes_on(demo: Demo, main_loop: Any, capsys: Any, msg: Any) -> None:
+def test_beginning_that_fails_is_reported_and_the_rest_goes_on(
+    demo: Demo, main_loop: Any, capsys: Any, msg: Any
+) -> None:
     def fail() -> None:
         raise ValueError("no")
 

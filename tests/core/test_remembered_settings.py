@@ -27,7 +27,7 @@ def test_load_without_keywords_takes_over_the_last_ones_and_what_was_set_since(m
     assert loaded(mpstate).combined == again.combined == {**again.combined, "max_age": "3", "origins": origins}
 
 
-def test_load_with_keywords_begins_anew(mpstate: Any, capsys: Any) -> None:
+def test_load_with_keywords_replaces_all(mpstate: Any, capsys: Any) -> None:
     loaded(mpstate, sysid=2, port=1).change("port", "2")
     assert loaded(mpstate, port=3).combined == {"port": 3, "origins": {}}
     assert capsys.readouterr().out == ""

@@ -15,16 +15,16 @@ from mavproxy_uavapi.core.rotating_file import RotatingFile
 
 
 @pytest.fixture
-def told() -> list[str]:
+def reported() -> list[str]:
     return []
 
 
 @pytest.fixture
-def rotating(tmp_path: Path, told: list[str]) -> Iterator[Callable[..., RotatingFile]]:
+def rotating(tmp_path: Path, reported: list[str]) -> Iterator[Callable[..., RotatingFile]]:
     made: list[RotatingFile] = []
 
     def make(name: str = "log", private: bool = False, delay: bool = False) -> RotatingFile:
-        made.append(RotatingFile(tmp_path / name, 1000, 2, told.append, private=private, delay=delay))
+        made.append(RotatingFile(tmp_path / name, 1000, 2, reported.append, private=private, delay=delay))
         return made[-1]
 
     yield make
@@ -54,17 +54,17 @@ def test_private_file_is_its_owners_alone(rotating: Callable[..., RotatingFile],
     assert modes == {0o600}
 
 
-def test_folder_that_cannot_be_written_is_told_of_once_and_tried_again(
-    rotating: Callable[..., RotatingFile], tmp_path: Path, told: list[str]
+def test_folder_that_cannot_be_written_is_reported_once_and_tried_again(
+    rotating: Callable[..., RotatingFile], tmp_path: Path, reported: list[str]
 ) -> None:
     file = rotating("not/there/log", delay=True)
     write(file, "one", "two")
-    assert len(told) == 1
-    assert "cannot write" in told[0]
+    assert len(reported) == 1
+    assert "cannot write" in reported[0]
     (tmp_path / "not" / "there").mkdir(parents=True)
     write(file, "three")
     assert (tmp_path / "not" / "there" / "log").read_text() == "three\n"
-    assert len(told) == 1
+    assert len(reported) == 1
 
 
 class FullDisk(io.RawIOBase):
@@ -90,7 +90,7 @@ class FullDisk(io.RawIOBase):
 
 
 def test_full_disk_tears_one_line_and_no_other(
-    rotating: Callable[..., RotatingFile], tmp_path: Path, told: list[str]
+    rotating: Callable[..., RotatingFile], tmp_path: Path, reported: list[str]
 ) -> None:
     file = rotating()
     write(file, "before")
@@ -99,8 +99,8 @@ def test_full_disk_tears_one_line_and_no_other(
     write(file, "torn line")
     write(file, "after")
     assert (tmp_path / "log").read_text() == "before\ntorn \nafter\n"
-    assert len(told) == 1
-    assert "No space left" in told[0]
+    assert len(reported) == 1
+    assert "No space left" in reported[0]
 
 
 def test_file_that_cannot_be_opened_is_an_error_at_once_unless_delayed(rotating: Callable[..., RotatingFile]) -> None:

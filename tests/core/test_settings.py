@@ -88,18 +88,18 @@ def origins(settings: ModuleSettings[Any]) -> dict[str, str]:
 # -- where they come from ----------------------------------------------------------------------------------
 
 
-def test_later_origins_win_and_each_is_told(ini: Any) -> None:
+def test_later_origins_win_and_each_is_reported(ini: Any) -> None:
     file = ini("[gradys]\nname = file\nlow = 2\nhigh = 6\nloud = on\n")
     settings = demo({"config": file, "high": 8, "loud": "off"}, GRADYS_LOW="3", GRADYS_HIGH="7", GRADYS_LOUD="yes")
     settings.set("loud", "1")
     now = settings.snapshot()
     assert (now["mode"], now["name"], now["low"], now["high"], now["loud"]) == ("land", "file", 3, 8.0, True)
-    told = origins(settings)
-    assert told["mode"] == "land                     default"
-    assert told["name"].endswith(f" {file}")
-    assert told["low"].endswith(" environment")
-    assert told["high"].endswith(" module load")
-    assert told["loud"].endswith(" gradys set")
+    reported = origins(settings)
+    assert reported["mode"] == "land                     default"
+    assert reported["name"].endswith(f" {file}")
+    assert reported["low"].endswith(" environment")
+    assert reported["high"].endswith(" module load")
+    assert reported["loud"].endswith(" gradys set")
 
 
 def test_environment_may_name_the_file_where_no_keyword_does(ini: Any, tmp_path: Path) -> None:
@@ -133,7 +133,7 @@ def test_other_sections_belong_to_others(ini: Any) -> None:
     assert demo({"config": file}).snapshot()["low"] == 2
 
 
-def test_launcher_tells_where_it_had_them_from(ini: Any) -> None:
+def test_launcher_reports_where_it_had_them_from(ini: Any) -> None:
     file = ini("[gradys]\nlow = 2\n")
     settings = demo({"config": file, "high": 6, "origins": {"high": "command line", "low": "uav.ini"}})
     assert settings.origins == {"low": "uav.ini", "high": "command line"}
@@ -148,7 +148,7 @@ def test_all_are_taken_together_in_whatever_order() -> None:
         demo({"low": 8})
 
 
-def test_check_is_told_what_was_changed() -> None:
+def test_check_gets_what_was_changed() -> None:
     settings = demo({"low": 2}, GRADYS_NAME="x")
     assert settings.last_changed == {"low", "name"}
     settings.set("high", 3)

@@ -57,9 +57,9 @@ def test_words_for_yes_and_no_and_nothing() -> None:
     assert not any(is_unset(word) for word in ("0", "no", "[a]", "nothing"))
 
 
-def test_a_path_of_somebody_who_is_here() -> None:
+def test_a_path_of_a_known_user() -> None:
     assert path_of("~/a b") == Path.home() / "a b"
-    with pytest.raises(SettingError, match="^spool: '~nobody_xyz/a': nobody here has that name"):
+    with pytest.raises(SettingError, match="^spool: '~nobody_xyz/a': no such user"):
         path_of("~nobody_xyz/a", "spool")
     with pytest.raises(SettingError, match="^no path can hold a zero byte"):
         path_of("a\0b")

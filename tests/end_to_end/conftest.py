@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from tests.support import processes
+from tests.support.lockstep_rig import LockstepRig
 from tests.support.processes import Lan, Rig, ardupilot, ardupilot_with_faults, embedded
 
 
@@ -31,11 +32,14 @@ def embedded_rig(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPa
     made.stop()
 
 
-@pytest.fixture(scope="module", params=["embedded", pytest.param("ardupilot", marks=pytest.mark.sitl)])
+@pytest.fixture(scope="module", params=["lockstep", pytest.param("ardupilot", marks=pytest.mark.sitl)])
 def faulty_rig(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
-    """A rig with a back door: what was sent can be seen, and the link, the pilot and the vehicle can misbehave."""
+    """A rig with a back door: what was sent can be seen, and the link, the pilot and the vehicle can misbehave.
+
+    The embedded vehicle flies in lock step here, ArduPilot by real processes.
+    """
     directory = tmp_path_factory.mktemp(request.param)
-    made = embedded(directory) if request.param == "embedded" else ardupilot_with_faults(directory)
+    made = LockstepRig(directory) if request.param == "lockstep" else ardupilot_with_faults(directory)
     yield made
     made.stop()
 

@@ -23,7 +23,7 @@ def guarded(harness, tmp_path_factory):
     directory = tmp_path_factory.mktemp("guarded")
     rig = harness.Rig(directory, harness.free_port())
     try:
-        instance = harness.start_embedded(rig)
+        instance = harness.start_embedded(rig, speedup=RIG_SPEEDUP)
         command = harness.mavproxy_command(instance, harness.load(rig.port, host="0.0.0.0"))
         rig.mavproxy = rig.start("mavproxy", command, {"UAVAPI_TOKEN": TOKEN})
         rig.mavproxy.says("listening on")
@@ -56,7 +56,7 @@ def test_the_token_is_shown_nowhere(guarded):
 
 
 def test_the_token_cannot_be_taken_away_while_others_can_reach_the_port(guarded):
-    guarded.mavproxy.ask("uavapi set token None", "anybody on that network")
+    guarded.mavproxy.ask("uavapi set token None", "everybody on that network")
     assert requests.get(guarded.url + "/telemetry/status", timeout=10).status_code == 401
 
 
@@ -68,11 +68,11 @@ def test_networks_that_are_named_need_no_token(guarded):
 
 
 def test_host_beyond_this_machine_is_refused_with_the_reason(embedded_rig):
-    said = embedded_rig.mavproxy.ask("uavapi set host 0.0.0.0", "allow_open")
-    assert "set a token" in said
-    said = embedded_rig.mavproxy.ask("uavapi set allow_open true", "listening on")
-    said = embedded_rig.mavproxy.ask("uavapi set host 0.0.0.0", "WARNING")
-    assert "anybody" in said
+    printed = embedded_rig.mavproxy.ask("uavapi set host 0.0.0.0", "allow_open")
+    assert "set a token" in printed
+    printed = embedded_rig.mavproxy.ask("uavapi set allow_open true", "listening on")
+    printed = embedded_rig.mavproxy.ask("uavapi set host 0.0.0.0", "WARNING")
+    assert "everybody" in printed
     embedded_rig.mavproxy.ask("uavapi set host 127.0.0.1", "listening on http://127.0.0.1")
     embedded_rig.mavproxy.ask("uavapi set allow_open false", "listening on")
 
@@ -169,7 +169,7 @@ def test_slow_headers_are_hung_up_on_and_hold_up_nobody(embedded_rig):
             connection.close()
 
 
-def test_more_than_a_bearable_rate_is_429(embedded_rig):
+def test_more_than_the_allowed_rate_is_429(embedded_rig):
     embedded_rig.mavproxy.type("uavapi set max_rate 10")
     embedded_rig.mavproxy.ask("uavapi set max_rate", "10.0 ")
     try:
@@ -212,18 +212,18 @@ print(json.dumps(told))
 def test_network_that_may_fly_has_a_share_of_the_connections_and_no_scripts(lan, harness, tmp_path):
     folders = {"scripts_path": str(tmp_path / "scripts"), "script_logs": str(tmp_path / "logs")}
     named = f"{lan.network},127.0.0.0/8"
-    rig = harness.embedded(tmp_path, host="0.0.0.0", token=TOKEN, allow_from=named, **folders)
+    rig = harness.embedded(tmp_path, host="0.0.0.0", token=TOKEN, allow_from=named, speedup=RIG_SPEEDUP, **folders)
     try:
         url = f"http://{lan.here}:{rig.port}"
 
-        def told():
+        def reported():
             command = [*lan.inside, sys.executable, "-c", UPLOAD, url]
             done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
             return json.loads(done.stdout)
 
-        assert told() == {"read": 200, "upload": 403, "open": 20, "read among idle ones": 200}
+        assert reported() == {"read": 200, "upload": 403, "open": 20, "read among idle ones": 200}
         rig.mavproxy.ask(f"uavapi set allow_scripts_from {lan.network}", "listening on")
-        assert told()["upload"] == 200
+        assert reported()["upload"] == 200
     finally:
         rig.stop()
 
@@ -239,7 +239,7 @@ def test_idle_strangers_leave_mavproxy_the_descriptors_to_connect_again(harness,
     owner = {"Authorization": f"Bearer {TOKEN}"}
     strangers = []
     try:
-        instance = harness.start_embedded(rig)
+        instance = harness.start_embedded(rig, speedup=RIG_SPEEDUP)
         mavproxy = harness.mavproxy_command(instance, harness.load(rig.port))
         limited = ["prlimit", "--nofile=160:4096", *mavproxy]
         rig.mavproxy = rig.start("mavproxy", limited, {"UAVAPI_TOKEN": TOKEN})

@@ -257,10 +257,10 @@ class Browser:
         command += [f"--log-net-log={self.traffic}", url]
         process = self._harness.Process(command, self._directory / "chromium.log", self._directory)
         try:
-            told = site.reported.wait(PATIENCE)
+            report_ = site.reported.wait(PATIENCE)
         finally:
             process.stop()
-        assert told, f"the page told nothing: {process.output()[-2000:]}"
+        assert report_, f"the page told nothing: {process.output()[-2000:]}"
 
     def statuses(self) -> dict[str, int]:
         """The API's answer to each try, by its name, as the browser received it."""
@@ -271,8 +271,8 @@ class Browser:
             if source is None:
                 continue
             number = int(source[1])
-            if asked := re.search(r'"url":"[^"]*[?&]by=(\w+)', line):
-                names[number] = asked[1]
+            if requested := re.search(r'"url":"[^"]*[?&]by=(\w+)', line):
+                names[number] = requested[1]
             if (answered := ANSWERED.search(line)) and number in names:
                 statuses[names[number]] = int(answered[1])
         return statuses

@@ -83,16 +83,16 @@ class Page:
         number = next(self._numbers)
         await self._socket.send_json({"id": number, "method": method, "params": params})
         while True:
-            told = await self._socket.receive_json(timeout=PATIENCE)
-            if told.get("method") == "Log.entryAdded":
-                self.refused.append(told["params"]["entry"]["text"])
-            if told.get("method") == "Network.requestWillBeSent":
+            reported = await self._socket.receive_json(timeout=PATIENCE)
+            if reported.get("method") == "Log.entryAdded":
+                self.refused.append(reported["params"]["entry"]["text"])
+            if reported.get("method") == "Network.requestWillBeSent":
                 self.refused += [
-                    u for u in [told["params"]["request"]["url"]] if not u.startswith((self.url, "data:"))
+                    u for u in [reported["params"]["request"]["url"]] if not u.startswith((self.url, "data:"))
                 ]
-            if told.get("id") == number:
-                assert "error" not in told, told
-                return told["result"]
+            if reported.get("id") == number:
+                assert "error" not in reported, reported
+                return reported["result"]
 
     async def look_at(self, url, script):
         self.url = url.rsplit("/", 1)[0]
@@ -150,6 +150,7 @@ def test_page_shows_all_endpoints_without_internet_and_one_can_be_tried(embedded
 
 @pytest.mark.needs("chromium")
 def test_every_endpoint_takes_what_the_page_would_ask(embedded_rig, tmp_path):
+    embedded_rig.set("allow_raw", "True")
     described = embedded_rig.ok(embedded_rig.get("/openapi.json"))
     operations = {f"{method.upper()} {path}" for path, methods in described["paths"].items() for method in methods}
     with browser(tmp_path / "profile") as devtools:

@@ -155,7 +155,7 @@ def test_stop_holds_and_resume_goes_on(rig):
         rig.sleep(0.1)
 
 
-def test_brake_ends_guided_flight_until_guided_is_asked_for(rig):
+def test_brake_ends_guided_flight_until_guided_is_requested(rig):
     rig.in_the_air(10)
     body = rig.ok(rig.get("/command/brake"))
     assert body["result"] == "Copter braking. Use /command/guided to enable movement commands again"

@@ -66,12 +66,12 @@ class _Handler(BaseHTTPRequestHandler):
         body = self.rfile.read(int(self.headers["Content-Length"]))
         self.server.updates.append((time.monotonic(), self.client_address, self.headers, body))
         time.sleep(self.server.delay)
-        said = json.dumps(self.server.body).encode()
+        output = json.dumps(self.server.body).encode()
         self.send_response(self.server.status)
-        for name, value in {"Content-Length": str(len(said)), **self.server.headers}.items():
+        for name, value in {"Content-Length": str(len(output)), **self.server.headers}.items():
             self.send_header(name, value)
         self.end_headers()
-        self.wfile.write(said)
+        self.wfile.write(output)
 
     def log_message(self, *_: Any) -> None:
         """Nothing on the terminal."""
@@ -102,7 +102,7 @@ def report(rig: Any) -> dict[str, Any]:
 def tell(rig: Any, recorder: Recorder, scheme: str = "") -> str:
     """Have it push there; the station's URL."""
     address = f"{scheme}127.0.0.1:{recorder.server_port}"
-    rig.mavproxy.ask(f"gradys set gs {address}", "gradys: telling")
+    rig.mavproxy.ask(f"gradys set gs {address}", "gradys: pushing to")
     return address
 
 
@@ -125,12 +125,12 @@ def test_the_form_is_that_of_the_original_once_a_second_on_one_connection(rig, r
     assert seqs == list(range(seqs[0], seqs[0] + len(seqs)))
 
 
-def test_dropped_by_the_station_is_told_apart_at_the_prompt_and_over_http(rig, recorder, harness):
+def test_dropped_by_the_station_is_counted_separately_at_the_prompt_and_over_http(rig, recorder, harness):
     recorder.body = {"id": 1, "type": 101, "seq": 0, "lat": 0, "lng": 0, "alt": 0, "DATA": "0"}
     tell(rig, recorder)
     harness.eventually(lambda: report(rig)["dropped_by_station"] >= 2, 10, "two dropped updates")
-    said = rig.mavproxy.ask("gradys status", "next is")
-    assert "of them dropped by the station: no browser watches" in said
+    output = rig.mavproxy.ask("gradys status", "next is")
+    assert "of them dropped by the station: no browser watches" in output
     assert report(rig)["round_trip_ms"]["last"] > 0
     rig.mavproxy.ask("gradys stats", "withheld")
 
@@ -146,12 +146,12 @@ def test_redirects_are_refused(rig, recorder, harness):
 
 
 def test_a_token_goes_along_and_is_not_shown(rig, recorder, harness):
-    rig.mavproxy.ask("gradys set token s3cret", "gradys: telling")
+    rig.mavproxy.ask("gradys set token s3cret", "gradys: pushing to")
     tell(rig, recorder)
     harness.eventually(lambda: recorder.updates, 10, "an update")
     assert recorder.updates[0][2]["Authorization"] == "Bearer s3cret"
     assert "s3cret" not in rig.mavproxy.ask("gradys set token", "(set)")
-    rig.mavproxy.ask("gradys set token None", "gradys: telling")
+    rig.mavproxy.ask("gradys set token None", "gradys: pushing to")
 
 
 @pytest.fixture(scope="module")
@@ -174,10 +174,10 @@ def test_tls_needs_a_certificate_that_is_trusted(rig, harness, certificate):
         tell(rig, station, "https://")
         harness.eventually(lambda: "not trusted" in (report(rig)["last_error"] or ""), 10, "the refusal")
         assert station.updates == []
-        rig.mavproxy.ask(f"gradys set ca_file {certificate}", "gradys: telling")
+        rig.mavproxy.ask(f"gradys set ca_file {certificate}", "gradys: pushing to")
         harness.eventually(lambda: station.updates, 10, "an update over TLS")
         rig.mavproxy.ask("gradys set ca_file /no/such/file", "No such file")
-        rig.mavproxy.ask("gradys set ca_file None", "gradys: telling")
+        rig.mavproxy.ask("gradys set ca_file None", "gradys: pushing to")
     finally:
         station.stop()
 
@@ -188,7 +188,7 @@ def test_ipv6(rig, harness):
     except OSError:
         pytest.skip("this machine has no IPv6 loopback")
     try:
-        rig.mavproxy.ask(f"gradys set gs [::1]:{station.server_port}", "gradys: telling")
+        rig.mavproxy.ask(f"gradys set gs [::1]:{station.server_port}", "gradys: pushing to")
         harness.eventually(lambda: station.updates, 10, "an update over IPv6")
         assert station.forms[0]["ip"] == f"[::1]:{rig.port}/"
     finally:
@@ -199,7 +199,7 @@ def test_several_stations_each_with_its_own_state_and_a_dead_one_delays_nobody(r
     hanging = socket.create_server(("127.0.0.1", 0))  # accepts, and never answers
     refusing = f"127.0.0.1:{harness.free_port()}"
     names = [f"127.0.0.1:{hanging.getsockname()[1]}", refusing, "no-such-host.invalid:80"]
-    rig.mavproxy.ask(f"gradys set gs {','.join(names)},127.0.0.1:{recorder.server_port}", "gradys: telling")
+    rig.mavproxy.ask(f"gradys set gs {','.join(names)},127.0.0.1:{recorder.server_port}", "gradys: pushing to")
     with hanging:
         harness.eventually(lambda: len(recorder.updates) >= 8, 20, "eight updates")
         times = [at for at, *_ in recorder.updates]
@@ -233,10 +233,10 @@ def test_no_fix_no_push_and_stale_no_push(harness, recorder, tmp_path):
         rig.mavproxy.ask("gradys status", "ip names no API")
         rig.control.fault("silence", sending=True, receiving=False)
         time.sleep(3.0)  # real processes: until the last position is older than max_age
-        told = len(recorder.updates)
-        rig.mavproxy.ask("gradys status", "nothing to say: the position of vehicle 7 is")
+        reported = len(recorder.updates)
+        rig.mavproxy.ask("gradys status", "nothing to send: the position of vehicle 7 is")
         time.sleep(2.0)
-        assert len(recorder.updates) == told
+        assert len(recorder.updates) == reported
     finally:
         rig.stop()
 
@@ -244,7 +244,7 @@ def test_no_fix_no_push_and_stale_no_push(harness, recorder, tmp_path):
 def test_routes_are_served_whichever_module_was_loaded_first_and_go_with_it(harness, tmp_path):
     rig = harness.Rig(tmp_path, harness.free_port())
     try:
-        instance = harness.start_embedded(rig)
+        instance = harness.start_embedded(rig, speedup=1)
         rig.mavproxy = rig.start("mavproxy", harness.mavproxy_command(instance))
         rig.mavproxy.says("Received", timeout=60)
         rig.mavproxy.ask("module load gradys", "Loaded module gradys")
@@ -263,12 +263,12 @@ def test_stop_and_start(rig, recorder, harness):
     tell(rig, recorder)
     harness.eventually(lambda: recorder.updates, 10, "an update")
     rig.mavproxy.ask("gradys stop", "gradys: stopped")
-    told = len(recorder.updates)
+    reported = len(recorder.updates)
     time.sleep(2.5)
-    assert len(recorder.updates) == told
+    assert len(recorder.updates) == reported
     assert report(rig)["running"] is False
-    rig.mavproxy.ask("gradys start", "gradys: telling")
-    harness.eventually(lambda: len(recorder.updates) > told, 10, "an update")
+    rig.mavproxy.ask("gradys start", "gradys: pushing to")
+    harness.eventually(lambda: len(recorder.updates) > reported, 10, "an update")
 
 
 @pytest.mark.parametrize(
@@ -284,8 +284,8 @@ def test_stop_and_start(rig, recorder, harness):
     ],
 )
 def test_a_mistake_at_the_prompt_is_one_clear_line(rig, line, answer):
-    said = rig.mavproxy.ask(line, answer)
-    assert "Traceback" not in said
+    output = rig.mavproxy.ask(line, answer)
+    assert "Traceback" not in output
 
 
 def test_the_original_stations_program_and_ours_agree(rig, harness, tmp_path):
@@ -294,7 +294,7 @@ def test_the_original_stations_program_and_ours_agree(rig, harness, tmp_path):
     command = [sys.executable, "-m", "mavproxy_gradys.station", f"--port={port}", f"--database={tmp_path}/s.db"]
     station = rig.start("station", command)
     station.says("listening on")
-    rig.mavproxy.ask(f"gradys set gs 127.0.0.1:{port}", "gradys: telling")
+    rig.mavproxy.ask(f"gradys set gs 127.0.0.1:{port}", "gradys: pushing to")
     url = f"http://127.0.0.1:{port}"
     harness.eventually(lambda: report(rig)["dropped_by_station"] >= 1, 10, "a dropped update")
     assert requests.get(f"{url}/devices", timeout=5).json() == {"devices": []}

@@ -136,7 +136,7 @@ def test_unloading_says_offline(rig, harness, tmp_path):
     subscriber.stop()
 
 
-def test_a_wrong_password_is_said(rig, harness, tmp_path):
+def test_a_wrong_password_is_reported(rig, harness, tmp_path):
     broker = Broker(rig, harness, tmp_path)
     sink = f"mqtt://uav:wrong@127.0.0.1:{broker.port}/fleet/{{sysid}}/{{quantity}}"
     settings = json.dumps({"sink": sink, "spool": f"{tmp_path}/spool.db"}, separators=(",", ":"))

@@ -243,7 +243,7 @@ def is_empty(rig: Any) -> bool:
 
 
 @pytest.mark.skipif(shutil.which("mount") is None, reason="mount")
-def test_a_full_disk_is_said_and_nothing_else_suffers(harness, rig, tmp_path):
+def test_a_full_disk_is_reported_and_nothing_else_suffers(harness, rig, tmp_path):
     disk = tmp_path / "small"
     disk.mkdir()
     mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=200k", "tmpfs", str(disk)], check=False)
@@ -265,13 +265,13 @@ def test_a_full_disk_is_said_and_nothing_else_suffers(harness, rig, tmp_path):
         before = report(rig)["quantities"][0]["taken"]
 
         def samples_wait():
-            told = report(rig)
-            return told["quantities"][0]["taken"] >= before + 8 and told["spool"]["problem"]
+            reported = report(rig)
+            return reported["quantities"][0]["taken"] >= before + 8 and reported["spool"]["problem"]
 
         harness.eventually(samples_wait, 20, "samples that the disk does not take")
         rig.mavproxy.ask("gradys status", "NOT KEPT just now")
-        said = rig.mavproxy.ask("module unload gradys", "Unloaded module gradys")
-        assert re.search(r"\d+ readings are lost: .*full", said)
+        output = rig.mavproxy.ask("module unload gradys", "Unloaded module gradys")
+        assert re.search(r"\d+ readings are lost: .*full", output)
     finally:
         rig.mavproxy.ask("module unload gradys", "gradys")
         subprocess.run(["umount", str(disk)], check=False)

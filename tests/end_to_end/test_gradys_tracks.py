@@ -62,18 +62,18 @@ def test_a_track_is_flown_again_over_http_with_progress_and_ends_at_home(rig, tr
     answer = rig.post("/mission/fly-track?wait=false", track=track.read_text())
     assert answer.status_code == 202
     legs = len(waypoints(parse(track.read_text())))
-    told = []
+    reported = []
 
     def over() -> bool:
         job = rig.get(answer.headers["Location"]).json()
-        told.append(job["progress"])
+        reported.append(job["progress"])
         return job["state"] != "running"
 
     seen = seen_while(rig, harness, over)
     assert rig.get(answer.headers["Location"]).json()["result"] == f"Flew {legs} legs and landed at home"
-    assert {2, legs} <= {progress["leg"] for progress in told if "leg" in progress}
-    assert all(progress["legs"] == legs for progress in told if "legs" in progress)
-    assert any(progress.get("stage") == "returning" for progress in told)
+    assert {2, legs} <= {progress["leg"] for progress in reported if "leg" in progress}
+    assert all(progress["legs"] == legs for progress in reported if "legs" in progress)
+    assert any(progress.get("stage") == "returning" for progress in reported)
     assert flight(rig)["state"] == "done"
     assert flight(rig)["leg"] == flight(rig)["legs"] == legs
     for corner in ((25, 0, -8), (25, 25, -14)):

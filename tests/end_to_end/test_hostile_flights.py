@@ -421,14 +421,14 @@ def test_mission_that_is_deleted_is_left_by_brake(rig, harness):
 def test_telemetry_that_is_not_a_number_is_not_flown_by(rig, harness, message, path, body):
     rig.in_the_air(10)
     rig.control.fault("nan", message=message)
-    harness.eventually(lambda: None in told(rig, message), 10, "its arrival")
+    harness.eventually(lambda: None in reported(rig, message), 10, "its arrival")
     since = mark(rig)
     answer = rig.post(path, **body)
     assert (answer.status_code, answer.json().get("code")) == (503, "stale"), answer.text
     assert [m for m in sent(rig, since) if m["name"].startswith("SET_POSITION")] == []
 
 
-def told(rig, message):
+def reported(rig, message):
     return rig.ok(rig.get(f"/telemetry/message/{message}"))["info"].values()
 
 
@@ -437,7 +437,7 @@ def told(rig, message):
 
 @on_ardupilot
 @pytest.mark.parametrize("verb", ["takeoff", "land", "rtl"])
-def test_first_command_goes_out_before_anything_is_asked(rig, harness, verb):
+def test_first_command_goes_out_before_anything_is_requested(rig, harness, verb):
     if verb == "takeoff":
         armed_on_the_ground(rig)
     else:
@@ -445,8 +445,8 @@ def test_first_command_goes_out_before_anything_is_asked(rig, harness, verb):
     reload(rig)
     since, asked_at = mark(rig), time.time()
     waiting = Background(lambda: rig.get(f"/command/{verb}"))
-    wanted = COMMANDS[verb]
-    received = harness.eventually(lambda: until_command(rig, since, wanted), 10, f"{verb} on the wire")
+    expected = COMMANDS[verb]
+    received = harness.eventually(lambda: until_command(rig, since, expected), 10, f"{verb} on the wire")
     took = received[-1]["wall"] - asked_at
     print(f"{verb} was on the wire after {1000 * took:.1f} ms")
     assert [m["fields"]["param_id"] for m in received if m["name"] == "PARAM_REQUEST_READ"] == []

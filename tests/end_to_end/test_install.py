@@ -96,7 +96,7 @@ def loads(python: Path, harness, directory: Path, answer: str) -> bool:
     directory.mkdir()
     rig = harness.Rig(directory, harness.free_port())
     try:
-        instance = harness.start_embedded(rig)
+        instance = harness.start_embedded(rig, speedup=2)
         command = harness.mavproxy_command(instance)
         rig.mavproxy = rig.start("mavproxy", [str(python), *command[1:]])
         rig.mavproxy.says("Detected vehicle")
@@ -110,14 +110,14 @@ def test_mavproxy_and_all_three_modules_start_with_the_lean_set_alone(lean_pytho
     assert subprocess.run([lean_python, "-c", seen], check=True, capture_output=True, text=True).stdout == "[]\n"
     rig = harness.Rig(tmp_path, harness.free_port())
     try:
-        instance = harness.start_embedded(rig)
+        instance = harness.start_embedded(rig, speedup=2)
         loads = [harness.load(rig.port), '--cmd=module load vision:{"source":"sim"}', "--cmd=module load gradys"]
         rig.mavproxy = rig.start("mavproxy", [str(lean_python), *harness.mavproxy_command(instance, *loads)[1:]])
         rig.wait_until_up()
         assert rig.get("/docs").status_code == 200
         harness.eventually(lambda: rig.ok(rig.get("/vision/status"))["info"]["camera"] == "ok", what="a picture")
-        said = rig.mavproxy.ask("module list", "wp:")
-        assert all(f"{name}: " in said for name in ("uavapi", "vision", "gradys", "adsb", "terrain"))
+        printed = rig.mavproxy.ask("module list", "wp:")
+        assert all(f"{name}: " in printed for name in ("uavapi", "vision", "gradys", "adsb", "terrain"))
         assert "Failed to load" not in rig.mavproxy.output() and "lie in one folder" not in rig.mavproxy.output()
     finally:
         rig.stop()

@@ -57,8 +57,8 @@ def of_this_run(directory: Path) -> list[str]:
 
 def test_one_command_gives_a_vehicle_to_fly_and_ends_all_it_started(launched, station, harness):
     process, url, directory = launched
-    said = process.says("/telemetry/gps", timeout=120)
-    lines = [line.strip() for line in said.splitlines() if "curl" in line]
+    printed = process.says("/telemetry/gps", timeout=120)
+    lines = [line.strip() for line in printed.splitlines() if "curl" in line]
     assert len(lines) == 3 and all(url in line for line in lines)
     for path in ("/command/arm", "/command/takeoff?alt=5", "/command/land"):
         answer = requests.get(url + path, timeout=120)
@@ -80,6 +80,6 @@ def test_a_taken_port_is_one_line(harness, tmp_path):
         command += ["--port", str(taken.getsockname()[1]), "--log_path", str(tmp_path)]
         process = harness.Process(command, tmp_path / "launcher.log", tmp_path)
         assert process.popen.wait(30) != 0
-        said = process.output().strip()
+        printed = process.output().strip()
         process.stop()
-    assert len(said.splitlines()) == 1 and "taken" in said
+    assert len(printed.splitlines()) == 1 and "taken" in printed

@@ -21,7 +21,7 @@ def mavproxy(harness, tmp_path_factory) -> Iterator:
     """A MAVProxy on the embedded vehicle, with none of our modules loaded."""
     made = harness.Rig(tmp_path_factory.mktemp("bare"), harness.free_port())
     try:
-        instance = harness.start_embedded(made)
+        instance = harness.start_embedded(made, speedup=2)
         env = {"PYTHONPATH": str(made.directory)}
         made.mavproxy = made.start("mavproxy", harness.mavproxy_command(instance), env)
         made.mavproxy.says("Received", timeout=60)  # the parameters: MAVProxy is up and settled
@@ -71,8 +71,8 @@ def test_reload_takes_the_port_over(mavproxy, harness):
     prompt.ask(load_line(mavproxy), f"listening on {mavproxy.url}")
     before = resources(prompt.pid)
     for _ in range(5):
-        said = prompt.ask(f"module reload {load_line(mavproxy).removeprefix('module load ')}", "listening on")
-        assert "Reloaded module uavapi" not in said or "Failed" not in said
+        output = prompt.ask(f"module reload {load_line(mavproxy).removeprefix('module load ')}", "listening on")
+        assert "Reloaded module uavapi" not in output or "Failed" not in output
         mavproxy.wait_until_up()
     assert harness.eventually(lambda: no_more_than(before, prompt.pid), 5, f"having no more than {before}")
     prompt.ask("module unload uavapi", "Unloaded module uavapi")
@@ -84,8 +84,8 @@ def test_the_modules_say_what_they_are(mavproxy):
     prompt.ask("vision status", "AprilTag")
     prompt.ask('module load gradys:{"gs":"127.0.0.1:9"}', "Loaded module gradys")
     prompt.ask("gradys status", "127.0.0.1:9")
-    said = prompt.ask("module list", "wp:")
-    assert "vision: " in said and "gradys: " in said
+    output = prompt.ask("module list", "wp:")
+    assert "vision: " in output and "gradys: " in output
     prompt.ask("module unload vision", "Unloaded module vision")
     prompt.ask("module unload gradys", "Unloaded module gradys")
 
@@ -101,7 +101,7 @@ def test_console_commands(mavproxy):
     prompt.ask("uavapi set", "link_timeout")
     prompt.ask("uavapi set prot 8001", "did you mean port?")
     prompt.ask("uavapi set port many", "it takes a int")
-    prompt.ask("uavapi set host 0.0.0.0", "anybody on that network")
+    prompt.ask("uavapi set host 0.0.0.0", "everybody on that network")
     prompt.ask("uavapi stop", "uavapi: stopped")
     with pytest.raises(requests.ConnectionError):
         mavproxy.get("/telemetry/status", timeout=5)
@@ -115,9 +115,9 @@ def test_a_port_in_use_is_one_clear_line_and_mavproxy_lives_on(mavproxy, harness
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", mavproxy.port))
         taken.listen()
-        said = prompt.ask(load_line(mavproxy), "takes another port")
-        assert "Address already in use" in said
-        assert "Traceback" not in said
+        output = prompt.ask(load_line(mavproxy), "takes another port")
+        assert "Address already in use" in output
+        assert "Traceback" not in output
     other = harness.free_port()
     prompt.ask(f"uavapi set port {other}", f"listening on http://127.0.0.1:{other}")
     prompt.ask("module unload uavapi", "Unloaded module uavapi")
@@ -133,8 +133,8 @@ def test_a_port_in_use_is_one_clear_line_and_mavproxy_lives_on(mavproxy, harness
     ],
 )
 def test_a_bad_setting_is_one_clear_line_and_mavproxy_lives_on(mavproxy, line, answer):
-    said = mavproxy.mavproxy.ask(line, answer)
-    assert "Traceback" not in said
+    output = mavproxy.mavproxy.ask(line, answer)
+    assert "Traceback" not in output
     mavproxy.mavproxy.ask("uavapi status", "Unknown command")
 
 
@@ -143,11 +143,11 @@ def test_a_missing_dependency_is_one_clear_line_and_mavproxy_lives_on(harness, t
     (tmp_path / "aiohttp.py").write_text(missing, encoding="utf-8")
     rig = harness.Rig(tmp_path, harness.free_port())
     try:
-        instance = harness.start_embedded(rig)
+        instance = harness.start_embedded(rig, speedup=2)
         rig.mavproxy = rig.start("mavproxy", harness.mavproxy_command(instance), {"PYTHONPATH": str(tmp_path)})
         rig.mavproxy.says("Detected vehicle")
-        said = rig.mavproxy.ask("module load uavapi", "Failed to load module")
-        assert "aiohttp" in said and "pip install" in said and "Traceback" not in said
+        output = rig.mavproxy.ask("module load uavapi", "Failed to load module")
+        assert "aiohttp" in output and "pip install" in output and "Traceback" not in output
         rig.mavproxy.ask("module list", "wp:")
     finally:
         rig.stop()
@@ -158,12 +158,12 @@ def test_loaded_from_the_command_line_before_there_is_a_link(harness, tmp_path):
     ini = tmp_path / "uavapi.ini"
     ini.write_text(f"[api]\nport = {rig.port}\nuav_connection = 127.0.0.1:17171\n", encoding="utf-8")
     try:
-        instance = harness.start_embedded(rig)
+        instance = harness.start_embedded(rig, speedup=2)
         option = f'--load-module=uavapi:{{"config":"{ini}"}},vision,gradys'
         rig.mavproxy = rig.start("mavproxy", harness.mavproxy_command(instance, option))
         rig.wait_until_up()
-        said = rig.mavproxy.ask("module list", "wp:")
-        assert all(f"{name}: " in said for name in ("uavapi", "vision", "gradys"))
+        output = rig.mavproxy.ask("module list", "wp:")
+        assert all(f"{name}: " in output for name in ("uavapi", "vision", "gradys"))
     finally:
         rig.stop()
 

@@ -21,7 +21,7 @@ def rig(harness, tmp_path_factory):
     fake.chmod(fake.stat().st_mode | stat.S_IXUSR)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PATH", f"{tools}{os.pathsep}{os.environ['PATH']}")
-        rig = harness.embedded(tmp_path_factory.mktemp("photo"))
+        rig = harness.embedded(tmp_path_factory.mktemp("photo"), speedup=RIG_SPEEDUP)
     rig.tools = tools
     yield rig
     rig.stop()

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 import requests
 
+SPEEDUP = 4  # a take-off and a landing are all that is flown
 LAT, LON, GROUND = -353632610, 1491652300, 584  # 1e-7 degrees, m AMSL
 
 
@@ -19,10 +20,10 @@ def rig(harness, tmp_path_factory) -> Iterator:
     """A MAVProxy with vehicles 1, its current one, and 2, and none of our modules; it has their parameters."""
     made = harness.Rig(tmp_path_factory.mktemp("reload"), harness.free_port())
     try:
-        first = harness.start_embedded(made)
+        first = harness.start_embedded(made, speedup=SPEEDUP)
         second = harness.free_instance()
         simulator = [sys.executable, "-m", "mavproxy_uavapi.sim", f"--home={harness.HOME}"]
-        more = made.start("second", [*simulator, f"--instance={second}", "--sysid=2", f"--speedup={harness.SPEEDUP}"])
+        more = made.start("second", [*simulator, f"--instance={second}", "--sysid=2", f"--speedup={SPEEDUP}"])
         more.says("listening on tcp")
         command = harness.mavproxy_command(first, f"--master=tcp:127.0.0.1:{5760 + 10 * second}")
         made.mavproxy = made.start("mavproxy", command)
@@ -49,8 +50,8 @@ def vehicle_of(port: int) -> str | None:
     return answer.json()["id"] if answer.status_code == 200 else None
 
 
-def flat(said: str) -> str:
-    return " ".join(said.split())
+def flat(output: str) -> str:
+    return " ".join(output.split())
 
 
 def test_uavapi_keeps_its_keywords_and_what_was_set_at_the_prompt(rig, prompt, harness):
@@ -58,22 +59,24 @@ def test_uavapi_keeps_its_keywords_and_what_was_set_at_the_prompt(rig, prompt, h
     prompt.ask(f'module load uavapi:{{"port":{rig.port},"sysid":2}}', f"listening on {rig.url}")
     prompt.ask(f"uavapi set port {other}", f"listening on http://127.0.0.1:{other}")
     for line in ("module reload uavapi", "module unload uavapi\nmodule load uavapi"):
-        said = prompt.ask(line, f"listening on http://127.0.0.1:{other}")
-        assert f"uavapi: as before: port={other}, sysid=2 (keywords at `module load` replace all that)" in flat(said)
+        output = prompt.ask(line, f"listening on http://127.0.0.1:{other}")
+        assert f"uavapi: as before: port={other}, sysid=2 (keywords at `module load` replace all that)" in flat(
+            output
+        )
         assert harness.eventually(lambda: vehicle_of(other)) == "2"
-    said = prompt.ask(f'module reload uavapi:{{"port":{rig.port}}}', f"listening on {rig.url}")
-    assert "as before" not in said
+    output = prompt.ask(f'module reload uavapi:{{"port":{rig.port}}}', f"listening on {rig.url}")
+    assert "as before" not in output
     assert harness.eventually(lambda: vehicle_of(rig.port)) == "1"
 
 
 def test_gradys_and_vision_keep_theirs(rig, prompt):
     prompt.ask(f'module load gradys:{{"spool":"{rig.directory}/spool.db"}}', "no ground station")
-    prompt.ask("gradys set gs 127.0.0.1:9", "telling http://127.0.0.1:9")
-    prompt.ask("module reload gradys", "telling http://127.0.0.1:9")
+    prompt.ask("gradys set gs 127.0.0.1:9", "pushing to http://127.0.0.1:9")
+    prompt.ask("module reload gradys", "pushing to http://127.0.0.1:9")
     prompt.ask('module load vision:{"source":"http"}', "looking for 36h11 through http")
     prompt.ask("vision set tags 0:0.4", "looking for")
-    said = prompt.ask("module reload vision", "looking for 36h11 through http")
-    assert "vision: as before: source=http, tags=0:0.4 (" in flat(said)
+    output = prompt.ask("module reload vision", "looking for 36h11 through http")
+    assert "vision: as before: source=http, tags=0:0.4 (" in flat(output)
 
 
 def test_takeoff_asks_for_no_parameter_that_mavproxy_has(rig, prompt):
@@ -109,9 +112,9 @@ def test_start_that_takes_long_says_so_and_mavproxy_goes_on(rig, prompt, tmp_pat
     os.mkfifo(pipe)
     prompt.ask(f'module load uavapi:{{"port":{rig.port},"log_path":"{pipe}"}}', "Loaded module uavapi")
     started = time.monotonic()
-    said = prompt.ask("uavapi status", f"it would be {rig.url}")
-    assert time.monotonic() - started < 1.5, said
-    prompt.says(f"still trying to listen on {rig.url}; a line tells when that is done")
+    output = prompt.ask("uavapi status", f"it would be {rig.url}")
+    assert time.monotonic() - started < 1.5, output
+    prompt.says(f"still trying to listen on {rig.url}; a line follows when it is done")
     with pytest.raises(requests.ConnectionError):
         rig.get("/telemetry/status", timeout=5)
     reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)

@@ -86,7 +86,7 @@ def test_script_flies_is_seen_in_tmux_and_lands_when_it_is_stopped(rig, harness)
     assert rig.status()["armed"] is False
 
 
-def test_stubborn_script_is_killed_after_the_grace_period_and_that_is_seen_coming(rig, harness):
+def test_stubborn_script_is_killed_after_the_grace_period_and_the_remaining_time_is_reported(rig, harness):
     execute(rig, "stubborn.sh")
     harness.eventually(lambda: show(rig, "stubborn.sh")["out"])
     with pytest.raises(requests.Timeout):  # its client hangs up; the stop goes on
@@ -127,7 +127,7 @@ def test_restarted_api_finds_its_scripts_again(rig, harness):
 
 
 @pytest.mark.parametrize(
-    ("action", "said", "end"),
+    ("action", "output", "end"),
     [
         ("nothing", "on_script_exit is nothing", (True, "GUIDED")),
         ("hold", "hold is done", (True, "GUIDED")),
@@ -135,13 +135,13 @@ def test_restarted_api_finds_its_scripts_again(rig, harness):
         ("rtl", "rtl is done", (False, "RTL")),
     ],
 )
-def test_script_that_dies_in_flight_leaves_the_vehicle_to_the_setting(rig, harness, action, said, end):
+def test_script_that_dies_in_flight_leaves_the_vehicle_to_the_setting(rig, harness, action, output, end):
     rig.mavproxy.type(f"uavapi set on_script_exit {action}")
     rig.in_the_air(8)  # from the ground: home is below
     x, y, _ = rig.ned()
     mark = rig.mavproxy.mark()
     execute(rig, "leaves", str(x + (DISTANCE if x < 0 else -DISTANCE)), str(y))
-    rig.mavproxy.says(f"leaves.py died (status 5): {said}", mark, timeout=90)
+    rig.mavproxy.says(f"leaves.py died (status 5): {output}", mark, timeout=90)
     assert show(rig, "leaves")["exit_status"] == 5
     harness.eventually(lambda: slow(rig), what="the end of its flight")
     status = rig.status()
@@ -162,16 +162,26 @@ def slow(rig):
     return math.hypot(velocity["vx"], velocity["vy"]) < 0.2
 
 
-def test_pilots_mode_is_left_alone_when_the_script_dies(rig, harness):
+DIES = """
+import os, sys, time
+
+while not os.path.exists(sys.argv[1]):
+    time.sleep(0.05)
+raise SystemExit(1)
+"""
+
+
+def test_pilots_mode_is_left_alone_when_the_script_dies(rig, harness, tmp_path):
     rig.mavproxy.type("uavapi set on_script_exit rtl")
-    upload(rig, "dies.py", "import time\ntime.sleep(1.5)\nraise SystemExit(1)\n")
+    upload(rig, "dies.py", DIES)
     rig.in_the_air(20)
     pilot_keeps_the_height(rig)
     mark = rig.mavproxy.mark()
-    execute(rig, "dies")
+    execute(rig, "dies", str(tmp_path / "now"))
     rig.mavproxy.type("mode LOITER")
     harness.eventually(lambda: rig.status()["mode"] == "LOITER")
     since = rig.control.ask("received", since=0)["last"] if rig.control is not None else 0
+    (tmp_path / "now").touch()
     rig.mavproxy.says("left alone: the vehicle is in LOITER", mark)
     assert show(rig, "dies")["exit_status"] == 1
     time.sleep(1)  # what is not to come would come at once

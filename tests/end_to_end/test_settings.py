@@ -66,7 +66,7 @@ def rig(harness, tmp_path_factory):
     config.write_text(INI.format(folder=directory), encoding="utf-8")
     terminal = rig.terminal = Terminal(f"uavapi-test-{rig.port}")
     try:
-        instance = harness.start_embedded(rig)
+        instance = harness.start_embedded(rig, speedup=4)
         load = harness.load(rig.port, config=str(config), link_timeout=8, script_grace=8)
         command = [*harness.mavproxy_command(instance, load), f"--logfile={directory / 'mav.tlog'}"]
         terminal.start(command, {"UAVAPI_MAX_AGE": "7", "UAVAPI_LINK_TIMEOUT": "7", "UAVAPI_SCRIPT_GRACE": "7"})
@@ -97,16 +97,16 @@ def configuration(rig, harness):
     return {match[1]: (match[2], match[3]) for match in found if match}
 
 
-def test_later_sources_win_and_config_tells_of_each(rig, harness):
+def test_later_sources_win_and_config_reports_each(rig, harness):
     rig.terminal.enter("uavapi set script_grace 9")
     file = str(rig.directory / "uav.ini")
-    told = configuration(rig, harness)
-    assert told["max_rate"] == ("500.0", "default")
-    assert told["max_jobs"] == ("6", file)
-    assert told["max_age"] == ("7.0", "environment")
-    assert told["link_timeout"] == ("8.0", "module load")
-    assert told["script_grace"] == ("9.0", "uavapi set")
-    assert told["port"] == (str(rig.port), "module load")
+    reported = configuration(rig, harness)
+    assert reported["max_rate"] == ("500.0", "default")
+    assert reported["max_jobs"] == ("6", file)
+    assert reported["max_age"] == ("7.0", "environment")
+    assert reported["link_timeout"] == ("8.0", "module load")
+    assert reported["script_grace"] == ("9.0", "uavapi set")
+    assert reported["port"] == (str(rig.port), "module load")
 
 
 def test_what_mavproxy_owns_is_one_line_for_each_key(rig):
@@ -122,8 +122,8 @@ def test_misspelt_key_is_one_line_and_loads_nothing(rig, harness, tmp_path):
     rig.terminal.enter("module unload uavapi")
     shown(rig, harness, "Unloaded module uavapi")
     rig.terminal.enter("module load uavapi:" + json.dumps({"config": str(file)}, separators=(",", ":")))
-    said = "".join(shown(rig, harness, "Failed to load module"))
-    assert "no key 'script_gracee' in [api]; did you mean script_grace?" in said
+    printed = "".join(shown(rig, harness, "Failed to load module"))
+    assert "no key 'script_gracee' in [api]; did you mean script_grace?" in printed
     load = harness.load(rig.port, config=str(rig.directory / "uav.ini")).removeprefix("--cmd=")
     rig.terminal.enter(load)
     rig.wait_until_up()
@@ -131,7 +131,7 @@ def test_misspelt_key_is_one_line_and_loads_nothing(rig, harness, tmp_path):
 
 def test_setting_takes_effect_at_once_and_a_refused_one_does_not(rig, harness):
     rig.terminal.enter("uavapi set host 0.0.0.0")
-    shown(rig, harness, "anybody on that network could fly the vehicle")
+    shown(rig, harness, "everybody on that network could fly the vehicle")
     assert configuration(rig, harness)["host"] == ("127.0.0.1", "default")
     rig.terminal.enter("uavapi set max_rate 1")
 
@@ -211,25 +211,27 @@ def test_one_file_that_the_environment_names_configures_all_three_modules(harnes
     file = tmp_path / "uav.ini"
     file.write_text(ALL_THREE.format(port=rig.port, folder=tmp_path), encoding="utf-8")
     try:
-        command = harness.mavproxy_command(harness.start_embedded(rig), "--load-module=uavapi,vision,gradys")
+        command = harness.mavproxy_command(
+            harness.start_embedded(rig, speedup=2), "--load-module=uavapi,vision,gradys"
+        )
         given = {"UAVAPI_CONFIG": str(file), "VISION_SPEED": "3", "GRADYS_PERIOD": "4"}
         rig.mavproxy = rig.start("mavproxy", command, given)
         rig.wait_until_up()
-        rig.mavproxy.says("gradys: telling http://127.0.0.1:9")
+        rig.mavproxy.says("gradys: pushing to http://127.0.0.1:9")
         rig.mavproxy.says("vision: looking for 36h11 through http")
         rows = rig.mavproxy.ask("vision config", "sim_occlusion") + rig.mavproxy.ask("gradys config", "spool_hours")
         words = [line.rpartition("> ")[2].split() for line in rows.splitlines()]  # the prompt may stand before one
-        told = {row[0]: row[1:] for row in words if len(row) > 2}
-        assert told["tags"] == ["0:0.4", str(file)]
-        assert told["speed"] == ["3.0", "environment"]
-        assert told["fps"] == ["20.0", "default"]
-        assert told["gs"] == ["127.0.0.1:9", str(file)]
-        assert told["period"] == ["4.0", "environment"]
-        assert told["token"] == ["(set)", str(file)]
+        reported = {row[0]: row[1:] for row in words if len(row) > 2}
+        assert reported["tags"] == ["0:0.4", str(file)]
+        assert reported["speed"] == ["3.0", "environment"]
+        assert reported["fps"] == ["20.0", "default"]
+        assert reported["gs"] == ["127.0.0.1:9", str(file)]
+        assert reported["period"] == ["4.0", "environment"]
+        assert reported["token"] == ["(set)", str(file)]
         assert "s3cret" not in rig.mavproxy.output()
         file.write_text(file.read_text(encoding="utf-8").replace("tags =", "tgas ="), encoding="utf-8")
-        said = rig.mavproxy.ask("module reload vision", "Failed to load module")
-        assert "no key 'tgas' in [vision]; did you mean tags?" in said
+        printed = rig.mavproxy.ask("module reload vision", "Failed to load module")
+        assert "no key 'tgas' in [vision]; did you mean tags?" in printed
         assert rig.get("/gradys/status").status_code == 200  # the others live on
     finally:
         rig.stop()

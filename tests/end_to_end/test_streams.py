@@ -11,8 +11,9 @@ from typing import Any
 import pytest
 import requests
 
+from mavproxy_uavapi.http.streaming import MOST_OPEN
+
 RIG_SPEEDUP = 2  # nobody flies far here, and each message costs processor time
-OPEN = 100
 
 
 @pytest.fixture
@@ -20,7 +21,7 @@ def unread(embedded_rig: Any) -> Iterator[list[socket.socket]]:
     """As many streams as may be open, none of which is read."""
     with contextlib.ExitStack() as clients:
         opened = []
-        for _ in range(OPEN):
+        for _ in range(MOST_OPEN):
             client = clients.enter_context(socket.socket())
             client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
             client.connect(("127.0.0.1", embedded_rig.port))

@@ -97,7 +97,7 @@ class Station:
         fields[groups[mask] : groups[mask] + 3] = vector
         self.send.set_position_target_local_ned_send(0, 1, 1, mavlink.MAV_FRAME_LOCAL_NED, mask, *fields, 0, 0)
 
-    def asked(self, name: str) -> Any:
+    def requested(self, name: str) -> Any:
         """What REQUEST_MESSAGE brings; None when the vehicle has nothing to say."""
         assert self.command(mavlink.MAV_CMD_REQUEST_MESSAGE, _number(name)) == ACCEPTED
         return self._until(name, 0.5)
@@ -226,22 +226,22 @@ def test_the_targets_that_guided_reports(station: Station) -> None:
     station.fly()
     station.setpoint(POSITION, 3, 0, -11)
     station.run(0.5)
-    local = station.asked("POSITION_TARGET_LOCAL_NED")
+    local = station.requested("POSITION_TARGET_LOCAL_NED")
     assert (local.type_mask, local.x, local.z) == (POSITION, 3.0, -11.0)
-    assert station.asked("POSITION_TARGET_GLOBAL_INT").type_mask == 0xF000 | POSITION
+    assert station.requested("POSITION_TARGET_GLOBAL_INT").type_mask == 0xF000 | POSITION
     station.stand()
-    assert station.asked("POSITION_TARGET_LOCAL_NED").type_mask == 0x0C07
+    assert station.requested("POSITION_TARGET_LOCAL_NED").type_mask == 0x0C07
     assert station.take_off() == ACCEPTED
     station.run(0.2)
-    stale = station.asked("POSITION_TARGET_LOCAL_NED")
+    stale = station.requested("POSITION_TARGET_LOCAL_NED")
     assert (stale.type_mask, stale.x, stale.z) == (POSITION, 3.0, -11.0)
-    assert station.asked("POSITION_TARGET_GLOBAL_INT") is None
+    assert station.requested("POSITION_TARGET_GLOBAL_INT") is None
     station.wait(lambda: station.landed_state == IN_AIR)
     station.setpoint(ACCELERATION, 0.2, 0, 0)
     station.run(4.0)
-    assert station.asked("POSITION_TARGET_LOCAL_NED").type_mask == ACCELERATION
+    assert station.requested("POSITION_TARGET_LOCAL_NED").type_mask == ACCELERATION
     station.mode(BRAKE)
-    assert station.asked("POSITION_TARGET_LOCAL_NED") is None
+    assert station.requested("POSITION_TARGET_LOCAL_NED") is None
 
 
 def test_speeds_disarming_and_takeoffs_are_refused_alike(station: Station) -> None:

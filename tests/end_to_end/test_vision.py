@@ -91,7 +91,7 @@ def test_the_frame_is_a_picture_and_so_is_the_stream(looking: Any) -> None:
     assert received.count(b"\xff\xd8\xff") >= 2
 
 
-def test_the_prompt_tells_the_same(looking: Any) -> None:
+def test_the_prompt_reports_the_same(looking: Any) -> None:
     assert "AprilTags of 36h11" in looking.mavproxy.ask("vision status", "in view")
     looking.mavproxy.ask("vision set famly x", "did you mean family")
     looking.mavproxy.ask("vision tag tag.pdf --size 0.15", "wrote tag.pdf")
@@ -228,8 +228,8 @@ def test_without_uavapi_the_prompt_is_all_it_takes(harness: Any, tmp_path: Path)
         rig.mavproxy.says("looking for 36h11 through sim")
         rig.mavproxy.says("Received", timeout=60)  # the parameters
         assert "no vehicle" not in rig.mavproxy.ask("vision mission 4 4 -3", "mission begins (job 1)")
-        told = rig.mavproxy.says("vision: Landed on tag 0", timeout=90)
-        assert "uavapi" not in told
+        reported = rig.mavproxy.says("vision: Landed on tag 0", timeout=90)
+        assert "uavapi" not in reported
         assert rig.control.ask("state")["position"][:2] == pytest.approx([4, -3], abs=0.3)
     finally:
         rig.stop()

@@ -103,12 +103,12 @@ class Scene:
     def flown_by(self, mark: int) -> list[Any]:
         """What the vehicle was sent since then that could move it; asking for telemetry could not."""
         heard = self.rig.control.ask("received", since=mark)["messages"]
-        asked = (SET_MESSAGE_INTERVAL, REQUEST_MESSAGE)
+        requested = (SET_MESSAGE_INTERVAL, REQUEST_MESSAGE)
         return [
             message
             for message in heard
             if message["name"] in ("SET_POSITION_TARGET_LOCAL_NED", "SET_MODE", "COMMAND_LONG", "LANDING_TARGET")
-            and message["fields"].get("command") not in asked
+            and message["fields"].get("command") not in requested
         ]
 
     def off(self, tag: Any) -> float:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 
 import pytest
-import requests
+
+from tests.support.lockstep_rig import LockstepRig
+from tests.support.processes import ardupilot
 
 WPL = """QGC WPL 110
 0\t1\t0\t16\t0\t0\t0\t0\t-35.363261\t149.165230\t584\t1
@@ -23,10 +25,10 @@ JSON = {"items": [{"command": 22, "alt": 10}, LEGS[0], {"command": 178, "param1"
 SPEEDUP = 4  # a vehicle gives an upload up after 8 s of its own clock; a busy machine needs some of ours
 
 
-@pytest.fixture(scope="module", params=["embedded", pytest.param("ardupilot", marks=pytest.mark.sitl)])
-def rig(request, harness, tmp_path_factory):
-    start = getattr(harness, request.param)
-    made = start(tmp_path_factory.mktemp("waypoints"), speedup=SPEEDUP)
+@pytest.fixture(scope="module", params=["lockstep", pytest.param("ardupilot", marks=pytest.mark.sitl)])
+def rig(request, tmp_path_factory):
+    directory = tmp_path_factory.mktemp("waypoints")
+    made = LockstepRig(directory) if request.param == "lockstep" else ardupilot(directory, speedup=SPEEDUP)
     yield made
     made.stop()
 
@@ -52,7 +54,7 @@ PLAN = {
 
 
 def post(rig, text, kind="text/plain"):
-    return requests.post(rig.url + "/mission/waypoints", data=text, headers={"Content-Type": kind}, timeout=60)
+    return rig.call("POST", "/mission/waypoints", data=text, headers={"Content-Type": kind})
 
 
 def items(rig):
@@ -65,7 +67,7 @@ def commands(rig):
 
 @pytest.fixture(autouse=True)
 def empty(rig):
-    rig.ok(requests.delete(rig.url + "/mission/waypoints", timeout=30))
+    rig.ok(rig.delete("/mission/waypoints"))
 
 
 @pytest.mark.parametrize("text", [WPL, json.dumps(PLAN), json.dumps(JSON)], ids=["wpl", "plan", "json"])
@@ -81,44 +83,44 @@ def test_upload_is_read_back(rig, text):
 
 
 def test_upload_by_form(rig):
-    answer = requests.post(rig.url + "/mission/waypoints", files={"file": ("m.waypoints", WPL)}, timeout=60)
+    answer = rig.call("POST", "/mission/waypoints", files={"file": ("m.waypoints", WPL)})
     assert rig.ok(answer)["result"] == "Mission of 5 items uploaded"
 
 
-def test_mission_is_flown_to_its_end(rig, harness):
+def test_mission_is_flown_to_its_end(rig):
     rig.ok(post(rig, WPL))
     assert rig.post("/mission/start").json()["code"] == "not_armed"
     rig.ok(rig.get("/command/arm"))
     assert rig.ok(rig.post("/mission/start", until_complete=True))["result"] == "Mission complete"
     progress = rig.ok(rig.get("/mission/progress"))["info"]
     assert (progress["total"], progress["last_reached"]) in [(5, 4), (5, 5)]
-    harness.eventually(lambda: rig.status()["landed_state"] == "on_ground")
+    rig.eventually(lambda: rig.status()["landed_state"] == "on_ground")
     rig.ok(rig.get("/command/disarm"))  # ArduPilot may have disarmed it already, or wait for DISARM_DELAY
 
 
-def test_start_begins_at_the_first_item_and_progress_is_told(rig, harness):
+def test_start_begins_at_the_first_item_and_progress_is_reported(rig):
     rig.ok(rig.post("/mission/waypoints", items=[*JSON["items"], {"command": "NAV_LOITER_UNLIM", "alt": 14}]))
     rig.ok(rig.get("/command/arm"))
     for _ in range(2):
         rig.ok(rig.post("/mission/start"))
-        told = rig.ok(rig.get("/mission/progress"))
-        assert told["info"]["state"] == "active"
-        assert told["info"]["mode"] == "AUTO"
-        assert told["info"]["current"] <= 2
-        assert told["age_s"] < 2
-        harness.eventually(lambda: rig.ok(rig.get("/mission/progress"))["info"]["last_reached"] == 4)
+        reported = rig.ok(rig.get("/mission/progress"))
+        assert reported["info"]["state"] == "active"
+        assert reported["info"]["mode"] == "AUTO"
+        assert reported["info"]["current"] <= 2
+        assert reported["age_s"] < 2
+        rig.eventually(lambda: rig.ok(rig.get("/mission/progress"))["info"]["last_reached"] == 4)
         rig.ok(rig.get("/command/guided"))
     rig.on_the_ground()
 
 
-def test_pilot_who_leaves_auto_ends_the_wait(rig, harness):
+def test_pilot_who_leaves_auto_ends_the_wait(rig):
     rig.ok(rig.post("/mission/waypoints", items=[*JSON["items"], {"command": "NAV_LOITER_UNLIM", "alt": 14}]))
     rig.in_the_air(10)
     job = rig.post("/mission/start?wait=false", until_complete=True).json()["job"]
-    harness.eventually(lambda: rig.status()["mode"] == "AUTO")
+    rig.eventually(lambda: rig.status()["mode"] == "AUTO")
     assert post(rig, WPL).json()["code"] == "busy"
-    rig.mavproxy.type("mode LOITER")
-    harness.eventually(lambda: "mode_changed" in rig.get(f"/jobs/{job}").text)
+    rig.switch_mode("LOITER")
+    rig.eventually(lambda: "mode_changed" in rig.get(f"/jobs/{job}").text)
     refused = rig.post("/mission/start")
     assert (refused.status_code, refused.json()["code"]) == (409, "mode_changed")
     rig.ok(rig.get("/command/guided"))
@@ -140,12 +142,3 @@ def test_mission_that_cannot_be_flown_is_422_and_changes_nothing(rig):
     answer = rig.post("/mission/waypoints", items=[{"command": "NAV_WAYPOINT", "lat": 999, "alt": 10}])
     assert answer.status_code == 422
     assert len(items(rig)) == 5
-
-
-def test_mavproxys_own_wp_module_still_works_beside_ours(rig, tmp_path):
-    file = tmp_path / "own.txt"
-    file.write_text(WPL)
-    rig.mavproxy.ask(f"wp load {file}", "Sent all 6 waypoints")
-    assert commands(rig)[0] == "NAV_TAKEOFF"
-    rig.ok(rig.post("/mission/waypoints", **JSON))
-    rig.mavproxy.ask("wp list", "Saved 5 waypoints")

@@ -42,10 +42,10 @@ def at_once(monkeypatch: pytest.MonkeyPatch) -> type[AtOnce]:
     return AtOnce
 
 
-class Teller:
-    """A vehicle that tells; `loop.pass_time` does not make it tell again."""
+class TelemetrySource:
+    """A vehicle that sends telemetry on request; `loop.pass_time` does not make it send again."""
 
-    TELLS: dict[str, dict[str, Any]] = {
+    MESSAGES: dict[str, dict[str, Any]] = {
         "heartbeat": {},
         "gps_raw_int": {"fix_type": 3},
         "sys_status": {
@@ -61,15 +61,15 @@ class Teller:
     def __init__(self, host: Host, make: Callable[..., Any], system: int = 10) -> None:
         self._host, self._make, self.system = host, make, system
 
-    def tell(self, name: str, **fields: Any) -> None:
-        """One message, now."""
-        given = {**self.TELLS.get(name, {}), **fields}
-        self._host._receive(self._make(name, self.system, **given))
+    def send(self, name: str, **fields: Any) -> None:
+        """Send one message now."""
+        values = {**self.MESSAGES.get(name, {}), **fields}
+        self._host._receive(self._make(name, self.system, **values))
 
-    def tell_all(self) -> None:
-        """All that it tells, now."""
-        for name in self.TELLS:
-            self.tell(name)
+    def send_all(self) -> None:
+        """Send all messages now."""
+        for name in self.MESSAGES:
+            self.send(name)
 
     @property
     def state(self) -> Any:
@@ -77,11 +77,11 @@ class Teller:
 
 
 @pytest.fixture
-def teller(host: Host, msg: Any, loop: Any) -> Teller:
-    """Vehicle 10, which has told all once; on the bench loop, whose link watch it must not start."""
+def telemetry(host: Host, msg: Any, loop: Any) -> TelemetrySource:
+    """Vehicle 10, which has sent each message once; its link watch must not start on the bench loop."""
     host.link_watch.watch = lambda state: None  # type: ignore[method-assign]
-    vehicle = Teller(host, msg)
-    vehicle.tell_all()
+    vehicle = TelemetrySource(host, msg)
+    vehicle.send_all()
     return vehicle
 
 

@@ -12,7 +12,7 @@ from mavproxy_gradys.service import Gradys
 
 
 @pytest.fixture
-def gradys(host: Any, teller: Any, settings: Any) -> Gradys:
+def gradys(host: Any, telemetry: Any, settings: Any) -> Gradys:
     """A service with one station, which has been told a few updates."""
     made = Gradys(host)
     made.settings = settings(gs="10.0.0.5:8000")
@@ -30,18 +30,18 @@ def gradys(host: Any, teller: Any, settings: Any) -> Gradys:
 
 
 def test_the_status_says_what_became_of_the_updates(gradys: Gradys) -> None:
-    said = console.status(gradys.report())
-    assert "3 sent, 2 acknowledged (1 of them dropped by the station: no browser watches), 1 failed" in said
-    assert "round trip 12.3 ms" in said
-    assert "we are at 192.0.2.2:8000/" in said
-    assert "last error 0 s ago: no answer within 3 s" in said
-    assert "next try in 1.0 s" in said
-    assert "vehicle 10: next is 2, last one acknowledged 0.0 s ago" in said
+    output = console.status(gradys.report())
+    assert "3 sent, 2 acknowledged (1 of them dropped by the station: no browser watches), 1 failed" in output
+    assert "round trip 12.3 ms" in output
+    assert "our address for it: 192.0.2.2:8000/" in output
+    assert "last error 0 s ago: no answer within 3 s" in output
+    assert "next try in 1.0 s" in output
+    assert "vehicle 10: next is 2, last one acknowledged 0.0 s ago" in output
 
 
 def test_the_status_says_why_nothing_is_pushed(gradys: Gradys) -> None:
     gradys.stations["http://10.0.0.5:8000"].vehicle(10).withhold("vehicle 10 has no position fix")
-    assert "nothing to say: vehicle 10 has no position fix" in console.status(gradys.report())
+    assert "nothing to send: vehicle 10 has no position fix" in console.status(gradys.report())
 
 
 def test_the_table_has_a_row_for_each_vehicle(gradys: Gradys) -> None:
@@ -58,7 +58,7 @@ def test_the_report_is_json_with_the_totals_in_front(gradys: Gradys) -> None:
     assert (report["spooled"], report["oldest_unsent_s"]) == (0, None)
 
 
-def test_the_spools_troubles_are_said() -> None:
+def test_the_spools_troubles_are_reported() -> None:
     spool = {"file": "/x", "problem": "disk is full", "dropped": {"size": 3, "age": 0}, "set_aside": ["/x.corrupt-1"]}
     assert console.spool_lines(spool) == [
         "  kept in /x",
@@ -68,7 +68,7 @@ def test_the_spools_troubles_are_said() -> None:
     ]
 
 
-def test_readings_that_are_refused_alone_are_said(gradys: Gradys) -> None:
+def test_readings_that_are_refused_alone_are_reported(gradys: Gradys) -> None:
     counts = dict.fromkeys(("batches", "sent", "acknowledged"), 3)
     sink = {
         "sink": "http://a",
@@ -78,8 +78,8 @@ def test_readings_that_are_refused_alone_are_said(gradys: Gradys) -> None:
         "next_try_s": None,
         "round_trip_ms": None,
     }
-    said = console.readings_lines({**gradys.report(), "sinks": [sink]})
-    assert said[-1] == "  2 times one was refused alone: it is sent when there is nothing else"
+    output = console.readings_lines({**gradys.report(), "sinks": [sink]})
+    assert output[-1] == "  2 times one was refused alone: it is sent when there is nothing else"
 
 
 def test_round_trips_are_of_the_last_hundred() -> None:

@@ -41,7 +41,7 @@ def test_a_value_stays_what_it_was(value: Any) -> None:
         [0] * (LONGEST_LIST + 1),
     ],
 )
-def test_a_value_that_cannot_be_told_is_refused_once(value: Any) -> None:
+def test_a_value_that_cannot_be_stored_is_refused_once(value: Any) -> None:
     with pytest.raises(Invalid) as raised:
         readings({"readings": [{"quantity": "a", "value": value}]})
     assert len(raised.value.problems) == 1
@@ -66,7 +66,7 @@ def test_what_is_no_reading_is_refused(body: Any) -> None:
         readings(body)
 
 
-def test_nobody_poses_as_a_vehicle(loop: Any, host: Any, teller: Any, settings: Any, at_once: Any) -> None:
+def test_nobody_poses_as_a_vehicle(loop: Any, host: Any, telemetry: Any, settings: Any, at_once: Any) -> None:
     gradys = Gradys(host)
     loop.run(gradys.start(settings(quantities="position@1,alt=VFR_HUD.alt")))
     service: Any = SimpleNamespace(host=host, settings=SimpleNamespace(sysid=0))
@@ -76,7 +76,7 @@ def test_nobody_poses_as_a_vehicle(loop: Any, host: Any, teller: Any, settings: 
         return loop.run(GradysHandlers(gradys).readings(call))
 
     for body in ({"quantity": "position"}, {"quantity": "alt", "device": "uav-1"}, {"quantity": "status"}):
-        with pytest.raises(Invalid, match="told by the vehicle itself"):
+        with pytest.raises(Invalid, match="from the vehicle itself only"):
             post(**body)
     assert post(quantity="position", device="buoy")["result"] == "Kept 1 reading"
     assert post(quantity="temperature")["result"] == "Kept 1 reading"

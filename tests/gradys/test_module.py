@@ -60,7 +60,7 @@ def test_before_the_first_idle_task_it_says_that_mavproxy_is_starting(mpstate: A
     module.unload()
 
 
-def test_config_tells_of_each_value_where_it_came_from_and_no_secret(mpstate: Any, capsys: Any) -> None:
+def test_config_reports_the_source_of_each_value_and_no_secret(mpstate: Any, capsys: Any) -> None:
     module = gradys.init(mpstate, token="s3cret", sink="mqtt://me:pass@broker/x")
     module.command(["set", "period", "2"])
     capsys.readouterr()
@@ -102,11 +102,11 @@ def test_routes_come_and_go_with_it(make: Any) -> None:
 def test_setting_takes_effect_at_once(make: Any, main_loop: Any, capsys: Any) -> None:
     module = make(gs="127.0.0.1:9")
     module.command(["set", "gs", "127.0.0.1:8,127.0.0.1:7"])
-    main_loop.until(lambda: "telling http://127.0.0.1:8, http://127.0.0.1:7" in capsys.readouterr().out)
+    main_loop.until(lambda: "pushing to http://127.0.0.1:8, http://127.0.0.1:7" in capsys.readouterr().out)
     module.command(["status"])
-    said = capsys.readouterr().out
-    assert "ground station http://127.0.0.1:8" in said and "ground station http://127.0.0.1:7" in said
-    assert "127.0.0.1:9" not in said
+    output = capsys.readouterr().out
+    assert "ground station http://127.0.0.1:8" in output and "ground station http://127.0.0.1:7" in output
+    assert "127.0.0.1:9" not in output
 
 
 def test_the_prompt_waits_for_no_goodbye(make: Any, main_loop: Any, capsys: Any, monkeypatch: Any) -> None:
@@ -127,7 +127,7 @@ def test_the_prompt_waits_for_no_goodbye(make: Any, main_loop: Any, capsys: Any,
     module.command(["stop"])
     module.command(["set", "period", "2"])
     assert leaving.wait(10)
-    assert "telling" not in capsys.readouterr().out  # the prompt was free all the time
+    assert "pushing to" not in capsys.readouterr().out  # the prompt was free all the time
     left.set()
     main_loop.until(lambda: "stopped" in capsys.readouterr().out)
 
@@ -169,7 +169,7 @@ def put(module: Any, count: int) -> None:
 
     async def wait() -> None:
         for number in range(count):
-            module.gradys.pipeline._kept().put(Reading("uav-1", 1, "alt", "m", float(number), 0.0))
+            module.gradys.pipeline._started_thread().put(Reading("uav-1", 1, "alt", "m", float(number), 0.0))
 
     module.host.bridge.run(wait())
 
@@ -188,8 +188,8 @@ def test_an_unload_says_how_many_readings_are_lost(
     put(module, count)
     module.unload()
     assert f"gradys: {lost}" in capsys.readouterr().out
-    (told,) = (record.message for record in caplog.records if "lost" in record.message)
-    assert told.startswith(lost) and "disk is full" in told
+    (reported,) = (record.message for record in caplog.records if "lost" in record.message)
+    assert reported.startswith(lost) and "disk is full" in reported
 
 
 def test_an_unload_writes_what_it_can_and_then_says_nothing(make: Any, capsys: Any, tmp_path: Path) -> None:
@@ -214,21 +214,21 @@ def test_what_was_left_at_a_stop_is_tried_once_more_at_the_unload(
     assert kept(tmp_path / "spool.db") == (12 if room else 0)
 
 
-def test_a_disk_that_hangs_at_the_unload_is_not_waited_for_and_its_readings_are_told(
+def test_a_disk_that_hangs_at_the_unload_is_not_waited_for_and_its_readings_are_reported(
     make: Any, capsys: Any, monkeypatch: Any
 ) -> None:
     module = make()
-    hung, asked = threading.Event(), threading.Event()
+    hung, requested = threading.Event(), threading.Event()
 
     def hang(*_: Any) -> list[int]:
-        asked.set()
+        requested.set()
         hung.wait(30)
         return []
 
     monkeypatch.setattr("mavproxy_gradys.module.LONGEST_END", 0.1)
     monkeypatch.setattr(Spool, "append", hang)
     put(module, 7)
-    assert asked.wait(10)
+    assert requested.wait(10)
     module.unload()
     assert "gradys: 7 readings" in capsys.readouterr().out
     hung.set()
@@ -248,9 +248,9 @@ def test_settings_outlive_a_reload_and_no_password_is_shown(mpstate: Any, tmp_pa
     module.command(["set", "gs", "127.0.0.1:9"])
     module.unload()
     again = gradys.init(mpstate)
-    told = capsys.readouterr().out
-    assert "sink=mqtt://me:***@127.0.0.1/fleet, token=(set), gs=127.0.0.1:9" in told
-    assert "secret" not in told and "hidden" not in told
+    reported = capsys.readouterr().out
+    assert "sink=mqtt://me:***@127.0.0.1/fleet, token=(set), gs=127.0.0.1:9" in reported
+    assert "secret" not in reported and "hidden" not in reported
     settings = again.module_settings.snapshot()
     assert ([sink.url for sink in settings.sink], settings.token, settings.gs[0].url) == (
         [sink],

@@ -14,7 +14,7 @@ from typing import Any
 from mavproxy_gradys.tracks.console import TrackConsole
 from mavproxy_uavapi.core.background import BackgroundCommands
 from mavproxy_uavapi.core.vehicle.jobs import CONSOLE, Job
-from mavproxy_uavapi.http.jobs import error_of
+from mavproxy_uavapi.http.reports import error_of
 from mavproxy_uavapi.scripts import on_exit
 
 LOOK_EVERY = 0.02  # s
@@ -47,7 +47,7 @@ class Typed:
             job = next((job for job in self._world.host.jobs.all() if job.client == CONSOLE), None)
             if job is not None and not job.running and f"{self._module}: {job.error or job.result}" in lines:
                 error = None if job.error is None else error_of(job)
-                return self._world.told(error["status"] if error else 200, error or {"result": job.result})
+                return self._world.reported(error["status"] if error else 200, error or {"result": job.result})
 
 
 def fly_track(world: Any, request: dict[str, Any]) -> Typed:
@@ -88,15 +88,15 @@ class Script:
         self._connections: list[Any] = []
         self.death: asyncio.Task[str] | None = None
         world.service.scripts.session_of = self._session_of
-        self.reply = world.loop.create_task(self._told(*ask, waits=waits))
+        self.reply = world.loop.create_task(self._reported(*ask, waits=waits))
         world.loop.settle()
 
     @staticmethod
     async def _session_of(peer: tuple[str, int] | None) -> str | None:
         return SESSION if peer is not None and peer[1] == PORT else None
 
-    async def _told(self, method: str, path: str, *body: Any, waits: bool) -> Any:
-        answer = await self._asked(method, path if waits else f"{path}?wait=false", *body)
+    async def _reported(self, method: str, path: str, *body: Any, waits: bool) -> Any:
+        answer = await self._requested(method, path if waits else f"{path}?wait=false", *body)
         if answer is None or answer.status != 202:
             return answer
         job: Job = self._world.host.jobs.get(answer.body["job"])
@@ -105,11 +105,11 @@ class Script:
         job.when_ended(ended.set)
         if job.running:
             await ended.wait()
-        shown = (await self._asked("GET", f"/jobs/{job.id}")).body
+        shown = (await self._requested("GET", f"/jobs/{job.id}")).body
         error = shown["error"]
-        return self._world.told(error["status"] if error else 200, error or shown)
+        return self._world.reported(error["status"] if error else 200, error or shown)
 
-    async def _asked(self, *request: Any) -> Any:
+    async def _requested(self, *request: Any) -> Any:
         self._connections.append(await self._world.request(*request, port=PORT))
         return await self._connections[-1].reply
 

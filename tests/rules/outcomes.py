@@ -1,6 +1,6 @@
-"""What each verb answers to each fault: the table that the tests check and docs/faults.md shows.
+"""The answer of each verb to each fault: the tests check this table, and docs/faults.md shows it.
 
-`python tests/rules/outcomes.py` writes the file anew.
+`python tests/rules/outcomes.py` writes that file.
 """
 
 from __future__ import annotations
@@ -17,83 +17,89 @@ FILE = Path(__file__).parents[2] / "docs" / "faults.md"
 
 
 class Fault(NamedTuple):
-    """A misfortune: what happens, and how soon after it an error is the answer (s)."""
+    """A fault: what happens, and how soon after it an error is the answer (s)."""
 
     meaning: str
     within: float
 
 
 class Verb(NamedTuple):
-    """A verb: its path or words, what a success takes when all goes well (s), and its outcome by fault."""
+    """A verb: its path or typed command, the duration of a success without faults (s), and its outcome by fault."""
 
     path: str
     takes: float
     outcomes: dict[str, str]
 
 
-HEARTBEAT = 1.1  # s until the next one, and its way here
+HEARTBEAT = 1.1  # s until the next heartbeat arrives
 
 FAULTS = {
-    "none": Fault("All goes well.", 0.0),
+    "none": Fault("No fault.", 0.0),
     "ack lost": Fault(
-        "The first acknowledgement of each command is lost, of those that may be repeated the second too. A command "
-        "is sent again up to three times; what a heartbeat shows needs no acknowledgement.",
+        "The first acknowledgement of each command is lost; of a command that may be repeated the second one, too. A "
+        "command is sent up to three times more. Effects that a heartbeat shows need no acknowledgement.",
         4.5,
     ),
     "acks lost for good": Fault(
-        "No acknowledgement ever comes. Modes, arming and a takeoff show themselves; nothing shows a speed, nor that "
-        "home is the new one.",
+        "No acknowledgement arrives. Telemetry shows modes, arming and a takeoff; it does not show a speed or a new "
+        "home.",
         6.5,
     ),
-    "late ack": Fault("Each acknowledgement takes 2 s, longer than it takes us to send the command again.", 4.5),
+    "late ack": Fault("Each acknowledgement takes 2 s, so the command is sent again before it arrives.", 4.5),
     "foreign acceptance": Fault(
-        "Another component of the vehicle says ACCEPTED, the autopilot itself says DENIED, and its word counts.",
+        "Another component of the vehicle answers ACCEPTED, the autopilot DENIED. The autopilot's answer counts.",
         2.0,
     ),
-    "foreign refusal": Fault("Another component says DENIED, the autopilot itself says ACCEPTED.", 0.2),
-    "refused": Fault("The autopilot says DENIED, and why.", 2.0),
+    "foreign refusal": Fault("Another component answers DENIED, the autopilot ACCEPTED.", 0.2),
+    "refused": Fault("The autopilot answers DENIED, with a reason.", 2.0),
     "busy once": Fault(
-        "The autopilot says TEMPORARILY_REJECTED, once. Arming and home are worth asking again while an estimator "
-        "settles; the rest is the client's to repeat.",
+        "The autopilot answers TEMPORARILY_REJECTED once. Arming and set_home are repeated, because the estimator "
+        "may be settling; other commands are the client's to repeat.",
         2.0,
     ),
-    "in progress": Fault("The autopilot says IN_PROGRESS for 4 s, then ACCEPTED.", 4.5),
-    "link silence": Fault("Neither side hears the other any more; found after the link timeout of 5 s.", 5.2),
+    "in progress": Fault("The autopilot answers IN_PROGRESS for 4 s, then ACCEPTED.", 4.5),
+    "link silence": Fault("No message passes in either direction; detected after the link timeout of 5 s.", 5.2),
     "reboot": Fault(
-        "The autopilot starts anew and is back 2 s later, disarmed, in STABILIZE. A command that waited for it in "
-        "vain reaches it then: it can set its home and arm; a speed is remembered for the next flight.",
+        "The autopilot reboots and is back 2 s later, disarmed, in STABILIZE. A command without an answer is sent "
+        "again and reaches it then: it can arm and set home; a speed is stored for the next flight.",
         2.0 + HEARTBEAT,
     ),
     "pilot's mode": Fault(
-        "The pilot switches to another mode. A speed is remembered until the vehicle flies in GUIDED again.",
+        "The pilot switches to another mode. A speed is stored until the vehicle flies in GUIDED again.",
         HEARTBEAT,
     ),
     "disarmed": Fault(
-        "The pilot stops the motors: in flight it falls, which is no landing. Arming that a heartbeat has shown is "
-        "done, and is not repeated.",
+        "The pilot stops the motors: in flight the vehicle falls, which is not a landing. Arming that a heartbeat "
+        "has shown is done, and is not repeated.",
         HEARTBEAT,
     ),
     "client gone": Fault(
-        "The client hangs up: the verb ends and is forgotten, the vehicle keeps its last setpoint. What lands, "
-        "returns or stops it goes on, and so do vision's flights. A script does not hang up but dies: what it flew "
-        "ends, but for a landing or return, and the vehicle does what `on_script_exit` says, here as by default.",
+        "The client hangs up: the verb ends, and the vehicle keeps its last setpoint. Verbs that land, return or "
+        "stop the vehicle go on, and so do vision's flights. A script does not hang up but fails: its movements end, "
+        "and the vehicle follows `on_script_exit` (here the default); a landing or return goes on.",
         0.1,
     ),
     "another client streams": Fault(
-        "Another client sends velocities five times a second, before and after. What stops the vehicle outranks "
-        "them; of two movements the newer one counts, and a turn ends with the setpoint that it came with.",
+        "Another client sends velocities five times a second, before and after. A verb that stops the vehicle "
+        "outranks them. Of two movements the newer one counts. A turn ends with its setpoint.",
         0.5,
     ),
     "another station flies it": Fault(
-        "Another ground station gives the vehicle a target of its own, elsewhere; its telemetry tells.", 4.0
+        "Another ground station gives the vehicle a target elsewhere; the vehicle's telemetry reports it.", 4.0
     ),
     "during a take-off": Fault("The vehicle has been climbing for 3 s, for another client.", 0.5),
     "in AUTO": Fault("The vehicle flies its mission.", 0.5),
+    "outside the envelope": Fault(
+        "An envelope is put around the place where the vehicle is; it ends 1.5 m beside and 0.5 m above it. What "
+        "leads out of it is refused. A flight of `vision` sees its velocities refused, and holds.",
+        5.0,
+    ),
 }
 
-REFUSAL = 2.0  # s; the autopilot's own word, after sending again
-ENDED, GOES_ON = "ended", "goes on"  # where nobody is left to be answered
-HOLDS = "; holds"  # after an outcome: the vehicle is told to hold then, until telemetry shows it, and nothing else
+OUTSIDE = "409 outside_envelope"
+REFUSAL = 2.0  # s for the autopilot's own answer, after a repetition
+ENDED, GOES_ON = "ended", "goes on"  # no client is left to get an answer
+HOLDS = "; holds"  # after an outcome: the vehicle is commanded to hold until telemetry shows it; nothing else is sent
 NONE = ""  # where it cannot happen
 
 SUCCESS = dict.fromkeys(FAULTS, "200")
@@ -106,17 +112,31 @@ REFUSED = {
 FLIGHT = {"reboot": "409 not_armed", "pilot's mode": "409 mode_changed", "disarmed": "409 not_armed"}
 GUIDED_ONLY = {"during a take-off": "409 busy", "in AUTO": "409 mode_changed"}
 OTHERS = {"another client streams": "409 superseded", "another station flies it": "409 superseded"}
-MOVING = {**SUCCESS, **LOST, **FLIGHT, **OTHERS, **GUIDED_ONLY}  # by setpoints, which nobody acknowledges
+MOVING = {
+    **SUCCESS,
+    **LOST,
+    **FLIGHT,
+    **OTHERS,
+    **GUIDED_ONLY,
+    "outside the envelope": OUTSIDE,
+}  # by setpoints, which nobody acknowledges
 TRACK = {**MOVING, **REFUSED}  # of the gradys module: movements, and a return
-VISION = {**MOVING, "client gone": GOES_ON, "another station flies it": "200"}  # it repeats its own
+SEES = f"{OUTSIDE}; holds"
+VISION = {
+    **MOVING,
+    "client gone": GOES_ON,
+    "another station flies it": "200",
+    "outside the envelope": SEES,
+}  # it repeats its own
 VISION_LAND = {**VISION, **dict.fromkeys(REFUSED, f"500 rejected{HOLDS}")}  # LAND is refused, in GUIDED
-VISION_MISSION = {**VISION_LAND, "another station flies it": "409 superseded"}
+VISION_MISSION = {**VISION_LAND, "another station flies it": "409 superseded", "outside the envelope": OUTSIDE}
 TRAVEL = {**MOVING, "another station flies it": "200"}  # it repeats its own
 MODE = {**SUCCESS, **LOST, **REFUSED, "reboot": "409 mode_changed", "pilot's mode": "409 mode_changed"}
 LANDING = {**SUCCESS, **LOST, **REFUSED, **FLIGHT, "client gone": GOES_ON}
 BRAKE = {**MODE, "client gone": GOES_ON}
 ARM = {**MODE, "busy once": "200", "reboot": "200", "another station flies it": NONE, "in AUTO": "409 mode_changed"}
 TAKEOFF = {**SUCCESS, **LOST, **REFUSED, **FLIGHT, **GUIDED_ONLY, "another station flies it": NONE}
+TAKEOFF |= {"outside the envelope": OUTSIDE}
 ACKED = {**SUCCESS, **LOST, **REFUSED, **FLIGHT, **GUIDED_ONLY}
 STOP = {**ACKED, "in AUTO": "200", "during a take-off": "200", "client gone": GOES_ON}
 RESUME = {
@@ -127,9 +147,10 @@ RESUME = {
     "in AUTO": "200",
 }
 TURN = {**ACKED, "acks lost for good": "504 timeout", "another client streams": "409 superseded"}
-TURN_RATE = {**MOVING, "another station flies it": "200"}
+TURN_RATE = {**MOVING, "another station flies it": "200", "outside the envelope": "200"}
 PROMPT = {"client gone": NONE}  # nobody hangs up there
 HOME = {**SUCCESS, **LOST, **REFUSED, "busy once": "200", "acks lost for good": "504 timeout"}
+HOME |= {"outside the envelope": OUTSIDE}
 SPEED = {
     **SUCCESS,
     **LOST,
@@ -145,6 +166,7 @@ WHY = {
     Ending.ABORTED: "DELETE, or a stop at the prompt",
     Ending.CLIENT_GONE: "its client hung up",
     Ending.SCRIPT_GONE: "its script died",
+    Ending.LEASE_OVER: "the lease of its client ran out",
     Ending.UNLOADED: "the API stops, or the module is unloaded",
     Ending.DEFECT: "a defect of ours",
 }
@@ -170,7 +192,7 @@ VERBS = {
     "resume": Verb("/movement/resume", 0.5, RESUME),
     "brake": Verb("/command/brake", HEARTBEAT, BRAKE),
     "guided": Verb("/command/guided", HEARTBEAT, MODE),
-    "set_mode": Verb("/command/set_mode", HEARTBEAT, MODE),
+    "set_mode": Verb("/command/set_mode", HEARTBEAT, {**MODE, "outside the envelope": OUTSIDE}),
     "set_home": Verb("/command/set_home", 2.0, HOME),
     "set_air_speed": Verb("/command/set_air_speed", 0.5, SPEED),
     "set_ground_speed": Verb("/command/set_ground_speed", 0.5, SPEED),
@@ -180,7 +202,9 @@ VERBS = {
     "vision/search": Verb("/vision/search", 60.0, VISION),
     "vision/mission": Verb("/vision/mission", 60.0, VISION_MISSION),
     "prompt: vision land": Verb("vision land", 30.0, {**VISION_LAND, **PROMPT}),
-    "prompt: uavapi fly": Verb("uavapi fly", 60.0, {**TRACK, **PROMPT}),
+    "prompt: uavapi fly": Verb(
+        "uavapi fly", 60.0, {**TRACK, **PROMPT, "outside the envelope": NONE}
+    ),  # it has no job
     "script: go_to_ned_wait": Verb("/movement/go_to_ned_wait", 10.0, {**MOVING, "client gone": f"{ENDED}{HOLDS}"}),
     "script: land": Verb("/command/land", 20.0, LANDING),
 }
@@ -190,19 +214,19 @@ TABLES = (4, 10, 8, 3, 4)  # verbs in each table of the page
 def page() -> str:
     """docs/faults.md."""
     lines = [
-        "# What a verb answers when something goes wrong",
+        "# Faults: the answer of each verb",
         "",
-        "Written by `python tests/rules/outcomes.py`. `tests/rules/test_fault_matrix.py` flies every cell on the",
-        "embedded vehicle: the answer is this one, it comes in time, and after it nothing is sent until the next",
-        "request: no setpoint, no mode, no command.",
+        "`python tests/rules/outcomes.py` writes this page. `tests/rules/test_fault_matrix.py` flies every cell on",
+        "the embedded vehicle and checks: the verb gives this answer, in time; afterwards nothing is sent until the",
+        "next request: no setpoint, no mode, no command.",
         "",
-        "A flight has been under way for 3 s when the link, the autopilot, the pilot or the client does something;",
-        "the other verbs wait for an acknowledgement then. Movements go by setpoints, which nobody acknowledges.",
-        "What is typed at MAVProxy's prompt, and what a script begins with `?wait=false`, has a job: its outcome is",
-        'what the answer would have been, and the prompt prints its sentence. "Holds": the vehicle is sent zero',
-        "velocities until telemetry shows that it stands still, and nothing else; the table at the end says why.",
+        "The fault begins 3 s after the start of a flight; other verbs then wait for an acknowledgement. Setpoints",
+        "of movements have no acknowledgement. A command at MAVProxy's prompt, or a script's call with",
+        "`?wait=false`, has a job; the table shows the job's outcome, and the prompt prints its text. `holds` means:",
+        "the vehicle is sent zero velocities until telemetry shows that it stands still, and nothing else. The",
+        "tables at the end give the reason.",
         "",
-        "| fault | what happens | ends it within, or delays it by |",
+        "| fault | what happens | longest time to the error, or delay of the success |",
         "| --- | --- | --- |",
     ]
     lines += [f"| {name} | {fault.meaning} | {_seconds(fault)} |" for name, fault in FAULTS.items()]
@@ -223,15 +247,16 @@ def endings_page() -> list[str]:
         "",
         "## What a vehicle does when the job that flies it ends",
         "",
-        "| it ends because | what is wanted |",
+        "| it ends because | policy |",
         "| --- | --- |",
         *(f"| {WHY[ending]} | {policy.value} |" for ending, policy in endings.FIXED.items()),
         f"| {WHY[Ending.CLIENT_GONE]} | `on_disconnect`: nothing, or hold |",
         f"| {WHY[Ending.SCRIPT_GONE]} | `on_script_exit`: nothing, hold, land or rtl |",
+        f"| {WHY[Ending.LEASE_OVER]} | `on_lease_end`: hold, land or rtl |",
         "",
-        "Safe means: what flies by our setpoints stops and holds, what the autopilot flies by itself goes on. It is",
-        "wanted too when a flight fails that only our setpoints keep going: vision's, a velocity with a duration.",
-        "What is wanted is done as far as telemetry allows, and sent until telemetry shows it:",
+        "The policy `safe` means: a vehicle that flies by our setpoints stops and holds; a flight of the autopilot",
+        "itself goes on. It also applies when a flight fails that depends on our setpoints: one of vision's, or a",
+        "velocity with a duration. Situation and policy give the action, which is sent until telemetry shows it:",
         "",
         "| telemetry shows | " + " | ".join(policy.value for policy in columns) + " |",
         "| --- |" + " --- |" * len(columns),

@@ -52,6 +52,11 @@ def goes_beside(flight: Any) -> bool:
     return flight.verb in BESIDE or flight.verb.endswith("_speed")
 
 
+def asks_first(flight: Any) -> bool:
+    """Whether it may ask the vehicle something before it takes it: `rtl` for home, AUTO for its mission."""
+    return flight.verb == "rtl" or (flight.verb == "set_mode" and flight.job.request["mode"] == "AUTO")
+
+
 def wanted_mode(flight: Any) -> str:
     """The mode that it switches to, or needs; "" for none."""
     if flight.verb == "set_mode":
@@ -154,8 +159,8 @@ class Judge:
     def _shows(self, flight: Any) -> bool:
         if flight.verb == "hold" and flight.mode == "GUIDED":
             return True  # zero velocities: a newer movement replaces them
-        wanted = wanted_mode(flight)
-        return flight.verb != "stop" and wanted != "" and self._world.copter.mode == wanted
+        expected = wanted_mode(flight)
+        return flight.verb != "stop" and expected != "" and self._world.copter.mode == expected
 
     def a_stopped_vehicle_gets_no_setpoint(self, sent: Any) -> str | None:
         if not self.stopped or not sent.is_setpoint or sent.flight.verb in ("guided", "set_mode", "hold", "resume"):
@@ -184,8 +189,8 @@ class Judge:
 
     def _modes_on_their_way(self, flight: Any) -> set[str]:
         """The modes that flights which have ended asked for before that one began."""
-        asked = [one for one in self._world.flights.values() if one.sent and not one.job.running]
-        return {wanted_mode(one) for one in asked if flight.job.began_at - one.sent[-1].at <= LATE_SWITCH}
+        requested = [one for one in self._world.flights.values() if one.sent and not one.job.running]
+        return {wanted_mode(one) for one in requested if flight.job.began_at - one.sent[-1].at <= LATE_SWITCH}
 
     def arm_leaves_a_vehicle_alone_that_others_armed(self, sent: Any) -> str | None:
         if sent.flight is None or sent.flight.verb != "arm" or sent.flight.armed or not sent.armed:
@@ -241,9 +246,7 @@ class Judge:
 
     def one_commands(self) -> str | None:
         commanders = [
-            one
-            for one in self._world.running
-            if not goes_beside(one) and not (one.verb == "rtl" and not one.sent)  # it asks for its home first
+            one for one in self._world.running if not goes_beside(one) and not (asks_first(one) and not one.sent)
         ]
         stops = [one for one in commanders if one.verb == "stop"] or self._world.copter.authority.paused
         allowed = 2 if stops else 1  # what a stop interrupts waits for its end

@@ -39,6 +39,7 @@ ASKING = {
     mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
     mavlink.MAV_CMD_RUN_PREARM_CHECKS,
 }
+READING = {"PARAM_REQUEST_READ", "MISSION_REQUEST_LIST", "MISSION_REQUEST_INT", "MISSION_ACK"}
 SHARED_REQUEST = 15.0  # s in which a message that was asked for is there, or given up
 SETTINGS = {"max_rate": 100000.0, "max_jobs": 1000}
 # Landings and returns that are quick; deadlines follow from the same parameters.
@@ -58,7 +59,7 @@ class Sent(NamedTuple):
     @property
     def asks(self) -> bool:
         """Whether it only asks for something."""
-        return self.message.get_type() == "PARAM_REQUEST_READ" or getattr(self.message, "command", None) in ASKING
+        return self.message.get_type() in READING or getattr(self.message, "command", None) in ASKING
 
     @property
     def is_setpoint(self) -> bool:
@@ -251,7 +252,7 @@ class ScriptedWorld:
 
         async def end() -> list[Any]:
             self.host.jobs.abort_remote("the module is unloaded")
-            return [message for message, _ in self.host.endings.last_words()]
+            return [message for message, _ in self.host.endings.closing_messages()]
 
         return list(self.loop.run(end()))
 
@@ -285,6 +286,7 @@ class ScriptedWorld:
             callbacks.clear()
         for job in self.host.jobs.running():
             job.abort(UavApiError("the test is over"))
+        self.loop.run(self.host.envelope_watch.close())
         self.loop.settle()
         self.loop.settle()
         if len(self.host.pending):  # what several ask for together ends by itself

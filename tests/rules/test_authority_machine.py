@@ -5,6 +5,7 @@ MACHINE_STEPS=200000 takes more steps, other ones each time. What it finds is wr
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator
 from typing import Any
@@ -14,8 +15,15 @@ from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
 
+from mavproxy_uavapi.core.envelope.model import Area, Envelope
+from mavproxy_uavapi.core.envelope.space import LocalFrame, Space, Spot
+from mavproxy_uavapi.core.envelope.store import ALL, API
+from mavproxy_uavapi.core.vehicle.messages import POSITION_IGNORED
 from tests.rules import rules_of_the_air, scripted_world
+from tests.support.drone import HOME
 
+PLACE_UNUSED = POSITION_IGNORED
+HELD = 3.0  # m that it may have moved since the position that it is told to hold
 STEPS_OF_ONE = 50
 IN_CI = 10_000
 WANTED = int(os.environ.get("MACHINE_STEPS", IN_CI))
@@ -45,15 +53,23 @@ MOVES = st.sampled_from(["go_to_ned", "go_to_ned_wait", "drive", "drive_wait"])
 POLICY = st.sampled_from(["nothing", "hold", "land", "rtl"])
 
 
+def around_home(half: float) -> Area:
+    """A square field around the drone's home."""
+    frame = LocalFrame(HOME)
+    ring = tuple(frame.degrees(Spot(n * half, e * half, 0)) for n, e in ((-1, -1), (1, -1), (1, 1), (-1, 1)))
+    return Area("field", inclusion=True, rings=(ring,))
+
+
 class Authority(RuleBasedStateMachine):
     """Everybody who may do something to a vehicle, in any order."""
 
     steps = 0  # of all machines so far
+    envelopes = {half: Space(Envelope((around_home(half),))) if half else None for half in (0, 25, 120)}
 
     def __init__(self) -> None:
         super().__init__()
         self.world: Any = None
-        self.aground = 0
+        self.aground = self.half = 0
 
     @initialize(
         where=st.sampled_from(["ground", "GUIDED", "GUIDED", "GUIDED", "LOITER", "AUTO", "armed"]),
@@ -63,6 +79,7 @@ class Authority(RuleBasedStateMachine):
     def begin(self, where: str, on_disconnect: str = "nothing", on_script_exit: str = "hold") -> None:
         self.world = scripted_world.ScriptedWorld(on_disconnect, on_script_exit)
         self.judge = rules_of_the_air.Judge(self.world)
+        self.world.on_send.append(self.stays_inside)
         drone = self.world.drone
         if where == "armed":
             drone.mode, drone.armed = "GUIDED", True
@@ -77,6 +94,7 @@ class Authority(RuleBasedStateMachine):
         self.judge.look()
         if seconds:
             self.world.loop.pass_time(seconds)
+            self.world.loop.settle()  # a request of this very moment is not answered yet
             self.judge.look()
         assert not self.judge.broken, self.judge.broken[0]
         drone = self.world.drone
@@ -182,8 +200,8 @@ class Authority(RuleBasedStateMachine):
         if share:
             self.world.script_dies(flights)
         else:
-            last_words = {message.get_type() for message in self.world.unload()}
-            assert last_words <= {"COMMAND_LONG", "SET_POSITION_TARGET_LOCAL_NED"}
+            closing_messages = {message.get_type() for message in self.world.unload()}
+            assert closing_messages <= {"COMMAND_LONG", "SET_POSITION_TARGET_LOCAL_NED"}
         self.then(later)
         # What somebody else waits for goes on: the clients here are no scripts.
         others = [one for one in flights if one.job._clients]
@@ -221,6 +239,22 @@ class Authority(RuleBasedStateMachine):
             if velocity != (0, 0, 0):
                 drone.target, drone.moving, drone._told_at = None, list(velocity), self.world.loop.time()
         self.then(later)
+
+    # -- the envelope -----------------------------------------------------------------------------------------
+
+    @rule(half=st.sampled_from([0, 0, 25, 120]), later=LATER)
+    def somebody_puts_an_envelope(self, half: int, later: float) -> None:
+        self.world.host.envelopes.put(API, ALL, self.envelopes[half])
+        self.half = half
+        self.then(later)
+
+    def stays_inside(self, sent: Any) -> None:
+        """No place outside of the envelope is sent, but that where the vehicle is."""
+        message = sent.message
+        if not self.half or message.get_type() != "SET_POSITION_TARGET_LOCAL_NED" or message.type_mask & PLACE_UNUSED:
+            return
+        to, at = (message.x, message.y, message.z), self.world.drone.at
+        assert max(abs(to[0]), abs(to[1])) <= self.half + 0.1 or math.dist(to, at) < HELD, f"{to} of {sent.flight}"
 
     # -- misfortunes --------------------------------------------------------------------------------------------
 

@@ -169,7 +169,7 @@ def test_the_drawing_names_what_exists() -> None:
     assert {word: wrong for word in classes if (wrong := why_wrong(word))} == {}
 
 
-def test_make_help_tells_of_each_target() -> None:
+def test_make_help_reports_each_target() -> None:
     done = subprocess.run(
         ["make", "--no-print-directory", "help"], cwd=ROOT, check=True, capture_output=True, text=True
     )

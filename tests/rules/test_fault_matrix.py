@@ -10,7 +10,10 @@ from typing import Any, NamedTuple
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from mavproxy_uavapi.core.envelope import formats
+from mavproxy_uavapi.core.envelope.store import ALL, API
 from tests.rules import clients, outcomes
+from tests.support.envelopes import feature, square
 
 ARM = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
 TAKEOFF = mavlink.MAV_CMD_NAV_TAKEOFF
@@ -132,6 +135,14 @@ def _overheard() -> dict[str, int]:
     return {"system": system, "component": component}
 
 
+def put_envelope(world: Any) -> None:
+    """It ends 1.5 m beside the vehicle and half a metre above it."""
+    north, east, down = world.at
+    area = feature("box", square(1.5, north, east), ceiling=0.5 - down)
+    world.host.envelopes.put(API, ALL, formats.of_geojson({"type": "FeatureCollection", "features": [area]}, "a box"))
+    world.loop.pass_time(1.5)  # in which the vehicle is asked how it brakes
+
+
 # What is so already when the request comes.
 BEFORE: dict[str, Callable[[Any], None]] = {
     "ack lost": lose_the_first_acks,
@@ -143,6 +154,7 @@ BEFORE: dict[str, Callable[[Any], None]] = {
     ),
     "refused": lambda world: about_each_command(world, "refuse", result=mavlink.MAV_RESULT_DENIED, text="Not now."),
     "busy once": be_busy_once,
+    "outside the envelope": put_envelope,
     "in progress": lambda world: about_each_command(world, "in_progress", seconds=4.0),
 }
 
@@ -265,14 +277,14 @@ def says_why(body: dict[str, Any], fault: str) -> bool:
 
 
 def hold_after(world: Any, since: float) -> float:
-    """See that it is told to hold and nothing else; since when telemetry has shown that it does (s)."""
+    """See that it is commanded to hold and nothing else; since when telemetry has shown that it does (s)."""
     closing = world.host.jobs.all()[-1]
     assert closing.verb.startswith("hold after ")
     world.loop.run(closing.outcome())
-    told = world.orders(since=since)
-    assert told
-    assert {m.get_type() for m in told} == {"SET_POSITION_TARGET_LOCAL_NED"}
-    assert {(m.vx, m.vy, m.vz) for m in told} == {(0.0, 0.0, 0.0)}
+    reported = world.orders(since=since)
+    assert reported
+    assert {m.get_type() for m in reported} == {"SET_POSITION_TARGET_LOCAL_NED"}
+    assert {(m.vx, m.vy, m.vz) for m in reported} == {(0.0, 0.0, 0.0)}
     assert math.hypot(*world.copter.body.velocity) < AT_REST
     return float(world.loop.time())
 

@@ -96,10 +96,10 @@ def test_stop_in_a_climb_and_land_after_it_lands(on_ground: Any) -> None:
 
 
 def test_movement_that_is_deleted_in_a_pause_does_not_go_on_after_it(world: Any) -> None:
-    asked = world.ask("POST", GO + "?wait=false", FAR)
+    requested = world.ask("POST", GO + "?wait=false", FAR)
     world.loop.pass_time(2.0)
     assert world.ask("GET", "/movement/stop").outcome == "200"
-    world.ask("DELETE", asked.headers["location"])
+    world.ask("DELETE", requested.headers["location"])
     world.loop.pass_time(1.0)
     world.ask("GET", "/movement/resume")
     world.loop.pass_time(3.0)
@@ -127,7 +127,7 @@ def test_two_stops_and_one_resume(world: Any) -> None:
     assert world.answer(going).outcome == "200"
 
 
-def test_second_stop_asked_while_the_first_is_on_its_way_keeps_the_movement(world: Any) -> None:
+def test_second_stop_requested_while_the_first_is_on_its_way_keeps_the_movement(world: Any) -> None:
     going = world.begin("POST", GO, {"x": 60, "y": 0, "z": -8})
     world.loop.pass_time(2.0)
     first = world.begin("GET", "/movement/stop")
@@ -141,14 +141,14 @@ def test_second_stop_asked_while_the_first_is_on_its_way_keeps_the_movement(worl
 def test_job_of_a_stop_that_is_deleted_leaves_the_vehicle_still(world: Any) -> None:
     going = world.begin("POST", GO, FAR)
     world.loop.pass_time(2.0)
-    asked = world.ask("GET", "/movement/stop?wait=false")
-    world.ask("DELETE", asked.headers["location"])
+    requested = world.ask("GET", "/movement/stop?wait=false")
+    world.ask("DELETE", requested.headers["location"])
     world.loop.pass_time(5.0)
     assert speed(world) < 0.3
     going.hang_up()
 
 
-def test_stop_that_the_vehicle_refuses_is_told_and_the_movement_goes_on(world: Any) -> None:
+def test_stop_that_the_vehicle_refuses_is_reported_and_the_movement_goes_on(world: Any) -> None:
     going = world.begin("POST", GO, {"x": 40, "y": 0, "z": -8})
     world.loop.pass_time(1.0)
     world.fault("refuse", command=PAUSE, result=4, text="no", count=1)
@@ -224,9 +224,9 @@ def test_the_newer_of_two_that_stop_wins(world: Any, first: str, then: str, afte
 
 def test_deleting_a_landing_before_its_mode_is_shown_ends_in_brake_or_guided_hold(world: Any) -> None:
     world.fault("delay_acks", command=MODE, seconds=0.5)
-    asked = world.ask("GET", "/command/land?wait=false")
+    requested = world.ask("GET", "/command/land?wait=false")
     world.loop.pass_time(0.05)
-    world.ask("DELETE", asked.headers["location"])
+    world.ask("DELETE", requested.headers["location"])
     world.loop.pass_time(10.0)
     assert world.copter.armed
     assert abs(world.at[2] + 8) < 1.5
@@ -250,20 +250,20 @@ def test_two_takeoffs_at_once_agree_on_one_height(on_ground: Any, after: float) 
 
 @pytest.mark.parametrize("after", [0.0, 0.02, 0.06, 0.3, 0.8, 1.5, 2.0, 2.5])
 def test_takeoff_that_is_deleted_stays_below_two_metres(on_ground: Any, after: float) -> None:
-    asked = on_ground.ask("GET", "/command/takeoff?alt=20&wait=false")
+    requested = on_ground.ask("GET", "/command/takeoff?alt=20&wait=false")
     if after:
         on_ground.loop.pass_time(after)
-    on_ground.ask("DELETE", asked.headers["location"])
+    on_ground.ask("DELETE", requested.headers["location"])
     on_ground.loop.pass_time(10.0)
     assert -on_ground.at[2] < 4.0
     assert speed(on_ground) < 0.3
 
 
 def test_takeoff_that_is_deleted_before_it_lifts_off_is_paused_first_and_the_pause_ends(on_ground: Any) -> None:
-    asked = on_ground.ask("GET", "/command/takeoff?alt=20&wait=false")
+    requested = on_ground.ask("GET", "/command/takeoff?alt=20&wait=false")
     on_ground.loop.pass_time(0.5)
     since = on_ground.loop.time()
-    on_ground.ask("DELETE", asked.headers["location"])
+    on_ground.ask("DELETE", requested.headers["location"])
     orders = on_ground.orders(since - 0.001)
     pauses = [m.param1 for m in orders if m.get_type() == "COMMAND_LONG" and m.command == PAUSE]
     assert orders[0].get_type() == "COMMAND_LONG"
@@ -272,18 +272,18 @@ def test_takeoff_that_is_deleted_before_it_lifts_off_is_paused_first_and_the_pau
 
 
 def test_takeoff_that_is_deleted_with_its_first_hold_lost_holds_all_the_same(on_ground: Any) -> None:
-    asked = on_ground.ask("GET", "/command/takeoff?alt=20&wait=false")
+    requested = on_ground.ask("GET", "/command/takeoff?alt=20&wait=false")
     on_ground.loop.pass_time(0.5)
     on_ground.fault("drop", message="SET_POSITION_TARGET_LOCAL_NED", count=2)
-    on_ground.ask("DELETE", asked.headers["location"])
+    on_ground.ask("DELETE", requested.headers["location"])
     on_ground.loop.pass_time(10.0)
     assert -on_ground.at[2] < 4.0
 
 
 def test_job_that_a_delete_began_may_be_deleted_and_the_vehicle_stays(world: Any) -> None:
-    asked = world.ask("POST", GO + "?wait=false", FAR)
+    requested = world.ask("POST", GO + "?wait=false", FAR)
     world.loop.pass_time(3.0)
-    deleting = world.begin("DELETE", asked.headers["location"])
+    deleting = world.begin("DELETE", requested.headers["location"])
     for _ in range(5):
         world.loop.pass_time(0.1)
         running = [job for job in world.ask("GET", "/jobs").body["jobs"] if job["state"] == "running"]
@@ -309,9 +309,9 @@ def test_pilot_who_takes_over_and_gives_back_ends_the_movement_for_good(world: A
 
 
 def test_hold_after_a_delete_gives_way_to_the_pilot(world: Any) -> None:
-    asked = world.ask("POST", GO + "?wait=false", FAR)
+    requested = world.ask("POST", GO + "?wait=false", FAR)
     world.loop.pass_time(3.0)
-    world.begin("DELETE", asked.headers["location"])
+    world.begin("DELETE", requested.headers["location"])
     world.loop.pass_time(0.3)
     world.fault("pilot_mode", mode="LOITER")
     world.loop.pass_time(1.5)

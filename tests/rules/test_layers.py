@@ -15,7 +15,7 @@ UAVAPI, VISION, GRADYS = "mavproxy_uavapi", "mavproxy_vision", "mavproxy_gradys"
 CORE, SIMULATOR, EXTENSION = f"{UAVAPI}.core", f"{UAVAPI}.sim", f"{UAVAPI}.http.extension"
 CLIENT, AERPAW = f"{UAVAPI}.client", f"{UAVAPI}.aerpaw"
 # What a program at the other end of HTTP shares with the server: no state, no thread, no link.
-PURE = [f"{CORE}.{name}" for name in ("errors", "timeout", "mavlink.flight_modes", "vehicle.geodesy")]
+PURE = [f"{CORE}.{name}" for name in ("errors", "timeout", "mavlink.flight_modes", "vehicle.geodesy", "envelope.kml")]
 # The rooms of each package, from the one that stands on no other to the one on top.
 FLOORS = {
     CORE: ("mainloop", "mavlink", "vehicle"),

@@ -56,11 +56,11 @@ def versions(name: str, where: dict[str, str] | None = None) -> dict[str, str]:
     return found
 
 
-def unmet(asked: list[Requirement], there: dict[str, str], where: dict[str, str] | None = None) -> list[str]:
+def unmet(requested: list[Requirement], there: dict[str, str], where: dict[str, str] | None = None) -> list[str]:
     """Which of the requirements those versions do not meet."""
     return [
         str(line)
-        for line in asked
+        for line in requested
         if (line.marker is None or line.marker.evaluate(where or {"extra": ""}))
         and not (
             (version := there.get(canonicalize_name(line.name)))
@@ -74,8 +74,8 @@ def unmet(asked: list[Requirement], there: dict[str, str], where: dict[str, str]
 @pytest.mark.parametrize(("name", "extras"), [("lean.txt", ("vision", "mqtt")), ("dev.txt", ("dev",))])
 def test_a_lock_meets_what_the_project_asks_for(name, extras, python, machine, asked_for: Asked):
     where = environment(python, machine)
-    asked = [line for extra in ("", *extras) for line in asked_for[extra]]
-    assert unmet(asked + listed("lean.in"), versions(name, where), where) == []
+    requested = [line for extra in ("", *extras) for line in asked_for[extra]]
+    assert unmet(requested + listed("lean.in"), versions(name, where), where) == []
 
 
 @pytest.mark.parametrize("name", ["lean.txt", "dev.txt"])
@@ -83,14 +83,14 @@ def test_a_lock_has_what_its_packages_ask_for_but_what_is_left_out(name):
     without = {line.name for line in listed("without.in")}
     there = versions(name)
     for package in there:
-        asked = [Requirement(line) for line in importlib.metadata.requires(package) or []]
-        assert unmet([line for line in asked if line.name not in without], there) == [], package
+        requested = [Requirement(line) for line in importlib.metadata.requires(package) or []]
+        assert unmet([line for line in requested if line.name not in without], there) == [], package
 
 
-def test_what_is_left_out_is_in_no_lock_and_still_asked_for_by_mavproxy():
+def test_what_is_left_out_is_in_no_lock_and_still_required_by_mavproxy():
     without = {line.name for line in listed("without.in")}
-    asked = {Requirement(line).name for line in importlib.metadata.requires("mavproxy") or []}
-    assert without <= asked
+    requested = {Requirement(line).name for line in importlib.metadata.requires("mavproxy") or []}
+    assert without <= requested
     for name in ("lean.txt", "dev.txt"):
         assert not without & {line.name for line in locked(name)}
 

@@ -19,7 +19,7 @@ class Asked(NamedTuple):
     reply: Any
 
 
-async def hammer(world: Any, seed: int, asked: list[Asked]) -> None:
+async def hammer(world: Any, seed: int, requested: list[Asked]) -> None:
     """A client that sends the vehicle somewhere else as soon as it has its answer, but for a breath."""
     dice = random.Random(seed)
     end = world.loop.time() + MINUTE
@@ -28,34 +28,34 @@ async def hammer(world: Any, seed: int, asked: list[Asked]) -> None:
         target = {"x": dice.randint(-20, 20), "y": dice.randint(-20, 20), "z": -dice.randint(5, 15)}
         began = world.loop.time()
         wire = await world.request("POST", PATH, target)
-        asked.append(Asked(began, target, await asyncio.wait_for(wire.reply, MINUTE)))
+        requested.append(Asked(began, target, await asyncio.wait_for(wire.reply, MINUTE)))
         await asyncio.sleep(dice.uniform(*dice.choice([(0.0, 0.1), (0.3, 1.0), (6.0, 10.0)])))
 
 
-def test_every_request_is_answered_and_the_vehicle_ends_where_the_last_one_said(make_world: Any) -> None:
+def test_every_request_is_answered_and_the_vehicle_ends_as_the_last_one_requested(make_world: Any) -> None:
     world = make_world()
-    asked: list[Asked] = []
+    requested: list[Asked] = []
 
     async def both() -> None:
-        await asyncio.gather(hammer(world, 1, asked), hammer(world, 2, asked))
+        await asyncio.gather(hammer(world, 1, requested), hammer(world, 2, requested))
 
     world.loop.run(both())
-    asked.sort(key=lambda one: one.at)
-    outcomes = [one.reply.outcome for one in asked]
+    requested.sort(key=lambda one: one.at)
+    outcomes = [one.reply.outcome for one in requested]
     assert set(outcomes) == {"200", "409 superseded"}
     assert outcomes[-1] == "200"
-    for one, newer in zip(asked, asked[1:], strict=False):
+    for one, newer in zip(requested, requested[1:], strict=False):
         if one.reply.outcome == "409 superseded":
             assert one.reply.at - newer.at < 0.1
             assert PATH in one.reply.body["detail"]
         else:
             assert one.reply.at - one.at < 30.0
-    last = asked[-1].target
+    last = requested[-1].target
     world.loop.pass_time(5.0)
     assert math.dist(world.at, (last["x"], last["y"], last["z"])) < 1.5
     assert world.host.jobs.running() == [] and len(world.host.pending) == 0
     setpoints = [message for message in world.orders() if message.get_type() == "SET_POSITION_TARGET_LOCAL_NED"]
-    assert [(m.x, m.y, m.z) for m in setpoints] == [(t["x"], t["y"], t["z"]) for _, t, _ in asked]
+    assert [(m.x, m.y, m.z) for m in setpoints] == [(t["x"], t["y"], t["z"]) for _, t, _ in requested]
 
 
 def test_identical_requests_join_the_one_in_flight(make_world: Any) -> None:

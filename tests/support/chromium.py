@@ -25,6 +25,7 @@ class Page:
     def __init__(self, socket: aiohttp.ClientWebSocketResponse) -> None:
         self._socket = socket
         self._number = 0
+        self.complaints: list[str] = []  # errors of scripts, and what the page's policy refused
 
     async def ask(self, method: str, **params: Any) -> dict[str, Any]:
         """One command; its result."""
@@ -32,11 +33,58 @@ class Page:
         await self._socket.send_json({"id": self._number, "method": method, "params": params})
         async for message in self._socket:
             answer = json.loads(message.data)
+            self._note(answer)
             if answer.get("id") == self._number:
                 assert "error" not in answer, answer
                 result: dict[str, Any] = answer["result"]
                 return result
         raise AssertionError("Chromium has gone")
+
+    def _note(self, event: dict[str, Any]) -> None:
+        if event.get("method") == "Runtime.exceptionThrown":
+            self.complaints.append(json.dumps(event["params"]["exceptionDetails"]))
+        elif event.get("method") == "Log.entryAdded" and event["params"]["entry"]["source"] != "network":
+            self.complaints.append(event["params"]["entry"]["text"])
+
+    async def visit(self, url: str, width: int = 1440, height: int = 900) -> None:
+        """Open an address, in a window of that size, and begin to note complaints."""
+        for domain in ("Page", "Log", "Runtime"):
+            await self.ask(f"{domain}.enable")
+        await self.resize(width, height)
+        await self.ask("Page.navigate", url=url)
+
+    async def resize(self, width: int, height: int) -> None:
+        """Make the window as large as that, in CSS pixels."""
+        await self.ask(
+            "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width < 600
+        )
+
+    async def middle(self, element: str) -> tuple[float, float]:
+        """Where the middle of an element is, which the script `element` gives; it is scrolled to."""
+        script = (
+            f"{{const e = {element}; e.scrollIntoView({{block: 'nearest'}}); const r = e.getBoundingClientRect(); "
+        )
+        x, y = json.loads(await self.evaluate(script + "JSON.stringify([r.x + r.width / 2, r.y + r.height / 2])}"))
+        return x, y
+
+    async def press(self, x: float, y: float) -> None:
+        """Press the mouse's button there, and keep it down."""
+        await self.ask("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
+        await self.ask("Input.dispatchMouseEvent", type="mousePressed", x=x, y=y, button="left", clickCount=1)
+
+    async def release(self, x: float, y: float) -> None:
+        """Let the mouse's button go."""
+        await self.ask("Input.dispatchMouseEvent", type="mouseReleased", x=x, y=y, button="left", clickCount=1)
+
+    async def click(self, element: str, right: float = 0, down: float = 0) -> None:
+        """Click an element, so many pixels from its middle."""
+        x, y = await self.middle(element)
+        await self.press(x + right, y + down)
+        await self.release(x + right, y + down)
+
+    async def key(self, kind: str, key: str, code: int) -> None:
+        """A `keyDown` or `keyUp`."""
+        await self.ask("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=code)
 
     async def evaluate(self, script: str) -> Any:
         """What a script gives."""
@@ -51,7 +99,8 @@ class Page:
             with contextlib.suppress(AssertionError):
                 if await self.evaluate(script):
                     return
-            assert time.monotonic() < deadline, script
+            if time.monotonic() > deadline:
+                raise AssertionError(f"{script}: the page says {await self.evaluate('document.body.innerText')}")
             await asyncio.sleep(0.1)
 
     async def picture(self) -> bytes:

@@ -73,8 +73,8 @@ class Projector:
         if self.renderer.look.occlusion:
             return ()
         sizes = options.sizes or {}
-        wanted = [tag for tag in self.renderer.tags if options.any_id or not sizes or tag.id in sizes]
-        found = [self._sight(tag, position, attitude, sizes.get(tag.id, 0.0)) for tag in wanted]
+        expected = [tag for tag in self.renderer.tags if options.any_id or not sizes or tag.id in sizes]
+        found = [self._sight(tag, position, attitude, sizes.get(tag.id, 0.0)) for tag in expected]
         return tuple(detection for detection in found if detection is not None)
 
     def _sight(self, tag: PlacedTag, position: Vector, attitude: Attitude, size: float) -> TagDetection | None:
@@ -187,7 +187,7 @@ class Eye:
         model = self.source.renderer.model
         image = np.zeros((model.height, model.width), np.uint8)
         image[0, :16:4] = np.frombuffer(np.uint32(self._number).tobytes(), np.uint8)  # no two frames are the same
-        return Frame(image, now - self.source.timing.told, now)
+        return Frame(image, now - self.source.timing.assumed_latency, now)
 
 
 class WireLink:
@@ -318,14 +318,14 @@ class Lockstep:
         async def unloaded() -> list[Any]:
             self.flights.abort_all()
             await asyncio.sleep(0)
-            return [message for words in self.host.last_words for message, _ in words()] if last else []
+            return [message for words in self.host.closing_messages for message, _ in words()] if last else []
 
         if last:
             self.wire.send = never  # type: ignore[method-assign]
-        said = self.run(unloaded())
-        for message in said:
+        output = self.run(unloaded())
+        for message in output:
             self.wire.deliver(message)
-        return said
+        return output
 
     def outcome(self, job: Any) -> Any:
         """Its result, or the error that it ended with."""

@@ -7,16 +7,60 @@ from __future__ import annotations
 
 import asyncio
 import json
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
-from urllib.parse import urlencode
 
+import requests
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from requests.structures import CaseInsensitiveDict
+
+from mavproxy_uavapi.api import apply
+from mavproxy_uavapi.sim.control import Control
 from tests.support.at_once import AtOnce
+from tests.support.calls import PendingCall
 from tests.support.mavproxy import mavproxy_state
 from tests.support.processes import SPEEDUP, Rig
 from tests.support.virtual_time import TimeTravellingLoop
-from tests.support.world import World
+from tests.support.wire import Wire
+from tests.support.world import MODES, World
+
+OURS = ("Content-Length", "Content-Type")  # which `World.request` states itself
+
+
+class _WiredCall:
+    """A request in flight, in memory."""
+
+    def __init__(self, world: World, wire: Wire) -> None:
+        self._world, self.wire = world, wire
+
+    def is_answered(self) -> bool:
+        return self.wire.reply.done()
+
+    def answer(self, timeout: float) -> Any:
+        reply = self._world.answer(self.wire, timeout * SPEEDUP)
+        headers = CaseInsensitiveDict(reply.headers)
+        body = reply.body
+        return SimpleNamespace(status_code=reply.status, text=json.dumps(body), headers=headers, json=lambda: body)
+
+
+class _BackDoor:
+    """The vehicle's back door, without a socket; see `tests.support.processes.Control`."""
+
+    def __init__(self, control: Control) -> None:
+        self._control = control
+
+    def ask(self, op: str, **arguments: Any) -> dict[str, Any]:
+        answer: dict[str, Any] = json.loads(self._control.handle_line(json.dumps({"op": op, **arguments})))
+        assert answer["ok"], answer
+        return answer
+
+    def fault(self, name: str, **arguments: Any) -> None:
+        self.ask("fault", name=name, **arguments)
+
+    def close(self) -> None:
+        """It has nothing to close."""
 
 
 class LockstepRig(Rig):
@@ -29,21 +73,36 @@ class LockstepRig(Rig):
         self._loop.set_default_executor(AtOnce())
         self.world = World(self._loop, mavproxy_state(), {})
         self.world.directory = directory
-        self.control = SimpleNamespace(fault=self.world.fault, close=lambda: None)  # type: ignore[assignment]
+        self.control = _BackDoor(self.world.control)  # type: ignore[assignment]
         self.world.boot()
         self.world.go_live()
 
-    def get(self, path: str, timeout: float = 120, **params: Any) -> Any:
-        query = urlencode({name: str(value).lower() if value is True else value for name, value in params.items()})
-        return self._asked("GET", f"{path}{'&' if '?' in path else '?'}{query}" if query else path, None, timeout)
+    def call(self, method: str, path: str, *, timeout: float = 120, **content: Any) -> Any:
+        return self._begin(method, path, **content).answer(timeout)
 
-    def post(self, path: str, timeout: float = 120, **body: Any) -> Any:
-        return self._asked("POST", path, body, timeout)
+    def begin(self, method: str, path: str, body: dict[str, Any] | None = None) -> PendingCall:
+        return self._begin(method, path, json=body)
 
-    def _asked(self, method: str, path: str, body: Any, timeout: float) -> Any:
-        reply = self.world.answer(self.world.begin(method, path, body), timeout * SPEEDUP)
-        text = json.dumps(reply.body)
-        return SimpleNamespace(status_code=reply.status, text=text, headers=reply.headers, json=lambda: reply.body)
+    def hang_up(self, method: str, path: str, body: dict[str, Any] | None = None, after: float = 0.5) -> None:
+        call = self._begin(method, path, json=body)
+        self.sleep(after)
+        assert not call.is_answered(), "it answered too soon"
+        call.wire.hang_up()
+
+    def _begin(self, method: str, path: str, **content: Any) -> _WiredCall:
+        request = requests.Request(method, self.url + path, **content).prepare()
+        headers = {name: value for name, value in request.headers.items() if name not in OURS}
+        path, kind = request.url.removeprefix(self.url), request.headers.get("Content-Type", "")
+        body = request.body.encode() if isinstance(request.body, str) else request.body
+        return _WiredCall(self.world, self.world.begin(method, path, body, kind=kind, headers=headers))
+
+    def switch_mode(self, name: str) -> None:
+        self.world.pilot_command(mavlink.MAV_CMD_DO_SET_MODE, mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, MODES[name])
+
+    def set(self, name: str, value: str) -> None:
+        service = self.world.service
+        service.settings = replace(service.settings, **{name: value})
+        apply(service.settings, service.host)
 
     def sleep(self, seconds: float) -> None:
         """Let as much of the vehicle's time pass as a rig with processes does in `seconds`."""

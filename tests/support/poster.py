@@ -53,7 +53,7 @@ class Poster:
         self._session = requests.Session()
         self._thread = threading.Thread(target=self._run, name="poster")
         self._data = b""
-        self._told: dict[str, dict[str, Any]] = {}
+        self._reported: dict[str, dict[str, Any]] = {}
         self.answers: list[int] = []
         self.height = math.nan
         self.frozen = False
@@ -96,11 +96,11 @@ class Poster:
         While nobody hears the vehicle, the camera goes on showing what it showed.
         """
         answer = self._session.get(f"{self._rig.url}/telemetry/message/{name}", timeout=10)
-        if answer.status_code == 503 and name in self._told:
-            return self._told[name]
+        if answer.status_code == 503 and name in self._reported:
+            return self._reported[name]
         body = answer.json()
-        self._told[name] = {**body["info"], "age": min(body["age_s"] * self._speedup, FORESEEN)}
-        return self._told[name]
+        self._reported[name] = {**body["info"], "age": min(body["age_s"] * self._speedup, FORESEEN)}
+        return self._reported[name]
 
 
 def tag_near(rig: Any, north: float = 0.6, east: float = -0.5, number: int = 0, size: float = 0.30) -> PlacedTag:

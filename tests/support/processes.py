@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 
 import requests
 
+from tests.support.calls import PendingCall, ThreadedCall
 from tests.support.relay import Relay
 
 SCRIPTS = Path(sysconfig.get_path("scripts"))
@@ -167,13 +168,30 @@ class Rig:
         self.is_ardupilot = False
         self.mavproxy: Process
 
-    def get(self, path: str, timeout: float = 120, **params: Any) -> requests.Response:
-        return requests.get(self.url + path, params=params, timeout=timeout)
+    def call(self, method: str, path: str, *, timeout: float = 120, **content: Any) -> Any:
+        """A request and its answer; `content` is of `requests.request`."""
+        return requests.request(method, self.url + path, timeout=timeout, **content)
 
-    def post(self, path: str, timeout: float = 120, **body: Any) -> requests.Response:
-        return requests.post(self.url + path, json=body, timeout=timeout)
+    def get(self, path: str, timeout: float = 120, **params: Any) -> Any:
+        return self.call("GET", path, params=params, timeout=timeout)
 
-    def ok(self, answer: requests.Response) -> dict[str, Any]:
+    def post(self, path: str, timeout: float = 120, **body: Any) -> Any:
+        return self.call("POST", path, json=body, timeout=timeout)
+
+    def delete(self, path: str) -> Any:
+        return self.call("DELETE", path)
+
+    def begin(self, method: str, path: str, body: dict[str, Any] | None = None) -> PendingCall:
+        """A request whose answer is waited for later."""
+        return ThreadedCall(lambda: self.call(method, path, json=body))
+
+    def hang_up(self, method: str, path: str, body: dict[str, Any] | None = None, after: float = 0.5) -> None:
+        """Ask, and hang up after so many s without an answer."""
+        with requests.Session() as session, contextlib.suppress(requests.ReadTimeout):
+            session.request(method, self.url + path, json=body, timeout=(5, after))
+            raise AssertionError("it answered too soon")
+
+    def ok(self, answer: Any) -> dict[str, Any]:
         """The body of an answer that must be a success."""
         assert answer.status_code == 200, f"{answer.status_code} {answer.text}"
         body: dict[str, Any] = answer.json()
@@ -194,6 +212,23 @@ class Rig:
     def clock(self) -> float:
         """Seconds."""
         return time.monotonic()
+
+    def eventually(self, look: Callable[[], Any], timeout: float = PATIENCE, what: str = "it") -> Any:
+        """The first true value of `look`, which must come within so many s of the rig's clock."""
+        deadline = self.clock() + timeout
+        while not (value := look()):
+            assert self.clock() < deadline, f"{what} did not happen within {timeout:g} s"
+            self.sleep(0.05)
+        return value
+
+    def switch_mode(self, name: str) -> None:
+        """The pilot changes the mode at MAVProxy's prompt."""
+        self.mavproxy.type(f"mode {name}")
+
+    def set(self, name: str, value: str) -> None:
+        """Change a setting of the API."""
+        self.mavproxy.type(f"uavapi set {name} {value}")
+        self.mavproxy.ask(f"uavapi set {name}", f" {value} ")
 
     def wait_until_up(self, timeout: float = PATIENCE) -> None:
         """Wait until the API knows its vehicle."""

@@ -78,12 +78,13 @@ class Relay:
                 return {"ok": True}
             assert op == "received", f"a wire knows nothing of {op}"
             found = [entry for entry in self._received if entry[0] > arguments.get("since", 0)]
-            told = [(wall, message) for _, wall, message in found if message.get_type() != "HEARTBEAT"]
+            reported = [(wall, message) for _, wall, message in found if message.get_type() != "HEARTBEAT"]
             return {
                 "ok": True,
                 "last": found[-1][0] if found else arguments.get("since", 0),
                 "messages": [
-                    {"name": message.get_type(), "wall": wall, "fields": message.to_dict()} for wall, message in told
+                    {"name": message.get_type(), "wall": wall, "fields": message.to_dict()}
+                    for wall, message in reported
                 ],
             }
 

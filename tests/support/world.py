@@ -10,8 +10,9 @@ import asyncio
 import contextlib
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from aiohttp import web
@@ -129,8 +130,7 @@ class World:
 
     def by_hand(self, command: int, *parameters: float) -> None:
         """A command of the pilot's, past the host and its link."""
-        message = mavlink.MAVLink_command_long_message(1, 1, command, 0, *parameters, *(0.0,) * (7 - len(parameters)))
-        self._deliver(message)
+        self._deliver(self._command(command, *parameters))
         self.simulator.step()
 
     def boot(self) -> None:
@@ -225,17 +225,24 @@ class World:
 
     # -- clients --------------------------------------------------------------------------------------------
 
-    def begin(self, method: str, path: str, body: Any = None, kind: str = "application/json") -> Wire:
-        """A request in flight; `body` is bytes, or made JSON of."""
-        return self.loop.run(self.request(method, path, body, kind))
+    def begin(self, method: str, path: str, body: Any = None, **rest: Any) -> Wire:
+        """A request in flight; `body` is bytes, or made JSON of, `rest` is of `request`."""
+        return self.loop.run(self.request(method, path, body, **rest))
 
     async def request(
-        self, method: str, path: str, body: Any = None, kind: str = "application/json", port: int = CLIENT
+        self,
+        method: str,
+        path: str,
+        body: Any = None,
+        kind: str = "application/json",
+        port: int = CLIENT,
+        headers: Mapping[str, str] = MappingProxyType({}),
     ) -> Wire:
         """As `begin`, for clients that run in the loop, at a port of their own."""
         wire = Wire(self.loop, Connection(self._runner.server), port)
         content = b"" if body is None else body if isinstance(body, bytes) else json.dumps(body).encode()
         head = [f"{method} {path} HTTP/1.1", "Host: localhost", "Connection: close"]
+        head += [f"{name}: {value}" for name, value in headers.items()]
         if body is not None:
             head += [f"Content-Type: {kind}", f"Content-Length: {len(content)}"]
         wire.ask("\r\n".join([*head, "", ""]).encode() + content)
@@ -243,7 +250,7 @@ class World:
 
     def ask(self, method: str, path: str, body: Any = None, kind: str = "application/json") -> Reply:
         """A request and its answer."""
-        return self.answer(self.begin(method, path, body, kind))
+        return self.answer(self.begin(method, path, body, kind=kind))
 
     def answer(self, wire: Wire, within: float = 600.0) -> Reply:
         """The answer of a request in flight, which must come within that many s."""
@@ -251,7 +258,7 @@ class World:
         assert reply is not None, "the server closed the connection without an answer"
         return reply
 
-    def told(self, status: int, body: dict[str, Any]) -> Reply:
+    def reported(self, status: int, body: dict[str, Any]) -> Reply:
         """What somebody has learnt just now, as an answer."""
         return Reply(status, body, self.loop.time(), {}, b"")
 
@@ -261,6 +268,14 @@ class World:
         """A fault of `sim.control`."""
         answer = json.loads(self.control.handle_line(json.dumps({"op": "fault", "name": name, **fields})))
         assert answer["ok"], answer
+
+    def pilot_command(self, command: int, *parameters: float) -> None:
+        """A command of the pilot's, from MAVProxy's prompt, which arrives with the next tick."""
+        self._arriving.append(self._command(command, *parameters))
+
+    @staticmethod
+    def _command(command: int, *parameters: float) -> Any:
+        return mavlink.MAVLink_command_long_message(1, 1, command, 0, *parameters, *(0.0,) * (7 - len(parameters)))
 
     def reboot(self, dark: float) -> None:
         """The autopilot starts anew, and says and hears nothing for `dark` s."""

@@ -83,7 +83,7 @@ def test_usb_camera_gets_its_resolution(temporary: Path, fake: Any) -> None:
         ('for last; do :; done; echo text > "$last"', "made no picture"),
     ],
 )
-def test_failure_is_told_with_the_tools_own_words_and_leaves_nothing(
+def test_failure_is_reported_with_the_tools_own_message_and_leaves_nothing(
     temporary: Path, fake: Any, text: str, words: str
 ) -> None:
     fake("fswebcam", text)
@@ -92,7 +92,7 @@ def test_failure_is_told_with_the_tools_own_words_and_leaves_nothing(
     assert list(temporary.iterdir()) == []
 
 
-def test_tool_that_is_not_installed_is_told(temporary: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_tool_that_is_not_installed_is_reported(temporary: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", str(temporary))
     with pytest.raises(ToolFailed, match="rpicam-still is not installed"):
         asyncio.run(take("rpicam-still", SHOT))

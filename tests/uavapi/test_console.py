@@ -32,7 +32,7 @@ def test_report_of_a_vehicle(loop: Any, api: Api, drone: Any) -> None:
     )
 
 
-def test_report_of_a_call_in_flight_tells_its_progress(
+def test_report_of_a_call_in_flight_reports_its_progress(
     loop: Any, host: Any, api: Api, flying: Any, copter: Any
 ) -> None:
     async def body(job: Any) -> str:
@@ -49,7 +49,7 @@ def test_report_of_a_call_in_flight_tells_its_progress(
     assert job == "  1: /movement/go_to_ned_wait altitude 20.0 m, distance to go 150.0 m"
 
 
-def test_lost_link_and_lost_packets_are_told(loop: Any, api: Api, drone: Any) -> None:
+def test_lost_link_and_lost_packets_are_reported(loop: Any, api: Api, drone: Any) -> None:
     drone._sequence += 9
     loop.pass_time(0.25)
     drone.power_off()

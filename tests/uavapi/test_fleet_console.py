@@ -30,6 +30,6 @@ def test_only_those_that_are_named(make_drone: Any, host: Any, loop: Any) -> Non
 
 
 @pytest.mark.parametrize("words", [[], ["dance"], ["land", "all"]])
-def test_what_means_nothing_is_told(host: Any, loop: Any, words: list[str]) -> None:
+def test_what_means_nothing_is_reported(host: Any, loop: Any, words: list[str]) -> None:
     with pytest.raises(BadRequest):
         loop.run(command(host, words))

@@ -57,10 +57,10 @@ def port() -> int:
 
 
 @pytest.fixture
-def module(loader: Loader, port: int, said: Any) -> Any:
+def module(loader: Loader, port: int, output: Any) -> Any:
     """The module, listening."""
     module = loader.load(port=port)
-    assert said("listening") == f"uavapi: listening on http://127.0.0.1:{port}\n"
+    assert output("listening") == f"uavapi: listening on http://127.0.0.1:{port}\n"
     return module
 
 
@@ -74,10 +74,10 @@ def ask(port: int, path: str) -> tuple[int, Any]:
 
 
 @pytest.fixture
-def said(main_loop: Any, capsys: Any) -> Callable[[str], str]:
+def output(main_loop: Any, capsys: Any) -> Callable[[str], str]:
     """Turn the main loop until those words were printed; everything that was printed since the last time."""
 
-    def said(words: str) -> str:
+    def output(words: str) -> str:
         printed: list[str] = []
 
         def found() -> bool:
@@ -87,7 +87,7 @@ def said(main_loop: Any, capsys: Any) -> Callable[[str], str]:
         main_loop.until(found)
         return "".join(printed)
 
-    return said
+    return output
 
 
 def listens(port: int) -> bool:
@@ -162,7 +162,7 @@ def test_command_goes_out_in_the_main_loop(
     [
         ({"prot": 1}, "uavapi: no setting 'prot'; did you mean port?"),
         ({"port": "x"}, "uavapi: port = 'x': it takes a int from 1 to 65535"),
-        ({"host": "0.0.0.0"}, "anybody on that network"),
+        ({"host": "0.0.0.0"}, "everybody on that network"),
         ({"config": "/no/such.ini"}, "/no/such.ini: No such file or directory"),
     ],
 )
@@ -180,13 +180,13 @@ def test_bad_argument_is_an_import_error_of_one_line_and_leaves_nothing(
 
 
 def test_taken_port_is_one_line_and_another_port_helps(
-    loader: Loader, main_loop: Any, port: int, capsys: Any, said: Any
+    loader: Loader, main_loop: Any, port: int, capsys: Any, output: Any
 ) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", port))
         taken.listen()
         module = loader.load(port=port)
-        assert said("\n") == (
+        assert output("\n") == (
             f"uavapi: cannot listen on http://127.0.0.1:{port}: Address already in use; "
             "`uavapi set port N` takes another port\n"
         )
@@ -194,17 +194,17 @@ def test_taken_port_is_one_line_and_another_port_helps(
         assert capsys.readouterr().out == ""
         other = free_port()
         module.command(["set", "port", str(other)])
-        said("listening")
+        output("listening")
         assert listens(other)
 
 
 # -- the prompt -------------------------------------------------------------------------------------------
 
 
-def test_set_port_restarts_there(module: Any, port: int, said: Any) -> None:
+def test_set_port_restarts_there(module: Any, port: int, output: Any) -> None:
     other = free_port()
     module.command(["set", "port", str(other)])
-    assert said("listening") == f"uavapi: listening on http://127.0.0.1:{other}\n"
+    assert output("listening") == f"uavapi: listening on http://127.0.0.1:{other}\n"
     assert listens(other)
     assert not listens(port)
 
@@ -234,36 +234,37 @@ def test_set_shows_the_settings(module: Any, port: int, capsys: Any) -> None:
     assert capsys.readouterr().out.split() == ["max_age", "5.0", "default"]
 
 
-def test_stop_and_start(module: Any, port: int, said: Any) -> None:
+def test_stop_and_start(module: Any, port: int, output: Any) -> None:
     module.command(["stop"])
-    assert said("stopped") == "uavapi: stopped\n"
+    assert output("stopped") == "uavapi: stopped\n"
     assert not listens(port)
     module.command(["start"])
-    assert said("listening") == f"uavapi: listening on http://127.0.0.1:{port}\n"
+    assert output("listening") == f"uavapi: listening on http://127.0.0.1:{port}\n"
     assert listens(port)
 
 
-def test_starts_and_stops_are_done_in_the_order_in_which_they_were_typed(module: Any, port: int, said: Any) -> None:
+def test_starts_and_stops_are_done_in_the_order_in_which_they_were_typed(module: Any, port: int, output: Any) -> None:
     other = free_port()
     for line in ("stop", "start", f"set port {other}", "stop", f"set port {port}", "start"):
         module.command(line.split())
     addresses = [f"uavapi: listening on http://127.0.0.1:{number}\n" for number in (port, other, port)]
     stopped = "uavapi: stopped\n"
     assert (
-        said(addresses[1] + stopped + addresses[2]) == stopped + addresses[0] + addresses[1] + stopped + addresses[2]
+        output(addresses[1] + stopped + addresses[2])
+        == stopped + addresses[0] + addresses[1] + stopped + addresses[2]
     )
     assert listens(port)
     assert not listens(other)
 
 
-def test_set_does_not_open_what_was_stopped(module: Any, said: Any) -> None:
+def test_set_does_not_open_what_was_stopped(module: Any, output: Any) -> None:
     module.command(["stop"])
     other = free_port()
     module.command(["set", "port", str(other)])
-    said("stopped")
+    output("stopped")
     assert not listens(other)
     module.command(["start"])
-    said("listening")
+    output("listening")
     assert listens(other)
 
 
@@ -281,7 +282,7 @@ def test_status_and_vehicles_and_help(module: Any, main_loop: Any, port: int, ms
 
 
 def test_commands_of_a_startup_script_come_before_the_main_loop(
-    loader: Loader, port: int, said: Any, capsys: Any
+    loader: Loader, port: int, output: Any, capsys: Any
 ) -> None:
     module = loader.load(port=port)
     started = time.monotonic()
@@ -290,18 +291,18 @@ def test_commands_of_a_startup_script_come_before_the_main_loop(
         module.command(line.split())
     assert time.monotonic() - started < 1.0
     assert f"not listening; it would be http://127.0.0.1:{port}" in capsys.readouterr().out
-    said("listening")
+    output("listening")
     assert listens(other)
 
 
-def test_startup_script_may_keep_it_from_listening(loader: Loader, main_loop: Any, port: int, said: Any) -> None:
+def test_startup_script_may_keep_it_from_listening(loader: Loader, main_loop: Any, port: int, output: Any) -> None:
     module = loader.load(port=port)
     module.command(["stop"])
     for _ in range(20):
         main_loop.turn(0.01)
     assert not listens(port)
     module.command(["start"])
-    said("listening")
+    output("listening")
     assert listens(port)
 
 
@@ -309,7 +310,7 @@ def test_startup_script_may_keep_it_from_listening(loader: Loader, main_loop: An
 
 
 def test_start_that_takes_long_holds_nothing_up_and_says_so_and_what_came_of_it(
-    loader: Loader, main_loop: Any, port: int, said: Any, monkeypatch: Any
+    loader: Loader, main_loop: Any, port: int, output: Any, monkeypatch: Any
 ) -> None:
     begun, released = threading.Event(), threading.Event()
 
@@ -324,24 +325,24 @@ def test_start_that_takes_long_holds_nothing_up_and_says_so_and_what_came_of_it(
     main_loop.turn()
     assert time.monotonic() - started < 0.5
     assert begun.wait(5)
-    still = f"uavapi: still trying to listen on http://127.0.0.1:{port}; a line tells when that is done\n"
-    assert said("still") == still
+    still = f"uavapi: still trying to listen on http://127.0.0.1:{port}; a line follows when it is done\n"
+    assert output("still") == still
     released.set()
-    assert said("listening") == f"uavapi: listening on http://127.0.0.1:{port}\n"
+    assert output("listening") == f"uavapi: listening on http://127.0.0.1:{port}\n"
 
 
-def test_start_that_fails_for_an_unforeseen_reason_says_so(
-    loader: Loader, port: int, said: Any, monkeypatch: Any
+def test_start_that_fails_for_an_unforeseen_reason_is_reported(
+    loader: Loader, port: int, output: Any, monkeypatch: Any
 ) -> None:
     module = loader.load(port=port)
     defects: list[Any] = []
     module.host.bridge.loop.set_exception_handler(lambda _, context: defects.append(context["exception"]))
     module.api.start = lambda _: 1 / 0
-    assert said("\n") == "uavapi: a defect ended this: ZeroDivisionError('division by zero')\n"
+    assert output("\n") == "uavapi: a defect ended this: ZeroDivisionError('division by zero')\n"
     assert [type(defect) for defect in defects] == [ZeroDivisionError]
     del module.api.start
     module.command(["start"])
-    said("listening")
+    output("listening")
     assert listens(port)
 
 
@@ -382,7 +383,7 @@ def test_track_is_flown_by_the_apis_own_vehicle(loader: Loader, capsys: Any) -> 
 
 
 def test_settings_of_the_load_and_of_the_prompt_outlive_a_reload(
-    loader: Loader, port: int, said: Any, capsys: Any
+    loader: Loader, port: int, output: Any, capsys: Any
 ) -> None:
     module = loader.load(port=1, token="secret", sysid=7)
     module.command(["set", "port", str(port)])
@@ -390,7 +391,7 @@ def test_settings_of_the_load_and_of_the_prompt_outlive_a_reload(
     loader.unload(module)
     capsys.readouterr()
     module = loader.load()
-    assert said("listening") == (
+    assert output("listening") == (
         f"uavapi: as before: port={port}, token=(set), sysid=7, allow_from=127.0.0.0/8 "
         "(keywords at `module load` replace all that)\n"
         f"uavapi: listening on http://127.0.0.1:{port}\n"
@@ -410,7 +411,7 @@ def test_settings_that_are_only_good_together_outlive_a_reload(loader: Loader, c
     assert (settings.host, settings.token, settings.allow_open) == ("0.0.0.0", "secret", False)
 
 
-def test_file_of_the_first_load_is_read_anew_and_yields_to_the_prompt(loader: Loader, tmp_path: Any) -> None:
+def test_file_of_the_first_load_is_read_again_and_yields_to_the_prompt(loader: Loader, tmp_path: Any) -> None:
     file = tmp_path / "uavapi.ini"
     file.write_text("[api]\nsysid = 2\nport = 8001\n")
     module = loader.load(config=str(file))
@@ -477,7 +478,7 @@ def test_unload_takes_its_descriptors_back_from_a_host_that_goes_on(
 
 
 def test_setting_that_needs_no_other_listening_leaves_calls_in_flight_alone(
-    module: Any, main_loop: Any, port: int, msg: Any, tmp_path: Any, said: Any
+    module: Any, main_loop: Any, port: int, msg: Any, tmp_path: Any, output: Any
 ) -> None:
     answers: list[Any] = []
     module.mavlink_packet(msg("heartbeat"))
@@ -489,12 +490,12 @@ def test_setting_that_needs_no_other_listening_leaves_calls_in_flight_alone(
     module.command(["set", "script_grace", "3"])
     (tmp_path / "file").touch()
     module.command(["set", "log_path", str(tmp_path / "file" / "uav.log")])
-    said("the logs stay as they were")
+    output("the logs stay as they were")
     assert len(module.host.jobs.running()) == 1 and answers == []
     assert module.api._server.service.settings.script_grace == 3
     module.command(["set", "max_rate", "1"])
     assert listens(port)
     module.command(["stop"])
-    said("stopped")
+    output("stopped")
     client.join(5.0)
     assert answers[0][1]["code"] == "aborted"

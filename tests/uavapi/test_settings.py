@@ -41,7 +41,7 @@ def test_loopback_may_be_listened_on(host: str) -> None:
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "192.168.1.5", "::", "10.0.0.1"])
 def test_network_may_not_be_listened_on(host: str) -> None:
-    with pytest.raises(SettingError, match="anybody on that network could fly the vehicle"):
+    with pytest.raises(SettingError, match="everybody on that network could fly the vehicle"):
         ApiModuleSettings({"host": host})
 
 
@@ -70,7 +70,7 @@ def test_ini_file_of_the_original_service_loads(ini: Any) -> None:
         ("[simulated]\nport = 1\n", "no key 'port' in \\[simulated\\]; there are simulated, ardupilot_path"),
         ("[apy]\nport = 1\n", "no section \\[apy\\]; did you mean api\\?"),
         ("[api]\nport = high\n", "it takes a int"),
-        ("[api]\nhost = 0.0.0.0\n", "anybody on that network"),
+        ("[api]\nhost = 0.0.0.0\n", "everybody on that network"),
         ("[api]\nuav_conection = x\n", "did you mean uav_connection\\?"),
     ],
 )
@@ -80,7 +80,7 @@ def test_file_that_means_nothing_is_refused_in_one_line(ini: Any, text: str, wor
     assert "\n" not in str(caught.value)
 
 
-def test_each_key_that_is_ignored_is_told_of_in_one_line(ini: Any) -> None:
+def test_each_key_that_is_ignored_is_reported_in_one_line(ini: Any) -> None:
     keys = {"api": ["uav_connection", "connection_type", "gradys_gs", "vehicle", "udp"]}
     keys["simulated"] = ["simulated", "ardupilot_path", "location", "speedup", "headless", "gs_connection"]
     file = ini("".join(f"[{section}]\n" + "".join(f"{name} = 1\n" for name in keys[section]) for section in keys))
@@ -89,7 +89,7 @@ def test_each_key_that_is_ignored_is_told_of_in_one_line(ini: Any) -> None:
     assert notes[0].endswith("uav_connection is ignored here, MAVProxy has the link (--master)")
 
 
-def test_what_is_listened_on_and_who_may_call_needs_listening_anew() -> None:
+def test_what_is_listened_on_and_who_may_call_needs_a_restart_of_the_server() -> None:
     settings = ApiModuleSettings()
     before = settings.snapshot()
     settings.set("script_grace", 3)

@@ -62,9 +62,9 @@ def test_true_is_no_number(model, name):
 
 def handlers(age, source):
     """The routes' actions, over a camera whose newest frame is `age` s old."""
-    seen = FrameResult(1, NOW - age - 0.1, NOW - age, NOW - age, (64, 48), ())
+    result = FrameResult(1, NOW - age - 0.1, NOW - age, NOW - age, (64, 48), ())
     vision = SimpleNamespace(
-        seen=seen,
+        result=result,
         image=IMAGE,
         worker=SimpleNamespace(source=source, detector=SimpleNamespace(model=CameraModel())),
         host=SimpleNamespace(clock=lambda: NOW, target=1),
@@ -121,18 +121,18 @@ def test_a_posted_frame_is_taken_and_leaves_no_trail():
     assert [route.path for route in routes if not route.trail] == ["/vision/frame"]
 
 
-def test_what_is_no_frame_of_the_camera_is_told():
+def test_what_is_no_frame_of_the_camera_is_reported():
     over = handlers(0.0, Posted(0.0))
     refusal = posted(over, cv2.imencode(".png", np.zeros((72, 128), np.uint8))[1].tobytes())
     assert isinstance(refusal, BadImage)
-    assert "128x72 came" in str(refusal)
+    assert "a frame has 128x72 px" in str(refusal)
     assert over.tracker.worker.source.read().image.shape == (72, 128)  # the status says so too
     assert isinstance(posted(over, b"nonsense"), BadImage)
     assert over.tracker.worker.source.read() is None
     assert "source http" in str(posted(handlers(0.0, SimpleNamespace(live=True)), jpeg(IMAGE)))
 
 
-def test_a_frame_that_does_not_arrive_is_told(monkeypatch):
+def test_a_frame_that_does_not_arrive_is_reported(monkeypatch):
     monkeypatch.setattr(calls, "BODY_TIMEOUT", 0.05)
 
     async def slow():
@@ -222,7 +222,7 @@ def test_a_picture_is_drawn_once_for_all_who_ask(monkeypatch):
     async def run():
         await ask(100)
         await ask(100)
-        over.tracker.seen = FrameResult(2, NOW, NOW, NOW, (64, 48), ())
+        over.tracker.result = FrameResult(2, NOW, NOW, NOW, (64, 48), ())
         await ask(100)
 
     asyncio.run(run())
@@ -235,12 +235,12 @@ def test_a_slow_drawing_is_joined_rather_than_overtaken(monkeypatch):
     over = handlers(0.0, Posted(0.0))
 
     async def run():
-        asked = []
+        requested = []
         for number in range(20):
-            over.tracker.seen = FrameResult(number, NOW, NOW, NOW, (64, 48), ())
-            asked.append(asyncio.create_task(over.frame(None)))
+            over.tracker.result = FrameResult(number, NOW, NOW, NOW, (64, 48), ())
+            requested.append(asyncio.create_task(over.frame(None)))
             await asyncio.sleep(0)
-        await asyncio.gather(*asked)
+        await asyncio.gather(*requested)
 
     asyncio.run(run())
     assert drawing.count == 1

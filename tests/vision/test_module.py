@@ -32,7 +32,7 @@ def running(module: Any, main_loop: Any) -> Any:
     return module
 
 
-def said(module: Any, capsys: Any, *words: str) -> str:
+def output(module: Any, capsys: Any, *words: str) -> str:
     capsys.readouterr()
     module.command(list(words))
     return capsys.readouterr().out
@@ -40,7 +40,7 @@ def said(module: Any, capsys: Any, *words: str) -> str:
 
 def said_later(module: Any, capsys: Any, main_loop: Any, *words: str) -> str:
     """What is printed in a later turn of the main loop."""
-    assert said(module, capsys, *words) == ""
+    assert output(module, capsys, *words) == ""
     printed: list[str] = []
     main_loop.until(lambda: printed.append(capsys.readouterr().out) or printed[-1])
     return printed[-1].strip()
@@ -52,27 +52,27 @@ def test_module_is_what_mavproxy_looks_for(module: Any, mpstate: Any) -> None:
 
 
 def test_status_says_what_it_is_and_help_what_it_can(module: Any, capsys: Any) -> None:
-    assert said(module, capsys).startswith("vision: source none")
-    assert "AprilTag" in said(module, capsys, "status")
-    assert said(module, capsys, "help") == HELP + "\n"
+    assert output(module, capsys).startswith("vision: source none")
+    assert "AprilTag" in output(module, capsys, "status")
+    assert output(module, capsys, "help") == HELP + "\n"
 
 
 def test_commands_before_the_first_turn_say_so(module: Any, capsys: Any) -> None:
     for words in (["start"], ["stop"], ["land"], ["abort"], ["mission"]):
-        assert "main loop" in said(module, capsys, *words)
+        assert "main loop" in output(module, capsys, *words)
 
 
-def test_config_and_set_tell_of_each_value_where_it_came_from(module: Any, capsys: Any) -> None:
-    lines = said(module, capsys, "config").splitlines()
+def test_config_and_set_report_the_source_of_each_value(module: Any, capsys: Any) -> None:
+    lines = output(module, capsys, "config").splitlines()
     assert [line.split()[0] for line in lines] == module.module_settings.names()
-    assert said(module, capsys, "set").splitlines() == lines
+    assert output(module, capsys, "set").splitlines() == lines
     module.command(["set", "speed", "2"])
-    assert said(module, capsys, "set", "speed").split() == ["speed", "2.0", "vision", "set"]
-    assert [line.split()[0] for line in said(module, capsys, "set", "sim_[tl]*").splitlines()] == [
+    assert output(module, capsys, "set", "speed").split() == ["speed", "2.0", "vision", "set"]
+    assert [line.split()[0] for line in output(module, capsys, "set", "sim_[tl]*").splitlines()] == [
         "sim_tags",
         "sim_latency",
     ]
-    assert said(module, capsys, "set", "spede") == "vision: no setting 'spede'; did you mean speed?\n"
+    assert output(module, capsys, "set", "spede") == "vision: no setting 'spede'; did you mean speed?\n"
 
 
 def test_loading_and_unloading_leaves_nothing_behind(mpstate: Any, descriptors: Any) -> None:
@@ -89,7 +89,7 @@ def test_loading_and_unloading_leaves_nothing_behind(mpstate: Any, descriptors: 
 @pytest.mark.parametrize("turns", [0, 1], ids=["before the first turn", "running"])
 def test_a_reload_leaves_nothing_to_say_at_the_end(mpstate: Any, turns: int) -> None:
     host = hosts.join(mpstate, None)  # another module that stays
-    words = list(host.last_words)
+    words = list(host.closing_messages)
     if turns:
         host.bridge.start()
     for _ in range(3):
@@ -97,7 +97,7 @@ def test_a_reload_leaves_nothing_to_say_at_the_end(mpstate: Any, turns: int) -> 
         for _ in range(turns):
             module.idle_task()
         module.unload()
-    assert host.last_words == words
+    assert host.closing_messages == words
     hosts.leave(mpstate, None)
 
 
@@ -117,7 +117,7 @@ def test_a_sources_password_is_never_shown(running: Any, main_loop: Any, capsys:
     assert begun == "vision: looking for 36h11 through rtsp://pilot:***@127.0.0.1:1/cam"
     main_loop.until(lambda: running.tracker.health.error)
     for word in ("status", "config", "set"):
-        text = said(running, capsys, word)
+        text = output(running, capsys, word)
         assert "rtsp://pilot:***@127.0.0.1:1/cam" in text
         assert "s3cret" not in text
     assert "s3cret" not in str(running.tracker.health.error)
@@ -133,17 +133,17 @@ def test_routes_come_and_go(running: Any) -> None:
 
 def test_without_a_vehicle_nothing_flies(running: Any, capsys: Any) -> None:
     for words in (["land"], ["search"], ["mission"]):
-        assert "no vehicle" in said(running, capsys, *words)
+        assert "no vehicle" in output(running, capsys, *words)
 
 
 def test_bad_words_are_explained(running: Any, capsys: Any, main_loop: Any) -> None:
-    assert "not an id" in said(running, capsys, "land", "x")
-    assert "ALT NORTH EAST" in said(running, capsys, "mission", "a")
-    assert "did you mean" in said(running, capsys, "set", "famly", "16h5")
-    assert "none of" in said(running, capsys, "set", "family", "4x4")
-    assert "not ID:SIZE" in said(running, capsys, "set", "tags", "0")
+    assert "not an id" in output(running, capsys, "land", "x")
+    assert "ALT NORTH EAST" in output(running, capsys, "mission", "a")
+    assert "did you mean" in output(running, capsys, "set", "famly", "16h5")
+    assert "none of" in output(running, capsys, "set", "family", "4x4")
+    assert "not ID:SIZE" in output(running, capsys, "set", "tags", "0")
     assert running.module_settings.snapshot().tags == "0:0.30"
-    assert "one of velocity, landing_target" in said(running, capsys, "set", "method", "magic")
+    assert "one of velocity, landing_target" in output(running, capsys, "set", "method", "magic")
     assert said_later(running, capsys, main_loop, "start") == "vision: no camera is set: " + SOURCES
 
 
@@ -168,19 +168,19 @@ def test_a_camera_that_hangs_does_not_hold_up_the_main_loop(running: Any, capsys
     time.sleep(0.3)  # its thread is in there now
     began = time.monotonic()
     try:
-        assert said(running, capsys, "set", "latency", "20") == ""
-        assert said(running, capsys, "stop") == ""
+        assert output(running, capsys, "set", "latency", "20") == ""
+        assert output(running, capsys, "stop") == ""
         assert time.monotonic() - began < 0.5
     finally:
         hang.set()
 
 
 def test_settings_that_need_no_camera_end_no_flight(running: Any, capsys: Any, main_loop: Any) -> None:
-    assert said(running, capsys, "set", "tags", "0:0.5") == ""
+    assert output(running, capsys, "set", "tags", "0:0.5") == ""
     main_loop.turn()
     time.sleep(0.1)
     assert running.tracker.settings.tags == "0:0.5"
-    assert said(running, capsys, "status").startswith("vision: source none")
+    assert output(running, capsys, "status").startswith("vision: source none")
 
 
 def test_settings_outlive_a_reload(mpstate: Any, capsys: Any) -> None:

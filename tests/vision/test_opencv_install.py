@@ -59,10 +59,10 @@ def test_the_installed_opencv_has_no_problem() -> None:
 def test_without_opencv_one_line_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "cv2", None)  # as if there were none
     monkeypatch.setattr(sys, "path", [])
-    said = opencv_install.problem()
-    assert said is not None
-    assert said.startswith(f"{NEEDS}cv2 does not import (") and "\n" not in said
-    assert said.endswith(f"): {INSTALL}")
+    output = opencv_install.problem()
+    assert output is not None
+    assert output.startswith(f"{NEEDS}cv2 does not import (") and "\n" not in output
+    assert output.endswith(f"): {INSTALL}")
 
 
 @pytest.mark.parametrize(
@@ -89,7 +89,7 @@ def test_an_opencv_that_does_not_serve_is_one_line_with_what_mends_it(tmp_path: 
     assert import_error(one) == f"{NEEDS}{fault}: {remove('opencv-python')}{INSTALL}"
 
 
-def test_a_second_attempt_tells_the_same_as_the_first(tmp_path: Path) -> None:
+def test_a_second_attempt_reports_the_same_as_the_first(tmp_path: Path) -> None:
     """OpenCV's loader marks `sys` while it runs, leaves the mark when it fails, and refuses to run twice."""
     loader = f"""\
 import sys
@@ -115,7 +115,7 @@ def test_two_in_one_folder_are_a_line_where_cv2_imports(
     )
 
 
-def test_one_in_each_of_two_folders_is_nothing_to_tell(
+def test_one_in_each_of_two_folders_is_not_reported(
     tmp_path: Path, mpstate: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The second one is the system's, say, which a virtual environment with --system-site-packages sees, too."""

@@ -34,7 +34,7 @@ def test_projected_tag_is_where_the_detector_finds_it(position, attitude, headin
     assert np.linalg.norm(seen.position - projected.position) < 0.02  # m
 
 
-def test_tag_that_is_cut_off_or_too_far_or_behind_the_lens_is_not_seen():
+def test_tag_that_is_cut_off_or_too_far_or_behind_the_lens_is_not_detected():
     renderer = Renderer(MODEL, Mount(), (PlacedTag("36h11", 0, 0.3, 0.0, 0.0),), Look())
     projector = Projector(renderer, seed=1)
     assert projector.detect(vector(0.0, 0.0, -2.0), UPRIGHT, OPTIONS)

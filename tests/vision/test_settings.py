@@ -114,7 +114,7 @@ def test_tags_are_those_of_the_main_family():
 
 
 @pytest.mark.parametrize("name", ["calibration", "directory", "source"])
-def test_a_path_of_somebody_who_is_not_here_is_refused(name):
+def test_a_path_of_an_unknown_user_is_refused(name):
     assert "'~nobody_xyz/a'" in refused(VisionModuleSettings(), name, "~nobody_xyz/a")
     assert "zero byte" in refused(VisionModuleSettings(), name, "a\0b")
 
@@ -124,7 +124,7 @@ def test_a_calibration_that_is_refused_leaves_the_one_before(tmp_path):
     good.write_text(json.dumps({"width": 1280, "height": 720, "fx": 1e3, "fy": 1e3, "cx": 639.5, "cy": 359.5}))
     bad.write_text('{"width": "640"}')
     settings = VisionModuleSettings({"calibration": str(good)})
-    assert "is no calibration" in refused(settings, "calibration", str(bad))
+    assert "is not a calibration" in refused(settings, "calibration", str(bad))
     assert settings.snapshot().model.width == 1280
     good.unlink()
     settings.set("speed", 1)  # what has nothing to do with it can still be set in flight

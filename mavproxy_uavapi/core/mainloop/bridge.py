@@ -89,7 +89,7 @@ class Bridge:
         if self._inbox and not self._delivering:
             self._delivering = True  # first, because the other thread may run before `call_soon` returns
             if not self._thread.call_soon(self._deliver):
-                self._inbox.clear()  # the loop has ended: nobody will read
+                self._inbox.clear()  # the loop has ended, so nothing reads them
         if self._waited_for:
             self._waited_for = False
             self._thread.call_soon(self._turn_ended.set)

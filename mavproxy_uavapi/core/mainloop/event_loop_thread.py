@@ -16,7 +16,7 @@ class EventLoopThread:
 
     Args:
         name: of the thread.
-        loop: a loop that somebody else runs, in place of a thread of its own.
+        loop: a loop that the caller runs, in place of a thread of its own.
     """
 
     def __init__(self, name: str, loop: asyncio.AbstractEventLoop | None = None) -> None:

@@ -37,7 +37,7 @@ class MainLoopQueue:
         except BlockingIOError:
             pass  # the pipe is full of unread wake-ups: it wakes the main loop anyway
         except OSError:
-            self._calls.clear()  # closed: MAVProxy unloads us, and nobody drains any more
+            self._calls.clear()  # closed: MAVProxy unloads us, so nothing drains the queue
 
     def drain(self) -> None:
         """Run what is queued now. Main loop only; what a call queues in turn waits for the next drain."""

@@ -1,1 +1,1 @@
-"""The link, and what its messages tell of each vehicle."""
+"""The link, and the state of each vehicle by its messages."""

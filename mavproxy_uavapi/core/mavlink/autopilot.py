@@ -37,7 +37,7 @@ def rank(heartbeat: Any) -> int:
     """How surely the sender of `heartbeat` is its system's autopilot; NONE when it is not one.
 
     An autopilot that names its firmware comes before a generic one, which counts only if it says what vehicle
-    it is: the heartbeat of a program that left everything at 0 tells nothing. Among equals component 1 comes
+    it is: the heartbeat of a program that leaves all fields at 0 has no information. Among equals component 1 comes
     first: MAVLink gives it to the autopilot, and MAVProxy addresses it. ArduPilot's peripherals (AP_Periph) name
     the firmware with type 0, and so does a copter before it knows its frame, as component 1.
     """

@@ -15,7 +15,7 @@ class ParameterWatch:
     """Finds what has changed in MAVProxy's tables since the last look."""
 
     def __init__(self) -> None:
-        self._seen: dict[Key, Values] = {}
+        self._last_tables: dict[Key, Values] = {}
         self._next = 0.0
 
     def changes(self, tables: Mapping[Key, Mapping[str, float]], now: float) -> dict[Key, Values]:
@@ -25,9 +25,9 @@ class ParameterWatch:
         self._next = now + PERIOD
         changed = {}
         for key, table in tables.items():
-            before = self._seen.get(key, {})
+            before = self._last_tables.get(key, {})
             if table == before:
                 continue
             changed[key] = {name: float(value) for name, value in table.items() if before.get(name) != value}
-            self._seen[key] = dict(table)
+            self._last_tables[key] = dict(table)
         return {key: values for key, values in changed.items() if values}

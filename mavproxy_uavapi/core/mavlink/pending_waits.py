@@ -1,4 +1,4 @@
-"""Acks and telemetry conditions that somebody awaits. Pure: no thread, no timer, no clock.
+"""Waits for acks and telemetry conditions. Pure: no thread, no timer, no clock.
 
 Register before sending, and the message itself wakes the waiter: there is no polling anywhere.
 Deadlines are the waiter's own (`core/vehicle/message_waiter.py`), which then discards its wait.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 REBOOT_STEP_BACK = 3000  # ms; more than any reordering between two links, less than any boot takes
-WRAP = 2**32  # ms; `time_boot_ms` begins anew at 0 after 49.7 days
+WRAP = 2**32  # ms; `time_boot_ms` wraps to 0 after 49.7 days
 WRAP_SLACK = 60_000  # ms by which the vehicle's clock may run ahead of ours over a wrap
 WINDOW = 5.0  # s of ours between two readings of the ratio
 # GLOBAL_POSITION_INT's time is that of the position fix, which may run behind the boot time of others.

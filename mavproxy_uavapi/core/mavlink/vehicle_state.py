@@ -101,7 +101,7 @@ class VehicleState:
         mode_changes: the newest of those: arrival and mode, oldest first.
         messages: newest message by name, and by `NAME[instance]` for those that come for several devices.
         others: newest message by (component, name), of the system's other components.
-        parameters: values by name, that PARAM_VALUE told or MAVProxy knew. A reboot does not change them.
+        parameters: values by name, from PARAM_VALUE or MAVProxy's own table. A reboot does not change them.
     """
 
     system: int

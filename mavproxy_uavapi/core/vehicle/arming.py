@@ -21,15 +21,15 @@ async def arm(vehicle: BaseVehicle, job: Job, timeout: float | None) -> None:
     before = vehicle.state.armed, vehicle.state.mode
 
     def check_unclaimed() -> None:
-        """Raise ModeChanged if somebody else armed the vehicle or switched its mode."""
+        """Raise ModeChanged if the pilot or another client armed the vehicle or switched its mode."""
         armed = vehicle.state.armed
         flies = armed and not vehicle.state.landed
         if vehicle.mode == GUIDED or ((armed, vehicle.state.mode) == before and not flies):
             return
         if armed:
-            raise ModeChanged(f"the vehicle is armed in {vehicle.mode} now: whoever armed it has it")
+            raise ModeChanged(f"the pilot or another client has armed the vehicle, in {vehicle.mode}")
         if vehicle.state.mode not in (before[1], None):
-            raise ModeChanged(f"the vehicle is in {vehicle.mode} now: somebody else switched it meanwhile")
+            raise ModeChanged(f"the pilot or another client switched the vehicle to {vehicle.mode} meanwhile")
 
     deadline = vehicle.clock() + (max(timeout - REASON_TIME, timeout / 2) if timeout else TIMEOUT)
     await _get_ready(vehicle, lambda: vehicle.has_position, check_unclaimed, deadline)
@@ -63,7 +63,7 @@ async def disarm(vehicle: BaseVehicle, job: Job, force: bool) -> None:
 
 def _requires_guided(vehicle: BaseVehicle) -> Callable[[], None]:
     def check() -> None:
-        if vehicle.state.mode is not None:  # it has just rebooted; the next heartbeat tells
+        if vehicle.state.mode is not None:  # after a reboot the next heartbeat has the mode
             vehicle.require_mode(GUIDED)
 
     return check

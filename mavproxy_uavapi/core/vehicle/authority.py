@@ -6,6 +6,7 @@ effect, only its own rank or a higher one supersedes it; a lower one is refused.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import IntEnum
 
 from mavproxy_uavapi.core.errors import Busy, Paused, Superseded
@@ -19,9 +20,13 @@ class Rank(IntEnum):
     """Which verb supersedes which: a higher rank comes first."""
 
     MOVEMENT = 1  # movements, yaw, speeds
-    ARM = 2  # arm, takeoff, a mode asked for on purpose, the start of a mission
+    ARM = 2  # arm, takeoff, guided, set_mode, the start of a mission
     STOP = 3  # land, rtl, brake, stop, hold, disarm
     FORCE = 4  # disarm in flight
+
+
+def no_objection() -> None:
+    """No check besides the rank."""
 
 
 class CommandAuthority:
@@ -100,14 +105,21 @@ class CommandAuthority:
 
     # -- commanding ---------------------------------------------------------------------------------------
 
-    def take(self, job: Job, rank: Rank) -> None:
+    def take(self, job: Job, rank: Rank, allow: Callable[[], None] = no_objection) -> None:
         """Make `job` the commander; the commander before is superseded.
 
+        Args:
+            job: the job that commands.
+            rank: its verb's.
+            allow: asked after the rank; what it raises refuses the job.
+
         Raises:
-            Busy, Paused: as `admit`; then nothing has changed.
+            Busy, Paused: as `admit`; then nothing has changed. Likewise what `allow` raises.
         """
         if job is not self.commander:
             self.admit(rank)
+        allow()
+        if job is not self.commander:
             self._supersede([self.commander, self.interrupted], job)
             self._suspended = None
         self._take(job, rank)
@@ -127,18 +139,28 @@ class CommandAuthority:
         self.begin_pause()
         self._take(job, Rank.STOP)
 
-    def accompany(self, job: Job, kind: str, rank: Rank = Rank.MOVEMENT, *, stopped_too: bool = False) -> None:
+    def accompany(
+        self,
+        job: Job,
+        kind: str,
+        rank: Rank = Rank.MOVEMENT,
+        *,
+        stopped_too: bool = False,
+        allow: Callable[[], None] = no_objection,
+    ) -> None:
         """Let `job` command beside the commander; an earlier one of its kind is superseded.
 
         Args:
             job: the job that commands.
             kind: YAW, a speed, or resume.
             rank, stopped_too: as for `admit`.
+            allow: as for `take`.
 
         Raises:
-            Busy, Paused: as `admit`.
+            Busy, Paused: as `admit`. Also what `allow` raises.
         """
         self.admit(rank, stopped_too=stopped_too)
+        allow()
         self._supersede([self._companions.get(kind)], job)
         self._companions[kind] = job
 

@@ -4,23 +4,27 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypeVar
 
 from pymavlink import mavutil
 
-from mavproxy_uavapi.core.errors import ModeChanged, NotArmed, Rejected, Stale
-from mavproxy_uavapi.core.mavlink.flight_modes import kind_of, mode_name, mode_number
+from mavproxy_uavapi.core.errors import ModeChanged, NotArmed, Rejected, Stale, Superseded
+from mavproxy_uavapi.core.mavlink.flight_modes import kind_of, mode_name, mode_names, mode_number
 from mavproxy_uavapi.core.mavlink.link import Address, Link, is_finite
 from mavproxy_uavapi.core.mavlink.pending_waits import PendingWaits
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle import messages, time_limits
 from mavproxy_uavapi.core.vehicle.authority import CommandAuthority
 from mavproxy_uavapi.core.vehicle.command_sender import CommandSender
+from mavproxy_uavapi.core.vehicle.envelope_check import Spaces
 from mavproxy_uavapi.core.vehicle.geodesy import offset
+from mavproxy_uavapi.core.vehicle.guard import EnvelopeGuard, GuardedLink
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.message_waiter import MessageWaiter
+from mavproxy_uavapi.core.vehicle.mission_files import MissionItem
 from mavproxy_uavapi.core.vehicle.mission_protocol import Waypoints
+from mavproxy_uavapi.core.vehicle.mission_way import Stop
 from mavproxy_uavapi.core.vehicle.parameters import Parameters
 from mavproxy_uavapi.core.vehicle.speeds import Speeds
 
@@ -28,6 +32,7 @@ T = TypeVar("T")
 mavlink = mavutil.mavlink
 
 HEARTBEAT_TIMEOUT = 5.0  # s until a message must show what was acknowledged
+HOLDING_MODES = ("LOITER", "HOLD", "POSHOLD", "ALT_HOLD", "STOP", "RTL")  # what comes first in a vehicle's mode map
 FRESH = 3.0  # s; no verb uses an older position
 
 
@@ -43,19 +48,28 @@ class BaseVehicle:
         link: the way out.
         pending: the host's waits.
         clock: monotonic seconds, the clock of arrivals.
+        spaces: gives the envelopes in force for it.
     """
 
-    def __init__(self, state: VehicleState, link: Link, pending: PendingWaits, clock: Callable[[], float]) -> None:
+    def __init__(
+        self,
+        state: VehicleState,
+        link: Link,
+        pending: PendingWaits,
+        clock: Callable[[], float],
+        spaces: Spaces = tuple,
+    ) -> None:
         self.state = state
-        self.link = link
         self.clock = clock
+        self.speeds = Speeds(state)
+        self.guard = EnvelopeGuard(self, spaces)
+        self.link: Link = GuardedLink(link, self.guard)
         self.authority = CommandAuthority(state)
         self.waiting = MessageWaiter(state, pending, clock)
-        self.commands = CommandSender(state, link, self.waiting)
-        self.waypoints = Waypoints(state, link, self.waiting)
-        self.parameters = Parameters(state, link, self.waiting)
-        self.speeds = Speeds(state)
-        self._modes_asked: dict[int, float] = {}  # modes that we asked for, the newest last, and when (s)
+        self.commands = CommandSender(state, self.link, self.waiting)
+        self.waypoints = Waypoints(state, self.link, self.waiting, self._allow_upload)
+        self.parameters = Parameters(state, self.link, self.waiting)
+        self._requested_modes: dict[int, float] = {}  # requested modes, the newest last, and when (s)
         self._requests: dict[str, asyncio.Task[Any]] = {}  # REQUEST_MESSAGE in flight, by message name
 
     # -- state --------------------------------------------------------------------------------------------
@@ -77,19 +91,19 @@ class BaseVehicle:
 
     @property
     def next_mode(self) -> str:
-        """The name of the mode that we asked for last, until a heartbeat shows the outcome; else `mode`."""
+        """The name of the last requested mode, until a heartbeat shows the outcome; else `mode`."""
         coming = self._on_its_way()
         return mode_name(self.state.vehicle_type, coming[-1]) if coming else self.mode
 
     def _on_its_way(self) -> list[int]:
-        """The modes that we asked for lately and that no heartbeat has shown since, the newest last."""
+        """The recently requested modes that no heartbeat has shown since, the newest last."""
         now = self.clock()
-        requests = [(mode, at) for mode, at in self._modes_asked.items() if now - at <= HEARTBEAT_TIMEOUT]
+        requests = [(mode, at) for mode, at in self._requested_modes.items() if now - at <= HEARTBEAT_TIMEOUT]
         for changed_at, mode in self.state.mode_changes:
             answered = [at for requested, at in requests if requested == mode and at <= changed_at]
             if answered:
                 requests = [(requested, at) for requested, at in requests if at > answered[-1]]
-            else:  # somebody else's switch: our earlier requests are void
+            else:  # a switch by the pilot or a failsafe: our earlier requests are void
                 requests = [(requested, at) for requested, at in requests if at >= changed_at]
         return [mode for mode, _ in requests]
 
@@ -157,13 +171,13 @@ class BaseVehicle:
             raise ModeChanged(f"the vehicle is in {self.mode}, not in {mode}; `{mode.lower()}` gets it there")
 
     def held_by(self, mode: str) -> None:
-        """Raise NotArmed if the vehicle was disarmed, ModeChanged if somebody else took it out of `mode`."""
+        """Raise NotArmed if the vehicle was disarmed, ModeChanged if the pilot or a failsafe switched its mode."""
         if self.state.armed is None:
             raise NotArmed("the autopilot rebooted meanwhile")
         if not self.state.armed:  # the mode comes second: a reboot changes both
             raise NotArmed("the vehicle was disarmed meanwhile" + ("" if self.mode == mode else f", in {self.mode}"))
         if self.mode != mode:
-            raise ModeChanged(f"the vehicle left {mode}: it is in {self.mode} now, and whoever switched it has it")
+            raise ModeChanged(f"the vehicle left {mode}: the pilot or a failsafe switched it to {self.mode}")
 
     async def flown(
         self, mode: str, names: Iterable[str], done: Callable[[], T | None], timeout: float, action: str
@@ -183,6 +197,52 @@ class BaseVehicle:
             return done()
 
         return await self.waiting.until({"HEARTBEAT", *names}, guarded, timeout, action)
+
+    @property
+    def holding_mode(self) -> str:
+        """The mode in which a vehicle of its type stays where it is, by itself."""
+        names = mode_names(self.state.vehicle_type)
+        return next((mode for mode in HOLDING_MODES if mode in names), self.mode)
+
+    def inside(self, order: messages.Target | messages.Command) -> Callable[[], None]:
+        """The check that the vehicle stays in its envelope with this order; for `CommandAuthority.take`."""
+        if isinstance(order, messages.Command):
+            message = order.to(self.address, 0)
+        else:
+            message = order.to(self.address, messages.NO_YAW)
+        return lambda: self.guard.require(message)
+
+    def require_route(self, places: Iterable[messages.GlobalTarget]) -> None:
+        """Raise OutsideEnvelope unless the straight ways from here through those places stay in the envelope."""
+        if self.guard.in_force:
+            self.guard.check.require_way([[self.guard.check.here(), *(Stop(p.lat, p.lon, p.alt) for p in places)]])
+
+    async def mission_to_fly(self) -> list[MissionItem]:
+        """The mission that it holds, for a verb that takes the vehicle then.
+
+        Raises:
+            Superseded: another job has taken it meanwhile, by a newer command.
+            Rejected, TimedOut, LinkLost.
+        """
+        commander = self.authority.commander
+        _, items = await self.waypoints.download()
+        if self.authority.commander is not commander:
+            raise Superseded("a newer command took the vehicle while its mission was read")
+        return items
+
+    def _allow_upload(self, items: Sequence[MissionItem]) -> None:
+        self.guard.require_mission(items, from_here=False)
+
+    @property
+    def is_mode_of_ours(self) -> bool:
+        """Whether it came into its mode by our command."""
+        asked_at = None if self.state.mode is None else self._requested_modes.get(self.state.mode)
+        return asked_at is not None and asked_at <= self.state.mode_since <= asked_at + HEARTBEAT_TIMEOUT
+
+    @property
+    def has_foreign_target(self) -> bool:
+        """Whether the autopilot reports a target that another ground station gave it."""
+        return False
 
     def commanding(self, job: Job, *needs: Callable[[], None]) -> Callable[[], None]:
         """The check before each message of `job`: it still commands, and no need raises."""
@@ -207,7 +267,7 @@ class BaseVehicle:
 
         Raises:
             Invalid: no such mode.
-            ModeChanged: somebody else switched it meanwhile.
+            ModeChanged: the pilot or a failsafe switched it meanwhile.
             Rejected, TimedOut, LinkLost.
         """
         number = mode_number(self.state.vehicle_type, mode)
@@ -219,7 +279,7 @@ class BaseVehicle:
             elsewhere = self.state.mode not in (before, number, None, *on_its_way)
             left_again = has_shown and self.state.mode not in (number, None)
             if elsewhere or left_again:
-                raise ModeChanged(f"the vehicle is in {self.mode} now: somebody else switched it meanwhile")
+                raise ModeChanged(f"the pilot or a failsafe switched the vehicle to {self.mode} meanwhile")
             has_shown = has_shown or self.state.mode == number
             return self.state.mode == number
 
@@ -227,8 +287,8 @@ class BaseVehicle:
             shown()
 
         def noted() -> None:
-            self._modes_asked.pop(number, None)
-            self._modes_asked[number] = self.clock()
+            self._requested_modes.pop(number, None)
+            self._requested_modes[number] = self.clock()
             job.modes.add(mode_name(self.state.vehicle_type, number))
 
         check = self.commanding(job, switched_by_nobody_else, *needs, noted)
@@ -236,7 +296,7 @@ class BaseVehicle:
             switch = command or messages.set_mode(number)
             await self.commands.send_until_shown(switch, check, shown, f"show mode {mode.upper()}")
         except Rejected:
-            self._modes_asked.pop(number, None)
+            self._requested_modes.pop(number, None)
             raise
         self.authority.shown(job)
 
@@ -273,4 +333,4 @@ class BaseVehicle:
 
         with self.waiting.expecting({name}, from_autopilot) as expected:
             await self.commands.send(messages.request_message(messages.MESSAGE_IDS[name]))
-            return await expected.within(HEARTBEAT_TIMEOUT, f"tell {name}")
+            return await expected.within(HEARTBEAT_TIMEOUT, f"report {name}")

@@ -1,6 +1,6 @@
 """A command and its acknowledgement.
 
-An ack counts only if it comes from the component that was asked, for that command, to us, after we asked. Without
+An ack counts only if the addressed component sends it to us, for that command, after we sent the command. Without
 an ack, a command that may be repeated is sent again.
 """
 
@@ -76,7 +76,7 @@ class CommandSender:
                 it raises ends the command.
 
         Raises:
-            Rejected: refused, with MAV_RESULT and the STATUSTEXTs since it was asked.
+            Rejected: refused, with MAV_RESULT and the STATUSTEXTs since the command.
             TimedOut: no ack, also after sending again.
             LinkLost: the heartbeats stopped, or there is no link.
         """
@@ -107,7 +107,7 @@ class CommandSender:
             action: ends the sentence "vehicle 1 did not …".
 
         Raises:
-            Rejected, TimedOut, LinkLost: as `send`; and whatever `check` and `shown` raise.
+            Rejected, TimedOut, LinkLost: as `send`; also the errors of `check` and `shown`.
         """
         for seconds in SHOWN_WITHIN:
             await self.send(command, check, shown=shown)

@@ -17,7 +17,7 @@ from mavproxy_uavapi.core.vehicle.turning import TurningVehicle
 
 TAKEOFF_SHARE = 0.05  # of the altitude, between TAKEOFF_TOLERANCE's two ends
 TAKEOFF_TOLERANCE = (0.3, 1.0)  # m
-TAKEOFF_END = 3.0  # s at its altitude after which a takeoff counts as done, whatever the autopilot says
+TAKEOFF_END = 3.0  # s at its altitude after which a takeoff counts as done, even if the autopilot still reports it
 LIFT_OFF_TIMEOUT = 5.0  # s in which an unacknowledged takeoff must show
 SLOWDOWN = 0.3  # s that a pause on the ground needs to slow the motors from full throttle
 STOP_TIMEOUT = 20.0  # s from full speed to rest
@@ -29,11 +29,11 @@ class Copter(TurningVehicle):
 
     holding_mode = "BRAKE"
 
-    def last_word(self) -> Any:
+    def hold_message(self) -> Any:
         """A zero velocity in GUIDED, else BRAKE."""
         if self.mode == self.next_mode == GUIDED:
             return VelocityTarget(0, 0, 0).to(self.address, NO_YAW)
-        return super().last_word()
+        return super().hold_message()
 
     @property
     def takes_speeds(self) -> bool:
@@ -45,14 +45,14 @@ class Copter(TurningVehicle):
     async def takeoff(self, job: Job, alt: float, *, vtol: bool = False, timeout: float | None = None) -> None:
         """Climb to `alt` m above home from the ground, armed and in GUIDED; done within tolerance of it.
 
-        The tolerance is 5 % of `alt`, at least 0.3 m and at most 1 m. It is vertical whatever `vtol` says.
+        The tolerance is 5 % of `alt`, at least 0.3 m and at most 1 m. A copter ignores `vtol`.
         """
         self.require_armed()
         self.require_mode(GUIDED)
         if self.state.landed is False:
             raise Busy("the vehicle is flying already")
         was_paused = self.authority.paused
-        self.authority.take(job, Rank.ARM)
+        self.authority.take(job, Rank.ARM, self.inside(messages.takeoff(alt)))
         await self._lift_off(job, alt)
         if was_paused:  # a pause outlives a takeoff in the autopilot
             await self._continue(job)
@@ -114,7 +114,7 @@ class Copter(TurningVehicle):
 
         Raises:
             NotFound: the vehicle is disarmed and has no home yet.
-            ModeChanged: somebody armed it while we requested its home.
+            ModeChanged: it was armed while we requested its home.
         """
         self.authority.take(job, Rank.STOP)
         if await self.is_done_at_home():
@@ -204,7 +204,7 @@ class Copter(TurningVehicle):
         not arm again until it reboots.
         """
         with contextlib.suppress(TimedOut):  # the setpoints are sent anyway
-            self.authority.begin_pause()  # whoever takes over has to end the pause
+            self.authority.begin_pause()  # the next commander must end the pause
             await self.commands.send(messages.pause(True), self.commanding(job, self.flying))
             await asyncio.sleep(SLOWDOWN)
         await self.rest(job)

@@ -1,7 +1,7 @@
 """What a vehicle does when the job that flies it ends. Only this module decides that, from telemetry.
 
 If another job or the pilot has the vehicle, nothing is sent. Else the table says what follows: a job like any other,
-which commands by rank, sends until telemetry shows the effect, and ends when somebody else commands.
+which commands by rank, sends until telemetry shows the effect, and ends when another job or the pilot commands.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ log = logging.getLogger("uavapi.copter")
 
 
 class Policy(Enum):
-    """What a vehicle shall do when nobody flies it any more."""
+    """What a vehicle shall do when the job that flies it ends."""
 
     NOTHING = "nothing"  # it follows its last command
     HOLD = "hold"  # it stops and stays, a landing too
@@ -59,7 +59,7 @@ WHAT_FOLLOWS: Mapping[Situation, Mapping[Policy, str | None]] = {
 }
 LANDINGS = {"LAND", "QLAND"}
 RETURNS = {"RTL", "SMART_RTL", "QRTL"}
-# After these errors somebody else has the vehicle: a pilot, whoever stopped it, or a failsafe.
+# After these errors we do not have the vehicle: the pilot, a client that stopped it, or a failsafe has it.
 HAS_ANOTHER_MASTER = (ModeChanged, NotArmed, Paused, LinkLost)
 FIXED: Mapping[Ending, Policy] = {
     Ending.DONE: Policy.NOTHING,
@@ -97,6 +97,7 @@ class FlightEndings:
     Attributes:
         on_disconnect: policy for a vehicle whose client hung up.
         on_script_exit: policy for a vehicle whose script died.
+        on_lease_end: policy for a vehicle whose client let its lease run out.
 
     Args:
         jobs: all jobs.
@@ -105,6 +106,7 @@ class FlightEndings:
     def __init__(self, jobs: JobBook) -> None:
         self.on_disconnect = Policy.NOTHING
         self.on_script_exit = Policy.HOLD
+        self.on_lease_end = Policy.HOLD
         self._jobs = jobs
         self._closing: dict[str, Job] = {}  # by the number of the job before
         jobs.on_ended.append(self._ended)
@@ -116,6 +118,8 @@ class FlightEndings:
             return Policy(job.on_disconnect) if job.on_disconnect else self.on_disconnect
         if job.ending is Ending.SCRIPT_GONE:
             return self.on_script_exit
+        if job.ending is Ending.LEASE_OVER:
+            return self.on_lease_end
         if job.ending is Ending.FAILED and job.steers and not isinstance(job.error, HAS_ANOTHER_MASTER):
             return Policy.SAFE
         return FIXED[job.ending]
@@ -136,13 +140,13 @@ class FlightEndings:
         """The action that `see_to` would take now; None for none."""
         return WHAT_FOLLOWS[situation(vehicle, modes)][policy]
 
-    def last_words(self) -> list[tuple[Any, int]]:
+    def closing_messages(self) -> list[tuple[Any, int]]:
         """Messages that must be sent before the link is given back, and the systems that they go to."""
-        last_words = []
+        closing_messages = []
         for job in self._closing.values():
             if job.running:
-                last_words.append((job.vehicle.last_word(), job.vehicle.state.system))
-        return last_words
+                closing_messages.append((job.vehicle.hold_message(), job.vehicle.state.system))
+        return closing_messages
 
     def see_to(
         self, vehicle: Vehicle, policy: Policy, why: str, client: str, modes: Collection[str] = ()

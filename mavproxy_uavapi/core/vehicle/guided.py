@@ -11,6 +11,7 @@ from mavproxy_uavapi.core.mavlink.pending_waits import PendingWaits
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle import messages, setpoint_in_force, time_limits
 from mavproxy_uavapi.core.vehicle.authority import Rank
+from mavproxy_uavapi.core.vehicle.envelope_check import Spaces
 from mavproxy_uavapi.core.vehicle.geodesy import offset
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.messages import NO_YAW, GlobalTarget, NedTarget, Target, VelocityTarget, Yaw
@@ -29,8 +30,15 @@ TAKING_OFF = messages.mavlink.MAV_LANDED_STATE_TAKEOFF
 class GuidedVehicle(Vehicle):
     """A vehicle that goes to positions in GUIDED."""
 
-    def __init__(self, state: VehicleState, link: Link, pending: PendingWaits, clock: Callable[[], float]) -> None:
-        super().__init__(state, link, pending, clock)
+    def __init__(
+        self,
+        state: VehicleState,
+        link: Link,
+        pending: PendingWaits,
+        clock: Callable[[], float],
+        spaces: Spaces = tuple,
+    ) -> None:
+        super().__init__(state, link, pending, clock, spaces)
         self._sent: Target | None = None  # our newest setpoint
         self._sent_at = 0.0
         self._shown: GlobalTarget | None = None  # our target as the autopilot reports it
@@ -44,7 +52,7 @@ class GuidedVehicle(Vehicle):
 
     @property
     def is_taking_off(self) -> bool:
-        """Whether the autopilot reports a takeoff, whoever commanded it."""
+        """Whether the autopilot reports a takeoff, ours or another one."""
         return bool(self.state.recent_field("EXTENDED_SYS_STATE", "landed_state") == TAKING_OFF)
 
     def require_no_takeoff(self) -> None:
@@ -84,7 +92,7 @@ class GuidedVehicle(Vehicle):
         north, east, up = self.leg_to(target)
         if self.height + up < FLOOR - TOLERANCE:
             raise Invalid(f"the target lies {-(self.height + up):.1f} m below home")
-        self.authority.take(job, Rank.MOVEMENT)
+        self.authority.take(job, Rank.MOVEMENT, self.inside(target))
         yaw = messages.facing(heading, look_at_target, north, east)
         await self.take_up(job, target, yaw)
         if not wait:
@@ -127,6 +135,22 @@ class GuidedVehicle(Vehicle):
                 return
         raise Superseded("another ground station gave the vehicle another target")
 
+    @property
+    def has_foreign_target(self) -> bool:
+        """Whether the autopilot reports another target or velocity than the newest of ours."""
+        flown = setpoint_in_force.shown(self.state, self._sent_at + TARGET_SHOWN)
+        if flown is None:
+            return False
+        if isinstance(flown, VelocityTarget):
+            speed = math.hypot(flown.vx, flown.vy, flown.vz)
+            ours = self._sent
+            own = math.hypot(ours.vx, ours.vy, ours.vz) if isinstance(ours, VelocityTarget) else 0.0
+            return speed > ARRIVAL_SPEED and abs(speed - own) > ARRIVAL_SPEED
+        if self._sent is None or isinstance(self._sent, VelocityTarget):
+            return True
+        self._shown = self._shown or flown
+        return max(*map(abs, offset(self._shown.lat, self._shown.lon, flown.lat, flown.lon))) > SAME_PLACE
+
     def speed_by(self, target: NedTarget | GlobalTarget) -> float:
         """Speed (m/s), from the message that has the position in the target's frame."""
         if isinstance(target, NedTarget):
@@ -136,7 +160,7 @@ class GuidedVehicle(Vehicle):
         return math.hypot(here.vx, here.vy, here.vz) * scale
 
     def report_leg(self, job: Job, distance: float) -> None:
-        """Have the job tell the altitude and what is left of the way."""
+        """Set the job's progress: the altitude, and the distance to go."""
         job.progress = {"altitude": self.height, "distance_to_go": distance}
 
     # -- setpoints ----------------------------------------------------------------------------------------
@@ -145,7 +169,7 @@ class GuidedVehicle(Vehicle):
         """Send a setpoint of `job` to a vehicle that is still in GUIDED.
 
         Raises:
-            Superseded, Paused, NotArmed, ModeChanged: somebody else has the vehicle; nothing is sent.
+            Superseded, Paused, NotArmed, ModeChanged: the job no longer has the vehicle; nothing is sent.
         """
         await pass_gate()
         self.commanding(job, self.flying)()

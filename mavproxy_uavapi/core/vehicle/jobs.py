@@ -1,4 +1,4 @@
-"""Verbs in flight: every blocking call is a job that somebody awaits.
+"""Verbs in flight: every call that flies is a job.
 
 The CommandAuthority of a vehicle decides which job commands it. An identical request joins the running job.
 """
@@ -12,7 +12,7 @@ from enum import Enum
 from typing import Any
 
 from mavproxy_uavapi.core.errors import Aborted, Superseded, TimedOut, UavApiError, without_frames
-from mavproxy_uavapi.core.sent_messages import SentNames, noting_sent_if_nobody_does
+from mavproxy_uavapi.core.sent_messages import SentNames, noting_sent_unless_noted
 
 FINISHED_KEPT = 100
 CONSOLE = "console"  # the client of what was typed at MAVProxy's prompt
@@ -27,6 +27,7 @@ class Ending(Enum):
     ABORTED = "aborted"  # by DELETE, or at the prompt
     CLIENT_GONE = "client gone"
     SCRIPT_GONE = "script gone"
+    LEASE_OVER = "lease over"
     UNLOADED = "unloaded"  # the API stops, or a module is unloaded
     DEFECT = "defect"  # of ours
 
@@ -40,10 +41,11 @@ class Job:
         request: the validated parameters.
         vehicle: what it commands; two jobs of one vehicle have the same object here.
         client: the client that began it: an address, or CONSOLE.
+        holder: the name by which that client may hold a lease; the same where it gave none.
         began_at, ended_at: on the loop's clock (s); ended_at is None while it runs.
         ending: why it ended; None while it runs.
         steers: whether the job flies the vehicle by a stream of setpoints, without which the vehicle must stop.
-        modes: names of the flight modes that it switched to; in any other mode somebody else has the vehicle.
+        modes: names of the flight modes that it switched to; in any other mode the pilot has the vehicle.
         script: the session of a script that the job goes on for; None for no script.
         outlives_client: whether it goes on when its client hangs up (land, rtl).
         on_disconnect: the `Policy`, by its value, of a client that hangs up; None for that of the setting.
@@ -58,7 +60,7 @@ class Job:
         self, number: int, verb: str, request: Mapping[str, Any], vehicle: Any, *, client: str, outlives_client: bool
     ) -> None:
         self.id = str(number)
-        self.client = client
+        self.client = self.holder = client
         self.verb = verb
         self.request = dict(request)
         self.vehicle = vehicle
@@ -79,7 +81,7 @@ class Job:
         self._task: asyncio.Task[None] | None = None
         self._limit: asyncio.TimerHandle | None = None
         self._finished = asyncio.Event()
-        self._clients: list[str | None] = []  # those that wait: the session of a script, None for anybody else
+        self._clients: list[str | None] = []  # the waiting clients: the session of a script, None for other clients
         self._sessions_sought = 0
         self._goes_on_for_others = False  # than a script
         self._when_ended: list[Callable[[], None]] = []
@@ -156,7 +158,7 @@ class Job:
         """Have the job go on without its clients: while a script lives, or to its end if no script asks for that.
 
         Args:
-            session: finds the session of the script that asks; None for anybody else. The job goes on meanwhile.
+            session: finds the session of the calling script; None for other clients. The job goes on meanwhile.
 
         Returns:
             What `session` found.
@@ -174,7 +176,7 @@ class Job:
         return script
 
     def end_with_script(self) -> None:
-        """End the job because its script died. It goes on if somebody else asked for the same, or waits for it."""
+        """End the job because its script died. It goes on if another client requested the same, or waits for it."""
         others_wait = any(client != self.script for client in self._clients)
         if not (others_wait or self._goes_on_for_others or self._sessions_sought):
             self.abort(Aborted(f"{self.verb}: its script died"), Ending.SCRIPT_GONE)
@@ -186,7 +188,7 @@ class Job:
         return not (self.outlives_client or self.script is not None or others)
 
     async def outcome(self, script: str | None = None) -> str:
-        """Await its result for a client. When the last client hangs up, the job ends unless it goes on for somebody.
+        """Await its result for a client. When the last client hangs up, the job ends, unless `go_on_for` keeps it.
 
         Args:
             script: the client's session, if it is a script that the job goes on for.
@@ -239,7 +241,7 @@ class JobBook:
         self._jobs[job.id] = self._running[job.id] = job
         job.when_ended(lambda: self._ended(job))
         self._forget_old()
-        with noting_sent_if_nobody_does() as job.sent:
+        with noting_sent_unless_noted() as job.sent:
             job.start(body, timeout)
         return job
 

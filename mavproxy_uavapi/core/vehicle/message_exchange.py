@@ -53,7 +53,7 @@ class MessageExchange(Generic[T]):
         """The value of the next message; None when none comes within `timeout` s.
 
         Raises:
-            LinkLost: the vehicle's heartbeats stopped; and whatever `read` raises.
+            LinkLost: the vehicle's heartbeats stopped; also the errors of `read`.
         """
         try:
             value = await wait_with_timeout(timeout, self._values.get())

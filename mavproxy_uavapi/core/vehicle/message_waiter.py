@@ -58,7 +58,7 @@ class MessageWaiter:
         """Wait until `condition` is not None; it is checked now and after each message of these names.
 
         Raises:
-            TimedOut, LinkLost: as `message`; and whatever `condition` raises.
+            TimedOut, LinkLost: as `message`; also the errors of `condition`.
         """
         value = condition()
         if value is not None:
@@ -118,7 +118,7 @@ class ExpectedMessage(Generic[T]):
             action: ends the sentence "vehicle 1 did not …".
 
         Raises:
-            TimedOut, LinkLost: as `MessageWaiter.message`; and whatever the test raises.
+            TimedOut, LinkLost: as `MessageWaiter.message`; also the errors of the test.
         """
         try:
             await wait_with_timeout(timeout, self._done.wait())

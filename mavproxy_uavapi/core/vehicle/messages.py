@@ -177,7 +177,7 @@ def set_servo(channel: int, pwm: int) -> Command:
 
 
 def set_mission_current(seq: int) -> Command:
-    """Make mission item `seq` (from 1) the current one, and count its jumps anew."""
+    """Make mission item `seq` (from 1) the current one, and reset its jump counters."""
     return Command(mavlink.MAV_CMD_DO_SET_MISSION_CURRENT, (seq, 1))
 
 

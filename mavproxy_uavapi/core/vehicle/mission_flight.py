@@ -42,14 +42,16 @@ async def fly(vehicle: Vehicle, job: Job, until_complete: bool = False, timeout:
         NotArmed: arm it first.
         ModeChanged: it is in a pilot's mode, or left AUTO meanwhile.
         Busy: it has no mission.
+        Superseded: a newer command took it meanwhile.
+        OutsideEnvelope: the mission, or the way to it, leaves the envelope.
         Rejected, TimedOut, LinkLost.
     """
     _require_startable(vehicle)
-    _, items = await vehicle.waypoints.download()
+    items = await vehicle.mission_to_fly()
     if not items:
         raise Busy("the vehicle has no mission; POST one to /mission/waypoints")
     _require_startable(vehicle)  # the pilot may have switched it meanwhile
-    vehicle.authority.take(job, Rank.ARM)
+    vehicle.authority.take(job, Rank.ARM, lambda: vehicle.guard.require_mission(items, from_here=True))
     await begin(vehicle, job, lambda: _require_startable(vehicle))
     if until_complete:
         await _flown_to_its_end(vehicle, job, items, timeout or LONGEST)

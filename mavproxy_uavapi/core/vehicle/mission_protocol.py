@@ -1,8 +1,8 @@
 """MAVLink's mission protocol: upload with read-back, download, clear.
 
-Messages count only from the autopilot that we asked, to us, and about the mission (not the fence or the rally
-points). Without an answer we ask again. MAVProxy's own `wp` module hears the same messages, but answers only those of
-transfers that it began.
+Messages count only if the addressed autopilot sends them to us and they are about the mission (not the fence or the
+rally points). Without an answer a request is repeated. MAVProxy's own `wp` module receives the same messages, but
+answers only those of its own transfers.
 """
 
 from __future__ import annotations
@@ -42,12 +42,25 @@ class Waypoints:
 
     Attributes:
         changed_at: when we last changed or started it, on the clock of arrivals (s).
+
+    Args:
+        state: the vehicle's.
+        link: the way out.
+        waiting: its waits.
+        allow: called with what is to be uploaded; what it raises refuses that.
     """
 
-    def __init__(self, state: VehicleState, link: Link, waiting: MessageWaiter) -> None:
+    def __init__(
+        self,
+        state: VehicleState,
+        link: Link,
+        waiting: MessageWaiter,
+        allow: Callable[[Sequence[MissionItem]], None] = lambda items: None,
+    ) -> None:
         self._state = state
         self._link = link
         self._waiting = waiting
+        self._allow = allow
         self._lock = asyncio.Lock()  # the protocol knows one transfer at a time
         self.changed_at = 0.0
 
@@ -78,6 +91,7 @@ class Waypoints:
 
         Raises:
             Rejected: with the MAV_MISSION_RESULT as `ack`.
+            OutsideEnvelope: it leaves the envelope; nothing was sent.
             TimedOut, LinkLost.
         """
 
@@ -85,6 +99,7 @@ class Waypoints:
             check()
             progress(done, of)
 
+        self._allow(items)
         async with self._lock:
             _, old = await self._download()
             await pass_gate()
@@ -146,18 +161,18 @@ class Waypoints:
                     return value
                 if message.get_type() == "MISSION_ACK" and message.type != mavlink.MAV_MISSION_ACCEPTED:
                     refusal = self._refusal(message, action)
-        raise refusal or TimedOut(f"vehicle {self._state.system} did not {action}, asked {SENDINGS} times")
+        raise refusal or TimedOut(f"vehicle {self._state.system} did not {action} after {SENDINGS} requests")
 
     async def _ask_count(self, talk: MessageExchange[Any]) -> int:
         question = mavlink.MAVLink_mission_request_list_message(*self._address, MISSION)
-        return await self._ask(talk, question, _count_of, "tell how many mission items it has")
+        return await self._ask(talk, question, _count_of, "report how many mission items it has")
 
     async def _download(self) -> tuple[MissionItem | None, list[MissionItem]]:
         with self._talk(ANSWERS) as talk:
             items = []
             for seq in range(await self._ask_count(talk)):
                 question = mavlink.MAVLink_mission_request_int_message(*self._address, seq, MISSION)
-                items.append(await self._ask(talk, question, _item_number(seq), f"tell mission item {seq}"))
+                items.append(await self._ask(talk, question, _item_number(seq), f"send mission item {seq}"))
             await self._send(
                 mavlink.MAVLink_mission_ack_message(*self._address, mavlink.MAV_MISSION_ACCEPTED, MISSION)
             )
@@ -218,7 +233,7 @@ class Waypoints:
                 return
             if message is None and handed_over:
                 raise TimedOut(
-                    f"vehicle {self._state.system} asked for {len(handed_over)} of {len(items)} items only"
+                    f"vehicle {self._state.system} requested only {len(handed_over)} of {len(items)} items"
                 )
             if message is None:
                 continue

@@ -50,11 +50,11 @@ class Parameters:
                     self._requests[self._state.reboots, name] = self._count(name) + 1
                     await self._link.send(messages.read_parameter(self._address, name), self._state.system)
                 with contextlib.suppress(TimedOut):
-                    await answers.within(TIMEOUT, f"tell {', '.join(requested)}")
+                    await answers.within(TIMEOUT, f"report {', '.join(requested)}")
         return {name: known[name] for names in quantities for name in names if name in known}
 
     async def read_now(self, name: str) -> float:
-        """The value of a parameter, asked for now.
+        """Request the value of a parameter now.
 
         Raises:
             NotFound: the vehicle does not answer for it: it has no such parameter.
@@ -64,7 +64,7 @@ class Parameters:
             with self._waiting.expecting({"PARAM_VALUE"}, _value_of(name)) as answer:
                 await self._link.send(messages.read_parameter(self._address, name), self._state.system)
                 with contextlib.suppress(TimedOut):
-                    return await answer.within(TIMEOUT, f"tell {name}")
+                    return await answer.within(TIMEOUT, f"report {name}")
         raise NotFound(f"vehicle {self._state.system} has no parameter {name}")
 
     async def set(self, name: str, value: float) -> float:
@@ -78,7 +78,7 @@ class Parameters:
         if name not in self._state.parameters:
             await self.read_now(name)
         for _ in range(MOST_REQUESTS):
-            values: list[float] = []  # that it tells meanwhile: its own, or the answer to an earlier request
+            values: list[float] = []  # reported meanwhile: its present value, or the answer to an earlier request
 
             def set_to(message: Any, values: list[float] = values) -> float | None:
                 if message.param_id == name:

@@ -64,9 +64,9 @@ class Plane(GuidedVehicle):
         await super().arm(job, timeout)
 
     def _require_disarmed(self) -> None:
-        """Raises ModeChanged unless it is disarmed: the mission of a vehicle that somebody armed is left alone."""
+        """Raise ModeChanged unless it is disarmed: the mission of a vehicle that another client armed must stay."""
         if self.state.armed is not False:
-            raise ModeChanged(f"the vehicle is armed in {self.mode} now: whoever armed it has it")
+            raise ModeChanged(f"the pilot or another client has armed the vehicle, in {self.mode}")
 
     # -- up and down --------------------------------------------------------------------------------------
 
@@ -79,7 +79,7 @@ class Plane(GuidedVehicle):
         self.require_mode(GUIDED)
         if self.state.landed is False:
             raise Busy("the vehicle is flying already")
-        self.authority.take(job, Rank.ARM)
+        self.authority.take(job, Rank.ARM, self.inside(messages.takeoff(alt)))
         allowed = self.allowed(CIRCLES + time_limits.leg_time(await self.limits(), 0.0, alt), timeout)
         if vtol:
             await self.commands.send(messages.takeoff(alt), self.commanding(job, self.flying))
@@ -137,11 +137,12 @@ class Plane(GuidedVehicle):
         here = self.fresh("GLOBAL_POSITION_INT")
         place = GlobalTarget(lat, lon, alt)
         items = landing_pattern.pattern(place, (here.lat / 1e7, here.lon / 1e7), vtol=vtol)
-        self.authority.take(job, Rank.STOP)
+        self.authority.take(job, Rank.STOP, lambda: self.guard.require_mission(items, from_here=True))
         if self.mode == AUTO:  # a mission cannot change while it is flown
             await self.switch_to(job, self.holding_mode)
         mode = self.mode
         await self.waypoints.upload(items, check=self.commanding(job, lambda: self.held_by(mode)))
+        self.guard.require_mission(items, from_here=True)  # again, because the upload has changed the mission
         await mission_flight.begin(self, job, lambda: self.held_by(mode) if self.mode != AUTO else None)
 
     async def come_down(self, job: Job) -> None:
@@ -211,7 +212,7 @@ class Plane(GuidedVehicle):
         place = self._global(target)
         if place.alt < 0:
             raise Invalid(f"the target lies {-place.alt:.1f} m below home")
-        self.authority.take(job, Rank.MOVEMENT)
+        self.authority.take(job, Rank.MOVEMENT, self.inside(messages.reposition(place)))
         await self._reposition(job, place)
         if not wait:
             return

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from mavproxy_uavapi.core.envelope.store import Envelopes
 from mavproxy_uavapi.core.errors import NoVehicle
 from mavproxy_uavapi.core.mavlink.flight_modes import kind_of
 from mavproxy_uavapi.core.mavlink.link import Link
@@ -30,10 +31,18 @@ class VehicleRegistry:
         link_watch: knows whether a link is alive.
         pending: the waits on them.
         clock: monotonic seconds, the clock of arrivals.
+        envelopes: those in force.
     """
 
     def __init__(
-        self, fleet: Fleet, link: Link, link_watch: LinkWatch, pending: PendingWaits, clock: Callable[[], float]
+        self,
+        fleet: Fleet,
+        link: Link,
+        link_watch: LinkWatch,
+        pending: PendingWaits,
+        clock: Callable[[], float],
+        *,
+        envelopes: Envelopes | None = None,
     ) -> None:
         self.current = 0
         self._fleet = fleet
@@ -41,6 +50,7 @@ class VehicleRegistry:
         self._link_watch = link_watch
         self._pending = pending
         self._clock = clock
+        self._envelopes = Envelopes() if envelopes is None else envelopes
         self._vehicles: dict[int, Vehicle] = {}
 
     def resolve(self, system: int = 0) -> int:
@@ -62,7 +72,9 @@ class VehicleRegistry:
         make = CLASSES[kind_of(state.vehicle_type)]
         vehicle = self._vehicles.get(system_id)
         if type(vehicle) is not make:  # the first time, or the autopilot came back with other firmware
-            vehicle = self._vehicles[system_id] = make(state, self._link, self._pending, self._clock)
+            vehicle = self._vehicles[system_id] = make(
+                state, self._link, self._pending, self._clock, lambda: self._envelopes.of(system_id)
+            )
         return vehicle
 
     def commandable(self, system: int = 0) -> Vehicle:

@@ -47,8 +47,8 @@ async def ask(state: VehicleState, waiting: MessageWaiter, link: Link) -> Global
         for name in (PLACE, MOTION):
             await link.send(request_message(MESSAGE_IDS[name]).to(address, 0), state.system)
         with contextlib.suppress(TimedOut):
-            velocity = velocity_of(await motion.within(TIMEOUT, f"tell {MOTION}"))
-            return velocity or place_of(await place.within(LATER, f"tell {PLACE}"), state)
+            velocity = velocity_of(await motion.within(TIMEOUT, f"report {MOTION}"))
+            return velocity or place_of(await place.within(LATER, f"report {PLACE}"), state)
     return None
 
 

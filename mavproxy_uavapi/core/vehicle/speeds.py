@@ -1,7 +1,7 @@
-"""The speeds that clients ask for. Pure.
+"""The speeds that clients request. Pure.
 
-ArduCopter forgets a speed when its mode or the kind of setpoint changes. In a pilot's mode it accepts none: a speed
-that is asked for then is remembered until the vehicle flies in GUIDED.
+ArduCopter drops a speed when its mode or the kind of setpoint changes. In a pilot's mode it accepts none: a speed
+that is requested then is stored until the vehicle flies in GUIDED.
 """
 
 from __future__ import annotations

@@ -53,7 +53,7 @@ class StreamRequester:
     async def run(self) -> None:
         """Look every few seconds, until cancelled."""
         while True:
-            with contextlib.suppress(UavApiError):  # no vehicle, or its link is lost: nobody to ask just now
+            with contextlib.suppress(UavApiError):  # no vehicle, or its link is lost: nothing can be requested
                 await self.look(self._registry.commandable(self._system))
             await asyncio.sleep(LOOK_EVERY)
 

@@ -14,7 +14,7 @@ MARGIN = 30.0  # s of the vehicle's clock
 FLOOR = 30.0  # s of ours: SIM_SPEEDUP does not shorten acks, heartbeats and a machine's pauses
 
 # ArduCopter's parameters: each quantity's name up to 4.6 in cm or cm/s, its name since 4.7 in m or m/s, and the
-# default (m, m/s, m/s/s), which counts until the vehicle has told its own. Times are in ms and s in both.
+# default (m, m/s, m/s/s), which is used until the vehicle has reported its own. Times are in ms and s in both.
 NAMES = {
     "horizontal": ("WPNAV_SPEED", "WP_SPD", 10.0),
     "up": ("WPNAV_SPEED_UP", "WP_SPD_UP", 2.5),

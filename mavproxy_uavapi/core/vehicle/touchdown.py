@@ -31,7 +31,7 @@ class Touchdown:
         """
         if self._disarmed_at is None:
             self._disarmed_at = now
-        told_since = age is not None and now - age > self._disarmed_at
-        if told_since:
+        updated_since = age is not None and now - age > self._disarmed_at
+        if updated_since:
             return True if abs(self._sinking) <= STANDING else None
         return True if now - self._disarmed_at >= POSITION_TIMEOUT else None

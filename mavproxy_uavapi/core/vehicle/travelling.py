@@ -41,7 +41,7 @@ class TravellingVehicle(GuidedVehicle):
         the setpoint is repeated for that time, then a stop is sent.
         """
         self.require_guided_flight()
-        self.authority.take(job, Rank.MOVEMENT)
+        self.authority.take(job, Rank.MOVEMENT, self.inside(velocity))
         yaw = messages.facing(heading, look_at_target, velocity.vx, velocity.vy)
         job.steers = duration is not None
         await self.take_up(job, velocity, yaw)

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from mavproxy_uavapi.core.errors import Busy, ModeChanged, NotArmed, NotFound, NotSupported, Rejected, TimedOut
-from mavproxy_uavapi.core.mavlink.flight_modes import mode_names, mode_number
+from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission, mode_names, mode_number
 from mavproxy_uavapi.core.vehicle import arming, messages
 from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_uavapi.core.vehicle.jobs import Job
@@ -14,7 +14,6 @@ from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
 from mavproxy_uavapi.core.vehicle.verbs import Verbs
 
 STOPPING_MODES = {"LAND", "RTL", "SMART_RTL", "BRAKE", "QLAND", "QRTL", "HOLD"}
-HOLDING_MODES = ("LOITER", "HOLD", "POSHOLD", "ALT_HOLD", "STOP", "RTL")  # what comes first in a vehicle's mode map
 HOME_RADIUS = 10.0  # m; closer than this a vehicle on the ground is at home
 
 
@@ -30,7 +29,7 @@ class Vehicle(Verbs):
         """Wait until it is ready, switch to GUIDED, arm, and wait until it is armed.
 
         A vehicle that flies in another mode than GUIDED belongs to its pilot: `ModeChanged`. So does one that
-        somebody arms meanwhile.
+        is armed by another client meanwhile.
 
         Raises:
             Rejected: it did not get ready, or refused; with the autopilot's reasons.
@@ -58,19 +57,19 @@ class Vehicle(Verbs):
         self.authority.shown(job)
 
     async def set_mode(self, job: Job, mode: str) -> None:
-        """Switch to any mode of the vehicle's type. A mode that stops it has the higher rank."""
-        mode_number(self.state.vehicle_type, mode)
+        """Switch to any mode of the vehicle's type. A mode that stops it has the higher rank.
+
+        Raises:
+            OutsideEnvelope: with an envelope, its mission leaves it, or in that mode nobody keeps it inside.
+        """
+        switch = messages.set_mode(mode_number(self.state.vehicle_type, mode))
+        if flies_mission(mode.upper()) and self.guard.in_force:
+            self.guard.require_mission(await self.mission_to_fly(), from_here=True)
         stops = mode.upper() in STOPPING_MODES | {self.holding_mode}
-        self.authority.take(job, Rank.STOP if stops else Rank.ARM)
+        self.authority.take(job, Rank.STOP if stops else Rank.ARM, self.inside(switch))
         await self.switch_to(job, mode)
 
     # -- stopping -----------------------------------------------------------------------------------------
-
-    @property
-    def holding_mode(self) -> str:
-        """The mode in which a vehicle of its type stays where it is, by itself."""
-        names = mode_names(self.state.vehicle_type)
-        return next((mode for mode in HOLDING_MODES if mode in names), self.mode)
 
     async def hold(self, job: Job) -> None:
         """Stop and stay, however it moves for us."""
@@ -79,11 +78,11 @@ class Vehicle(Verbs):
             await self.switch_to(job, self.holding_mode)
 
     async def come_down(self, job: Job) -> None:
-        """Land where nobody flies it any more; by whatever the type has."""
+        """Land after the end of a flight, by the means of its type: RTL, or else its holding mode."""
         await self.set_mode(job, "RTL" if "RTL" in mode_names(self.state.vehicle_type) else self.holding_mode)
 
-    def last_word(self) -> Any:
-        """The one message that makes it hold, when nobody can see to it any more."""
+    def hold_message(self) -> Any:
+        """The one message that makes it hold, for the end of the module."""
         return messages.set_mode(mode_number(self.state.vehicle_type, self.holding_mode)).to(self.address, 0)
 
     # -- home ---------------------------------------------------------------------------------------------
@@ -94,7 +93,7 @@ class Vehicle(Verbs):
         Raises:
             NotArmed: it is disarmed elsewhere.
             NotFound: it is disarmed, and has no home yet.
-            ModeChanged: somebody armed it while we requested its home.
+            ModeChanged: it was armed while we requested its home.
         """
         if self.state.armed is not False:
             return False
@@ -102,7 +101,7 @@ class Vehicle(Verbs):
         if distance is None:
             await self.home()
             if self.state.armed is not False:
-                raise ModeChanged(f"the vehicle was armed meanwhile, in {self.mode}: whoever armed it has it")
+                raise ModeChanged(f"the pilot or another client has armed the vehicle, in {self.mode}")
             self.fresh("GLOBAL_POSITION_INT")
             distance = self.distance_home() or 0.0
         if distance > HOME_RADIUS:
@@ -127,7 +126,7 @@ class Vehicle(Verbs):
         await self.waiting.until(names, landed, timeout, f"land and disarm in {mode}")
 
     def report_home(self, job: Job) -> None:
-        """Have the job tell the altitude and the way home."""
+        """Set the job's progress: the altitude, and the distance to home."""
         job.progress = {"altitude": self.height}
         distance = self.distance_home()
         if distance is not None:
@@ -139,12 +138,13 @@ class Vehicle(Verbs):
         Returns:
             Whether it is in force now; else it is remembered until the vehicle flies in GUIDED.
         """
-        self.authority.accompany(job, f"{kind} speed", stopped_too=True)
+        change = messages.change_speed(kind, speed)
+        self.authority.accompany(job, f"{kind} speed", stopped_too=True, allow=self.inside(change))
         if not self.takes_speeds:
             self.speeds.remember(kind, speed)
             return False
         try:
-            await self.commands.send(messages.change_speed(kind, speed), self.commanding(job, self._require_speeds))
+            await self.commands.send(change, self.commanding(job, self._require_speeds))
         except (ModeChanged, Rejected):
             if self.takes_speeds:
                 raise
@@ -163,9 +163,10 @@ class Vehicle(Verbs):
             raise ModeChanged(f"the vehicle is in {self.mode} now, which takes no speed")
 
     async def set_home(self, job: Job) -> None:
-        """Make the current position home; asked again while the estimator settles."""
-        self.authority.accompany(job, "home", Rank.ARM)
-        await self.commands.send(messages.set_home_here(), self.commanding(job))
+        """Make the current position home; the command is repeated while the estimator settles."""
+        order = messages.set_home_here()
+        self.authority.accompany(job, "home", Rank.ARM, allow=self.inside(order))
+        await self.commands.send(order, self.commanding(job))
         await self.home()
 
     async def home(self) -> Any:

@@ -49,7 +49,7 @@ class Airframe(Vehicle):
 
     @property
     def airspeed(self) -> float:
-        """The indicated one, m/s, as its sensor tells."""
+        """The indicated airspeed of its sensor, m/s."""
         return max(self.body.airspeed, 0.0) / self.navigator.air_factor
 
     @property

@@ -53,7 +53,7 @@ class Navigator:
         self._slope = 0.0
         self._last_bearing = 0.0
         self.speed_target: float | None = None
-        """Airspeed that DO_CHANGE_SPEED asked for, or None."""
+        """The airspeed of DO_CHANGE_SPEED, or None."""
 
     # Targets.
 

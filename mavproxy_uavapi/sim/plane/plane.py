@@ -33,7 +33,7 @@ class SimulatedPlane(Airframe):
     banner: ClassVar[tuple[str, ...]] = ("ArduPlane V4.7.0-dev (embedded)",)
     mission_commands = ALL_ITEMS
     streams = PLANE_GROUPS
-    tells_wind = True
+    reports_wind = True
     mode_switch = ("FLTMODE_CH", "FLTMODE")
     rate_prefix = "MAV1_"
 

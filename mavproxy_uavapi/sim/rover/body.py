@@ -33,7 +33,7 @@ class CarBody(Body):
     speed: float = 0.0
 
     def drive(self, speed: float, turn_rate: float, grip: Grip, dt: float) -> None:
-        """Move for dt seconds with the speed (m/s) and the turn rate (rad/s) that are asked for, as far as can be."""
+        """Move for dt seconds with the requested speed (m/s) and turn rate (rad/s), within its limits."""
         faster = abs(speed) > abs(self.speed) and speed * self.speed >= 0
         change = (grip.acceleration if faster else grip.deceleration) * dt
         self._move(self.speed + max(-change, min(change, speed - self.speed)), turn_rate, grip, dt)

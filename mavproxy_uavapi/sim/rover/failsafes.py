@@ -51,7 +51,7 @@ class Failsafes:
         self._vehicle = vehicle
         self._blind_for = 0.0
         self.active = False
-        """Whether the position is lost; a low battery is not told by the heartbeat."""
+        """Whether the position is lost; the heartbeat does not report a low battery."""
 
     def update(self, dt: float) -> None:
         """Check everything; dt seconds have passed."""

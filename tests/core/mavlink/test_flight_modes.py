@@ -26,7 +26,7 @@ COPTER, PLANE, ROVER = mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_TYPE_FIXED_WING, 
         (200, "other"),
     ],
 )
-def test_kind_is_told_by_the_type_of_the_heartbeat(vehicle_type: int, kind: str) -> None:
+def test_kind_is_known_by_the_type_of_the_heartbeat(vehicle_type: int, kind: str) -> None:
     assert kind_of(vehicle_type) == kind
 
 
@@ -39,7 +39,7 @@ def test_names_and_numbers_depend_on_the_type(vehicle_type: int, number: int, na
     assert mode_number(vehicle_type, name.lower()) == number
 
 
-def test_mode_without_a_name_is_told_by_its_number() -> None:
+def test_mode_without_a_name_is_named_by_its_number() -> None:
     assert mode_name(COPTER, 250) == "MODE250"
     assert mode_name(COPTER, None) == "UNKNOWN"
     assert mode_name(200, 3) == "MODE3"

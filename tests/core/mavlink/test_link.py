@@ -60,12 +60,12 @@ def test_source_is_mavproxys_own_address(mpstate: Any, host: Any) -> None:
     assert MavproxyLink(host.bridge, mpstate).source == Address(250, 190)
 
 
-def test_fake_link_remembers_and_tells(loop: asyncio.AbstractEventLoop) -> None:
-    told: list[Any] = []
-    link = FakeLink(lambda message, system: told.append((message, system)))
+def test_fake_link_remembers_and_sends(loop: asyncio.AbstractEventLoop) -> None:
+    reported: list[Any] = []
+    link = FakeLink(lambda message, system: reported.append((message, system)))
     loop.run_until_complete(link.send(HELLO, 3))
     assert link.sent == [HELLO]
-    assert told == [(HELLO, 3)]
+    assert reported == [(HELLO, 3)]
 
 
 @pytest.mark.parametrize("number", [float("nan"), float("inf"), float("-inf")])

@@ -3,7 +3,7 @@ from __future__ import annotations
 from mavproxy_uavapi.core.mavlink.parameter_watch import PERIOD, ParameterWatch
 
 
-def test_first_look_tells_all_and_the_next_ones_what_has_changed() -> None:
+def test_first_look_reports_all_and_the_next_ones_what_has_changed() -> None:
     watch, tables = ParameterWatch(), {(1, 1): {"RTL_ALT": 1500, "LAND_SPEED": 50.0}}
     assert watch.changes(tables, 10.0) == {(1, 1): {"RTL_ALT": 1500.0, "LAND_SPEED": 50.0}}
     assert watch.changes(tables, 20.0) == {}
@@ -19,7 +19,7 @@ def test_it_looks_once_in_a_period() -> None:
     assert watch.changes(tables, 10.0 + PERIOD) != {}
 
 
-def test_table_that_is_emptied_and_filled_anew_tells_what_is_different() -> None:
+def test_table_that_is_emptied_and_filled_again_reports_what_is_different() -> None:
     watch, tables = ParameterWatch(), {(1, 1): {"RTL_ALT": 1500.0, "LAND_SPEED": 50.0}}
     watch.changes(tables, 10.0)
     tables[1, 1] = {}

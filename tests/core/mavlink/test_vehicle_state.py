@@ -272,7 +272,7 @@ def test_lost_chunk_leaves_one_gap(state: VehicleState, hear: Any, lost: tuple[i
     assert state.statustexts_since(0.0) == [expected]
 
 
-def test_text_whose_last_chunk_is_lost_is_told_after_a_while(state: VehicleState, hear: Any) -> None:
+def test_text_whose_last_chunk_is_lost_is_reported_after_a_while(state: VehicleState, hear: Any) -> None:
     hear("statustext", at=3.0, text="a" * 50, id=7, chunk_seq=0)
     hear("attitude", at=3.0 + CHUNK_TIMEOUT - 0.1)
     assert state.statustexts_since(0.0) == []
@@ -280,13 +280,13 @@ def test_text_whose_last_chunk_is_lost_is_told_after_a_while(state: VehicleState
     assert state.statustexts_since(0.0) == ["a" * 50]
 
 
-def test_chunk_that_comes_twice_is_told_once(state: VehicleState, hear: Any) -> None:
+def test_chunk_that_comes_twice_is_reported_once(state: VehicleState, hear: Any) -> None:
     for number, text in ((0, "a" * 50), (0, "a" * 50), (1, "end")):
         hear("statustext", text=text, id=7, chunk_seq=number)
     assert state.statustexts_since(0.0) == ["a" * 50 + "end"]
 
 
-def test_said_since_begins_with_its_moment(state: VehicleState, hear: Any) -> None:
+def test_texts_since_a_moment_include_it(state: VehicleState, hear: Any) -> None:
     for at, text in ((1.0, "one"), (2.0, "two"), (3.0, "three")):
         hear("statustext", at=at, text=text)
     assert state.statustexts_since(2.0) == ["two", "three"]

@@ -173,7 +173,7 @@ def test_in_progress_and_denied_in_one_batch(drone: Any, send: Any) -> None:
         send()
 
 
-def test_refusal_carries_the_result_and_what_was_said_since_it_was_asked(loop: Any, drone: Any, send: Any) -> None:
+def test_refusal_carries_the_result_and_the_texts_since_the_command(loop: Any, drone: Any, send: Any) -> None:
     drone.say("long ago")
     loop.pass_time(5.0)
     drone.answers[SERVO] = [DENIED]
@@ -187,7 +187,7 @@ def test_refusal_carries_the_result_and_what_was_said_since_it_was_asked(loop: A
     )
 
 
-def test_refusal_carries_what_is_said_shortly_after_the_ack(loop: Any, drone: Any, send: Any) -> None:
+def test_refusal_carries_texts_shortly_after_the_ack(loop: Any, drone: Any, send: Any) -> None:
     drone.answers[SERVO] = [DENIED]
     loop.call_later(0.3, drone.say, "Servo: no such channel")
     with pytest.raises(Rejected) as caught:
@@ -213,7 +213,7 @@ def test_refusal_does_not_carry_what_another_component_says(loop: Any, drone: An
     assert caught.value.statustext == ["Servo: no such channel"]
 
 
-def test_silent_refusal_is_told_soon(loop: Any, drone: Any, send: Any) -> None:
+def test_silent_refusal_is_reported_soon(loop: Any, drone: Any, send: Any) -> None:
     drone.answers[SERVO] = [FAILED]
     started = loop.time()
     with pytest.raises(Rejected) as caught:
@@ -222,7 +222,7 @@ def test_silent_refusal_is_told_soon(loop: Any, drone: Any, send: Any) -> None:
     assert loop.time() - started < 1.0
 
 
-def test_patient_command_is_asked_again_until_it_is_accepted(drone: Any, send: Any) -> None:
+def test_patient_command_is_repeated_until_it_is_accepted(drone: Any, send: Any) -> None:
     drone.answers[HOME] = [BUSY, FAILED, OK]
     took = send(messages.set_home_here())
     assert confirmations(drone, HOME) == [0, 0, 0]
@@ -237,14 +237,14 @@ def test_patience_ends(loop: Any, drone: Any, send: Any) -> None:
     assert loop.time() - started == pytest.approx(5.0, abs=1.1)
 
 
-def test_patient_command_that_is_denied_is_not_asked_again(drone: Any, send: Any) -> None:
+def test_patient_command_that_is_denied_is_not_repeated(drone: Any, send: Any) -> None:
     drone.answers[HOME] = [DENIED]
     with pytest.raises(Rejected):
         send(messages.set_home_here())
     assert len(drone.commands(HOME)) == 1
 
 
-def test_impatient_command_is_not_asked_again(drone: Any, send: Any) -> None:
+def test_impatient_command_is_not_repeated(drone: Any, send: Any) -> None:
     drone.answers[SERVO] = [BUSY]
     with pytest.raises(Rejected):
         send()
@@ -289,6 +289,6 @@ def test_link_loss_ends_the_wait_and_nothing_more_is_sent(loop: Any, drone: Any,
     assert len(host.pending) == 0
 
 
-def test_results_are_told_by_name() -> None:
+def test_results_are_reported_by_name() -> None:
     assert result_name(mavlink.MAV_RESULT_UNSUPPORTED) == "MAV_RESULT_UNSUPPORTED"
     assert result_name(99) == "MAV_RESULT_99"

@@ -105,7 +105,7 @@ def test_refused_takeoff_is_rejected_with_the_reason(armed: Any, copter: Any, pi
 
 
 @pytest.mark.parametrize("verb", ["takeoff", "land", "rtl", "go_to", "travel"])
-def test_command_goes_out_before_any_parameter_is_asked_for(
+def test_command_goes_out_before_any_parameter_is_requested(
     loop: Any, armed: Any, copter: Any, pilotage: Any, verb: str
 ) -> None:
     armed.parameters.clear()
@@ -164,7 +164,7 @@ def test_rtl_on_the_ground_away_from_home_is_not_armed(loop: Any, drone: Any, co
     nothing_more(loop, drone)
 
 
-def test_rtl_of_a_vehicle_that_is_armed_while_its_home_is_asked_for_is_not_done(
+def test_rtl_of_a_vehicle_that_is_armed_while_its_home_is_requested_is_not_done(
     loop: Any, drone: Any, copter: Any, pilotage: Any
 ) -> None:
     drone.answers[mavlink.MAV_CMD_REQUEST_MESSAGE] = [None]
@@ -176,7 +176,7 @@ def test_rtl_of_a_vehicle_that_is_armed_while_its_home_is_asked_for_is_not_done(
     assert isinstance(job.error, ModeChanged) and drone.mode == "STABILIZE"
 
 
-def test_rtl_on_the_ground_away_from_a_home_that_was_not_told_yet_is_not_done(
+def test_rtl_on_the_ground_away_from_a_home_that_was_not_reported_yet_is_not_done(
     loop: Any, drone: Any, copter: Any, pilotage: Any
 ) -> None:
     drone.at = [50.0, 0.0, 0.0]
@@ -203,7 +203,7 @@ def test_reboot_while_landing_is_not_a_landing(loop: Any, flying: Any, copter: A
         pilotage.result(job)
 
 
-def test_landing_tells_its_height(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+def test_landing_reports_its_height(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
     loop.run(copter.home())
     job = pilotage.start(copter.land)
     loop.pass_time(4.0)

@@ -105,7 +105,7 @@ def test_every_situation_and_policy(loop: Any, host: Any, drone: Any, copter: An
     show(drone)
     loop.settle()
     action = EXPECTED[now][list(Policy).index(policy)]
-    before, asked = len(drone.orders()), loop.now
+    before, requested = len(drone.orders()), loop.now
 
     async def see_to() -> Any:
         return host.endings.see_to(copter, policy, "in a test", "10.0.0.7", ITS_OWN)
@@ -124,7 +124,7 @@ def test_every_situation_and_policy(loop: Any, host: Any, drone: Any, copter: An
         assert not drone.paused
     else:
         assert drone.mode == "BRAKE"
-    assert loop.now > asked
+    assert loop.now > requested
 
 
 @pytest.mark.parametrize("policy", Policy)
@@ -170,6 +170,7 @@ POLICIES = {
     Ending.ABORTED: Policy.HOLD,
     Ending.CLIENT_GONE: Policy.LAND,  # as it is set here
     Ending.SCRIPT_GONE: Policy.RTL,
+    Ending.LEASE_OVER: Policy.HOLD,
     Ending.UNLOADED: Policy.SAFE,
     Ending.DEFECT: Policy.SAFE,
 }
@@ -234,23 +235,23 @@ def test_hold_ends_when_somebody_else_flies(loop: Any, host: Any, flying: Any, c
     assert (flying.setpoints()[-1].x, flying.setpoints()[-1].y) == (0.0, 50.0)
 
 
-def test_last_words_are_what_an_ending_had_still_to_say(
+def test_closing_messages_are_those_that_an_ending_has_not_sent_yet(
     loop: Any, host: Any, flying: Any, copter: Any, ended: Any
 ) -> None:
-    assert host.endings.last_words() == []
+    assert host.endings.closing_messages() == []
     ended(Ending.ABORTED)
-    ((message, system),) = host.endings.last_words()
+    ((message, system),) = host.endings.closing_messages()
     assert (message.get_type(), system) == ("SET_POSITION_TARGET_LOCAL_NED", 1)
     assert (message.vx, message.vy, message.vz) == (0, 0, 0)
 
 
-def test_last_words_for_a_mission_are_brake(loop: Any, host: Any, drone: Any, copter: Any, pilotage: Any) -> None:
+def test_closing_message_for_a_mission_is_brake(loop: Any, host: Any, drone: Any, copter: Any, pilotage: Any) -> None:
     drone.fly("GUIDED")
     loop.settle()
     job = pilotage.start(copter.set_mode, "AUTO")
     drone.answers[mavlink.MAV_CMD_DO_SET_MODE] = [None]
     end(loop, job)
-    ((message, _),) = host.endings.last_words()
+    ((message, _),) = host.endings.closing_messages()
     assert (message.command, message.param2) == (mavlink.MAV_CMD_DO_SET_MODE, 17)
 
 

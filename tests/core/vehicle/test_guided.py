@@ -178,7 +178,7 @@ def test_speed_that_is_set_while_another_is_repeated_disturbs_no_movement(
     assert copter.speeds.in_force == dict.fromkeys(("ground", "descent", "climb"), 1.0)
 
 
-def test_newer_target_takes_over_while_the_older_client_is_told(
+def test_newer_target_takes_over_while_the_older_client_is_notified(
     loop: Any, flying: Any, copter: Any, pilotage: Any
 ) -> None:
     older = pilotage.start(copter.go_to, FAR, wait=True)

@@ -143,7 +143,7 @@ def test_identical_request_joins_even_before_the_first_has_begun(bench: Bench) -
     assert bench.begun == [first.id, for_another_vehicle.id]
 
 
-def test_request_after_the_end_of_an_identical_one_begins_anew(bench: Bench) -> None:
+def test_request_after_the_end_of_an_identical_one_begins_a_new_job(bench: Bench) -> None:
     bench.go.set()
     first = bench.begin("/go", x=1)
     assert bench.begin("/go", x=1) is not first
@@ -196,7 +196,7 @@ def test_job_goes_on_while_it_is_not_known_who_asks(bench: Bench) -> None:
     assert job.running
 
 
-def test_job_ends_with_the_script_that_alone_asked_for_it(bench: Bench) -> None:
+def test_job_ends_with_the_script_that_alone_requested_it(bench: Bench) -> None:
     job = bench.begin()
     bench.go_on_for(job, "a")
     bench.client(job, "a")
@@ -205,7 +205,7 @@ def test_job_ends_with_the_script_that_alone_asked_for_it(bench: Bench) -> None:
 
 
 @pytest.mark.parametrize("first", [None, "a"])
-def test_job_that_somebody_else_asked_for_goes_on_without_the_script(bench: Bench, first: str | None) -> None:
+def test_job_that_somebody_else_requested_goes_on_without_the_script(bench: Bench, first: str | None) -> None:
     job = bench.begin()
     for asker in (None, "a") if first is None else ("a", None):
         bench.go_on_for(job, asker)
@@ -225,7 +225,7 @@ def test_job_that_somebody_waits_for_ends_with_that_client_once_the_script_is_de
     assert job.ending is Ending.CLIENT_GONE
 
 
-def test_job_of_two_scripts_ends_with_the_one_that_asked_last(bench: Bench) -> None:
+def test_job_of_two_scripts_ends_with_the_one_that_requested_last(bench: Bench) -> None:
     job = bench.begin()
     bench.go_on_for(job, "a")
     bench.go_on_for(job, "b")

@@ -62,10 +62,10 @@ def test_link_loss_ends_a_wait(loop: Any, drone: Any, copter: Any) -> None:
 
 def test_expecting_catches_what_comes_before_it_is_awaited(loop: Any, drone: Any, copter: Any) -> None:
     async def send_first() -> Any:
-        with copter.waiting.expecting({"VFR_HUD"}, lambda m: m.heading) as told:
+        with copter.waiting.expecting({"VFR_HUD"}, lambda m: m.heading) as reported:
             drone.send("vfr_hud", heading=7)
             await copter.waiting.message({"VFR_HUD"}, lambda m: m, 1.0, "come")
-            return await told.within(1.0, "tell")
+            return await reported.within(1.0, "tell")
 
     drone.mute.add("VFR_HUD")
     assert loop.run(send_first()) == 7

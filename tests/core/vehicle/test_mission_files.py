@@ -71,7 +71,7 @@ def test_plan_with_a_survey_and_unknown_yaw() -> None:
     assert read(plan(simple(22, 0, 0, 0, None, 0, 0, 10), survey)) == [TAKEOFF, LEG]
 
 
-def test_plan_with_what_only_qgroundcontrol_can_expand_is_told() -> None:
+def test_plan_with_what_only_qgroundcontrol_can_expand_is_reported() -> None:
     with pytest.raises(BadRequest, match="StructureScan"):
         read(plan({"type": "ComplexItem", "complexItemType": "StructureScan"}))
 
@@ -85,9 +85,9 @@ def test_json_items_by_name_or_number() -> None:
     assert read(json.dumps({"items": items})) == read(json.dumps(items)) == [TAKEOFF, LEG, SHOOT]
 
 
-def test_what_is_told_can_be_posted_again() -> None:
-    told = [item.report(seq) for seq, item in enumerate([TAKEOFF, LEG, SHOOT], 1)]
-    assert read(json.dumps({"items": told})) == [TAKEOFF, LEG, SHOOT]
+def test_a_reported_mission_can_be_posted_again() -> None:
+    reported = [item.report(seq) for seq, item in enumerate([TAKEOFF, LEG, SHOOT], 1)]
+    assert read(json.dumps({"items": reported})) == [TAKEOFF, LEG, SHOOT]
 
 
 BAD_ITEMS = [
@@ -153,5 +153,5 @@ def test_answer_in_floats_is_understood() -> None:
     ],
 )
 def test_read_back_is_compared_by_what_every_autopilot_keeps(found: list[MissionItem], words: str | None) -> None:
-    told = difference([TAKEOFF, LEG], found)
-    assert told is None if words is None else told is not None and words in told
+    reported = difference([TAKEOFF, LEG], found)
+    assert reported is None if words is None else reported is not None and words in reported

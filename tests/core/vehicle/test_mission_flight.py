@@ -48,9 +48,9 @@ def orders(drone: Any) -> list[int]:
 def test_start_is_from_the_first_item_in_auto(loop: Any, flying: Any, flight: Flight, pilotage: Any) -> None:
     job = flight.start()
     loop.pass_time(1.0)
-    wanted = [mavlink.MAV_CMD_DO_SET_MISSION_CURRENT, mavlink.MAV_CMD_DO_SET_MODE, mavlink.MAV_CMD_MISSION_START]
-    assert orders(flying) == wanted
-    assert flying.commands(wanted[0])[0].param1 == 1
+    expected = [mavlink.MAV_CMD_DO_SET_MISSION_CURRENT, mavlink.MAV_CMD_DO_SET_MODE, mavlink.MAV_CMD_MISSION_START]
+    assert orders(flying) == expected
+    assert flying.commands(expected[0])[0].param1 == 1
     assert flying.mode == "AUTO"
     flight.tell(1)
     assert pilotage.result(job) == "done"
@@ -130,15 +130,15 @@ def test_older_autopilot_without_a_state_is_understood(loop: Any, flying: Any, f
     assert pilotage.result(job) == "done"
 
 
-def test_progress_is_told_and_a_mission_before_this_one_is_not(loop: Any, flying: Any, copter: Any) -> None:
+def test_progress_is_reported_and_a_mission_before_this_one_is_not(loop: Any, flying: Any, copter: Any) -> None:
     with pytest.raises(Stale):
         mission_flight.progress(copter)
     flying.send("mission_item_reached", seq=9)
     flying.send("mission_current", seq=2, total=65535, mission_state=mavlink.MISSION_STATE_PAUSED)
     loop.pass_time(0.5)
     copter.waypoints.changed_at = loop.time()
-    told = mission_flight.progress(copter)
-    assert told == {
+    reported = mission_flight.progress(copter)
+    assert reported == {
         "current": 2,
         "total": None,
         "last_reached": None,

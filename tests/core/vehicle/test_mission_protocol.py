@@ -125,19 +125,19 @@ def test_download_has_home_and_the_items(loop: Any, copter: Any, store: Store) -
 
 
 @pytest.mark.parametrize("name", ["MISSION_REQUEST_LIST", "MISSION_REQUEST_INT"])
-def test_lost_questions_are_asked_again(loop: Any, copter: Any, store: Store, name: str) -> None:
+def test_lost_requests_are_repeated(loop: Any, copter: Any, store: Store, name: str) -> None:
     store.lost[name] = 3
     assert loop.run(copter.waypoints.download()) == (HOME, OLD)
     store.lost[name] = -1
-    with pytest.raises(TimedOut, match="asked 4 times"):
+    with pytest.raises(TimedOut, match="after 4 requests"):
         loop.run(copter.waypoints.download())
 
 
-def test_upload_replaces_the_mission_and_tells_its_progress(loop: Any, copter: Any, store: Store) -> None:
-    told: list[tuple[int, int]] = []
-    loop.run(copter.waypoints.upload(NEW, lambda done, of: told.append((done, of))))
+def test_upload_replaces_the_mission_and_reports_its_progress(loop: Any, copter: Any, store: Store) -> None:
+    reported: list[tuple[int, int]] = []
+    loop.run(copter.waypoints.upload(NEW, lambda done, of: reported.append((done, of))))
     assert store.items[1:] == NEW
-    assert told == [(1, 4), (2, 4), (3, 4), (4, 4)]
+    assert reported == [(1, 4), (2, 4), (3, 4), (4, 4)]
 
 
 def test_shorter_and_empty_missions_are_replaced_too(loop: Any, copter: Any, store: Store) -> None:
@@ -194,7 +194,7 @@ def test_transfer_that_was_cancelled_is_tried_once_more(loop: Any, copter: Any, 
     assert store.counts == 2
 
 
-def test_lost_link_is_said_at_once_and_nothing_more_is_sent(
+def test_lost_link_is_reported_at_once_and_nothing_more_is_sent(
     loop: Any, copter: Any, store: Store, host: Any, drone: Any
 ) -> None:
     store.lost["MISSION_ITEM_INT"] = -1
@@ -205,13 +205,13 @@ def test_lost_link_is_said_at_once_and_nothing_more_is_sent(
         loop.run(task)
 
 
-def test_clear_is_seen_to_be_done(loop: Any, copter: Any, store: Store) -> None:
+def test_clear_is_verified(loop: Any, copter: Any, store: Store) -> None:
     store.lost["MISSION_CLEAR_ALL"] = 1
     loop.run(copter.waypoints.clear())
     assert store.items == [HOME]
 
 
-def test_refused_clearing_is_told(loop: Any, copter: Any, store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_refused_clearing_is_reported(loop: Any, copter: Any, store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(store, "mission_clear_all", lambda _: store.ack(mavlink.MAV_MISSION_ERROR))
     with pytest.raises(Rejected) as caught:
         loop.run(copter.waypoints.clear())

@@ -26,11 +26,11 @@ def test_status_of_a_vehicle_that_is_ready(loop: Any, drone: Any, copter: Any) -
 
 
 def test_status_of_a_vehicle_in_the_air(loop: Any, flying: Any, copter: Any) -> None:
-    told = status(copter, True, loop.time())
-    assert (told["mode"], told["armed"], told["landed_state"]) == ("GUIDED", True, "in_air")
+    reported = status(copter, True, loop.time())
+    assert (reported["mode"], reported["armed"], reported["landed_state"]) == ("GUIDED", True, "in_air")
 
 
-def test_reasons_are_what_it_said_about_arming_of_late(loop: Any, drone: Any, copter: Any) -> None:
+def test_reasons_are_its_recent_texts_about_arming(loop: Any, drone: Any, copter: Any) -> None:
     drone.ready = False
     drone.say("PreArm: long ago")
     loop.pass_time(70.0)
@@ -45,7 +45,7 @@ def test_reasons_are_what_it_said_about_arming_of_late(loop: Any, drone: Any, co
     assert status(copter, True, loop.time())["ready_to_arm"] is False
 
 
-def test_reason_without_words_is_told_in_ours(loop: Any, drone: Any, copter: Any) -> None:
+def test_reason_without_a_text_gets_one_of_ours(loop: Any, drone: Any, copter: Any) -> None:
     drone.ready = False
     loop.pass_time(1.0)
     assert "pre-arm checks do not pass" in why_not(copter, True, loop.time())
@@ -71,7 +71,7 @@ def test_armed_vehicle_needs_no_reasons(loop: Any, drone: Any, copter: Any) -> N
 
 
 @pytest.mark.parametrize(
-    ("told", "name"),
+    ("reported", "name"),
     [
         (mavlink.MAV_LANDED_STATE_ON_GROUND, "on_ground"),
         (mavlink.MAV_LANDED_STATE_IN_AIR, "in_air"),
@@ -79,8 +79,8 @@ def test_armed_vehicle_needs_no_reasons(loop: Any, drone: Any, copter: Any) -> N
         (mavlink.MAV_LANDED_STATE_LANDING, "landing"),
     ],
 )
-def test_landed_state_is_what_it_tells(loop: Any, drone: Any, copter: Any, told: int, name: str) -> None:
-    drone.landed = told
+def test_landed_state_is_what_it_reports(loop: Any, drone: Any, copter: Any, reported: int, name: str) -> None:
+    drone.landed = reported
     loop.pass_time(0.5)
     assert landed_state(copter) == name
 

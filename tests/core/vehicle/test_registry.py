@@ -60,7 +60,7 @@ def test_type_comes_from_the_heartbeat_and_may_change(registry: VehicleRegistry,
     assert registry.find().kind == "plane"
 
 
-def test_vehicle_without_heartbeats_cannot_be_commanded_but_seen(
+def test_vehicle_without_heartbeats_cannot_be_commanded_but_read(
     loop: Any, registry: VehicleRegistry, hear: Any
 ) -> None:
     hear()

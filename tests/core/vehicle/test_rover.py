@@ -20,14 +20,14 @@ def drone(loop: Any, drone: Any) -> Any:
     telemetry, obey = drone._telemetry, drone._obey
 
     def rovers() -> Any:
-        told = telemetry()
+        reported = telemetry()
         resting = drone.mode == "HOLD"
-        told["HEARTBEAT"] |= {
+        reported["HEARTBEAT"] |= {
             "type": ROVER,
             "system_status": mavlink.MAV_STATE_STANDBY if resting else mavlink.MAV_STATE_ACTIVE,
         }
-        told["EXTENDED_SYS_STATE"]["landed_state"] = mavlink.MAV_LANDED_STATE_UNDEFINED
-        return told
+        reported["EXTENDED_SYS_STATE"]["landed_state"] = mavlink.MAV_LANDED_STATE_UNDEFINED
+        return reported
 
     def obeyed(message: Any) -> bool:
         if message.command != mavlink.MAV_CMD_DO_SET_MODE:

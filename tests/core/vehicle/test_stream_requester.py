@@ -32,63 +32,63 @@ def watch(loop: Any, registry: Any) -> Any:
     return watch
 
 
-def asked(drone: Any) -> list[tuple[int, float]]:
+def requested(drone: Any) -> list[tuple[int, float]]:
     return [(int(command.param1), command.param2) for command in drone.commands(INTERVAL)]
 
 
-def test_what_comes_is_not_asked_for(drone: Any, watch: Any) -> None:
+def test_messages_that_arrive_are_not_requested(drone: Any, watch: Any) -> None:
     watch(60.0)
-    assert asked(drone) == []
+    assert requested(drone) == []
 
 
-def test_what_does_not_come_is_asked_for_at_its_rate(drone: Any, watch: Any) -> None:
+def test_messages_that_do_not_arrive_are_requested_at_their_rate(drone: Any, watch: Any) -> None:
     drone.mute.add("EXTENDED_SYS_STATE")
     watch(0.5)
-    assert asked(drone) == []  # it came once, when the drone was powered on
+    assert requested(drone) == []  # it came once, when the drone was powered on
     watch(5.0)
-    assert asked(drone)[0] == (MESSAGE_IDS["EXTENDED_SYS_STATE"], 1e6 / WANTED["EXTENDED_SYS_STATE"])
+    assert requested(drone)[0] == (MESSAGE_IDS["EXTENDED_SYS_STATE"], 1e6 / WANTED["EXTENDED_SYS_STATE"])
 
 
 def test_message_that_helps_ends_the_asking(loop: Any, drone: Any, watch: Any) -> None:
     drone.mute.add("ATTITUDE")
     watch(4.5)
-    assert len(asked(drone)) == 1
+    assert len(requested(drone)) == 1
     drone.mute.clear()
     watch(60.0)
-    assert len(asked(drone)) == 1
+    assert len(requested(drone)) == 1
 
 
-def test_message_that_stops_later_is_asked_for_again(drone: Any, watch: Any) -> None:
+def test_message_that_stops_later_is_requested_again(drone: Any, watch: Any) -> None:
     watch(30.0)
     drone.mute.add("VFR_HUD")
     watch(6.0)
-    assert asked(drone)[0][0] == MESSAGE_IDS["VFR_HUD"]
+    assert requested(drone)[0][0] == MESSAGE_IDS["VFR_HUD"]
 
 
 def test_asking_without_success_becomes_rare(drone: Any, watch: Any) -> None:
     drone.mute.add("VFR_HUD")
     watch(100.0)
     few = FIRST_ASKINGS + 100 / ASK_AGAIN
-    assert FIRST_ASKINGS < len(asked(drone)) <= few
+    assert FIRST_ASKINGS < len(requested(drone)) <= few
 
 
 def test_refusal_does_not_end_the_watch(drone: Any, watch: Any) -> None:
     drone.mute |= {"GLOBAL_POSITION_INT", "VFR_HUD"}
     drone.answers[INTERVAL] = [mavlink.MAV_RESULT_DENIED]
     watch(30.0)
-    assert {number for number, _ in asked(drone)} == {MESSAGE_IDS["GLOBAL_POSITION_INT"], MESSAGE_IDS["VFR_HUD"]}
+    assert {number for number, _ in requested(drone)} == {MESSAGE_IDS["GLOBAL_POSITION_INT"], MESSAGE_IDS["VFR_HUD"]}
 
 
-def test_nobody_is_asked_while_the_link_is_lost_and_all_again_when_it_is_back(drone: Any, watch: Any) -> None:
+def test_nothing_is_requested_while_the_link_is_lost_and_all_again_when_it_is_back(drone: Any, watch: Any) -> None:
     drone.power_off()
     watch(20.0)
-    before = len(asked(drone))
+    before = len(requested(drone))
     watch(60.0)
-    assert len(asked(drone)) == before
+    assert len(requested(drone)) == before
     drone.mute.add("VFR_HUD")
     drone.power_on()
     watch(2 * LOOK_EVERY)
-    assert MESSAGE_IDS["VFR_HUD"] in {number for number, _ in asked(drone)[before:]}
+    assert MESSAGE_IDS["VFR_HUD"] in {number for number, _ in requested(drone)[before:]}
 
 
 def test_watch_waits_for_the_first_vehicle(loop: Any, host: Any, watch: Any, make_drone: Any) -> None:
@@ -96,4 +96,4 @@ def test_watch_waits_for_the_first_vehicle(loop: Any, host: Any, watch: Any, mak
     drone = make_drone()
     drone.mute.add("ATTITUDE")
     watch(10.0)
-    assert asked(drone)
+    assert requested(drone)

@@ -15,10 +15,10 @@ def test_travel_sends_one_velocity(loop: Any, flying: Any, copter: Any, pilotage
 
 
 def test_travel_with_duration_repeats_the_velocity_then_stops(
-    loop: Any, flying: Any, copter: Any, pilotage: Any
+    loop: Any, flying: Any, copter: Any, pilotage: Any, link: Any
 ) -> None:
     started, times = loop.time(), []
-    copter.link.on_send = lambda message, system: (
+    link.on_send = lambda message, system: (
         times.append(loop.time() - started),
         flying.on_send(message, system),
     )

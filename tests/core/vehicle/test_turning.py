@@ -39,7 +39,7 @@ def test_yaw_rate_without_a_movement_holds_the_place(loop: Any, flying: Any, cop
     assert setpoint.yaw_rate == pytest.approx(-math.pi / 4)
 
 
-def test_yaw_rate_repeats_the_velocity_that_the_autopilot_tells(
+def test_yaw_rate_repeats_the_velocity_that_the_autopilot_reports(
     loop: Any, flying: Any, copter: Any, pilotage: Any
 ) -> None:
     flying.moving = [1.0, 0.0, 0.0]  # another station's
@@ -58,7 +58,7 @@ def test_yaw_rate_does_not_fly_back_to_a_target_of_ours_that_another_station_has
     assert last.alt == pytest.approx(20.0, abs=0.1)
 
 
-def test_yaw_rate_holds_the_place_where_the_autopilot_does_not_tell_its_target(
+def test_yaw_rate_holds_the_place_where_the_autopilot_does_not_report_its_target(
     loop: Any, flying: Any, copter: Any, pilotage: Any
 ) -> None:
     pilotage.do(copter.go_to, FAR)
@@ -77,7 +77,7 @@ def test_yaw_rate_in_a_takeoff_is_busy(loop: Any, flying: Any, copter: Any, pilo
     assert flying.setpoints() == []
 
 
-def test_yaw_rate_is_not_sent_when_the_pilot_switches_while_the_target_is_asked_for(
+def test_yaw_rate_is_not_sent_when_the_pilot_switches_while_the_target_is_requested(
     loop: Any, flying: Any, copter: Any, pilotage: Any
 ) -> None:
     flying.mute_requests = True

@@ -78,7 +78,7 @@ def test_arm_of_a_vehicle_that_does_not_get_ready_is_rejected_with_its_reasons(
     assert numbers(drone) == [PREARM]
 
 
-def test_arm_tells_what_the_autopilot_said_when_it_refuses(drone: Any, copter: Any, pilotage: Any) -> None:
+def test_arm_reports_the_autopilots_texts_when_it_refuses(drone: Any, copter: Any, pilotage: Any) -> None:
     drone.answers[ARM] = [FAILED]
     drone.says[ARM] = ["Arm: throttle too high"]
     with pytest.raises(Rejected) as caught:
@@ -253,7 +253,7 @@ def test_speed_is_set_by_its_type(flying: Any, copter: Any, kind: str, number: i
     assert copter.speeds.in_force == {kind: 3.5}
 
 
-def test_speed_that_is_asked_for_before_guided_is_sent_once_it_flies(
+def test_speed_that_is_requested_before_guided_is_sent_once_it_flies(
     loop: Any, drone: Any, copter: Any, pilotage: Any
 ) -> None:
     pilotage.do(copter.set_speed, "ground", 3.5)
@@ -301,7 +301,7 @@ def test_set_home_is_retried_while_the_estimator_settles_and_then_read_back(
     assert copter.state.messages["HOME_POSITION"].message.altitude == 584000
 
 
-def test_home_is_asked_for(loop: Any, drone: Any, copter: Any) -> None:
+def test_home_is_requested(loop: Any, drone: Any, copter: Any) -> None:
     assert loop.run(copter.home()).latitude == -350000000
 
 
@@ -313,7 +313,7 @@ def test_home_that_is_not_set_is_not_found(loop: Any, drone: Any, copter: Any) -
 
 def test_home_that_does_not_come_is_a_timeout(loop: Any, drone: Any, copter: Any) -> None:
     drone.answers[mavlink.MAV_CMD_REQUEST_MESSAGE] = [mavlink.MAV_RESULT_ACCEPTED]
-    with pytest.raises(TimedOut, match="did not tell HOME_POSITION"):
+    with pytest.raises(TimedOut, match="did not report HOME_POSITION"):
         loop.run(copter.home())
 
 
@@ -342,7 +342,7 @@ def test_sim_speedup_of_a_real_vehicle_is_not_supported(loop: Any, drone: Any, c
     assert [message.get_type() for message in drone.got] == ["PARAM_REQUEST_READ"]
 
 
-def test_parameters_are_asked_for_once_and_missing_ones_left_out(loop: Any, drone: Any, copter: Any) -> None:
+def test_parameters_are_requested_once_and_missing_ones_left_out(loop: Any, drone: Any, copter: Any) -> None:
     assert loop.run(copter.parameters.read([("RTL_ALT",), ("NO_SUCH",)])) == {"RTL_ALT": 1500.0}
     drone.got.clear()
     assert loop.run(copter.parameters.read([("RTL_ALT",)])) == {"RTL_ALT": 1500.0}
@@ -386,8 +386,8 @@ def test_without_an_estimator_report_the_prearm_bit_counts(copter: Any) -> None:
 
 
 def test_autopilot_that_does_not_report_prearm_checks_may_try(copter: Any) -> None:
-    told = copter.state.messages["SYS_STATUS"].message
-    told.onboard_control_sensors_present = told.onboard_control_sensors_health = 0
+    reported = copter.state.messages["SYS_STATUS"].message
+    reported.onboard_control_sensors_present = reported.onboard_control_sensors_health = 0
     assert copter.is_ready_to_arm
     del copter.state.messages["SYS_STATUS"]
     assert not copter.is_ready_to_arm
@@ -410,11 +410,11 @@ def test_old_position_is_not_flown_by(loop: Any, drone: Any, copter: Any) -> Non
         copter.fresh("HOME_POSITION")
 
 
-def test_guard_tells_pilot_disarming_and_reboot_apart(copter: Any) -> None:
+def test_guard_distinguishes_pilot_disarming_and_reboot(copter: Any) -> None:
     state = copter.state
     state.armed = True
     copter.held_by("STABILIZE")
-    with pytest.raises(ModeChanged, match="left GUIDED: it is in STABILIZE now"):
+    with pytest.raises(ModeChanged, match="left GUIDED: the pilot or a failsafe switched it to STABILIZE"):
         copter.held_by("GUIDED")
     state.armed = False
     with pytest.raises(NotArmed, match="was disarmed"):

@@ -8,7 +8,7 @@ import pytest
 from mavproxy_gradys.forwarding.confirmations import MOST, Confirmations
 
 
-def said(*numbers: Any) -> bytes:
+def output(*numbers: Any) -> bytes:
     return json.dumps({"acknowledged": numbers}).encode()
 
 
@@ -21,8 +21,8 @@ def confirmations() -> Confirmations:
 
 def test_who_waits_has_what_is_confirmed_in_time(loop: Any, confirmations: Confirmations) -> None:
     confirmations.expect({1, 2, 3})
-    loop.call_later(1.0, confirmations.take, said(2))
-    loop.call_later(2.0, confirmations.take, said(1, 3, 99))
+    loop.call_later(1.0, confirmations.take, output(2))
+    loop.call_later(2.0, confirmations.take, output(1, 3, 99))
     began = loop.time()
     assert loop.run(confirmations.wait({1, 2, 3}, 20.0)) == {1, 2, 3}
     assert loop.time() - began == pytest.approx(2.0)
@@ -30,9 +30,9 @@ def test_who_waits_has_what_is_confirmed_in_time(loop: Any, confirmations: Confi
 
 def test_what_is_late_is_collected_next_time(loop: Any, confirmations: Confirmations) -> None:
     confirmations.expect({1, 2})
-    confirmations.take(said(1))
+    confirmations.take(output(1))
     assert loop.run(confirmations.wait({1, 2}, 5.0)) == {1}
-    confirmations.take(said(2))
+    confirmations.take(output(2))
     assert confirmations.collect({2, 3}) == {2}
     assert confirmations.collect({2, 3}) == set()
 
@@ -46,7 +46,7 @@ def test_a_connection_that_ends_ends_the_wait(loop: Any, confirmations: Confirma
 
 
 @pytest.mark.parametrize("nonsense", [b"", b"[]", b"7", b'{"acknowledged": 1}', b'{"acknowledged": [[1], "1", null]}',
-                                      b"\xff", None, "text", b"[" * 100_000, said(7)])  # fmt: skip
+                                      b"\xff", None, "text", b"[" * 100_000, output(7)])  # fmt: skip
 def test_nonsense_confirms_nothing(confirmations: Confirmations, nonsense: Any) -> None:
     confirmations.expect({1})
     confirmations.take(nonsense)
@@ -56,4 +56,4 @@ def test_nonsense_confirms_nothing(confirmations: Confirmations, nonsense: Any) 
 def test_memory_is_bounded(confirmations: Confirmations) -> None:
     for first in range(0, 10 * MOST, 200):
         confirmations.expect(set(range(first, first + 200)))
-    assert len(confirmations._awaited) + len(confirmations._kept) <= MOST + 200
+    assert len(confirmations._awaited) + len(confirmations._confirmed) <= MOST + 200

@@ -44,7 +44,7 @@ class Broker:
         self.connects = self.publishes = 0.0
         self.refuses = ""
         self.made = self.open = 0
-        self.said: list[tuple[str, bool]] = []
+        self.output: list[tuple[str, bool]] = []
 
     def client(self, *_: Any, **__: Any) -> Client:
         self.made += 1
@@ -68,7 +68,7 @@ class Client:
         await asyncio.sleep(self._broker.publishes)
         if topic == self._broker.refuses:
             raise aiomqtt.MqttError("refused")
-        self._broker.said.append((topic, retain))
+        self._broker.output.append((topic, retain))
 
 
 @pytest.fixture
@@ -91,13 +91,13 @@ def sent(loop: Any, sink: MqttSink, *readings: Reading) -> Any:
 def test_each_connection_says_online_and_closes_with_offline(loop: Any, sink: MqttSink, broker: Broker) -> None:
     assert sent(loop, sink) == {1}
     loop.run(sink.close())
-    assert broker.said == [("fleet/7/status", True), ("fleet/7/alt", False), ("fleet/7/status", True)]
+    assert broker.output == [("fleet/7/status", True), ("fleet/7/alt", False), ("fleet/7/status", True)]
     assert broker.open == 0
 
 
 def test_only_where_a_vehicle_is_stays_with_the_broker(loop: Any, sink: MqttSink, broker: Broker) -> None:
     sent(loop, sink, *(Reading(device, 7, "position", "", [1, 2, 3], 0.0) for device in ("uav-7", "buoy")))
-    assert sorted(broker.said[1:]) == [("fleet/7/position", False), ("fleet/7/position", True)]
+    assert sorted(broker.output[1:]) == [("fleet/7/position", False), ("fleet/7/position", True)]
 
 
 def test_a_connection_that_comes_too_late_is_closed_and_meanwhile_none_is_made(
@@ -134,7 +134,7 @@ def test_a_connection_that_cannot_say_online_is_none(loop: Any, sink: MqttSink, 
     assert broker.open == 0
     broker.refuses = ""
     assert sent(loop, sink) == {1}
-    assert broker.said[0] == ("fleet/7/status", True)
+    assert broker.output[0] == ("fleet/7/status", True)
 
 
 def test_one_vehicle_finds_out_that_the_broker_is_not_there(loop: Any, sink: MqttSink, broker: Broker) -> None:

@@ -16,7 +16,7 @@ from mavproxy_gradys.forwarding.spool import Spool
 
 @pytest.fixture
 def pipeline(
-    loop: Any, host: Any, teller: Any, poster: Any, at_once: Any, monkeypatch: Any
+    loop: Any, host: Any, telemetry: Any, poster: Any, at_once: Any, monkeypatch: Any
 ) -> Iterator[ReadingPipeline]:
     """Its only receiver is `poster`."""
     monkeypatch.setattr("mavproxy_gradys.forwarding.sender.make_sink", lambda sink, _: HttpSink(sink, poster))
@@ -49,19 +49,19 @@ def reading(value: Any) -> Reading:
     return Reading("uav-1", 1, "alt", "m", value, 0.0)
 
 
-def test_a_position_that_is_told_once_is_sampled_once(
-    loop: Any, pipeline: Any, start: Any, teller: Any, poster: Any
+def test_a_position_that_is_reported_once_is_sampled_once(
+    loop: Any, pipeline: Any, start: Any, telemetry: Any, poster: Any
 ) -> None:
     start(sink="http://a/r", quantities="position@0.1")
     for _ in range(3):
-        teller.tell_all()
+        telemetry.send_all()
         loop.pass_time(1)
     assert len(values(poster)) == 3
-    assert "not come anew" in pipeline.report()["quantities"][0]["why_not"]["10"]
+    assert "no new" in pipeline.report()["quantities"][0]["why_not"]["10"]
 
 
 def test_readings_that_a_full_disk_does_not_take_outlast_a_setting(
-    loop: Any, pipeline: Any, start: Any, teller: Any, poster: Any, monkeypatch: Any
+    loop: Any, pipeline: Any, start: Any, telemetry: Any, poster: Any, monkeypatch: Any
 ) -> None:
     def full(*_: Any) -> None:
         raise NotStored("the disk is full")
@@ -69,7 +69,7 @@ def test_readings_that_a_full_disk_does_not_take_outlast_a_setting(
     with monkeypatch.context() as patch:
         patch.setattr(Spool, "append", full)
         start(sink="http://a/r", quantities="position@1")
-        teller.tell_all()
+        telemetry.send_all()
         loop.pass_time(2)
         loop.run(pipeline.stop())
         assert pipeline.report()["spooled"] == 1
@@ -85,7 +85,7 @@ def test_readings_that_a_full_disk_does_not_take_outlast_a_setting(
     assert len(values(poster)) == 1
 
 
-def test_what_is_posted_while_it_starts_anew_is_kept_or_refused(
+def test_what_is_posted_while_it_restarts_is_kept_or_refused(
     loop: Any, pipeline: Any, start: Any, poster: Any
 ) -> None:
     start()

@@ -116,7 +116,7 @@ def test_flush_does_not_wait_for_the_pause(loop: Any, spool_thread: Any, sender:
     assert len(poster.posts) == before + 1
 
 
-def test_a_receiver_that_acknowledges_nothing_is_not_asked_again_at_once(
+def test_a_receiver_that_acknowledges_nothing_is_not_tried_again_at_once(
     loop: Any, spool_thread: Any, sender: Any, poster: Any
 ) -> None:
     poster.answer = {"acknowledged": []}
@@ -187,7 +187,7 @@ def test_a_receiver_that_is_not_ready_is_offered_the_same_again(
     assert sum(poster.batches[-2:], []) == kept
 
 
-def test_a_defect_is_told_once_and_does_not_end_the_delivery(
+def test_a_defect_is_reported_once_and_does_not_end_the_delivery(
     loop: Any, spool_thread: Any, sender: Any, poster: Any
 ) -> None:
     answers, poster.answer = poster.answer, RecursionError("too deep")
@@ -201,7 +201,7 @@ def test_a_defect_is_told_once_and_does_not_end_the_delivery(
     assert (spool_thread.count, sender.last_error) == (0, "")
 
 
-def test_the_log_tells_of_an_outage_once(
+def test_the_log_reports_an_outage_once(
     loop: Any, spool_thread: Any, sender: Any, poster: Any, down: Any, caplog: Any
 ) -> None:
     answers, poster.answer = poster.answer, down
@@ -215,7 +215,7 @@ def test_the_log_tells_of_an_outage_once(
     ]
 
 
-def test_after_a_receivers_return_nobody_waits_longer_than_it_is_said(
+def test_after_a_receivers_return_nobody_waits_longer_than_documented(
     loop: Any, spool_thread: Any, sender: Any, poster: Any, down: Any
 ) -> None:
     poster.answer = down

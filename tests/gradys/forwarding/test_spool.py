@@ -144,7 +144,7 @@ def test_a_clock_that_is_set_makes_nothing_old(opened: Any, clock: Clock) -> Non
     assert numbers(spool) == kept
 
 
-def test_after_a_restart_of_the_machine_ages_begin_anew(opened: Any, clock: Clock) -> None:
+def test_after_a_restart_of_the_machine_ages_restart(opened: Any, clock: Clock) -> None:
     clock.now = 5000.0
     spool = opened(longest=60.0)
     kept = spool.append([reading()])
@@ -196,19 +196,19 @@ while True:
 
 def test_what_was_kept_survives_kill_9(tmp_path: Path) -> None:
     file = tmp_path / "spool.db"
-    told: list[int] = []
+    reported: list[int] = []
     for _ in range(5):
         child = subprocess.Popen([sys.executable, "-c", KILLED, str(file)], stdout=subprocess.PIPE, text=True)
         assert child.stdout is not None
         with child.stdout:
-            told += [int(child.stdout.readline()) for _ in range(20)]
+            reported += [int(child.stdout.readline()) for _ in range(20)]
             child.send_signal(signal.SIGKILL)
-            told += [int(line) for line in child.stdout if line.endswith("\n")]
+            reported += [int(line) for line in child.stdout if line.endswith("\n")]
         child.wait()
     spool = Spool(file, 1e9, 1e9)
     assert spool.set_aside is None
     found = numbers(spool, limit=1_000_000)
-    assert set(told) <= set(found)
+    assert set(reported) <= set(found)
     assert len(found) % 10 == 0  # whole transactions
     spool.close()
 

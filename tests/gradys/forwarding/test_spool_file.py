@@ -154,7 +154,7 @@ def test_only_a_folder_that_is_ours_is_tightened(tmp_path: Path) -> None:
         assert mode(folder) == left
 
 
-def test_what_cannot_be_tightened_is_said_and_used(file: Path, monkeypatch: Any, caplog: Any) -> None:
+def test_what_cannot_be_tightened_is_reported_and_used(file: Path, monkeypatch: Any, caplog: Any) -> None:
     kept(file)
     file.chmod(0o644)
 
@@ -192,7 +192,7 @@ def test_a_folder_a_pipe_and_a_device_are_no_spools(file: Path) -> None:
     pipe = file.with_name("pipe")
     os.mkfifo(pipe)
     for path in (file.parent, pipe, Path("/dev/null")):
-        with pytest.raises(NotStored, match="is no spool"):
+        with pytest.raises(NotStored, match="is not a spool"):
             opened(path)
 
 
@@ -250,8 +250,8 @@ def test_who_is_refused_does_not_open_the_file_for_others(file: Path) -> None:
     with opened(file) as spool:
         with pytest.raises(NotStored, match="another MAVProxy uses it"):
             opened(file)  # a descriptor of the file, closed by hand, would end the lock here
-        said = subprocess.run([sys.executable, "-c", OPENED, str(file)], capture_output=True, text=True, check=True)
-        assert "another MAVProxy uses it" in said.stdout
+        output = subprocess.run([sys.executable, "-c", OPENED, str(file)], capture_output=True, text=True, check=True)
+        assert "another MAVProxy uses it" in output.stdout
         assert spool.append([reading()])
 
 
@@ -266,7 +266,7 @@ def test_a_file_of_a_version_that_we_do_not_know_is_refused_and_left_as_it_is(fi
     assert file.read_bytes() == before
 
 
-def test_the_file_itself_says_from_the_first_moment_whose_it_is(file: Path) -> None:
+def test_the_file_itself_has_our_application_id_from_the_first_moment(file: Path) -> None:
     with opened(file):
         header = file.read_bytes()[:100]
     assert header[:16] == b"SQLite format 3\0" and header[68:72] == b"grad"

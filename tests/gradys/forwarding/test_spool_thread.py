@@ -103,7 +103,7 @@ def test_what_is_acknowledged_goes_and_nothing_else(loop: Any, spool_thread: Spo
     assert taken(loop, spool_thread) == [1, 3]
 
 
-def test_a_full_disk_is_said_and_sampled_readings_wait_in_memory(
+def test_a_full_disk_is_reported_and_sampled_readings_wait_in_memory(
     loop: Any, spool_thread: SpoolThread, disk: Disk
 ) -> None:
     loop.run(spool_thread.keep([reading(0)]))
@@ -135,8 +135,8 @@ def test_full_disk_that_can_be_read_is_full_all_the_same(
     disk.make_room()
     loop.pass_time(1)
     assert spool_thread.problem == ""
-    said = [record.getMessage().partition(":")[0] for record in caplog.records]
-    assert said == ["the spool fails", "the spool works again"]
+    output = [record.getMessage().partition(":")[0] for record in caplog.records]
+    assert output == ["the spool fails", "the spool works again"]
 
 
 def test_posted_reading_that_a_full_disk_refused_is_a_problem_for_a_while(
@@ -263,7 +263,7 @@ def test_what_fails_after_readings_were_kept_does_not_keep_them_twice(
 
 
 @pytest.mark.parametrize("wrong", [math.inf, math.nan, [math.inf]])
-def test_a_value_that_cannot_be_told_is_dropped_alone_and_counted(
+def test_a_value_that_cannot_be_stored_is_dropped_alone_and_counted(
     loop: Any, spool_thread: SpoolThread, wrong: Any
 ) -> None:
     for value in (1, wrong, 2):
@@ -275,7 +275,7 @@ def test_a_value_that_cannot_be_told_is_dropped_alone_and_counted(
     assert spool_thread.dropped == {"value": 1}
 
 
-def test_a_defect_loses_no_reading_is_told_once_and_leaves_no_file_open(
+def test_a_defect_loses_no_reading_is_reported_once_and_leaves_no_file_open(
     loop: Any, disk: Disk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     spool_thread = SpoolThread(disk.make, loop.time)
@@ -338,7 +338,7 @@ def test_while_the_file_is_being_opened_it_says_so(loop: Any, disk: Disk) -> Non
     loop.run(spool_thread.stop())
 
 
-def test_the_log_tells_of_a_full_disk_once_and_of_drops_once_a_minute(
+def test_the_log_reports_a_full_disk_once_and_drops_once_a_minute(
     loop: Any, spool_thread: SpoolThread, disk: Disk, monkeypatch: pytest.MonkeyPatch, caplog: Any
 ) -> None:
     monkeypatch.setattr(spool_threads, "HELD", 10)

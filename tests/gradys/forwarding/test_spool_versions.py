@@ -66,8 +66,8 @@ def make_old(file: Path, version: int) -> None:
     with contextlib.closing(sqlite3.connect(file, isolation_level=None)) as db:
         db.executescript(OLD[version].format(first=FIRST))
         db.executemany(row, [(FIRST + n,) for n in range(1, 6)])
-        told = [(mqtt, FIRST + n) for n in range(100, 2000)]
-        db.executemany("INSERT INTO acknowledged VALUES (?, ?)", told)
+        reported = [(mqtt, FIRST + n) for n in range(100, 2000)]
+        db.executemany("INSERT INTO acknowledged VALUES (?, ?)", reported)
         db.execute("DELETE FROM acknowledged")
         db.executemany(
             "INSERT INTO acknowledged VALUES (?, ?)", [(http, FIRST + 1), (mqtt, FIRST + 3), ("nobody's", FIRST + 4)]
@@ -117,7 +117,7 @@ def test_no_password_is_left_of_an_older_file(file: Path, version: int) -> None:
     assert b"s3cret" not in left and b"s3cret" not in file.read_bytes()
 
 
-def test_a_step_that_was_interrupted_is_begun_anew(file: Path, monkeypatch: Any) -> None:
+def test_a_step_that_was_interrupted_is_restarted(file: Path, monkeypatch: Any) -> None:
     make_old(file, 1)
 
     def interrupted(url: str) -> Any:
@@ -132,7 +132,7 @@ def test_a_step_that_was_interrupted_is_begun_anew(file: Path, monkeypatch: Any)
         assert numbers(spool, HTTP) == [3, 4, 5]
 
 
-def test_a_disk_without_room_to_write_the_file_anew_is_no_reason_not_to_use_it(
+def test_a_disk_without_room_to_rewrite_the_file_is_no_reason_not_to_use_it(
     file: Path, monkeypatch: Any, caplog: Any
 ) -> None:
     make_old(file, 1)
@@ -144,7 +144,7 @@ def test_a_disk_without_room_to_write_the_file_anew_is_no_reason_not_to_use_it(
         patch.setitem(STEPS, 2, full)
         with opened(file) as spool:
             assert numbers(spool, HTTP) == [3, 4, 5]
-    assert "stays of version 2 for now: database or disk is full" in caplog.text
+    assert "keeps version 2 for now: database or disk is full" in caplog.text
     with opened(file):
         pass
     assert version_of(file) == VERSION

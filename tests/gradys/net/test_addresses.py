@@ -46,7 +46,7 @@ def test_what_is_no_station_is_refused(text: str) -> None:
         station(text)
 
 
-def test_several_stations_are_told_once_each() -> None:
+def test_several_stations_are_listed_once_each() -> None:
     assert [s.host for s in stations("a:1, b:1,,a:1")] == ["a", "b"]
     assert stations("") == ()
 

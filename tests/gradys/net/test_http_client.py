@@ -43,7 +43,7 @@ class Peer:
         return (await answer) if asyncio.iscoroutine(answer) else answer
 
 
-def asked(loop: Any, peer: Peer, times: int = 1, **given: Any) -> list[Any]:
+def requested(loop: Any, peer: Peer, times: int = 1, **given: Any) -> list[Any]:
     """What the client makes of the peer's answers."""
     loop.patience = 0.2
 
@@ -67,14 +67,14 @@ def peer() -> Peer:
 
 def test_one_connection_is_used_again(loop: Any, peer: Peer) -> None:
     peer.answer = lambda request: web.json_response({"type": 103})
-    assert asked(loop, peer, 3) == [{"type": 103}] * 3
+    assert requested(loop, peer, 3) == [{"type": 103}] * 3
     assert len(set(peer.connections)) == 1
 
 
 @pytest.mark.parametrize("text", ["OK", "[" * 100_000, "9" * 5000])
 def test_a_200_that_is_no_json_is_none(loop: Any, peer: Peer, text: str) -> None:
     peer.answer = lambda request: web.Response(text=text)
-    assert asked(loop, peer) == [None]
+    assert requested(loop, peer) == [None]
 
 
 @pytest.mark.parametrize(
@@ -94,7 +94,7 @@ def test_a_200_that_is_no_json_is_none(loop: Any, peer: Peer, text: str) -> None
 def test_what_is_no_200_is_a_refusal(loop: Any, peer: Peer, answer: Any, text: str, too_large: bool) -> None:
     peer.answer = answer
     with pytest.raises(NotDelivered, match=text) as raised:
-        asked(loop, peer)
+        requested(loop, peer)
     assert raised.value.reached and raised.value.too_large == too_large
 
 
@@ -102,7 +102,7 @@ def test_an_answer_that_would_grow_large_is_no_json(loop: Any, peer: Peer) -> No
     bomb = gzip.compress(b" " * 50 * LARGEST_ANSWER)
     peer.answer = lambda request: web.Response(body=bomb, headers={"Content-Encoding": "gzip"})
     tracemalloc.start()
-    assert asked(loop, peer) == [None]
+    assert requested(loop, peer) == [None]
     _, most = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert most < 4 * LARGEST_ANSWER
@@ -136,7 +136,7 @@ def test_a_connection_that_was_closed_meanwhile_is_replaced_once(loop: Any, peer
         return web.json_response({})
 
     peer.answer = answer
-    assert asked(loop, peer, 2) == [{}, {}]
+    assert requested(loop, peer, 2) == [{}, {}]
 
 
 def test_silence_ends_with_the_time_out(loop: Any, peer: Peer) -> None:
@@ -146,7 +146,7 @@ def test_silence_ends_with_the_time_out(loop: Any, peer: Peer) -> None:
 
     peer.answer = silent
     with pytest.raises(NotDelivered, match="no answer within 3 s") as raised:
-        asked(loop, peer)
+        requested(loop, peer)
     assert not raised.value.reached
 
 

@@ -16,11 +16,11 @@ class Server:
     """A name server that answers about `good` at once and about all others when it is told to."""
 
     def __init__(self) -> None:
-        self.asked: list[str] = []
+        self.requested: list[str] = []
         self.answers = threading.Event()
 
     def ask(self, host: str, *_: Any) -> Any:
-        self.asked.append(host)
+        self.requested.append(host)
         if host != "good":
             self.answers.wait(20)
         if host == "nobody":
@@ -28,7 +28,7 @@ class Server:
         return [INFO]
 
 
-def test_a_name_that_is_not_answered_holds_up_no_other_and_is_asked_once(loop: Any) -> None:
+def test_a_name_that_is_not_answered_holds_up_no_other_and_is_looked_up_once(loop: Any) -> None:
     server = Server()
     names = Resolver(server.ask)
 
@@ -38,7 +38,7 @@ def test_a_name_that_is_not_answered_holds_up_no_other_and_is_asked_once(loop: A
                 with pytest.raises(asyncio.TimeoutError):
                     await asyncio.wait_for(names.look_up(dead, 80), 3.0)
             assert await names.look_up("good", 80) == [INFO]
-        assert sorted(server.asked) == ["dead1", "dead2", "good", "good", "good"]
+        assert sorted(server.requested) == ["dead1", "dead2", "good", "good", "good"]
         server.answers.set()
         assert await names.look_up("dead1", 80) == [INFO]
 

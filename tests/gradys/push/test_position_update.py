@@ -16,108 +16,108 @@ CAPTURED = (
 )
 
 
-def where(teller: Any, now: float, **given: Any) -> position_update.Position:
+def where(telemetry: Any, now: float, **given: Any) -> position_update.Position:
     limits = {"max_age": 5.0, "link_timeout": 5.0, "has_position": True, **given}
-    return position_of(teller.state, now, **limits)
+    return position_of(telemetry.state, now, **limits)
 
 
-def form(teller: Any, now: float, **given: Any) -> dict[str, str]:
+def form(telemetry: Any, now: float, **given: Any) -> dict[str, str]:
     fields = {"seq": 0, "ip": "192.0.2.2:8000/", "ready": True, "max_age": 5.0, **given}
-    return position_update.form(teller.state, where(teller, now), now, **fields)
+    return position_update.form(telemetry.state, where(telemetry, now), now, **fields)
 
 
-def test_the_bytes_are_those_of_the_original(teller: Any, loop: Any) -> None:
-    assert position_update.encode(form(teller, loop.time())) == CAPTURED
+def test_the_bytes_are_those_of_the_original(telemetry: Any, loop: Any) -> None:
+    assert position_update.encode(form(telemetry, loop.time())) == CAPTURED
 
 
-def test_old_positions_are_not_told(teller: Any, loop: Any) -> None:
+def test_old_positions_are_not_reported(telemetry: Any, loop: Any) -> None:
     now = loop.time()
-    assert where(teller, now + 4.9).age == pytest.approx(4.9)
+    assert where(telemetry, now + 4.9).age == pytest.approx(4.9)
     with pytest.raises(Stale, match="5.1 s old"):
-        where(teller, now + 5.1, link_timeout=60.0)
+        where(telemetry, now + 5.1, link_timeout=60.0)
 
 
-def test_a_lost_link_is_said_before_anything_else(teller: Any, loop: Any) -> None:
+def test_a_lost_link_is_reported_before_anything_else(telemetry: Any, loop: Any) -> None:
     with pytest.raises(LinkLost):
-        where(teller, loop.time() + 5.0)
+        where(telemetry, loop.time() + 5.0)
 
 
-def test_a_vehicle_that_never_told_its_position_has_none(host: Any, msg: Any, loop: Any) -> None:
+def test_a_vehicle_that_never_reported_its_position_has_none(host: Any, msg: Any, loop: Any) -> None:
     host.link_watch.watch = lambda state: None
     host._receive(msg("heartbeat", 3))
-    with pytest.raises(Stale, match="not told its position"):
+    with pytest.raises(Stale, match="not reported its position"):
         position_of(host.fleet.vehicles[3], loop.time(), max_age=5, link_timeout=5, has_position=True)
 
 
 @pytest.mark.parametrize("fix", [1, 2])
-def test_without_a_3d_fix_nothing_is_told(teller: Any, loop: Any, fix: int) -> None:
-    teller.tell("gps_raw_int", fix_type=fix)
+def test_without_a_3d_fix_nothing_is_reported(telemetry: Any, loop: Any, fix: int) -> None:
+    telemetry.send("gps_raw_int", fix_type=fix)
     with pytest.raises(NoFix, match="no position fix"):
-        where(teller, loop.time())
+        where(telemetry, loop.time())
 
 
-def test_a_second_receiver_with_a_fix_will_do(teller: Any, loop: Any) -> None:
-    teller.tell("gps_raw_int", fix_type=1)
-    teller.tell("gps2_raw", fix_type=3)
-    assert where(teller, loop.time()).lat == -15.840081
+def test_a_second_receiver_with_a_fix_will_do(telemetry: Any, loop: Any) -> None:
+    telemetry.send("gps_raw_int", fix_type=1)
+    telemetry.send("gps2_raw", fix_type=3)
+    assert where(telemetry, loop.time()).lat == -15.840081
 
 
-def test_a_receiver_that_has_fallen_silent_does_not_count(teller: Any, loop: Any) -> None:
-    teller.tell("gps2_raw", fix_type=3)
+def test_a_receiver_that_has_fallen_silent_does_not_count(telemetry: Any, loop: Any) -> None:
+    telemetry.send("gps2_raw", fix_type=3)
     loop.now += 6
-    teller.tell_all()
-    teller.tell("gps_raw_int", fix_type=1)
+    telemetry.send_all()
+    telemetry.send("gps_raw_int", fix_type=1)
     with pytest.raises(NoFix, match="no position fix"):
-        where(teller, loop.time())
+        where(telemetry, loop.time())
 
 
-def test_a_battery_that_is_not_measured_is_left_out(teller: Any, loop: Any) -> None:
-    teller.tell("sys_status", battery_remaining=-1)
-    assert "battery_percent" not in form(teller, loop.time())
+def test_a_battery_that_is_not_measured_is_left_out(telemetry: Any, loop: Any) -> None:
+    telemetry.send("sys_status", battery_remaining=-1)
+    assert "battery_percent" not in form(telemetry, loop.time())
 
 
-def test_without_a_receiver_the_estimator_decides(teller: Any, loop: Any) -> None:
-    teller.tell("gps_raw_int", fix_type=0)
-    assert where(teller, loop.time(), has_position=True)
+def test_without_a_receiver_the_estimator_decides(telemetry: Any, loop: Any) -> None:
+    telemetry.send("gps_raw_int", fix_type=0)
+    assert where(telemetry, loop.time(), has_position=True)
     with pytest.raises(NoFix):
-        where(teller, loop.time(), has_position=False)
+        where(telemetry, loop.time(), has_position=False)
 
 
 @pytest.mark.parametrize("fields", [{"lat": 0, "lon": 0}, {"lat": 910000000}, {"lon": -1810000000}])
-def test_a_place_that_is_none_is_not_told(teller: Any, loop: Any, fields: dict[str, int]) -> None:
-    teller.tell("global_position_int", **fields)
+def test_a_place_that_is_none_is_not_reported(telemetry: Any, loop: Any, fields: dict[str, int]) -> None:
+    telemetry.send("global_position_int", **fields)
     with pytest.raises(NoFix):
-        where(teller, loop.time())
+        where(telemetry, loop.time())
 
 
-def test_zero_latitude_alone_is_a_place(teller: Any, loop: Any) -> None:
-    teller.tell("global_position_int", lat=0)
-    assert where(teller, loop.time()).lat == 0.0
+def test_zero_latitude_alone_is_a_place(telemetry: Any, loop: Any) -> None:
+    telemetry.send("global_position_int", lat=0)
+    assert where(telemetry, loop.time()).lat == 0.0
 
 
-def test_what_is_not_a_number_is_left_out(teller: Any, loop: Any) -> None:
-    teller.tell("vfr_hud", airspeed=math.nan, groundspeed=math.inf)
-    fields = form(teller, loop.time())
+def test_what_is_not_a_number_is_left_out(telemetry: Any, loop: Any) -> None:
+    telemetry.send("vfr_hud", airspeed=math.nan, groundspeed=math.inf)
+    fields = form(telemetry, loop.time())
     assert "air_speed" not in fields and "ground_speed" not in fields
     assert "nan" not in position_update.encode(fields).decode().lower()
 
 
-def test_without_a_fresh_vfr_hud_the_position_message_tells_speed_and_heading(teller: Any, loop: Any) -> None:
+def test_without_a_fresh_vfr_hud_the_position_message_reports_speed_and_heading(telemetry: Any, loop: Any) -> None:
     loop.now += 6.0
     for name in ("heartbeat", "gps_raw_int"):
-        teller.tell(name)
-    teller.tell("global_position_int", vx=300, vy=400, hdg=27049)
-    fields = form(teller, loop.time())
+        telemetry.send(name)
+    telemetry.send("global_position_int", vx=300, vy=400, hdg=27049)
+    fields = form(telemetry, loop.time())
     assert (fields["ground_speed"], fields["heading"]) == ("5.0", "270")
     assert "air_speed" not in fields and "battery_percent" not in fields
-    teller.tell("global_position_int", hdg=65535)
-    assert "heading" not in form(teller, loop.time())
+    telemetry.send("global_position_int", hdg=65535)
+    assert "heading" not in form(telemetry, loop.time())
 
 
-def test_a_vehicle_that_is_not_ready_says_so(teller: Any, loop: Any) -> None:
-    assert form(teller, loop.time(), ready=False)["ready_to_arm"] == "False"
+def test_a_vehicle_that_is_not_ready_says_so(telemetry: Any, loop: Any) -> None:
+    assert form(telemetry, loop.time(), ready=False)["ready_to_arm"] == "False"
 
 
-def test_speeds_are_told_without_the_noise_of_single_precision(teller: Any, loop: Any) -> None:
-    teller.tell("vfr_hud", groundspeed=1.100000023841858)
-    assert form(teller, loop.time())["ground_speed"] == "1.1"
+def test_speeds_are_reported_without_the_noise_of_single_precision(telemetry: Any, loop: Any) -> None:
+    telemetry.send("vfr_hud", groundspeed=1.100000023841858)
+    assert form(telemetry, loop.time())["ground_speed"] == "1.1"

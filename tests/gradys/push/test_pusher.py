@@ -13,7 +13,7 @@ from mavproxy_gradys.push.statistics import StationTally
 
 
 @pytest.fixture
-def push(loop: Any, host: Any, teller: Any, settings: Any) -> Callable[..., Pusher]:
+def push(loop: Any, host: Any, telemetry: Any, settings: Any) -> Callable[..., Pusher]:
     """Begins to push to a station: `push(poster, ip="192.0.2.2")`."""
 
     def begin(poster: Any, address: str = "127.0.0.1:9", **given: Any) -> Pusher:
@@ -31,73 +31,73 @@ def push(loop: Any, host: Any, teller: Any, settings: Any) -> Callable[..., Push
     return begin
 
 
-def telling(loop: Any, seconds: float, *tellers: Any) -> None:
+def sending(loop: Any, seconds: float, *vehicles: Any) -> None:
     """Let time go by, in which the vehicles tell all four times a second."""
     for _ in range(round(seconds * 4)):
-        for teller in tellers:
-            teller.tell_all()
+        for telemetry in vehicles:
+            telemetry.send_all()
         loop.pass_time(0.25)
 
 
-def test_once_a_second_with_numbers_that_advance(loop: Any, teller: Any, poster: Any, push: Any) -> None:
+def test_once_a_second_with_numbers_that_advance(loop: Any, telemetry: Any, poster: Any, push: Any) -> None:
     host_api = ("0.0.0.0", 8000)
     push(poster)._host.api_address = host_api
-    telling(loop, 5, teller)
+    sending(loop, 5, telemetry)
     assert [form["seq"] for form in poster.forms] == ["0", "1", "2", "3", "4"]
     assert poster.times == pytest.approx([1000.1, 1001.1, 1002.1, 1003.1, 1004.1])
     assert poster.posts[0][1] == "http://127.0.0.1:9/update-info/"
     assert poster.forms[0]["ip"] == "192.0.2.2:8000/"
 
 
-def test_slow_answers_do_not_make_the_cadence_drift(loop: Any, teller: Any, poster: Any, push: Any) -> None:
+def test_slow_answers_do_not_make_the_cadence_drift(loop: Any, telemetry: Any, poster: Any, push: Any) -> None:
     poster.takes = 0.7
     push(poster)
-    telling(loop, 5, teller)
+    sending(loop, 5, telemetry)
     assert poster.times == pytest.approx([1000.1, 1001.1, 1002.1, 1003.1, 1004.1])
 
 
 def test_an_update_is_never_sent_while_the_one_before_is_on_its_way(
-    loop: Any, teller: Any, poster: Any, push: Any
+    loop: Any, telemetry: Any, poster: Any, push: Any
 ) -> None:
     poster.takes = 1.5
     push(poster)
-    telling(loop, 6, teller)
+    sending(loop, 6, telemetry)
     assert poster.times == pytest.approx([1000.1, 1002.1, 1004.1])
 
 
-def test_dropped_by_the_station_is_counted_apart(loop: Any, teller: Any, poster: Any, push: Any) -> None:
+def test_dropped_by_the_station_is_counted_apart(loop: Any, telemetry: Any, poster: Any, push: Any) -> None:
     poster.answer = {"type": 101}
     pusher = push(poster)
-    telling(loop, 3, teller)
+    sending(loop, 3, telemetry)
     vehicle = pusher.tally.vehicle(10)
     assert (vehicle.sent, vehicle.acknowledged, vehicle.dropped, vehicle.seq) == (3, 3, 3, 3)
 
 
-def test_a_200_that_is_no_json_is_an_acknowledgement(loop: Any, teller: Any, poster: Any, push: Any) -> None:
+def test_a_200_that_is_no_json_is_an_acknowledgement(loop: Any, telemetry: Any, poster: Any, push: Any) -> None:
     poster.answer = None
     pusher = push(poster)
-    telling(loop, 2, teller)
+    sending(loop, 2, telemetry)
     assert (pusher.tally.total("acknowledged"), pusher.tally.total("dropped")) == (2, 0)
 
 
 def test_a_number_is_used_again_until_it_is_acknowledged(
-    loop: Any, teller: Any, poster: Any, push: Any, down: Any
+    loop: Any, telemetry: Any, poster: Any, push: Any, down: Any
 ) -> None:
     push(poster)
-    telling(loop, 2, teller)
+    sending(loop, 2, telemetry)
     poster.answer = down
-    telling(loop, 2, teller)
+    sending(loop, 2, telemetry)
     poster.answer = {"type": 103}
-    telling(loop, 3, teller)
+    sending(loop, 3, telemetry)
     assert [form["seq"] for form in poster.forms] == ["0", "1", "2", "2", "2", "3"]
 
 
-def test_a_station_that_is_down_is_asked_less_and_less_often(
-    loop: Any, teller: Any, poster: Any, push: Any, down: Any
+def test_a_station_that_is_down_is_tried_less_and_less_often(
+    loop: Any, telemetry: Any, poster: Any, push: Any, down: Any
 ) -> None:
     poster.answer = down
     pusher = push(poster)
-    telling(loop, 130, teller)
+    sending(loop, 130, telemetry)
     gaps = [after - before for before, after in zip(poster.times, poster.times[1:], strict=False)]
     assert gaps[:5] == pytest.approx([1, 2, 4, 8, 16], abs=1.01)
     assert all(gap == pytest.approx(30, abs=1.01) for gap in gaps[5:])
@@ -107,14 +107,14 @@ def test_a_station_that_is_down_is_asked_less_and_less_often(
 
 
 def test_after_an_outage_the_cadence_is_the_old_one_and_nothing_old_is_sent(
-    loop: Any, teller: Any, poster: Any, push: Any, down: Any
+    loop: Any, telemetry: Any, poster: Any, push: Any, down: Any
 ) -> None:
     poster.answer = down
     push(poster)
-    telling(loop, 20, teller)
+    sending(loop, 20, telemetry)
     before = len(poster.posts)
     poster.answer = {"type": 103}
-    telling(loop, 40, teller)
+    sending(loop, 40, telemetry)
     times = poster.times[before:]
     assert times[0] <= 1020 + 30
     assert times == pytest.approx([times[0] + n for n in range(len(times))], abs=0.01)
@@ -122,103 +122,103 @@ def test_after_an_outage_the_cadence_is_the_old_one_and_nothing_old_is_sent(
 
 
 def test_one_vehicle_asks_whether_the_station_is_back(
-    loop: Any, host: Any, msg: Any, teller: Any, poster: Any, push: Any, down: Any
+    loop: Any, host: Any, msg: Any, telemetry: Any, poster: Any, push: Any, down: Any
 ) -> None:
-    fleet = [teller, *(type(teller)(host, msg, system) for system in range(11, 31))]
+    fleet = [telemetry, *(type(telemetry)(host, msg, system) for system in range(11, 31))]
     poster.answer, poster.takes = down, 0.1
     push(poster)
-    telling(loop, 1, *fleet)
+    sending(loop, 1, *fleet)
     assert len(poster.posts) == len(fleet)  # nobody knew yet
     poster.posts.clear()
-    telling(loop, 2, *fleet)
+    sending(loop, 2, *fleet)
     assert len(poster.posts) == 1
     poster.answer = {"type": 103}
-    telling(loop, 8, *fleet)
+    sending(loop, 8, *fleet)
     assert {form["id"] for form in poster.forms} == {str(system) for system in range(10, 31)}
 
 
 def test_every_vehicle_has_its_own_id_and_numbers(
-    loop: Any, host: Any, msg: Any, teller: Any, poster: Any, push: Any
+    loop: Any, host: Any, msg: Any, telemetry: Any, poster: Any, push: Any
 ) -> None:
     push(poster)
-    telling(loop, 2, teller)
-    second = type(teller)(host, msg, 11)
-    telling(loop, 2, teller, second)
-    told = [(form["id"], form["seq"]) for form in poster.forms]
-    assert told == [("10", "0"), ("10", "1"), ("10", "2"), ("11", "0"), ("10", "3"), ("11", "1")]
+    sending(loop, 2, telemetry)
+    second = type(telemetry)(host, msg, 11)
+    sending(loop, 2, telemetry, second)
+    reported = [(form["id"], form["seq"]) for form in poster.forms]
+    assert reported == [("10", "0"), ("10", "1"), ("10", "2"), ("11", "0"), ("10", "3"), ("11", "1")]
 
 
 def test_a_vehicle_that_the_station_refuses_does_not_hold_up_the_others(
-    loop: Any, host: Any, msg: Any, teller: Any, poster: Any, push: Any
+    loop: Any, host: Any, msg: Any, telemetry: Any, poster: Any, push: Any
 ) -> None:
-    second = type(teller)(host, msg, 11)
-    second.tell_all()
+    second = type(telemetry)(host, msg, 11)
+    second.send_all()
     refusal = NotDelivered("it answers 500", reached=True)
     poster.answer = lambda body: refusal if b"id=10&" in body else {"type": 103}
     pusher = push(poster)
-    telling(loop, 8, teller, second)
+    sending(loop, 8, telemetry, second)
     assert pusher.tally.vehicle(11).acknowledged == 8
     assert pusher.tally.vehicle(10).failed == 4  # at 0, 1, 3 and 7 s
     assert pusher.tally.vehicle(10).last_error == "it answers 500"
 
 
 def test_old_positions_are_never_pushed_and_the_tally_says_why(
-    loop: Any, teller: Any, poster: Any, push: Any
+    loop: Any, telemetry: Any, poster: Any, push: Any
 ) -> None:
     pusher = push(poster, max_age=2)
-    telling(loop, 2, teller)
+    sending(loop, 2, telemetry)
     for _ in range(8):
-        teller.tell("heartbeat")
+        telemetry.send("heartbeat")
         loop.pass_time(0.5)
     assert len(poster.posts) == 4
     vehicle = pusher.tally.vehicle(10)
     assert "s old" in vehicle.why_not and vehicle.withheld == 2
-    telling(loop, 2, teller)
+    sending(loop, 2, telemetry)
     assert len(poster.posts) == 6 and vehicle.why_not == ""
 
 
-def test_without_a_fix_nothing_is_pushed(loop: Any, teller: Any, poster: Any, push: Any) -> None:
-    teller.TELLS = {**teller.TELLS, "gps_raw_int": {"fix_type": 1}}
-    teller.tell_all()
+def test_without_a_fix_nothing_is_pushed(loop: Any, telemetry: Any, poster: Any, push: Any) -> None:
+    telemetry.MESSAGES = {**telemetry.MESSAGES, "gps_raw_int": {"fix_type": 1}}
+    telemetry.send_all()
     pusher = push(poster)
-    telling(loop, 3, teller)
+    sending(loop, 3, telemetry)
     assert poster.posts == []
     assert "no position fix" in pusher.tally.vehicle(10).why_not
 
 
-def test_ip_is_found_out_when_it_is_not_set_and_asked_again_only_now_and_then(
-    loop: Any, teller: Any, poster: Any, push: Any, monkeypatch: Any
+def test_ip_is_found_out_when_it_is_not_set_and_looked_up_again_only_now_and_then(
+    loop: Any, telemetry: Any, poster: Any, push: Any, monkeypatch: Any
 ) -> None:
-    asked: list[float] = []
+    requested: list[float] = []
 
     async def own_address(_names: Any, host: str, port: int) -> str:
-        asked.append(loop.time())
+        requested.append(loop.time())
         return "192.0.2.7"
 
     monkeypatch.setattr("mavproxy_gradys.push.pusher.own_address", own_address)
     pusher = push(poster, ip="")
-    telling(loop, 40, teller)
+    sending(loop, 40, telemetry)
     assert {form["ip"] for form in poster.forms} == {"192.0.2.7/"}  # uavapi is not loaded: no port
-    assert len(asked) == 2
+    assert len(requested) == 2
     assert "names no API" in pusher.tally.note
 
 
 def test_a_name_that_nobody_knows_is_an_error_like_any_other(
-    loop: Any, teller: Any, poster: Any, push: Any, monkeypatch: Any
+    loop: Any, telemetry: Any, poster: Any, push: Any, monkeypatch: Any
 ) -> None:
     async def own_address(_names: Any, host: str, port: int) -> str:
         raise OSError(-2, "Name or service not known")
 
     monkeypatch.setattr("mavproxy_gradys.push.pusher.own_address", own_address)
     pusher = push(poster, ip="")
-    telling(loop, 2, teller)
+    sending(loop, 2, telemetry)
     assert poster.posts == []
     assert "Name or service not known" in pusher.tally.last_error
     assert pusher.tally.total("sent") == 0
 
 
 def test_a_name_server_that_is_silent_holds_up_nobody(
-    loop: Any, teller: Any, poster: Any, push: Any, monkeypatch: Any
+    loop: Any, telemetry: Any, poster: Any, push: Any, monkeypatch: Any
 ) -> None:
     async def own_address(_names: Any, host: str, port: int) -> str:
         await asyncio.sleep(1000)
@@ -226,17 +226,17 @@ def test_a_name_server_that_is_silent_holds_up_nobody(
 
     monkeypatch.setattr("mavproxy_gradys.push.pusher.own_address", own_address)
     pusher = push(poster, ip="", timeout=2)
-    telling(loop, 3, teller)
-    assert "no answer about the name" in pusher.tally.last_error
+    sending(loop, 3, telemetry)
+    assert "the name server did not answer" in pusher.tally.last_error
 
 
-def test_the_log_tells_of_an_outage_and_of_a_refusal_once(
-    loop: Any, teller: Any, poster: Any, push: Any, down: Any, caplog: Any
+def test_the_log_reports_an_outage_and_a_refusal_once(
+    loop: Any, telemetry: Any, poster: Any, push: Any, down: Any, caplog: Any
 ) -> None:
     push(poster)
     for answer in (down, {"type": 103}, NotDelivered("it answers 500", reached=True), {"type": 103}):
         poster.answer = answer
-        telling(loop, 40, teller)
+        sending(loop, 40, telemetry)
     url = "http://127.0.0.1:9"
     assert [(record.name, record.message) for record in caplog.records] == [
         ("gradys.push", f"{url} does not answer: cannot connect"),
@@ -246,20 +246,22 @@ def test_the_log_tells_of_an_outage_and_of_a_refusal_once(
     ]
 
 
-def test_a_dead_station_does_not_delay_another(loop: Any, teller: Any, poster: Any, push: Any, down: Any) -> None:
+def test_a_dead_station_does_not_delay_another(loop: Any, telemetry: Any, poster: Any, push: Any, down: Any) -> None:
     dead = type(poster)(loop)
     dead.answer, dead.takes = down, 3.0
     push(dead, "127.0.0.1:8")
     push(poster)
-    telling(loop, 10, teller)
+    sending(loop, 10, telemetry)
     assert len(poster.posts) == 10
     assert poster.times == pytest.approx([1000.1 + n for n in range(10)])
 
 
-def test_cancelling_ends_the_updates_on_their_way_and_closes(loop: Any, teller: Any, poster: Any, push: Any) -> None:
+def test_cancelling_ends_the_updates_on_their_way_and_closes(
+    loop: Any, telemetry: Any, poster: Any, push: Any
+) -> None:
     poster.takes = 100.0
     pusher = push(poster)
-    telling(loop, 1, teller)
+    sending(loop, 1, telemetry)
     pusher.task.cancel()
     loop.settle()
     assert pusher.task.done() and poster.closed

@@ -68,11 +68,11 @@ class Asker:
         return answer.status, answer.body.decode()
 
     def whole(self, method: str, path: str, **given: Any) -> Any:
-        async def asked() -> Any:
+        async def requested() -> Any:
             async with self._client.request(method, path, **given) as answer:
                 return SimpleNamespace(status=answer.status, headers=answer.headers, body=await answer.read())
 
-        return self._loop.run(asked())
+        return self._loop.run(requested())
 
     def json(self, path: str) -> Any:
         answer = self.whole("GET", path)
@@ -80,7 +80,7 @@ class Asker:
         return json.loads(answer.body)
 
     def look(self) -> None:
-        self._loop.run(self.watch.look())
+        self._loop.run(self.watch.update())
 
 
 @pytest.fixture
@@ -230,7 +230,7 @@ def test_the_page_loads_its_own_files_and_nothing_else(ask: Any) -> None:
     assert ask("GET", "/../app.py")[0] == 404 and ask("GET", "/page/app.py")[0] == 404
 
 
-def test_half_a_letter_is_told_as_a_question_mark(ask: Any) -> None:
+def test_an_unpaired_surrogate_is_shown_as_a_question_mark(ask: Any) -> None:
     body = json.dumps({"readings": [reading(1, value="\ud800", device="s")]})
     assert ask("POST", "/readings", data=body)[0] == 200
     assert ask("GET", "/readings?device=s")[0] == 200

@@ -50,21 +50,21 @@ class Broker:
     Attributes:
         acknowledged: packet identifiers in their order.
         after: batches that the store had by the newest acknowledgement.
-        told: (topic, numbers) of what was published.
+        published: (topic, numbers) of each confirmation.
     """
 
     def __init__(self, store: Store) -> None:
         self._store = store
         self.acknowledged: list[int] = []
         self.after = 0
-        self.told: list[tuple[str, list[int]]] = []
+        self.published: list[tuple[str, list[int]]] = []
 
     def acknowledge(self, messages: Sequence[Message]) -> None:
         self.acknowledged += [message.mid for message in messages]
         self.after = len(self._store.batches)
 
-    def tell(self, topic: str, payload: str) -> None:
-        self.told.append((topic, json.loads(payload)["acknowledged"]))
+    def publish(self, topic: str, payload: str) -> None:
+        self.published.append((topic, json.loads(payload)["acknowledged"]))
 
 
 @pytest.fixture
@@ -98,10 +98,10 @@ def test_acknowledged_in_order_and_after_the_commit(rig: Any, loop: Any) -> None
     for mid in range(1, 5):
         rig.inbox.put(message(mid, "confirmed/x" if mid > 2 else ""))
     loop.pass_time(0.6)
-    assert (rig.broker.acknowledged, rig.broker.told) == ([], [])
+    assert (rig.broker.acknowledged, rig.broker.published) == ([], [])
     loop.pass_time(20)
     assert (rig.broker.acknowledged, rig.broker.after) == ([1, 2, 3, 4], 1)
-    assert rig.broker.told == [("confirmed/x", [3, 4])]
+    assert rig.broker.published == [("confirmed/x", [3, 4])]
     assert (rig.statistics.stored, rig.statistics.confirmed) == (4, 2)
 
 
@@ -116,13 +116,13 @@ def test_poison_is_counted_logged_once_a_minute_and_acknowledged(
     rig.inbox.put(message(8))
     loop.pass_time(2)
     assert rig.broker.acknowledged == list(range(1, 9)) and rig.store.batches == [[8]]
-    assert (rig.statistics.refused, rig.broker.told) == (7, [])
+    assert (rig.statistics.refused, rig.broker.published) == (7, [])
     (record,) = caplog.records
     assert record.levelno == logging.WARNING and "\x1b" not in record.getMessage()
     loop.pass_time(61)
     rig.inbox.put(message(9, payload=b"poison"))
     loop.pass_time(1)
-    assert "7 messages are no readings" in caplog.records[-1].getMessage()
+    assert "7 messages are not readings" in caplog.records[-1].getMessage()
 
 
 def test_what_the_database_refuses_costs_nobody_else(rig: Any, loop: Any) -> None:
@@ -132,7 +132,7 @@ def test_what_the_database_refuses_costs_nobody_else(rig: Any, loop: Any) -> Non
     loop.settle()
     assert rig.broker.acknowledged == [1, 2, 3, 4]
     assert rig.store.batches == [[1, 2], [4]]
-    assert rig.broker.told == [("confirmed/x", [1, 2, 4])] and rig.statistics.refused == 1
+    assert rig.broker.published == [("confirmed/x", [1, 2, 4])] and rig.statistics.refused == 1
 
 
 def test_a_status_is_no_reading_and_no_poison(rig: Any, loop: Any) -> None:

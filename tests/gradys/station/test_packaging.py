@@ -28,10 +28,10 @@ def test_the_dashboard_asks_for_metrics_that_there_are() -> None:
     text = exposition(StationCollector(Statistics(), watch, health)).decode()
     there = set(re.findall(r"^(station_\w+)", text, re.MULTILINE))
     panels = json.loads((PACKAGING / "grafana-station.json").read_text(encoding="utf-8"))["panels"]
-    asked = {
+    requested = {
         name for panel in panels for one in panel["targets"] for name in re.findall(r"station_[a-z_]+", one["expr"])
     }
-    assert len(asked) >= 10 and asked <= there
+    assert len(requested) >= 10 and requested <= there
 
 
 def test_the_unit_starts_a_worker() -> None:

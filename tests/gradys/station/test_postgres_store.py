@@ -105,15 +105,15 @@ def test_the_fleet_is_one_for_all_workers(make: Any, run: Any, monkeypatch: pyte
     monkeypatch.setattr("mavproxy_gradys.station.postgres_store.SHOW_EVERY", 0.01)
     one, other = make("worker-1"), make("worker-2")
 
-    async def told() -> list[tuple[str, str]]:
+    async def reported() -> list[tuple[str, str]]:
         await asyncio.sleep(0.2)
         return [(newest.device, newest.value) for newest in (await one.fleet()).newest]
 
     run(one.add([row(1, TODAY, value=1), row(1, TODAY, "uav-2", value=8)]))
     run(other.add([row(2, TODAY + 1, value=2)]))
-    assert run(told()) == [("uav-1", "2"), ("uav-2", "8")]
+    assert run(reported()) == [("uav-1", "2"), ("uav-2", "8")]
     run(one.add([row(3, TODAY + 0.5, value=3)]))  # late, and kept by another worker than the newer one
-    assert run(told()) == [("uav-1", "2"), ("uav-2", "8")]
+    assert run(reported()) == [("uav-1", "2"), ("uav-2", "8")]
 
 
 def test_what_the_database_refuses_is_a_value_error(make: Any, run: Any) -> None:

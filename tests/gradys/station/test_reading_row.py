@@ -14,12 +14,12 @@ def test_a_reading_is_a_row() -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "told", "number"),
+    ("value", "reported", "number"),
     [(True, "true", 1.0), ("é", '"\\u00e9"', None), ([1, 2.5], "[1, 2.5]", None), ("a\0b", '"a\\u0000b"', None)],
 )
-def test_values_are_json(value: Any, told: str, number: float | None) -> None:
+def test_values_are_json(value: Any, reported: str, number: float | None) -> None:
     row = reading_row({**READING, "value": value})
-    assert (row.value, row.number) == (told, number)
+    assert (row.value, row.number) == (reported, number)
 
 
 @pytest.mark.parametrize(

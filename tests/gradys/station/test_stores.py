@@ -21,12 +21,12 @@ def row(seq: int, **given: Any) -> ReadingRow:
     return reading_row({**reading, "time": 1_699_999_000 + seq, **given})
 
 
-async def every(store: Store, **asked: Any) -> list[tuple[Any, ...]]:
-    return [found async for chunk in store.readings(ReadingQuery(**asked)) for found in chunk]
+async def every(store: Store, **requested: Any) -> list[tuple[Any, ...]]:
+    return [found async for chunk in store.readings(ReadingQuery(**requested)) for found in chunk]
 
 
-async def history(store: Store, start: float, end: float, buckets: int, **asked: Any) -> list[Any]:
-    given = {"device": "uav-1", "quantity": "alt", "element": None, **asked}
+async def history(store: Store, start: float, end: float, buckets: int, **requested: Any) -> list[Any]:
+    given = {"device": "uav-1", "quantity": "alt", "element": None, **requested}
     return await store.history(HistoryQuery(start=start, end=end, buckets=buckets, **given))
 
 
@@ -115,7 +115,7 @@ def test_the_fleet_shows_the_newest_of_each(store: Store, run: Any, monkeypatch:
     assert [(n.device, n.value) for n in run(shown())] == [("uav-1", "5"), ("uav-2", '"x"'), ("uav-3", "9")]
 
 
-def test_a_file_that_is_none_is_said(tmp_path: Path) -> None:
+def test_a_file_that_is_none_is_reported(tmp_path: Path) -> None:
     (tmp_path / "s.db").write_bytes(b"no database, but longer than a hundred bytes" * 9)
     with pytest.raises(NotStored):
         SqliteStore(tmp_path / "s.db")

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from mavproxy_gradys.tracks.console import TrackConsole, shown, words
+from mavproxy_gradys.tracks.console import TrackConsole, argument_parser, report_text
 from mavproxy_gradys.tracks.service import Tracking
 from mavproxy_uavapi.core.errors import BadRequest
 
@@ -16,19 +16,19 @@ from mavproxy_uavapi.core.errors import BadRequest
 )  # fmt: skip
 def test_a_number_that_cannot_be_flown_by_is_refused(option: str) -> None:
     with pytest.raises(BadRequest):
-        words().parse_args(["fly", "a.track", *option.split()])
+        argument_parser().parse_args(["fly", "a.track", *option.split()])
 
 
 def test_numbers_within_their_limits_are_taken() -> None:
-    given = words().parse_args(["fly", "a.track", "--ground", "-3.5", "--reach", "200", "--transit", "20"])
+    given = argument_parser().parse_args(["fly", "a.track", "--ground", "-3.5", "--reach", "200", "--transit", "20"])
     assert (given.ground, given.reach, given.transit) == (-3.5, 200.0, 20.0)
 
 
 def test_all_flights_are_shown() -> None:
     flight: dict[str, Any] = {"state": "running", "error": None, "stage": "flying", "leg": 2, "legs": 5}
-    said = shown({"recording": None, "flights": [{**flight, "vehicle": 1}, {**flight, "vehicle": 2}]})
-    assert said.splitlines() == [f"track flight running, vehicle {n}: flying, leg 2 of 5" for n in (1, 2)]
-    assert shown({"recording": None, "flights": []}) == "no track is recorded or flown"
+    output = report_text({"recording": None, "flights": [{**flight, "vehicle": 1}, {**flight, "vehicle": 2}]})
+    assert output.splitlines() == [f"track flight running, vehicle {n}: flying, leg 2 of 5" for n in (1, 2)]
+    assert report_text({"recording": None, "flights": []}) == "no track is recorded or flown"
 
 
 @pytest.mark.parametrize(
@@ -40,14 +40,14 @@ def test_all_flights_are_shown() -> None:
     ],
 )
 def test_track_is_flown_by_the_vehicle_that_is_named(
-    loop: Any, host: Any, teller: Any, capsys: Any, tmp_path: Any, monkeypatch: Any, line: str, answer: str
+    loop: Any, host: Any, telemetry: Any, capsys: Any, tmp_path: Any, monkeypatch: Any, line: str, answer: str
 ) -> None:
     async def at_once(call: Any, *args: Any) -> Any:
         return call(*args)
 
     monkeypatch.setattr("asyncio.to_thread", at_once)
     monkeypatch.chdir(tmp_path)
-    teller.tell("heartbeat")
+    telemetry.send("heartbeat")
     TrackConsole(host, Tracking(host)).command(line.split())
     loop.pass_time(1.0)
     host.bridge.turn()

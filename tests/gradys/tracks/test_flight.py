@@ -79,14 +79,14 @@ def test_no_takeoff_is_higher_than_the_verb_allows(loop: Any) -> None:
 
 
 @pytest.mark.parametrize("reach", [999.0, float("nan")])
-def test_what_is_not_within_reach_is_refused(host: Any, teller: Any, reach: float) -> None:
+def test_what_is_not_within_reach_is_refused(host: Any, telemetry: Any, reach: float) -> None:
     copter = host.registry.find(10)
     assert flight_of(copter, [place(1000, 5)], 1001.0)
     with pytest.raises(Invalid, match="waypoint 1 of the track is 1000 m away"):
         flight_of(copter, [place(1000, 5)], reach)
 
 
-def test_a_vehicle_that_is_no_copter_does_not_fly_tracks(host: Any, teller: Any) -> None:
-    teller.tell("heartbeat", type=1)
+def test_a_vehicle_that_is_no_copter_does_not_fly_tracks(host: Any, telemetry: Any) -> None:
+    telemetry.send("heartbeat", type=1)
     with pytest.raises(NotSupported):
         flight_of(host.registry.find(10), [place(0, 5)], 1000.0)

@@ -28,15 +28,15 @@ LONG = LINE + "# a comment\n" * 10_000
 
 
 @pytest.fixture
-def service(host: Any, teller: Any, monkeypatch: pytest.MonkeyPatch) -> Service:
+def service(host: Any, telemetry: Any, monkeypatch: pytest.MonkeyPatch) -> Service:
     """Before vehicle 10, which flies in GUIDED."""
 
     async def at_once(call: Callable[..., Any], *args: Any) -> Any:
         return call(*args)
 
     monkeypatch.setattr(asyncio, "to_thread", at_once)
-    teller.tell("heartbeat", armed=True, mode="GUIDED", system_status=4)
-    teller.tell("extended_sys_state", landed_state=2)
+    telemetry.send("heartbeat", armed=True, mode="GUIDED", system_status=4)
+    telemetry.send("extended_sys_state", landed_state=2)
     return Service(host, ApiModuleSettings(environ={}).snapshot())
 
 
@@ -47,7 +47,7 @@ def call_of(service: Service, text: str = LONG, **query: str) -> Call:
     return Call(service, request, TrackRequest(track=text), Match("/mission/fly-track"))
 
 
-def asked(service: Service, call: Call) -> Any:
+def requested(service: Service, call: Call) -> Any:
     return audited(call, GradysHandlers(Gradys(service.host)).fly_track)
 
 
@@ -58,9 +58,9 @@ def sizes(service: Service, loop: Any) -> list[int]:
 
 
 def test_neither_job_nor_trail_keeps_the_tracks_text(loop: Any, service: Service) -> None:
-    assert loop.run(asked(service, call_of(service, wait="false"))).status == 202
+    assert loop.run(requested(service, call_of(service, wait="false"))).status == 202
     with pytest.raises(Invalid):
-        loop.run(asked(service, call_of(service, LONG + "nonsense")))
+        loop.run(requested(service, call_of(service, LONG + "nonsense")))
     service.host.jobs.on_ended.clear()
     service.host.jobs.abort_remote("enough")
     loop.settle()
@@ -69,19 +69,19 @@ def test_neither_job_nor_trail_keeps_the_tracks_text(loop: Any, service: Service
 
 
 def test_the_same_track_joins_the_flight_and_another_does_not(loop: Any, service: Service) -> None:
-    answers = [loop.run(asked(service, call_of(service, text, wait="false"))) for text in (LONG, LONG, LINE)]
+    answers = [loop.run(requested(service, call_of(service, text, wait="false"))) for text in (LONG, LONG, LINE)]
     assert [answer.headers["Location"] for answer in answers] == ["/jobs/1", "/jobs/1", "/jobs/2"]
 
 
 def test_the_limit_of_jobs_holds_for_tracks_too(loop: Any, service: Service) -> None:
     service.settings = replace(service.settings, max_jobs=0)
     with pytest.raises(TooManyRequests):
-        loop.run(asked(service, call_of(service)))
+        loop.run(requested(service, call_of(service)))
 
 
 def test_hanging_up_holds_where_that_is_set(loop: Any, service: Service) -> None:
     service.host.endings.on_disconnect = Policy.HOLD
-    waiting = loop.create_task(asked(service, call_of(service)))
+    waiting = loop.create_task(requested(service, call_of(service)))
     loop.settle()
     waiting.cancel()
     loop.settle()

@@ -15,9 +15,9 @@ def no_thread(monkeypatch: pytest.MonkeyPatch, at_once: Any) -> None:
     monkeypatch.setattr("mavproxy_gradys.tracks.recorder.ThreadPoolExecutor", at_once)
 
 
-def telling(loop: Any, teller: Any, seconds: float) -> None:
+def sending(loop: Any, telemetry: Any, seconds: float) -> None:
     for _ in range(round(seconds * 4)):
-        teller.tell("gps_raw_int", time_usec=round(loop.time() * 1e6), lat=357713121, lon=-786743912, alt=584090)
+        telemetry.send("gps_raw_int", time_usec=round(loop.time() * 1e6), lat=357713121, lon=-786743912, alt=584090)
         loop.pass_time(0.25)
 
 
@@ -28,9 +28,9 @@ def recorder(loop: Any, host: Any, file: Path, style: str = "text", **given: Any
 
 
 @pytest.mark.parametrize("style", ["text", "tuple"])
-def test_a_reading_every_period(loop: Any, host: Any, teller: Any, tmp_path: Path, style: str) -> None:
+def test_a_reading_every_period(loop: Any, host: Any, telemetry: Any, tmp_path: Path, style: str) -> None:
     made = recorder(loop, host, tmp_path / "track", style)
-    telling(loop, teller, 21)
+    sending(loop, telemetry, 21)
     loop.run(made.stop())
     readings = parse((tmp_path / "track").read_text())
     assert made.written == len(readings)
@@ -39,21 +39,21 @@ def test_a_reading_every_period(loop: Any, host: Any, teller: Any, tmp_path: Pat
     ] == [5_000_000] * 3
 
 
-def test_gpx_is_whole_at_every_moment(loop: Any, host: Any, teller: Any, tmp_path: Path) -> None:
+def test_gpx_is_whole_at_every_moment(loop: Any, host: Any, telemetry: Any, tmp_path: Path) -> None:
     made = recorder(loop, host, tmp_path / "a.gpx", "gpx")
     for count in range(3):
         text = (tmp_path / "a.gpx").read_text()
         assert text.endswith("</gpx>\n") and text.count("<trkpt") >= count
-        telling(loop, teller, 5)
+        sending(loop, telemetry, 5)
     loop.run(made.stop())
 
 
-def test_the_latest_is_written_on_every_message(loop: Any, host: Any, teller: Any, tmp_path: Path) -> None:
+def test_the_latest_is_written_on_every_message(loop: Any, host: Any, telemetry: Any, tmp_path: Path) -> None:
     latest = tmp_path / "latest"
     made = recorder(loop, host, tmp_path / "track", latest=latest)
     seen = set()
     for _ in range(8):
-        telling(loop, teller, 0.25)
+        sending(loop, telemetry, 0.25)
         seen.add(latest.read_text())
     assert len(seen) == 8
     assert all(len(parse(text)) == 1 for text in seen)
@@ -61,28 +61,30 @@ def test_the_latest_is_written_on_every_message(loop: Any, host: Any, teller: An
     assert host.listeners == []
 
 
-def test_stopping_writes_what_was_heard_last(loop: Any, host: Any, teller: Any, tmp_path: Path) -> None:
+def test_stopping_writes_what_was_heard_last(loop: Any, host: Any, telemetry: Any, tmp_path: Path) -> None:
     latest = tmp_path / "latest"
     made = recorder(loop, host, tmp_path / "track", latest=latest)
-    telling(loop, teller, 1)
+    sending(loop, telemetry, 1)
     for number in (7, 8):
-        teller.tell("gps_raw_int", time_usec=number, lat=357713121, lon=-786743912, alt=584090, fix_type=3)
+        telemetry.send("gps_raw_int", time_usec=number, lat=357713121, lon=-786743912, alt=584090, fix_type=3)
     loop.run(made.stop())
     loop.settle()
     assert parse(latest.read_text())[0].time_usec == 8
 
 
-def test_nothing_old_is_recorded(loop: Any, host: Any, teller: Any, tmp_path: Path) -> None:
+def test_nothing_old_is_recorded(loop: Any, host: Any, telemetry: Any, tmp_path: Path) -> None:
     made = recorder(loop, host, tmp_path / "track")
-    telling(loop, teller, 6)
+    sending(loop, telemetry, 6)
     written = made.written
     loop.pass_time(30)
     assert made.written <= written + 1
-    assert "tells no GPS_RAW_INT" in made.problem
+    assert "sends no GPS_RAW_INT" in made.problem
     loop.run(made.stop())
 
 
-def test_a_file_that_cannot_be_written_is_said_at_once(loop: Any, host: Any, teller: Any, tmp_path: Path) -> None:
+def test_a_file_that_cannot_be_written_is_reported_at_once(
+    loop: Any, host: Any, telemetry: Any, tmp_path: Path
+) -> None:
     with pytest.raises(NotStored, match="No such file or directory"):
         recorder(loop, host, tmp_path / "no" / "track")
 

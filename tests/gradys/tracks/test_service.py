@@ -16,13 +16,13 @@ PLACES = [TrackWaypoint(-15.84, -47.9266, 20.0)]
 
 
 @pytest.fixture
-def fleet(host: Any, msg: Any, teller: Any) -> list[Any]:
+def fleet(host: Any, msg: Any, telemetry: Any) -> list[Any]:
     """Two vehicles in the air, in GUIDED."""
-    fleet = [type(teller)(host, msg, system) for system in (11, 12)]
+    fleet = [type(telemetry)(host, msg, system) for system in (11, 12)]
     for vehicle in fleet:
-        vehicle.tell_all()
-        vehicle.tell("heartbeat", armed=True, mode="GUIDED", system_status=4)
-        vehicle.tell("extended_sys_state", landed_state=2)
+        vehicle.send_all()
+        vehicle.send("heartbeat", armed=True, mode="GUIDED", system_status=4)
+        vehicle.send("extended_sys_state", landed_state=2)
     return fleet
 
 
@@ -37,16 +37,16 @@ def begin(loop: Any, host: Any, tracks: Tracking, system: int, name: str = "a") 
     return job
 
 
-def test_the_flights_of_all_vehicles_are_told_and_end_with_the_module(loop: Any, host: Any, fleet: Any) -> None:
+def test_the_flights_of_all_vehicles_are_reported_and_end_with_the_module(loop: Any, host: Any, fleet: Any) -> None:
     tracks = Tracking(host)
     jobs = [begin(loop, host, tracks, vehicle.system) for vehicle in fleet]
-    told = tracks.report()["flights"]
-    assert [(flight["vehicle"], flight["state"]) for flight in told] == [(11, "running"), (12, "running")]
+    reported = tracks.report()["flights"]
+    assert [(flight["vehicle"], flight["state"]) for flight in reported] == [(11, "running"), (12, "running")]
     loop.run(tracks.close())
     assert ["gradys is unloaded" in str(job.error) for job in jobs] == [True, True]
 
 
-def test_of_a_vehicle_the_newest_flight_is_told(loop: Any, host: Any, fleet: Any) -> None:
+def test_of_a_vehicle_the_newest_flight_is_reported(loop: Any, host: Any, fleet: Any) -> None:
     tracks = Tracking(host)
     jobs = [begin(loop, host, tracks, 11, name) for name in "abc"]
     assert [job.running for job in jobs] == [False, False, True]

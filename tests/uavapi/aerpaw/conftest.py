@@ -32,11 +32,11 @@ class FakeApi:
 
     def __init__(self) -> None:
         self.armed, self.mode, self.alt, self.yaw = False, LOITER, 0.0, 0.0
-        self.asked: list[tuple[str, str, dict[str, Any]]] = []
+        self.requested: list[tuple[str, str, dict[str, Any]]] = []
         self.refusals: dict[str, tuple[int, dict[str, Any]]] = {}
         self.takes: dict[str, float | None] = {}
         self.gone: list[str] = []
-        self.telling = True
+        self.sending = True
         self.url = ""
         self._jobs: dict[str, str] = {}
         self._loop = asyncio.new_event_loop()
@@ -54,10 +54,10 @@ class FakeApi:
         self._loop.close()
 
     def verbs(self) -> list[str]:
-        return [path for _, path, _ in self.asked]
+        return [path for _, path, _ in self.requested]
 
     def last(self, path: str) -> dict[str, Any]:
-        return [values for _, asked, values in self.asked if asked == path][-1]
+        return [values for _, requested, values in self.requested if requested == path][-1]
 
     def _run(self) -> None:
         asyncio.set_event_loop(self._loop)
@@ -100,7 +100,7 @@ class FakeApi:
         await socket.prepare(request)
         reading = asyncio.ensure_future(socket.receive())
         while not (reading.done() and reading.result().type in (WSMsgType.CLOSE, WSMsgType.CLOSED)):
-            if self.telling:
+            if self.sending:
                 for name, fields in self._messages().items():
                     await socket.send_str(json.dumps({"name": name, "component": 1, "fields": fields}))
             await asyncio.sleep(EVERY)
@@ -121,12 +121,12 @@ class FakeApi:
     async def _verb(self, request: web.Request) -> web.Response:
         path = request.path
         values = {**request.query, **(await request.json() if request.can_read_body else {})}
-        self.asked.append((request.method, path, values))
+        self.requested.append((request.method, path, values))
         if path in self.refusals:
             status, body = self.refusals[path]
             return web.json_response(body, status=status)
         if values.get("wait") == "false":
-            number = str(len(self.asked))
+            number = str(len(self.requested))
             self._jobs[number] = path
             self._loop.call_later(self.takes.get(path, 0.0) or 0.0, self._obey, path, values, number)
             return web.json_response({"id": "7", "job": number}, status=202)
@@ -154,7 +154,7 @@ class FakeApi:
 
     async def _job(self, request: web.Request) -> web.Response:
         number = request.match_info["id"]
-        self.asked += [("DELETE", request.path, {})] if request.method == "DELETE" else []
+        self.requested += [("DELETE", request.path, {})] if request.method == "DELETE" else []
         return web.json_response({"state": "running" if number in self._jobs else "succeeded", "error": None})
 
 

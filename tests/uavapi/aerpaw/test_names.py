@@ -93,9 +93,9 @@ def test_real_package_is_left_alone_or_lends_its_util(monkeypatch: Any, tmp_path
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True, env=environment
     )
-    said = done.stdout.splitlines()
-    assert "--real" in said[0]
-    assert said[1] == "True mavproxy_uavapi.aerpaw.drone"
+    output = done.stdout.splitlines()
+    assert "--real" in output[0]
+    assert output[1] == "True mavproxy_uavapi.aerpaw.drone"
 
 
 # -- the command line -------------------------------------------------------------------------------------

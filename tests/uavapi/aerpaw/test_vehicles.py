@@ -51,16 +51,16 @@ def test_battery_is_text_that_loggers_take_apart(drone: Drone) -> None:
     assert re.fullmatch(r"Battery:voltage=12.6,current=1.5,level=88", text)
 
 
-def test_vehicle_goes_on_telling_while_its_script_blocks(api: Any, drone: Drone) -> None:
+def test_vehicle_goes_on_sending_while_its_script_blocks(api: Any, drone: Drone) -> None:
     api.alt = 5.0
     time.sleep(0.3)
     assert drone.position.alt == 5.0
 
 
 def test_silent_vehicle_is_not_connected(api: Any, drone: Drone) -> None:
-    api.telling = False
-    for told in drone._thread.drone.telemetry._messages.values():
-        assert told.at
+    api.sending = False
+    for reported in drone._thread.drone.telemetry._messages.values():
+        assert reported.at
     drone._thread.drone.telemetry._max_age = 0.05
     time.sleep(0.2)
     with pytest.raises(NotConnectedError, match="GLOBAL_POSITION_INT"):
@@ -106,15 +106,17 @@ def test_refusal_is_the_error_that_scripts_know(api: Any, drone: Drone) -> None:
 
 def test_goto_points_to_where_it_goes(api: Any, flying: Drone) -> None:
     asyncio.run(flying.goto_coordinates(flying.position + VectorNED(30, 0)))
-    asked = api.last(GO_TO)
-    assert asked["look_at_target"] is True and "heading" not in asked
-    assert (asked["tolerance"], asked["timeout"], asked["on_disconnect"]) == (2.0, 300.0, "hold")
+    requested = api.last(GO_TO)
+    assert requested["look_at_target"] is True and "heading" not in requested
+    assert (requested["tolerance"], requested["timeout"], requested["on_disconnect"]) == (2.0, 300.0, "hold")
 
 
-@pytest.mark.parametrize(("heading", "wanted"), [(-1, 359), (90, 90), (720, 0)])
-def test_goto_keeps_its_target_heading_and_forgets_it(api: Any, flying: Drone, heading: float, wanted: float) -> None:
+@pytest.mark.parametrize(("heading", "expected"), [(-1, 359), (90, 90), (720, 0)])
+def test_goto_keeps_its_target_heading_and_forgets_it(
+    api: Any, flying: Drone, heading: float, expected: float
+) -> None:
     asyncio.run(flying.goto_coordinates(flying.position + VectorNED(30, 0), target_heading=heading))
-    assert api.last(GO_TO)["heading"] == wanted
+    assert api.last(GO_TO)["heading"] == expected
     assert flying._current_heading is None
 
 
@@ -145,7 +147,7 @@ def test_cancelled_goto_hangs_up_so_that_the_vehicle_stops(api: Any, flying: Dro
     async def flight() -> None:
         api.takes[GO_TO] = None
         going = asyncio.ensure_future(flying.goto_coordinates(flying.position + VectorNED(50, 0)))
-        await until(lambda: api.asked)
+        await until(lambda: api.requested)
         going.cancel()
         await until(lambda: api.gone == [GO_TO])
         assert flying.done_moving()
@@ -176,7 +178,7 @@ def test_vehicle_that_its_pilot_armed_is_taken_over_at_the_first_command_only(ap
     asyncio.run(flight())
 
 
-def test_velocity_is_left_to_the_api_and_not_asked_for_twice(api: Any, flying: Drone) -> None:
+def test_velocity_is_left_to_the_api_and_not_requested_twice(api: Any, flying: Drone) -> None:
     async def flight() -> None:
         api.takes[TRAVEL] = None
         for _ in range(3):
@@ -186,8 +188,13 @@ def test_velocity_is_left_to_the_api_and_not_asked_for_twice(api: Any, flying: D
         assert api.verbs() == [TRAVEL, TRAVEL]
 
     asyncio.run(flight())
-    asked = api.last(TRAVEL)
-    assert (asked["vx"], asked["vy"], asked["duration"], asked["on_disconnect"]) == (1, 2.5, 3600.0, "hold")
+    requested = api.last(TRAVEL)
+    assert (requested["vx"], requested["vy"], requested["duration"], requested["on_disconnect"]) == (
+        1,
+        2.5,
+        3600.0,
+        "hold",
+    )
     flying.close()
     for _ in range(100):
         if len(api.gone) == 2:
@@ -205,8 +212,8 @@ def test_velocity_with_a_duration_returns_at_once(api: Any, flying: Drone) -> No
         assert flying.done_moving()
 
     asyncio.run(flight())
-    asked = api.last("/movement/travel_at_body")
-    assert (asked["front"], asked["right"]) == (3, 0) and asked["duration"] == pytest.approx(5, abs=1e-3)
+    requested = api.last("/movement/travel_at_body")
+    assert (requested["front"], requested["right"]) == (3, 0) and requested["duration"] == pytest.approx(5, abs=1e-3)
 
 
 def test_velocity_that_is_refused_raises(api: Any, flying: Drone) -> None:
@@ -276,9 +283,9 @@ def test_dummy_is_closed_and_nothing_else() -> None:
     ("policy", "verbs"),
     [("rtl", ["/command/rtl"]), ("land", ["/command/land"]), ("hold", [TRAVEL]), ("nothing", [])],
 )
-def test_vehicle_in_the_air_is_seen_to(api: Any, flying: Drone, policy: str, verbs: list[str]) -> None:
+def test_vehicle_in_the_air_follows_the_policy(api: Any, flying: Drone, policy: str, verbs: list[str]) -> None:
     flying._has_commanded = True
-    assert asyncio.run(on_exit.see_to(flying, policy))
+    assert asyncio.run(on_exit.apply_policy(flying, policy))
     assert api.verbs() == verbs
 
 
@@ -287,28 +294,28 @@ def test_vehicle_in_the_air_is_seen_to(api: Any, flying: Drone, policy: str, ver
 )
 def test_rover_stops_where_a_copter_lands(api: Any, rover: Any, policy: str, verb: str) -> None:
     rover._has_commanded = True
-    assert asyncio.run(on_exit.see_to(rover, policy))
+    assert asyncio.run(on_exit.apply_policy(rover, policy))
     assert api.verbs() == [verb]
 
 
 def test_vehicle_that_the_script_never_commanded_is_left_alone(api: Any, flying: Drone) -> None:
-    assert asyncio.run(on_exit.see_to(flying, "rtl"))
-    assert api.asked == []
+    assert asyncio.run(on_exit.apply_policy(flying, "rtl"))
+    assert api.requested == []
 
 
 def test_vehicle_that_its_pilot_has_is_left_alone(api: Any, flying: Drone) -> None:
     flying._has_commanded, api.mode = True, 5
-    assert asyncio.run(on_exit.see_to(flying, "rtl"))
-    assert api.asked == []
+    assert asyncio.run(on_exit.apply_policy(flying, "rtl"))
+    assert api.requested == []
 
 
 def test_vehicle_on_the_ground_is_disarmed(api: Any, flying: Drone) -> None:
     flying._has_commanded, api.alt = True, 0.0
-    assert asyncio.run(on_exit.see_to(flying, "rtl"))
+    assert asyncio.run(on_exit.apply_policy(flying, "rtl"))
     assert api.verbs() == ["/command/disarm"]
 
 
-def test_refused_return_is_told(api: Any, flying: Drone) -> None:
+def test_refused_return_is_reported(api: Any, flying: Drone) -> None:
     flying._has_commanded = True
     api.refusals["/command/rtl"] = (503, {"detail": "silent", "code": "link_lost"})
-    assert not asyncio.run(on_exit.see_to(flying, "rtl"))
+    assert not asyncio.run(on_exit.apply_policy(flying, "rtl"))

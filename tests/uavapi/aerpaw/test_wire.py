@@ -66,5 +66,5 @@ def test_what_the_script_has_imported_is_not_its_own(name: str) -> None:
     if name == "Evil":
         assert wire.read(data, __name__)["value"] is Evil
         return
-    with pytest.raises(ValueError, match="not taken"):
+    with pytest.raises(ValueError, match="not accepted"):
         wire.read(data, __name__)

@@ -11,7 +11,7 @@ from mavproxy_uavapi.client.errors import error_of
 from mavproxy_uavapi.core.errors import Aborted, Invalid, ModeChanged, NotArmed, Stale, Superseded, UavApiError
 
 
-def test_properties_are_what_the_vehicle_tells(ours: Drone, flying: Any, loop: Any) -> None:
+def test_properties_are_what_the_vehicle_reports(ours: Drone, flying: Any, loop: Any) -> None:
     loop.pass_time(0.5)
     assert ours.id == 1
     assert ours.position.alt == pytest.approx(20, abs=0.5)
@@ -29,8 +29,8 @@ def test_property_that_is_too_old_raises(ours: Drone, flying: Any, loop: Any) ->
     assert not ours.is_connected
 
 
-def test_message_that_was_never_told_is_stale(ours: Drone) -> None:
-    with pytest.raises(Stale, match="not told"):
+def test_message_that_was_never_reported_is_stale(ours: Drone) -> None:
+    with pytest.raises(Stale, match="not reported"):
         ours.telemetry.fields("RANGEFINDER")
 
 
@@ -149,7 +149,7 @@ def test_fleet_is_by_system_id(loop: Any, url: str, flying: Any) -> None:
         loop.run(two(url, url))
 
 
-def test_errors_keep_what_the_autopilot_said() -> None:
+def test_errors_keep_the_autopilots_texts() -> None:
     error = error_of(500, {"detail": "refused", "code": "rejected", "ack": "DENIED", "statustext": ["PreArm: no"]})
     assert (error.ack, error.statustext) == ("DENIED", ["PreArm: no"])  # type: ignore[attr-defined]
     assert type(error_of(418, {"detail": "tea", "code": "teapot"})) is UavApiError

@@ -1,9 +1,11 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import gc
 import io
 import json
+import logging
 import socket
 import weakref
 from typing import Any
@@ -12,7 +14,7 @@ import pytest
 from aiohttp import ClientSession
 from aiohttp.test_utils import RawTestServer, TestClient
 
-from mavproxy_uavapi.http.app import ApiServer, listening_socket, make_handler
+from mavproxy_uavapi.http.app import ApiServer, is_ours, listening_socket, make_handler
 from mavproxy_uavapi.http.requests import Servo
 from mavproxy_uavapi.http.responses import Handler
 from mavproxy_uavapi.http.route import Route
@@ -288,3 +290,17 @@ def test_only_what_commands_does_not_wait_for_the_main_loop(
     monkeypatch.setattr(host.bridge, "wait_for_main_loop", wait_for_main_loop)
     loop.run(api.ask(method, path))
     assert bool(waited) is gives_way
+
+
+@pytest.mark.parametrize(
+    ("error", "ours"),
+    [
+        (TimeoutError(errno.ETIMEDOUT, "Connection timed out"), False),  # it read nothing, and the kernel closed it
+        (ConnectionResetError(), False),
+        (TimeoutError(), True),
+        (KeyError("x"), True),
+    ],
+)
+def test_a_line_about_a_client_that_has_gone_is_not_logged(error: Exception, ours: bool) -> None:
+    record = logging.LogRecord("uavapi", logging.ERROR, "", 0, "", None, (type(error), error, None))
+    assert is_ours(record) is ours

@@ -23,7 +23,7 @@ def run_of(script: str) -> Run:
 FAR = {"x": 500, "y": 0, "z": -20}
 
 
-def test_trace_tells_what_was_asked_what_was_sent_and_how_it_ended(flying: Any, service: Any, api: Any) -> None:
+def test_trace_reports_what_was_requested_what_was_sent_and_how_it_ended(flying: Any, service: Any, api: Any) -> None:
     api.get("/command/set_ground_speed?new_v=5")
     (entry,) = service.host.audit.entries
     assert (entry.verb, entry.request, entry.system) == ("/command/set_ground_speed", {"new_v": 5}, 1)
@@ -49,7 +49,7 @@ def test_job_that_is_not_waited_for_leaves_its_trace_when_it_has_ended(
     assert of_job.seconds >= 1.0
 
 
-def test_vehicle_is_told_what_follows_before_the_trace_of_its_job_is_left(
+def test_closing_command_is_sent_before_the_trace_of_its_job_is_left(
     flying: Any, service: Any, api: Any, loop: Any, link: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     accepted = api.post("/movement/go_to_ned_wait?wait=false", FAR)

@@ -37,12 +37,12 @@ def test_body_of_the_owner_is_sent_for(flying: Any, port: Port) -> None:
             "POST", "/movement/drive", OWNER, "Content-Type: application/json", f"Content-Length: {len(body)}",
             "Expect: 100-continue",
         )  # fmt: skip
-        asked = await wire.answer()
+        requested = await wire.answer()
         wire.writer.write(body)
-        return asked, await wire.answer()
+        return requested, await wire.answer()
 
-    asked, answer = port.run(act)
-    assert (asked.status, answer.status) == (100, 200)
+    requested, answer = port.run(act)
+    assert (requested.status, answer.status) == (100, 200)
 
 
 def test_unknown_expectation_is_417(flying: Any, port: Port) -> None:

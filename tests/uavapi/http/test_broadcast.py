@@ -1,60 +1,118 @@
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.http.broadcast import QUEUED, TOGETHER, Event, Subscription, TelemetryBroadcast
+from mavproxy_uavapi.http.broadcast import TICK, TelemetryBroadcast
+from mavproxy_uavapi.http.subscription import Names, Subscription, Wishes
 
 
 @pytest.fixture
-def state(host: Any, msg: Any) -> Any:
-    return host.fleet.update(msg("heartbeat"), 0.0)
+def hear(host: Any, loop: Any) -> Any:
+    """Subscribes; gives a function that lets time pass and tells what has come, as JSON."""
+    broadcast = TelemetryBroadcast(host)
+    contexts: list[Any] = []
+
+    def hear(**wishes: Any) -> Any:
+        subscription = Subscription(Wishes(**{kind: Names(text) for kind, text in wishes.items()}), loop.call_later)
+
+        async def begin() -> None:
+            contexts.append(broadcast.heard_by(subscription))
+            contexts[-1].__enter__()
+
+        loop.run(begin())
+
+        def come(seconds: float = 0.0) -> list[dict[str, Any]]:
+            loop.pass_time(seconds)
+            events = loop.run(subscription.next(1.0)) if subscription._queue else []
+            return [json.loads(event.json(0)) for event in events]
+
+        return come
+
+    yield hear
+    for context in contexts:
+        context.__exit__(None, None, None)
+    assert host.listeners == [] and host.observers == []
 
 
-def take(loop: Any, subscription: Subscription) -> list[Event]:
-    return loop.run(subscription.next())
+def named(events: list[dict[str, Any]], name: str) -> list[Any]:
+    return [event["info"] for event in events if name in (event.get("view"), event.get("event"))]
 
 
-def times(events: list[Event]) -> list[int]:
-    return [event.message.time_boot_ms for event in events]
-
-
-def test_reader_that_falls_behind_loses_the_oldest_and_is_told_how_many(loop: Any, state: Any, msg: Any) -> None:
-    subscription = Subscription(frozenset(), None, None)
-    for number in range(QUEUED + 25):
-        subscription.offer(state, Event(msg("attitude", time_boot_ms=number), 0.0), 1.0)
-    assert subscription.dropped == 25
-    got = [time for _ in range(QUEUED // TOGETHER) for time in times(take(loop, subscription))]
-    assert got == list(range(25, QUEUED + 25))
-
-
-def test_rate_lets_the_first_through_and_counts_components_apart(loop: Any, state: Any, msg: Any) -> None:
-    subscription = Subscription(frozenset(), None, 2.0)
-    for tenth in range(11):
-        for component in (1, 154):
-            event = Event(msg("attitude", component=component, time_boot_ms=tenth), 0.0)
-            subscription.offer(state, event, tenth / 10)
-    heard = [(event.message.time_boot_ms, event.message.get_srcComponent()) for event in take(loop, subscription)]
-    assert heard == [(tenth, component) for tenth in (0, 5, 10) for component in (1, 154)]
-
-
-def test_event_tells_each_client_what_that_has_lost(msg: Any) -> None:
-    import json
-
-    event = Event(msg("attitude", roll=float("nan"), system=3), 12.3456)
-    for dropped in (0, 7):
-        told = json.loads(event.json(dropped))
-        assert (told["dropped"], told["system"], told["name"], told["time"]) == (dropped, 3, "ATTITUDE", 12.346)
-        assert told["fields"]["roll"] is None
-
-
-def test_broadcast_listens_while_somebody_does() -> None:
-    listeners: list[Any] = []
-    broadcast = TelemetryBroadcast(listeners)
-    with broadcast.heard_by(Subscription(frozenset(), None, None)):
-        with pytest.raises(KeyError), broadcast.heard_by(Subscription(frozenset(), None, None)):
-            assert len(listeners) == 1
+def test_broadcast_listens_while_somebody_does(host: Any) -> None:
+    broadcast = TelemetryBroadcast(host)
+    with broadcast.heard_by(Subscription(Wishes())):
+        with pytest.raises(KeyError), broadcast.heard_by(Subscription(Wishes())):
+            assert len(host.listeners) == 1
             raise KeyError
-        assert len(listeners) == 1
-    assert listeners == []
+        assert len(host.listeners) == 1
+    assert host.listeners == []
+
+
+def test_view_is_what_the_read_answers(flying: Any, hear: Any, api: Any) -> None:
+    come = hear(view="gps,attitude")
+    come(1.0)
+    events = come(1.0)
+    assert {event["view"] for event in events} == {"gps", "attitude"}
+    read = api.get("/telemetry/gps").body["info"]
+    assert named(events, "gps")[-1].keys() == read.keys()
+    assert named(events, "gps")[-1]["position"]["relative_alt"] == 20.0
+
+
+def test_what_was_known_before_comes_first_with_its_own_time(flying: Any, hear: Any, loop: Any, host: Any) -> None:
+    flying.power_off()
+    loop.pass_time(3.0)
+    come = hear(view="gps", event="alive")
+    alive, gps = come()[:2]
+    assert (alive["event"], gps["view"]) == ("alive", "gps")
+    assert alive["time"] - gps["time"] > 2.0
+
+
+def test_status_tells_a_lost_link_though_nothing_arrives(flying: Any, hear: Any, host: Any) -> None:
+    come = hear(view="status", event="link")
+    come(1.0)
+    flying.power_off()
+    events = come(host.link_watch.timeout + 2 * TICK)
+    assert named(events, "link") == [{"alive": False}]
+    assert named(events, "status")[-1]["link"]["alive"] is False
+
+
+def test_events_tell_mode_arming_texts_and_who_commands(
+    flying: Any, hear: Any, api: Any, host: Any, msg: Any
+) -> None:
+    come = hear(event="*", view="vehicle")
+    come(1.0)
+    host.bridge.feed(msg("statustext", text="hello", severity=4))
+    task = api.begin("POST", "/movement/drive_wait", json={"x": 50, "y": 0, "z": 0})
+    events = come(2.0)
+    assert named(events, "statustext") == [{"severity": 4, "text": "hello"}]
+    (authority,) = named(events, "authority")
+    assert authority["commanded_by"]["verb"] == "/movement/drive_wait"
+    assert {job["state"] for job in named(events, "job")} == {"running"}
+    assert named(events, "vehicle")[-1]["commanded_by"] == authority["commanded_by"]
+    assert api.post("/command/land?wait=false").status == 202
+    events = come(3.0)
+    assert named(events, "mode")[0] == {"mode": "LAND"}
+    assert [job["error"]["code"] for job in named(events, "job") if job["state"] == "failed"] == ["superseded"]
+    task.cancel()
+
+
+def test_what_other_modules_tell_is_an_event(host: Any, hear: Any) -> None:
+    come = hear(event="tag")
+    host.tell("tag", 1, {"id": 7, "seen": True})
+    host.tell("delivered", 1, {"count": 3})
+    assert [event["info"] for event in come()] == [{"id": 7, "seen": True}]
+
+
+def test_nothing_ticks_when_nobody_listens(flying: Any, hear: Any, loop: Any, host: Any) -> None:
+    broadcast = TelemetryBroadcast(host)
+
+    async def listen() -> None:
+        with broadcast.heard_by(Subscription(Wishes(event=Names("*")))):
+            assert broadcast._ticks is not None
+
+    loop.run(listen())
+    loop.pass_time(2 * TICK)
+    assert broadcast._ticks is None

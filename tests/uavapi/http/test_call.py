@@ -26,7 +26,7 @@ def test_vehicle_is_the_one_of_the_settings(make_drone: Any, service: Any) -> No
     make_drone(2)
     service.settings = ApiModuleSettings({"sysid": 2}).snapshot()
     call = Call(service, None, Empty())  # type: ignore[arg-type]
-    assert call.vehicle.state.system == call.seen.state.system == 2
+    assert call.vehicle.state.system == call.known_vehicle.state.system == 2
     assert call.answer("done")["id"] == "2"
 
 
@@ -78,7 +78,7 @@ SESSION = "UAV_API_1_a"
 
 @pytest.mark.parametrize("waits", [True, False], ids=["waits", "does not wait"])
 @pytest.mark.parametrize("script_first", [True, False], ids=["script first", "human first"])
-def test_dead_script_does_not_end_what_a_human_asked_for_too(
+def test_dead_script_does_not_end_what_a_human_requested_too(
     flying: Any, service: Any, api: Any, loop: Any, waits: bool, script_first: bool
 ) -> None:
     asking = [None]

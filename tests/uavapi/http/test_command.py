@@ -191,7 +191,7 @@ def test_verb_that_the_type_does_not_have_is_404_not_supported(
     assert answer.body["detail"].endswith(f"does not have /command/{path}")
 
 
-def test_newer_command_tells_the_older_client_at_once(api: Any, loop: Any, flying: Any) -> None:
+def test_newer_command_notifies_the_older_client_at_once(api: Any, loop: Any, flying: Any) -> None:
     older = api.begin("GET", "/command/land")
     loop.pass_time(2.0)
     newer = api.get("/command/brake")

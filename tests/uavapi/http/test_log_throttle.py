@@ -13,14 +13,14 @@ def test_one_line_for_each_cause_and_minute_with_the_number_of_those_left_out() 
     now, lines = [0.0], list[str]()
     throttle = LogThrottle(lambda: now[0], lines.append)
     for _ in range(513):
-        throttle.tell("full", "no room")
-    throttle.tell("accept", "no descriptors")
+        throttle.log("full", "no room")
+    throttle.log("accept", "no descriptors")
     assert lines == ["no room", "no descriptors"]
     now[0] = EVERY
-    throttle.tell("full", "no room")
+    throttle.log("full", "no room")
     assert lines[2:] == ["no room (and 512 more since the last such line)"]
     now[0] = 2 * EVERY
-    throttle.tell("full", "no room")
+    throttle.log("full", "no room")
     assert lines[3:] == ["no room"]
 
 

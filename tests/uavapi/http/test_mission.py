@@ -52,10 +52,10 @@ def test_a_file_as_body_or_form_and_json_are_uploaded(api: Any, vehicles_mission
     assert len(vehicles_mission) == 3
 
 
-def test_mission_is_told_and_cleared(api: Any, loop: Any, vehicles_mission: list[Any]) -> None:
+def test_mission_is_reported_and_cleared(api: Any, loop: Any, vehicles_mission: list[Any]) -> None:
     post(api, WPL)
-    told = api.get("/mission/waypoints").body
-    assert (told["home"]["seq"], [item["seq"] for item in told["items"]]) == (0, [1, 2, 3])
+    reported = api.get("/mission/waypoints").body
+    assert (reported["home"]["seq"], [item["seq"] for item in reported["items"]]) == (0, [1, 2, 3])
     assert loop.run(api.ask("DELETE", "/mission/waypoints")).body["result"] == "Mission cleared"
     assert vehicles_mission == []
 
@@ -74,7 +74,7 @@ def test_mission_in_flight_is_not_changed(api: Any, loop: Any, flying: Any, vehi
 
 
 @pytest.mark.usefixtures("vehicles_mission")
-def test_refusal_is_told(api: Any, copter: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_refusal_is_reported(api: Any, copter: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     async def refuse(_items: Any, _progress: Any, **_checks: Any) -> None:
         raise Rejected("no; its old mission is unchanged", "MAV_MISSION_NO_SPACE", ["Full"])
 

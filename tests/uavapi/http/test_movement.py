@@ -195,7 +195,7 @@ def test_movement_on_the_ground_is_409(drone: Any, loop: Any, api: Any) -> None:
     assert (answer.status, answer.body["code"]) == (409, "busy")
 
 
-def test_drive_that_is_asked_for_twice_aims_at_one_place(there: Any, loop: Any, api: Any) -> None:
+def test_drive_that_is_requested_twice_aims_at_one_place(there: Any, loop: Any, api: Any) -> None:
     values = {"x": 40, "y": 0, "z": 0}
     first = api.begin("POST", "/movement/drive_wait", json=values)
     loop.pass_time(2.0)

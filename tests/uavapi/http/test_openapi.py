@@ -39,22 +39,22 @@ OURS = [error for error in leaves() if error.__module__ == "mavproxy_uavapi.core
 @pytest.mark.parametrize("operation", OPERATIONS, ids=named)
 def test_every_route_is_described_with_its_action_and_model(operation: tuple[Route, str]) -> None:
     route, method = operation
-    told = described(route, method)
-    assert told["summary"] == (route.action.__doc__ or "").strip().splitlines()[0].strip()
-    assert told["summary"].endswith(".")
-    assert told["tags"][0] in TAGS
-    fields = {parameter["name"] for parameter in told["parameters"] if parameter["in"] == "query"}
-    assert ("202" in told["responses"]) is route.job
-    assert ("207" in told["responses"]) is (told["tags"] == ["fleet"])
-    assert ("wait" in fields) is (route.job or told["tags"] == ["fleet"])
+    reported = described(route, method)
+    assert reported["summary"] == (route.action.__doc__ or "").strip().splitlines()[0].strip()
+    assert reported["summary"].endswith(".")
+    assert reported["tags"][0] in TAGS
+    fields = {parameter["name"] for parameter in reported["parameters"] if parameter["in"] == "query"}
+    assert ("202" in reported["responses"]) is route.job
+    assert ("207" in reported["responses"]) is (reported["tags"] == ["fleet"])
+    assert ("wait" in fields) is (route.job or reported["tags"] == ["fleet"])
     if method == "GET":
-        assert fields - {"wait", "on_disconnect"} == set(route.model.model_fields)
+        assert fields - {"wait", "on_disconnect", "lease", "client"} == set(route.model.model_fields)
     elif method == "POST" and not route.raw and route.model.model_fields:
-        body = told["requestBody"]["content"]["application/json"]
+        body = reported["requestBody"]["content"]["application/json"]
         assert body["schema"]["$ref"].endswith(f"/{route.model.__name__}")
         properties = DOCUMENT["components"]["schemas"][route.model.__name__]["properties"]
         assert set(properties) == set(route.model.model_fields)
-    in_path = {parameter["name"] for parameter in told["parameters"] if parameter["in"] == "path"}
+    in_path = {parameter["name"] for parameter in reported["parameters"] if parameter["in"] == "path"}
     assert in_path == set(re.findall(r"{(\w+)}", route.path))
 
 
@@ -102,14 +102,19 @@ def test_every_parameter_says_what_it_is(model: type[requests.Request]) -> None:
 @pytest.mark.parametrize("operation", OPERATIONS, ids=named)
 def test_documented_errors_are_those_of_the_tree(operation: tuple[Route, str]) -> None:
     known = {(str(error.status), error.code) for error in OURS}
-    told = {
+    reported = {
         (status, code)
         for status, response in described(*operation)["responses"].items()
         if int(status) >= 400
         for code in response["content"]["application/json"]["examples"]
     }
-    assert told <= known
-    assert {("401", "unauthorized"), ("403", "forbidden"), ("422", "invalid"), ("429", "too_many_requests")} <= told
+    assert reported <= known
+    assert {
+        ("401", "unauthorized"),
+        ("403", "forbidden"),
+        ("422", "invalid"),
+        ("429", "too_many_requests"),
+    } <= reported
 
 
 @pytest.mark.parametrize("error", OURS, ids=lambda error: error.__name__)
@@ -158,8 +163,8 @@ def test_routes_of_other_modules_are_described_too(api: Any, service: Any) -> No
 
     service.host.extensions["/extra/look"] = Route("/extra/look", action, requests.Heading, ("POST",))
     body = api.get("/openapi.json").body
-    told = body["paths"]["/extra/look"]["post"]
-    assert (told["tags"], told["summary"]) == (["extra"], "Look around.")
-    assert told["description"].startswith("All the way.")
+    reported = body["paths"]["/extra/look"]["post"]
+    assert (reported["tags"], reported["summary"]) == (["extra"], "Look around.")
+    assert reported["description"].startswith("All the way.")
     assert body["openapi"] == "3.1.0"
     assert "extra" in [tag["name"] for tag in body["tags"]]

@@ -54,7 +54,7 @@ def test_a_value_that_is_never_confirmed_is_504(api: Any, drone: Any, monkeypatc
     assert (answer := put(api, "WPNAV_SPEED", 500)).status == 504, answer.body
 
 
-def test_many_are_set_and_each_failure_is_told(api: Any, drone: Any) -> None:
+def test_many_are_set_and_each_failure_is_reported(api: Any, drone: Any) -> None:
     body = {"parameters": {"wpnav_speed": 600, "RTL_ALT": 2000, "NO_SUCH": 1}}
     answer = api.post("/parameters", body)
     assert answer.status == 207

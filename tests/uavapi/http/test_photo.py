@@ -12,14 +12,14 @@ from mavproxy_uavapi.core.errors import TimedOut, ToolFailed
 @pytest.fixture
 def taken(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """What the camera tool was asked for."""
-    asked: list[Any] = []
+    requested: list[Any] = []
 
     async def take(tool: str, shot: Shot) -> bytes:
-        asked.append((tool, shot))
+        requested.append((tool, shot))
         return b"\xff\xd8\xffpicture"
 
     monkeypatch.setattr(camera_tools, "take", take)
-    return asked
+    return requested
 
 
 def photo(api: Any, loop: Any, query: str) -> Any:
@@ -51,7 +51,7 @@ def test_values_out_of_range_are_422(api: Any, taken: list[Any], query: str) -> 
 
 
 @pytest.mark.parametrize(("error", "status"), [(ToolFailed("failed", "its words"), 500), (TimedOut("slow"), 504)])
-def test_failures_are_told(api: Any, monkeypatch: pytest.MonkeyPatch, error: Exception, status: int) -> None:
+def test_failures_are_reported(api: Any, monkeypatch: pytest.MonkeyPatch, error: Exception, status: int) -> None:
     async def take(_tool: str, _shot: Shot) -> bytes:
         raise error
 

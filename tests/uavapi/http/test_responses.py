@@ -22,6 +22,7 @@ TREE = [
     (errors.Busy("a"), 409, "busy"),
     (errors.NotArmed("a"), 409, "not_armed"),
     (errors.Aborted("a"), 409, "aborted"),
+    (errors.OutsideEnvelope("a"), 409, "outside_envelope"),
     (errors.LinkLost("a"), 503, "link_lost"),
     (errors.NoVehicle("a"), 503, "no_vehicle"),
     (errors.Stale("a"), 503, "stale"),

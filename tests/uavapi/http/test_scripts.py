@@ -105,20 +105,20 @@ def test_clear_removes_all_by_both_paths(api: Any, loop: Any, scripts: Any) -> N
     assert api.get("/mission/list-scripts").body["scripts"] == []
 
 
-def test_execute_passes_name_and_arguments_and_tells_the_session(
+def test_execute_passes_name_and_arguments_and_reports_the_session(
     api: Any, scripts: Any, drone: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    asked: list[Any] = []
+    requested: list[Any] = []
 
     async def execute(name: str, args: list[str]) -> runs.Run:
-        asked.append((name, args))
+        requested.append((name, args))
         return runs.Run(
             tmp_path, "a.py", args, "uavapi_1_a", 1, 8000, 1e9, tmp_path / "o", tmp_path / "e", 10.0, alive=True
         )
 
     monkeypatch.setattr(scripts, "execute", execute)
     answer = api.post("/mission/execute-script", {"script_name": "a", "args": ["x y", ";"]})
-    assert asked == [("a", ["x y", ";"])]
+    assert requested == [("a", ["x y", ";"])]
     assert (answer.status, answer.body["type"], answer.body["script"]) == (200, 46, "a.py")
     assert (answer.body["id"], answer.body["session"]) == ("1", "uavapi_1_a")
 
@@ -145,7 +145,7 @@ def test_stop_of_a_script_that_does_not_run_is_400(api: Any, scripts: Any) -> No
 @pytest.mark.parametrize(
     ("error", "status"), [(ToolFailed("no tmux", "its words"), 500), (BadRequest("a.py is already running"), 400)]
 )
-def test_failures_to_execute_are_told(
+def test_failures_to_execute_are_reported(
     api: Any, scripts: Any, monkeypatch: pytest.MonkeyPatch, error: Exception, status: int
 ) -> None:
     async def fail(_name: str, _args: list[str]) -> None:
@@ -180,7 +180,7 @@ def ran(scripts: Any, tmp_path: Path) -> runs.Run:
 
 
 @pytest.mark.usefixtures("ran")
-def test_ended_run_is_told_with_its_status_and_the_ends_of_its_logs(api: Any) -> None:
+def test_ended_run_is_reported_with_its_status_and_the_ends_of_its_logs(api: Any) -> None:
     body = api.get("/mission/scripts/a.py").body
     assert (body["script"], body["running"]) == ("a.py", False)
     assert (body["run"]["exit_status"], body["run"]["out"], body["run"]["err"]) == (3, "one\ntwo", "ouch \u00fc\n")

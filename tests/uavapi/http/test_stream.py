@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 from aiohttp import WSCloseCode, WSMsgType
 
-from mavproxy_uavapi.http import broadcast
-from mavproxy_uavapi.http.broadcast import QUEUED
+from mavproxy_uavapi.http import stream_event
 from mavproxy_uavapi.http.streaming import KEEP_ALIVE, LINGER, MOST_OPEN, UNREAD
+from mavproxy_uavapi.http.subscription import QUEUED
 from mavproxy_uavapi.http.telemetry_views import fields
 
 
@@ -78,7 +78,9 @@ def test_rate_is_a_limit_for_each_name(flying: Any, api: Any, loop: Any, events:
     assert loop.time() - started >= 3.0
 
 
-@pytest.mark.parametrize("query", ["?rate=0", "?rate=nan", "?sysid=300", "?sysid=x"])
+@pytest.mark.parametrize(
+    "query", ["?rate=0", "?rate=nan", "?sysid=300", "?sysid=x", "?view=gsp", "?events=mode,moods"]
+)
 def test_filter_that_makes_no_sense_is_422(api: Any, query: str) -> None:
     assert api.get(f"/telemetry/stream{query}").status == 422
 
@@ -196,7 +198,7 @@ def encodings(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         found.append(message.get_type())
         return fields(message)
 
-    monkeypatch.setattr(broadcast, "fields", counting)
+    monkeypatch.setattr(stream_event, "fields", counting)
     return found
 
 
@@ -237,7 +239,7 @@ def test_what_nobody_reads_is_not_encoded(
 
 
 @pytest.mark.parametrize(("headers", "says"), [({}, b"event: end"), (UPGRADE, b"\x03\xf0nothing was read")])
-def test_client_that_reads_nothing_is_dropped_and_told_why(
+def test_client_that_reads_nothing_is_dropped_and_gets_the_reason(
     flying: Any, api: Any, loop: Any, host: Any, unread: Any, msg: Any, headers: dict[str, str], says: bytes
 ) -> None:
     client = unread("/telemetry/stream?names=STATUSTEXT", **headers)
@@ -287,7 +289,7 @@ def test_streams_beyond_the_most_are_429_and_a_place_is_free_again(
     api.until(lambda: api.service.streams.count == MOST_OPEN)
     refused = api.get("/telemetry/stream")
     assert (refused.status, refused.body["code"]) == (429, "too_many_requests")
-    assert "100 streams" in refused.body["detail"]
+    assert f"{MOST_OPEN} streams" in refused.body["detail"]
     clients[0].close()
     api.until(lambda: api.service.streams.count < MOST_OPEN)
     assert loop.run(server_sent_events(api, "", 1))
@@ -310,19 +312,19 @@ def test_websocket_that_says_too_much_at_once_is_closed(flying: Any, api: Any, l
 
 
 def test_websocket_that_talks_without_end_has_to_wait(flying: Any, api: Any, loop: Any) -> None:
-    said = 0
+    output = 0
 
     async def talk() -> None:
-        nonlocal said
+        nonlocal output
         async with api.client.ws_connect("/telemetry/stream?names=NONE") as socket:
             while True:
                 await socket.send_bytes(bytes(4000))
-                said += 4000
+                output += 4000
 
     talking = loop.create_task(talk())
     loop.pass_time(10.0)
     talking.cancel()
-    assert 0 < said < 20e6  # what the buffers on the way hold, rather than all that it has to say
+    assert 0 < output < 20e6  # what the buffers on the way hold, rather than all that it has to say
 
 
 def test_quiet_websocket_is_pinged(flying: Any, api: Any, loop: Any) -> None:

@@ -82,7 +82,7 @@ def test_sys_status_is_the_message(flying: Any, api: Any) -> None:
     assert body["status"]["current_battery"] is None
 
 
-def test_sensor_status_tells_each_sensors_bits(flying: Any, api: Any, loop: Any) -> None:
+def test_sensor_status_reports_each_sensors_bits(flying: Any, api: Any, loop: Any) -> None:
     flying.ready = False
     loop.pass_time(0.3)
     body = api.get("/telemetry/sensor_status/").body
@@ -101,7 +101,7 @@ def test_attitude_is_in_degrees(flying: Any, api: Any, loop: Any) -> None:
     assert set(info) == {"roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed"}
 
 
-def test_status_tells_whether_it_can_be_flown(flying: Any, api: Any) -> None:
+def test_status_reports_whether_it_can_be_flown(flying: Any, api: Any) -> None:
     body = api.get("/telemetry/status").body
     assert (body["result"], body["id"]) == ("Success", "1")
     info = body["info"]
@@ -113,7 +113,7 @@ def test_status_tells_whether_it_can_be_flown(flying: Any, api: Any) -> None:
     assert info["why_not"] == []
 
 
-def test_status_of_a_lost_link_is_told_with_its_age(flying: Any, api: Any, loop: Any) -> None:
+def test_status_of_a_lost_link_is_reported_with_its_age(flying: Any, api: Any, loop: Any) -> None:
     flying.power_off()
     loop.pass_time(30.0)
     body = api.get("/telemetry/status").body
@@ -139,7 +139,7 @@ def test_old_data_is_503_stale(flying: Any, api: Any, loop: Any, path: str) -> N
     loop.pass_time(5.2)
     answer = api.get(f"/telemetry/{path}")
     assert (answer.status, answer.body["code"]) == (503, "stale")
-    assert f"last told {MESSAGE_OF[path]} 5." in answer.body["detail"]
+    assert f"last reported {MESSAGE_OF[path]} 5." in answer.body["detail"]
 
 
 def test_client_may_ask_for_younger_or_older_data(flying: Any, api: Any, loop: Any) -> None:
@@ -167,7 +167,7 @@ def test_before_the_first_vehicle_is_503_no_vehicle(api: Any, path: str) -> None
     assert (answer.status, answer.body["code"]) == (503, "no_vehicle")
 
 
-def test_message_that_was_never_told_is_asked_for(api: Any, loop: Any, host: Any, drone: Any) -> None:
+def test_message_that_was_never_reported_is_requested(api: Any, loop: Any, host: Any, drone: Any) -> None:
     del host.fleet.vehicles[1].messages["VFR_HUD"]
     drone.mute.add("VFR_HUD")
     request = api.begin("GET", "/telemetry/general")
@@ -178,7 +178,7 @@ def test_message_that_was_never_told_is_asked_for(api: Any, loop: Any, host: Any
     assert loop.run(request).body["info"]["heading"] == 12
 
 
-def test_readers_of_what_was_never_told_share_one_request_and_none_waits_for_the_others(
+def test_readers_of_what_was_never_reported_share_one_request_and_none_waits_for_the_others(
     api: Any, loop: Any, host: Any, drone: Any
 ) -> None:
     for name in ("VFR_HUD", "GPS_RAW_INT"):
@@ -186,15 +186,15 @@ def test_readers_of_what_was_never_told_share_one_request_and_none_waits_for_the
         drone.mute.add(name)
     drone.answers[mavlink.MAV_CMD_REQUEST_MESSAGE] = [None]
     began = loop.time()
-    asked = [api.begin("GET", f"/telemetry/{path}") for path in ("general", "gps_raw") * 3]
-    assert [loop.run(request).body["code"] for request in asked] == ["stale"] * 6
+    requested = [api.begin("GET", f"/telemetry/{path}") for path in ("general", "gps_raw") * 3]
+    assert [loop.run(request).body["code"] for request in requested] == ["stale"] * 6
     assert loop.time() - began == pytest.approx(FIRST_TIMEOUT, abs=0.2)
     assert {command.param1 for command in drone.commands(mavlink.MAV_CMD_REQUEST_MESSAGE)} == {74}
     assert len(drone.commands(mavlink.MAV_CMD_REQUEST_MESSAGE)) == 2
 
 
 @pytest.mark.parametrize("result", [mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENIED])
-def test_message_that_does_not_come_when_asked_for_is_stale(
+def test_message_that_does_not_come_when_requested_is_stale(
     api: Any, loop: Any, host: Any, drone: Any, result: int
 ) -> None:
     del host.fleet.vehicles[1].messages["VFR_HUD"]
@@ -202,13 +202,13 @@ def test_message_that_does_not_come_when_asked_for_is_stale(
     drone.answers[mavlink.MAV_CMD_REQUEST_MESSAGE] = [result]
     answer = api.get("/telemetry/general")
     assert (answer.status, answer.body["code"]) == (503, "stale")
-    assert "has not told VFR_HUD yet" in answer.body["detail"]
+    assert "has not reported VFR_HUD yet" in answer.body["detail"]
 
 
 # -- home, compass, any message ---------------------------------------------------------------------------
 
 
-def test_home_is_asked_for_and_flat(flying: Any, api: Any) -> None:
+def test_home_is_requested_and_flat(flying: Any, api: Any) -> None:
     answer = api.get("/telemetry/home_info")
     age = answer.body.pop("age_s")
     assert answer.body == {
@@ -246,7 +246,7 @@ def test_compass_without_a_calibration_is_404_that_says_so(drone: Any, api: Any)
     assert "calibration" in answer.body["detail"]
 
 
-def test_compass_tells_each_fitness(drone: Any, api: Any, loop: Any) -> None:
+def test_compass_reports_each_fitness(drone: Any, api: Any, loop: Any) -> None:
     drone.send("mag_cal_report", compass_id=0, cal_status=4, autosaved=1, fitness=5.5)
     drone.send("mag_cal_report", compass_id=2, cal_status=4, autosaved=1, fitness=7.5)
     loop.pass_time(20.0)
@@ -258,7 +258,7 @@ def test_compass_tells_each_fitness(drone: Any, api: Any, loop: Any) -> None:
 
 
 @pytest.mark.parametrize("name", ["EXTENDED_SYS_STATE", "extended_sys_state/"])
-def test_any_message_is_told_with_count_and_rate(flying: Any, api: Any, loop: Any, name: str) -> None:
+def test_any_message_is_reported_with_count_and_rate(flying: Any, api: Any, loop: Any, name: str) -> None:
     loop.pass_time(10.0)
     info = api.get(f"/telemetry/message/{name}").body["info"]
     assert info["landed_state"] == 2

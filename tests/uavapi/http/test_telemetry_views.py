@@ -46,9 +46,9 @@ def test_unknown_elements_of_an_array_are_none(msg: Any) -> None:
 
 
 def test_fields_are_all_fields_and_bytes_are_base64(msg: Any) -> None:
-    told = views.fields(msg("ATTITUDE", yaw=1.5))
-    assert set(told) == {"mavpackettype", *mavlink.MAVLink_attitude_message.fieldnames}
-    assert told["yaw"] == 1.5
+    reported = views.fields(msg("ATTITUDE", yaw=1.5))
+    assert set(reported) == {"mavpackettype", *mavlink.MAVLink_attitude_message.fieldnames}
+    assert reported["yaw"] == 1.5
     raw = views.fields(msg("DATA96", type=1, len=3, data=b"abc" + bytes(93)))
     assert raw["data"] == [97, 98, 99] + [0] * 93 or isinstance(raw["data"], str)
 
@@ -66,9 +66,9 @@ def test_gps_is_in_degrees_metres_and_metres_a_second(msg: Any) -> None:
 
 
 def test_gps_raw_heading_of_655_degrees_is_none(msg: Any) -> None:
-    told = views.gps_raw(msg("GPS_RAW_INT", cog=65535, vel=250, satellites_visible=11, fix_type=3))
-    assert told["velocity"] == {"ground_speed": 2.5, "speed_direction": None}
-    assert (told["satelites"], told["fix_type"]) == (11, 3)
+    reported = views.gps_raw(msg("GPS_RAW_INT", cog=65535, vel=250, satellites_visible=11, fix_type=3))
+    assert reported["velocity"] == {"ground_speed": 2.5, "speed_direction": None}
+    assert (reported["satelites"], reported["fix_type"]) == (11, 3)
 
 
 def test_errors_are_those_that_are_not_zero(msg: Any) -> None:
@@ -78,11 +78,11 @@ def test_errors_are_those_that_are_not_zero(msg: Any) -> None:
     }  # fmt: skip
 
 
-def test_sensors_are_told_by_their_own_bits(msg: Any) -> None:
+def test_sensors_are_known_by_their_own_bits(msg: Any) -> None:
     gps = mavlink.MAV_SYS_STATUS_SENSOR_GPS
-    told = views.sensors(msg("SYS_STATUS", onboard_control_sensors_present=gps))
-    assert told["gps"] == {"present": True, "enabled": False, "health": False}
-    assert told["gyro"] == {"present": False, "enabled": False, "health": False}
+    reported = views.sensors(msg("SYS_STATUS", onboard_control_sensors_present=gps))
+    assert reported["gps"] == {"present": True, "enabled": False, "health": False}
+    assert reported["gyro"] == {"present": False, "enabled": False, "health": False}
 
 
 def test_home_is_in_degrees_and_metres(msg: Any) -> None:
@@ -92,6 +92,6 @@ def test_home_is_in_degrees_and_metres(msg: Any) -> None:
     }  # fmt: skip
 
 
-def test_yaw_is_told_from_0_to_360(msg: Any) -> None:
+def test_yaw_is_reported_from_0_to_360(msg: Any) -> None:
     assert views.attitude(msg("ATTITUDE", yaw=-math.pi / 2, yawspeed=math.pi))["yaw"] == pytest.approx(270)
     assert views.attitude(msg("ATTITUDE", yawspeed=math.pi))["yawspeed"] == pytest.approx(180)

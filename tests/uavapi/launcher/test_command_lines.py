@@ -113,7 +113,7 @@ def test_the_modules_own_keys_of_the_file_reach_the_module(tmp_path: Path) -> No
     assert text is not None and "max_age = 2" in text and "allow_from = 10.0.0.0/8" in text
 
 
-def test_module_is_told_where_each_setting_came_from(tmp_path: Path) -> None:
+def test_module_knows_where_each_setting_came_from(tmp_path: Path) -> None:
     file = tmp_path / "uav.ini"
     file.write_text("[api]\nport = 8005\nsysid = 5\nscript_grace = 20\n", encoding="utf-8")
     read = parse(["--config", str(file), "--sysid", "7"], environ={"UAVAPI_LOG_PATH": "/l/u.log"})

@@ -97,7 +97,7 @@ def test_simulated_section_may_say_no(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "output"),
     [
         ("[api]\nprot=8001\n", "no key 'prot' in [api]; did you mean port?"),
         ("[apl]\nport=8001\n", "no section [apl]; did you mean api?"),
@@ -107,15 +107,15 @@ def test_simulated_section_may_say_no(tmp_path):
         ("[api]\nport=1\nport=2\n", "already exists"),
     ],
 )
-def test_wrong_file_is_one_line(tmp_path, capsys, text, said):
+def test_wrong_file_is_one_line(tmp_path, capsys, text, output):
     assert main([ini(tmp_path, text)]) == 2
     message = capsys.readouterr().err
-    assert said in message
+    assert output in message
     assert message.count("\n") == 1
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "output"),
     [
         (["--config", "/nonexistent/uav.ini"], "No such file"),
         (["--prot", "1"], "unrecognized arguments: --prot"),
@@ -139,10 +139,10 @@ def test_wrong_file_is_one_line(tmp_path, capsys, text, said):
         (["--simulated", "--location", "99,0,0,0"], "expected lat,lon,alt,heading"),
     ],
 )
-def test_wrong_option_is_one_line_and_status_2(capsys, words, said):
+def test_wrong_option_is_one_line_and_status_2(capsys, words, output):
     assert main(["--port", str(free_port()), *words]) == 2
     message = capsys.readouterr().err
-    assert said in message
+    assert output in message
     assert message.count("\n") == 1
 
 
@@ -188,24 +188,24 @@ def test_the_environment_stands_between_file_and_command_line(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "output"),
     [
         ("[vison]\nspeed = 2\n", "no section [vison]; did you mean vision?"),
         ("[vision]\nspede = 2\n", "no key 'spede' in [vision]; did you mean speed?"),
         ("[vision]\nspeed = nan\n", "speed = 'nan': it takes a float from 0.1 to 10"),
         ("[vision]\ntags = 0:0.3.0\n", "tags: '0:0.3.0' is not ID:SIZE"),
         ("[gradys]\nperoid = 2\n", "no key 'peroid' in [gradys]; did you mean period?"),
-        ("[gradys]\nsink = mqtt://me:s3cret@b/a?b\n", "sink: mqtt://me:***@b/a?***: a topic holds none of + # ?"),
+        ("[gradys]\nsink = mqtt://me:s3cret@b/a?b\n", "sink: mqtt://me:***@b/a?***: a topic has none of + # ?"),
     ],
 )
-def test_sections_of_the_modules_are_checked_before_anything_starts(tmp_path, text, said):
+def test_sections_of_the_modules_are_checked_before_anything_starts(tmp_path, text, output):
     if "[vision]" in text:
         pytest.importorskip("cv2")
     file = tmp_path / "uav.ini"
     file.write_text(text, encoding="utf-8")
     with pytest.raises(OptionError) as caught:
         parse(["--config", str(file)], environ={})
-    assert f"{file}: {said}" in str(caught.value)
+    assert f"{file}: {output}" in str(caught.value)
     assert "s3cret" not in str(caught.value)
 
 

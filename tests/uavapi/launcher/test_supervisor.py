@@ -86,7 +86,7 @@ def is_alive(pid):
     return state != "Z"
 
 
-def eventually(condition, timeout_s=10.0):
+def eventually(condition, timeout_s=60.0):
     """Wait for real processes; the time is a limit, not a pause."""
     deadline = time.monotonic() + timeout_s
     while not condition():

@@ -44,14 +44,14 @@ def test_line_without_end_comes_in_parts(log: Path, follower: Follower) -> None:
     assert [len(part) for part in follower.lines(at_end=True)] == [PIECE // 2]
 
 
-def test_log_that_is_cut_is_read_anew(log: Path, follower: Follower) -> None:
+def test_log_that_is_cut_is_read_again(log: Path, follower: Follower) -> None:
     log.write_bytes(b"one\ntwo\nthr")
     assert follower.lines(at_end=False) == ["one", "two"]
     log.write_bytes(b"four\n")
     assert follower.lines(at_end=False) == ["thr", "four"]
 
 
-def test_log_that_is_replaced_is_read_anew(log: Path, follower: Follower) -> None:
+def test_log_that_is_replaced_is_read_again(log: Path, follower: Follower) -> None:
     log.write_bytes(b"one\n")
     assert follower.lines(at_end=False) == ["one"]
     log.rename(log.with_name("log.1"))

@@ -60,7 +60,7 @@ async def up(scripts: Scripts, script: str) -> None:
 
 @pytest.mark.needs("tmux")
 @pytest.mark.usefixtures("own_tmux")
-def test_script_is_told_where_the_api_is_and_its_end_is_remembered(tmp_path: Path) -> None:
+def test_script_learns_where_the_api_is_and_its_end_is_remembered(tmp_path: Path) -> None:
     async def story(scripts: Scripts) -> Any:
         await scripts.save("a.py", PRINTS)
         await scripts.execute("a", [])

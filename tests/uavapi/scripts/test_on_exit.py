@@ -64,7 +64,7 @@ def test_somebody_elses_verb_is_not_superseded(loop: Any, host: Any, flying: Any
     assert job.running
 
 
-def test_no_vehicle_is_said(loop: Any, host: Any) -> None:
+def test_no_vehicle_is_reported(loop: Any, host: Any) -> None:
     assert "nothing can be done" in after(loop, host, "land", sysid=9)
 
 

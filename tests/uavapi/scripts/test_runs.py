@@ -48,7 +48,7 @@ def test_tail_is_the_end_of_a_log(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("told", "died"),
+    ("reported", "died"),
     [
         ({"exit_status": 0, "ended_at": 2.0}, False),
         ({"exit_status": 1, "ended_at": 2.0}, True),
@@ -62,15 +62,20 @@ def test_tail_is_the_end_of_a_log(tmp_path: Path) -> None:
     ],
 )
 def test_a_run_died_unless_it_ended_well_or_by_ctrl_c_on_our_asking(
-    make_run: MakeRun, told: dict[str, object], died: bool
+    make_run: MakeRun, reported: dict[str, object], died: bool
 ) -> None:
-    assert replace(make_run(), **told).died is died  # type: ignore[arg-type]
+    assert replace(make_run(), **reported).died is died  # type: ignore[arg-type]
 
 
 def test_report_of_a_run_that_is_being_stopped_says_how_long_it_has(make_run: MakeRun) -> None:
     run = replace(make_run(grace=10.0), alive=True, started_at=100.0, stopping_at=105.0)
-    told = run.report(now=108.0)
-    assert (told["running"], told["running_for_s"], told["stopping"], told["kill_in_s"]) == (True, 8.0, True, 7.0)
+    reported = run.report(now=108.0)
+    assert (reported["running"], reported["running_for_s"], reported["stopping"], reported["kill_in_s"]) == (
+        True,
+        8.0,
+        True,
+        7.0,
+    )
 
 
 def test_record_that_was_removed_leaves_what_was_known(make_run: MakeRun) -> None:

@@ -4,7 +4,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from mavproxy_uavapi.sim import Options
 
 
-def test_acks_go_to_who_asked(ground):
+def test_acks_go_to_the_sender(ground):
     sender = mavlink.MAVLink(None, srcSystem=42, srcComponent=7)
     message = mavlink.MAVLink_command_long_message(1, 1, 512, 0, 148, 0, 0, 0, 0, 0, 0)
     ground.simulator.receive(ground.link, mavlink.MAVLink(None).parse_buffer(message.pack(sender))[0])

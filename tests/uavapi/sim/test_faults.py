@@ -240,7 +240,7 @@ def test_another_station_gives_a_velocity_that_expires(flying):
     assert flying.body.velocity_east == pytest.approx(0.0, abs=0.1)
 
 
-def test_what_was_received_is_told_by_index(control):
+def test_what_was_received_is_reported_by_index(control):
     send_command(control.ground)
     control.ground.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
     first = control.ask(op="received")

@@ -262,7 +262,7 @@ def test_flying_down_into_the_ground_lands_and_disarms(flying):
     assert not flying.copter.armed
 
 
-def test_the_nose_follows_the_way_unless_told_not_to(flying):
+def test_the_nose_follows_the_way_unless_commanded_otherwise(flying):
     flying.local((0.0, 60.0, -10.0))
     flying.run(5.0)
     assert flying.heading == pytest.approx(90.0, abs=2.0)

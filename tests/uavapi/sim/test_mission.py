@@ -191,7 +191,7 @@ def test_bad_uploads_are_refused(ground):
     assert ground.of("MISSION_ACK")[-1].type == mavlink.MAV_MISSION_INVALID_SEQUENCE
 
 
-def test_an_abandoned_upload_is_asked_for_again_and_then_cancelled(ground):
+def test_an_abandoned_upload_is_requested_again_and_then_cancelled(ground):
     ground.run(6.0)
     ground.send(mavlink.MAVLink_mission_count_message(1, 1, 3, 0))
     ground.run(9.5)

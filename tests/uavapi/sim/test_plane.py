@@ -179,7 +179,7 @@ def test_takeoff(plane):
     assert plane.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0) == FAILED
 
 
-def test_reposition_circles_around_the_place_and_tells_of_the_arrival(flying):
+def test_reposition_circles_around_the_place_and_reports_the_arrival(flying):
     assert reposition(flying, 500.0, 0.0) == ACCEPTED
     flying.run(60.0)
     assert [m.seq for m in flying.of("MISSION_ITEM_REACHED")] == [0]
@@ -260,7 +260,7 @@ def test_a_ground_speed_holds_against_the_wind(new_ground):
     assert vehicle(ground).airspeed > 25.0
 
 
-def test_the_wind_carries_the_plane_and_is_told(new_ground):
+def test_the_wind_carries_the_plane_and_is_reported(new_ground):
     ground = on_runway(new_ground, wind=Wind(6.0, 270.0))
     ground.mode(TAKEOFF)
     ground.arm()

@@ -114,7 +114,7 @@ def test_a_raised_throttle_keeps_it_from_arming(rover):
     assert rover.arm() == FAILED
 
 
-def test_a_place_is_driven_to_and_told_of(rover):
+def test_a_place_is_driven_to_and_reported(rover):
     rover.local((40.0, 0.0, -5.0))
     rover.run(12.0)
     assert not rover.of("MISSION_ITEM_REACHED")

@@ -59,24 +59,24 @@ def test_streams_are_per_link(ground):
 
 
 def test_intervals_can_be_read_stopped_and_set_to_the_default(ground):
-    def told():
+    def reported():
         ground.heard.clear()
         ground.command(GET_INTERVAL, ATTITUDE)
         return ground.of("MESSAGE_INTERVAL")[0].interval_us
 
-    assert told() == -1
+    assert reported() == -1
     ground.command(SET_INTERVAL, ATTITUDE, 250000)
-    assert told() == 250000
+    assert reported() == 250000
     ground.command(SET_INTERVAL, ATTITUDE, -1)
-    assert told() == -1
+    assert reported() == -1
     ground.send(mavlink.MAVLink_param_set_message(1, 1, b"SR0_EXTRA1", 5.0, 4))
     ground.command(SET_INTERVAL, ATTITUDE, 0)
-    assert told() == 200000
+    assert reported() == 200000
     assert ground.command(SET_INTERVAL, 4242, 1000000) == mavlink.MAV_RESULT_DENIED
     assert ground.command(SET_INTERVAL, ATTITUDE, 1000) == mavlink.MAV_RESULT_DENIED
 
 
-def test_the_default_is_the_rate_that_a_stream_was_asked_for_last(ground):
+def test_the_default_is_the_rate_that_a_stream_was_requested_last(ground):
     stream(ground, mavlink.MAV_DATA_STREAM_ALL, 4)
     ground.command(SET_INTERVAL, ATTITUDE, 20000)
     ground.command(SET_INTERVAL, ATTITUDE, 0)

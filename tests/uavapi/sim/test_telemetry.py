@@ -6,7 +6,7 @@ from mavproxy_uavapi.sim import Options, Simulator
 REQUEST = mavlink.MAV_CMD_REQUEST_MESSAGE
 
 
-def asked(ground, name):
+def requested(ground, name):
     """REQUEST_MESSAGE for a message by name; the message."""
     ground.heard.clear()
     number = getattr(mavlink, f"MAVLINK_MSG_ID_{name}")
@@ -27,8 +27,8 @@ def test_every_message_survives_the_wire(flying):
         assert decoded.get_type() == name
 
 
-def test_global_position_tells_both_altitudes_and_the_heading(flying):
-    position = asked(flying, "GLOBAL_POSITION_INT")
+def test_global_position_reports_both_altitudes_and_the_heading(flying):
+    position = requested(flying, "GLOBAL_POSITION_INT")
     assert position.relative_alt == pytest.approx(10000, abs=100)
     assert position.alt == pytest.approx(594000, abs=100)
     assert position.hdg == pytest.approx(35300, abs=100)
@@ -43,19 +43,19 @@ def test_simstate_is_the_truth_while_position_is_the_estimate(ground):
     assert believed.lat - truth.lat == pytest.approx(449, abs=2)
 
 
-def test_nothing_is_said_about_position_before_there_is_one(ground):
+def test_nothing_is_reported_about_position_before_there_is_one(ground):
     ground.command(REQUEST, mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT)
     ground.run(1.0)
     assert not ground.of("GLOBAL_POSITION_INT")
-    assert asked(ground, "GPS_RAW_INT").fix_type == mavlink.GPS_FIX_TYPE_NO_GPS
-    assert not asked(ground, "EKF_STATUS_REPORT").flags & mavlink.EKF_POS_HORIZ_ABS
+    assert requested(ground, "GPS_RAW_INT").fix_type == mavlink.GPS_FIX_TYPE_NO_GPS
+    assert not requested(ground, "EKF_STATUS_REPORT").flags & mavlink.EKF_POS_HORIZ_ABS
     assert ground.command(mavlink.MAV_CMD_GET_HOME_POSITION) == mavlink.MAV_RESULT_FAILED
     ground.run(6.0)
-    assert asked(ground, "EKF_STATUS_REPORT").flags == 831
-    assert asked(ground, "GPS_RAW_INT").fix_type >= mavlink.GPS_FIX_TYPE_3D_FIX
+    assert requested(ground, "EKF_STATUS_REPORT").flags == 831
+    assert requested(ground, "GPS_RAW_INT").fix_type >= mavlink.GPS_FIX_TYPE_3D_FIX
 
 
-def test_home_position_comes_unasked_when_home_is_set(ground):
+def test_home_position_comes_without_a_request_when_home_is_set(ground):
     ground.run(6.0)
     assert len(ground.of("HOME_POSITION")) == 1
     ground.command_int(mavlink.MAV_CMD_DO_SET_HOME, 3, (0, 0, 0, 0), (-353600000, 1491700000, 5.0))
@@ -64,8 +64,8 @@ def test_home_position_comes_unasked_when_home_is_set(ground):
     assert (home.latitude, home.longitude, home.altitude) == (-353600000, 1491700000, 589000)
 
 
-def test_heartbeat_tells_mode_armed_and_flying(flying):
-    heartbeat = asked(flying, "HEARTBEAT")
+def test_heartbeat_reports_mode_armed_and_flying(flying):
+    heartbeat = requested(flying, "HEARTBEAT")
     assert heartbeat.custom_mode == 4
     assert heartbeat.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
     assert heartbeat.system_status == mavlink.MAV_STATE_ACTIVE
@@ -73,26 +73,26 @@ def test_heartbeat_tells_mode_armed_and_flying(flying):
 
 
 def test_capabilities_do_not_promise_ftp(ground):
-    version = asked(ground, "AUTOPILOT_VERSION")
+    version = requested(ground, "AUTOPILOT_VERSION")
     assert not version.capabilities & mavlink.MAV_PROTOCOL_CAPABILITY_FTP
     assert version.capabilities & mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
     assert version.flight_sw_version >> 24 == 4
 
 
 def test_the_battery_drains_in_flight(flying):
-    before = asked(flying, "BATTERY_STATUS")
+    before = requested(flying, "BATTERY_STATUS")
     flying.run(60.0)
-    after = asked(flying, "BATTERY_STATUS")
+    after = requested(flying, "BATTERY_STATUS")
     assert after.current_consumed > before.current_consumed + 200
-    assert asked(flying, "SYS_STATUS").battery_remaining < 95
+    assert requested(flying, "SYS_STATUS").battery_remaining < 95
 
 
 def test_the_voltage_falls_only_where_the_pack_has_a_capacity(flying):
     flying.run(900)
-    assert asked(flying, "SYS_STATUS").voltage_battery > 12_000
+    assert requested(flying, "SYS_STATUS").voltage_battery > 12_000
     flying.send(mavlink.MAVLink_param_set_message(1, 1, b"SIM_BATT_CAP_AH", 3.3, 9))
     flying.run(1)
-    assert asked(flying, "SYS_STATUS").voltage_battery < 11_000
+    assert requested(flying, "SYS_STATUS").voltage_battery < 11_000
 
 
 def test_timesync_is_answered_in_vehicle_time(ground):

@@ -54,7 +54,7 @@ def test_corners_that_cannot_be_refined_stay():
     assert (refine(np.full((480, 640), 90, np.uint8), rough) == rough).all()
 
 
-def test_only_wanted_ids_are_seen_unless_all_are():
+def test_only_selected_ids_are_detected_unless_all_are_selected():
     image = frame(tags=(PlacedTag("36h11", 5, SIZE, 0, 0),))
     assert Detector(MODEL, DetectorOptions(sizes={0: SIZE})).detect(image) == ()
     (seen,) = Detector(MODEL, DetectorOptions(sizes={0: SIZE}, any_id=True)).detect(image)
@@ -98,7 +98,7 @@ def test_the_far_setting_sees_farther():
 
 
 @pytest.mark.parametrize("apart", [0.22, 0.5])
-def test_each_tag_is_told_once_however_often_it_is_looked_for(apart):
+def test_each_tag_is_reported_once_however_often_it_is_detected(apart):
     tags = (PlacedTag("36h11", 0, SIZE, 0, 0), PlacedTag("36h11", 0, SIZE, 0, apart))
     for height in (1.5, 4.0):
         seen = Detector(MODEL, DetectorOptions(sizes={0: SIZE}, far=True)).detect(frame(height, tags=tags))
@@ -107,7 +107,7 @@ def test_each_tag_is_told_once_however_often_it_is_looked_for(apart):
 
 @pytest.mark.parametrize("exposure", [0.3, 0.15, 0.1])
 @pytest.mark.parametrize("far", [False, True])
-def test_a_dim_picture_is_seen_through(exposure, far):
+def test_tags_in_a_dim_picture_are_detected(exposure, far):
     detector = Detector(MODEL, DetectorOptions(sizes={0: SIZE}, far=far))
     for height in (0.8, 2.0, 4.0):
         (seen,) = detector.detect(frame(height, look=Look(exposure=exposure, noise=1.5)))
@@ -121,7 +121,7 @@ def test_a_picture_that_is_bright_enough_is_left_as_it_is():
     assert not lit(dark).any()
 
 
-def test_a_picture_that_is_read_wrong_tells_how_many_bits():
+def test_a_picture_that_is_read_wrong_reports_how_many_bits():
     picture = marker_image("36h11", 0, 16)
     picture[3 * 16 : 4 * 16, 3 * 16 : 4 * 16] = 255 - picture[3 * 16 : 4 * 16, 3 * 16 : 4 * 16]
     canvas = np.full((480, 640), 255, np.uint8)

@@ -47,8 +47,8 @@ def test_a_calibration_may_have_as_many_coefficients_as_opencv_takes(tmp_path, c
 @pytest.mark.parametrize(
     ("changed", "why"),
     [
-        *(({name: ...}, f"missing are .'{name}'") for name in ("width", "height", "fx", "fy", "cx", "cy")),
-        ({"nonsense": 5}, "nobody knows .'nonsense'"),
+        *(({name: ...}, f"missing: .'{name}'") for name in ("width", "height", "fx", "fy", "cx", "cy")),
+        ({"nonsense": 5}, "unknown: .'nonsense'"),
         ({"width": "640"}, "width: '640' is not a number"),
         ({"height": True}, "height: True is not a number"),
         ({"width": 640.5}, "width: 640.5 is not a whole number"),
@@ -62,7 +62,7 @@ def test_a_calibration_may_have_as_many_coefficients_as_opencv_takes(tmp_path, c
         ({"fy": math.inf}, "fy: inf is not a number"),
         ({"fx": 10**400}, "fx: 1000"),
         ({"cy": 481}, "outside the frame"),
-        ({"distortion": [0.1, 0.2, 0.3]}, "3 coefficients of distortion"),
+        ({"distortion": [0.1, 0.2, 0.3]}, "3 distortion coefficients"),
         ({"distortion": [math.nan, 0, 0, 0, 0]}, "distortion: nan"),
         ({"distortion": "none"}, "distortion: 'none' is not a list"),
         ({"distortion": {"k1": 1}}, "is not a list"),
@@ -71,7 +71,7 @@ def test_a_calibration_may_have_as_many_coefficients_as_opencv_takes(tmp_path, c
 def test_a_calibration_that_makes_no_sense_is_refused(tmp_path, changed, why):
     file = tmp_path / "camera.json"
     file.write_text(json.dumps(calibration(**changed)), encoding="utf-8")
-    with pytest.raises(SettingError, match=f"is no calibration: .*{why}"):
+    with pytest.raises(SettingError, match=f"is not a calibration: .*{why}"):
         load(file)
 
 
@@ -79,7 +79,7 @@ def test_a_calibration_that_makes_no_sense_is_refused(tmp_path, changed, why):
 def test_a_file_that_is_no_calibration_is_refused(tmp_path, text):
     file = tmp_path / "camera.json"
     file.write_bytes(text if isinstance(text, bytes) else text.encode())
-    with pytest.raises(SettingError, match="is no calibration"):
+    with pytest.raises(SettingError, match="is not a calibration"):
         load(file)
 
 
@@ -104,8 +104,8 @@ def test_what_is_no_file_is_no_calibration(tmp_path):
         ("chessboard:3x6:0.025", "4 to 50 squares each way"),
         ("chessboard:9x999:0.025", "4 to 50 squares each way"),
         ("charuco:30x30:0.03", "at most 500 squares"),
-        ("charuco:7x5:0.03:0.03", "markers less"),
-        ("charuco:7x5:0.03:-0.02", "markers less"),
+        ("charuco:7x5:0.03:0.03", "markers are smaller"),
+        ("charuco:7x5:0.03:-0.02", "markers are smaller"),
         ("chessboard:9x6:0", "0.001 to 2 m"),
         ("chessboard:9x6:1e400", "0.001 to 2 m"),
     ],
@@ -131,12 +131,12 @@ def test_a_folder_without_boards_makes_no_camera(tmp_path):
         calibrate(tmp_path / "none", Board.parse("charuco:7x5:0.03:0.022"))
 
 
-def test_images_that_determine_no_camera_are_told(tmp_path):
+def test_images_that_determine_no_camera_are_reported(tmp_path):
     squares = np.kron(np.indices((7, 10)).sum(axis=0) % 2, np.ones((40, 40))) * 200 + 30
     flat = np.pad(squares, 40, constant_values=230).astype(np.uint8)
     for index in range(5):
         cv2.imwrite(str(tmp_path / f"{index}.png"), flat)
-    with pytest.raises(SettingError, match="the images make no camera: "):
+    with pytest.raises(SettingError, match="the images give no camera model: "):
         calibrate(tmp_path, Board.parse("chessboard:10x7:0.03"))
 
 

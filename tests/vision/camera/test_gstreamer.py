@@ -115,7 +115,7 @@ def test_without_gstreamer_one_line_says_what_to_install(monkeypatch):
 
 def test_a_program_that_cannot_be_run_is_no_camera(monkeypatch, tmp_path):
     monkeypatch.setattr(gstreamer, "LAUNCH", str(tmp_path))
-    with pytest.raises(NoCamera, match="cannot be run: Permission denied"):
+    with pytest.raises(NoCamera, match="cannot be started: Permission denied"):
         Pipeline(BALL.format("ball"), 0.0, (64, 48)).open()
 
 
@@ -133,7 +133,7 @@ def test_a_program_that_falls_silent_but_goes_on_is_no_camera(monkeypatch, tmp_p
     program.write_text("#!/bin/sh\nexec 1>&-\nexec sleep 60\n")
     program.chmod(0o755)
     monkeypatch.setattr(gstreamer, "LAUNCH", str(program))
-    monkeypatch.setattr(gstreamer, "ENDING", 0.05)
+    monkeypatch.setattr(gstreamer, "END_TIMEOUT", 0.05)
     source = Pipeline("libcamerasrc", 0.0, (64, 48))
     source.open()
     process = source._process

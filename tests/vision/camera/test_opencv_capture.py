@@ -40,7 +40,7 @@ def test_what_the_network_kept_is_dated_by_its_own_time():
         assert clock.sent(105.0 + 0.001 * frame, 0.04 * frame) == pytest.approx(100.2 + 0.04 * frame)
 
 
-def test_another_clock_of_a_stream_is_learned_anew():
+def test_another_clock_of_a_stream_is_learned_again():
     clock = StreamClock()
     clock.sent(100.0, 50.0)
     assert clock.sent(101.0, 0.04) == pytest.approx(101.0)  # it began again
@@ -67,19 +67,19 @@ def test_an_error_does_not_show_a_password():
 
 def camera(monkeypatch, spec, settings=None, clock=time.monotonic, **given):
     """A capture of OpenCV's that does as told, and what it was asked for."""
-    asked = {}
+    requested = {}
     given = {"get": lambda _: 0.0, "release": lambda: None, **given}
-    device = SimpleNamespace(isOpened=lambda: True, set=asked.__setitem__, **given)
+    device = SimpleNamespace(isOpened=lambda: True, set=requested.__setitem__, **given)
     monkeypatch.setattr(cv2, "VideoCapture", lambda *_: device)
     source = make_source(VisionModuleSettings({"source": spec, **(settings or {})}).snapshot(), lambda _: None, clock)
     source.open()
-    return source, asked
+    return source, requested
 
 
 def test_a_camera_gives_what_opencv_gives_in_grey(monkeypatch):
-    source, asked = camera(monkeypatch, "camera:0", read=lambda: (True, np.full((48, 64), 0x1234, np.uint16)))
+    source, requested = camera(monkeypatch, "camera:0", read=lambda: (True, np.full((48, 64), 0x1234, np.uint16)))
     assert source.read().image[0, 0] == 0x12
-    assert (asked[cv2.CAP_PROP_FRAME_WIDTH], asked[cv2.CAP_PROP_FRAME_HEIGHT]) == (640, 480)
+    assert (requested[cv2.CAP_PROP_FRAME_WIDTH], requested[cv2.CAP_PROP_FRAME_HEIGHT]) == (640, 480)
 
 
 def test_a_camera_that_opencv_cannot_read_is_no_camera(monkeypatch):
@@ -90,7 +90,7 @@ def test_a_camera_that_opencv_cannot_read_is_no_camera(monkeypatch):
     with pytest.raises(NoCamera, match="camera:0: "):
         source.read()
     source, _ = camera(monkeypatch, "camera:0", read=lambda: (True, np.zeros((4, 4), np.float32)))
-    with pytest.raises(NoCamera, match="float32: no picture"):
+    with pytest.raises(NoCamera, match="float32, which is not a picture"):
         source.read()
 
 
@@ -100,10 +100,10 @@ def test_an_absurd_camera_is_no_camera(spec):
         Capture(spec, 0.0, (64, 48), 25.0).open()
 
 
-def test_a_calibrated_camera_is_asked_for_the_size_it_was_calibrated_at(monkeypatch, tmp_path):
+def test_the_calibrated_size_is_requested_from_a_camera(monkeypatch, tmp_path):
     save(CameraModel(1280, 720, 900.0, 900.0, 640.0, 360.0), tmp_path / "camera.json")
-    _, asked = camera(monkeypatch, "camera:0", {"calibration": str(tmp_path / "camera.json")})
-    assert (asked[cv2.CAP_PROP_FRAME_WIDTH], asked[cv2.CAP_PROP_FRAME_HEIGHT]) == (1280, 720)
+    _, requested = camera(monkeypatch, "camera:0", {"calibration": str(tmp_path / "camera.json")})
+    assert (requested[cv2.CAP_PROP_FRAME_WIDTH], requested[cv2.CAP_PROP_FRAME_HEIGHT]) == (1280, 720)
 
 
 def test_a_drivers_time_stamps_are_taken_once_they_are_known_to_be_on_our_clock(monkeypatch):

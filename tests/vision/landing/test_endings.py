@@ -21,8 +21,8 @@ def under_way(lockstep: Any, name: str) -> tuple[Any, Any]:
     if name in ("takeoff", "leg"):
         rig.switch_on()
         rig.open_eye()
-        errand = MissionPlan(alt=10, north=60, east=0, on_tag=False)
-        job = rig.begin(rig.flights.errand(rig.copter, errand), "/vision/mission")
+        plan = MissionPlan(alt=10, north=60, east=0, on_tag=False)
+        job = rig.begin(rig.flights.mission(rig.copter, plan), "/vision/mission")
         until(rig, lambda: any(m.command == TAKEOFF for m in sent(rig, "COMMAND_LONG")))
         until(rig, lambda: rig.truth.north > 2.0 if name == "leg" else height(rig) > 0.5)
         return rig, job

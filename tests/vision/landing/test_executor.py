@@ -43,7 +43,7 @@ def test_without_positions_a_landing_ends(flying):
     silent(rig, "LOCAL_POSITION_NED")
     error = rig.outcome(job)
     assert isinstance(error, LandingFailed)
-    assert "has not told where it is" in str(error)
+    assert "has not reported where it is" in str(error)
     assert error.report["action"] == "rtl"
 
 
@@ -57,7 +57,7 @@ def test_a_velocity_that_is_no_number_is_not_sent_and_the_vehicle_holds(flying, 
     assert holds(rig, seconds=3.0)
 
 
-def test_a_return_that_is_refused_is_told_with_the_reason_of_the_landing(flying):
+def test_a_return_that_is_refused_is_reported_with_the_reason_of_the_landing(flying):
     rig = flying(sim_tags="", attempts=1, leash=1.0)
     job = rig.land()
     rig.pass_time(1.0)

@@ -48,7 +48,7 @@ def test_control_it_lands_on_the_tag(flying):
     rig = flying()
     assert rig.outcome(rig.land()).startswith("Landed on tag 0")
     assert landed_off(rig) < 0.2
-    report = rig.flights.report.told()
+    report = rig.flights.report.as_dict()
     assert report["attempts"] == 1
     assert report["touchdown_error"] == pytest.approx(landed_off(rig), abs=0.02)
     assert report["last_offset"] < 0.2
@@ -63,7 +63,7 @@ def test_wrong_id_is_not_landed_on(flying):
     assert landed_off(rig, 0, 0) < 1
 
 
-def test_an_id_that_is_asked_for_is_landed_on(flying):
+def test_an_id_that_is_requested_is_landed_on(flying):
     rig = flying(sim_tags="1:0.30@0.8,-0.6")
     assert rig.outcome(rig.land(1)).startswith("Landed on tag 1")
     assert landed_off(rig) < 0.2
@@ -256,7 +256,7 @@ def test_link_silence_of_four_seconds_is_rested_out(flying):
     assert landed_off(rig) < 0.2
 
 
-def test_during_link_silence_it_is_told_to_rest(flying):
+def test_during_link_silence_it_is_commanded_to_rest(flying):
     rig = flying(alt=5.0)
     rig.land()
     rig.pass_time(2.0)
@@ -264,9 +264,9 @@ def test_during_link_silence_it_is_told_to_rest(flying):
     rig.pass_time(1.5)
     mark = len(rig.wire.sent)
     rig.pass_time(1.0)
-    told = setpoints(rig, mark)
-    assert told
-    assert all(m.vx == m.vy == m.vz == 0 for m in told)
+    reported = setpoints(rig, mark)
+    assert reported
+    assert all(m.vx == m.vy == m.vz == 0 for m in reported)
 
 
 def test_a_lost_link_ends_the_landing_and_nothing_more_is_sent(flying):

@@ -36,11 +36,11 @@ def test_stopped_in_what_a_failed_landing_does_it_holds(flying, action):
     until(rig, lambda: rig.mode == action.upper())
     rig.pass_time(1.0)
     assert rig.stop()
-    assert str(rig.outcome(job)) == "stopped; the vehicle is told to hold"
+    assert str(rig.outcome(job)) == "stopped; the vehicle is commanded to hold"
     assert holds(rig, "BRAKE")
 
 
-def test_stopped_in_the_pilots_mode_nothing_is_sent_and_nothing_else_is_said(flying):
+def test_stopped_in_the_pilots_mode_nothing_is_sent_and_nothing_else_is_reported(flying):
     rig = flying()
     job = rig.land()
     rig.pass_time(2.0)
@@ -61,7 +61,7 @@ def test_a_mission_that_is_stopped_at_its_takeoff_does_not_take_off(lockstep, af
     rig = lockstep(sim_tags=TAG, **SMALL)
     rig.switch_on()
     rig.open_eye()
-    job = rig.begin(rig.flights.errand(rig.copter, MissionPlan(alt=5, north=8, east=-5)))
+    job = rig.begin(rig.flights.mission(rig.copter, MissionPlan(alt=5, north=8, east=-5)))
     until(rig, lambda: any(m.command == TAKEOFF for m in sent(rig, "COMMAND_LONG")))
     rig.pass_time(after)
     rig.stop()
@@ -105,11 +105,11 @@ def test_unloaded_in_the_autopilots_land_it_lands(flying):
 def test_a_mission_that_is_stopped_holds_before_it_writes_its_track(flying):
     rig = flying()
     rig.flights._directory = lambda: (_ for _ in ()).throw(RuntimeError("no home directory"))
-    job = rig.begin(rig.flights.errand(rig.copter, MissionPlan(alt=20, north=60, east=0)))
+    job = rig.begin(rig.flights.mission(rig.copter, MissionPlan(alt=20, north=60, east=0)))
     rig.pass_time(4.0)
     assert rig.stop()
     error = rig.outcome(job)
-    assert "told to hold" in str(error)
+    assert "commanded to hold" in str(error)
     assert holds(rig)
     assert rig.flights.report.track == "not written: no home directory"
 
@@ -121,8 +121,8 @@ def test_a_flight_that_is_ended_while_it_is_prepared_never_begins(lockstep, ende
     rig.open_eye()
     hear = rig.host._receive
     silent(rig, "PARAM_VALUE")
-    errand = MissionPlan(alt=5, north=8, east=-5, method="landing_target")
-    job = rig.begin(rig.flights.errand(rig.copter, errand), "/vision/mission")
+    plan = MissionPlan(alt=5, north=8, east=-5, method="landing_target")
+    job = rig.begin(rig.flights.mission(rig.copter, plan), "/vision/mission")
     rig.pass_time(0.3)
     getattr(rig, ended)()
     rig.host._receive = hear
@@ -138,7 +138,7 @@ def test_what_is_ended_before_telemetry_shows_its_mode_is_held_all_the_same(flyi
     job = rig.land()
     until(rig, lambda: rig.mode == action.upper())
     rig.pass_time(0.2)
-    assert rig.stop() == "stopped; the vehicle is told to hold"
+    assert rig.stop() == "stopped; the vehicle is commanded to hold"
     rig.pass_time(0.02)
     rig.host._receive = hear
     rig.outcome(job)
@@ -198,19 +198,19 @@ def test_a_landing_that_takes_over_stops_what_was_flown(flying):
 
     rig.begin(drive, "/movement/travel")
     rig.pass_time(2.0)
-    want = rig.tracker.want
+    add_tag_id = rig.tracker.add_tag_id
 
     async def slowly(number: int) -> None:
         await asyncio.sleep(2.0)
-        await want(number)
+        await add_tag_id(number)
 
-    rig.tracker.want = slowly
+    rig.tracker.add_tag_id = slowly
     mark = len(rig.wire.sent)
     rig.land()
     rig.pass_time(0.2)
-    told = sent(rig, "SET_POSITION_TARGET_LOCAL_NED", mark)
-    assert told
-    assert (told[-1].vx, told[-1].vy, told[-1].vz) == (0, 0, 0)
+    reported = sent(rig, "SET_POSITION_TARGET_LOCAL_NED", mark)
+    assert reported
+    assert (reported[-1].vx, reported[-1].vy, reported[-1].vz) == (0, 0, 0)
 
 
 # -- another vehicle -------------------------------------------------------------------------------------------

@@ -21,8 +21,8 @@ from tests.support.landing import LARGE, PLND, holds, pilot, plnd, sent, silent,
 @pytest.mark.parametrize(("forward", "right"), [(1.0, 0.5), (-1.0, 0.5), (0.3, -2.0)])
 def test_the_angles_of_landing_target_mean_the_same_as_its_position(forward, right):
     message = landing_target(1.0, vector(forward, right, 4.0), Attitude())
-    told = (-math.tan(message.angle_y), math.tan(message.angle_x))  # as AC_PrecLand_MAVLink.cpp reads them
-    assert told == pytest.approx((forward / 4.0, right / 4.0))
+    reported = (-math.tan(message.angle_y), math.tan(message.angle_x))  # as AC_PrecLand_MAVLink.cpp reads them
+    assert reported == pytest.approx((forward / 4.0, right / 4.0))
     assert (message.x, message.y, message.z) == pytest.approx((forward, right, 4.0))
 
 
@@ -55,9 +55,9 @@ def test_stopped_and_unloaded_in_one_breath_it_holds_and_plnd_is_as_before(flyin
     assert plnd(rig) == before
 
 
-def test_last_words_of_an_unloaded_module_go_when_its_parameters_are_given_back(flying):
+def test_closing_messages_of_an_unloaded_module_are_removed_once_its_parameters_are_restored(flying):
     rig = flying(alt=6.0, plnd=True, **LARGE)
-    before, words = plnd(rig), rig.host.last_words
+    before, words = plnd(rig), rig.host.closing_messages
     rig.land(method="landing_target")
     until(rig, lambda: rig.mode == "LAND")
     rig.pass_time(1.0)
@@ -65,9 +65,9 @@ def test_last_words_of_an_unloaded_module_go_when_its_parameters_are_given_back(
     silent(rig, "PARAM_VALUE")
     rig.unload()
     rig.pass_time(5.0)
-    assert rig.flights.last_words in words
+    assert rig.flights.closing_messages in words
     rig.host._receive = hear
-    until(rig, lambda: rig.flights.last_words not in words)
+    until(rig, lambda: rig.flights.closing_messages not in words)
     assert plnd(rig) == before
 
 
@@ -124,8 +124,8 @@ def test_parameters_are_given_back_after_two_landings_in_a_row(flying, pause):
     during: list[dict[str, float]] = []
     rig.each_step.append(lambda: during.append(plnd(rig)) if rig.mode == "LAND" and rig.flights.running else None)
     assert rig.outcome(rig.land(method="landing_target")).startswith("Landed on tag 0")
-    wanted = {name: WANTED[name] for name in PLND}
-    assert during[100] == wanted
+    expected = {name: WANTED[name] for name in PLND}
+    assert during[100] == expected
     rig.pass_time(20.0)
     assert plnd(rig) == before
 
@@ -275,7 +275,7 @@ def test_motors_that_stop_in_flight_are_no_landing(flying):
     assert "fell" in str(error)
 
 
-def test_a_target_that_is_no_number_is_not_told_and_the_landing_goes_on_by_itself(flying):
+def test_a_target_that_is_no_number_is_not_reported_and_the_landing_goes_on_by_itself(flying):
     rig = flying(alt=6.0, plnd=True, **LARGE)
     before = plnd(rig)
     job = rig.land(method="landing_target")

@@ -38,17 +38,17 @@ def test_a_folder_may_repeat_itself():
 
 
 def test_the_worker_looks_at_the_newest_frame_and_ends(tmp_path):
-    told = []
+    reported = []
     source = Posted(0.0)
-    worker = Worker(source, blind(), lambda seen, _: told.append(seen))
+    worker = Worker(source, blind(), lambda seen, _: reported.append(seen))
     worker.start()
     source.post(picture(7))
     for _ in range(500):
-        if told:
+        if reported:
             break
         worker._stop.wait(0.01)
     worker.stop()
-    assert told[0].size == (64, 48)
+    assert reported[0].size == (64, 48)
     assert worker.health.state == "closed"
     assert worker.health.frames == 1
 
@@ -58,11 +58,11 @@ class Script(Posted):
 
     def __init__(self, clock, *images):
         super().__init__(0.0)
-        self.clock, self.images, self.told = clock, list(images), []
+        self.clock, self.images, self.reported = clock, list(images), []
         self.worker = None
 
     def read(self):
-        self.told.append(self.worker.health)
+        self.reported.append(self.worker.health)
         self.clock.now += 0.1
         image = self.images.pop(0) if self.images else None
         return None if image is None else Frame(image, self.clock.now, self.clock.now)
@@ -74,34 +74,34 @@ def watched(*images):
     source = Script(clock, *images)
     worker = source.worker = Worker(source, blind(), lambda *_: None, clock)
     worker._read_until_it_fails()
-    return worker, source.told
+    return worker, source.reported
 
 
 def test_what_was_wrong_is_forgotten_when_frames_come_again():
     worker, _ = watched(picture(1))
     assert worker.health.error.startswith("no frames for 1.")
-    worker.source.images, worker.source.told = [picture(2), picture(3)], []
+    worker.source.images, worker.source.reported = [picture(2), picture(3)], []
     worker._read_until_it_fails()
-    states = [(health.state, health.error) for health in worker.source.told]
+    states = [(health.state, health.error) for health in worker.source.reported]
     assert states[0] == ("no frames", worker.health.error)
     assert states[1] == ("ok", "")
 
 
 def test_frames_of_another_shape_are_not_looked_at():
     wide = np.full((720, 1280), 9, np.uint8)
-    worker, told = watched(picture(1), wide, wide + 1, np.full((960, 1280), 7, np.uint8))
-    assert [health.state for health in told[:5]] == ["starting", "ok", "wrong shape", "wrong shape", "ok"]
-    assert told[2].error == "asked for is 640x480 px or another size of that shape, and 1280x720 came"
-    assert told[4].error == ""
+    worker, reported = watched(picture(1), wide, wide + 1, np.full((960, 1280), 7, np.uint8))
+    assert [health.state for health in reported[:5]] == ["starting", "ok", "wrong shape", "wrong shape", "ok"]
+    assert reported[2].error == "a frame has 1280x720 px instead of 640x480 or a size of the same shape"
+    assert reported[4].error == ""
     assert worker._newest.image.shape == (960, 1280)
     assert worker.health.skipped == 1  # the two wide ones were not even kept
 
 
 def test_a_camera_of_the_wrong_shape_is_no_camera_to_fly_by():
-    worker, told = watched(np.full((720, 1280), 9, np.uint8))
-    assert told[1].state == "wrong shape"
-    with pytest.raises(NoCamera, match=r"the camera: wrong shape \(asked for is 640x480 px .* 1280x720 came\)"):
-        Tracker.require_camera(SimpleNamespace(worker=worker, health=told[1]))
+    worker, reported = watched(np.full((720, 1280), 9, np.uint8))
+    assert reported[1].state == "wrong shape"
+    with pytest.raises(NoCamera, match=r"the camera: wrong shape \(a frame has 1280x720 px .* same shape\)"):
+        Tracker.require_camera(SimpleNamespace(worker=worker, health=reported[1]))
 
 
 def test_a_defect_is_not_forgotten():

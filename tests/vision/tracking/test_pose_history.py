@@ -103,7 +103,7 @@ def test_the_way_travelled_does_not_jump_with_the_position():
     assert made.motion(1.05).position[0] == pytest.approx(9)
 
 
-def test_a_reboot_begins_anew_and_a_message_out_of_order_is_left_out():
+def test_a_reboot_restarts_the_history_and_a_message_out_of_order_is_left_out():
     made = History()
     made.add_motion(100, vector(0, 0, 0), vector(1, 0, 0))
     made.add_motion(99.9, vector(5, 5, 5), vector(9, 9, 9))

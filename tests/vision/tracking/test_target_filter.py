@@ -16,9 +16,9 @@ def measurement(at, place, travelled=(0, 0, -5), height=5.0, tag=0):
 def test_three_sightings_make_a_target():
     target = Target()
     for step in range(3):
-        assert not target.found
+        assert not target.is_confirmed
         target.take([measurement(step * 0.05, (1, 2, 0))])
-    assert target.found
+    assert target.is_confirmed
     assert target.place == pytest.approx([1, 2, 0])
     assert target.age(1.0) == pytest.approx(0.9)
 
@@ -30,7 +30,7 @@ def test_noise_is_averaged():
     assert target.place[:2] == pytest.approx([1, 2], abs=0.1)
 
 
-def test_a_far_outlier_is_left_out_and_does_not_count_as_seen():
+def test_a_far_outlier_is_left_out_and_does_not_count_as_a_detection():
     target = Target()
     for step in range(5):
         target.take([measurement(step * 0.05, (1, 2, 0))])
@@ -44,7 +44,7 @@ def test_two_equal_tags_before_one_is_chosen_are_ambiguous():
     for step in range(5):
         target.take([measurement(step * 0.05, (1, 2, 0)), measurement(step * 0.05, (-1, 2, 0))])
     assert target.ambiguous == 5
-    assert not target.found
+    assert not target.is_confirmed
 
 
 def test_a_second_equal_tag_that_comes_into_view_later_is_ignored():

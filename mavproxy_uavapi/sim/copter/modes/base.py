@@ -15,7 +15,7 @@ class Mode(mode.Mode):
 
     manual_throttle: ClassVar[bool] = False
     positions: ClassVar[bool] = True
-    """Whether the horizontal position is under the controller, which base_mode's guided bit tells."""
+    """Whether the horizontal position is under the controller, as the guided bit of base_mode reports."""
 
     def __init__(self, aircraft: Aircraft) -> None:
         self.aircraft = aircraft

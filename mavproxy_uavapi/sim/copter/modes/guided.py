@@ -1,4 +1,4 @@
-"""GUIDED: the vehicle flies where a companion computer or a ground station tells it to."""
+"""GUIDED: the vehicle flies to the targets of a companion computer or a ground station."""
 
 from __future__ import annotations
 

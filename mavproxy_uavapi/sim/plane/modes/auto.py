@@ -76,7 +76,7 @@ class Auto(NavigatingMode, MissionMode):
         return True
 
     def leave(self) -> None:
-        """Leave the mission; a landing that is broken off begins anew at its DO_LAND_START."""
+        """Leave the mission; an aborted landing restarts at its DO_LAND_START."""
         plane = self.plane
         self.runner.stop()
         start = plane.resume_landing() if self.submode is AutoSubmode.LAND else None
@@ -304,7 +304,7 @@ class Auto(NavigatingMode, MissionMode):
         plane.say(mavlink.MAV_SEVERITY_INFO, "Mission complete, changing mode to RTL")
         plane.set_mode(RTL_NUMBER)
 
-    # What it tells.
+    # Reports.
 
     @property
     def taking_off(self) -> bool:

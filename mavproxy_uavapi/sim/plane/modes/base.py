@@ -16,7 +16,7 @@ class Mode(mode.Mode):
     """A mode of a plane; `step` is called at the control rate while it is the current one."""
 
     navigates: ClassVar[bool] = False
-    """Whether the plane flies by itself to somewhere, which base_mode's guided bit tells."""
+    """Whether the plane flies by itself to somewhere, as the guided bit of base_mode reports."""
     automatic_throttle: ClassVar[bool] = True
     guided: ClassVar[bool] = False
     """Whether the ground station may give it targets."""
@@ -33,7 +33,7 @@ class Mode(mode.Mode):
         raise NotImplementedError
 
     def navigation(self) -> Navigation | None:
-        """What NAV_CONTROLLER_OUTPUT tells."""
+        """What NAV_CONTROLLER_OUTPUT reports."""
         return None
 
     @property

@@ -11,7 +11,7 @@ from .base import NavigatingMode
 
 
 class Guided(NavigatingMode):
-    """A mode change makes the present place the target; MISSION_ITEM_REACHED 0 tells of each arrival."""
+    """A mode change makes the present place the target; MISSION_ITEM_REACHED 0 reports each arrival."""
 
     name = "GUIDED"
     number = 15
@@ -47,7 +47,7 @@ class Guided(NavigatingMode):
         demand = plane.navigator.circle(self._radius)
         if plane.navigator.reached and not self._arrival_told:
             self._arrival_told = True
-            plane.tell(ItemReached(0))
+            plane.emit(ItemReached(0))
         return self.fly(demand)
 
     @property

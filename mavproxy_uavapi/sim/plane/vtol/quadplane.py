@@ -20,7 +20,7 @@ VTOL_STATES = {
 
 
 class SimulatedQuadPlane(LiftFrame):
-    """Says that it is a fixed wing (Q_MAV_TYPE 0); EXTENDED_SYS_STATE tells whether it hovers."""
+    """Its type is a fixed wing (Q_MAV_TYPE 0); EXTENDED_SYS_STATE reports whether it hovers."""
 
     banner = ("ArduPlane V4.7.0-dev (embedded)", "QuadPlane Frame: QUAD/X")
 

@@ -19,7 +19,7 @@ class Stage(Enum):
 
 
 class Transition:
-    """As in ArduPlane it ends Q_TRANSITION_MS after the airspeed was reached; texts tell of each step."""
+    """As in ArduPlane it ends Q_TRANSITION_MS after the airspeed was reached; texts report each step."""
 
     def __init__(self, vehicle: Airframe) -> None:
         self._vehicle = vehicle

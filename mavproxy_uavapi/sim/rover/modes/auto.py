@@ -167,7 +167,7 @@ class Auto(NavigatingMode, MissionMode):
         self.rover.say(mavlink.MAV_SEVERITY_NOTICE, "Mission Complete")
         self.submode = AutoSubmode.STOP
 
-    # What it tells.
+    # Reports.
 
     def set_speed(self, speed: float) -> bool:
         if self.submode is AutoSubmode.HEADING:

@@ -15,7 +15,7 @@ class Mode(mode.Mode):
     """A mode of a rover; `step` is called at the control rate while it is the current one."""
 
     autopilot: ClassVar[bool] = False
-    """Whether the rover drives by itself, which base_mode's guided bit tells."""
+    """Whether the rover drives by itself, as the guided bit of base_mode reports."""
     manual_input: ClassVar[bool] = False
     needs_velocity: ClassVar[bool] = True
 
@@ -32,7 +32,7 @@ class Mode(mode.Mode):
         return False
 
     def navigation(self) -> Navigation | None:
-        """What NAV_CONTROLLER_OUTPUT tells; nothing where a pilot drives."""
+        """What NAV_CONTROLLER_OUTPUT reports; nothing where a pilot drives."""
         if not self.autopilot:
             return None
         return Navigation()

@@ -80,7 +80,7 @@ class Guided(NavigatingMode):
         drive = self.rover.navigator.step(dt)
         if self.rover.navigator.reached and not self._arrival_told:
             self._arrival_told = True
-            self.rover.tell(ItemReached(0))
+            self.rover.emit(ItemReached(0))
         return drive
 
     def _watch_time(self) -> None:

@@ -1,4 +1,4 @@
-"""Modes that Rover has, and that it refuses to enter as this vehicle stands: nobody to follow, nowhere to dock."""
+"""Modes that Rover has and that this vehicle refuses to enter: there is no vehicle to follow and no dock."""
 
 from __future__ import annotations
 

@@ -1,0 +1,71 @@
+"""Which envelopes are in force for which vehicle. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from mavproxy_uavapi.core.envelope.model import Envelope, Limits
+from mavproxy_uavapi.core.envelope.space import Space
+
+ALL = 0  # in place of a system id: every vehicle
+OPERATOR, API = "setting", "api"  # who put it: the operator by the setting, a client by the API
+
+
+class Key(NamedTuple):
+    """Who put an envelope, and for which system id."""
+
+    by: str
+    system: int
+
+
+class Envelopes:
+    """The envelopes by who put them and for which vehicle. A vehicle must be inside all that are for it.
+
+    So a client can make narrower what the operator has set, and never wider.
+
+    Attributes:
+        expects_fences: whether each vehicle's own fence is its envelope; while it is not known, nothing is inside.
+    """
+
+    def __init__(self) -> None:
+        self.expects_fences = False
+        self._spaces: dict[Key, Space] = {}
+        self._of: dict[int, tuple[Space, ...]] = {}  # by system id, what `of` has answered
+
+    def put(self, by: str, system: int, envelope: Envelope | Space | None) -> None:
+        """Put an envelope in place of that one's former one, all at once; None takes it away.
+
+        Raises:
+            Invalid: it makes no sense as geometry; the former one stays in force.
+        """
+        space = Space(envelope) if isinstance(envelope, Envelope) else envelope
+        spaces = {key: former for key, former in self._spaces.items() if key != (by, system)}
+        if space is not None:
+            spaces[Key(by, system)] = space
+        self._spaces, self._of = spaces, {}
+
+    def clear(self, by: str) -> None:
+        """Take all away that one has put; to be called too when `expects_fences` has changed."""
+        self._spaces = {key: space for key, space in self._spaces.items() if key.by != by}
+        self._of = {}
+
+    def of(self, system: int) -> tuple[Space, ...]:
+        """Those in force for a vehicle: the same object until one of them changes."""
+        if system not in self._of:
+            known = [space for key, space in self._spaces.items() if key.system in (ALL, system)]
+            if self.expects_fences and Key(OPERATOR, system) not in self._spaces:
+                known.append(
+                    missing(f"MAVProxy has not loaded the fence of vehicle {system}: `fence list`", "the fence")
+                )
+            self._of[system] = tuple(known)
+        return self._of[system]
+
+    def all(self) -> Iterator[tuple[Key, Space]]:
+        """All of them."""
+        return iter(self._spaces.items())
+
+
+def missing(reason: str, source: str) -> Space:
+    """An envelope of which nothing is known yet: nothing is inside."""
+    return Space(Envelope(limits=Limits(height=1e-3), source=source), reason)

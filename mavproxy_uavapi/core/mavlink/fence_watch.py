@@ -1,0 +1,40 @@
+"""The fences that MAVProxy's module `fence` has loaded. MAVProxy's main loop only."""
+
+from __future__ import annotations
+
+from typing import Any
+
+PERIOD = 1.0  # s between looks
+
+
+class FenceWatch:
+    """Finds which fences have changed since the last look."""
+
+    def __init__(self) -> None:
+        self._seen: dict[int, list[Any]] = {}
+        self._next = 0.0
+
+    def changes(self, modules: Any, now: float) -> dict[int, list[Any]]:
+        """By system id, the items of each fence that is new or different, at most every PERIOD s of `now`.
+
+        A fence that is still on its way from the vehicle is none yet.
+
+        Args:
+            modules: MAVProxy's public modules, by name.
+            now: s.
+        """
+        if now < self._next:
+            return {}
+        self._next = now + PERIOD
+        module = modules.get("fence")
+        loaders = {} if module is None else dict(module.wploader_by_sysid)
+        changed = {}
+        for system, loader in loaders.items():
+            items = [loader.item(number) for number in range(loader.count())]
+            if len(items) == getattr(loader, "expected_count", 0) and items != self._seen.get(system, []):
+                changed[system] = self._seen[system] = items
+        return changed
+
+    def forget(self) -> None:
+        """Take every fence for new."""
+        self._seen = {}

@@ -1,0 +1,207 @@
+"""In flight: a vehicle under our command that will leave its envelope in the time that it needs to stop is stopped.
+
+One under the pilot's hand is never touched, nor one that lands, returns or holds.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import math
+from collections.abc import Callable
+from typing import Any
+
+from mavproxy_uavapi.core.envelope import braking
+from mavproxy_uavapi.core.envelope.space import TOUCH, Breach, Space, Spot, outside_by
+from mavproxy_uavapi.core.envelope.store import Envelopes
+from mavproxy_uavapi.core.errors import OutsideEnvelope, Stale, UavApiError
+from mavproxy_uavapi.core.held_tasks import HeldTasks
+from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission
+from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
+from mavproxy_uavapi.core.vehicle import time_limits
+from mavproxy_uavapi.core.vehicle.geodesy import moved
+from mavproxy_uavapi.core.vehicle.guard import STOPPING
+from mavproxy_uavapi.core.vehicle.jobs import Ending, Job, JobBook
+from mavproxy_uavapi.core.vehicle.mission_way import Stop
+from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+
+log = logging.getLogger("uavapi.copter")
+
+CLIENT = "envelope"  # the client of the jobs that stop vehicles
+INTERVAL = 0.25  # s between two positions, until the vehicle has told two
+SLOWEST = 0.3  # m/s; slower than this nothing is stopped
+HOME_ASKED, HOME_PAUSE = 60, 2.0  # times that home is asked for, and s between them
+CORRIDOR, MISSION_CORRIDOR = 1.5, 3.0  # m beside a way that was allowed, in which the autopilot is trusted to stop
+
+
+class EnvelopeWatch:
+    """Looks at each position of each vehicle.
+
+    Args:
+        registry: the vehicles.
+        jobs: all jobs; a stop is one.
+        envelopes: those in force.
+        say: told each stop in a sentence.
+    """
+
+    def __init__(
+        self, registry: VehicleRegistry, jobs: JobBook, envelopes: Envelopes, say: Callable[[str], None]
+    ) -> None:
+        self._registry = registry
+        self._jobs = jobs
+        self._envelopes = envelopes
+        self._say = say
+        self._stops: dict[int, Job] = {}
+        self._tasks = HeldTasks()
+        self._prepared: set[tuple[int, int]] = set()  # system ids and boots
+
+    def listen(self, state: VehicleState, message: Any) -> None:
+        """A message from a vehicle."""
+        if not self._envelopes.of(state.system):
+            return
+        is_position = message.get_type() == "GLOBAL_POSITION_INT" and message.get_srcComponent() == state.component
+        if is_position:
+            vehicle = self._registry.find(state.system)
+            self._prepare(vehicle)
+            self.look(vehicle)
+
+    def _prepare(self, vehicle: Vehicle) -> None:
+        """Ask once in each boot for what the envelope counts by: home, and how the vehicle stops."""
+        key = vehicle.state.system, vehicle.state.reboots
+        if key not in self._prepared:
+            self._prepared.add(key)
+            self._tasks.start(self._ask(vehicle), "the questions for an envelope")
+
+    @staticmethod
+    async def _ask(vehicle: Vehicle) -> None:
+        of_copter = [*braking.WANTED, *time_limits.WANTED]
+        quantities = {"rover": braking.WANTED_OF_ROVER, "plane": [("WP_LOITER_RAD",)]}.get(vehicle.kind, of_copter)
+        with contextlib.suppress(UavApiError):
+            await vehicle.parameters.read(
+                [*quantities, ("WP_LOITER_RAD",)] if vehicle.kind == "plane" else quantities
+            )
+        for _ in range(HOME_ASKED):
+            if "HOME_POSITION" in vehicle.state.messages:
+                return
+            with contextlib.suppress(UavApiError):
+                await vehicle.home()
+            await asyncio.sleep(HOME_PAUSE)
+
+    async def close(self) -> None:
+        """End the questions that are not answered yet."""
+        await self._tasks.end()
+
+    def look(self, vehicle: Vehicle) -> None:
+        """Stop the vehicle if it is ours and will leave."""
+        stop = self._stops.get(vehicle.state.system)
+        if not is_ours(vehicle) or (stop is not None and stop.running):
+            return
+        try:
+            found = leaving(vehicle)
+        except Stale:
+            return  # where it is, or where home is, nobody knows: what moves it is refused
+        if found is not None:
+            self._stop(vehicle, *found)
+
+    def _stop(self, vehicle: Vehicle, space: Space, breach: Breach) -> None:
+        system = vehicle.state.system
+        what = f"{breach.what} of {space.envelope.source}"
+        sentence = f"vehicle {system} was about to break {what}: it is stopped ({vehicle.holding_mode})"
+        log.critical("%s", sentence)
+        self._say(sentence)
+        commander = vehicle.authority.flies
+        error = OutsideEnvelope(sentence, {"what": breach.what, "source": space.envelope.source})
+
+        async def body(job: Job) -> str:
+            await vehicle.set_mode(job, vehicle.holding_mode)
+            return sentence
+
+        job = self._jobs.begin(
+            vehicle, "brake at the envelope", {"of": what}, body, client=CLIENT, outlives_client=True
+        )
+        self._stops[system] = job
+        if commander is not None:
+            commander.abort(error, Ending.SUPERSEDED)
+        job.when_ended(lambda: self._tell_failure(job, system))
+
+    def _tell_failure(self, job: Job, system: int) -> None:
+        if isinstance(job.error, UavApiError):
+            self._say(f"vehicle {system} was not stopped: {job.error}")
+
+
+def is_ours(vehicle: Vehicle) -> bool:
+    """Whether it flies by a command of ours: in a mode that we chose or command in, towards no other's target."""
+    state, mode = vehicle.state, vehicle.mode
+    if not state.armed or (state.landed and vehicle.kind != "rover") or vehicle.authority.commander is None:
+        return False
+    if mode in STOPPING or mode == vehicle.holding_mode:
+        return False
+    if not (mode == "GUIDED" or flies_mission(mode) or (mode == "TAKEOFF" and vehicle.kind == "plane")):
+        return False
+    commanded = vehicle.guard.ordered_at >= state.mode_since or vehicle.is_mode_of_ours
+    return commanded and not vehicle.has_foreign_target
+
+
+def leaving(vehicle: Vehicle) -> tuple[Space, Breach] | None:
+    """The envelope that the vehicle is about to leave, and what it will break; None while it stays inside.
+
+    Raises:
+        Stale: where it is, or where home is, is not known.
+    """
+    here, velocity = vehicle.guard.check.here(), _velocity(vehicle)
+    if math.hypot(*velocity) < SLOWEST:
+        return None
+    seconds = _until_it_brakes(vehicle)
+    coasted = _moved(here, velocity, seconds)
+    end = coasted if _keeps_way(vehicle, here, coasted) else _stopping_place(vehicle, here, velocity, seconds)
+    for space in vehicle.guard.check.spaces:
+        if space.missing:
+            continue
+        frame, rules = vehicle.guard.check.rules(space, here, 0.0)
+        way = [frame.spot((stop.lat, stop.lon), stop.up) for stop in (here, end)]
+        breach = space.breach(way, rules)
+        if breach is not None and _gets_worse(way, rules):
+            return space, breach
+    return None
+
+
+def _gets_worse(way: list[Spot], rules: Any) -> bool:
+    before = outside_by(way[0], rules)
+    return before <= TOUCH or outside_by(way[1], rules) > before + TOUCH
+
+
+def _velocity(vehicle: Vehicle) -> tuple[float, float, float]:
+    """m/s north, east, up."""
+    told = vehicle.fresh("GLOBAL_POSITION_INT")
+    return told.vx / 100.0, told.vy / 100.0, 0.0 if vehicle.kind == "rover" else -told.vz / 100.0
+
+
+def _until_it_brakes(vehicle: Vehicle) -> float:
+    """Seconds of the vehicle's clock from the newest position until a stop after the next one has an effect."""
+    received = vehicle.state.messages["GLOBAL_POSITION_INT"]
+    interval = INTERVAL if received.interval is None else received.interval
+    return (interval + braking.OURS) * max(vehicle.state.time_ratio.ratio, 0.1) + braking.ITS_OWN
+
+
+def _stopping_place(vehicle: Vehicle, here: Stop, velocity: tuple[float, float, float], seconds: float) -> Stop:
+    parameters = vehicle.state.parameters
+    if vehicle.kind == "plane":  # it circles: no farther ahead than a radius
+        speed = math.hypot(*velocity[:2])
+        more = vehicle.guard.check.circle / speed if speed > SLOWEST else 0.0
+        return _moved(here, velocity, seconds + more)
+    stopping = braking.of_rover(parameters) if vehicle.kind == "rover" else braking.of_brake(parameters)
+    north, east, up = stopping.to_rest(velocity, seconds)
+    return Stop(*moved(here.lat, here.lon, north, east), here.up + up)
+
+
+def _moved(here: Stop, velocity: tuple[float, float, float], seconds: float) -> Stop:
+    north, east, up = (seconds * speed for speed in velocity)
+    return Stop(*moved(here.lat, here.lon, north, east), here.up + up)
+
+
+def _keeps_way(vehicle: Vehicle, here: Stop, coasted: Stop) -> bool:
+    """Whether it flies along a way that was allowed, at the end of which the autopilot stops by itself."""
+    corridor = vehicle.guard.check.circle or (MISSION_CORRIDOR if flies_mission(vehicle.mode) else CORRIDOR)
+    return all(vehicle.guard.beside_way(stop) <= corridor for stop in (here, coasted))

@@ -1,0 +1,223 @@
+"""The envelope before the link: no message that leads out of it is sent, whoever asks for it.
+
+Each vehicle has a guard, and all that is sent to the vehicle passes it (`GuardedLink`), so no verb can forget it.
+Verbs ask it earlier too, so that a refused command ends no other (`CommandAuthority.take`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from mavproxy_uavapi.core.envelope import braking
+from mavproxy_uavapi.core.envelope.space import LocalFrame, Space, Spot, to_leg
+from mavproxy_uavapi.core.errors import OutsideEnvelope
+from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission, mode_name
+from mavproxy_uavapi.core.mavlink.link import Address, Link
+from mavproxy_uavapi.core.vehicle import orders
+from mavproxy_uavapi.core.vehicle.envelope_check import Checked, EnvelopeCheck, Spaces
+from mavproxy_uavapi.core.vehicle.geodesy import moved, offset, rotate
+from mavproxy_uavapi.core.vehicle.messages import NedTarget
+from mavproxy_uavapi.core.vehicle.mission_files import MissionItem
+from mavproxy_uavapi.core.vehicle.mission_way import Stop
+
+REACH = 200_000.0  # m from the vehicle: no target lies farther, with or without an envelope
+STAY = 1.0  # m: a target this near holds the vehicle where it is
+CHECKED_FOR = 30.0  # s for which a mission that was looked at may be started
+# The modes that end a flight, or hold it, or are watched. In any other nobody keeps the envelope.
+STOPPING = {"BRAKE", "HOLD", "LAND", "RTL", "SMART_RTL", "QLAND", "QRTL"}
+KEPT = {"GUIDED", *STOPPING}
+# Parameters that decide where an autopilot flies by itself, and how long it goes on without us.
+PROTECTED = ("FENCE_", "RTL_", "SRTL_", "Q_RTL_", "GUID_", "WP_LOITER_RAD")
+
+
+STANDING = (
+    orders.ChangeSpeed | orders.SetParameter | orders.MoveHome | orders.ChangeMission
+)  # move nothing by themselves
+
+
+class EnvelopeGuard:
+    """Says whether a message keeps a vehicle in its envelopes.
+
+    Attributes:
+        check: holds ways against the envelopes.
+        way: the way that it was last allowed to fly, straight from place to place; empty with velocities.
+        ordered_at: when the newest message went out that moves the vehicle (s); -inf for none.
+
+    Args:
+        vehicle: which.
+        spaces: gives the envelopes in force for it.
+    """
+
+    def __init__(self, vehicle: Checked, spaces: Spaces) -> None:
+        self.check = EnvelopeCheck(vehicle, spaces)
+        self.way: list[Stop] = []
+        self.ordered_at = -math.inf
+        self._vehicle = vehicle
+        self._checked_mission: tuple[Sequence[Space], float, list[Stop]] | None = None
+
+    @property
+    def in_force(self) -> bool:
+        """Whether there is an envelope for it."""
+        return bool(self.check.spaces)
+
+    def require(self, message: Any) -> None:
+        """Raise unless `message` may be sent.
+
+        Raises:
+            OutsideEnvelope: it leads out of an envelope, or nobody can say where.
+            Stale: it is not known where the vehicle is, or where its home is.
+        """
+        order = orders.order_of(message)
+        if isinstance(order, orders.GoTo):
+            self._require_sane(order)
+        if order is not None and self.in_force:
+            self._require_order(order)
+
+    def require_mission(self, items: Sequence[MissionItem], *, from_here: bool) -> None:
+        """Raise OutsideEnvelope unless a whole mission stays inside; with `from_here` it may be flown then."""
+        if self.in_force:
+            way = self.check.require_mission(items, from_here=from_here)
+            if from_here:
+                self._checked_mission = self.check.spaces, self._vehicle.clock(), way
+
+    def sent(self, message: Any) -> None:
+        """Note a message that went out."""
+        order = orders.order_of(message)
+        if isinstance(order, orders.ChangeMission):
+            self._checked_mission = None
+        if order is None or isinstance(order, STANDING):
+            return
+        self.ordered_at = self._vehicle.clock()
+        if isinstance(order, orders.GoTo | orders.Climb) and self.in_force:
+            self.way = self._way_of(order)
+        elif isinstance(order, orders.FlyMission) and self._checked_mission is not None:
+            self.way = self._checked_mission[2]
+        else:
+            self.way = []
+
+    def beside_way(self, stop: Stop) -> float:
+        """Metres from a place to the way that was allowed last; infinite where there is none."""
+        frame = LocalFrame((stop.lat, stop.lon))
+        spots = [frame.spot((at.lat, at.lon), at.up) for at in self.way]
+        nearest = (to_leg(Spot(0.0, 0.0, stop.up), a, b) for a, b in zip(spots, spots[1:], strict=False))
+        return min(nearest, default=math.inf)
+
+    # -- orders -------------------------------------------------------------------------------------------
+
+    def _require_sane(self, order: orders.GoTo) -> None:
+        """Refuse what is plainly wrong, whether there is an envelope or not."""
+        target = order.target
+        here = self._vehicle.state.messages.get("GLOBAL_POSITION_INT")
+        if isinstance(target, NedTarget):
+            distance = math.hypot(target.x, target.y)
+        elif here is not None:
+            distance = math.hypot(*offset(here.message.lat / 1e7, here.message.lon / 1e7, target.lat, target.lon))
+        else:
+            return
+        if distance > REACH:
+            sentence = f"the target is {distance / 1000:.0f} km away; {REACH / 1000:g} km are the most"
+            raise OutsideEnvelope(sentence, {"what": "the reach of any vehicle", "by": round(distance - REACH)})
+
+    def _require_order(self, order: orders.Order) -> None:
+        if isinstance(order, orders.GoTo | orders.Climb):
+            way = self._way_of(order)
+            self.check.require_way([way], stays=isinstance(order, orders.GoTo) and _length(way) <= STAY)
+            self.check.require_speeds()
+        elif isinstance(order, orders.Fly):
+            self._require_velocity(order)
+        elif isinstance(order, orders.ChangeSpeed):
+            self.check.require_speed(order.kind, order.speed)
+        elif isinstance(order, orders.SwitchMode):
+            self._require_mode(order.number)
+        elif isinstance(order, orders.FlyMission):
+            if order.now or self._vehicle.state.armed is not False:
+                self._require_checked_mission()
+        elif isinstance(order, orders.SetParameter):
+            if order.name.startswith(PROTECTED):
+                raise OutsideEnvelope(f"{order.name} decides where the vehicle flies by itself: not with an envelope")
+        elif isinstance(order, orders.ChangeMission):
+            return  # no vehicle flies it before it was looked at
+        elif isinstance(order, orders.MoveHome):
+            if self._vehicle.state.armed is not False:
+                raise OutsideEnvelope("heights and distances of the envelope count from home: it stays in flight")
+        else:
+            raise OutsideEnvelope(f"nobody can say whether {order.name} keeps the vehicle in the envelope")
+
+    def _require_mode(self, number: int) -> None:
+        mode = mode_name(self._vehicle.state.vehicle_type, number)
+        if flies_mission(mode):
+            self._require_checked_mission()
+        elif mode == "TAKEOFF" and self._vehicle.kind == "plane":
+            return  # the verb has asked for its height; where it levels off is watched
+        elif mode not in KEPT | {self._vehicle.holding_mode}:
+            raise OutsideEnvelope(f"in {mode} nobody keeps the vehicle in the envelope; a pilot may switch to it")
+
+    def _require_checked_mission(self) -> None:
+        checked = self._checked_mission
+        if checked is None or checked[0] != self.check.spaces or self._vehicle.clock() - checked[1] > CHECKED_FOR:
+            raise OutsideEnvelope("the vehicle's mission was not held against the envelope; POST /mission/start does")
+
+    def _require_velocity(self, order: orders.Fly) -> None:
+        """The way that is flown until the autopilot drops the setpoint, and until it stands."""
+        north, east, down = order.velocity
+        if math.hypot(north, east, down) < 1e-3:
+            return  # it stops
+        if order.by_heading:
+            north, east = rotate(north, east, self._vehicle.fresh("ATTITUDE").yaw)
+        parameters, drives = self._vehicle.state.parameters, self.check.drives
+        stopping = braking.of_rover(parameters) if drives else braking.of_guided(parameters)
+        lasts = max(parameters.get("GUID_TIMEOUT", 3.0), 0.1) + braking.LATENCY
+        here = self.check.here()
+        on = stopping.to_rest((north, east, 0.0 if drives else -down), lasts)
+        end = Stop(*moved(here.lat, here.lon, on[0], on[1]), here.up + on[2])
+        self.check.require_way([[here, end]], may_return=False)
+        for kind, speed in (("ground", math.hypot(north, east)), ("climb", -down), ("descent", down)):
+            self.check.require_speed(kind, speed)
+
+    def _way_of(self, order: orders.GoTo | orders.Climb) -> list[Stop]:
+        here = self.check.here()
+        if isinstance(order, orders.Climb):
+            return [here, here._replace(up=order.alt)]
+        target = order.target
+        if isinstance(target, NedTarget):
+            local = self._vehicle.fresh("LOCAL_POSITION_NED")
+            lat, lon = moved(here.lat, here.lon, target.x - local.x, target.y - local.y)
+            up = here.up + local.z - target.z
+        else:
+            lat, lon, up = target.lat, target.lon, target.alt
+        return [here, Stop(lat, lon, 0.0 if self.check.drives else up)]
+
+
+class GuardedLink:
+    """A vehicle's way out, past its guard.
+
+    Args:
+        link: sends messages.
+        guard: says which may be sent.
+    """
+
+    def __init__(self, link: Link, guard: EnvelopeGuard) -> None:
+        self._link = link
+        self._guard = guard
+
+    @property
+    def source(self) -> Address:
+        """See `Link.source`."""
+        return self._link.source
+
+    async def send(self, message: Any, system: int) -> None:
+        """See `Link.send`.
+
+        Raises:
+            OutsideEnvelope, Stale: as `EnvelopeGuard.require`; nothing is sent.
+        """
+        self._guard.require(message)
+        await self._link.send(message, system)
+        self._guard.sent(message)
+
+
+def _length(way: Sequence[Stop]) -> float:
+    a, b = way[0], way[-1]
+    return math.hypot(*offset(a.lat, a.lon, b.lat, b.lon), b.up - a.up)

@@ -1,0 +1,111 @@
+"""Leases: a client that commands says for how long it is alive without a word; then its vehicle is seen to.
+
+MAVProxy's own heartbeats keep the autopilot's ground station failsafe quiet, so nobody else notices a remote program
+that died, or whose network did.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from mavproxy_uavapi.core.errors import Aborted
+from mavproxy_uavapi.core.mavlink.link_watch import LinkWatch
+from mavproxy_uavapi.core.vehicle.endings import FlightEndings, Situation, situation
+from mavproxy_uavapi.core.vehicle.jobs import Ending
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+
+log = logging.getLogger("uavapi.copter")
+
+LINK_PAUSE = 1.0  # s until it is looked at again whether a vehicle hears us whose lease ran out
+
+
+@dataclass
+class Lease:
+    """One client's lease of one vehicle: its length, and when it runs out (s, on the clock of arrivals)."""
+
+    holder: str
+    seconds: float
+    ends_at: float
+
+
+class Leases:
+    """The leases by vehicle; one each, that of the client who asked last. Asyncio thread only.
+
+    Args:
+        endings: sees to vehicles, by its `on_lease_end`.
+        link_watch: knows which hear us.
+        clock: monotonic seconds.
+        loop: where the timers run.
+        say: told each end in a sentence.
+    """
+
+    def __init__(
+        self,
+        endings: FlightEndings,
+        link_watch: LinkWatch,
+        clock: Callable[[], float],
+        loop: asyncio.AbstractEventLoop,
+        say: Callable[[str], None],
+    ) -> None:
+        self._endings = endings
+        self._link_watch = link_watch
+        self._clock = clock
+        self._loop = loop
+        self._say = say
+        self._leases: dict[Vehicle, Lease] = {}
+        self._timers: dict[Vehicle, asyncio.TimerHandle] = {}
+
+    def of(self, vehicle: Vehicle) -> Lease | None:
+        """The lease of a vehicle; None where there is none."""
+        return self._leases.get(vehicle)
+
+    def take(self, vehicle: Vehicle, holder: str, seconds: float) -> None:
+        """Begin, or lengthen or shorten, a client's lease of a vehicle; 0 s gives it back."""
+        self._forget(vehicle)
+        if seconds > 0:
+            self._leases[vehicle] = Lease(holder, seconds, self._clock() + seconds)
+            self._timers[vehicle] = self._loop.call_later(seconds, self._look, vehicle)
+
+    def renew(self, holder: str) -> None:
+        """A call of that client arrived."""
+        for lease in self._leases.values():
+            if lease.holder == holder:
+                lease.ends_at = self._clock() + lease.seconds
+
+    def close(self) -> None:
+        """Forget them all."""
+        for vehicle in list(self._leases):
+            self._forget(vehicle)
+
+    def _forget(self, vehicle: Vehicle) -> None:
+        self._leases.pop(vehicle, None)
+        timer = self._timers.pop(vehicle, None)
+        if timer is not None:
+            timer.cancel()
+
+    def _look(self, vehicle: Vehicle) -> None:
+        """See whether the lease has run out; if so, see to the vehicle, once it hears us."""
+        lease = self._leases[vehicle]
+        remaining = lease.ends_at - self._clock()
+        if remaining <= 0 and self._link_watch.is_alive(vehicle.state):
+            self._forget(vehicle)
+            self._end(vehicle, lease)
+        else:
+            self._timers[vehicle] = self._loop.call_later(max(remaining, LINK_PAUSE), self._look, vehicle)
+
+    def _end(self, vehicle: Vehicle, lease: Lease) -> None:
+        commander = vehicle.authority.flies or vehicle.authority.commander
+        if commander is None or commander.holder != lease.holder:
+            return  # somebody else commands by now
+        if situation(vehicle, commander.modes) in (Situation.LAND, Situation.RTL):
+            return  # what it asked for last is as good
+        why = f"the lease of {lease.holder} ran out"
+        self._say(f"vehicle {vehicle.state.system}: {why} ({lease.seconds:g} s without a call)")
+        log.warning("vehicle %d: %s", vehicle.state.system, why)
+        if commander.running:
+            commander.abort(Aborted(f"{commander.verb}: {why}"), Ending.LEASE_OVER)
+        else:
+            self._endings.see_to(vehicle, self._endings.on_lease_end, f"after {why}", lease.holder, commander.modes)

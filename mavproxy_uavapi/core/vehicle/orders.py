@@ -1,0 +1,197 @@
+"""What a message has a vehicle do, as far as an envelope has a say in it. Pure.
+
+What is not known here is `Unknown`: with an envelope in force it is not sent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from pymavlink import mavutil
+
+from mavproxy_uavapi.core.vehicle.messages import (
+    ACCELERATION_IGNORED,
+    POSITION_IGNORED,
+    SPEED_TYPES,
+    VELOCITY_IGNORED,
+    GlobalTarget,
+    NedTarget,
+)
+
+mavlink = mavutil.mavlink
+
+
+@dataclass(frozen=True)
+class GoTo:
+    """Fly straight to a place, and stay."""
+
+    target: NedTarget | GlobalTarget
+
+
+@dataclass(frozen=True)
+class Fly:
+    """Fly at a velocity until it times out: m/s north, east, down; or front, right, down with `by_heading`."""
+
+    velocity: tuple[float, float, float]
+    by_heading: bool = False
+
+
+@dataclass(frozen=True)
+class Climb:
+    """Take off to `alt` m above home."""
+
+    alt: float
+
+
+@dataclass(frozen=True)
+class ChangeSpeed:
+    """Fly at `speed` m/s from now on; `kind` is air, ground, climb or descent."""
+
+    kind: str
+    speed: float
+
+
+@dataclass(frozen=True)
+class SwitchMode:
+    """Fly in another mode, by its number."""
+
+    number: int
+
+
+@dataclass(frozen=True)
+class FlyMission:
+    """Fly the mission that the vehicle holds, from now on or, where it does not fly it, the next time."""
+
+    now: bool
+
+
+@dataclass(frozen=True)
+class ChangeMission:
+    """Change the mission that the vehicle holds; it is looked at as a whole before that, and before it is flown."""
+
+
+@dataclass(frozen=True)
+class MoveHome:
+    """Make another place home, from which heights and distances count."""
+
+
+@dataclass(frozen=True)
+class SetParameter:
+    """Set a parameter."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """Nobody can say where this leads."""
+
+    name: str
+
+
+Order = GoTo | Fly | Climb | ChangeSpeed | SwitchMode | FlyMission | ChangeMission | MoveHome | SetParameter | Unknown
+SPEED_KINDS = {number: kind for kind, number in SPEED_TYPES.items()}
+ALL_IGNORED = POSITION_IGNORED | VELOCITY_IGNORED | ACCELERATION_IGNORED
+PLACE_ONLY, VELOCITY_ONLY = ALL_IGNORED & ~POSITION_IGNORED, ALL_IGNORED & ~VELOCITY_IGNORED
+BODY_FRAMES = (mavlink.MAV_FRAME_BODY_NED, mavlink.MAV_FRAME_BODY_OFFSET_NED)
+ABOVE_HOME = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
+
+# Commands that move nothing, or that stop or land the vehicle.
+HARMLESS_COMMANDS = {
+    mavlink.MAV_CMD_REQUEST_MESSAGE,
+    mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
+    mavlink.MAV_CMD_RUN_PREARM_CHECKS,
+    mavlink.MAV_CMD_COMPONENT_ARM_DISARM,
+    mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN,
+    mavlink.MAV_CMD_DO_SET_SERVO,
+    mavlink.MAV_CMD_CONDITION_YAW,
+    mavlink.MAV_CMD_DO_PAUSE_CONTINUE,  # what is continued was allowed when it began, and is watched
+    mavlink.MAV_CMD_DO_SET_REVERSE,
+    mavlink.MAV_CMD_DO_LAND_START,
+}
+HARMLESS_MESSAGES = {
+    "HEARTBEAT",
+    "LANDING_TARGET",
+    "MISSION_ACK",
+    "MISSION_REQUEST_INT",
+    "MISSION_REQUEST_LIST",
+    "PARAM_REQUEST_READ",
+    "REQUEST_DATA_STREAM",
+}
+
+
+def order_of(message: Any) -> Order | None:
+    """What a message of ours has the vehicle do; None for what moves it nowhere."""
+    name = message.get_type()
+    if name in READERS:
+        return READERS[name](message)
+    return None if name in HARMLESS_MESSAGES else Unknown(name)
+
+
+def _local(message: Any) -> Order:
+    used = message.type_mask & ALL_IGNORED
+    if used == PLACE_ONLY and message.coordinate_frame == mavlink.MAV_FRAME_LOCAL_NED:
+        return GoTo(NedTarget(message.x, message.y, message.z))
+    if used == VELOCITY_ONLY and message.coordinate_frame in (mavlink.MAV_FRAME_LOCAL_NED, *BODY_FRAMES):
+        return Fly((message.vx, message.vy, message.vz), message.coordinate_frame in BODY_FRAMES)
+    return Unknown("that kind of setpoint")
+
+
+def _global(message: Any) -> Order:
+    if message.type_mask & ALL_IGNORED != PLACE_ONLY or message.coordinate_frame not in ABOVE_HOME:
+        return Unknown("that kind of setpoint")
+    return GoTo(GlobalTarget(message.lat_int / 1e7, message.lon_int / 1e7, message.alt))
+
+
+def _command(message: Any) -> Order | None:
+    if message.command in HARMLESS_COMMANDS:
+        return None
+    read = COMMANDS.get(message.command)
+    return Unknown(f"command {message.command}") if read is None else read(message)
+
+
+def _speed(message: Any) -> Order:
+    kind = SPEED_KINDS.get(int(message.param1))
+    return Unknown("that kind of speed") if kind is None or message.param2 <= 0 else ChangeSpeed(kind, message.param2)
+
+
+def _reposition(message: Any) -> Order:
+    changes_mode = int(message.param2) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
+    if message.get_type() != "COMMAND_INT" or message.frame not in ABOVE_HOME or changes_mode:
+        return Unknown("that kind of reposition")
+    return GoTo(GlobalTarget(message.x / 1e7, message.y / 1e7, message.z))
+
+
+def _climb(message: Any) -> Order:
+    return Climb(message.param7) if message.get_type() == "COMMAND_LONG" else Unknown("that kind of takeoff")
+
+
+def _mission(message: Any) -> Order:
+    if message.mission_type != mavlink.MAV_MISSION_TYPE_MISSION or getattr(message, "current", 0):
+        return Unknown("that kind of mission item")  # a fence, a rally point, a target for GUIDED
+    return ChangeMission()
+
+
+def _parameter(message: Any) -> Order:
+    return SetParameter(message.param_id)
+
+
+COMMANDS: dict[int, Callable[[Any], Order]] = {
+    mavlink.MAV_CMD_NAV_TAKEOFF: _climb,
+    mavlink.MAV_CMD_DO_CHANGE_SPEED: _speed,
+    mavlink.MAV_CMD_DO_REPOSITION: _reposition,
+    mavlink.MAV_CMD_DO_SET_HOME: lambda message: MoveHome(),
+    mavlink.MAV_CMD_DO_SET_MODE: lambda message: SwitchMode(int(message.param2)),
+    mavlink.MAV_CMD_MISSION_START: lambda message: FlyMission(now=True),
+    mavlink.MAV_CMD_DO_SET_MISSION_CURRENT: lambda message: FlyMission(now=False),
+}
+READERS: dict[str, Callable[[Any], Order | None]] = {
+    "SET_POSITION_TARGET_LOCAL_NED": _local,
+    "SET_POSITION_TARGET_GLOBAL_INT": _global,
+    "COMMAND_LONG": _command,
+    "COMMAND_INT": _command,
+    "PARAM_SET": _parameter,
+    **dict.fromkeys(("MISSION_CLEAR_ALL", "MISSION_COUNT", "MISSION_ITEM_INT"), _mission),
+}

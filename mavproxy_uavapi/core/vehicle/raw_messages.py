@@ -1,0 +1,148 @@
+"""Any MAVLink message by its name: its fields are checked, and the authority as for every other command."""
+
+from __future__ import annotations
+
+import inspect
+import math
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+from pymavlink import mavutil
+
+from mavproxy_uavapi.core.errors import Invalid, ModeChanged
+from mavproxy_uavapi.core.mavlink.link import Address
+from mavproxy_uavapi.core.vehicle.authority import Rank
+from mavproxy_uavapi.core.vehicle.jobs import Job
+from mavproxy_uavapi.core.vehicle.messages import Command
+from mavproxy_uavapi.core.vehicle.start_gate import pass_gate
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+
+mavlink = mavutil.mavlink
+
+TARGETS = ("target_system", "target_component")  # the vehicle's address; a message need not name it
+WITH_ACK = ("COMMAND_LONG", "COMMAND_INT")
+BITS = {f"{sign}int{bits}_t": (sign == "", bits) for sign in ("", "u") for bits in (8, 16, 32, 64)}  # signed, size
+LARGEST_FLOAT = 3.4028234e38  # in single precision
+
+
+@dataclass(frozen=True)
+class RawCommand(Command):
+    """A COMMAND_LONG or COMMAND_INT as its sender wrote it; it is sent once."""
+
+    message: Any = None
+    repeatable: bool = False
+
+    def to(self, address: Address, confirmation: int) -> Any:
+        """The message; it is addressed already."""
+        del address, confirmation
+        return self.message
+
+
+def message_named(name: str, fields: Mapping[str, Any], address: Address) -> Any:
+    """The message of that name, of MAVProxy's dialect.
+
+    Args:
+        name: such as `COMMAND_LONG`, in any case.
+        fields: a value for each of its fields: a number, the name of an entry of the field's enum, a list for an
+            array, text for characters. Extension fields may be left out; so may the target.
+        address: the vehicle's.
+
+    Raises:
+        Invalid: there is no such message, a field is missing or unknown, or its type cannot hold the value.
+    """
+    kind = _kinds().get(name.upper())
+    if kind is None:
+        raise Invalid(f"there is no MAVLink message {name[:64]!r}", "name")
+    unknown = sorted(set(fields) - set(kind.fieldnames))
+    if unknown:
+        raise Invalid(f"{kind.msgname} has no field {unknown[0][:64]!r}", "fields", unknown[0])
+    signature = inspect.signature(kind.__init__).parameters
+    values = dict(zip(TARGETS, address, strict=True)) | dict(fields)
+    arguments = {}
+    for field in kind.fieldnames:
+        if field in values:
+            arguments[field] = _value(kind, field, values[field])
+        elif signature[field].default is inspect.Parameter.empty:
+            raise Invalid(f"{kind.msgname} needs {field}", "fields", field)
+    for field, own in zip(TARGETS, address, strict=True):
+        if field in fields and arguments[field] != own:
+            raise Invalid(f"{field} of this vehicle is {own}; name another vehicle in the path", "fields", field)
+    return kind(**arguments)
+
+
+async def send(vehicle: Vehicle, job: Job, message: Any) -> None:
+    """Send a message for `job`; a command is done when the vehicle has accepted it, another message when it is sent.
+
+    It supersedes a movement, because it may steer.
+
+    Raises:
+        ModeChanged: the vehicle flies in a mode that is the pilot's.
+        Busy: a verb of a higher rank is on its way.
+        Rejected, TimedOut, LinkLost.
+    """
+
+    def require_not_the_pilots() -> None:
+        if vehicle.state.armed and not vehicle.state.landed and vehicle.mode != "GUIDED":
+            raise ModeChanged(f"the vehicle is flying in {vehicle.mode}; `guided` takes it over")
+
+    require_not_the_pilots()
+    vehicle.authority.take(job, Rank.ARM)
+    check = vehicle.commanding(job, require_not_the_pilots)
+    if message.get_type() in WITH_ACK:
+        await vehicle.commands.send(RawCommand(message.command, message=message), check)
+    else:
+        await pass_gate()
+        check()
+        await vehicle.link.send(message, vehicle.state.system)
+    vehicle.authority.shown(job)
+
+
+@cache
+def _kinds() -> dict[str, Any]:
+    return {kind.msgname: kind for kind in mavlink.mavlink_map.values()}
+
+
+def _value(kind: Any, field: str, value: Any) -> Any:
+    """A field's value, as pymavlink takes it.
+
+    Raises:
+        Invalid: the field cannot hold it.
+    """
+    index = kind.fieldnames.index(field)
+    order = kind.ordered_fieldnames.index(field)
+    kind_of_number, length = kind.fieldtypes[index], kind.array_lengths[order]
+    if kind_of_number == "char":
+        return _characters(field, value, max(length, 1))
+    enum = mavlink.enums.get(kind.fieldenums_by_name.get(field, ""), {})
+    if not length:
+        return _number(field, value, kind_of_number, enum)
+    if not isinstance(value, list) or len(value) != length:
+        raise Invalid(f"{field} is a list of {length} numbers", "fields", field)
+    return [_number(field, member, kind_of_number, enum) for member in value]
+
+
+def _characters(field: str, value: Any, length: int) -> bytes:
+    encoded = value.encode() if isinstance(value, str) else b"\0" * (length + 1)
+    if len(encoded) > length:
+        raise Invalid(f"{field} is a text of at most {length} bytes", "fields", field)
+    return encoded
+
+
+def _number(field: str, value: Any, kind_of_number: str, enum: Mapping[int, Any]) -> int | float:
+    if isinstance(value, str):
+        value = next((number for number, entry in enum.items() if entry.name == value.upper()), value)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise Invalid(f"{field} is a number" + (" or a name of its enum" if enum else ""), "fields", field)
+    if kind_of_number not in BITS:
+        largest = LARGEST_FLOAT if kind_of_number == "float" else sys.float_info.max
+        if not abs(value) <= largest:  # NaN neither
+            raise Invalid(f"{field} is a finite number that its type can hold", "fields", field)
+        return float(value)
+    signed, bits = BITS[kind_of_number]
+    least, most = (-(1 << bits - 1), (1 << bits - 1) - 1) if signed else (0, (1 << bits) - 1)
+    if not math.isfinite(value) or value != int(value) or not least <= value <= most:
+        raise Invalid(f"{field} is a whole number from {least} to {most}", "fields", field)
+    return int(value)

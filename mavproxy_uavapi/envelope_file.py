@@ -1,0 +1,112 @@
+"""The operator's envelope: the file that the setting `envelope` names, read again whenever it changes."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+from pathlib import Path
+
+from mavproxy_uavapi.core.envelope import formats
+from mavproxy_uavapi.core.envelope.space import Space
+from mavproxy_uavapi.core.envelope.store import ALL, OPERATOR, Envelopes, missing
+from mavproxy_uavapi.core.errors import SettingError, UavApiError
+from mavproxy_uavapi.core.values import is_unset
+
+log = logging.getLogger("uavapi.api")
+
+VEHICLE = "vehicle"  # in place of a file: the fence that MAVProxy has loaded
+LOOK_EVERY = 2.0  # s
+LARGEST = 4 * 1024 * 1024  # bytes
+Stamp = tuple[int, int, int]
+
+
+def read(name: str) -> Space:
+    """The envelope of a file.
+
+    Raises:
+        SettingError: it cannot be read, or makes no sense.
+    """
+    path = Path(name).expanduser()
+    try:
+        if path.stat().st_size > LARGEST:
+            raise SettingError(f"{path} has more than {LARGEST // 1024**2} MB", "envelope")
+        return Space(formats.read(path.read_text(encoding="utf-8"), path.name))
+    except (OSError, UnicodeDecodeError) as error:
+        raise SettingError(
+            f"{path} cannot be read: {getattr(error, 'strerror', None) or error}", "envelope"
+        ) from error
+    except UavApiError as error:
+        raise SettingError(f"{path}: {error}", "envelope") from error
+
+
+def check(name: str) -> None:
+    """Raise SettingError unless the setting may be `name`."""
+    if not is_unset(name) and name != VEHICLE:
+        read(name)
+
+
+class EnvelopeFile:
+    """Keeps the operator's envelope as the file says. Asyncio thread only.
+
+    Args:
+        envelopes: where it is put.
+        warn: told in a sentence what went wrong.
+    """
+
+    def __init__(self, envelopes: Envelopes, warn: Callable[[str], None]) -> None:
+        self._envelopes = envelopes
+        self._warn = warn
+        self._name = ""
+        self._stamp: Stamp | None = None
+
+    def use(self, name: str) -> None:
+        """Take up the setting: a file, `vehicle`, or nothing."""
+        if name == self._name and not self._has_changed():
+            return
+        self._name = name
+        self._envelopes.expects_fences = name == VEHICLE
+        if is_unset(name) or name == VEHICLE:
+            self._stamp = None
+            self._envelopes.clear(OPERATOR)
+        else:
+            self._take()
+
+    async def watch(self) -> None:
+        """Look every few seconds whether the file has changed, until cancelled."""
+        while True:
+            await asyncio.sleep(LOOK_EVERY)
+            if await asyncio.to_thread(self._has_changed):
+                self._take()
+
+    def _has_changed(self) -> bool:
+        return not is_unset(self._name) and self._name != VEHICLE and self._read_stamp() != self._stamp
+
+    def _remaining(self) -> str:
+        """What is in force without it."""
+        if any(key.by == OPERATOR for key, _ in self._envelopes.all()):
+            return "the one before stays in force"
+        reason = f"the envelope {self._name} could not be read"
+        self._envelopes.put(OPERATOR, ALL, missing(reason, self._name))
+        return "until it can be, nothing that moves a vehicle is sent"
+
+    def _read_stamp(self) -> Stamp | None:
+        try:
+            found = Path(self._name).expanduser().stat()
+        except OSError:
+            return None
+        return found.st_mtime_ns, found.st_size, found.st_ino
+
+    def _take(self) -> None:
+        """Read the file, and put it in force at once; a file that cannot be read keeps the former one in force."""
+        self._stamp = self._read_stamp()
+        try:
+            space = read(self._name)
+        except SettingError as error:
+            self._warn(f"envelope: {error}; {self._remaining()}")
+            return
+        for key, _ in list(self._envelopes.all()):
+            if key.by == OPERATOR and key.system != ALL:
+                self._envelopes.put(*key, None)
+        self._envelopes.put(OPERATOR, ALL, space)
+        log.info("envelope: %s is in force, %d areas", self._name, len(space.envelope.areas))

@@ -1,0 +1,76 @@
+"""Jobs and vehicles as answer bodies, for reads and streams alike."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.vehicle.jobs import Job
+from mavproxy_uavapi.core.vehicle.readiness import status
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+from mavproxy_uavapi.http.telemetry_views import gps
+
+
+def report_of_job(job: Job, now: float) -> dict[str, Any]:
+    """A job as an answer body; times in s."""
+    return {
+        "job": job.id,
+        "verb": job.verb,
+        "request": job.request,
+        "client": job.client,
+        "state": job.outcome_name,
+        "progress": {**job.stage, **job.progress},
+        "seconds": round((job.ended_at or now) - job.began_at, 3),
+        "result": job.result,
+        "error": None if job.error is None else error_of(job),
+    }
+
+
+def error_of(job: Job) -> dict[str, Any]:
+    """Why the job failed, as in the answer of the blocking call."""
+    assert job.error is not None
+    error = job.error
+    return {"status": error.status, "code": error.code, "detail": error.detail, **error.extras()}
+
+
+def status_of(host: Host, vehicle: Vehicle) -> dict[str, Any]:
+    """Whether the vehicle is flyable, and why not, as `/telemetry/status` has it."""
+    return status(vehicle, host.link_watch.is_alive(vehicle.state), host.clock())
+
+
+def report_of_vehicle(host: Host, vehicle: Vehicle) -> dict[str, Any]:
+    """A vehicle as an answer body."""
+    state = vehicle.state
+    info = status_of(host, vehicle)
+    return {
+        "id": state.system,
+        "type": info.pop("vehicle_type"),
+        **info,
+        **_position(vehicle, host.clock()),
+        "current": state.system == host.registry.resolve(),
+        "paused": vehicle.authority.paused,
+        "commanded_by": commander_of(vehicle),
+        "lease": _lease(host, vehicle),
+    }
+
+
+def _position(vehicle: Vehicle, now: float) -> dict[str, Any]:
+    """Position, velocity and heading as in `/telemetry/gps`, and their age (s); None while unknown."""
+    received = vehicle.state.newest("GLOBAL_POSITION_INT")
+    if received is None:
+        return {"position": None, "velocity": None, "heading": None, "age_s": None}
+    return {**gps(received.message), "age_s": round(now - received.at, 3)}
+
+
+def _lease(host: Host, vehicle: Vehicle) -> dict[str, Any] | None:
+    """Whose lease the vehicle is under, and the s that are left of it; None for nobody's."""
+    lease = host.leases.of(vehicle)
+    if lease is None:
+        return None
+    return {"client": lease.holder, "remaining_s": round(max(lease.ends_at - host.clock(), 0.0), 3)}
+
+
+def commander_of(vehicle: Vehicle) -> dict[str, Any] | None:
+    """The job that flies the vehicle; None if there is none."""
+    job = vehicle.authority.flies
+    return None if job is None else {"job": job.id, "verb": job.verb, "client": job.client}

@@ -1,0 +1,70 @@
+"""Something on its way to the clients of a stream; encoded once for all of them, and only when one reads it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cached_property
+from typing import Any
+
+from mavproxy_uavapi.http.responses import dumps
+from mavproxy_uavapi.http.telemetry_views import fields
+
+
+class Event:
+    """Something on its way to its subscribers.
+
+    Args:
+        kind: `name` for a message, `view`, or `event`: the member of the JSON that holds the name.
+        name: what it is called.
+        system: of which vehicle; 0 for none.
+        at: when it arrived, s since 1970.
+        members: makes the rest of the JSON, at the first reader.
+        component: of a message.
+    """
+
+    def __init__(
+        self,
+        kind: str,
+        name: str,
+        system: int,
+        at: float,
+        members: Callable[[], Mapping[str, Any]],
+        *,
+        component: int = 0,
+    ) -> None:
+        self.kind, self.name, self.system, self.component = kind, name, system, component
+        self._at, self._make = at, members
+        self._encoded: tuple[int, bytes] | None = None
+
+    @cached_property
+    def _members(self) -> str:
+        head = {"system": self.system, self.kind: self.name, "time": round(self._at, 3)}
+        return dumps({**head, **self._make()})[1:]
+
+    def json(self, dropped: int) -> str:
+        """The event as JSON, for a client that has lost `dropped` events so far."""
+        return f'{{"dropped": {dropped}, {self._members}'
+
+    def sse(self, dropped: int) -> bytes:
+        """The same as a Server-Sent Event; encoded once for all who have lost as many."""
+        if self._encoded is None or self._encoded[0] != dropped:
+            self._encoded = dropped, f"event: {self.name}\ndata: {self.json(dropped)}\n\n".encode()
+        return self._encoded[1]
+
+
+def of_message(message: Any, at: float) -> Event:
+    """A MAVLink message that arrived at `at` (s since 1970)."""
+    component = message.get_srcComponent()
+    return Event(
+        "name",
+        message.get_type(),
+        message.get_srcSystem(),
+        at,
+        lambda: {"component": component, "fields": fields(message)},
+        component=component,
+    )
+
+
+def of_info(kind: str, name: str, system: int, at: float, info: Mapping[str, Any]) -> Event:
+    """A view or an event whose payload is made already."""
+    return Event(kind, name, system, at, lambda: {"info": info})

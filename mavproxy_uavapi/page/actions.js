@@ -1,0 +1,89 @@
+// The verbs of the chosen vehicle. What starts something is held; what stops it is one click.
+
+import {Panel} from "./panel.js";
+import {element, heightInput, heightOf, labelled, setAttribute, setText} from "./dom.js";
+import "./hold_button.js";
+
+export class FlightActions extends Panel {
+  build() {
+    this.alt = heightInput(this.context.preferences.alt, "height of the take-off in m");
+    this.arm = this.held("Arm", () => this.send("/command/arm"));
+    this.disarm = this.held("Disarm", () => this.send("/command/disarm"));
+    this.takeoff = this.held("Take off", () => this.send("/command/takeoff", {alt: heightOf(this.alt)}));
+    this.land = this.held("Land", () => this.send("/command/land"));
+    this.rtl = this.held("Return", () => this.send("/command/rtl"));
+    this.guided = this.held("Guided", () => this.send("/command/guided"));
+    this.brake = this.clicked("Brake", () => this.send("/command/brake"));
+    this.stop = this.clicked("Stop", () => this.send("/movement/stop"));
+    this.resume = this.held("Resume", () => this.send("/movement/resume"));
+    this.answer = element("p", {class: "answer", role: "status"});
+    this.append(
+      element("div", {class: "buttons"}, this.arm, this.takeoff, labelled("to", this.alt, "m")),
+      element("div", {class: "buttons"}, this.land, this.rtl, this.guided, this.disarm),
+      element("div", {class: "buttons"}, this.brake, this.stop, this.resume), this.answer);
+    this.context.fleet.addEventListener("job", event => this.heard(event.detail));
+    this.context.fleet.addEventListener("chosen", () => this.say("", ""));
+  }
+
+  held(label, act) { return element("hold-button", {label, on: {confirmed: act}}); }
+
+  clicked(label, act) { return element("button", {type: "button", class: "stop", on: {click: act}}, label); }
+
+  async send(path, body = {}) {
+    const verb = path.split("/").pop().replaceAll("_", " "), {id} = this.vehicle;
+    this.say(`vehicle ${id}: ${verb} …`, "wait");
+    try {
+      this.await((await this.context.api.command(this.path(path), body)).job, verb);
+    } catch (error) {
+      this.say(`vehicle ${id}: ${verb}: ${error.message}`, "bad");
+    }
+  }
+
+  /** Show what becomes of a job. */
+  await(job, verb) {
+    this.awaited = job;
+    this.say(`vehicle ${this.vehicle.id}: ${verb} (job ${job})`, "wait");
+    const known = this.context.fleet.jobs.get(job);
+    if (known) this.heard(known);
+  }
+
+  /** The end of the job that was begun here last. */
+  heard(job) {
+    if (job.job !== this.awaited || job.state === "running") return;
+    if (job.state === "succeeded") this.say(`vehicle ${job.system}: ${job.result}`, "good");
+    else this.say(`vehicle ${job.system}: ${sentenceOf(job)}`, "bad");
+  }
+
+  say(text, kind) {
+    setText(this.answer, text);
+    setAttribute(this.answer, "class", `answer ${kind}`);
+  }
+
+  render(at) {
+    const report = this.vehicle?.get("vehicle"), live = report && this.vehicle.isAlive(at) && !this.context.stream.trouble(at);
+    const ground = report?.landed_state === "on_ground";
+    this.allow(this.arm, live && !report.armed && report.ready_to_arm, live ? "it is armed, or not ready" : "no live data");
+    this.allow(this.takeoff, live && report.armed && ground && heightOf(this.alt) !== null, "arm it first, and say how high");
+    this.allow(this.disarm, live && report.armed && ground, "only on the ground");
+    this.allow(this.guided, live, "no live data");
+    this.allow(this.resume, live && report.paused, "it is not stopped");
+    for (const button of [this.land, this.rtl]) this.allow(button, Boolean(report), "no vehicle");
+    for (const button of [this.brake, this.stop]) button.disabled = !report;
+    this.arm.hidden = Boolean(live && report.armed);
+    this.disarm.hidden = !(live && report.armed && ground);
+    this.resume.hidden = !(live && report.paused);
+  }
+
+  allow(button, allowed, why) {
+    setAttribute(button, "disabled", !allowed);
+    setAttribute(button, "title", allowed ? "hold for a second" : why);
+  }
+}
+
+/** Why a job failed, in words. */
+export function sentenceOf(job) {
+  const texts = job.error?.statustext ?? [];
+  return `${job.error?.detail ?? "failed"}${texts.length ? ` (${texts.join("; ")})` : ""}`;
+}
+
+customElements.define("flight-actions", FlightActions);

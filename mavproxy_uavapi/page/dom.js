@@ -1,0 +1,57 @@
+// Elements: made from plain objects, and changed only where something differs. Text is never read as HTML.
+
+/** An element; `props` are properties or attributes, `on` are its listeners; children are elements or text. */
+export function element(tag, props = {}, ...children) {
+  const made = document.createElement(tag);
+  for (const [name, value] of Object.entries(props)) {
+    if (name === "on") for (const [event, listener] of Object.entries(value)) made.addEventListener(event, listener);
+    else if (name === "class") made.className = value;
+    else if (name in made && !name.startsWith("aria")) made[name] = value;
+    else made.setAttribute(name, value);
+  }
+  made.append(...children.filter(child => child !== null && child !== undefined));
+  return made;
+}
+
+/** Set a node's text if it is another one. */
+export function setText(node, text) {
+  const wanted = String(text);
+  if (node.textContent !== wanted) node.textContent = wanted;
+}
+
+/** Set an attribute if it is another one; null removes it. */
+export function setAttribute(node, name, value) {
+  if (value === null || value === false) {
+    if (node.hasAttribute(name)) node.removeAttribute(name);
+  } else if (node.getAttribute(name) !== String(value)) {
+    node.setAttribute(name, value === true ? "" : value);
+  }
+}
+
+/** Set a boolean property if it is another one. */
+export function setFlag(node, name, value) {
+  if (node[name] !== value) node[name] = value;
+}
+
+/** A label with its input. */
+export function labelled(text, input, unit = "") {
+  return element("label", {class: "field"}, element("span", {}, text), input, unit ? element("span", {class: "unit"}, unit) : null);
+}
+
+/** An input for a height in m above home; an empty or wild one is invalid, and `heightOf` gives null. */
+export function heightInput(value, label = "height in m") {
+  return element("input", {type: "number", min: "1", max: "500", step: "any", required: true, inputMode: "decimal", value: String(value), "aria-label": label});
+}
+
+/** The height in m; null if it is none that may be flown. */
+export function heightOf(input) {
+  return input.value !== "" && input.checkValidity() ? Number(input.value) : null;
+}
+
+/** A number with so many decimals; a dash for what is not known. */
+export function number(value, decimals = 1) {
+  return value === null || value === undefined || !Number.isFinite(value) ? "–" : value.toFixed(decimals);
+}
+
+/** Whether the user wants little to move. */
+export const calmMotion = matchMedia("(prefers-reduced-motion: reduce)");

@@ -1,0 +1,129 @@
+// What the page knows of each vehicle: its newest views, where it was, and what it said.
+
+import {Fresh} from "./freshness.js";
+
+const TRAIL = 1000, TRAIL_STEP = 0.5; // places of a trail, and m between two of them
+const HISTORY = 1200; // points of each curve
+const TEXTS = 200, JOBS = 60, TAGS = 50;
+const METRES_PER_DEGREE = 111318.845;
+export const VIEWS = ["gps", "general", "gps_raw", "ned", "attitude", "battery", "home", "target", "vehicle", "mission"];
+
+export class Vehicle {
+  constructor(id) {
+    this.id = id;
+    this.views = Object.fromEntries(VIEWS.map(name => [name, new Fresh()]));
+    this.trail = []; // [lat, lon]
+    this.history = {alt: [], speed: []}; // [ms, value]
+    this.texts = []; // {at, severity, text}
+    this.mission = []; // the items that it holds, once they were read
+    this.fence = null; // {radius, alt}
+    this.tags = []; // {id, lat, lon}
+  }
+
+  /** The newest value of a view; null before the first. */
+  get(view) { return this.views[view].value; }
+
+  take(view, value, at) {
+    this.views[view].set(value, at);
+    if (view === "gps") this.moved(value, at);
+    if (view === "general") remember(this.history.speed, at, value.groundspeed);
+  }
+
+  moved({position}, at) {
+    remember(this.history.alt, at, position.relative_alt);
+    const last = this.trail[this.trail.length - 1];
+    if (last) {
+      const north = (position.lat - last[0]) * METRES_PER_DEGREE;
+      const east = (position.lon - last[1]) * METRES_PER_DEGREE * Math.cos(position.lat * Math.PI / 180);
+      if (Math.hypot(north, east) < TRAIL_STEP) return;
+    }
+    this.trail.push([position.lat, position.lon]);
+    if (this.trail.length > TRAIL) this.trail.splice(0, TRAIL / 10);
+  }
+
+  /** A tag in sight: its place, by what the vehicle tells of its own. */
+  sawTag({id, seen, ned}) {
+    const here = this.get("gps")?.position, own = this.get("ned")?.position;
+    if (!seen || !ned || !here || !own) return;
+    const lat = here.lat + (ned[0] - own.x) / METRES_PER_DEGREE;
+    const lon = here.lon + (ned[1] - own.y) / METRES_PER_DEGREE / Math.cos(here.lat * Math.PI / 180);
+    this.tags = [...this.tags.filter(tag => tag.id !== id), {id, lat, lon}].slice(-TAGS);
+  }
+
+  /** Whether heartbeats come, as far as we are told now. */
+  isAlive(at) {
+    const report = this.views.vehicle;
+    return report.value !== null && report.value.link.alive && !report.isOld(at);
+  }
+
+  get mode() { return this.get("vehicle")?.mode ?? null; }
+  get armed() { return this.get("vehicle")?.armed ?? null; }
+  get flies() { return this.armed === true && this.get("vehicle").landed_state !== "on_ground"; }
+}
+
+function remember(curve, at, value) {
+  if (value === null || value === undefined) return;
+  curve.push([at, value]);
+  if (curve.length > HISTORY) curve.splice(0, HISTORY / 10);
+}
+
+/** All vehicles and jobs. Dispatches `news` at whatever is new, and `chosen`, `vehicle`, `event` and `job`. */
+export class Fleet extends EventTarget {
+  constructor() {
+    super();
+    this.vehicles = new Map();
+    this.jobs = new Map(); // by number, oldest first
+    this.chosenId = 0;
+  }
+
+  get chosen() { return this.vehicles.get(this.chosenId) ?? null; }
+
+  /** The vehicles in the order of their ids. */
+  get all() { return [...this.vehicles.values()].sort((a, b) => a.id - b.id); }
+
+  choose(id) {
+    if (!this.vehicles.has(id) || id === this.chosenId) return;
+    this.chosenId = id;
+    this.dispatchEvent(new Event("chosen"));
+    this.dispatchEvent(new Event("news"));
+  }
+
+  /** Take an event of the stream that happened at `at` (ms). */
+  take(event, at) {
+    if (event.view !== undefined) this.of(event.system).take(event.view, event.info, at);
+    else if (event.event === "statustext") this.heardText(event, at);
+    else if (event.event === "job") this.heardJob(event);
+    else if (event.event === "tag") this.of(event.system).sawTag(event.info);
+    if (event.event !== undefined) this.dispatchEvent(new CustomEvent("event", {detail: event}));
+    if (event.view === "vehicle" && event.info.current && !this.chosenId) this.choose(event.system);
+    this.dispatchEvent(new Event("news"));
+  }
+
+  of(system) {
+    let vehicle = this.vehicles.get(system);
+    if (!vehicle) {
+      this.vehicles.set(system, vehicle = new Vehicle(system));
+      this.dispatchEvent(new CustomEvent("vehicle", {detail: vehicle}));
+    }
+    return vehicle;
+  }
+
+  heardText(event, at) {
+    const texts = this.of(event.system).texts;
+    const text = {at, wall: event.time, ...event.info};
+    if (texts.some(one => one.wall === text.wall && one.text === text.text)) return; // told again after a reconnection
+    texts.push(text);
+    if (texts.length > TEXTS) texts.shift();
+  }
+
+  heardJob(event) {
+    const job = {...event.info, system: event.system};
+    this.jobs.delete(job.job);
+    this.jobs.set(job.job, job);
+    for (const [number, old] of this.jobs) {
+      if (this.jobs.size <= JOBS) break;
+      if (old.state !== "running") this.jobs.delete(number);
+    }
+    this.dispatchEvent(new CustomEvent("job", {detail: job}));
+  }
+}

@@ -1,0 +1,64 @@
+// What the vehicle is doing, who commands it, and whether it may fly and why not.
+
+import {Panel} from "./panel.js";
+import {element, setAttribute, setText} from "./dom.js";
+import {ageText} from "./freshness.js";
+
+const SCRIPTED = {AUTO: "its mission", RTL: "the autopilot: it returns", LAND: "the autopilot: it lands",
+  SMART_RTL: "the autopilot: it returns", AUTO_RTL: "the autopilot: it returns", QLAND: "the autopilot: it lands",
+  QRTL: "the autopilot: it returns", TAKEOFF: "the autopilot: it takes off", BRAKE: "nobody: it brakes"};
+
+export class FlightStatus extends Panel {
+  build() {
+    this.mode = element("span", {class: "mode"});
+    this.armed = element("span", {class: "badge"});
+    this.landed = element("span", {class: "badge quiet"});
+    this.age = element("span", {class: "age"});
+    this.commander = element("p", {class: "commander"});
+    this.may = element("p", {class: "may"});
+    this.reasons = element("ul", {class: "reasons"});
+    this.append(element("div", {class: "row"}, this.mode, this.armed, this.landed, this.age), this.commander, this.may, this.reasons);
+  }
+
+  render(at) {
+    const report = this.vehicle?.get("vehicle") ?? null;
+    this.hidden = report === null;
+    if (report === null) return;
+    const alive = this.vehicle.isAlive(at), live = alive && !this.context.stream.trouble(at);
+    this.classList.toggle("old", !live);
+    setText(this.mode, report.mode ?? "mode unknown");
+    setText(this.armed, report.armed === null ? "armed?" : report.armed ? "ARMED" : "disarmed");
+    setAttribute(this.armed, "class", `badge ${report.armed ? "armed" : ""}`);
+    setText(this.landed, report.landed_state.replace("_", " "));
+    const silent = this.vehicle.views.vehicle.age(at) + (report.link.alive ? 0 : 1000 * report.link.heartbeat_age_s);
+    setText(this.age, live ? "" : `${ageText(silent)} old`);
+    setText(this.commander, `Commanded by ${commanderOf(report)}`);
+    this.showReadiness(report, live);
+  }
+
+  showReadiness(report, live) {
+    const [text, kind] = !live ? ["May it fly? Not known: this is old.", "wait"]
+      : report.armed ? ["", "good"]
+      : report.ready_to_arm ? ["Ready to arm.", "good"] : ["Not ready to arm:", "bad"];
+    setText(this.may, text);
+    setAttribute(this.may, "class", `may ${kind}`);
+    const reasons = live && !report.armed ? report.why_not : [];
+    const key = reasons.join("\n");
+    if (key !== this.shown) {
+      this.shown = key;
+      this.reasons.replaceChildren(...reasons.map(reason => element("li", {}, reason)));
+    }
+  }
+}
+
+/** Who flies a vehicle, in words. */
+export function commanderOf(report) {
+  const job = report.commanded_by;
+  if (job) return `${job.verb.split("/").pop().replaceAll("_", " ")} of ${job.client} (job ${job.job})${report.paused ? ", stopped" : ""}`;
+  if (report.paused) return "nobody: it was stopped";
+  if (report.mode === "GUIDED" || report.mode === "GUIDED_NOGPS") return report.armed ? "nobody: it keeps its last target" : "nobody";
+  if (!report.armed) return "nobody";
+  return SCRIPTED[report.mode] ?? `its pilot (${report.mode})`;
+}
+
+customElements.define("flight-status", FlightStatus);

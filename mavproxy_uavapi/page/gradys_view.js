@@ -1,0 +1,45 @@
+// The module gradys: its ground stations, what waits in the spool, and what became of it. Offered while it is loaded.
+
+import {Panel} from "./panel.js";
+import {element, setText} from "./dom.js";
+
+const EVERY = 1000; // ms from one look to the next while the tab is open
+
+export class GradysView extends Panel {
+  build() {
+    this.head = element("p", {class: "where"});
+    this.stations = element("ul", {class: "plain"});
+    this.sinks = element("ul", {class: "plain"});
+    this.flush = element("button", {type: "button", on: {click: () => this.tryNow()}}, "Try all now");
+    this.append(this.head, element("h3", {}, "Ground stations"), this.stations, element("h3", {}, "Sinks of readings"), this.sinks, this.flush);
+    this.addEventListener("opened", () => this.look());
+    setInterval(() => { if (!this.hidden && !document.hidden) this.look(); }, EVERY);
+  }
+
+  async look() {
+    try {
+      const {info} = await this.context.api.get("/gradys/status");
+      const trip = info.round_trip_ms?.median;
+      setText(this.head, `${info.sent} positions sent, ${info.acknowledged} acknowledged${trip === undefined ? "" : `, ${trip} ms there and back`}; ${info.spooled ?? 0} readings wait.`);
+      fill(this.stations, info.stations, one => [one.station, one.last_error ?? `${one.acknowledged} of ${one.sent} acknowledged`]);
+      fill(this.sinks, info.sinks, one => [one.sink, one.last_error ?? `${one.acknowledged} of ${one.sent} acknowledged`]);
+    } catch (error) {
+      setText(this.head, error.message);
+    }
+  }
+
+  async tryNow() {
+    try {
+      setText(this.head, (await this.context.api.call("POST", "/gradys/flush")).result);
+    } catch (error) {
+      setText(this.head, error.message);
+    }
+  }
+}
+
+function fill(list, things, words) {
+  const rows = (things ?? []).map(one => words(one));
+  list.replaceChildren(...(rows.length ? rows : [["none", ""]]).map(([name, text]) => element("li", {}, element("b", {}, name), " ", text)));
+}
+
+customElements.define("gradys-view", GradysView);

@@ -1,0 +1,92 @@
+// A button that acts only when it is held: by pointer, Space or Enter. Dispatches `confirmed`.
+// Assistive technology that cannot hold a button clicks it twice: the first click asks, the second confirms.
+
+import {element, setAttribute, setText} from "./dom.js";
+
+const HOLD = 800; // ms
+const SECOND_CLICK = 4000; // ms within which it must come
+
+export class HoldButton extends HTMLElement {
+  connectedCallback() {
+    if (this.button) {
+      document.addEventListener("visibilitychange", this.hide);
+      return;
+    }
+    this.label = element("span", {class: "hold-label"}, this.getAttribute("label"));
+    this.fill = element("span", {class: "hold-fill", "aria-hidden": "true"});
+    this.button = element("button", {type: "button"}, this.fill, this.label);
+    this.append(this.button);
+    this.describe();
+    const {button} = this;
+    button.addEventListener("pointerdown", event => { if (event.button === 0) this.begin(); });
+    for (const name of ["pointerup", "pointerleave", "pointercancel", "blur"]) button.addEventListener(name, () => this.end());
+    button.addEventListener("keydown", event => this.keyDown(event));
+    button.addEventListener("keyup", event => { if (isPress(event)) this.end(); });
+    button.addEventListener("click", event => this.clicked(event));
+    button.addEventListener("contextmenu", event => event.preventDefault()); // a long touch
+    this.hide = () => this.end();
+    document.addEventListener("visibilitychange", this.hide);
+  }
+
+  disconnectedCallback() {
+    this.end();
+    document.removeEventListener("visibilitychange", this.hide);
+  }
+
+  static observedAttributes = ["label", "disabled", "title"];
+
+  attributeChangedCallback() { if (this.button) this.describe(); }
+
+  describe() {
+    const label = this.getAttribute("label");
+    setText(this.label, label);
+    setAttribute(this.button, "aria-label", `${label}: hold for a second, or press twice`);
+    setAttribute(this.button, "title", this.getAttribute("title") || "hold for a second");
+    const disabled = this.hasAttribute("disabled");
+    if (disabled) this.end();
+    if (this.button.disabled !== disabled) this.button.disabled = disabled;
+  }
+
+  keyDown(event) {
+    if (!isPress(event)) return;
+    event.preventDefault(); // no click of its own
+    if (!event.repeat) this.begin();
+  }
+
+  begin() {
+    if (this.timer || this.button.disabled) return;
+    this.physical = true;
+    this.classList.add("held");
+    this.timer = setTimeout(() => this.confirm(), HOLD);
+  }
+
+  end() {
+    clearTimeout(this.timer);
+    this.timer = 0;
+    this.classList.remove("held");
+  }
+
+  /** A click without a pointer or a key before it; the browser sends one after each pointer, too. */
+  clicked(event) {
+    const physical = this.physical || event.detail > 0;
+    this.physical = false;
+    if (physical) return;
+    if (this.askedAt && performance.now() - this.askedAt < SECOND_CLICK) {
+      this.confirm();
+      return;
+    }
+    this.askedAt = performance.now();
+    setAttribute(this.button, "aria-label", `${this.getAttribute("label")}: press again to confirm`);
+    setTimeout(() => { this.askedAt = 0; this.describe(); }, SECOND_CLICK);
+  }
+
+  confirm() {
+    this.end();
+    this.askedAt = 0;
+    this.dispatchEvent(new CustomEvent("confirmed", {bubbles: true}));
+  }
+}
+
+function isPress(event) { return event.key === " " || event.key === "Enter"; }
+
+customElements.define("hold-button", HoldButton);

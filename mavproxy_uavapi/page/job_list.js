@@ -1,0 +1,60 @@
+// The verbs in flight and the last ones that ended; a running one can be aborted.
+
+import {Panel} from "./panel.js";
+import {element, setAttribute, setText} from "./dom.js";
+import {sentenceOf} from "./actions.js";
+
+const SHOWN = 25;
+
+export class JobList extends Panel {
+  build() {
+    this.rows = new Map();
+    this.list = element("ol", {class: "jobs"});
+    this.empty = element("p", {class: "empty"}, "Nothing was asked of a vehicle yet.");
+    this.append(this.empty, this.list);
+  }
+
+  render() {
+    const jobs = [...this.context.fleet.jobs.values()].slice(-SHOWN);
+    this.empty.hidden = jobs.length > 0;
+    for (const [number, row] of this.rows) if (!jobs.some(job => job.job === number)) { row.remove(); this.rows.delete(number); }
+    for (const job of jobs) this.show(job);
+  }
+
+  show(job) {
+    let row = this.rows.get(job.job);
+    if (!row) {
+      row = element("li");
+      row.what = element("b");
+      row.state = element("span", {class: "state"});
+      row.abort = element("button", {type: "button", class: "stop small", on: {click: () => this.abort(job.job)}}, "Abort");
+      row.append(element("div", {class: "row"}, row.what, row.abort), row.state);
+      this.rows.set(job.job, row);
+      this.list.prepend(row);
+    }
+    setText(row.what, `${job.job} · vehicle ${job.system} · ${job.verb.split("/").pop().replaceAll("_", " ")}`);
+    setText(row.state, stateOf(job));
+    setAttribute(row, "class", job.state);
+    row.abort.hidden = job.state !== "running";
+    setAttribute(row.abort, "aria-label", `abort job ${job.job}`);
+  }
+
+  async abort(number) {
+    try {
+      await this.context.api.call("DELETE", `/jobs/${number}`, {timeout: 60000});
+    } catch (error) {
+      setText(this.rows.get(number).state, error.message);
+    }
+  }
+}
+
+function stateOf(job) {
+  if (job.state === "succeeded") return `${job.result} (${job.seconds.toFixed(1)} s)`;
+  if (job.state === "failed") return sentenceOf(job);
+  const {distance_to_go: far, altitude, item, items, stage} = job.progress;
+  const parts = [stage, item === undefined ? "" : `item ${item} of ${items}`, far === undefined ? "" : `${far.toFixed(1)} m to go`,
+    altitude === undefined ? "" : `${altitude.toFixed(1)} m high`];
+  return parts.filter(Boolean).join(", ") || "under way";
+}
+
+customElements.define("job-list", JobList);

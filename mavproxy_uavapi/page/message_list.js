@@ -1,0 +1,37 @@
+// What the autopilot said, newest first, and changes of mode, arming, link and commander.
+
+import {Panel} from "./panel.js";
+import {element} from "./dom.js";
+
+const SHOWN = 80;
+const SEVERITIES = ["emergency", "alert", "critical", "error", "warning", "notice", "info", "debug"];
+const WORST = 4; // warnings and worse stand out
+
+export class MessageList extends Panel {
+  build() {
+    this.list = element("ol", {class: "messages", "aria-live": "polite"});
+    this.append(this.list);
+    this.context.fleet.addEventListener("event", event => this.heard(event.detail));
+  }
+
+  heard({event, system, time, info}) {
+    const text = event === "statustext" ? info.text
+      : event === "mode" ? `mode ${info.mode}`
+      : event === "armed" ? (info.armed ? "armed" : "disarmed")
+      : event === "link" ? (info.alive ? "the link is back" : "LINK LOST")
+      : event === "tag" ? `tag ${info.id} ${info.seen ? "in sight" : "out of sight"}`
+      : event === "delivered" ? `${info.count} readings delivered to ${info.sink}` : "";
+    if (!text) return;
+    const severity = event === "statustext" ? info.severity : event === "link" && !info.alive ? 2 : 6;
+    const key = `${system} ${time} ${text}`;
+    if ([...this.list.children].some(row => row.key === key)) return; // told again after a reconnection
+    const clock = new Date(time * 1000).toLocaleTimeString([], {hour12: false});
+    const row = element("li", {class: severity <= WORST ? "bad" : ""}, element("time", {}, clock),
+      element("b", {}, system ? String(system) : ""), element("span", {title: SEVERITIES[severity]}, text));
+    row.key = key;
+    this.list.prepend(row);
+    while (this.list.children.length > SHOWN) this.list.lastChild.remove();
+  }
+}
+
+customElements.define("message-list", MessageList);

@@ -1,0 +1,38 @@
+// What is asked besides the stream, seldom: which modules are loaded, and the fence of the chosen vehicle.
+
+const EVERY = 20000; // ms
+const CIRCLE = 2; // FENCE_TYPE's bit of the circle around home
+
+/** Look now, whenever another vehicle is chosen, and every EVERY ms. */
+export function watchModules({api, fleet, painter}, tabs, panels) {
+  const look = () => {
+    if (document.hidden) return;
+    for (const [path, panel] of Object.entries(panels)) offer(api, path, tabs, panel);
+    if (fleet.chosen) readFence(api, fleet.chosen, painter);
+  };
+  for (const panel of Object.values(panels)) tabs.offer(panel, false);
+  fleet.addEventListener("chosen", look);
+  setInterval(look, EVERY);
+}
+
+/** Offer the tab of a module that answers. */
+async function offer(api, path, tabs, panel) {
+  try {
+    await api.get(path);
+    tabs.offer(panel, true);
+  } catch (error) {
+    if (error.status === 404) tabs.offer(panel, false);
+  }
+}
+
+/** The circular fence, from what MAVProxy knows of the parameters; the vehicle is not asked. */
+async function readFence(api, vehicle, painter) {
+  try {
+    const {parameters} = await api.get(`/vehicles/${vehicle.id}/parameters?match=FENCE_*`);
+    const on = parameters.FENCE_ENABLE === 1 && (parameters.FENCE_TYPE & CIRCLE) !== 0;
+    vehicle.fence = on && parameters.FENCE_RADIUS > 0 ? {radius: parameters.FENCE_RADIUS} : null;
+    painter.touch();
+  } catch {
+    vehicle.fence = null; // no fence is drawn that is not known
+  }
+}

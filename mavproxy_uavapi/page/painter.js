@@ -1,0 +1,35 @@
+// When the page is drawn: soon after news, in the next frame while a hand moves something, and seldom at rest.
+
+import {now} from "./freshness.js";
+
+const SOON = 60; // ms from one drawing to the next while there is news
+const SELDOM = 250; // ms, for the ages
+
+export class Painter {
+  constructor(paint) {
+    this.paint = paint;
+    this.planned = Infinity; // when it is drawn next
+    this.drawn = -Infinity;
+  }
+
+  /** Draw in the next frame. */
+  touch() { this.plan(0); }
+
+  /** Draw soon. */
+  news() { this.plan(Math.max(this.drawn + SOON - now(), 0)); }
+
+  plan(pause) {
+    const at = now() + pause;
+    if (at >= this.planned) return; // an earlier one stands
+    clearTimeout(this.timer);
+    this.planned = at;
+    this.timer = setTimeout(() => requestAnimationFrame(() => this.draw()), pause);
+  }
+
+  draw() {
+    this.planned = Infinity;
+    this.drawn = now();
+    this.plan(SELDOM);
+    this.paint(this.drawn);
+  }
+}

@@ -1,0 +1,59 @@
+// The autopilot's parameters: found by name, changed one at a time, and shown as the autopilot holds them then.
+
+import {Panel} from "./panel.js";
+import {element, labelled, setAttribute, setText} from "./dom.js";
+import "./hold_button.js";
+
+const SHOWN = 60;
+
+export class ParameterList extends Panel {
+  build() {
+    this.filter = element("input", {type: "search", value: "WPNAV*", autocomplete: "off", spellcheck: false, on: {change: () => this.look()}});
+    this.rows = element("dl", {class: "parameters"});
+    this.note = element("p", {class: "empty"});
+    this.answer = element("p", {class: "answer", role: "status"});
+    this.append(labelled("names, with * and ?", this.filter), this.note, this.rows, this.answer);
+    this.addEventListener("opened", () => this.look());
+    this.context.fleet.addEventListener("chosen", () => { if (!this.hidden) this.look(); });
+  }
+
+  async look() {
+    if (!this.vehicle) return;
+    try {
+      const {parameters} = await this.context.api.get(this.path(`/parameters?match=${encodeURIComponent(this.filter.value || "*")}`));
+      const names = Object.keys(parameters);
+      setText(this.note, names.length > SHOWN ? `${names.length} match; the first ${SHOWN}:` : names.length ? "" : "None that MAVProxy knows.");
+      this.rows.replaceChildren(...names.slice(0, SHOWN).flatMap(name => this.row(name, parameters[name])));
+    } catch (error) {
+      this.say(error.message, "bad");
+    }
+  }
+
+  row(name, value) {
+    const input = element("input", {type: "text", inputMode: "decimal", value: text(value), "aria-label": name});
+    const set = element("hold-button", {label: "Set", disabled: "", on: {confirmed: () => this.set(name, input)}});
+    input.addEventListener("input", () => setAttribute(set, "disabled", input.value.trim() === "" || !Number.isFinite(Number(input.value))));
+    return [element("dt", {}, name), element("dd", {}, input, set)];
+  }
+
+  async set(name, input) {
+    this.say(`${name} …`, "wait");
+    try {
+      const body = await this.context.api.call("PUT", this.path(`/parameters/${name}`), {json: {value: Number(input.value)}, timeout: 20000});
+      input.value = text(body.value);
+      this.say(body.result, "good");
+    } catch (error) {
+      this.say(error.message, "bad");
+    }
+  }
+
+  say(words, kind) {
+    setText(this.answer, words);
+    setAttribute(this.answer, "class", `answer ${kind}`);
+  }
+}
+
+/** A single-precision number without the digits that it does not have. */
+const text = value => String(Number(value.toPrecision(7)));
+
+customElements.define("parameter-list", ParameterList);

@@ -1,0 +1,55 @@
+// What this browser likes: theme, the height of a take-off. Nothing here changes the vehicle or the API.
+
+import {Panel} from "./panel.js";
+import {element, heightInput, heightOf, labelled} from "./dom.js";
+import {forgetColours} from "./colours.js";
+
+const KEY = "uavapi-page";
+const DEFAULTS = {theme: "auto", alt: 10};
+
+/** The stored preferences, and how to change them. */
+export class Preferences {
+  constructor() {
+    try {
+      Object.assign(this, DEFAULTS, JSON.parse(localStorage.getItem(KEY)) ?? {});
+    } catch {
+      Object.assign(this, DEFAULTS);
+    }
+    if (!Number.isFinite(this.alt)) this.alt = DEFAULTS.alt;
+    this.show();
+  }
+
+  set(name, value) {
+    this[name] = value;
+    localStorage.setItem(KEY, JSON.stringify({theme: this.theme, alt: this.alt}));
+    this.show();
+  }
+
+  show() {
+    document.documentElement.dataset.theme = ["light", "dark"].includes(this.theme) ? this.theme : "auto";
+    forgetColours();
+  }
+}
+
+export class PagePreferences extends Panel {
+  build() {
+    const {preferences, api} = this.context;
+    const theme = element("select", {on: {change: () => { preferences.set("theme", theme.value); this.context.painter.touch(); }}},
+      ...["auto", "light", "dark"].map(name => element("option", {value: name}, name)));
+    theme.value = preferences.theme;
+    const alt = heightInput(preferences.alt, "height of a take-off in m");
+    alt.addEventListener("change", () => { if (heightOf(alt) !== null) preferences.set("alt", heightOf(alt)); });
+    const forget = element("button", {type: "button", on: {click: () => api.setToken("")}}, "Forget the token");
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { forgetColours(); this.context.painter.touch(); });
+    this.append(element("h3", {}, "This browser"), labelled("theme", theme), labelled("height of a take-off", alt, "m"),
+      element("div", {class: "buttons"}, forget),
+      element("h3", {}, "Keys"), element("dl", {class: "keys"},
+        element("dt", {}, "Escape, held ½ s"), element("dd", {}, "HOLD ALL"),
+        element("dt", {}, "Space or Enter, held 1 s"), element("dd", {}, "does what the focused button says"),
+        element("dt", {}, "arrows on the top view"), element("dd", {}, "choose a place, 1 m a press, 10 m with Shift; Enter takes it"),
+        element("dt", {}, "+ and −"), element("dd", {}, "nearer, farther")),
+      element("p", {}, "The API itself: ", element("a", {href: "/docs"}, "/docs"), ". Its settings are changed at MAVProxy's prompt: uavapi set."));
+  }
+}
+
+customElements.define("page-preferences", PagePreferences);

@@ -1,0 +1,56 @@
+// Numbers of the vehicle, each with its unit; one that is old is greyed and says how old.
+
+import {Panel} from "./panel.js";
+import {element, number, setText} from "./dom.js";
+import {ageText} from "./freshness.js";
+import "./horizon.js";
+
+const FIXES = ["no GPS", "no fix", "2D fix", "3D fix", "DGPS", "RTK float", "RTK fixed"];
+
+const LARGE = 4; // tiles beside the horizon
+
+// label, unit, view, text of the view's value, whether it is a warning
+const TILES = [
+  ["Height", "m", "gps", v => number(v.position.relative_alt), () => false],
+  ["Speed", "m/s", "general", v => number(v.groundspeed), () => false],
+  ["Climb", "m/s", "gps", v => number(-v.velocity.vz), () => false],
+  ["Heading", "°", "gps", v => number(v.heading, 0), () => false],
+  ["North", "m", "ned", v => number(v.position.x), () => false],
+  ["East", "m", "ned", v => number(v.position.y), () => false],
+  ["Battery", "%", "battery", v => number(v.battery_remaining, 0), v => v.battery_remaining !== null && v.battery_remaining < 25],
+  ["Voltage", "V", "battery", v => number(v.voltage === null ? null : v.voltage / 1000), () => false],
+  ["GPS", "", "gps_raw", v => `${FIXES[v.fix_type] ?? "fix"}`, v => v.fix_type < 3],
+  ["Satellites", "", "gps_raw", v => number(v.satelites, 0), () => false],
+  ["EKF", "", "vehicle", v => (v.ekf_ok ? "ok" : "no position"), v => !v.ekf_ok],
+  ["Link loss", "%", "vehicle", v => number(100 * v.link.packet_loss), v => v.link.packet_loss > 0.05],
+];
+
+export class VehicleReadings extends Panel {
+  build() {
+    this.tiles = TILES.map(([label, unit]) => {
+      const value = element("span", {class: "value"}), age = element("span", {class: "age"});
+      const tile = element("div", {class: "tile"}, element("dt", {}, label), element("dd", {}, value, unit ? element("span", {class: "unit"}, unit) : null, age));
+      return {tile, value, age};
+    });
+    const [large, small] = [this.tiles.slice(0, LARGE), this.tiles.slice(LARGE)].map(tiles => tiles.map(({tile}) => tile));
+    this.attitude = document.createElement("attitude-view");
+    this.append(element("div", {class: "instruments"}, this.attitude, element("dl", {class: "tiles large"}, ...large)), element("dl", {class: "tiles"}, ...small));
+    this.attitude.start(this.context);
+  }
+
+  render(at) {
+    this.attitude.render(at);
+    const cut = Boolean(this.context.stream.trouble(at)), alive = this.vehicle?.isAlive(at);
+    TILES.forEach(([, , view, text, isBad], index) => {
+      const {tile, value, age} = this.tiles[index], fresh = this.vehicle?.views[view];
+      const known = fresh && fresh.value !== null;
+      const old = !known || cut || !alive || fresh.isOld(at);
+      setText(value, known ? text(fresh.value) : "–");
+      tile.classList.toggle("old", old);
+      tile.classList.toggle("alarm", known && !old && isBad(fresh.value));
+      setText(age, known && old ? `${ageText(fresh.age(at))} old` : "");
+    });
+  }
+}
+
+customElements.define("vehicle-readings", VehicleReadings);

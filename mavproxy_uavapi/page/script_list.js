@@ -1,0 +1,97 @@
+// Scripts on the vehicle's computer: upload, run, follow the log, stop.
+
+import {Panel} from "./panel.js";
+import {element, labelled, setAttribute, setText} from "./dom.js";
+import {readEvents} from "./stream.js";
+import "./hold_button.js";
+
+const EVERY = 2000; // ms from one look to the next while the tab is open
+const LINES = 400; // of a log
+
+export class ScriptList extends Panel {
+  build() {
+    this.rows = element("ol", {class: "scripts"});
+    this.file = element("input", {type: "file", accept: ".py,.sh", on: {change: () => this.upload()}});
+    this.answer = element("p", {class: "answer", role: "status"});
+    this.log = element("pre", {class: "log", tabIndex: 0, hidden: true, "aria-label": "log"});
+    this.append(this.rows, labelled("upload a script", this.file), this.answer, this.log);
+    this.addEventListener("opened", () => this.look());
+    setInterval(() => { if (!this.hidden && !document.hidden) this.look(); }, EVERY);
+  }
+
+  async look() {
+    try {
+      const [listed, running] = [await this.context.api.get("/mission/list-scripts"), await this.context.api.get("/mission/running-scripts")];
+      const busy = new Map(running.scripts.map(run => [run.script, run]));
+      this.show([...listed.scripts, ...listed.shell_scripts], busy);
+    } catch (error) {
+      this.say(error.message, "bad");
+    }
+  }
+
+  show(names, busy) {
+    const key = JSON.stringify([names, [...busy.keys()]]);
+    if (key === this.shown) return;
+    this.shown = key;
+    const rows = names.map(name => {
+      const act = busy.has(name)
+        ? element("button", {type: "button", class: "stop small", on: {click: () => this.send("/mission/stop-script", name, 60000)}}, "Stop")
+        : element("hold-button", {label: "Run", on: {confirmed: () => this.send("/mission/execute-script", name)}});
+      const log = element("button", {type: "button", class: "small", on: {click: () => this.follow(name)}}, "Log");
+      return element("li", {class: busy.has(name) ? "running" : ""}, element("b", {}, name), element("span", {class: "state"}, busy.has(name) ? "runs" : ""), act, log);
+    });
+    this.rows.replaceChildren(...(rows.length ? rows : [element("li", {class: "empty"}, "No script was uploaded yet.")]));
+  }
+
+  async upload() {
+    const [file] = this.file.files, form = new FormData();
+    if (!file) return;
+    form.append("file", file);
+    this.file.value = "";
+    await this.tell(() => this.context.api.call("POST", "/mission/upload-script", {body: form}), `${file.name} is uploaded`);
+  }
+
+  async send(path, name, timeout) {
+    await this.tell(() => this.context.api.call("POST", path, {json: {script_name: name}, timeout}), `${name}: ${path.includes("stop") ? "stopped" : "started"}`);
+    if (path.includes("execute")) this.follow(name);
+  }
+
+  async tell(work, done) {
+    try {
+      await work();
+      this.say(done, "good");
+    } catch (error) {
+      this.say(error.message, "bad");
+    }
+    this.look();
+  }
+
+  /** Show the log of a script's newest run, and go on while it runs. */
+  async follow(name) {
+    this.following?.abort();
+    const stop = this.following = new AbortController();
+    this.log.hidden = false;
+    this.log.replaceChildren();
+    try {
+      const response = await this.context.api.open(`/mission/scripts/${encodeURIComponent(name)}/log?follow=1`, stop.signal);
+      await readEvents(response, event => this.line(event));
+    } catch (error) {
+      if (!stop.signal.aborted) this.say(error.message, "bad");
+    }
+  }
+
+  line(event) {
+    const end = event.line === undefined;
+    const text = end ? `— ended, exit status ${event.exit_status ?? "unknown"}` : event.line;
+    this.log.append(element("span", {}, `${text.replace(/\n$/, "")}\n`));
+    while (this.log.children.length > LINES) this.log.firstChild.remove();
+    this.log.scrollTop = this.log.scrollHeight;
+  }
+
+  say(text, kind) {
+    setText(this.answer, text);
+    setAttribute(this.answer, "class", `answer ${kind}`);
+  }
+}
+
+customElements.define("script-list", ScriptList);

@@ -1,0 +1,81 @@
+// The telemetry stream: Server-Sent Events, read with fetch because an EventSource cannot send a token.
+
+import {ApiError} from "./api.js";
+import {StreamClock, now} from "./freshness.js";
+
+const SILENT = 1800; // ms without an event until the API counts as gone; one comes every 500 ms
+const DEAD = 6000; // ms until the connection is given up
+const PAUSES = [250, 500, 1000, 2000]; // ms until the next try
+
+/** Reads Server-Sent Events; calls `take` with the data of each. */
+export async function readEvents(response, take) {
+  const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
+  let rest = "";
+  for (;;) {
+    const {value, done} = await reader.read();
+    if (done) return;
+    const blocks = (rest + value).split("\n\n");
+    rest = blocks.pop();
+    for (const block of blocks) {
+      const data = block.split("\n").filter(line => line.startsWith("data:")).map(line => line.slice(5).trim());
+      if (data.length) take(JSON.parse(data.join("\n")));
+    }
+  }
+}
+
+/** One stream that is opened again whenever it ends; `take(event, happened)` gets each event. */
+export class TelemetryStream {
+  constructor(api, query, take) {
+    this.api = api;
+    this.path = `/telemetry/stream?${new URLSearchParams(query)}`;
+    this.take = take;
+    this.heardAt = -Infinity;
+    this.why = "not connected yet";
+    api.addEventListener("token-changed", () => this.hurry());
+  }
+
+  /** Why there is no live data; empty while there is. */
+  trouble(at) {
+    if (this.why) return this.why;
+    return at - this.heardAt > SILENT ? "the API has fallen silent" : "";
+  }
+
+  async run() {
+    for (let failures = 0; ; failures += 1) {
+      const before = this.heardAt;
+      await this.once();
+      if (this.heardAt > before) failures = 0;
+      const pause = PAUSES[Math.min(failures, PAUSES.length - 1)];
+      await new Promise(resolve => { this.hurry = resolve; setTimeout(resolve, pause); });
+    }
+  }
+
+  opened() {} // called whenever the stream begins anew
+  hurry() {} // ends the pause; set while there is one
+
+  async once() {
+    const stop = new AbortController();
+    const opened = now();
+    const watch = setInterval(() => { if (now() - Math.max(this.heardAt, opened) > DEAD) stop.abort(); }, 500);
+    try {
+      const response = await this.api.open(this.path, stop.signal);
+      this.clock = new StreamClock();
+      this.opened();
+      await readEvents(response, event => this.heard(event));
+      this.why = "the API has ended the connection";
+    } catch (error) {
+      this.why = error instanceof ApiError ? error.message : "the API cannot be reached";
+    } finally {
+      clearInterval(watch);
+      stop.abort();
+    }
+  }
+
+  heard(event) {
+    const arrived = now(), sent = event.time * 1000;
+    this.heardAt = arrived;
+    this.why = "";
+    if (event.event === "alive") this.clock.learn(sent, arrived);
+    this.take(event, this.clock.happened(sent, arrived));
+  }
+}

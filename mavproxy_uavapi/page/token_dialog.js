@@ -1,0 +1,35 @@
+// Asks for the API's token, once; it is kept in this tab's session storage and goes with the tab.
+
+import {Panel} from "./panel.js";
+import {element} from "./dom.js";
+
+export class TokenDialog extends Panel {
+  build() {
+    this.input = element("input", {type: "password", autocomplete: "off", required: true, name: "token"});
+    this.note = element("p", {class: "answer bad", role: "status"});
+    const form = element("form", {method: "dialog", on: {submit: event => this.taken(event)}},
+      element("h2", {}, "This API wants its token"),
+      element("p", {}, "It is the setting token of uavapi. This tab keeps it until it is closed."),
+      element("label", {class: "field"}, element("span", {}, "token"), this.input), this.note,
+      element("button", {type: "submit"}, "Use it"));
+    this.dialog = element("dialog", {"aria-label": "token"}, form);
+    this.append(this.dialog);
+    this.context.api.addEventListener("token", () => this.ask());
+  }
+
+  ask() {
+    if (this.dialog.open) return;
+    this.note.textContent = this.context.api.hasToken ? "The token was not accepted." : "";
+    this.input.value = "";
+    this.dialog.showModal();
+  }
+
+  taken(event) {
+    event.preventDefault();
+    this.dialog.close();
+    this.context.api.setToken(this.input.value.trim());
+    this.input.value = "";
+  }
+}
+
+customElements.define("token-dialog", TokenDialog);

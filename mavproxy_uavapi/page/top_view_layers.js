@@ -1,0 +1,218 @@
+// What the top view draws, from the ground up. Each function draws one thing; places are metres [north, east].
+
+import {BOLD, FONT, haloed} from "./canvas.js";
+import {colourOf} from "./colours.js";
+
+const ARROW = [[0, -13], [9, 10], [0, 5], [-9, 10]]; // pixels, nose up
+const STEPS = [1, 2, 5];
+const CORNER = 4; // px
+
+/** The spacing of grid lines in metres, so that they are at least `pixels` apart. */
+export function gridStep(scale, pixels = 56) {
+  for (let power = 0.1; ; power *= 10) for (const step of STEPS) if (step * power * scale >= pixels) return step * power;
+}
+
+export function drawGrid(pen, camera, theme) {
+  const step = gridStep(camera.scale), [top, left] = camera.metres(0, 0), [bottom, right] = camera.metres(camera.width, camera.height);
+  const digits = step < 1 ? 1 : 0;
+  pen.font = FONT;
+  for (let n = Math.ceil(left / step); n * step <= right; n += 1) {
+    const x = Math.round(camera.pixels([0, n * step])[0]) + 0.5;
+    line(pen, [x, 0], [x, camera.height], n === 0 ? theme["grid-strong"] : theme.grid);
+    if (n % 2 === 0) haloed(pen, axis(n * step, "E", "W", digits), x + 4, camera.height - 6, theme.dim, theme.map);
+  }
+  for (let n = Math.ceil(bottom / step); n * step <= top; n += 1) {
+    const y = Math.round(camera.pixels([n * step, 0])[1]) + 0.5;
+    line(pen, [0, y], [camera.width, y], n === 0 ? theme["grid-strong"] : theme.grid);
+    if (n % 2 === 0 && y < camera.height - 64) haloed(pen, axis(n * step, "N", "S", digits), 6, y - 4, theme.dim, theme.map);
+  }
+}
+
+const axis = (metres, positive, negative, digits) => `${Math.abs(metres).toFixed(digits)} ${metres < 0 ? negative : positive}`;
+
+export function drawScale(pen, camera, theme) {
+  const step = gridStep(camera.scale, 90), long = step * camera.scale, x = 16, y = camera.height - 26;
+  pen.strokeStyle = theme.ink;
+  pen.lineWidth = 2;
+  pen.beginPath();
+  pen.moveTo(x, y - 5); pen.lineTo(x, y); pen.lineTo(x + long, y); pen.lineTo(x + long, y - 5);
+  pen.stroke();
+  pen.font = BOLD;
+  haloed(pen, step >= 1000 ? `${step / 1000} km` : `${Number(step.toFixed(1))} m`, x + 6, y - 6, theme.ink, theme.map);
+}
+
+export function drawFence(pen, camera, home, fence, theme) {
+  const [x, y] = camera.pixels(home), radius = fence.radius * camera.scale;
+  pen.setLineDash([10, 6]);
+  pen.strokeStyle = theme.bad;
+  pen.lineWidth = 1.5;
+  pen.beginPath();
+  pen.arc(x, y, radius, 0, 7);
+  pen.stroke();
+  pen.setLineDash([]);
+  pen.font = FONT;
+  haloed(pen, `fence ${fence.radius} m`, x + 4, y - radius - 5, theme.bad, theme.map);
+}
+
+export function drawHome(pen, camera, place, theme) {
+  const [x, y] = camera.pixels(place);
+  disc(pen, x, y, 10, theme.surface, theme.ink, 2);
+  pen.font = BOLD;
+  pen.textAlign = "center";
+  pen.fillStyle = theme.ink;
+  pen.fillText("H", x, y + 4);
+  pen.textAlign = "start";
+}
+
+export function drawTag(pen, camera, tag, theme) {
+  const [x, y] = camera.pixels(tag.place);
+  pen.fillStyle = theme.ink;
+  pen.fillRect(x - 9, y - 9, 18, 18);
+  pen.fillStyle = theme.surface;
+  pen.fillRect(x - 5, y - 5, 4, 4);
+  pen.fillRect(x + 1, y + 1, 4, 4);
+  pen.font = BOLD;
+  haloed(pen, `tag ${tag.id}`, x + 13, y + 4, theme.ink, theme.map);
+}
+
+/** Where a vehicle was: `trail` in degrees. What is nearer than a few pixels to the last corner is left out. */
+export function drawTrail(pen, camera, projection, trail, system, old) {
+  if (trail.length < 2) return;
+  const last = trail.length - 1;
+  let x = -Infinity, y = -Infinity;
+  pen.strokeStyle = colourOf(system);
+  pen.globalAlpha = old ? 0.25 : 0.65;
+  pen.lineWidth = 2.5;
+  pen.lineJoin = "bevel";
+  pen.beginPath();
+  for (let n = 0; n <= last; n += 1) {
+    const [right, down] = camera.pixels(projection.metres(trail[n][0], trail[n][1]));
+    if (Math.abs(right - x) + Math.abs(down - y) < CORNER && n < last) continue;
+    pen.lineTo(x = right, y = down);
+  }
+  pen.stroke();
+  pen.globalAlpha = 1;
+}
+
+/** A mission: `current` is the number of the item that is flown; a draft is dashed. */
+export function drawMission(pen, camera, items, {current = 0, draft = false, selected = -1}, theme) {
+  if (!items.length) return;
+  pen.strokeStyle = theme.accent;
+  pen.lineWidth = 2;
+  pen.setLineDash(draft ? [7, 5] : []);
+  path(pen, camera, items.map(item => item.place));
+  pen.stroke();
+  pen.setLineDash([]);
+  pen.font = BOLD;
+  pen.textAlign = "center";
+  for (const item of items) {
+    const [x, y] = camera.pixels(item.place), lit = item.number === current || item.number - 1 === selected;
+    disc(pen, x, y, 11, lit ? theme.accent : theme.surface, theme.accent, 2);
+    pen.fillStyle = lit ? theme.surface : theme.accent;
+    pen.fillText(String(item.number), x, y + 4);
+  }
+  pen.textAlign = "start";
+}
+
+export function drawTarget(pen, camera, from, place, system, theme) {
+  const [x, y] = camera.pixels(place), colour = colourOf(system);
+  if (from) {
+    pen.setLineDash([3, 5]);
+    pen.strokeStyle = colour;
+    pen.lineWidth = 2;
+    path(pen, camera, [from, place]);
+    pen.stroke();
+    pen.setLineDash([]);
+  }
+  cross(pen, x, y, 11, theme.map, 6);
+  cross(pen, x, y, 11, colour, 3);
+}
+
+/** A place that was chosen and not yet sent. */
+export function drawChosen(pen, camera, from, place, theme) {
+  const [x, y] = camera.pixels(place);
+  if (from) {
+    pen.setLineDash([6, 6]);
+    pen.strokeStyle = theme.warn;
+    pen.lineWidth = 2;
+    path(pen, camera, [from, place]);
+    pen.stroke();
+    pen.setLineDash([]);
+  }
+  for (const radius of [15, 4]) {
+    pen.strokeStyle = theme.warn;
+    pen.lineWidth = 3;
+    pen.beginPath();
+    pen.arc(x, y, radius, 0, 7);
+    pen.stroke();
+  }
+}
+
+/** Where a label fits that begins at x, y: lower where another is already; `taken` are the places of all. */
+export function freePlace(taken, x, y, width) {
+  const clashes = at => taken.some(one => Math.abs(one.y - at) < 15 && x < one.x + one.width && one.x < x + width);
+  let free = y;
+  while (clashes(free)) free += 15;
+  taken.push({x, y: free, width});
+  return free;
+}
+
+export function drawVehicle(pen, camera, {place, heading, system, label, old, chosen, taken}, theme) {
+  const [x, y] = camera.pixels(place), turn = (heading ?? 0) * Math.PI / 180, sin = Math.sin(turn), cos = Math.cos(turn);
+  if (chosen) {
+    pen.strokeStyle = theme.accent;
+    pen.lineWidth = 2;
+    pen.beginPath();
+    pen.arc(x, y, 20, 0, 7);
+    pen.stroke();
+  }
+  pen.beginPath();
+  ARROW.forEach(([right, down], index) => {
+    const point = [x + right * cos - down * sin, y + right * sin + down * cos];
+    if (index) pen.lineTo(...point);
+    else pen.moveTo(...point);
+  });
+  pen.closePath();
+  pen.lineWidth = 2;
+  pen.lineJoin = "round";
+  pen.fillStyle = old ? theme.map : colourOf(system);
+  pen.strokeStyle = old ? theme.dim : theme.surface;
+  pen.fill();
+  pen.stroke();
+  pen.font = BOLD;
+  const wide = pen.measureText(label).width, from = x + 20 + wide > camera.width - 4 ? x - 20 - wide : x + 20;
+  haloed(pen, label, from, freePlace(taken, from, y - 12, wide), old ? theme.dim : theme.ink, theme.map);
+}
+
+function line(pen, from, to, colour) {
+  pen.strokeStyle = colour;
+  pen.lineWidth = 1;
+  pen.beginPath();
+  pen.moveTo(...from);
+  pen.lineTo(...to);
+  pen.stroke();
+}
+
+function path(pen, camera, places) {
+  pen.beginPath();
+  for (const place of places) pen.lineTo(...camera.pixels(place));
+}
+
+function disc(pen, x, y, radius, fill, edge, wide) {
+  pen.fillStyle = fill;
+  pen.strokeStyle = edge;
+  pen.lineWidth = wide;
+  pen.beginPath();
+  pen.arc(x, y, radius, 0, 7);
+  pen.fill();
+  pen.stroke();
+}
+
+function cross(pen, x, y, size, colour, wide) {
+  pen.strokeStyle = colour;
+  pen.lineWidth = wide;
+  pen.beginPath();
+  pen.moveTo(x - size, y - size); pen.lineTo(x + size, y + size);
+  pen.moveTo(x + size, y - size); pen.lineTo(x - size, y + size);
+  pen.stroke();
+}

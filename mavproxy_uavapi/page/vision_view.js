@@ -1,0 +1,88 @@
+// The camera: the newest frame with its tags, and landing on one. Offered while the module vision is loaded.
+
+import {Panel} from "./panel.js";
+import {element, labelled, setAttribute, setText} from "./dom.js";
+import {ageText, now} from "./freshness.js";
+import "./hold_button.js";
+import {sentenceOf} from "./actions.js";
+
+const FRAME_EVERY = 150; // ms between two frames, at least
+const OLD = 2000; // ms
+
+export class VisionView extends Panel {
+  build() {
+    this.picture = element("img", {alt: "the camera's newest frame", hidden: true});
+    this.note = element("p", {class: "where"});
+    this.tag = element("input", {type: "number", min: "0", step: "1", placeholder: "main"});
+    this.land = element("hold-button", {label: "Land on the tag", on: {confirmed: () => this.send("/vision/land")}});
+    this.search = element("hold-button", {label: "Search for it", on: {confirmed: () => this.send("/vision/search")}});
+    const stop = element("button", {type: "button", class: "stop", on: {click: () => this.stop()}}, "Stop");
+    this.answer = element("p", {class: "answer", role: "status"});
+    this.append(element("figure", {}, this.picture), this.note, element("div", {class: "buttons"}, labelled("tag", this.tag), this.land, this.search, stop), this.answer);
+    this.addEventListener("opened", () => this.watch());
+    this.context.fleet.addEventListener("job", event => this.heard(event.detail));
+  }
+
+  /** Fetch frames for as long as the tab is open. */
+  async watch() {
+    if (this.watching) return;
+    this.watching = true;
+    while (!this.hidden) {
+      if (!document.hidden) await this.fetch();
+      await new Promise(resolve => setTimeout(resolve, FRAME_EVERY));
+    }
+    this.watching = false;
+  }
+
+  async fetch() {
+    try {
+      const url = URL.createObjectURL(await this.context.api.blob("/vision/frame.jpg"));
+      const before = this.picture.src;
+      this.picture.src = url;
+      this.picture.hidden = false;
+      if (before) URL.revokeObjectURL(before);
+      this.at = now();
+      this.why = "";
+    } catch (error) {
+      this.why = error.message;
+    }
+    this.context.painter.touch();
+  }
+
+  async send(path) {
+    const body = this.tag.value === "" ? {} : {id: Number(this.tag.value)};
+    this.say("sending …", "wait");
+    try {
+      this.awaited = (await this.context.api.command(this.path(path), body)).job;
+    } catch (error) {
+      this.say(error.message, "bad");
+    }
+  }
+
+  async stop() {
+    try {
+      this.say((await this.context.api.urgent(this.path("/vision/stop"))).result, "good");
+    } catch (error) {
+      this.say(error.message, "bad");
+    }
+  }
+
+  heard(job) {
+    if (job.job !== this.awaited) return;
+    if (job.state === "running") this.say([job.progress.stage ?? job.progress.phase, "under way"].find(Boolean), "wait");
+    else this.say(job.state === "succeeded" ? job.result : sentenceOf(job), job.state === "succeeded" ? "good" : "bad");
+  }
+
+  say(text, kind) {
+    setText(this.answer, text);
+    setAttribute(this.answer, "class", `answer ${kind}`);
+  }
+
+  render(at) {
+    const age = at - (this.at ?? -Infinity), old = age > OLD;
+    this.picture.classList.toggle("old-picture", old);
+    setText(this.note, this.why ? `${this.why}${this.at ? `; the picture is ${ageText(age)} old` : ""}` : old ? "waiting for a frame" : "");
+  }
+}
+
+customElements.define("vision-view", VisionView);

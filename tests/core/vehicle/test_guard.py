@@ -1,0 +1,141 @@
+"""The guard of vehicles that are no copters; tests/rules/test_envelope.py flies a copter against it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from mavproxy_uavapi.core.envelope.model import Area, Envelope, Limits
+from mavproxy_uavapi.core.envelope.space import LocalFrame, Space, Spot
+from mavproxy_uavapi.core.errors import OutsideEnvelope, Stale
+from mavproxy_uavapi.core.mavlink.flight_modes import mode_number
+from mavproxy_uavapi.core.mavlink.link import Address
+from mavproxy_uavapi.core.mavlink.vehicle_state import Received, VehicleState
+from mavproxy_uavapi.core.vehicle import messages
+from mavproxy_uavapi.core.vehicle.envelope_watch import leaving
+from mavproxy_uavapi.core.vehicle.messages import NO_YAW, GlobalTarget, NedTarget, VelocityTarget
+from mavproxy_uavapi.core.vehicle.registry import CLASSES
+
+HOME = (-35.0, 149.0)
+FRAME = LocalFrame(HOME)
+TYPES = {
+    "copter": mavlink.MAV_TYPE_QUADROTOR,
+    "plane": mavlink.MAV_TYPE_FIXED_WING,
+    "rover": mavlink.MAV_TYPE_GROUND_ROVER,
+}
+
+
+def square(half: float, **limits: float) -> Space:
+    ring = tuple(FRAME.degrees(Spot(n * half, e * half, 0)) for n, e in ((-1, -1), (1, -1), (1, 1), (-1, 1)))
+    area = Area("field", inclusion=True, rings=(ring,), floor=5.0, ceiling=60.0)
+    return Space(Envelope((area,), Limits(**limits)))
+
+
+@pytest.fixture
+def make(host: Any, msg: Callable[..., Any], loop: Any) -> Callable[..., Any]:
+    """Makes a vehicle at a place (m north, east, up) with a velocity (m/s)."""
+
+    def made(kind: str, space: Space, at=(0.0, 0.0, 20.0), velocity=(0.0, 0.0, 0.0), **parameters: float) -> Any:
+        state = VehicleState(1, 1, TYPES[kind], loop.time(), armed=True, mode=mode_number(TYPES[kind], "GUIDED"))
+        state.parameters.update(parameters)
+        lat, lon = FRAME.degrees(Spot(*at))
+        vx, vy, vz = (round(100 * speed) for speed in velocity)
+        told = {
+            "GLOBAL_POSITION_INT": {
+                "lat": round(lat * 1e7), "lon": round(lon * 1e7), "alt": 600_000, "relative_alt": round(1000 * at[2]),
+                "vx": vx, "vy": vy, "vz": vz,
+            },
+            "LOCAL_POSITION_NED": {"x": at[0], "y": at[1], "z": -at[2]},
+            "HOME_POSITION": {"latitude": round(HOME[0] * 1e7), "longitude": round(HOME[1] * 1e7)},
+        }  # fmt: skip
+        for name, fields in told.items():
+            state.messages[name] = Received(msg(name.lower(), 1, 1, 0, **fields), loop.time())
+        return CLASSES[kind](state, host.link, host.pending, loop.time, lambda: (space,))
+
+    return made
+
+
+def allowed(vehicle: Any, order: Any) -> bool:
+    try:
+        vehicle.inside(order)()
+    except OutsideEnvelope:
+        return False
+    return True
+
+
+def test_plane_keeps_the_radius_of_its_circles_from_every_border(make: Any) -> None:
+    plane = make("plane", square(300), WP_LOITER_RAD=80.0)
+    for north, fits in ((200, True), (215, True), (225, False), (400, False)):
+        place = GlobalTarget(*FRAME.degrees(Spot(north, 0, 0)), 40.0)
+        assert allowed(plane, messages.reposition(place)) is fits
+
+
+def test_plane_that_flies_at_a_border_is_leaving_a_radius_before_it(make: Any) -> None:
+    for north, leaves in ((150, False), (230, True)):
+        plane = make("plane", square(300), at=(north, 0, 40), velocity=(20, 0, 0), WP_LOITER_RAD=80.0)
+        assert (leaving(plane) is not None) is leaves
+
+
+def test_rover_has_no_floor_and_stops_by_its_own_deceleration(make: Any) -> None:
+    rover = make("rover", square(50), at=(0, 0, -3.0), ATC_DECEL_MAX=2.0)
+    assert allowed(rover, NedTarget(45, 0, 0)) and not allowed(rover, NedTarget(55, 0, 0))
+    assert allowed(rover, VelocityTarget(5, 0, 0)) and not allowed(rover, VelocityTarget(12, 0, 0))
+    assert allowed(rover, NedTarget(0, 0, 3.0))
+    for north, leaves in ((30, False), (42, True)):
+        driving = make("rover", square(50), at=(north, 0, 0), velocity=(5, 0, 0), ATC_DECEL_MAX=2.0)
+        assert (leaving(driving) is not None) is leaves
+
+
+def test_speed_in_force_counts_for_places(make: Any) -> None:
+    copter = make("copter", square(300, speed=5), WPNAV_SPEED=1000.0)
+    assert not allowed(copter, NedTarget(10, 0, -20))
+    copter.speeds.remember("ground", 4.0)
+    assert allowed(copter, NedTarget(10, 0, -20))
+    assert not allowed(copter, messages.change_speed("ground", 6.0))
+    assert allowed(copter, messages.change_speed("climb", 6.0))
+
+
+def test_longer_timeout_of_the_autopilot_makes_a_velocity_lead_farther(make: Any) -> None:
+    assert allowed(make("copter", square(100)), VelocityTarget(10, 0, 0))
+    assert not allowed(make("copter", square(100), GUID_TIMEOUT=10.0), VelocityTarget(10, 0, 0))
+
+
+def test_nothing_that_moves_is_sent_without_a_position_and_a_stop_is(make: Any, loop: Any) -> None:
+    copter = make("copter", square(100))
+    loop.pass_time(5.0)
+    for order in (NedTarget(10, 0, -20), VelocityTarget(1, 0, 0), messages.takeoff(10.0)):
+        with pytest.raises(Stale):
+            copter.inside(order)()
+    for order in (VelocityTarget(0, 0, 0), messages.set_mode(17), messages.set_mode(9), messages.disarm(True)):
+        copter.inside(order)()
+
+
+def test_home_that_is_not_known_is_stale_where_the_distance_counts(make: Any) -> None:
+    copter = make("copter", square(100, distance=50))
+    assert not allowed(copter, NedTarget(60, 0, -20))
+    del copter.state.messages["HOME_POSITION"]
+    with pytest.raises(Stale):
+        copter.inside(NedTarget(10, 0, -20))()
+
+
+def test_vehicle_outside_may_hold_its_place_but_not_creep_on(make: Any) -> None:
+    copter = make("copter", square(100), at=(110, 0, 20))
+    assert allowed(copter, NedTarget(110, 0, -20))
+    assert not allowed(copter, NedTarget(110.3, 0, -20))
+    assert allowed(copter, NedTarget(0, 0, -20))
+    address = Address(1, 1)
+    message = VelocityTarget(-1, 0, 0).to(address, NO_YAW)
+    with pytest.raises(OutsideEnvelope):
+        copter.guard.require(message)
+
+
+def test_faster_climb_needs_more_room_below_the_ceiling(make: Any) -> None:
+    near, fast = make("copter", square(100), at=(0, 0, 50), velocity=(0, 0, -1)), None
+    assert leaving(near) is None
+    fast = make("copter", square(100), at=(0, 0, 57), velocity=(0, 0, -4))
+    space, breach = leaving(fast)
+    assert breach.what == "field" and math.isfinite(breach.by) and space.envelope.areas

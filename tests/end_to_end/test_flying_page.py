@@ -1,0 +1,169 @@
+"""The page at / in a real browser: a flight by its buttons, keys and top view, and what it says when cut off."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.support.chromium import Page, chromium
+
+RIG_SPEEDUP = 5  # so that the page counts no number as old on a busy machine
+pytestmark = pytest.mark.needs("chromium")
+
+ESCAPE = 27
+CANVAS = "document.querySelector('top-view canvas')"
+BUTTON = "[...document.querySelectorAll('{tag}')].find(b => b.textContent === '{label}' && b.checkVisibility())"
+
+
+class Pilot:
+    """Somebody in front of the page."""
+
+    def __init__(self, page: Page, rig: Any) -> None:
+        self.page, self.rig = page, rig
+
+    async def sees(self, element: str, text: str) -> None:
+        """Wait until an element shows that text."""
+        await self.page.until(f"document.querySelector({element!r}).innerText.includes({text!r})")
+
+    async def hold(self, label: str) -> None:
+        """Hold a button until it acts."""
+        element = BUTTON.format(tag="hold-button", label=label)
+        await self.page.until(f"!{element}.button.disabled")
+        await self.page.evaluate(f"window.acted = false; {element}.addEventListener('confirmed', () => acted = true)")
+        x, y = await self.page.middle(element)
+        await self.page.press(x, y)
+        await self.page.until("acted")
+        await self.page.release(x, y)
+
+    async def click(self, label: str) -> None:
+        """Click a button."""
+        await self.page.click(BUTTON.format(tag="button", label=label))
+
+    async def hold_all_by_key(self) -> None:
+        """Hold Escape."""
+        await self.page.key("keyDown", "Escape", ESCAPE)
+        await self.page.until("!document.getElementById('hold-result').hidden")
+        await self.page.key("keyUp", "Escape", ESCAPE)
+
+
+async def take_off(pilot: Pilot) -> None:
+    await pilot.sees("flight-status", "Ready to arm.")
+    assert pilot.rig.ok(pilot.rig.get("/jobs"))["jobs"] == []  # to open the page has commanded nothing
+    await pilot.click("Arm")  # too short
+    await pilot.hold("Arm")
+    await pilot.sees("flight-status", "ARMED")
+    for height, refused in (("", "true"), ("501", "true"), ("10", "false")):
+        await pilot.page.evaluate(f"document.querySelector('flight-actions input').value = '{height}'")
+        button = BUTTON.format(tag="hold-button", label="Take off")
+        await pilot.page.until(f"{button}.button.disabled === {refused}")
+    await pilot.hold("Take off")
+    await pilot.sees("flight-actions", "Takeoff successful")
+    assert [job["verb"] for job in pilot.rig.ok(pilot.rig.get("/jobs"))["jobs"]] == [
+        "/command/arm",
+        "/command/takeoff",
+    ]
+
+
+async def go_to_a_click(pilot: Pilot, right: float, down: float) -> None:
+    await pilot.page.click(CANVAS, right, down)
+    await pilot.sees("go-to", "m away")
+    assert pilot.rig.ok(pilot.rig.get("/jobs"))["jobs"][-1]["state"] != "running"  # a click alone sends nothing
+    await pilot.hold("Go there")
+    await pilot.sees("flight-status", "Commanded by go to gps wait of 127.0.0.1")
+
+
+async def fly_a_drawn_mission(pilot: Pilot) -> None:
+    await pilot.click("Mission")
+    await pilot.sees("mission-plan", "holds no items")
+    await pilot.click("Draw")
+    await pilot.sees("mission-plan", "Drawing")
+    for right, down in ((-120, -90), (120, -90)):
+        await pilot.page.click(CANVAS, right, down)
+    await pilot.hold("Upload draft")
+    await pilot.sees("mission-plan", "Mission of 4 items uploaded")
+    await pilot.sees("mission-plan", "holds 4 items")
+    await pilot.hold("Start mission")
+    await pilot.sees("flight-status", "AUTO")
+
+
+async def see_the_link_lost(pilot: Pilot) -> None:
+    pilot.rig.control.fault("silence", sending=True, receiving=True)
+    await pilot.sees("#trouble", "LINK LOST: vehicle 1")
+    await pilot.page.until("[...document.querySelectorAll('.tile')].every(tile => tile.classList.contains('old'))")
+    await pilot.sees("flight-status", "Not known: this is old.")
+    await pilot.click("HOLD ALL")
+    await pilot.sees("#hold-result", "0 of 1 hold")
+    await pilot.sees("#hold-result", "vehicle 1: no heartbeat")
+    pilot.rig.control.ask("clear")
+    await pilot.sees("connection-state", "live")
+
+
+async def give_the_token(pilot: Pilot) -> None:
+    pilot.rig.mavproxy.ask("uavapi set token sesame", "listening on")  # anew
+    await pilot.page.visit(pilot.rig.url + "/")
+    await pilot.page.until("document.querySelector('dialog').open")
+    await pilot.sees("#trouble", "this API wants its token")
+    await pilot.page.ask("Input.insertText", text="sesame")
+    await pilot.click("Use it")
+    await pilot.sees("connection-state", "live")
+    assert await pilot.page.evaluate("JSON.stringify(localStorage).includes('sesame') || document.cookie") in (
+        False,
+        "",
+    )
+
+
+async def see_the_api_gone(pilot: Pilot) -> None:
+    pilot.rig.mavproxy.type("module unload uavapi")
+    await pilot.sees("#trouble", "NO LIVE DATA")
+    await pilot.page.until("document.querySelector('flight-status').classList.contains('old')")
+    await pilot.click("HOLD ALL")
+    await pilot.sees("#hold-result", "HOLD ALL WAS NOT DELIVERED")
+
+
+async def accessible(pilot: Pilot) -> None:
+    """Let axe-core look at the page as it is; it may find nothing serious."""
+    spec = find_spec("axe_core_python")
+    assert spec is not None and spec.origin is not None
+    await pilot.page.evaluate(Path(spec.origin).with_name("axe.min.js").read_text(encoding="utf-8") + ";0")
+    found = json.loads(await pilot.page.evaluate("axe.run().then(r => JSON.stringify(r.violations))"))
+    assert [one["id"] for one in found if one["impact"] in ("serious", "critical")] == []
+
+
+async def flight(rig: Any, directory: Path) -> list[str]:
+    async with chromium(directory) as page:
+        pilot = Pilot(page, rig)
+        await page.visit(rig.url + "/")
+        await pilot.sees("connection-state", "live")
+        await take_off(pilot)
+        rig.control.fault("pilot_sticks", throttle=1500)
+        await go_to_a_click(pilot, 150, -90)
+        await pilot.sees("flight-actions", "Arrived at coord")
+        await fly_a_drawn_mission(pilot)
+        await accessible(pilot)
+        rig.control.fault("pilot_mode", mode="LOITER")
+        await pilot.sees("flight-status", "Commanded by its pilot (LOITER)")
+        await pilot.hold("Guided")
+        await pilot.sees("flight-status", "GUIDED")
+        await go_to_a_click(pilot, -200, 100)
+        await pilot.hold_all_by_key()
+        await pilot.sees("#hold-result", "every vehicle holds")
+        await pilot.sees("flight-status", "BRAKE")
+        await pilot.sees("flight-actions", "was superseded")
+        await see_the_link_lost(pilot)
+        await page.resize(390, 844)
+        await page.until("document.documentElement.scrollWidth <= innerWidth")
+        await accessible(pilot)
+        await pilot.hold("Land")
+        await pilot.sees("flight-actions", "Landed")
+        await give_the_token(pilot)
+        await see_the_api_gone(pilot)
+        return page.complaints
+
+
+def test_a_whole_flight_from_the_page(embedded_rig: Any, tmp_path: Path) -> None:
+    assert asyncio.run(flight(embedded_rig, tmp_path)) == []

@@ -1,0 +1,120 @@
+"""No verb can forget the envelope: all that is sent to a vehicle passes its guard; what is new to it is refused."""
+
+from __future__ import annotations
+
+import ast
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from mavproxy_uavapi.core.errors import OutsideEnvelope
+from mavproxy_uavapi.core.vehicle import orders
+from mavproxy_uavapi.core.vehicle.guard import STOPPING, GuardedLink
+from mavproxy_uavapi.core.vehicle.registry import CLASSES
+from tests.rules import outcomes
+from tests.rules.test_fault_matrix import REQUESTS, STAGES, begin, prepare
+from tests.support.envelopes import feature, square
+
+ROOT = Path(__file__).parents[2]
+FAR_AWAY = {"type": "FeatureCollection", "features": [feature("elsewhere", square(50, 3000, 3000))]}
+STOP_MODES = {5, 6, 9, 17, 21}  # ArduCopter's LOITER (a plane's hold), RTL, LAND, BRAKE, SMART_RTL
+
+
+@pytest.mark.parametrize("kind", CLASSES)
+def test_every_way_to_the_link_passes_the_guard(host: Any, kind: str) -> None:
+    from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
+
+    vehicle = CLASSES[kind](VehicleState(1, 1, 2, 0.0), host.link, host.pending, host.clock)
+    ways = vehicle.link, vehicle.commands._link, vehicle.waypoints._link, vehicle.parameters._link
+    assert all(way is vehicle.link for way in ways) and isinstance(vehicle.link, GuardedLink)
+
+
+def test_nobody_but_the_registry_is_given_the_bare_link() -> None:
+    files = [
+        file for package in ("uavapi", "vision", "gradys") for file in (ROOT / f"mavproxy_{package}").rglob("*.py")
+    ]
+    bare = []
+    for file in files:
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            is_link = isinstance(node, ast.Attribute) and node.attr in ("link", "_mavproxy_link")
+            if is_link and isinstance(node.value, ast.Name | ast.Attribute):
+                owner = node.value.id if isinstance(node.value, ast.Name) else node.value.attr
+                if owner.strip("_") == "host":
+                    bare.append(f"{file}: {owner}.{node.attr}")
+    assert bare == []
+
+
+def test_every_command_that_is_not_known_is_unknown() -> None:
+    known = orders.HARMLESS_COMMANDS | orders.COMMANDS.keys()
+    for number in mavlink.enums["MAV_CMD"]:
+        message = mavlink.MAVLink_command_long_message(1, 1, number, 0, *(1.0,) * 7)
+        assert isinstance(orders.order_of(message), orders.Unknown) == (number not in known or number == 192)
+
+
+def test_every_message_that_is_not_known_is_unknown() -> None:
+    known = orders.HARMLESS_MESSAGES | orders.READERS.keys()
+    assert (
+        "SET_ATTITUDE_TARGET" not in known and "RC_CHANNELS_OVERRIDE" not in known and "MANUAL_CONTROL" not in known
+    )
+
+    class Message:
+        def __init__(self, name: str) -> None:
+            self._name = name
+
+        def get_type(self) -> str:
+            return self._name
+
+    for cls in mavlink.mavlink_map.values():
+        if cls.msgname not in known:
+            assert isinstance(orders.order_of(Message(cls.msgname)), orders.Unknown)
+
+
+def test_setpoint_of_a_kind_that_no_verb_uses_is_refused(host: Any, copter: Any, flying: Any, loop: Any) -> None:
+    from mavproxy_uavapi.core.envelope import formats
+
+    host.envelopes.put("api", 0, formats.of_geojson(FAR_AWAY, "a test"))
+    head = (0, 1, 1)
+    accelerating = mavlink.MAVLink_set_position_target_local_ned_message(*head, 1, 0b110000111111, *(1.0,) * 9, 0, 0)
+    offset = mavlink.MAVLink_set_position_target_local_ned_message(*head, 7, 0b110111111000, *(1.0,) * 9, 0, 0)
+    amsl = mavlink.MAVLink_set_position_target_global_int_message(*head, 5, 0b110111111000, 0, 0, 1.0, *(0.0,) * 8)
+    moded = mavlink.MAVLink_command_int_message(1, 1, 6, 192, 0, 0, -1, 1, 0, 0, 0, 0, 10)
+    for message in (accelerating, offset, amsl, moded):
+        with pytest.raises(OutsideEnvelope):
+            loop.run(copter.link.send(message, 1))
+    assert flying.setpoints() == []
+
+
+@pytest.mark.parametrize("verb", [name for name in REQUESTS if name not in ("stop", "resume")])
+def test_no_verb_moves_a_vehicle_that_is_outside_but_to_stop_it_or_bring_it_down(make_world: Any, verb: str) -> None:
+    request = REQUESTS[verb]
+    world = make_world(STAGES[request.stage], camera=request.camera)
+    prepare(world, request.stage, "none")
+    assert world.ask("PUT", "/envelope", FAR_AWAY).outcome == "200"
+    since = world.loop.time()
+    begin(world, verb, request.far if request.far is not None else request.near)
+    world.loop.pass_time(6.0)
+    for message in world.orders(since=since):
+        assert stays_or_comes_down(message, world.at), message
+    assert outcomes.VERBS[verb]
+
+
+def stays_or_comes_down(message: Any, at: tuple[float, float, float]) -> bool:
+    order = orders.order_of(message)
+    if isinstance(order, orders.Fly):
+        return order.velocity == (0.0, 0.0, 0.0)
+    if isinstance(order, orders.GoTo):
+        return math.dist((order.target.x, order.target.y, order.target.z), at) < 0.5
+    if isinstance(order, orders.SwitchMode):
+        return order.number in STOP_MODES | {4}
+    return (
+        order is None
+        or isinstance(order, orders.ChangeSpeed)
+        or (isinstance(order, orders.SetParameter) and order.name.startswith("PLND_"))
+    )
+
+
+def test_stopping_modes_are_named_once() -> None:
+    assert {"BRAKE", "LAND", "RTL", "HOLD"} <= STOPPING

@@ -1,0 +1,108 @@
+"""A client that commands and then falls silent: its vehicle is seen to, unless somebody else has it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from mavproxy_uavapi.core.vehicle.endings import Policy
+
+FAR = {"x": 300, "y": 0, "z": -8}
+QUIET = "/movement/go_to_ned?lease=5&client=mission"
+
+
+@pytest.fixture
+def world(make_world: Any) -> Any:
+    return make_world()
+
+
+def speed(world: Any) -> float:
+    return math.hypot(*world.copter.body.velocity)
+
+
+def shown(world: Any) -> Any:
+    return world.ask("GET", "/vehicles/1?client=watcher").body["lease"]
+
+
+@pytest.mark.parametrize("wait", ["", "&wait=false"])
+def test_vehicle_holds_when_the_lease_of_a_silent_client_runs_out(world: Any, wait: str) -> None:
+    path = QUIET.replace("go_to_ned", "go_to_ned_wait") if wait else QUIET
+    assert world.ask("POST", path + wait, FAR).status in (200, 202)
+    world.loop.pass_time(4.5)
+    assert speed(world) > 4.0 and shown(world)["client"] == "mission@127.0.0.1"
+    world.loop.pass_time(10.0)
+    assert speed(world) < 0.3 and shown(world) is None
+    assert "the lease of mission@127.0.0.1 ran out" in world.screen()
+    if wait:
+        jobs = world.ask("GET", "/jobs?client=watcher").body["jobs"]
+        flight = next(job for job in jobs if job["verb"] == "/movement/go_to_ned_wait")
+        assert flight["error"]["code"] == "aborted" and "lease" in flight["error"]["detail"]
+
+
+def test_any_call_of_the_client_renews_it_and_calls_of_others_do_not(world: Any) -> None:
+    world.ask("POST", QUIET, FAR)
+    for _ in range(4):
+        world.loop.pass_time(4.0)
+        world.ask("GET", "/telemetry/gps?client=mission")
+    assert speed(world) > 4.0
+    for _ in range(4):
+        world.loop.pass_time(3.0)
+        world.ask("GET", "/telemetry/gps?client=watcher")
+    assert speed(world) < 0.3
+
+
+@pytest.mark.parametrize(("policy", "mode"), [(Policy.LAND, "LAND"), (Policy.RTL, "RTL")])
+def test_setting_says_what_the_vehicle_does(world: Any, policy: Policy, mode: str) -> None:
+    world.host.endings.on_lease_end = policy
+    world.ask("POST", QUIET, FAR)
+    world.loop.pass_time(8.0)
+    assert world.copter.mode.name == mode
+
+
+def test_vehicle_that_somebody_else_commands_by_then_is_left_alone(world: Any) -> None:
+    world.ask("POST", QUIET, FAR)
+    world.loop.pass_time(2.0)
+    world.ask("POST", "/movement/go_to_ned?client=other", {"x": -300, "y": 0, "z": -8})
+    since = world.loop.time()
+    world.loop.pass_time(10.0)
+    assert world.orders(since=since) == []
+    assert world.copter.body.velocity[0] < -4.0
+
+
+def test_pilot_and_landing_are_left_alone(world: Any) -> None:
+    world.ask("POST", QUIET, FAR)
+    world.fault("pilot_mode", mode="LOITER")
+    since = world.loop.time()
+    world.loop.pass_time(10.0)
+    assert world.orders(since=since) == []
+
+
+def test_landing_that_the_client_began_goes_on(world: Any) -> None:
+    world.ask("GET", "/command/land?wait=false&lease=2&client=mission")
+    world.loop.pass_time(25.0)
+    assert not world.copter.armed and world.at[2] > -0.1
+
+
+def test_lease_is_given_back(world: Any) -> None:
+    world.ask("POST", QUIET, FAR)
+    world.ask("POST", "/movement/go_to_ned?lease=0&client=mission", FAR)
+    assert shown(world) is None
+    world.loop.pass_time(10.0)
+    assert speed(world) > 4.0
+
+
+def test_lease_that_runs_out_while_the_link_is_silent_counts_when_it_is_back(world: Any) -> None:
+    world.ask("POST", QUIET, FAR)
+    world.loop.pass_time(1.0)
+    world.cut_until = world.loop.time() + 9.0
+    world.loop.pass_time(9.0)
+    assert speed(world) > 4.0
+    world.loop.pass_time(6.0)
+    assert speed(world) < 0.3
+
+
+@pytest.mark.parametrize("query", ["lease=-1", "lease=x", "lease=nan", "lease=1e9", "client=", "client=a%20b"])
+def test_lease_that_makes_no_sense_is_refused(world: Any, query: str) -> None:
+    assert world.ask("POST", f"/movement/go_to_ned?{query}", FAR).outcome == "422 invalid"

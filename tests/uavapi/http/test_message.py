@@ -1,0 +1,75 @@
+"""/message, before the scripted copter."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+PAUSE = {"command": "MAV_CMD_DO_SET_MODE", "confirmation": 0, "param1": 1, "param2": 17}
+PAUSE |= dict.fromkeys([f"param{number}" for number in range(3, 8)], 0)
+BRAKE = {"name": "COMMAND_LONG", "fields": PAUSE}
+DOWN = {"time_boot_ms": 0, "coordinate_frame": "MAV_FRAME_LOCAL_NED", "type_mask": 0x0DF8, "x": 0, "y": 0, "z": -5}
+DOWN |= dict.fromkeys(("vx", "vy", "vz", "afx", "afy", "afz", "yaw", "yaw_rate"), 0)
+SETPOINT = {"name": "SET_POSITION_TARGET_LOCAL_NED", "fields": DOWN}
+
+
+@pytest.fixture
+def allowed(api: Any) -> None:
+    api.service.settings = replace(api.service.settings, allow_raw=True)
+
+
+def test_off_until_it_is_set(api: Any, flying: Any) -> None:
+    answer = api.post("/message", BRAKE)
+    assert (answer.status, answer.body["code"]) == (403, "forbidden")
+    assert "allow_raw" in answer.body["detail"]
+    assert flying.orders() == []
+
+
+@pytest.mark.usefixtures("allowed")
+def test_a_command_is_done_when_it_is_accepted(api: Any, flying: Any) -> None:
+    answer = api.post("/message", BRAKE)
+    assert (answer.status, answer.body["result"]) == (200, "COMMAND_LONG accepted")
+    assert flying.mode == "BRAKE"
+
+
+@pytest.mark.usefixtures("allowed")
+def test_a_refused_command_is_an_error_with_its_ack(api: Any, flying: Any) -> None:
+    flying.answers[mavlink.MAV_CMD_DO_SET_MODE] = [mavlink.MAV_RESULT_DENIED]
+    answer = api.post("/message", BRAKE)
+    assert (answer.status, answer.body["code"], answer.body["ack"]) == (500, "rejected", "MAV_RESULT_DENIED")
+    assert len(flying.orders()) == 1
+
+
+@pytest.mark.usefixtures("allowed")
+def test_any_other_message_is_sent_as_it_is(api: Any, flying: Any) -> None:
+    assert api.post("/message", SETPOINT).body["result"] == "SET_POSITION_TARGET_LOCAL_NED sent"
+    (order,) = flying.orders()
+    assert (order.get_type(), order.z, order.target_system) == ("SET_POSITION_TARGET_LOCAL_NED", -5.0, 1)
+
+
+@pytest.mark.usefixtures("allowed")
+def test_it_supersedes_a_movement(api: Any, flying: Any) -> None:
+    movement = api.post("/movement/go_to_ned_wait?wait=false", {"x": 200, "y": 0, "z": -20}).body["job"]
+    assert api.post("/message", SETPOINT).status == 200
+    assert api.get(f"/jobs/{movement}").body["error"]["code"] == "superseded"
+
+
+@pytest.mark.usefixtures("allowed")
+@pytest.mark.parametrize("message", [BRAKE, SETPOINT])
+def test_a_pilot_who_flies_is_left_alone(api: Any, flying: Any, message: Any) -> None:
+    flying.pilot("LOITER")
+    api.loop.settle()
+    answer = api.post("/message", message)
+    assert (answer.status, answer.body["code"]) == (409, "mode_changed")
+    assert flying.orders() == []
+
+
+@pytest.mark.usefixtures("allowed")
+def test_what_does_not_fit_is_422_and_names_the_field(api: Any, flying: Any) -> None:
+    answer = api.post("/message", {**BRAKE, "fields": {**PAUSE, "param1": "x"}})
+    assert answer.status == 422
+    assert answer.body["detail"][0]["loc"] == ["body", "fields", "param1"]
+    assert flying.orders() == []
