@@ -26,6 +26,7 @@ log = logging.getLogger("gradys.spool")
 
 COMMIT_EVERY = 0.5  # s between transactions for sampled readings
 TRIM_EVERY = 10.0  # s
+CLOSING_POLL = 0.01  # s
 HELD = 5000  # sampled readings held in memory while they cannot be written; beyond it the oldest are dropped
 
 
@@ -83,7 +84,9 @@ class SpoolThread:
             self._closed = True
             closing = self._thread.submit(self._close)  # it runs even if this task is cancelled
             self._thread.shutdown(wait=False)
-        await asyncio.wrap_future(closing)
+        while not closing.done():  # a task that awaits it would, when cancelled, cancel the closing that still waits
+            await asyncio.sleep(CLOSING_POLL)
+        closing.result()
         self._thread.shutdown()  # it has nothing left to do
         self._drops.report(self.dropped, at_once=True)
 

@@ -26,6 +26,7 @@ class Page:
         self._socket = socket
         self._number = 0
         self.complaints: list[str] = []  # errors of scripts, and what the page's policy refused
+        self.failed_requests: list[str] = []
 
     async def ask(self, method: str, **params: Any) -> dict[str, Any]:
         """One command; its result."""
@@ -43,8 +44,12 @@ class Page:
     def _note(self, event: dict[str, Any]) -> None:
         if event.get("method") == "Runtime.exceptionThrown":
             self.complaints.append(json.dumps(event["params"]["exceptionDetails"]))
-        elif event.get("method") == "Log.entryAdded" and event["params"]["entry"]["source"] != "network":
-            self.complaints.append(event["params"]["entry"]["text"])
+        elif event.get("method") == "Log.entryAdded":
+            entry = event["params"]["entry"]
+            if entry["source"] == "network":
+                self.failed_requests.append(f"{entry.get('url')}: {entry['text']}")
+            else:
+                self.complaints.append(entry["text"])
 
     async def visit(self, url: str, width: int = 1440, height: int = 900) -> None:
         """Open an address, in a window of that size, and begin to note complaints."""
@@ -100,7 +105,10 @@ class Page:
                 if await self.evaluate(script):
                     return
             if time.monotonic() > deadline:
-                raise AssertionError(f"{script}: the page says {await self.evaluate('document.body.innerText')}")
+                text = await self.evaluate("document.body.innerText")
+                raise AssertionError(
+                    f"{script}: the page says {text!r}; complaints {self.complaints}, failed {self.failed_requests}"
+                )
             await asyncio.sleep(0.1)
 
     async def picture(self) -> bytes:

@@ -1,9 +1,12 @@
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import math
 import sqlite3
+import threading
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -364,3 +367,30 @@ def test_the_log_names_the_file_that_was_set_aside(loop: Any, disk: Disk, caplog
     begin(loop, spool_thread)
     assert [record.message.rpartition("/")[2] for record in caplog.records] == ["spool.db.corrupt-1"]
     loop.run(spool_thread.stop())
+
+
+def test_a_stop_that_is_cancelled_behind_a_slow_disk_still_closes_the_file(tmp_path: Path) -> None:
+    path, slow, busy = tmp_path / "spool.db", threading.Event(), threading.Event()
+
+    def hang(_: Spool) -> None:
+        busy.set()
+        slow.wait(30)
+
+    async def scenario() -> ThreadPoolExecutor:
+        spool_thread = SpoolThread(lambda: Spool(path, 1e9, 1e9))
+        spool_thread.start([SINK])
+        await spool_thread.keep([reading()])
+        work = asyncio.create_task(spool_thread._do(hang))
+        await asyncio.to_thread(busy.wait, 30)
+        stop = asyncio.create_task(spool_thread.stop())
+        for _ in range(3):  # as a module's end does, and then the loop's
+            await asyncio.sleep(0.05)
+            stop.cancel()
+        slow.set()
+        await asyncio.gather(work, stop, return_exceptions=True)
+        return spool_thread._thread
+
+    thread = asyncio.run(scenario())
+    thread.shutdown()
+    with contextlib.closing(sqlite3.connect(path, timeout=0)) as db:
+        assert db.execute("SELECT count(*) FROM readings").fetchone() == (1,)
