@@ -10,6 +10,9 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 # Compiling all of pymavlink's dialects takes longer than the rest; what is imported is compiled then.
 LOCKED := install --no-compile --no-deps --require-hashes --only-binary :all: -r
 
+# Container images often set it; then each of some hundred processes of the tests would compile MAVProxy anew.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: demo demo-fleet test test-all test-sitl lint format bench soak lock clean help
 
 demo: $(MODULES)  ## fly a simulated copter: MAVProxy with uavapi and vision; ARGS go to mavproxy-uavapi
