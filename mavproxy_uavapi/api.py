@@ -82,6 +82,8 @@ class Api:
 def apply(settings: ApiSettings, host: Host) -> None:
     """Set what the vehicles do by these settings, whoever commands them."""
     host.link_watch.timeout = settings.link_timeout
+    host.registry.traffic.separation = settings.separation
+    host.registry.traffic.waits = settings.on_conflict == "wait"
     host.endings.on_disconnect = Policy.HOLD if settings.on_disconnect == "hold" else Policy.NOTHING
     host.endings.on_lease_end = Policy(settings.on_lease_end)
     host.endings.on_script_exit = Policy(settings.on_script_exit)

@@ -76,6 +76,8 @@ class ApiSettings:
         script_size: kB of one script.
         script_quota: MB of all scripts together.
         envelope: file with where vehicles may fly; `vehicle` for their own fences, empty for none.
+        separation: m that vehicles keep from each other; 0 keeps none.
+        on_conflict: what a command does that leads too near to another vehicle: refuse, or wait.
         on_lease_end: what the vehicle does when its client's lease runs out: hold, land or rtl.
         on_script_exit: what the vehicle does when its script dies in flight: nothing, hold, land or rtl.
         log_console, debug: components (COPTER, API, GRADYS_GS, SCRIPT) that log to the console, in detail.
@@ -109,6 +111,8 @@ class ApiSettings:
     script_size: int
     script_quota: int
     envelope: str
+    separation: float
+    on_conflict: str
     on_script_exit: str
     log_console: frozenset[str]
     log_path: str
@@ -251,6 +255,8 @@ class ApiModuleSettings(ModuleSettings[ApiSettings]):
             MPSetting("on_disconnect", str, "continue", "when a client hangs up", choice=["continue", "hold"]),
             MPSetting("on_lease_end", str, "hold", "when a client's lease ends", choice=["hold", "land", "rtl"]),
             MPSetting("envelope", str, "", "where vehicles may fly: a file, or `vehicle`"),
+            MPSetting("separation", float, 0.0, "m that vehicles keep from each other; 0: none", range=(0, 1000)),
+            MPSetting("on_conflict", str, "refuse", "for what leads too near", choice=["refuse", "wait"]),
             MPSetting("allow_from", str, "", "networks that may call without a token", tab="Access"),
             MPSetting("allow_scripts_from", str, "", "networks among these that may run scripts, too"),
             MPSetting("allow_open", bool, False, "let everybody call without a token"),

@@ -84,7 +84,8 @@ class SpoolThread:
             self._closed = True
             closing = self._thread.submit(self._close)  # it runs even if this task is cancelled
             self._thread.shutdown(wait=False)
-        while not closing.done():  # a task that awaits it would, when cancelled, cancel the closing that still waits
+        # A task that awaits it would, when cancelled, cancel the closing that still waits for the thread.
+        while not closing.done():  # noqa: ASYNC110
             await asyncio.sleep(CLOSING_POLL)
         closing.result()
         self._thread.shutdown()  # it has nothing left to do

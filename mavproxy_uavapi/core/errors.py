@@ -13,6 +13,7 @@
     |  |- Paused               409 paused         `stop` holds the vehicle
     |  |- NotArmed             409 not_armed
     |  |- OutsideEnvelope      409 outside_envelope
+    |  |- TooNear              409 too_near       it would come too near to another vehicle
     |  `- Aborted              409 aborted
     |- Invalid                 422 invalid        nothing was sent
     |  `- SettingError         422 invalid        an unknown setting, or a value that it refuses
@@ -141,6 +142,23 @@ class OutsideEnvelope(Conflict):
     def extras(self) -> dict[str, Any]:
         """`outside`, where something is."""
         return {"outside": self.outside} if self.outside else {}
+
+
+class TooNear(Conflict):
+    """It would come too near to another vehicle; nothing was sent.
+
+    `near` says to which `vehicle`, in how many s (`in_s`), and `at` which place (as of `OutsideEnvelope`).
+    """
+
+    code = "too_near"
+
+    def __init__(self, sentence: str, near: Mapping[str, Any]) -> None:
+        super().__init__(sentence)
+        self.near = dict(near)
+
+    def extras(self) -> dict[str, Any]:
+        """`near`."""
+        return {"near": self.near}
 
 
 class Aborted(Conflict):

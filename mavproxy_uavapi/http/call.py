@@ -164,7 +164,7 @@ class Call:
 
         async def body(job: Job) -> str:
             with self.naming_source():
-                await verb(job)
+                await self.service.host.registry.traffic.in_turn(job, verb)
             return result if isinstance(result, str) else result()
 
         jobs = self.service.host.jobs

@@ -61,6 +61,11 @@ class CommandAuthority:
         return self.commander is not None and self.commander.running and not self._shown
 
     @property
+    def rank(self) -> Rank:
+        """The commander's rank."""
+        return self._rank
+
+    @property
     def interrupted(self) -> Job | None:
         """The job that waits for the end of a pause."""
         return None if self._suspended is None else self._suspended[0]

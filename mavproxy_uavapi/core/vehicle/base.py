@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import ModeChanged, NotArmed, Rejected, Stale, Superseded
-from mavproxy_uavapi.core.mavlink.flight_modes import kind_of, mode_name, mode_names, mode_number
+from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission, kind_of, mode_name, mode_names, mode_number
 from mavproxy_uavapi.core.mavlink.link import Address, Link, is_finite
 from mavproxy_uavapi.core.mavlink.pending_waits import PendingWaits
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
@@ -19,7 +19,7 @@ from mavproxy_uavapi.core.vehicle.authority import CommandAuthority
 from mavproxy_uavapi.core.vehicle.command_sender import CommandSender
 from mavproxy_uavapi.core.vehicle.envelope_check import Spaces
 from mavproxy_uavapi.core.vehicle.geodesy import offset
-from mavproxy_uavapi.core.vehicle.guard import EnvelopeGuard, GuardedLink
+from mavproxy_uavapi.core.vehicle.guard import STOPPING, EnvelopeGuard, GuardedLink
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.message_waiter import MessageWaiter
 from mavproxy_uavapi.core.vehicle.mission_files import MissionItem
@@ -243,6 +243,20 @@ class BaseVehicle:
     def has_foreign_target(self) -> bool:
         """Whether the autopilot reports a target that another ground station gave it."""
         return False
+
+    @property
+    def flies_for_us(self) -> bool:
+        """Whether it flies by a command of ours: in a mode that we chose or command in, towards no other's target."""
+        if not self.state.armed or (self.state.landed and self.kind != "rover") or self.authority.commander is None:
+            return False
+        if self.mode in STOPPING or self.mode == self.holding_mode:
+            return False
+        if not (
+            self.mode == "GUIDED" or flies_mission(self.mode) or (self.mode == "TAKEOFF" and self.kind == "plane")
+        ):
+            return False
+        commanded = self.guard.ordered_at >= self.state.mode_since or self.is_mode_of_ours
+        return commanded and not self.has_foreign_target
 
     def commanding(self, job: Job, *needs: Callable[[], None]) -> Callable[[], None]:
         """The check before each message of `job`: it still commands, and no need raises."""

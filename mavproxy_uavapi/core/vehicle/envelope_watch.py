@@ -1,6 +1,7 @@
 """In flight: a vehicle under our command that will leave its envelope in the time that it needs to stop is stopped.
 
-One under the pilot's hand is never touched, nor one that lands, returns or holds.
+So is one that will come too near to another; of two of ours that with the lower rank, or else the later command. One
+under the pilot's hand is never touched, nor one that lands, returns or holds.
 """
 
 from __future__ import annotations
@@ -13,15 +14,15 @@ from collections.abc import Callable
 from typing import Any
 
 from mavproxy_uavapi.core.envelope import braking
+from mavproxy_uavapi.core.envelope.forecast import Meeting
 from mavproxy_uavapi.core.envelope.space import TOUCH, Breach, Space, Spot, outside_by
 from mavproxy_uavapi.core.envelope.store import Envelopes
-from mavproxy_uavapi.core.errors import OutsideEnvelope, Stale, UavApiError
+from mavproxy_uavapi.core.errors import OutsideEnvelope, Stale, TooNear, UavApiError
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle import time_limits
 from mavproxy_uavapi.core.vehicle.geodesy import moved
-from mavproxy_uavapi.core.vehicle.guard import STOPPING
 from mavproxy_uavapi.core.vehicle.jobs import Ending, Job, JobBook
 from mavproxy_uavapi.core.vehicle.mission_way import Stop
 from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
@@ -34,6 +35,7 @@ INTERVAL = 0.25  # s between two positions, until the vehicle has told two
 SLOWEST = 0.3  # m/s; slower than this nothing is stopped
 HOME_ASKED, HOME_PAUSE = 60, 2.0  # times that home is asked for, and s between them
 CORRIDOR, MISSION_CORRIDOR = 1.5, 3.0  # m beside a way that was allowed, in which the autopilot is trusted to stop
+MARGIN = 1.0  # s more than it needs to stop, in which no vehicle comes too near to another
 
 
 class EnvelopeWatch:
@@ -59,7 +61,7 @@ class EnvelopeWatch:
 
     def listen(self, state: VehicleState, message: Any) -> None:
         """A message from a vehicle."""
-        if not self._envelopes.of(state.system):
+        if not self._envelopes.of(state.system) and not self._registry.traffic.in_force:
             return
         is_position = message.get_type() == "GLOBAL_POSITION_INT" and message.get_srcComponent() == state.component
         if is_position:
@@ -94,25 +96,44 @@ class EnvelopeWatch:
         await self._tasks.end()
 
     def look(self, vehicle: Vehicle) -> None:
-        """Stop the vehicle if it is ours and will leave."""
-        stop = self._stops.get(vehicle.state.system)
-        if not is_ours(vehicle) or (stop is not None and stop.running):
+        """Stop the vehicle if it is ours and will leave, or come too near to another."""
+        vehicle.guard.remaining()  # how far it is on its way
+        if not self._may_stop(vehicle):
             return
         try:
             found = leaving(vehicle)
+            near = None if found else self._registry.traffic.nearing(vehicle, _until_it_stands(vehicle) + MARGIN)
         except Stale:
             return  # where it is, or where home is, nobody knows: what moves it is refused
         if found is not None:
-            self._stop(vehicle, *found)
+            space, breach = found
+            what = f"{breach.what} of {space.envelope.source}"
+            details = {"what": breach.what, "source": space.envelope.source}
+            self._stop(vehicle, f"break {what}", what, lambda sentence: OutsideEnvelope(sentence, details))
+        elif near is not None:
+            self._stop_one(vehicle, *near)
 
-    def _stop(self, vehicle: Vehicle, space: Space, breach: Breach) -> None:
+    def _may_stop(self, vehicle: Vehicle) -> bool:
+        stop = self._stops.get(vehicle.state.system)
+        return vehicle.flies_for_us and (stop is None or not stop.running)
+
+    def _stop_one(self, vehicle: Vehicle, other: Vehicle, found: Meeting) -> None:
+        """Stop that of two vehicles which has the lower rank, or else the later command."""
+        ours = [one for one in (vehicle, other) if self._may_stop(one) and _moves(one)]
+        if not ours:
+            return
+        held = min(ours, key=lambda one: (one.authority.rank, -one.guard.ordered_at))
+        kept_from = other if held is vehicle else vehicle
+        what = f"vehicle {kept_from.state.system}"
+        near = {"vehicle": kept_from.state.system, "in_s": round(found.seconds, 1)}
+        self._stop(held, f"come too near to {what}", what, lambda sentence: TooNear(sentence, near))
+
+    def _stop(self, vehicle: Vehicle, deed: str, what: str, error_of: Callable[[str], UavApiError]) -> None:
         system = vehicle.state.system
-        what = f"{breach.what} of {space.envelope.source}"
-        sentence = f"vehicle {system} was about to break {what}: it is stopped ({vehicle.holding_mode})"
+        sentence = f"vehicle {system} was about to {deed}: it is stopped ({vehicle.holding_mode})"
         log.critical("%s", sentence)
         self._say(sentence)
         commander = vehicle.authority.flies
-        error = OutsideEnvelope(sentence, {"what": breach.what, "source": space.envelope.source})
 
         async def body(job: Job) -> str:
             await vehicle.set_mode(job, vehicle.holding_mode)
@@ -123,25 +144,12 @@ class EnvelopeWatch:
         )
         self._stops[system] = job
         if commander is not None:
-            commander.abort(error, Ending.SUPERSEDED)
+            commander.abort(error_of(sentence), Ending.SUPERSEDED)
         job.when_ended(lambda: self._tell_failure(job, system))
 
     def _tell_failure(self, job: Job, system: int) -> None:
         if isinstance(job.error, UavApiError):
             self._say(f"vehicle {system} was not stopped: {job.error}")
-
-
-def is_ours(vehicle: Vehicle) -> bool:
-    """Whether it flies by a command of ours: in a mode that we chose or command in, towards no other's target."""
-    state, mode = vehicle.state, vehicle.mode
-    if not state.armed or (state.landed and vehicle.kind != "rover") or vehicle.authority.commander is None:
-        return False
-    if mode in STOPPING or mode == vehicle.holding_mode:
-        return False
-    if not (mode == "GUIDED" or flies_mission(mode) or (mode == "TAKEOFF" and vehicle.kind == "plane")):
-        return False
-    commanded = vehicle.guard.ordered_at >= state.mode_since or vehicle.is_mode_of_ours
-    return commanded and not vehicle.has_foreign_target
 
 
 def leaving(vehicle: Vehicle) -> tuple[Space, Breach] | None:
@@ -165,6 +173,20 @@ def leaving(vehicle: Vehicle) -> tuple[Space, Breach] | None:
         if breach is not None and _gets_worse(way, rules):
             return space, breach
     return None
+
+
+def _moves(vehicle: Vehicle) -> bool:
+    return math.hypot(*_velocity(vehicle)) >= SLOWEST
+
+
+def _until_it_stands(vehicle: Vehicle) -> float:
+    """Seconds of the vehicle's clock from now until it stands, if it is stopped after its next position."""
+    speed, parameters = math.hypot(*_velocity(vehicle)), vehicle.state.parameters
+    if vehicle.kind == "plane":
+        return _until_it_brakes(vehicle) + 2 * vehicle.guard.check.circle / max(speed, 1.0)
+    stopping = braking.of_rover(parameters) if vehicle.kind == "rover" else braking.of_brake(parameters)
+    way = stopping.to_rest(_velocity(vehicle), 0.0)
+    return _until_it_brakes(vehicle) + 2 * math.hypot(*way) / max(speed, SLOWEST)
 
 
 def _gets_worse(way: list[Spot], rules: Any) -> bool:

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from mavproxy_uavapi.core.envelope import braking
 from mavproxy_uavapi.core.envelope.space import LocalFrame, Space, Spot, to_leg
-from mavproxy_uavapi.core.errors import OutsideEnvelope
+from mavproxy_uavapi.core.errors import OutsideEnvelope, Stale
 from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission, mode_name
 from mavproxy_uavapi.core.mavlink.link import Address, Link
 from mavproxy_uavapi.core.vehicle import orders
@@ -21,9 +21,11 @@ from mavproxy_uavapi.core.vehicle.geodesy import moved, offset, rotate
 from mavproxy_uavapi.core.vehicle.messages import NedTarget
 from mavproxy_uavapi.core.vehicle.mission_files import MissionItem
 from mavproxy_uavapi.core.vehicle.mission_way import Stop
+from mavproxy_uavapi.core.vehicle.traffic import Traffic
 
 REACH = 200_000.0  # m from the vehicle: no target lies farther, with or without an envelope
 STAY = 1.0  # m: a target this near holds the vehicle where it is
+CORNER = 3.0  # m from a corner of its way, where the vehicle has passed it
 CHECKED_FOR = 30.0  # s for which a mission that was looked at may be started
 # The modes that end a flight, or hold it, or are watched. In any other nobody keeps the envelope.
 STOPPING = {"BRAKE", "HOLD", "LAND", "RTL", "SMART_RTL", "QLAND", "QRTL"}
@@ -37,13 +39,21 @@ STANDING = (
 )  # move nothing by themselves
 
 
+class Ordered(NamedTuple):
+    """What the newest message has the vehicle do: a way, whether to places or by a velocity; when it went out (s)."""
+
+    way: Sequence[Stop] = ()
+    is_to_place: bool = True
+    at: float = -math.inf
+
+
 class EnvelopeGuard:
-    """Says whether a message keeps a vehicle in its envelopes.
+    """Says whether a message keeps a vehicle in its envelopes, and away from other vehicles.
 
     Attributes:
         check: holds ways against the envelopes.
-        way: the way that it was last allowed to fly, straight from place to place; empty with velocities.
-        ordered_at: when the newest message went out that moves the vehicle (s); -inf for none.
+        traffic: keeps it away from other vehicles; None where nobody does.
+        ordered: the newest message that moves the vehicle.
 
     Args:
         vehicle: which.
@@ -52,21 +62,33 @@ class EnvelopeGuard:
 
     def __init__(self, vehicle: Checked, spaces: Spaces) -> None:
         self.check = EnvelopeCheck(vehicle, spaces)
-        self.way: list[Stop] = []
-        self.ordered_at = -math.inf
+        self.traffic: Traffic | None = None
+        self.ordered = Ordered()
+        self._passed = 0  # legs of the ordered way
         self._vehicle = vehicle
         self._checked_mission: tuple[Sequence[Space], float, list[Stop]] | None = None
 
     @property
     def in_force(self) -> bool:
-        """Whether there is an envelope for it."""
-        return bool(self.check.spaces)
+        """Whether there is an envelope for it, or other vehicles are to be kept away from."""
+        return bool(self.check.spaces) or (self.traffic is not None and self.traffic.in_force)
+
+    @property
+    def ordered_at(self) -> float:
+        """When the newest message went out that moves the vehicle (s); -inf for none."""
+        return self.ordered.at
+
+    @property
+    def way(self) -> Sequence[Stop]:
+        """The way that it was last allowed to fly, straight from place to place; empty with velocities."""
+        return self.ordered.way if self.ordered.is_to_place else ()
 
     def require(self, message: Any) -> None:
         """Raise unless `message` may be sent.
 
         Raises:
             OutsideEnvelope: it leads out of an envelope, or nobody can say where.
+            TooNear: it leads too near to another vehicle.
             Stale: it is not known where the vehicle is, or where its home is.
         """
         order = orders.order_of(message)
@@ -76,26 +98,52 @@ class EnvelopeGuard:
             self._require_order(order)
 
     def require_mission(self, items: Sequence[MissionItem], *, from_here: bool) -> None:
-        """Raise OutsideEnvelope unless a whole mission stays inside; with `from_here` it may be flown then."""
+        """Raise OutsideEnvelope unless a whole mission stays inside; with `from_here` it may be flown then.
+
+        Raises:
+            TooNear: from here it leads too near to another vehicle.
+        """
         if self.in_force:
             way = self.check.require_mission(items, from_here=from_here)
             if from_here:
+                self._require_apart(way)
                 self._checked_mission = self.check.spaces, self._vehicle.clock(), way
 
-    def sent(self, message: Any) -> None:
-        """Note a message that went out."""
-        order = orders.order_of(message)
+    def sending(self, message: Any) -> Ordered:
+        """Note a message that is about to be sent, before others are asked about theirs; what was ordered before."""
+        before, order = self.ordered, orders.order_of(message)
         if isinstance(order, orders.ChangeMission):
             self._checked_mission = None
         if order is None or isinstance(order, STANDING):
-            return
-        self.ordered_at = self._vehicle.clock()
-        if isinstance(order, orders.GoTo | orders.Climb) and self.in_force:
-            self.way = self._way_of(order)
-        elif isinstance(order, orders.FlyMission) and self._checked_mission is not None:
-            self.way = self._checked_mission[2]
-        else:
-            self.way = []
+            return before
+        way: list[Stop] = []
+        if self.in_force and isinstance(order, orders.GoTo | orders.Climb):
+            way = self._way_of(order)
+        elif self.in_force and isinstance(order, orders.Fly):
+            way = self._way_at(order)
+        elif self._checked_mission is not None and self._starts_mission(order):
+            way = self._checked_mission[2]
+        self.take_up(Ordered(way, not isinstance(order, orders.Fly), self._vehicle.clock()))
+        return before
+
+    def take_up(self, ordered: Ordered) -> None:
+        """Note what the vehicle is told to do, or what it still does because a message could not be sent."""
+        self.ordered, self._passed = ordered, 0
+
+    def remaining(self) -> Sequence[Stop]:
+        """The corners of its way that are still ahead; empty where it has none. To be asked at each position."""
+        way = self.ordered.way
+        if len(way) < 2:
+            return ()
+        try:
+            here = self.check.here()
+        except Stale:
+            return way[self._passed + 1 :]
+        frame = LocalFrame((here.lat, here.lon))
+        spots, at = [frame.spot((stop.lat, stop.lon), stop.up) for stop in way], Spot(0.0, 0.0, here.up)
+        while self._passed + 2 < len(way) and _is_past(at, spots[self._passed : self._passed + 3]):
+            self._passed += 1
+        return way[self._passed + 1 :]
 
     def beside_way(self, stop: Stop) -> float:
         """Metres from a place to the way that was allowed last; infinite where there is none."""
@@ -122,9 +170,7 @@ class EnvelopeGuard:
 
     def _require_order(self, order: orders.Order) -> None:
         if isinstance(order, orders.GoTo | orders.Climb):
-            way = self._way_of(order)
-            self.check.require_way([way], stays=isinstance(order, orders.GoTo) and _length(way) <= STAY)
-            self.check.require_speeds()
+            self._require_place(order)
         elif isinstance(order, orders.Fly):
             self._require_velocity(order)
         elif isinstance(order, orders.ChangeSpeed):
@@ -140,10 +186,18 @@ class EnvelopeGuard:
         elif isinstance(order, orders.ChangeMission):
             return  # no vehicle flies it before it was looked at
         elif isinstance(order, orders.MoveHome):
-            if self._vehicle.state.armed is not False:
+            if self._vehicle.state.armed is not False and self.check.spaces:
                 raise OutsideEnvelope("heights and distances of the envelope count from home: it stays in flight")
         else:
             raise OutsideEnvelope(f"nobody can say whether {order.name} keeps the vehicle in the envelope")
+
+    def _require_place(self, order: orders.GoTo | orders.Climb) -> None:
+        way = self._way_of(order)
+        stays = isinstance(order, orders.GoTo) and _length(way) <= STAY
+        self.check.require_way([way], stays=stays)
+        self.check.require_speeds()
+        if not stays:
+            self._require_apart(way)
 
     def _require_mode(self, number: int) -> None:
         mode = mode_name(self._vehicle.state.vehicle_type, number)
@@ -151,30 +205,50 @@ class EnvelopeGuard:
             self._require_checked_mission()
         elif mode == "TAKEOFF" and self._vehicle.kind == "plane":
             return  # the verb has asked for its height; where it levels off is watched
-        elif mode not in KEPT | {self._vehicle.holding_mode}:
+        elif self.check.spaces and mode not in KEPT | {self._vehicle.holding_mode}:
             raise OutsideEnvelope(f"in {mode} nobody keeps the vehicle in the envelope; a pilot may switch to it")
 
     def _require_checked_mission(self) -> None:
         checked = self._checked_mission
         if checked is None or checked[0] != self.check.spaces or self._vehicle.clock() - checked[1] > CHECKED_FOR:
             raise OutsideEnvelope("the vehicle's mission was not held against the envelope; POST /mission/start does")
+        self._require_apart(checked[2])
+
+    def _starts_mission(self, order: orders.Order) -> bool:
+        if isinstance(order, orders.SwitchMode):
+            return flies_mission(mode_name(self._vehicle.state.vehicle_type, order.number))
+        return isinstance(order, orders.FlyMission)
+
+    def _require_apart(self, way: Sequence[Stop]) -> None:
+        if self.traffic is not None:
+            self.traffic.require(self._vehicle, way)
 
     def _require_velocity(self, order: orders.Fly) -> None:
-        """The way that is flown until the autopilot drops the setpoint, and until it stands."""
-        north, east, down = order.velocity
+        north, east, down = self._velocity(order)
         if math.hypot(north, east, down) < 1e-3:
             return  # it stops
+        way = self._way_at(order)
+        self.check.require_way([way], may_return=False)
+        for kind, speed in (("ground", math.hypot(north, east)), ("climb", -down), ("descent", down)):
+            self.check.require_speed(kind, speed)
+        self._require_apart(way)
+
+    def _velocity(self, order: orders.Fly) -> tuple[float, float, float]:
+        """m/s north, east, down."""
+        north, east, down = order.velocity
         if order.by_heading:
             north, east = rotate(north, east, self._vehicle.fresh("ATTITUDE").yaw)
+        return north, east, down
+
+    def _way_at(self, order: orders.Fly) -> list[Stop]:
+        """The way that is flown until the autopilot drops the setpoint, and until it stands."""
+        north, east, down = self._velocity(order)
         parameters, drives = self._vehicle.state.parameters, self.check.drives
         stopping = braking.of_rover(parameters) if drives else braking.of_guided(parameters)
         lasts = max(parameters.get("GUID_TIMEOUT", 3.0), 0.1) + braking.LATENCY
         here = self.check.here()
         on = stopping.to_rest((north, east, 0.0 if drives else -down), lasts)
-        end = Stop(*moved(here.lat, here.lon, on[0], on[1]), here.up + on[2])
-        self.check.require_way([[here, end]], may_return=False)
-        for kind, speed in (("ground", math.hypot(north, east)), ("climb", -down), ("descent", down)):
-            self.check.require_speed(kind, speed)
+        return [here, Stop(*moved(here.lat, here.lon, on[0], on[1]), here.up + on[2])]
 
     def _way_of(self, order: orders.GoTo | orders.Climb) -> list[Stop]:
         here = self.check.here()
@@ -211,11 +285,23 @@ class GuardedLink:
         """See `Link.send`.
 
         Raises:
-            OutsideEnvelope, Stale: as `EnvelopeGuard.require`; nothing is sent.
+            OutsideEnvelope, TooNear, Stale: as `EnvelopeGuard.require`; nothing is sent.
         """
         self._guard.require(message)
-        await self._link.send(message, system)
-        self._guard.sent(message)
+        before = self._guard.sending(message)
+        noted = self._guard.ordered
+        try:
+            await self._link.send(message, system)
+        except BaseException:
+            if self._guard.ordered is noted:
+                self._guard.take_up(before)
+            raise
+
+
+def _is_past(at: Spot, corners: Sequence[Spot]) -> bool:
+    """Whether a vehicle at `at` has passed the second of three corners."""
+    a, b, c = corners
+    return math.dist(at, b) < CORNER or to_leg(at, b, c) + CORNER < to_leg(at, a, b)
 
 
 def _length(way: Sequence[Stop]) -> float:

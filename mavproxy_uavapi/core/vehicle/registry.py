@@ -14,6 +14,7 @@ from mavproxy_uavapi.core.mavlink.vehicle_state import Fleet
 from mavproxy_uavapi.core.vehicle.copter import Copter
 from mavproxy_uavapi.core.vehicle.plane import Plane
 from mavproxy_uavapi.core.vehicle.rover import Rover
+from mavproxy_uavapi.core.vehicle.traffic import Traffic
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 CLASSES: dict[str, type[Vehicle]] = {"copter": Copter, "plane": Plane, "rover": Rover, "other": Vehicle}
@@ -24,6 +25,7 @@ class VehicleRegistry:
 
     Attributes:
         current: the system id that MAVProxy's own commands go to; 0 before it knows one.
+        traffic: keeps the vehicles apart.
 
     Args:
         fleet: the state of each vehicle.
@@ -52,6 +54,7 @@ class VehicleRegistry:
         self._clock = clock
         self._envelopes = Envelopes() if envelopes is None else envelopes
         self._vehicles: dict[int, Vehicle] = {}
+        self.traffic = Traffic(lambda: [self.find(system) for system in self._fleet.vehicles])
 
     def resolve(self, system: int = 0) -> int:
         """That system id; for 0 MAVProxy's current one, or else the first that was heard, or 0."""
@@ -75,6 +78,7 @@ class VehicleRegistry:
             vehicle = self._vehicles[system_id] = make(
                 state, self._link, self._pending, self._clock, lambda: self._envelopes.of(system_id)
             )
+            vehicle.guard.traffic = self.traffic
         return vehicle
 
     def commandable(self, system: int = 0) -> Vehicle:

@@ -1,0 +1,121 @@
+"""Where vehicles will be, and whether two of them come too near to each other. Pure.
+
+A forecast is a row of points along a way, each with the times between which the vehicle may be there. Two vehicles
+come too near where two such points are too near and their times overlap.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from mavproxy_uavapi.core.envelope.space import Spot
+
+FINE = 8  # points in the distance to be kept
+MOST = 400  # points of one way; those of a longer way lie farther apart, and count as wider
+LEAST_PACE = 0.1  # m/s; a speed of 0 must not make a way endless
+
+
+class Pace(NamedTuple):
+    """How fast a vehicle flies to places, m/s."""
+
+    level: float
+    climb: float
+    descent: float
+
+
+class Slack(NamedTuple):
+    """How far a vehicle may be from its time on a way: `ahead` s early, `behind` s late for each leg, and a share."""
+
+    ahead: float
+    behind: float
+    share: float
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """Where a vehicle may be, and when.
+
+    Attributes:
+        points: m north, east, up; one row for each, the first is where it is now.
+        early, late: s from now, for each point.
+        apart: m between neighbours.
+    """
+
+    points: Any
+    early: Any
+    late: Any
+    apart: float
+
+    def until(self, seconds: float) -> Forecast:
+        """The part of it that may be reached within that many s."""
+        kept = self.early <= seconds
+        return Forecast(self.points[kept], self.early[kept], np.minimum(self.late[kept], seconds), self.apart)
+
+    def at_any_time(self) -> Forecast:
+        """The same points, each at any time: for a vehicle that does not tell where it is."""
+        return Forecast(self.points, np.zeros_like(self.early), np.full_like(self.late, math.inf), self.apart)
+
+
+class Meeting(NamedTuple):
+    """Where two vehicles come too near: the one's place, in how many s, and how many m they are apart."""
+
+    at: Spot
+    seconds: float
+    gap: float
+
+
+def along(spots: Sequence[Spot], pace: Pace, slack: Slack, distance: float, *, stays: bool = True) -> Forecast:
+    """The forecast of a way.
+
+    Args:
+        spots: the corners, the first is where the vehicle is now.
+        pace: how fast it flies.
+        slack: how late or early it may be.
+        distance: m to be kept.
+        stays: whether it stays at the end of the way.
+    """
+    legs = [_leg(a, b, pace) for a, b in zip(spots, spots[1:], strict=False)]
+    apart = max(distance / FINE, sum(length for length, _ in legs) / MOST)
+    rows, early, late, begun = [tuple(spots[0])], [0.0], [slack.behind], 0.0
+    for number, ((length, seconds), a, b) in enumerate(zip(legs, spots, spots[1:], strict=False), 1):
+        shares = np.linspace(0.0, 1.0, math.ceil(length / apart) + 1)[1:]
+        rows += [tuple(one) for one in np.outer(1 - shares, a) + np.outer(shares, b)]
+        times = begun + shares * seconds
+        early += list(np.maximum(times * (1 - slack.share) - slack.ahead, 0.0))
+        late += list(times * (1 + slack.share) + slack.behind * (number + 1))
+        begun += seconds
+    if stays:
+        late[-1] = math.inf
+    return Forecast(np.array(rows), np.array(early), np.array(late), apart)
+
+
+def _leg(a: Spot, b: Spot, pace: Pace) -> tuple[float, float]:
+    """Metres, and seconds."""
+    level, up = math.hypot(b.north - a.north, b.east - a.east), b.up - a.up
+    vertical = pace.climb if up > 0 else pace.descent
+    return math.hypot(level, up), max(level / max(pace.level, LEAST_PACE), abs(up) / max(vertical, LEAST_PACE))
+
+
+def meeting(ours: Forecast, theirs: Forecast, distance: float) -> Meeting | None:
+    """Where two come nearer than `distance` m first; None where they do not.
+
+    Two that are nearer already may do anything but come nearer still.
+    """
+    if not len(ours.points) or not len(theirs.points):
+        return None
+    gaps = np.linalg.norm(ours.points[:, None, :] - theirs.points[None, :, :], axis=2)
+    limit = min(distance + max(ours.apart, theirs.apart), float(gaps[0, 0]) - 1e-6)
+    together = (ours.early[:, None] <= theirs.late[None, :]) & (theirs.early[None, :] <= ours.late[:, None])
+    near = (gaps < limit) & together
+    rows = near.any(axis=1)
+    if not rows.any():
+        return None
+    row = int(np.argmax(rows))
+    column = int(np.argmin(np.where(near[row], gaps[row], math.inf)))
+    at = max(float(ours.early[row]), float(theirs.early[column]))
+    return Meeting(Spot(*map(float, ours.points[row])), at, float(gaps[row, column]))
