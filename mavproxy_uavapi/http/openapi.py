@@ -55,6 +55,7 @@ OF_A_FLIGHT = (
     errors.NotArmed,
     errors.Aborted,
     errors.OutsideEnvelope,
+    errors.TooNear,
 )
 OF_A_SCRIPT = (errors.BadRequest, errors.NotFound, errors.ToolFailed)
 BY_TAG: Mapping[str, tuple[type[UavApiError], ...]] = {

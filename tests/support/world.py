@@ -66,7 +66,7 @@ class World:
 
     Attributes:
         sent: what the host sent, oldest first; MAVProxy's own requests are not in it.
-        simulator: the vehicle.
+        simulator: the vehicle; the first of `simulators`.
         uplink_until, cut_until: s; until then nothing reaches the vehicle, or nothing goes either way.
         gradys: the module's own side.
         tracker, flights: the module's own side, with a simulated camera; only in a world that was made with one.
@@ -89,7 +89,9 @@ class World:
         self.sent: list[Sent] = []
         self.uplink_until = self.cut_until = -math.inf
         self.source = US
-        self._cable = self.simulator.open_link("test")
+        self.simulators: list[Simulator] = []
+        self._cables: list[Any] = []
+        self.join(self.simulator)
         self._encoder = mavlink.MAVLink(None, *US)
         self._parser = mavlink.MAVLink(None)
         self._arriving: list[Any] = []
@@ -102,6 +104,11 @@ class World:
         self._streams: list[asyncio.Task[None]] = []
         self._look: list[Callable[[], None]] = []
         self._camera = contextlib.AsyncExitStack()
+
+    def join(self, simulator: Simulator) -> None:
+        """Put a vehicle on the link."""
+        self.simulators.append(simulator)
+        self._cables.append(simulator.open_link("test"))
 
     def mount_camera(self, settings: dict[str, Any]) -> None:
         """Give it vision with a simulated camera, which looks from `go_live` on; needs OpenCV."""
@@ -180,7 +187,8 @@ class World:
     def go_live(self) -> None:
         """Connect the host, and let it get to know the vehicle."""
         self.simulator.received.clear()
-        self._cable.messages()
+        for cable in self._cables:
+            cable.messages()
         self.loop.run(self._runner.setup())
         watch = StreamRequester(self.host.registry, 0)
         self._tasks = [self.loop.create_task(self._run()), self.loop.create_task(watch.run())]
@@ -195,13 +203,16 @@ class World:
         while True:
             if self.loop.time() >= streams_at:
                 streams_at += STREAMS_EVERY
-                self._deliver(mavlink.MAVLink_request_data_stream_message(1, 1, 0, STREAM_RATE, 1))
+                for simulator in self.simulators:
+                    system = simulator.options.sysid
+                    self._deliver(mavlink.MAVLink_request_data_stream_message(system, 1, 0, STREAM_RATE, 1))
             arriving, self._arriving = self._arriving, []
             for message in arriving:
                 self._deliver(message)
             for _ in range(STEPS):
-                self.simulator.step()
-            data = self._cable.drain()
+                for simulator in self.simulators:
+                    simulator.step()
+            data = b"".join(cable.drain() for cable in self._cables)
             if self.loop.time() >= self.cut_until and data:
                 for message in self._parser.parse_buffer(data) or []:
                     self.host.bridge.feed(message)
@@ -210,7 +221,8 @@ class World:
 
     def _deliver(self, message: Any) -> None:
         if self.loop.time() >= max(self.uplink_until, self.cut_until):
-            self.simulator.receive(self._cable, self._as_on_the_wire(message))
+            for simulator, cable in zip(self.simulators, self._cables, strict=True):
+                simulator.receive(cable, self._as_on_the_wire(message))
 
     def _as_on_the_wire(self, message: Any) -> Any:
         return mavlink.MAVLink(None).parse_buffer(message.pack(self._encoder))[0]
@@ -218,7 +230,7 @@ class World:
     async def send(self, message: Any, system: int) -> None:
         """See `core.mavlink.link.Link.send`; who is cancelled before it came to it has sent nothing."""
         await asyncio.sleep(0)
-        if system != self.simulator.options.sysid:
+        if system not in (simulator.options.sysid for simulator in self.simulators):
             raise LinkLost(f"there is no vehicle {system}")
         self.sent.append(Sent(self.loop.time(), self._as_on_the_wire(message)))
         self._arriving.append(message)

@@ -51,11 +51,6 @@ class Forecast:
     late: Any
     apart: float
 
-    def until(self, seconds: float) -> Forecast:
-        """The part of it that may be reached within that many s."""
-        kept = self.early <= seconds
-        return Forecast(self.points[kept], self.early[kept], np.minimum(self.late[kept], seconds), self.apart)
-
     def at_any_time(self) -> Forecast:
         """The same points, each at any time: for a vehicle that does not tell where it is."""
         return Forecast(self.points, np.zeros_like(self.early), np.full_like(self.late, math.inf), self.apart)
@@ -69,7 +64,15 @@ class Meeting(NamedTuple):
     gap: float
 
 
-def along(spots: Sequence[Spot], pace: Pace, slack: Slack, distance: float, *, stays: bool = True) -> Forecast:
+def along(
+    spots: Sequence[Spot],
+    pace: Pace,
+    slack: Slack,
+    distance: float,
+    *,
+    stays: bool = True,
+    seconds: float = math.inf,
+) -> Forecast:
     """The forecast of a way.
 
     Args:
@@ -78,20 +81,28 @@ def along(spots: Sequence[Spot], pace: Pace, slack: Slack, distance: float, *, s
         slack: how late or early it may be.
         distance: m to be kept.
         stays: whether it stays at the end of the way.
+        seconds: how far the forecast goes; what may be reached later is not in it.
     """
     legs = [_leg(a, b, pace) for a, b in zip(spots, spots[1:], strict=False)]
     apart = max(distance / FINE, sum(length for length, _ in legs) / MOST)
-    rows, early, late, begun = [tuple(spots[0])], [0.0], [slack.behind], 0.0
-    for number, ((length, seconds), a, b) in enumerate(zip(legs, spots, spots[1:], strict=False), 1):
-        shares = np.linspace(0.0, 1.0, math.ceil(length / apart) + 1)[1:]
-        rows += [tuple(one) for one in np.outer(1 - shares, a) + np.outer(shares, b)]
-        times = begun + shares * seconds
-        early += list(np.maximum(times * (1 - slack.share) - slack.ahead, 0.0))
-        late += list(times * (1 + slack.share) + slack.behind * (number + 1))
-        begun += seconds
-    if stays:
-        late[-1] = math.inf
-    return Forecast(np.array(rows), np.array(early), np.array(late), apart)
+    rows, early, late = [np.array([spots[0]])], [np.zeros(1)], [np.array([slack.behind])]
+    begun = 0.0
+    for number, ((length, lasts), a, b) in enumerate(zip(legs, spots, spots[1:], strict=False), 2):
+        first = begun * (1 - slack.share) - slack.ahead
+        if first > seconds:
+            break
+        pieces = math.ceil(length / apart)
+        wanted = pieces * min(1.0, (seconds - first) / (lasts * (1 - slack.share) or 1.0))
+        shares = np.arange(1, min(pieces, math.ceil(wanted)) + 1) / max(pieces, 1)
+        rows.append(np.outer(1 - shares, a) + np.outer(shares, b))
+        times = begun + shares * lasts
+        early.append(np.maximum(times * (1 - slack.share) - slack.ahead, 0.0))
+        late.append(times * (1 + slack.share) + slack.behind * number)
+        begun += lasts
+    latest = np.concatenate(late)
+    if stays and sum(map(len, late)) == 1 + sum(math.ceil(length / apart) for length, _ in legs):
+        latest[-1] = math.inf
+    return Forecast(np.concatenate(rows), np.concatenate(early), latest, apart)
 
 
 def _leg(a: Spot, b: Spot, pace: Pace) -> tuple[float, float]:

@@ -115,17 +115,14 @@ class Traffic:
     def _meeting(self, vehicle: Any, ours: Expected, other: Any, slack: Slack, seconds: float) -> Meeting | None:
         frame = LocalFrame((ours.stops[0].lat, ours.stops[0].lon))
         planned = slack is PLANNED
-        theirs = self._forecast(frame, other, expected(other, LOOKED_AHEAD if planned else CERTAIN), slack)
+        theirs = self._forecast(frame, other, expected(other, LOOKED_AHEAD if planned else CERTAIN), slack, seconds)
         if _age(other) > OLD:
             theirs = theirs.at_any_time()
-        mine = self._forecast(frame, vehicle, ours, slack)
-        if seconds != math.inf:
-            mine, theirs = mine.until(seconds), theirs.until(seconds)
-        return meeting(mine, theirs, self.separation)
+        return meeting(self._forecast(frame, vehicle, ours, slack, seconds), theirs, self.separation)
 
-    def _forecast(self, frame: LocalFrame, vehicle: Any, route: Expected, slack: Slack) -> Forecast:
+    def _forecast(self, frame: LocalFrame, vehicle: Any, route: Expected, slack: Slack, seconds: float) -> Forecast:
         spots = [frame.spot((stop.lat, stop.lon), stop.up) for stop in route.stops]
-        return along(spots, _pace(vehicle), slack, self.separation, stays=route.stays)
+        return along(spots, _pace(vehicle), slack, self.separation, stays=route.stays, seconds=seconds)
 
     def _apart_for(self, vehicle: Any, other: Any, seconds: float) -> bool:
         """Whether two are too far apart to come near each other in that time; cheap."""

@@ -15,8 +15,10 @@ EXACT, LOOSE = Slack(0.0, 0.5, 0.0), Slack(1.0, 4.0, 0.2)
 DISTANCE = 8.0
 
 
-def flight(*spots: tuple[float, float, float], slack: Slack = EXACT, stays: bool = True) -> Forecast:
-    return along([Spot(*spot) for spot in spots], PACE, slack, DISTANCE, stays=stays)
+def flight(
+    *spots: tuple[float, float, float], slack: Slack = EXACT, stays: bool = True, seconds: float = math.inf
+) -> Forecast:
+    return along([Spot(*spot) for spot in spots], PACE, slack, DISTANCE, stays=stays, seconds=seconds)
 
 
 def test_a_way_is_flown_at_its_pace_and_ends_where_the_vehicle_stays() -> None:
@@ -70,10 +72,19 @@ def test_a_vehicle_that_does_not_tell_where_it_is_may_be_anywhere_on_its_way() -
 
 
 def test_only_what_comes_soon_is_looked_at_in_flight() -> None:
-    ours = flight((0, 0, 10), (0, 100, 10))
-    assert meeting(ours.until(5.0), flight((0, 60, 10)), DISTANCE) is None
-    assert meeting(ours.until(12.0), flight((0, 60, 10)), DISTANCE) is not None
-    assert meeting(ours.until(-1.0), flight((0, 60, 10)), DISTANCE) is None
+    way, other = ((0, 0, 10), (0, 0, 15), (0, 100, 15)), flight((0, 60, 15))
+    assert meeting(flight(*way, seconds=7.0), other, DISTANCE) is None
+    assert meeting(flight(*way, seconds=14.0), other, DISTANCE) is not None
+
+
+@pytest.mark.parametrize("seconds", [0.0, 1.0, 2.0, 3.7, 9.0, 22.0, 100.0])
+def test_a_short_forecast_is_the_beginning_of_the_whole(seconds: float) -> None:
+    way = ((0, 0, 10), (0, 0, 15), (0, 100, 15), (0, 100, 15), (0, 90, 5))
+    whole, part = (flight(*way, slack=LOOSE, seconds=until) for until in (math.inf, seconds))
+    count = len(part.points)
+    assert (part.points == whole.points[:count]).all() and (part.early == whole.early[:count]).all()
+    assert (part.late[:-1] == whole.late[: count - 1]).all()
+    assert (whole.early[count:] > seconds).all()
 
 
 def test_slack_makes_more_meetings() -> None:

@@ -1,0 +1,172 @@
+"""Vehicles of one MAVProxy keep their distance, whoever commands them; pilots are left alone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from tests.support.at_once import AtOnce
+from tests.support.crossing_flights import APART, Fleet
+from tests.support.envelopes import place
+
+SEPARATION = 8.0  # m
+WPL_ITEM = "{}\t{}\t{}\t16\t0\t0\t0\t0\t{}\t{}\t{}\t1\n"
+ORDERS = {"SET_POSITION_TARGET_LOCAL_NED", "SET_POSITION_TARGET_GLOBAL_INT"}
+
+
+@pytest.fixture
+def make(loop: Any) -> Iterator[Callable[..., Fleet]]:
+    """Makes a fleet with some settings."""
+    loop.set_default_executor(AtOnce())
+    fleets: list[Fleet] = []
+
+    def made(count: int = 2, **settings: Any) -> Fleet:
+        fleets.append(Fleet(loop, count, settings, SEPARATION))
+        return fleets[-1]
+
+    yield made
+    for fleet in fleets:
+        fleet.close()
+
+
+@pytest.fixture
+def pair(make: Callable[..., Fleet]) -> Fleet:
+    """Two copters, 15 m apart, 10 m above the ground; the second is east of the first."""
+    return make(2, separation=SEPARATION)
+
+
+def to(north: float, east: float, alt: float = 10.0) -> dict[str, Any]:
+    lat, lon = place(north, east)
+    return {"lat": lat, "long": lon, "alt": alt}
+
+
+def orders(fleet: Fleet) -> list[Any]:
+    return [sent.message for sent in fleet.world.sent if sent.message.get_type() in ORDERS]
+
+
+def mode(fleet: Fleet, system: int) -> str:
+    return str(fleet.world.simulators[system - 1].copter.mode.name)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_random_crossing_flights_never_come_nearer_than_the_setting(make: Callable[..., Fleet], seed: int) -> None:
+    fleet = make(4, separation=SEPARATION)
+    fleet.fly_at_random(40.0, seed)
+    fleet.loop.pass_time(45.0)
+    assert (fleet.breaches, fleet.nearest >= SEPARATION) == (0, True)
+    assert fleet.outcomes["200"] >= 5
+
+
+def test_without_the_setting_the_same_flights_come_too_near(make: Callable[..., Fleet]) -> None:
+    fleet = make(4)
+    fleet.fly_at_random(40.0, 1)
+    fleet.loop.pass_time(45.0)
+    assert fleet.breaches > 0
+
+
+def test_a_way_through_a_vehicle_that_hovers_is_refused_and_nothing_is_sent(pair: Fleet) -> None:
+    reply = pair.ask(1, "movement/go_to_gps", to(0, 40))
+    assert reply.outcome == "409 too_near"
+    assert reply.body["near"]["vehicle"] == 2 and reply.body["near"]["at"]["alt"] == pytest.approx(10, abs=0.5)
+    assert "vehicle 2" in reply.body["detail"] and orders(pair) == []
+    assert pair.ask(1, "movement/go_to_gps", to(0, 40, 45)).outcome == "200"  # climbs past it
+
+
+def test_a_velocity_and_a_takeoff_count_too(pair: Fleet) -> None:
+    assert pair.ask(1, "movement/travel_at_ned", {"vx": 0, "vy": 4, "vz": 0}).outcome == "409 too_near"
+    assert pair.ask(1, "movement/travel_at_ned", {"vx": 0, "vy": -4, "vz": 0}).outcome == "200"
+    assert pair.ask(2, "command/land").outcome == "200"
+    assert pair.ask(1, "movement/stop").outcome == "200" and pair.ask(1, "command/guided").outcome == "200"
+    assert pair.ask(1, "movement/go_to_gps_wait", to(0, APART, 12)).outcome == "200"  # it has landed: no traffic
+    assert pair.ask(2, "command/arm").outcome == "200"
+    assert pair.ask(2, "command/takeoff", {"alt": 10}).outcome == "409 too_near"
+
+
+def test_a_crossing_that_comes_much_later_is_allowed(pair: Fleet) -> None:
+    second = pair.begin(2, "movement/go_to_gps_wait", to(30, APART))
+    assert pair.ask(1, "movement/go_to_gps", to(30, APART)).outcome == "409 too_near"
+    far = pair.ask(1, "movement/go_to_gps_wait", to(-150, 0))
+    assert far.outcome == "200" and pair.world.answer(second).outcome == "200"
+    assert pair.nearest >= SEPARATION
+
+
+def test_with_wait_a_command_has_its_turn_when_the_way_is_free(make: Callable[..., Fleet]) -> None:
+    fleet = make(2, separation=SEPARATION, on_conflict="wait")
+    waiting = fleet.begin(1, "movement/go_to_gps_wait", to(0, APART))
+    fleet.loop.pass_time(2.0)
+    assert not waiting.reply.done() and orders(fleet) == []
+    (job,) = fleet.world.ask("GET", "/vehicles/1/jobs").body["jobs"]
+    assert job["progress"] == {"waits_for_vehicle": 2}
+    assert fleet.ask(2, "movement/go_to_gps_wait", to(40, APART)).outcome == "200"
+    assert fleet.world.answer(waiting).outcome == "200"
+    assert fleet.nearest >= SEPARATION
+
+
+def test_a_newer_command_ends_the_wait(make: Callable[..., Fleet]) -> None:
+    fleet = make(2, separation=SEPARATION, on_conflict="wait")
+    waiting = fleet.begin(1, "movement/go_to_gps_wait", to(0, APART))
+    fleet.loop.pass_time(1.0)
+    assert fleet.ask(1, "command/brake").outcome == "200"
+    assert fleet.world.answer(waiting).outcome == "409 superseded"
+    assert fleet.ask(2, "movement/go_to_gps_wait", to(40, APART)).outcome == "200"
+    assert mode(fleet, 1) == "BRAKE"
+
+
+def test_who_waits_for_ever_is_refused(make: Callable[..., Fleet]) -> None:
+    fleet = make(2, separation=SEPARATION, on_conflict="wait")
+    reply = fleet.ask(1, "movement/go_to_gps_wait", to(0, APART))
+    assert reply.outcome == "409 too_near" and orders(fleet) == []
+
+
+def test_a_vehicle_that_falls_silent_may_be_anywhere_on_its_way(pair: Fleet) -> None:
+    assert pair.ask(2, "movement/go_to_gps", to(60, APART)).outcome == "200"
+    pair.loop.pass_time(0.5)
+    second = pair.world.simulators[1]
+    second.faults.silence(second.vehicle.now, math.inf, sending=True, receiving=False)
+    pair.loop.pass_time(30.0)  # it has long arrived
+    reply = pair.ask(1, "movement/go_to_gps", to(30, APART + 5))
+    assert reply.outcome == "409 too_near" and "s old" in reply.body["detail"]
+
+
+def of_another_station(system: int, north: float, east: float) -> Any:
+    lat, lon = place(north, east)
+    return mavlink.MAVLink_set_position_target_global_int_message(
+        0, system, 1, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT, 0b110111111000,
+        round(lat * 1e7), round(lon * 1e7), 10.0, 0, 0, 0, 0, 0, 0, 0, 0,
+    )  # fmt: skip
+
+
+def test_of_two_that_meet_in_flight_ours_is_held_and_the_other_is_left_alone(pair: Fleet) -> None:
+    assert pair.ask(2, "movement/go_to_gps_wait", to(40, APART)).outcome == "200"
+    flight = pair.begin(1, "movement/go_to_gps_wait", to(80, 0))
+    pair.loop.pass_time(4.0)
+    pair.by_hand(2, of_another_station(2, 40, -40))
+    reply = pair.world.answer(flight)
+    assert reply.outcome == "409 too_near" and "stopped (BRAKE)" in reply.body["detail"]
+    pair.loop.pass_time(0.5)
+    assert mode(pair, 1) == "BRAKE" and mode(pair, 2) == "GUIDED"
+    assert pair.stops == 1
+
+
+def test_who_returns_is_not_stopped_and_who_moves_in_its_way_is(pair: Fleet) -> None:
+    assert pair.ask(2, "movement/go_to_gps_wait", to(60, APART)).outcome == "200"
+    returning = pair.begin(2, "command/rtl")
+    pair.loop.pass_time(1.0)
+    assert pair.ask(1, "movement/go_to_gps", to(30, APART)).outcome == "409 too_near"
+    assert pair.world.answer(returning).outcome == "200"
+    assert pair.ask(1, "movement/go_to_gps", to(30, APART)).outcome == "200"
+
+
+def test_a_mission_is_held_against_the_others_before_it_begins(pair: Fleet) -> None:
+    rows = [(0, 1, 0, *place(0, 0), 584), (1, 0, 3, *place(0, APART), 10), (2, 0, 3, *place(40, APART), 10)]
+    plan = "QGC WPL 110\n" + "".join(WPL_ITEM.format(*row) for row in rows)
+    uploaded = pair.world.ask("POST", "/vehicles/1/mission/waypoints", plan.encode(), "text/plain")
+    assert uploaded.outcome == "200"
+    assert pair.ask(1, "mission/start").outcome == "409 too_near"
+    assert mode(pair, 1) == "GUIDED"
+    assert pair.ask(2, "movement/go_to_gps_wait", to(-60, APART)).outcome == "200"
+    assert pair.ask(1, "mission/start").outcome == "200"
