@@ -57,7 +57,7 @@ class Forecast:
 
 
 class Meeting(NamedTuple):
-    """Where two vehicles come too near: the one's place, in how many s, and how many m they are apart."""
+    """Where two vehicles begin to come too near: the one's place, in how many s; and how near they come, m."""
 
     at: Spot
     seconds: float
@@ -129,4 +129,4 @@ def meeting(ours: Forecast, theirs: Forecast, distance: float) -> Meeting | None
     row = int(np.argmax(rows))
     column = int(np.argmin(np.where(near[row], gaps[row], math.inf)))
     at = max(float(ours.early[row]), float(theirs.early[column]))
-    return Meeting(Spot(*map(float, ours.points[row])), at, float(gaps[row, column]))
+    return Meeting(Spot(*map(float, ours.points[row])), at, float(gaps[near].min()))

@@ -134,7 +134,7 @@ class Traffic:
         lat, lon = LocalFrame((here.lat, here.lon)).degrees(found.at)
         system, age = other.state.system, _age(other)
         when = f"in {found.seconds:.0f} s" if age <= OLD else f"whose position is {age:.0f} s old"
-        sentence = f"it would come {found.gap:.1f} m near to vehicle {system}, {when}; {self.separation:g} m are kept"
+        sentence = f"it would come within {found.gap:.1f} m of vehicle {system}, {when}; {self.separation:g} m are kept"
         home = _home_amsl(vehicle)
         at = {"lat": round(lat, 7), "long": round(lon, 7), "alt": round(found.at.up - home, 2)}
         return TooNear(sentence, {"vehicle": system, "in_s": round(found.seconds, 1), "at": at})
