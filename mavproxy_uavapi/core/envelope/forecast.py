@@ -120,7 +120,8 @@ def meeting(ours: Forecast, theirs: Forecast, distance: float) -> Meeting | None
     if not len(ours.points) or not len(theirs.points):
         return None
     gaps = np.linalg.norm(ours.points[:, None, :] - theirs.points[None, :, :], axis=2)
-    limit = min(distance + max(ours.apart, theirs.apart), float(gaps[0, 0]) - 1e-6)
+    between = math.hypot(distance, (ours.apart + theirs.apart) / 2)  # so far may two points be, and the ways nearer
+    limit = min(between, float(gaps[0, 0]) - 1e-6)
     together = (ours.early[:, None] <= theirs.late[None, :]) & (theirs.early[None, :] <= ours.late[:, None])
     near = (gaps < limit) & together
     rows = near.any(axis=1)

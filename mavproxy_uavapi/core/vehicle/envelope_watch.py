@@ -109,7 +109,7 @@ class EnvelopeWatch:
             space, breach = found
             what = f"{breach.what} of {space.envelope.source}"
             details = {"what": breach.what, "source": space.envelope.source}
-            self._stop(vehicle, f"break {what}", what, lambda sentence: OutsideEnvelope(sentence, details))
+            self._stop(vehicle, f"break {what}", "envelope", lambda sentence: OutsideEnvelope(sentence, details))
         elif near is not None:
             self._stop_one(vehicle, *near)
 
@@ -126,9 +126,9 @@ class EnvelopeWatch:
         kept_from = other if held is vehicle else vehicle
         what = f"vehicle {kept_from.state.system}"
         near = {"vehicle": kept_from.state.system, "in_s": round(found.seconds, 1)}
-        self._stop(held, f"come too near to {what}", what, lambda sentence: TooNear(sentence, near))
+        self._stop(held, f"come too near to {what}", "other vehicle", lambda sentence: TooNear(sentence, near))
 
-    def _stop(self, vehicle: Vehicle, deed: str, what: str, error_of: Callable[[str], UavApiError]) -> None:
+    def _stop(self, vehicle: Vehicle, deed: str, before: str, error_of: Callable[[str], UavApiError]) -> None:
         system = vehicle.state.system
         sentence = f"vehicle {system} was about to {deed}: it is stopped ({vehicle.holding_mode})"
         log.critical("%s", sentence)
@@ -140,7 +140,7 @@ class EnvelopeWatch:
             return sentence
 
         job = self._jobs.begin(
-            vehicle, "brake at the envelope", {"of": what}, body, client=CLIENT, outlives_client=True
+            vehicle, f"brake at the {before}", {"why": deed}, body, client=CLIENT, outlives_client=True
         )
         self._stops[system] = job
         if commander is not None:

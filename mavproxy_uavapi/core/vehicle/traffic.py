@@ -22,6 +22,7 @@ from mavproxy_uavapi.core.vehicle.mission_way import Stop
 
 PLANNED = Slack(ahead=1.0, behind=4.0, share=0.15)
 WATCHED = Slack(ahead=0.3, behind=0.5, share=0.1)
+MARGIN = 0.5  # m more than the separation, for what a forecast does not have
 CERTAIN = 1.0  # s for which a vehicle that nobody commands through us keeps its velocity
 LOOKED_AHEAD = 5.0  # s, likewise, before a command is sent
 RTL_HEIGHT = 15.0  # m; used until the vehicle's own is known
@@ -106,6 +107,10 @@ class Traffic:
             if vehicle.authority.commander is not before:
                 raise Superseded(f"{job.verb} was superseded by {vehicle.authority.commander.verb} while it waited")
 
+    @property
+    def _kept(self) -> float:
+        return self.separation + MARGIN
+
     # -- others -------------------------------------------------------------------------------------------
 
     def _others(self, vehicle: Any) -> list[Any]:
@@ -118,11 +123,11 @@ class Traffic:
         theirs = self._forecast(frame, other, expected(other, LOOKED_AHEAD if planned else CERTAIN), slack, seconds)
         if _age(other) > OLD:
             theirs = theirs.at_any_time()
-        return meeting(self._forecast(frame, vehicle, ours, slack, seconds), theirs, self.separation)
+        return meeting(self._forecast(frame, vehicle, ours, slack, seconds), theirs, self._kept)
 
     def _forecast(self, frame: LocalFrame, vehicle: Any, route: Expected, slack: Slack, seconds: float) -> Forecast:
         spots = [frame.spot((stop.lat, stop.lon), stop.up) for stop in route.stops]
-        return along(spots, _pace(vehicle), slack, self.separation, stays=route.stays, seconds=seconds)
+        return along(spots, _pace(vehicle), slack, self._kept, stays=route.stays, seconds=seconds)
 
     def _apart_for(self, vehicle: Any, other: Any, seconds: float) -> bool:
         """Whether two are too far apart to come near each other in that time; cheap."""
@@ -134,7 +139,9 @@ class Traffic:
         lat, lon = LocalFrame((here.lat, here.lon)).degrees(found.at)
         system, age = other.state.system, _age(other)
         when = f"in {found.seconds:.0f} s" if age <= OLD else f"whose position is {age:.0f} s old"
-        sentence = f"it would come within {found.gap:.1f} m of vehicle {system}, {when}; {self.separation:g} m are kept"
+        sentence = (
+            f"it would come within {found.gap:.1f} m of vehicle {system}, {when}; {self.separation:g} m are kept"
+        )
         home = _home_amsl(vehicle)
         at = {"lat": round(lat, 7), "long": round(lon, 7), "alt": round(found.at.up - home, 2)}
         return TooNear(sentence, {"vehicle": system, "in_s": round(found.seconds, 1), "at": at})
