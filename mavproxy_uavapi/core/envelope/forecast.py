@@ -85,24 +85,23 @@ def along(
     """
     legs = [_leg(a, b, pace) for a, b in zip(spots, spots[1:], strict=False)]
     apart = max(distance / FINE, sum(length for length, _ in legs) / MOST)
-    rows, early, late = [np.array([spots[0]])], [np.zeros(1)], [np.array([slack.behind])]
+    points, times, slower = [np.array([spots[0]])], [np.zeros(1)], [np.array([slack.behind])]
     begun = 0.0
     for number, ((length, lasts), a, b) in enumerate(zip(legs, spots, spots[1:], strict=False), 2):
-        first = begun * (1 - slack.share) - slack.ahead
-        if first > seconds:
-            break
-        pieces = math.ceil(length / apart)
-        wanted = pieces * min(1.0, (seconds - first) / (lasts * (1 - slack.share) or 1.0))
-        shares = np.arange(1, min(pieces, math.ceil(wanted)) + 1) / max(pieces, 1)
-        rows.append(np.outer(1 - shares, a) + np.outer(shares, b))
-        times = begun + shares * lasts
-        early.append(np.maximum(times * (1 - slack.share) - slack.ahead, 0.0))
-        late.append(times * (1 + slack.share) + slack.behind * number)
+        shares = np.linspace(0.0, 1.0, math.ceil(length / apart) + 1)[1:]
+        points.append(np.outer(1 - shares, a) + np.outer(shares, b))
+        times.append(begun + shares * lasts)
+        slower.append(np.full_like(shares, slack.behind * number))
         begun += lasts
-    latest = np.concatenate(late)
-    if stays and sum(map(len, late)) == 1 + sum(math.ceil(length / apart) for length, _ in legs):
-        latest[-1] = math.inf
-    return Forecast(np.concatenate(rows), np.concatenate(early), latest, apart)
+        if begun * (1 - slack.share) - slack.ahead > seconds:
+            break
+    planned = np.concatenate(times)
+    early = np.maximum(planned * (1 - slack.share) - slack.ahead, 0.0)
+    late = planned * (1 + slack.share) + np.concatenate(slower)
+    if stays:
+        late[-1] = math.inf
+    kept = early <= seconds
+    return Forecast(np.concatenate(points)[kept], early[kept], late[kept], apart)
 
 
 def _leg(a: Spot, b: Spot, pace: Pace) -> tuple[float, float]:
