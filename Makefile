@@ -30,7 +30,7 @@ test-all: $(INSTALLED)  ## run the tests that take long, too
 
 test-sitl: $(INSTALLED)  ## run the tests that need ArduPilot's SITL, built in ARDUPILOT_HOME
 	@test -n "$(ARDUPILOT_HOME)" || { echo "set ARDUPILOT_HOME to a built copy of ArduPilot"; exit 2; }
-	ARDUPILOT_HOME=$(ARDUPILOT_HOME) $(BIN)/python -m pytest -m sitl $(ARGS)
+	ARDUPILOT_HOME=$(ARDUPILOT_HOME) $(BIN)/python -m pytest -m sitl -o faulthandler_timeout=1800 $(ARGS)
 
 lint: $(INSTALLED)  ## check style and types: ruff, mypy
 	$(BIN)/ruff check .
