@@ -58,6 +58,8 @@ class Gradys:
         for pusher in pushers:
             self._tasks.start(pusher.run(), f"the push to {pusher.station.url}")
         self.pipeline.start(settings)
+        if settings.hear:
+            self._tasks.start(hear(self.host, settings), "the listening to other MAVProxys")
 
     def _pusher(self, station: StationAddress, settings: GradysSettings) -> Pusher:
         client = Client(settings.timeout, settings.token, settings.ca_file)
@@ -124,3 +126,13 @@ class Gradys:
             **self.pipeline.report(),
             "tracks": self.tracks.report(),
         }
+
+
+async def hear(host: Host, settings: GradysSettings) -> None:
+    """Listen to the positions of other MAVProxys' vehicles, until cancelled."""
+    try:
+        from mavproxy_gradys.nearby.listener import Listener  # noqa: PLC0415  an extra
+    except ModuleNotFoundError as missing:
+        host.warn(f"`gradys set hear` needs {missing.name}: pip install 'mavproxy-uavapi[mqtt]'")
+        return
+    await Listener(host, settings.hear, settings.timeout, settings.ca_file).run()

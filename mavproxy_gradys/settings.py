@@ -12,12 +12,14 @@ from MAVProxy.modules.lib.mp_settings import MPSetting
 from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.forwarding.readings import Quantity, parse_quantities
 from mavproxy_gradys.forwarding.sink_address import SinkAddress, sink_addresses
-from mavproxy_gradys.net.addresses import StationAddress, checked_ip, stations
+from mavproxy_gradys.net.addresses import StationAddress, checked_ip, split_url, stations
 from mavproxy_gradys.net.http_client import tls_context
+from mavproxy_uavapi.core.addresses import masked
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.ini_file import IniFile
 from mavproxy_uavapi.core.settings import ModuleSettings
 from mavproxy_uavapi.core.state_directory import state_directory
+from mavproxy_uavapi.core.text import escaped
 from mavproxy_uavapi.core.values import path_of
 
 
@@ -34,6 +36,7 @@ class GradysSettings:
         token: bearer token for stations and HTTP sinks; empty for none.
         ca_file: certificates to check TLS with; empty for the system's.
         sink: the receivers of readings.
+        hear: broker at which other MAVProxys tell the positions of their vehicles; empty for none.
         quantities: the sampled quantities.
         spool: file that keeps readings until they are acknowledged.
         spool_mb: its largest size (MB of readings); beyond it the oldest are dropped.
@@ -48,6 +51,7 @@ class GradysSettings:
     token: str
     ca_file: str
     sink: tuple[SinkAddress, ...]
+    hear: str
     quantities: tuple[Quantity, ...]
     spool: Path
     spool_mb: float
@@ -70,6 +74,17 @@ def header_value(text: str) -> str:
     return text
 
 
+def broker(text: str) -> str:
+    """The address of a broker, checked; empty for none.
+
+    Raises:
+        SettingError: it is malformed.
+    """
+    if text:
+        split_url(text, ("mqtt", "mqtts"))
+    return text
+
+
 def spool_path(text: str) -> Path:
     """The spool's file; empty for the default.
 
@@ -85,13 +100,14 @@ class GradysModuleSettings(ModuleSettings[GradysSettings]):
     """The settings of the loaded module; [api] of an INI file may also have the station, as `gradys_gs`."""
 
     module = "gradys"
-    secrets = frozenset({"token", "sink"})
+    secrets = frozenset({"token", "sink", "hear"})
     parsers = {
         "gs": stations,
         "ip": checked_ip,
         "token": header_value,
         "ca_file": lambda text: str(path_of(text)) if text else "",
         "sink": sink_addresses,
+        "hear": broker,
         "quantities": parse_quantities,
         "spool": spool_path,
     }
@@ -112,6 +128,7 @@ class GradysModuleSettings(ModuleSettings[GradysSettings]):
                 "",
                 "where readings go, by comma: http(s)://HOST/PATH[#ack=status], mqtt(s)://HOST/TOPIC[#ack=station]",
             ),
+            MPSetting("hear", str, "", "broker with the positions of other MAVProxys: mqtt(s)://HOST[/TOPIC]"),
             MPSetting("quantities", str, "position@1", "what is sampled while there is a sink"),
             MPSetting("spool", str, default_spool(), "file that keeps readings until they are acknowledged"),
             MPSetting("spool_mb", float, 64.0, "MB of readings kept; beyond it the oldest go", range=(0.1, 100_000)),
@@ -142,5 +159,7 @@ class GradysModuleSettings(ModuleSettings[GradysSettings]):
         yield from super().settings_in(ini)
 
     def shown(self, name: str) -> str:
-        """As any setting; the sinks without their passwords."""
+        """As any setting; sinks and brokers without their passwords."""
+        if name == "hear":
+            return escaped(masked(self.snapshot().hear))
         return ",".join(map(str, self.snapshot().sink)) if name == "sink" else super().shown(name)

@@ -170,3 +170,27 @@ def test_tls_is_checked_by_the_ca_file(rig, harness, tmp_path):
 def _sink(rig: Any) -> dict[str, Any]:
     sinks = rig.ok(rig.get("/gradys/status"))["info"]["sinks"]
     return dict(sinks[0]) if sinks else {"last_error": None}
+
+
+def test_a_vehicle_of_another_mavproxy_that_comes_near_is_reported_at_the_prompt(rig, harness, tmp_path):
+    broker = Broker(rig, harness, tmp_path)
+    rig.mavproxy.ask(f'module load gradys:{{"spool":"{tmp_path}/spool.db"}}', "Loaded module gradys")
+    rig.mavproxy.ask("uavapi set separation 8", "")
+    rig.in_the_air(10)
+    mark = rig.mavproxy.mark()
+    rig.mavproxy.type(f"gradys set hear mqtt://uav:secret@127.0.0.1:{broker.port}")
+    harness.eventually(lambda: "fleet/+/position" in broker._process.output(), 15, "the subscription")
+    here = rig.ok(rig.get("/telemetry/gps"))["info"]["position"]
+    client = mqtt.Client(mqtt.CallbackAPIVersion.VERSION2)
+    client.username_pw_set("uav", "secret")
+    client.connect("127.0.0.1", broker.port)
+    client.loop_start()
+    for device, metres in (("uav-10", 1), ("uav-7", 60), ("uav-8", 5)):  # ourselves, far away, near
+        value = [here["lat"] + metres / 111_000, here["lon"], 10.0]
+        client.publish("fleet/x/position", json.dumps({"device": device, "value": value}), qos=1).wait_for_publish(5)
+    said = rig.mavproxy.says("of another MAVProxy", mark)
+    client.loop_stop()
+    client.disconnect()
+    assert "*** uav-8 of another MAVProxy comes within 5 m of uav-10, over the ground" in said
+    assert "uav-7" not in said
+    assert "secret" not in rig.mavproxy.ask("gradys config", "spool_hours")

@@ -22,7 +22,7 @@ from mavproxy_uavapi.core.vehicle.mission_way import Stop
 
 PLANNED = Slack(ahead=1.0, behind=4.0, share=0.15)
 WATCHED = Slack(ahead=0.3, behind=0.5, share=0.1)
-MARGIN = 0.5  # m more than the separation, for what a forecast does not have
+MARGIN = 1.0  # m more than the separation, for what a forecast does not have
 CERTAIN = 1.0  # s for which a vehicle that nobody commands through us keeps its velocity
 LOOKED_AHEAD = 5.0  # s, likewise, before a command is sent
 RTL_HEIGHT = 15.0  # m; used until the vehicle's own is known

@@ -1,0 +1,98 @@
+"""Hears the positions that other MAVProxys tell an MQTT broker, and warns of vehicles that come near."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import random
+import ssl
+from urllib.parse import unquote
+
+import aiomqtt
+
+from mavproxy_gradys.forwarding.mqtt_sink import KEEP_ALIVE, disconnect
+from mavproxy_gradys.forwarding.readings import device_of
+from mavproxy_gradys.nearby.advice import Advice, Track
+from mavproxy_gradys.net.addresses import split_url
+from mavproxy_gradys.net.http_client import tls_context
+from mavproxy_gradys.net.outage_log import Outage
+from mavproxy_gradys.net.schedule import Backoff
+from mavproxy_uavapi.core.host import Host
+
+DEFAULT_TOPIC = "fleet/+/position"
+LONGEST_PAUSE = 20.0  # s between attempts to connect
+log = logging.getLogger("gradys.nearby")
+
+
+class Listener:
+    """Subscribes to the positions of others.
+
+    Args:
+        host: our vehicles, and their `separation`.
+        url: mqtt(s)://[USER:PASSWORD@]HOST[:PORT][/TOPIC]
+        timeout: s for an answer of the broker.
+        ca_file: certificates to check TLS with; empty for the system's.
+    """
+
+    def __init__(self, host: Host, url: str, timeout: float, ca_file: str) -> None:
+        self._host = host
+        self._parts, self._port = split_url(url, ("mqtt", "mqtts"))
+        self._topic = unquote(self._parts.path.lstrip("/")) or DEFAULT_TOPIC
+        self._timeout = timeout
+        self._ca_file = ca_file
+        self._advice = Advice()
+        name = f"the broker {self._parts.hostname}:{self._port}"
+        self._outage = Outage(log, f"no positions of others from {name}", f"positions of others from {name} again")
+
+    async def run(self) -> None:
+        """Listen, until cancelled."""
+        backoff = Backoff(random.random, LONGEST_PAUSE)
+        while True:
+            client = self._make()
+            try:
+                await client.__aenter__()
+                await client.subscribe(self._topic, qos=0)
+                backoff.succeeded()
+                self._outage.update("")
+                async for message in client.messages:
+                    if not message.retain:  # nobody knows how old a retained position is
+                        self._take(message.payload)
+            except aiomqtt.MqttError as error:
+                self._outage.update(str(error) or "no answer")
+            finally:
+                await disconnect(client)
+            await asyncio.sleep(backoff.failed(self._host.clock()))
+
+    def _make(self) -> aiomqtt.Client:
+        parts = self._parts
+        return aiomqtt.Client(
+            parts.hostname or "",
+            self._port,
+            username=unquote(parts.username) if parts.username else None,
+            password=unquote(parts.password) if parts.password else None,
+            timeout=self._timeout,
+            keepalive=KEEP_ALIVE,
+            tls_context=self._tls() if parts.scheme == "mqtts" else None,
+        )
+
+    def _tls(self) -> ssl.SSLContext:
+        context = tls_context(self._ca_file)
+        return context if isinstance(context, ssl.SSLContext) else ssl.create_default_context()
+
+    def _take(self, payload: object) -> None:
+        if isinstance(payload, bytes | str) and self._advice.take(payload, self._host.clock()):
+            separation, now = self._host.registry.traffic.separation, self._host.clock()
+            names = {device_of(system) for system in self._host.fleet.vehicles}
+            for sentence in self._advice.warnings(self._in_the_air(), names, separation, now):
+                log.warning("%s", sentence)
+                self._host.warn(sentence)
+
+    def _in_the_air(self) -> dict[str, Track]:
+        tracks = {}
+        for state in self._host.fleet.vehicles.values():
+            received = state.messages.get("GLOBAL_POSITION_INT")
+            if received is not None and state.armed and not state.landed:
+                at = received.message
+                place, velocity = (at.lat / 1e7, at.lon / 1e7), (at.vx / 100, at.vy / 100)
+                tracks[device_of(state.system)] = Track(place, velocity, received.at)
+        return tracks
