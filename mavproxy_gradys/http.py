@@ -17,7 +17,7 @@ from mavproxy_gradys.tracks.formats import waypoints_of
 from mavproxy_gradys.tracks.request import TrackFile, TrackRequest
 from mavproxy_uavapi.core.errors import Invalid, NoVehicle
 from mavproxy_uavapi.core.vehicle.jobs import Job
-from mavproxy_uavapi.http.extension import EITHER, POST, Answer, Call, Empty, Request, Route
+from mavproxy_uavapi.http.extension import EITHER, FLY, POST, WATCH, Answer, Call, Empty, Request, Route
 
 MOST_READINGS = 1000  # readings in one request
 LONGEST_LIST = 64
@@ -80,10 +80,10 @@ class GradysHandlers:
     def routes(self) -> list[Route]:
         """The routes."""
         return [
-            Route("/gradys/status", self.status, Empty),
-            Route("/gradys/readings", self.readings, Readings, POST),
-            Route("/gradys/flush", self.flush, Empty, EITHER),
-            Route(VERB, self.fly_track, TrackRequest, POST, job=True),
+            Route("/gradys/status", self.status, Empty, WATCH),
+            Route("/gradys/readings", self.readings, Readings, FLY, POST),
+            Route("/gradys/flush", self.flush, Empty, FLY, EITHER),
+            Route(VERB, self.fly_track, TrackRequest, FLY, POST, job=True),
         ]
 
     async def status(self, call: Call) -> dict[str, Any]:
@@ -122,6 +122,7 @@ class GradysHandlers:
 
     def _reading(self, call: Call, request: OneReading, now: float) -> Reading:
         system = request.sysid or call.known_vehicle.state.system
+        call.require_right(system)
         at = now if request.time is None else request.time
         device = request.device or device_of(system)
         if request.quantity in self._gradys.pipeline.reserved and VEHICLE.fullmatch(device):

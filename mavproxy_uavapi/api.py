@@ -47,6 +47,7 @@ class Api:
         self.host.api_address = settings.host, settings.port
         self._tasks.start(StreamRequester(self.host.registry, settings.sysid).run(), "the watch over the telemetry")
         self._tasks.start(self._envelope.watch(), "the watch over the envelope's file")
+        self._tasks.start(server.service.tokens.watch(), "the watch over the tokens' file")
         self._tasks.start(memory.give_back(), "the return of freed memory")
         self._tasks.start(server.service.scripts.start(), "the search for running scripts")
 
@@ -63,6 +64,11 @@ class Api:
     def use_envelope(self, name: str) -> None:
         """Take up the setting `envelope`, whether the API listens or not."""
         self._envelope.use(name)
+
+    def take_tokens(self) -> None:
+        """Take up the tokens' file now: the prompt has changed it."""
+        if self._server is not None:
+            self._server.service.tokens.take()
 
     async def stop(self) -> None:
         """Close the port and end the calls in flight."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import logging
 from collections.abc import Callable
 from pathlib import Path
@@ -12,13 +11,12 @@ from mavproxy_uavapi.core.envelope.space import Space
 from mavproxy_uavapi.core.envelope.store import ALL, OPERATOR, Envelopes, missing
 from mavproxy_uavapi.core.errors import SettingError, UavApiError
 from mavproxy_uavapi.core.values import is_unset
+from mavproxy_uavapi.watched_file import WatchedFile
 
 log = logging.getLogger("uavapi.api")
 
 VEHICLE = "vehicle"  # in place of a file: the fence that MAVProxy has loaded
-LOOK_EVERY = 2.0  # s
 LARGEST = 4 * 1024 * 1024  # bytes
-Stamp = tuple[int, int, int]
 
 
 def read(name: str) -> Space:
@@ -58,29 +56,24 @@ class EnvelopeFile:
         self._envelopes = envelopes
         self._warn = warn
         self._name = ""
-        self._stamp: Stamp | None = None
+        self._file = WatchedFile()
 
     def use(self, name: str) -> None:
         """Take up the setting: a file, `vehicle`, or nothing."""
-        if name == self._name and not self._has_changed():
+        if name == self._name and not self._file.has_changed():
             return
         self._name = name
         self._envelopes.expects_fences = name == VEHICLE
-        if is_unset(name) or name == VEHICLE:
-            self._stamp = None
+        is_file = not is_unset(name) and name != VEHICLE
+        self._file.use(name if is_file else "")
+        if not is_file:
             self._envelopes.clear(OPERATOR)
         else:
             self._take()
 
     async def watch(self) -> None:
         """Look every few seconds whether the file has changed, until cancelled."""
-        while True:
-            await asyncio.sleep(LOOK_EVERY)
-            if await asyncio.to_thread(self._has_changed):
-                self._take()
-
-    def _has_changed(self) -> bool:
-        return not is_unset(self._name) and self._name != VEHICLE and self._read_stamp() != self._stamp
+        await self._file.watch(self._take)
 
     def _remaining(self) -> str:
         """What is in force without it."""
@@ -90,16 +83,9 @@ class EnvelopeFile:
         self._envelopes.put(OPERATOR, ALL, missing(reason, self._name))
         return "until it can be, nothing that moves a vehicle is sent"
 
-    def _read_stamp(self) -> Stamp | None:
-        try:
-            found = Path(self._name).expanduser().stat()
-        except OSError:
-            return None
-        return found.st_mtime_ns, found.st_size, found.st_ino
-
     def _take(self) -> None:
         """Read the file, and put it in force at once; a file that cannot be read keeps the former one in force."""
-        self._stamp = self._read_stamp()
+        self._file.look()
         try:
             space = read(self._name)
         except SettingError as error:

@@ -12,7 +12,7 @@ try:
     from mavproxy_uavapi.api import Api
 except ModuleNotFoundError as missing:  # MAVProxy prints the text of an ImportError as one line
     raise ImportError(f"uavapi needs {missing.name}: pip install mavproxy-uavapi") from missing
-from mavproxy_uavapi import fleet_console
+from mavproxy_uavapi import authority_console, fleet_console, token_console
 from mavproxy_uavapi.console import report, vehicles
 from mavproxy_uavapi.core.background import BackgroundCommands
 from mavproxy_uavapi.core.errors import SettingError
@@ -25,6 +25,8 @@ NAME = "uavapi"
 COMPLETIONS = [
     "<status|start|stop|vehicles|config|log|help>",
     "fleet <arm|brake|disarm|guided|land|rtl|stop>",
+    "token <add|list|remove>",
+    "authority <take|release>",
     "set (UAVAPISETTING)",
     "fly (FILENAME)",
 ]
@@ -40,6 +42,10 @@ uavapi log [N]           the last N commands: the caller and the outcome of each
 uavapi vehicles          every vehicle that was heard
 uavapi fly FILE          fly a recorded track with the API's vehicle, `sysid` (module gradys)
 uavapi fleet VERB [N …]  arm, brake, disarm, guided, land, rtl or stop, for every vehicle or those system ids
+uavapi authority         who holds and who commands each vehicle
+uavapi authority take [N …], release [N …]  hold vehicles for the prompt; end a hold, whoever has it
+uavapi token add NAME ROLE [N …]  a new token for watch, fly (every vehicle, or those) or admin; shown once
+uavapi token list, remove NAME    who has a token; take one away
 uavapi help              this"""
 
 
@@ -58,6 +64,8 @@ class UavApiModule(SharedModule[ApiSettings]):
             "vehicles": lambda _: self._print_text(vehicles),
             "fly": self._fly,
             "fleet": self._fleet,
+            "authority": self._authority,
+            "token": self._token,
             "help": lambda _: print(HELP),
         }
         super().__init__(
@@ -153,6 +161,20 @@ class UavApiModule(SharedModule[ApiSettings]):
 
     def _fleet(self, args: list[str]) -> None:
         self._background.send(lambda: fleet_console.command(self.host, args), f"at fleet {' '.join(args)}")
+
+    def _authority(self, args: list[str]) -> None:
+        self._background.send(lambda: authority_console.command(self.host, args), f"at authority {' '.join(args)}")
+
+    def _token(self, args: list[str]) -> None:
+        file = self.module_settings.snapshot().tokens
+
+        async def change() -> str:
+            text, has_changed = await asyncio.to_thread(token_console.command, file, args)
+            if has_changed:
+                self.api.take_tokens()
+            return text
+
+        self._background.send(change, f"at token {' '.join(args)}")
 
     def _log(self, args: list[str]) -> None:
         try:

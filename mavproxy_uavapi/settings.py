@@ -10,7 +10,7 @@ from typing import Any
 
 from MAVProxy.modules.lib.mp_settings import MPSetting
 
-from mavproxy_uavapi import envelope_file
+from mavproxy_uavapi import envelope_file, tokens
 from mavproxy_uavapi.core.addresses import is_loopback, local_url_of, url_of
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.ini_file import IniFile
@@ -42,7 +42,7 @@ NOT_OURS: dict[str, dict[str, str]] = {
     "logs": {},
 }
 # Settings for which an API must listen again: its address, its vehicle, and the access.
-ACCESS = ("token", "allow_from", "allow_scripts_from", "allow_open", "cors_origins")
+ACCESS = ("token", "tokens", "allow_from", "allow_scripts_from", "allow_open", "cors_origins")
 LISTENING = ("host", "port", "sysid", "ports", "certfile", "keyfile", *ACCESS)
 ON_SCRIPT_EXIT = ("nothing", "hold", "land", "rtl")
 
@@ -83,6 +83,7 @@ class ApiSettings:
         log_console, debug: components (COPTER, API, GRADYS_GS, SCRIPT) that log to the console, in detail.
         log_path: the log file, or its folder; empty for none.
         token: the bearer token that clients must send; empty for none.
+        tokens: the file with the tokens of operators; empty for none.
     """
 
     host: str
@@ -118,6 +119,7 @@ class ApiSettings:
     log_path: str
     debug: frozenset[str]
     token: str
+    tokens: str
 
     @property
     def url(self) -> str:
@@ -149,10 +151,10 @@ class ApiSettings:
         Raises:
             SettingError: with the reason.
         """
-        if not self.is_local and not (self.token or self.allow_from or self.allow_open):
+        if not self.is_local and not (self.token or self.tokens or self.allow_from or self.allow_open):
             raise SettingError(
-                f"host = {self.host}: everybody on that network could fly the vehicle; set a token, or name the "
-                "networks that may call without one (allow_from), or set allow_open on purpose",
+                f"host = {self.host}: everybody on that network could fly the vehicle; set a token or tokens, or "
+                "name the networks that may call without one (allow_from), or set allow_open on purpose",
                 "host",
             )
         if bool(self.certfile) != bool(self.keyfile):
@@ -235,6 +237,7 @@ class ApiModuleSettings(ModuleSettings[ApiSettings]):
     secrets = frozenset({"token"})
     parsers = {
         "host": address,
+        "tokens": lambda text: "" if is_unset(text) else text,
         "ports": ports,
         "allow_from": networks,
         "allow_scripts_from": networks,
@@ -278,6 +281,7 @@ class ApiModuleSettings(ModuleSettings[ApiSettings]):
             MPSetting("script_quota", int, 50, "MB of all scripts", range=(1, 100000)),
             MPSetting("on_script_exit", str, "hold", "when a script dies in flight", choice=list(ON_SCRIPT_EXIT)),
             MPSetting("token", str, "", "what clients must send as a bearer token", tab="Access"),
+            MPSetting("tokens", str, "", "a file with the tokens of operators, a role each"),
         ]
 
     def make(self, values: Mapping[str, Any], origins: Mapping[str, str]) -> ApiSettings:
@@ -290,6 +294,8 @@ class ApiModuleSettings(ModuleSettings[ApiSettings]):
         settings.check()
         if "envelope" in changed:
             envelope_file.check(settings.envelope)
+        if "tokens" in changed:
+            tokens.check(settings.tokens)
 
     def settings_in(self, ini: IniFile) -> Iterator[tuple[str, str]]:
         """The settings among the keys of the original service's sections; a note reports each other key.

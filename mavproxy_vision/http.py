@@ -13,8 +13,10 @@ from mavproxy_uavapi.core.errors import BadRequest
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 from mavproxy_uavapi.http.extension import (
     EITHER,
+    FLY,
     NED_REACH,
     POST,
+    WATCH,
     Blocking,
     Call,
     Empty,
@@ -105,15 +107,15 @@ class VisionHandlers:
     def routes(self) -> list[Route]:
         """The routes."""
         return [
-            Route("/vision/status", self.status, Empty),
-            Route("/vision/tags", self.tags, Empty),
-            Route("/vision/frame.jpg", self.frame, Empty),
-            Route("/vision/stream.mjpg", self.stream, StreamRequest),
-            Route("/vision/frame", self.post_frame, FrameRequest, POST, raw=True, trail=False),
-            Route("/vision/land", self.land, LandRequest, POST, job=True),
-            Route("/vision/search", self.search, SearchRequest, POST, job=True),
-            Route("/vision/mission", self.mission, MissionRequest, POST, job=True),
-            Route("/vision/stop", self.stop, Empty, EITHER, stops=True),
+            Route("/vision/status", self.status, Empty, WATCH),
+            Route("/vision/tags", self.tags, Empty, WATCH),
+            Route("/vision/frame.jpg", self.frame, Empty, WATCH),
+            Route("/vision/stream.mjpg", self.stream, StreamRequest, WATCH),
+            Route("/vision/frame", self.post_frame, FrameRequest, FLY, POST, raw=True, trail=False),
+            Route("/vision/land", self.land, LandRequest, FLY, POST, job=True),
+            Route("/vision/search", self.search, SearchRequest, FLY, POST, job=True),
+            Route("/vision/mission", self.mission, MissionRequest, FLY, POST, job=True),
+            Route("/vision/stop", self.stop, Empty, FLY, EITHER, stops=True),
         ]
 
     # -- reading -------------------------------------------------------------------------------------------
@@ -184,6 +186,7 @@ class VisionHandlers:
 
     async def post_frame(self, call: Call) -> dict[str, Any]:
         """Take a frame: the body is a JPEG or PNG; needs source `http`."""
+        call.require_right(self.tracker.system)  # its landings follow what the frames show
         worker = self.tracker.worker
         if worker is None or not isinstance(worker.source, Posted):
             raise BadRequest("frames are taken with `vision set source http` only")
@@ -217,17 +220,24 @@ class VisionHandlers:
         plan = MissionPlan(p.alt, p.north, p.east, p.lat, p.long, p.id, p.tag, method)
         return await self._fly(call, self.flights.mission(call.copter, plan))
 
-    async def stop(self, _call: Call) -> dict[str, Any]:
+    async def stop(self, call: Call) -> dict[str, Any]:
         """End the landing, search or mission in flight; the vehicle holds where it is."""
+        self._require_rights(call)
         done = self.flights.stop("stopped")
         return self._answer("Nothing was in flight" if done is None else done.capitalize())
 
     async def _fly(self, call: Call, task: FlightTask) -> Any:
+        self._require_rights(call)
         answer = await call.fly(call.copter, task, task.result, outlives_client=True)
         report = task.report if task.begun else self.flights.report  # of the running flight that it joined
         if isinstance(answer, dict) and report is not None:
             answer["info"] = report.as_dict()
         return answer
+
+    def _require_rights(self, call: Call) -> None:
+        """Let only those on who may command each vehicle that flies for us: its flight is about to end."""
+        for system in self.flights.systems:
+            call.require_right(system)
 
     def _answer(self, result: str, **members: Any) -> dict[str, Any]:
         return envelope(self.tracker.system, result, **members)

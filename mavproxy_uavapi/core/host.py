@@ -23,8 +23,9 @@ from mavproxy_uavapi.core.mavlink.pending_waits import PendingWaits
 from mavproxy_uavapi.core.mavlink.vehicle_state import Fleet, VehicleState
 from mavproxy_uavapi.core.vehicle.endings import FlightEndings
 from mavproxy_uavapi.core.vehicle.envelope_watch import EnvelopeWatch
+from mavproxy_uavapi.core.vehicle.holds import Holds
 from mavproxy_uavapi.core.vehicle.jobs import Job, JobBook
-from mavproxy_uavapi.core.vehicle.leases import Leases
+from mavproxy_uavapi.core.vehicle.leases import Leases, operator_of
 from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
 
 ATTRIBUTE = "uavapi_host"  # attribute of MAVProxy's state, so that a reloaded module finds it
@@ -39,6 +40,7 @@ class Host:
         audit: the trail of commands.
         envelopes: where vehicles may fly.
         leases: for how long a client counts as alive without a call.
+        holds: which operators hold vehicles.
         envelope_watch: stops those of ours that would leave.
         listeners: called with each vehicle message, after the state has taken it and the waits have seen it.
         observers: called with what happens besides: name, system id, s ago, and what; see `tell`.
@@ -77,7 +79,9 @@ class Host:
         self.jobs = JobBook()
         self.jobs.on_ended.append(self._leave_trace)
         self.endings = FlightEndings(self.jobs)
-        self.leases = Leases(self.endings, self.link_watch, clock, self.bridge.loop, self.warn)
+        timing = self.endings, self.link_watch, clock, self.bridge.loop, self.warn
+        self.leases = Leases(*timing)
+        self.holds = Holds(Leases(*timing, whose=operator_of), clock)
         self.envelope_watch = EnvelopeWatch(self.registry, self.jobs, self.envelopes, self.warn)
         self.listeners: list[Callable[[VehicleState, Any, float], None]] = []
         self.observers: list[Callable[[str, int, float, Mapping[str, Any]], None]] = []
@@ -121,6 +125,7 @@ class Host:
 
         async def collect() -> list[tuple[Any, int]]:
             self.leases.close()
+            self.holds.close()
             await self.envelope_watch.close()
             return [message for messages in self.closing_messages for message in messages()]
 

@@ -2,9 +2,26 @@
 
 from __future__ import annotations
 
+from aiohttp import web
+
 from mavproxy_uavapi.core.errors import Forbidden
+from mavproxy_uavapi.core.roles import Role
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.caller import CALLER, Caller
+from mavproxy_uavapi.http.route import Route
+
+
+def may_use(request: web.BaseRequest, route: Route) -> bool:
+    """Whether the caller's role is enough for a route; a file of the page is for everybody."""
+    caller = request.get(CALLER)
+    return caller is None or caller.role >= route.needs
+
+
+def require_role(request: web.BaseRequest, route: Route) -> None:
+    """Raise Forbidden unless the caller's role is enough for the route."""
+    if not may_use(request, route):
+        name, role = request[CALLER].name, request[CALLER].role
+        raise Forbidden(f"{route.path} needs a token for `{route.needs.word}`; that of {name} is for `{role.word}`")
 
 
 def require_owner(call: Call, what: str) -> None:
@@ -15,5 +32,6 @@ def require_owner(call: Call, what: str) -> None:
         what: begins the sentence "…: call with the token …".
     """
     caller: Caller = call.request[CALLER]
-    if not (caller.has_token or caller.is_local or caller.is_in(call.service.settings.allow_scripts_from)):
+    trusted = caller.has_token or caller.is_local or caller.is_in(call.service.settings.allow_scripts_from)
+    if caller.role < Role.ADMIN or not trusted:
         raise Forbidden(f"{what}: call with the token, or from this machine, or set allow_scripts_from")

@@ -15,9 +15,11 @@ from aiohttp import web
 from aiohttp.http_exceptions import HttpProcessingError
 
 from mavproxy_uavapi.core.errors import NotFound
+from mavproxy_uavapi.http.access import require_role
 from mavproxy_uavapi.http.auditing import audited
 from mavproxy_uavapi.http.bodies import invite
 from mavproxy_uavapi.http.call import SERVICE, Call, Service, holder_of, parameters
+from mavproxy_uavapi.http.caller import CALLER
 from mavproxy_uavapi.http.connection import IDLE_TIMEOUT, LINGER, headers_are_here
 from mavproxy_uavapi.http.cors import TRUSTED_ORIGIN, add_cors_headers
 from mavproxy_uavapi.http.error_answers import errors_as_answers
@@ -78,7 +80,11 @@ async def _answer(request: web.BaseRequest) -> web.StreamResponse:
     route = match.route
     if route is None:
         raise web.HTTPMethodNotAllowed(request.method, match.allowed)
-    request[SERVICE].host.leases.renew(holder_of(request))
+    require_role(request, route)
+    host, caller = request[SERVICE].host, request.get(CALLER)
+    host.leases.renew(holder_of(request))
+    if caller is not None:
+        host.holds.renew(caller.operator)
     await invite(request)
     params = await parameters(request, route.model, body=request.method in WITH_BODY and not route.raw)
     call = Call(request[SERVICE], request, params, match)

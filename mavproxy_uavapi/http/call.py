@@ -13,7 +13,7 @@ from typing import Any, TypeVar, cast
 
 from aiohttp import web
 
-from mavproxy_uavapi.core.errors import BadRequest, Invalid, NotSupported, TooManyRequests
+from mavproxy_uavapi.core.errors import BadRequest, Forbidden, Invalid, NotSupported, TooManyRequests
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 from mavproxy_uavapi.core.vehicle.copter import Copter
@@ -21,6 +21,7 @@ from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.http.broadcast import TelemetryBroadcast
 from mavproxy_uavapi.http.bucket import Bucket
+from mavproxy_uavapi.http.caller import CALLER, Caller, client_of
 from mavproxy_uavapi.http.log_throttle import LogThrottle
 from mavproxy_uavapi.http.requests import Request, parse
 from mavproxy_uavapi.http.responses import Answer, envelope
@@ -28,6 +29,7 @@ from mavproxy_uavapi.http.router import NOWHERE, Match
 from mavproxy_uavapi.http.streaming import MOST_OPEN, Slots
 from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.settings import ApiSettings
+from mavproxy_uavapi.tokens import Token, Tokens
 
 log = logging.getLogger("uavapi.http.server")
 R = TypeVar("R", bound=Request)
@@ -48,6 +50,7 @@ class Service:
         host: the vehicles and their jobs.
         settings: the present settings.
         scripts: the mission scripts.
+        tokens: those of operators.
         broadcast: the telemetry for subscribers.
         streams: the slots of streaming answers, of all kinds.
         callers: the request rates of callers that passed the door check.
@@ -58,6 +61,7 @@ class Service:
     host: Host
     settings: ApiSettings
     scripts: Scripts = field(init=False)
+    tokens: Tokens = field(init=False)
     broadcast: TelemetryBroadcast = field(init=False)
     streams: Slots = field(default_factory=lambda: Slots(MOST_OPEN, "streams are open"))
     callers: Bucket = field(default_factory=Bucket)
@@ -68,6 +72,13 @@ class Service:
         self.scripts = Scripts(self.host, self.settings)
         self.broadcast = TelemetryBroadcast(self.host)
         self.throttle = LogThrottle(self.host.clock, log.warning)
+        self.tokens = Tokens(self.host.warn)
+        self.tokens.use(self.settings.tokens)
+
+    def token_of(self, digest: bytes) -> Token | None:
+        """The token in force that has that hash: an operator's, or that of a script that runs."""
+        token = self.tokens.find(digest) or self.scripts.token_of(digest)
+        return token if token is not None and self.tokens.counts(token) else None
 
 
 class Call:
@@ -87,7 +98,7 @@ class Call:
         self.path = match.path
         self.named_system = match.system
         self.names = match.names
-        self._verb = "" if match.route is None else match.route.verb
+        self._route = match.route
         self._params = self.remembered = params
         self.job: Job | None = None
 
@@ -107,16 +118,43 @@ class Call:
         return self.service.host.registry.find(self.system)
 
     @property
+    def caller(self) -> Caller:
+        """Who passed the door."""
+        return self.request[CALLER]
+
+    @property
     def vehicle(self) -> Vehicle:
         """The vehicle, whose link must be alive so that it can be commanded.
 
         Raises:
             NotSupported: its type does not have the route's verb.
+            Forbidden, Busy: as `require_flyable`.
         """
         vehicle = self.service.host.registry.commandable(self.system)
-        if self._verb and not vehicle.has(self._verb):
+        self.require_flyable(vehicle)
+        if self._route is not None and self._route.verb and not vehicle.has(self._route.verb):
             raise NotSupported(f"a {vehicle.kind} does not have {self.path}")
         return vehicle
+
+    def require_flyable(self, vehicle: Vehicle) -> None:
+        """Let only those on who may cause a message to the vehicle, and command it if the route does.
+
+        Raises:
+            Forbidden: the caller's token is not for that vehicle.
+            Busy: somebody else holds it, and the route does not stop it.
+        """
+        self.require_right(vehicle.state.system)
+        if self._route is not None and self._route.commands and not self._route.stops:
+            self.require_unheld(vehicle)
+
+    def require_unheld(self, vehicle: Vehicle) -> None:
+        """Raise Busy if somebody else of the same or a higher role holds the vehicle."""
+        self.service.host.holds.require(vehicle, self.caller.operator)
+
+    def require_right(self, system: int) -> None:
+        """Raise Forbidden unless the caller's token is for that vehicle, whoever holds it."""
+        if not self.caller.flies(system):
+            raise Forbidden(f"the token of {self.caller.name} is not for commands to vehicle {system}")
 
     @property
     def copter(self) -> Copter:
@@ -154,6 +192,7 @@ class Call:
             urgent: whether it ends a flight or a movement; no limit on jobs refuses it then.
             identity: what identifies the request, if the parameters do not.
         """
+        self.require_flyable(vehicle)  # again: somebody may have taken it while a body arrived
         params = self.remembered = identity or self.remembered
         is_async, on_disconnect, lease, holder = (
             self.is_async,
@@ -181,7 +220,7 @@ class Call:
             timeout=getattr(params, "timeout", None),
         )
         job.on_disconnect = on_disconnect or job.on_disconnect
-        job.holder = holder
+        job.holder, job.operator = holder, self.caller.operator.name
         if lease is not None:
             self.service.host.leases.take(vehicle, holder, lease)
         script = None
@@ -217,8 +256,8 @@ class Call:
 
     @property
     def client(self) -> str:
-        """The client's address."""
-        return self.request.remote or "unknown"
+        """The client's address, with the name of its token before it."""
+        return client_of(self.request)
 
     @property
     def peer(self) -> tuple[str, int] | None:
@@ -264,12 +303,12 @@ class Call:
 
 
 def holder_of(request: web.BaseRequest) -> str:
-    """The name under which a client holds leases: its address, and what the query's `client` adds to it.
+    """The name under which a client has leases: as in the trail, and what the query's `client` adds to it.
 
     Raises:
         Invalid: `client` is no short word.
     """
-    name, address = request.query.get("client"), request.remote or "unknown"
+    name, address = request.query.get("client"), client_of(request)
     if name is not None and not CLIENT_NAME.fullmatch(name):
         raise Invalid(f"{name!r} is no word of up to 64 letters, digits, `_`, `.`, `:` and `-`", "query", "client")
     return address if name is None else f"{name}@{address}"

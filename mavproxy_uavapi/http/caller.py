@@ -9,7 +9,9 @@ from dataclasses import dataclass
 
 from aiohttp import web
 
+from mavproxy_uavapi.core.roles import Operator, Role
 from mavproxy_uavapi.settings import Network
+from mavproxy_uavapi.tokens import Token
 
 IpAddress = ipaddress.IPv4Address | ipaddress.IPv6Address
 
@@ -47,13 +49,35 @@ class Caller:
 
     Attributes:
         address: its IP address; None if the connection has none.
-        has_token: whether it sent the token.
+        has_token: whether it sent a token that counts.
         forwarded: whether a proxy passed the request on; the address is the proxy's then.
+        token: the named token that it sent; None for the setting `token`, and for none.
     """
 
     address: IpAddress | None
     has_token: bool = False
     forwarded: bool = False
+    token: Token | None = None
+
+    @property
+    def name(self) -> str:
+        """The name of its token; empty for none."""
+        return "" if self.token is None else self.token.name
+
+    @property
+    def role(self) -> Role:
+        """What it may do; without a named token everything, within the limits of its network."""
+        return Role.ADMIN if self.token is None else self.token.role
+
+    @property
+    def operator(self) -> Operator:
+        """As whom it holds vehicles: its token's owner, or else its address."""
+        return Operator(str(self.address or NOBODY), self.role) if self.token is None else self.token.operator
+
+    def flies(self, system: int) -> bool:
+        """Whether it may command that vehicle."""
+        named = frozenset() if self.token is None else self.token.vehicles
+        return self.role >= Role.FLY and (not named or system in named)
 
     @property
     def group(self) -> str:
@@ -73,3 +97,9 @@ class Caller:
 
 
 CALLER = web.RequestKey("caller", Caller)  # set by the door check
+
+
+def client_of(request: web.BaseRequest) -> str:
+    """Who calls, for the trail and for answers: the address, and before it the name of the token if there is one."""
+    caller, address = request.get(CALLER), request.remote or NOBODY
+    return f"{caller.name}@{address}" if caller is not None and caller.name else address

@@ -8,6 +8,7 @@ from aiohttp import web
 
 from mavproxy_uavapi.core.errors import BadRequest, NotFound, UavApiError, without_frames
 from mavproxy_uavapi.http.call import SERVICE
+from mavproxy_uavapi.http.caller import client_of
 from mavproxy_uavapi.http.responses import Handler, dumps, failure
 
 log = logging.getLogger("uavapi.http")
@@ -33,7 +34,7 @@ async def errors_as_answers(request: web.BaseRequest, handler: Handler) -> web.S
         return await handler(request)
     except UavApiError as error:
         if error.status in REFUSALS and not error.in_trail:
-            request[SERVICE].host.audit.refused(request.remote or "unknown", error.code)
+            request[SERVICE].host.audit.refused(client_of(request), error.code)
         return failure(without_frames(error))
     except web.HTTPException as error:
         return of_http_exception(error) if error.status >= 400 else error

@@ -96,6 +96,7 @@ VEHICLE = {
     "current": True,
     "paused": False,
     "commanded_by": {"job": "7", "verb": "/movement/go_to_ned_wait", "client": "127.0.0.1"},
+    "held_by": None,
 }
 
 PATH_PARAMETERS = {
@@ -148,11 +149,18 @@ RESULTS: Mapping[str, str] = {
     "/mission/start": "Mission started",
     "POST /mission/waypoints": "Mission of 3 items uploaded",
     "DELETE /mission/waypoints": "Mission cleared",
+    "/authority/take": "anna holds vehicle 1",
+    "/authority/release": "Vehicle 1 is released",
 }
 
 AGE = {"age_s": 0.12}
+NOBODY_HOLDS = {"vehicle": 1, "held_by": None, "role": None, "remaining_s": None, "commanded_by": None}
+HELD = {**NOBODY_HOLDS, "held_by": "anna", "role": "fly", "remaining_s": 30.0}
 ONE_SENSOR = {"present": True, "enabled": True, "health": True}
 MEMBERS: Mapping[str, Mapping[str, Any]] = {
+    "/authority": {"vehicles": [HELD]},
+    "/authority/take": HELD,
+    "/authority/release": NOBODY_HOLDS,
     "/telemetry/general": {
         "info": {"airspeed": 0.1, "groundspeed": 4.9, "heading": 90, "throttle": 41, "alt": 604.2},
         **AGE,

@@ -2,19 +2,22 @@
 
 A module puts its routes into `Host.extensions`, by path; the API serves them while it is loaded:
 
-    host.extensions["/vision/land"] = Route("/vision/land", land, LandRequest, EITHER, job=True)
+    host.extensions["/vision/land"] = Route("/vision/land", land, LandRequest, FLY, EITHER, job=True)
 """
 
 from mavproxy_uavapi.http.call import Call, in_time
 from mavproxy_uavapi.http.requests import NED_REACH, Blocking, Empty, Number, Request, Written
 from mavproxy_uavapi.http.responses import Answer, envelope
-from mavproxy_uavapi.http.route import EITHER, POST, Route
+from mavproxy_uavapi.http.route import ADMIN, EITHER, FLY, POST, WATCH, Route
 from mavproxy_uavapi.http.streaming import Slots, StreamingResponse
 
 __all__ = [
+    "ADMIN",
     "EITHER",
+    "FLY",
     "NED_REACH",
     "POST",
+    "WATCH",
     "Answer",
     "Blocking",
     "Call",

@@ -37,6 +37,7 @@ async def show_job(call: Call) -> dict[str, Any]:
 async def abort_job(call: Call) -> dict[str, Any]:
     """Abort a job; a vehicle that it flies stops and holds its place."""
     job, host = _job(call), call.service.host
+    call.require_right(job.vehicle.state.system)
     if not job.running:
         raise Busy(f"job {job.id} ({job.verb}) has ended already")
     job.abort(Aborted(f"{job.verb} was aborted by DELETE /jobs/{job.id}"))

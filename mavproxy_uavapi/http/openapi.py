@@ -25,7 +25,9 @@ ABOUT = """\
 Arm, fly, watch and script an ArduPilot vehicle through MAVProxy. Units: metres, m/s, degrees, seconds, unless a \
 name says otherwise. NED is north, east, down of the EKF origin; relative altitudes are above home.
 
-**Calls from this page fly the vehicle.** Each call answers when telemetry shows its effect, or says why it failed."""
+**Calls from this page fly the vehicle.** Each call answers when telemetry shows its effect, or says why it failed.
+
+`x-role` is what a token must be for: `watch`, `fly` (the vehicle that is meant), or `admin`."""
 
 TAGS = {
     "command": "Arm, take off, land, modes, speeds, home. GET and POST do the same.",
@@ -36,6 +38,7 @@ TAGS = {
     "parameters": "The autopilot's parameters; each new value is read back.",
     "envelope": "Where vehicles may fly. Nothing that leads out of it is sent, whoever asks for it.",
     "message": "Any MAVLink message, for what has no verb. Off unless the setting `allow_raw` is true.",
+    "authority": "Which operator holds a vehicle. Taking it and giving it back sends nothing.",
     "vehicles": "All known vehicles. The prefix `/vehicles/{sysid}` of any path means that vehicle; without it the "
     "setting `sysid` decides, or MAVProxy's current vehicle is meant.",
     "fleet": "One verb for several vehicles, with an answer for each.",
@@ -66,6 +69,7 @@ BY_TAG: Mapping[str, tuple[type[UavApiError], ...]] = {
     "mission": OF_A_SCRIPT,
     "envelope": (errors.NotFound, errors.BadRequest),
     "vehicles": (errors.NotFound,),
+    "authority": (errors.NoVehicle, errors.Busy),
     "parameters": (*OF_A_VEHICLE, errors.NotFound, errors.TimedOut, errors.OutsideEnvelope),
     "fleet": (),
     "docs": (errors.NotFound,),
@@ -229,6 +233,7 @@ def operation(route: Route, method: str) -> dict[str, Any]:
         "summary": summary.strip(),
         "description": "\n\n".join(part for part in about if part),
         "parameters": _path_parameters(route),
+        "x-role": route.needs.word,
         "responses": {"200": _success(route, method), **_failures(errors_of(route))},
     }
     if route.verb:

@@ -7,6 +7,7 @@ import math
 from aiohttp import web
 
 from mavproxy_uavapi.core.errors import TooManyRequests
+from mavproxy_uavapi.http.access import may_use
 from mavproxy_uavapi.http.call import SERVICE
 from mavproxy_uavapi.http.caller import CALLER, Caller
 from mavproxy_uavapi.http.responses import Handler
@@ -16,9 +17,9 @@ COMMANDS = ("/command/", "/movement/")  # paths that also command by GET
 
 
 def stops(request: web.BaseRequest) -> bool:
-    """Whether the request stops a vehicle; no limit refuses or delays it then."""
+    """Whether the request stops a vehicle, and its caller may; no limit refuses or delays it then."""
     route = request[MATCH].route
-    return route is not None and route.stops
+    return route is not None and route.stops and may_use(request, route)
 
 
 async def yield_to_main_loop(request: web.BaseRequest, handler: Handler) -> web.StreamResponse:
@@ -34,7 +35,7 @@ async def yield_to_main_loop(request: web.BaseRequest, handler: Handler) -> web.
 def _rate_key(caller: Caller, request: web.BaseRequest) -> str:
     """The key under which requests are counted: the caller and the vehicle. Unknown vehicles count as one."""
     system = request[MATCH].system
-    return f"{caller.group} {system if system in request[SERVICE].host.fleet.vehicles else 0}"
+    return f"{caller.name}@{caller.group} {system if system in request[SERVICE].host.fleet.vehicles else 0}"
 
 
 async def limit_rate(request: web.BaseRequest, handler: Handler) -> web.StreamResponse:

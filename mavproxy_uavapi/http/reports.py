@@ -50,6 +50,7 @@ def report_of_vehicle(host: Host, vehicle: Vehicle) -> dict[str, Any]:
         "current": state.system == host.registry.resolve(),
         "paused": vehicle.authority.paused,
         "commanded_by": commander_of(vehicle),
+        "held_by": holder_of(host, vehicle),
         "lease": _lease(host, vehicle),
     }
 
@@ -68,6 +69,24 @@ def _lease(host: Host, vehicle: Vehicle) -> dict[str, Any] | None:
     if lease is None:
         return None
     return {"client": lease.holder, "remaining_s": round(max(lease.ends_at - host.clock(), 0.0), 3)}
+
+
+def report_of_authority(host: Host, vehicle: Vehicle) -> dict[str, Any]:
+    """Who holds and who commands a vehicle, as an answer body."""
+    hold = host.holds.of(vehicle)
+    return {
+        "vehicle": vehicle.state.system,
+        "held_by": None if hold is None else hold.operator.name,
+        "role": None if hold is None else hold.operator.role.word,
+        "remaining_s": None if hold is None or hold.remaining is None else round(hold.remaining, 3),
+        "commanded_by": commander_of(vehicle),
+    }
+
+
+def holder_of(host: Host, vehicle: Vehicle) -> str | None:
+    """The name of the operator who holds the vehicle; None if nobody does."""
+    hold = host.holds.of(vehicle)
+    return None if hold is None else hold.operator.name
 
 
 def commander_of(vehicle: Vehicle) -> dict[str, Any] | None:

@@ -7,12 +7,14 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from typing import Any
 
+from mavproxy_uavapi.core.roles import Role
 from mavproxy_uavapi.http.requests import Request
 from mavproxy_uavapi.http.responses import Answer
 
 Action = Callable[[Any], Awaitable[Answer]]  # takes a Call
 EITHER = ("GET", "POST")
 POST = ("POST",)
+WATCH, FLY, ADMIN = Role.WATCH, Role.FLY, Role.ADMIN  # what a route can need
 
 
 @dataclass(frozen=True)
@@ -22,6 +24,7 @@ class Route:
     path: str
     action: Action
     model: type[Request]
+    needs: Role  # which role a caller needs; `Call.vehicle` looks at the vehicle
     methods: tuple[str, ...] = ("GET",)
     raw: bool = False  # whether the action itself reads the body, which holds no parameters
     job: bool = False  # whether the action runs as a job; a client need not wait for it

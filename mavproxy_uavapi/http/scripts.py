@@ -47,7 +47,7 @@ async def list_scripts(call: Call) -> dict[str, Any]:
 async def execute_script(call: Call) -> dict[str, Any]:
     """Run a script in a tmux session of its own; answers when it has started."""
     scripts, p = _scripts(call), call.params(ExecuteScript)
-    run = await scripts.execute(p.script_name, p.args)
+    run = await scripts.execute(p.script_name, p.args, call.caller.operator.name)
     return _answer(call, STARTED, **_report(run))
 
 

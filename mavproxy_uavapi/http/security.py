@@ -14,13 +14,13 @@ import ipaddress
 import logging
 import math
 import socket
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from urllib.parse import urlsplit
 
 from aiohttp import web
 
 from mavproxy_uavapi.core.errors import Forbidden, TooManyRequests, UavApiError, Unauthorized, without_frames
-from mavproxy_uavapi.http.call import SERVICE
+from mavproxy_uavapi.http.call import SERVICE, Service
 from mavproxy_uavapi.http.caller import CALLER, Caller, address_of, group_of
 from mavproxy_uavapi.http.connection import Connection
 from mavproxy_uavapi.http.cors import TRUSTED_ORIGIN
@@ -28,6 +28,7 @@ from mavproxy_uavapi.http.page import wants_page
 from mavproxy_uavapi.http.responses import Handler, failure
 from mavproxy_uavapi.http.router import MATCH
 from mavproxy_uavapi.settings import ApiSettings
+from mavproxy_uavapi.tokens import Token, digest_of
 
 log = logging.getLogger("uavapi.http.door")
 OURSELVES = {"same-origin", "none"}  # Sec-Fetch-Site of our own page and of a typed address
@@ -123,8 +124,18 @@ def _names_us(host: str, own: str) -> bool:
     return True
 
 
-def check_caller(remote: str | None, headers: Mapping[str, str], settings: ApiSettings) -> Caller:
-    """The caller, if it has the token or comes from a network that needs none.
+def no_token(_credentials: bytes) -> Token | None:
+    """Where no named token is known."""
+    return None
+
+
+def check_caller(
+    remote: str | None,
+    headers: Mapping[str, str],
+    settings: ApiSettings,
+    find: Callable[[bytes], Token | None] = no_token,
+) -> Caller:
+    """The caller, if it has a token or comes from a network that needs none.
 
     Behind a proxy the peer's address is the proxy's, not the caller's; it gives no access then.
 
@@ -132,36 +143,48 @@ def check_caller(remote: str | None, headers: Mapping[str, str], settings: ApiSe
         remote: the peer's IP address.
         headers: the request's.
         settings: the access settings.
+        find: the named token of what a caller sent.
 
     Raises:
         Unauthorized: a token is needed, and missing or wrong.
         Forbidden: no token is set, and the caller's network is not in the settings.
     """
     forwarded = any(name in headers for name in PROXIES_SAY)
-    caller = Caller(address_of(remote), has_token(headers.get("Authorization"), settings.token), forwarded)
+    authorization = headers.get("Authorization")
+    credentials = credentials_of(authorization)
+    token = find(credentials) if credentials else None
+    has = token is not None or has_token(authorization, settings.token)
+    caller = Caller(address_of(remote), has, forwarded, token)
     if caller.has_token or caller.is_in(settings.allow_from):
         return caller
-    if settings.token:
+    if settings.token or settings.tokens:
         raise Unauthorized("this API wants its token: Authorization: Bearer …")
     if not settings.allow_open and not caller.is_local:
         raise Forbidden(f"{remote}{' by a proxy' if forwarded else ''} is in none of the networks that may call")
     return caller
 
 
-def has_token(authorization: str | None, token: str) -> bool:
-    """Whether the Authorization header holds the token; the header may hold any bytes."""
+def credentials_of(authorization: str | None) -> bytes:
+    """What an Authorization header holds after `Bearer`, which may be any bytes; empty without."""
     scheme, _, credentials = (authorization or "").partition(" ")
-    credential_bytes = credentials.strip().encode("utf-8", "surrogateescape")
-    return bool(token) and scheme.lower() == "bearer" and hmac.compare_digest(credential_bytes, token.encode())
+    return credentials.strip().encode("utf-8", "surrogateescape") if scheme.lower() == "bearer" else b""
 
 
-def admitted(request: web.BaseRequest, settings: ApiSettings) -> Caller:
+def has_token(authorization: str | None, token: str) -> bool:
+    """Whether the Authorization header holds the token of the settings."""
+    return bool(token) and hmac.compare_digest(credentials_of(authorization), token.encode())
+
+
+def admitted(request: web.BaseRequest, service: Service) -> Caller:
     """The caller, if it may call and its command does not come from a page of another site.
 
     Raises:
         Unauthorized, Forbidden: it may not, with the reason.
     """
-    caller = check_caller(request.remote, request.headers, settings)
+    settings = service.settings
+    caller = check_caller(
+        request.remote, request.headers, settings, lambda credentials: service.token_of(digest_of(credentials))
+    )
     route = request[MATCH].route
     # A page of another site does not have the token, and cannot send that header.
     if route is not None and route.commands and not caller.has_token:
@@ -171,13 +194,14 @@ def admitted(request: web.BaseRequest, settings: ApiSettings) -> Caller:
 
 async def door(request: web.BaseRequest, handler: Handler) -> web.StreamResponse:
     """Check every request before anything else reads it; answer the preflight of a trusted page."""
-    settings = request[SERVICE].settings
+    service = request[SERVICE]
+    settings = service.settings
     connection = Connection.of(request)
     try:
         check_origin(request.headers, settings.cors_origins)
         if TRUSTED_ORIGIN in request and request.method == "OPTIONS":
             return web.Response(status=204)
-        caller = admitted(request, settings)
+        caller = admitted(request, service)
     except Unauthorized as error:
         # A browser has no token before it has the page that asks for one; the files show nothing of the vehicle.
         if not is_open(request[MATCH].path, request.headers) or _wait_of_reader(request):
@@ -188,7 +212,16 @@ async def door(request: web.BaseRequest, handler: Handler) -> web.StreamResponse
     if connection is not None:
         connection.judged(True)
     request[CALLER] = caller
-    return await handler(request)
+    if caller.token is None:
+        return await handler(request)
+    with service.tokens.in_use(caller.token, lambda: _hang_up(request)):
+        return await handler(request)
+
+
+def _hang_up(request: web.BaseRequest) -> None:
+    """Close the connection of a request whose token is in force no more; it ends as if its client had hung up."""
+    if request.transport is not None:
+        request.transport.abort()
 
 
 async def _refused(request: web.BaseRequest, connection: Connection | None, error: UavApiError) -> web.StreamResponse:

@@ -8,7 +8,7 @@ from typing import Any
 
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.mavlink.vehicle_state import StatusText, VehicleState
-from mavproxy_uavapi.http.reports import commander_of, report_of_job
+from mavproxy_uavapi.http.reports import commander_of, holder_of, report_of_job
 
 NAMES = ("alive", "mode", "armed", "link", "authority", "statustext", "job", "tag", "delivered")
 TEXTS_TOLD_FIRST = 20  # of the newest of a vehicle, to who begins to listen
@@ -60,7 +60,11 @@ class NewsWatch:
         """What is new of one vehicle; nothing when it is looked at for the first time."""
         now = self._host.clock()
         vehicle = self._host.registry.find(state.system)
-        authority = {"commanded_by": commander_of(vehicle), "paused": vehicle.authority.paused}
+        authority = {
+            "commanded_by": commander_of(vehicle),
+            "held_by": holder_of(self._host, vehicle),
+            "paused": vehicle.authority.paused,
+        }
         newest = state.statustexts[-1] if state.statustexts else None
         seen = _Seen(state.mode, state.armed, self._host.link_watch.is_alive(state), authority, newest)
         before, self._seen[state.system] = self._seen.get(state.system), seen

@@ -31,8 +31,8 @@ async def _newest(call: Call, name: str) -> Received:
     if received is None:
         await _ask_for(call, name)
         received = vehicle.state.newest(name)
-        if received is None:  # it came with the news of a reboot, so it is outdated
-            raise Stale(f"vehicle {vehicle.state.system} has not reported {name} since it rebooted")
+        if received is None:  # it was not requested, or it came with the news of a reboot, so it is outdated
+            raise Stale(f"vehicle {vehicle.state.system} has not reported {name} since it booted")
     age = vehicle.clock() - received.at
     if age > max_age:
         raise Stale(f"vehicle {vehicle.state.system} last reported {name} {age:.1f} s ago (max_age is {max_age:g} s)")
@@ -40,11 +40,18 @@ async def _newest(call: Call, name: str) -> Received:
 
 
 async def _ask_for(call: Call, name: str) -> None:
+    """Request a message for a caller that may send something to the vehicle; others get what comes anyway."""
+    if not _may_ask(call):
+        return
     vehicle = call.vehicle
     try:
         await wait_with_timeout(FIRST_TIMEOUT, vehicle.request(name))
     except (Rejected, TimedOut, asyncio.TimeoutError) as error:
         raise Stale(f"vehicle {vehicle.state.system} has not reported {name} yet") from error
+
+
+def _may_ask(call: Call) -> bool:
+    return call.caller.flies(call.known_vehicle.state.system)
 
 
 def _age(call: Call, received: Received) -> float:
@@ -116,13 +123,14 @@ async def compass(call: Call) -> dict[str, Any]:
 
 async def home_info(call: Call) -> dict[str, Any]:
     """Request the home position: degrees, m AMSL; x, y, z m north, east, down of the EKF origin."""
-    vehicle = call.vehicle
+    may_ask = _may_ask(call)
+    vehicle = call.vehicle if may_ask else call.known_vehicle
     age = vehicle.state.age("HOME_POSITION", vehicle.clock())
-    if age is None or age > HOME_AGE:
+    if may_ask and (age is None or age > HOME_AGE):
         await vehicle.home()
     received = vehicle.state.messages.get("HOME_POSITION")
     if received is None:
-        raise Stale(f"vehicle {vehicle.state.system} has not reported its home since it rebooted")
+        raise Stale(f"vehicle {vehicle.state.system} has not reported its home since it booted")
     return call.answer("Success", **views.home(received.message), age_s=_age(call, received))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import hmac
 import logging
 import os
 import signal
@@ -14,10 +15,12 @@ from pathlib import Path
 
 from mavproxy_uavapi.core.errors import BadRequest, NoVehicle, ToolFailed
 from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.roles import Role
 from mavproxy_uavapi.scripts import aerpaw, clients, names, on_exit, runner, runs, tmux
 from mavproxy_uavapi.scripts.runs import Run
 from mavproxy_uavapi.scripts.store import ScriptStore
 from mavproxy_uavapi.settings import ApiSettings
+from mavproxy_uavapi.tokens import SCRIPT, Token, digest_of, new_token
 
 log = logging.getLogger("uavapi.script")
 
@@ -40,6 +43,7 @@ class Scripts:
         self._watched: dict[str, Run] = {}
         self._watches: dict[str, asyncio.Task[None]] = {}
         self._launching = asyncio.Lock()
+        self._trusted: dict[str, Run] = {}  # by session: those that have begun, from before their first call
 
     def renew(self, settings: ApiSettings) -> None:
         """Use other settings. Running scripts go on as they were started."""
@@ -93,8 +97,8 @@ class Scripts:
         except OSError as error:
             raise ToolFailed(f"cannot save {name} in {self.store.folder}: {error.strerror}") from error
 
-    async def execute(self, name: str, args: Sequence[str]) -> Run:
-        """Start a script in its own session; returns when it runs.
+    async def execute(self, name: str, args: Sequence[str], operator: str = "") -> Run:
+        """Start a script in its own session, in the name of that operator; returns when it runs.
 
         Raises:
             BadRequest: it is already running, or `name` is not a valid script name.
@@ -106,22 +110,24 @@ class Scripts:
             if self.running_run(path.name) is not None:
                 raise BadRequest(f"{path.name} is already running")
             # A client that hangs up now must not leave an unwatched script.
-            return await asyncio.shield(self._launch(path, args))
+            return await asyncio.shield(self._launch(path, args, operator))
 
-    async def _launch(self, path: Path, args: Sequence[str]) -> Run:
-        run = await self._create(path, args)
+    async def _launch(self, path: Path, args: Sequence[str], operator: str) -> Run:
+        run = self._trusted_run(await self._create(path, args, operator))
         try:
             await tmux.start(run.session, [sys.executable, "-I", runner.__file__, str(run.path)], run.path)
             run = await self._started(run)
         except ToolFailed:
             await tmux.kill(run.session)
+            self._trusted.pop(run.session, None)
             await asyncio.to_thread(runs.discard, run)
             raise
         self._watch(run)
         log.info("%s runs in session %s", run.script, run.session)
         return run
 
-    async def _create(self, path: Path, args: Sequence[str]) -> Run:
+    async def _create(self, path: Path, args: Sequence[str], operator: str) -> Run:
+        token = new_token() if self._settings.tokens else ""
         try:
             command = await asyncio.to_thread(self._command, path)
             return await asyncio.to_thread(
@@ -134,7 +140,9 @@ class Scripts:
                 cwd=path.parent,
                 port=self._settings.port,
                 grace=self._settings.script_grace,
-                environment=self.environment(),
+                environment=self.environment(token),
+                operator=operator,
+                token=digest_of(token.encode()).hex() if token else "",
             )
         except OSError as error:
             raise ToolFailed(f"cannot write logs in {self.logs}: {error.strerror}") from error
@@ -210,20 +218,31 @@ class Scripts:
         except NoVehicle:
             return self._settings.sysid
 
-    def environment(self) -> dict[str, str]:
-        """Our own environment, and the variables by which a script reaches the API."""
+    def environment(self, token: str = "") -> dict[str, str]:
+        """Our own environment, and the variables by which a script reaches the API, by that token."""
         return {
             **os.environ,
             "PYTHONUNBUFFERED": "1",  # so that its output reaches the logs and the session at once
             "UAVAPI_URL": self._settings.local_url,
-            "UAVAPI_TOKEN": self._settings.token,
+            "UAVAPI_TOKEN": token or self._settings.token,
             "UAVAPI_SYSID": str(self.sysid),
         }
+
+    def token_of(self, digest: bytes) -> Token | None:
+        """The token with that hash, if a script that runs has it: that of an admin, because scripts run as us."""
+        for run in self._trusted.values():
+            if run.token and hmac.compare_digest(digest.hex().encode(), run.token.encode()):
+                return Token(f"{run.operator}{SCRIPT}{names.stem(run.script)}", Role.ADMIN, frozenset(), digest)
+        return None
+
+    def _trusted_run(self, run: Run) -> Run:
+        self._trusted[run.session] = run
+        return run
 
     # -- watching -----------------------------------------------------------------------------------------
 
     def _watch(self, run: Run) -> None:
-        self._watched[run.session] = run
+        self._watched[run.session] = self._trusted_run(run)
         self._watches[run.session] = asyncio.create_task(self._until_ended(run))
 
     async def _until_ended(self, run: Run) -> None:
@@ -234,6 +253,7 @@ class Scripts:
                 self._watched[run.session] = run
         finally:
             self._watched.pop(run.session, None)
+            self._trusted.pop(run.session, None)
             self._watches.pop(run.session, None)
         log.info("%s ended with status %s", run.script, run.exit_status)
         if run.died:

@@ -36,6 +36,8 @@ class Run:
         killed: whether it was killed after the grace period.
         error: why it could not start.
         alive: whether its runner lives.
+        operator: who started it.
+        token: the hash of the token by which it calls, in hexadecimal digits; empty if it has none of its own.
     """
 
     path: Path
@@ -55,6 +57,8 @@ class Run:
     killed: bool = False
     error: str | None = None
     alive: bool = False
+    operator: str = ""
+    token: str = ""
 
     @property
     def running(self) -> bool:
@@ -109,6 +113,8 @@ def create(
     port: int,
     grace: float,
     environment: Mapping[str, str],
+    operator: str = "",
+    token: str = "",
 ) -> Run:
     """Create the files of a new run: record, environment (only for the runner) and two empty logs.
 
@@ -123,7 +129,17 @@ def create(
     if path.exists():  # an earlier run began in the same second; names hold whole seconds
         time.sleep(1.0 - started_at % 1.0)
         return create(
-            logs, script, args, sysid, command=command, cwd=cwd, port=port, grace=grace, environment=environment
+            logs,
+            script,
+            args,
+            sysid,
+            command=command,
+            cwd=cwd,
+            port=port,
+            grace=grace,
+            environment=environment,
+            operator=operator,
+            token=token,
         )
     out_log, err_log = logs / f"{name}_out.log", logs / f"{name}_err.log"
     record = {
@@ -138,6 +154,8 @@ def create(
         "grace": grace,
         "command": list(command),
         "cwd": str(cwd),
+        "operator": operator,
+        "token": token,
     }
     out_log.touch()
     err_log.touch()

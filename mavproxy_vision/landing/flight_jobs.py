@@ -205,6 +205,11 @@ class FlightJobs:
         return self._flight is not None and self._flight.job.running
 
     @property
+    def systems(self) -> list[int]:
+        """The system ids of the vehicles whose flights run or are being prepared."""
+        return [flight.vehicle.state.system for flight in self._begun if flight.job.running]
+
+    @property
     def phase(self) -> str:
         """Its present activity."""
         return self._flight.phase if self._flight is not None else "over"

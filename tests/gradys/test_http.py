@@ -10,6 +10,7 @@ from mavproxy_gradys.service import Gradys
 from mavproxy_gradys.tracks.request import TrackRequest
 from mavproxy_uavapi.core.errors import Invalid
 from mavproxy_uavapi.http.call import Call
+from mavproxy_uavapi.http.caller import CALLER, Caller
 from mavproxy_uavapi.http.requests import parse
 
 
@@ -72,7 +73,7 @@ def test_nobody_poses_as_a_vehicle(loop: Any, host: Any, telemetry: Any, setting
     service: Any = SimpleNamespace(host=host, settings=SimpleNamespace(sysid=0))
 
     def post(**body: Any) -> Any:
-        call = Call(service, SimpleNamespace(), parse(Readings, "body", {"value": 1, **body}))  # type: ignore[arg-type]
+        call = Call(service, {CALLER: Caller(None)}, parse(Readings, "body", {"value": 1, **body}))  # type: ignore[arg-type]
         return loop.run(GradysHandlers(gradys).readings(call))
 
     for body in ({"quantity": "position"}, {"quantity": "alt", "device": "uav-1"}, {"quantity": "status"}):

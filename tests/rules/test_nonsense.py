@@ -41,6 +41,7 @@ BOUNDS: dict[str, tuple[float, float]] = {
     "front": METRES,
     "heading": (0.0, 360.0),
     "lat": (-90.0, 90.0),
+    "lease": (1.0, 3600.0),
     "long": (-180.0, 180.0),
     "max_age": (LEAST, 86_400.0),
     "new_v": (LEAST, 50.0),
@@ -51,6 +52,7 @@ BOUNDS: dict[str, tuple[float, float]] = {
     "sysid": (1, 255),
     "timeout": (LEAST, 86_400.0),
     "tolerance": (LEAST, 100.0),
+    "vehicle": (1, 255),
     "vx": VELOCITY,
     "vy": VELOCITY,
     "vz": VELOCITY,
@@ -60,8 +62,8 @@ BOUNDS: dict[str, tuple[float, float]] = {
     "z": DOWN,
 }
 TAKEOFF_ALT = (LEAST, 500.0)
-WHOLE = {"channel", "pwm", "sysid"}
-OPTIONAL = {"duration", "focus_distance", "max_age", "rate", "sysid", "timeout"}
+WHOLE = {"channel", "pwm", "sysid", "vehicle"}
+OPTIONAL = {"duration", "focus_distance", "max_age", "rate", "sysid", "timeout", "vehicle"}
 # The other parameters of a request that is good.
 GOOD: dict[str, dict[str, Any]] = {
     "/movement/go_to_gps": {"lat": -35.363, "long": 149.165, "alt": 50},
@@ -252,7 +254,7 @@ def put_back(world: Any, path: str) -> None:
         world.loop.pass_time(0.1)
 
 
-SENDS_NOTHING = {"timeout", "tolerance", "max_age", "capture_time", "focus_distance"}
+SENDS_NOTHING = {"timeout", "tolerance", "max_age", "capture_time", "focus_distance", "lease", "vehicle"}
 
 
 class Trial:

@@ -10,7 +10,7 @@ CLIENT = 50000  # a client's port
 
 
 class Reply(NamedTuple):
-    """An answer: HTTP status, parsed body, when it came (s), and as it was."""
+    """An answer: HTTP status, parsed body (None for what is no JSON), when it came (s), and as it was."""
 
     status: int
     body: Any
@@ -68,7 +68,8 @@ class Wire(asyncio.Transport):
             return None
         status, *lines = head.decode("latin-1").split("\r\n")
         headers = {name.strip().lower(): value.strip() for name, _, value in (line.partition(":") for line in lines)}
-        content = json.loads(body, parse_constant=_no_json)
+        is_json = headers.get("content-type", "").startswith("application/json")
+        content = json.loads(body, parse_constant=_no_json) if is_json and body else None
         return Reply(int(status.split()[1]), content, self._loop.time(), headers, body)
 
     def get_write_buffer_size(self) -> int:

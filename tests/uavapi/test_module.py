@@ -102,6 +102,8 @@ def test_module_is_what_mavproxy_looks_for(module: Any, mpstate: Any) -> None:
     assert mpstate.completions["uavapi"] == [
         "<status|start|stop|vehicles|config|log|help>",
         "fleet <arm|brake|disarm|guided|land|rtl|stop>",
+        "token <add|list|remove>",
+        "authority <take|release>",
         "set (UAVAPISETTING)",
         "fly (FILENAME)",
     ]

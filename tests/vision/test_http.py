@@ -16,6 +16,7 @@ from aiohttp.test_utils import TestClient, TestServer, make_mocked_request
 from mavproxy_uavapi.core.errors import BadRequest, Invalid, TooManyRequests, UavApiError
 from mavproxy_uavapi.http import call as calls
 from mavproxy_uavapi.http.call import Call
+from mavproxy_uavapi.http.caller import CALLER, Caller
 from mavproxy_uavapi.http.requests import parse
 from mavproxy_uavapi.http.streaming import Slots
 from mavproxy_vision import http
@@ -97,6 +98,7 @@ def posted(over, body):
     found = []
 
     async def handle(request):
+        request[CALLER] = Caller(None)
         try:
             found.append(await over.post_frame(Call(None, request, FrameRequest())))
         except BadRequest as error:
@@ -164,6 +166,7 @@ def post_many(over, count):
     """The answers to so many frames that are posted at once."""
 
     async def handle(request):
+        request[CALLER] = Caller(None)
         try:
             await over.post_frame(Call(None, request, FrameRequest()))
         except UavApiError as error:

@@ -40,8 +40,9 @@ class Job:
         verb: the path that was called, `/movement/go_to_ned_wait`.
         request: the validated parameters.
         vehicle: what it commands; two jobs of one vehicle have the same object here.
-        client: the client that began it: an address, or CONSOLE.
+        client: the client that began it: an address, with the name of its token before it, or CONSOLE.
         holder: the name by which that client may hold a lease; the same where it gave none.
+        operator: the name by which it may hold the vehicle.
         began_at, ended_at: on the loop's clock (s); ended_at is None while it runs.
         ending: why it ended; None while it runs.
         steers: whether the job flies the vehicle by a stream of setpoints, without which the vehicle must stop.
@@ -60,7 +61,7 @@ class Job:
         self, number: int, verb: str, request: Mapping[str, Any], vehicle: Any, *, client: str, outlives_client: bool
     ) -> None:
         self.id = str(number)
-        self.client = self.holder = client
+        self.client = self.holder = self.operator = client
         self.verb = verb
         self.request = dict(request)
         self.vehicle = vehicle

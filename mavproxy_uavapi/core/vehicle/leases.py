@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from mavproxy_uavapi.core.errors import Aborted
 from mavproxy_uavapi.core.mavlink.link_watch import LinkWatch
 from mavproxy_uavapi.core.vehicle.endings import FlightEndings, Situation, situation
-from mavproxy_uavapi.core.vehicle.jobs import Ending
+from mavproxy_uavapi.core.vehicle.jobs import Ending, Job
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 log = logging.getLogger("uavapi.copter")
@@ -31,6 +31,16 @@ class Lease:
     ends_at: float
 
 
+def client_of(job: Job) -> str:
+    """The client that a job is for."""
+    return job.holder
+
+
+def operator_of(job: Job) -> str:
+    """The operator that a job is for."""
+    return job.operator
+
+
 class Leases:
     """The leases by vehicle; one each, that of the client who asked last. Asyncio thread only.
 
@@ -40,6 +50,7 @@ class Leases:
         clock: monotonic seconds.
         loop: where the timers run.
         say: told each end in a sentence.
+        whose: by which name a job's client has leases.
     """
 
     def __init__(
@@ -49,12 +60,15 @@ class Leases:
         clock: Callable[[], float],
         loop: asyncio.AbstractEventLoop,
         say: Callable[[str], None],
+        *,
+        whose: Callable[[Job], str] = client_of,
     ) -> None:
         self._endings = endings
         self._link_watch = link_watch
         self._clock = clock
         self._loop = loop
         self._say = say
+        self._whose = whose
         self._leases: dict[Vehicle, Lease] = {}
         self._timers: dict[Vehicle, asyncio.TimerHandle] = {}
 
@@ -98,7 +112,7 @@ class Leases:
 
     def _end(self, vehicle: Vehicle, lease: Lease) -> None:
         commander = vehicle.authority.flies or vehicle.authority.commander
-        if commander is None or commander.holder != lease.holder:
+        if commander is None or self._whose(commander) != lease.holder:
             return  # somebody else commands by now
         if situation(vehicle, commander.modes) in (Situation.LAND, Situation.RTL):
             return  # what it asked for last is as good

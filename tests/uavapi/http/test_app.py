@@ -17,7 +17,7 @@ from aiohttp.test_utils import RawTestServer, TestClient
 from mavproxy_uavapi.http.app import ApiServer, is_ours, listening_socket, make_handler
 from mavproxy_uavapi.http.requests import Servo
 from mavproxy_uavapi.http.responses import Handler
-from mavproxy_uavapi.http.route import Route
+from mavproxy_uavapi.http.route import FLY, Route
 from mavproxy_uavapi.settings import ApiModuleSettings
 
 MAX_BODY = 1024 * 1024  # bytes
@@ -117,7 +117,7 @@ def test_path_of_another_module_is_served_while_that_is_loaded(flying: Any, api:
         return call.answer(f"Searching for {call.params(Servo).channel}")
 
     assert api.post("/vision/search", {"channel": 3, "pwm": 1000}).status == 404
-    host.extensions["/vision/search"] = Route("/vision/search", search, Servo, ("POST",))
+    host.extensions["/vision/search"] = Route("/vision/search", search, Servo, FLY, ("POST",))
     for slash in ("", "/"):
         answer = api.post(f"/vision/search{slash}", {"channel": 3, "pwm": 1000})
         assert (answer.status, answer.body["result"]) == (200, "Searching for 3")

@@ -11,7 +11,7 @@ import pytest
 from mavproxy_uavapi.core.audit import COUNTED_FOR
 from mavproxy_uavapi.core.text import LONGEST
 from mavproxy_uavapi.http.requests import Empty
-from mavproxy_uavapi.http.route import POST, Route
+from mavproxy_uavapi.http.route import FLY, POST, Route
 from mavproxy_uavapi.scripts.on_exit import after_death
 from mavproxy_uavapi.scripts.runs import Run
 
@@ -75,7 +75,7 @@ def test_route_without_a_trail_leaves_no_trace(service: Any, api: Any, host: Any
         return {}
 
     for trail in (True, False):
-        host.extensions["/take"] = Route("/take", take, Empty, POST, trail=trail)
+        host.extensions["/take"] = Route("/take", take, Empty, FLY, POST, trail=trail)
         for _ in range(3):
             assert api.post("/take").status == 200
         assert len(service.host.audit.entries) == 3
@@ -123,7 +123,7 @@ def test_job_of_a_task_that_a_finished_call_began_has_an_entry_of_its_own(
         dead.append(asyncio.create_task(watch()))
         return {"result": "runs"}
 
-    host.extensions["/execute"] = Route("/execute", execute, Empty, POST)
+    host.extensions["/execute"] = Route("/execute", execute, Empty, FLY, POST)
     api.post("/execute")
     loop.pass_time(10.0)
     of_call, of_death = service.host.audit.entries

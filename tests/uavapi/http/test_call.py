@@ -7,8 +7,9 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.http.call import BODY_TIMEOUT, Call, in_time
+from mavproxy_uavapi.http.caller import CALLER, Caller
 from mavproxy_uavapi.http.requests import Blocking, Empty, Servo
-from mavproxy_uavapi.http.route import POST, Route
+from mavproxy_uavapi.http.route import FLY, POST, Route
 from mavproxy_uavapi.scripts.on_exit import after_death
 from mavproxy_uavapi.scripts.runs import Run
 from mavproxy_uavapi.settings import ApiModuleSettings
@@ -25,7 +26,7 @@ def test_vehicle_is_the_one_of_the_settings(make_drone: Any, service: Any) -> No
     make_drone(1)
     make_drone(2)
     service.settings = ApiModuleSettings({"sysid": 2}).snapshot()
-    call = Call(service, None, Empty())  # type: ignore[arg-type]
+    call = Call(service, {CALLER: Caller(None)}, Empty())  # type: ignore[arg-type]
     assert call.vehicle.state.system == call.known_vehicle.state.system == 2
     assert call.answer("done")["id"] == "2"
 
@@ -50,7 +51,7 @@ def test_body_that_does_not_arrive_is_400(api: Any, loop: Any, host: Any, raw: b
         yield b"{"
         await asyncio.sleep(2 * BODY_TIMEOUT)
 
-    host.extensions["/take"] = Route("/take", take, Empty, POST, raw=raw)
+    host.extensions["/take"] = Route("/take", take, Empty, FLY, POST, raw=raw)
     began = loop.time()
     answer = api.post("/take", data=body())
     assert (answer.status, answer.body["detail"]) == (400, "the body did not arrive within 10 s")

@@ -11,7 +11,7 @@ from mavproxy_uavapi.core import errors
 from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.http import examples, requests
 from mavproxy_uavapi.http.openapi import BY_PATH, KINDS, RAW_BODIES, TAGS, document, example_of, simplified
-from mavproxy_uavapi.http.route import Route
+from mavproxy_uavapi.http.route import FLY, Route
 from mavproxy_uavapi.http.routes import ROUTES
 
 DOCUMENT = document(ROUTES)
@@ -161,7 +161,7 @@ def test_routes_of_other_modules_are_described_too(api: Any, service: Any) -> No
         """
         return {}
 
-    service.host.extensions["/extra/look"] = Route("/extra/look", action, requests.Heading, ("POST",))
+    service.host.extensions["/extra/look"] = Route("/extra/look", action, requests.Heading, FLY, ("POST",))
     body = api.get("/openapi.json").body
     reported = body["paths"]["/extra/look"]["post"]
     assert (reported["tags"], reported["summary"]) == (["extra"], "Look around.")

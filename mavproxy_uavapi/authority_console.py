@@ -1,0 +1,40 @@
+"""`uavapi authority [take|release [SYSID …]]` at the prompt: who holds the vehicles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from mavproxy_uavapi.core.errors import BadRequest
+from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.roles import THE_PROMPT
+from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+
+USAGE = "authority takes `take` or `release` and, for some vehicles only, their system ids"
+
+
+async def command(host: Host, args: Sequence[str]) -> str:
+    """Run the command, for every known vehicle if none is named; a line for each.
+
+    Raises:
+        BadRequest: no such command, or a word is no system id.
+        NoVehicle: none such was heard.
+    """
+    word, numbers = (args[0] if args else ""), args[1:]
+    if word not in ("", "take", "release") or not all(number.isdecimal() for number in numbers):
+        raise BadRequest(USAGE)
+    vehicles = [host.registry.find(system) for system in [int(n) for n in numbers] or sorted(host.fleet.vehicles)]
+    for vehicle in vehicles:
+        if word == "take":
+            host.holds.take(vehicle, THE_PROMPT, 0)
+        elif word == "release":
+            host.holds.release(vehicle, THE_PROMPT)
+    return "\n".join(["authority", *(_line(host, vehicle) for vehicle in vehicles)])
+
+
+def _line(host: Host, vehicle: Vehicle) -> str:
+    hold, job = host.holds.of(vehicle), vehicle.authority.flies
+    held = "nobody holds it" if hold is None else f"{hold.operator.name} holds it"
+    if hold is not None and hold.remaining is not None:
+        held += f" ({hold.operator.role.word}, {hold.remaining:.0f} s without a call)"
+    commanded = "" if job is None else f"; {job.client} commands: {job.verb}"
+    return f"  vehicle {vehicle.state.system}: {held}{commanded}"

@@ -1,0 +1,52 @@
+"""A file that is read again whenever it changes."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from pathlib import Path
+
+LOOK_EVERY = 2.0  # s
+Stamp = tuple[int, int, int, int, int, int]
+
+
+class WatchedFile:
+    """Says when a file has changed: its text, its place, its owner or its mode.
+
+    Attributes:
+        path: the file; None for none.
+    """
+
+    def __init__(self) -> None:
+        self.path: Path | None = None
+        self._stamp: Stamp | None = None
+
+    def use(self, name: str) -> None:
+        """Watch that file from now on; none if the name is empty."""
+        self.path = Path(name).expanduser() if name else None
+        self._stamp = None
+
+    def look(self) -> None:
+        """Note the file as it is: it is about to be read."""
+        self._stamp = self._read_stamp()
+
+    def has_changed(self) -> bool:
+        """Whether it is not the one of the last look."""
+        return self.path is not None and self._read_stamp() != self._stamp
+
+    async def watch(self, take: Callable[[], None]) -> None:
+        """Call `take` after each change, within a few seconds, until cancelled."""
+        while True:
+            await asyncio.sleep(LOOK_EVERY)
+            if await asyncio.to_thread(self.has_changed):
+                take()
+
+    def _read_stamp(self) -> Stamp | None:
+        if self.path is None:
+            return None
+        try:
+            found = self.path.stat()
+            link = self.path.lstat()
+        except OSError:
+            return None
+        return found.st_mtime_ns, found.st_ctime_ns, found.st_size, found.st_ino, found.st_mode, link.st_ino
