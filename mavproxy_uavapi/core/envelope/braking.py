@@ -78,6 +78,11 @@ def of_brake(parameters: Mapping[str, float]) -> Braking:
     return Braking(min(BRAKE_DECELERATION, hardest), vertical, jerk)
 
 
+def of(kind: str, parameters: Mapping[str, float]) -> Braking:
+    """A vehicle of that kind that is stopped at once."""
+    return of_rover(parameters) if kind == "rover" else of_brake(parameters)
+
+
 def of_rover(parameters: Mapping[str, float]) -> Braking:
     """A rover in HOLD."""
     known = parameters.get("ATC_DECEL_MAX") or parameters.get("ATC_ACCEL_MAX") or ROVER_DECELERATION

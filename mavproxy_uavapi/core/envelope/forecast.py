@@ -70,17 +70,15 @@ def along(
     slack: Slack,
     distance: float,
     *,
-    stays: bool = True,
     seconds: float = math.inf,
 ) -> Forecast:
-    """The forecast of a way.
+    """The forecast of a way, at the end of which the vehicle stays.
 
     Args:
         spots: the corners, the first is where the vehicle is now.
         pace: how fast it flies.
         slack: how late or early it may be.
         distance: m to be kept.
-        stays: whether it stays at the end of the way.
         seconds: how far the forecast goes; what may be reached later is not in it.
     """
     legs = [_leg(a, b, pace) for a, b in zip(spots, spots[1:], strict=False)]
@@ -98,8 +96,7 @@ def along(
     planned = np.concatenate(times)
     early = np.maximum(planned * (1 - slack.share) - slack.ahead, 0.0)
     late = planned * (1 + slack.share) + np.concatenate(slower)
-    if stays:
-        late[-1] = math.inf
+    late[-1] = math.inf
     kept = early <= seconds
     return Forecast(np.concatenate(points)[kept], early[kept], late[kept], apart)
 

@@ -184,7 +184,7 @@ def _until_it_stands(vehicle: Vehicle) -> float:
     speed, parameters = math.hypot(*_velocity(vehicle)), vehicle.state.parameters
     if vehicle.kind == "plane":
         return _until_it_brakes(vehicle) + 2 * vehicle.guard.check.circle / max(speed, 1.0)
-    stopping = braking.of_rover(parameters) if vehicle.kind == "rover" else braking.of_brake(parameters)
+    stopping = braking.of(vehicle.kind, parameters)
     way = stopping.to_rest(_velocity(vehicle), 0.0)
     return _until_it_brakes(vehicle) + 2 * math.hypot(*way) / max(speed, SLOWEST)
 
@@ -213,7 +213,7 @@ def _stopping_place(vehicle: Vehicle, here: Stop, velocity: tuple[float, float, 
         speed = math.hypot(*velocity[:2])
         more = vehicle.guard.check.circle / speed if speed > SLOWEST else 0.0
         return _moved(here, velocity, seconds + more)
-    stopping = braking.of_rover(parameters) if vehicle.kind == "rover" else braking.of_brake(parameters)
+    stopping = braking.of(vehicle.kind, parameters)
     north, east, up = stopping.to_rest(velocity, seconds)
     return Stop(*moved(here.lat, here.lon, north, east), here.up + up)
 

@@ -6,6 +6,7 @@ Verbs ask it earlier too, so that a refused command ends no other (`CommandAutho
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -117,14 +118,20 @@ class EnvelopeGuard:
         if order is None or isinstance(order, STANDING):
             return before
         way: list[Stop] = []
-        if self.in_force and isinstance(order, orders.GoTo | orders.Climb):
-            way = self._way_of(order)
-        elif self.in_force and isinstance(order, orders.Fly):
-            way = self._way_at(order)
-        elif self._checked_mission is not None and self._starts_mission(order):
-            way = self._checked_mission[2]
+        with contextlib.suppress(Stale):  # what may be sent without a position, as a stop, goes out
+            way = self._way_by(order)
         self.take_up(Ordered(way, not isinstance(order, orders.Fly), self._vehicle.clock()))
         return before
+
+    def _way_by(self, order: orders.Order) -> list[Stop]:
+        """The way that an order leads along, as far as it is known. Raises Stale."""
+        if self.in_force and isinstance(order, orders.GoTo | orders.Climb):
+            return self._way_of(order)
+        if self.in_force and isinstance(order, orders.Fly):
+            return self._way_at(order)
+        if self._checked_mission is not None and self._starts_mission(order):
+            return self._checked_mission[2]
+        return []
 
     def take_up(self, ordered: Ordered) -> None:
         """Note what the vehicle is told to do, or what it still does because a message could not be sent."""
@@ -243,12 +250,22 @@ class EnvelopeGuard:
     def _way_at(self, order: orders.Fly) -> list[Stop]:
         """The way that is flown until the autopilot drops the setpoint, and until it stands."""
         north, east, down = self._velocity(order)
+        if math.hypot(north, east, down) < 1e-3:
+            return self._way_to_rest()
         parameters, drives = self._vehicle.state.parameters, self.check.drives
         stopping = braking.of_rover(parameters) if drives else braking.of_guided(parameters)
         lasts = max(parameters.get("GUID_TIMEOUT", 3.0), 0.1) + braking.LATENCY
         here = self.check.here()
         on = stopping.to_rest((north, east, 0.0 if drives else -down), lasts)
         return [here, Stop(*moved(here.lat, here.lon, on[0], on[1]), here.up + on[2])]
+
+    def _way_to_rest(self) -> list[Stop]:
+        """The way that it needs to stand, from the velocity that it has."""
+        here, told = self.check.here(), self._vehicle.fresh("GLOBAL_POSITION_INT")
+        stopping = braking.of_rover if self.check.drives else braking.of_guided
+        velocity = told.vx / 100.0, told.vy / 100.0, 0.0 if self.check.drives else -told.vz / 100.0
+        north, east, up = stopping(self._vehicle.state.parameters).to_rest(velocity, braking.LATENCY)
+        return [here, Stop(*moved(here.lat, here.lon, north, east), here.up + up)]
 
     def _way_of(self, order: orders.GoTo | orders.Climb) -> list[Stop]:
         here = self.check.here()

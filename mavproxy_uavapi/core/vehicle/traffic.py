@@ -9,8 +9,9 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Awaitable, Callable, Iterable, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
+from mavproxy_uavapi.core.envelope import braking
 from mavproxy_uavapi.core.envelope.forecast import Forecast, Meeting, Pace, Slack, along, meeting
 from mavproxy_uavapi.core.envelope.space import LocalFrame
 from mavproxy_uavapi.core.errors import Stale, Superseded, TooNear
@@ -26,17 +27,11 @@ MARGIN = 1.0  # m more than the separation, for what a forecast does not have
 CERTAIN = 1.0  # s for which a vehicle that nobody commands through us keeps its velocity
 LOOKED_AHEAD = 5.0  # s, likewise, before a command is sent
 RTL_HEIGHT = 15.0  # m; used until the vehicle's own is known
+STOPPED = {"BRAKE", "HOLD"}
 RETURNS, LANDS = {"RTL", "SMART_RTL", "QRTL"}, {"LAND", "QLAND"}
 RETRY, LONGEST_WAIT = 0.5, 120.0  # s between two looks of a command that waits, and until it is refused
 OLD = 3.0  # s; whose position is older may be anywhere on its way
 CORNERS = 8  # of the polygon in place of a plane's circle
-
-
-class Expected(NamedTuple):
-    """Where a vehicle goes from now on: places with m above sea level, and whether it stays at the last of them."""
-
-    stops: list[Stop]
-    stays: bool = True
 
 
 class Traffic:
@@ -69,11 +64,11 @@ class Traffic:
         """
         if not self.in_force or not way:
             return
-        ours = Expected(_to_amsl(vehicle, way))
+        ours = _to_amsl(vehicle, way)
         for other in self._others(vehicle):
             found = self._meeting(vehicle, ours, other, PLANNED, math.inf)
             if found is not None:
-                raise self._too_near(vehicle, other, found, ours.stops[0])
+                raise self._too_near(vehicle, other, found, ours[0])
 
     def nearing(self, vehicle: Any, seconds: float) -> tuple[Any, Meeting] | None:
         """The vehicle that it is about to come too near to within that many s, and where; None for none."""
@@ -117,17 +112,17 @@ class Traffic:
         """Those that are in the air or on their way there, and have told where."""
         return [other for other in self._vehicles() if other is not vehicle and _counts(other)]
 
-    def _meeting(self, vehicle: Any, ours: Expected, other: Any, slack: Slack, seconds: float) -> Meeting | None:
-        frame = LocalFrame((ours.stops[0].lat, ours.stops[0].lon))
+    def _meeting(self, vehicle: Any, ours: list[Stop], other: Any, slack: Slack, seconds: float) -> Meeting | None:
+        frame = LocalFrame((ours[0].lat, ours[0].lon))
         planned = slack is PLANNED
         theirs = self._forecast(frame, other, expected(other, LOOKED_AHEAD if planned else CERTAIN), slack, seconds)
         if _age(other) > OLD:
             theirs = theirs.at_any_time()
         return meeting(self._forecast(frame, vehicle, ours, slack, seconds), theirs, self._kept)
 
-    def _forecast(self, frame: LocalFrame, vehicle: Any, route: Expected, slack: Slack, seconds: float) -> Forecast:
-        spots = [frame.spot((stop.lat, stop.lon), stop.up) for stop in route.stops]
-        return along(spots, _pace(vehicle), slack, self._kept, stays=route.stays, seconds=seconds)
+    def _forecast(self, frame: LocalFrame, vehicle: Any, way: list[Stop], slack: Slack, seconds: float) -> Forecast:
+        spots = [frame.spot((stop.lat, stop.lon), stop.up) for stop in way]
+        return along(spots, _pace(vehicle), slack, self._kept, seconds=seconds)
 
     def _apart_for(self, vehicle: Any, other: Any, seconds: float) -> bool:
         """Whether two are too far apart to come near each other in that time; cheap."""
@@ -147,8 +142,8 @@ class Traffic:
         return TooNear(sentence, {"vehicle": system, "in_s": round(found.seconds, 1), "at": at})
 
 
-def expected(vehicle: Any, seconds: float) -> Expected:
-    """Where a vehicle goes from now on.
+def expected(vehicle: Any, seconds: float) -> list[Stop]:
+    """Where a vehicle goes from now on: places with m above sea level; it stays at the last.
 
     Args:
         vehicle: which.
@@ -156,17 +151,18 @@ def expected(vehicle: Any, seconds: float) -> Expected:
     """
     here = _place(vehicle)
     if vehicle.mode in LANDS:
-        return Expected([here, here._replace(up=_home_amsl(vehicle))])
+        return [here, here._replace(up=_home_amsl(vehicle))]
     if vehicle.mode in RETURNS:
-        return Expected(_way_home(vehicle, here))
+        return _way_home(vehicle, here)
     planned = vehicle.guard.remaining()
     if planned and (vehicle.flies_for_us or vehicle.state.landed):
-        return Expected(_rounded(vehicle, [here, *_to_amsl(vehicle, planned)]))
+        return _rounded(vehicle, [here, *_to_amsl(vehicle, planned)])
     velocity = _velocity(vehicle)
-    if math.hypot(*velocity) * seconds < 1.0:
-        return Expected([here])
-    north, east, up = (speed * seconds for speed in velocity)
-    return Expected([here, Stop(*moved(here.lat, here.lon, north, east), here.up + up)], stays=False)
+    if vehicle.mode in STOPPED or vehicle.mode == vehicle.holding_mode:
+        north, east, up = braking.of(vehicle.kind, vehicle.state.parameters).to_rest(velocity, braking.LATENCY)
+    else:
+        north, east, up = (speed * seconds for speed in velocity)
+    return [here, Stop(*moved(here.lat, here.lon, north, east), here.up + up)]
 
 
 def _rounded(vehicle: Any, stops: list[Stop]) -> list[Stop]:

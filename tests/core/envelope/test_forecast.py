@@ -15,10 +15,8 @@ EXACT, LOOSE = Slack(0.0, 0.5, 0.0), Slack(1.0, 4.0, 0.2)
 DISTANCE = 8.0
 
 
-def flight(
-    *spots: tuple[float, float, float], slack: Slack = EXACT, stays: bool = True, seconds: float = math.inf
-) -> Forecast:
-    return along([Spot(*spot) for spot in spots], PACE, slack, DISTANCE, stays=stays, seconds=seconds)
+def flight(*spots: tuple[float, float, float], slack: Slack = EXACT, seconds: float = math.inf) -> Forecast:
+    return along([Spot(*spot) for spot in spots], PACE, slack, DISTANCE, seconds=seconds)
 
 
 def test_a_way_is_flown_at_its_pace_and_ends_where_the_vehicle_stays() -> None:
@@ -65,7 +63,7 @@ def test_who_is_too_near_already_may_go_away_and_come_no_nearer() -> None:
 
 
 def test_a_vehicle_that_does_not_tell_where_it_is_may_be_anywhere_on_its_way() -> None:
-    passes = flight((0, 0, 10), (0, 100, 10), stays=False)
+    passes = flight((0, 0, 10), (0, 100, 10))
     late = flight((-300, 20, 10), (300, 20, 10))
     assert meeting(late, passes, DISTANCE) is None
     assert meeting(late, passes.at_any_time(), DISTANCE) is not None

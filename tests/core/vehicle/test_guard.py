@@ -35,6 +35,17 @@ def square(half: float, **limits: float) -> Space:
     return Space(Envelope((area,), Limits(**limits)))
 
 
+def test_a_stop_goes_out_though_nobody_knows_where_the_vehicle_is(make: Callable[..., Any], loop: Any) -> None:
+    vehicle = make("copter", square(100.0))
+    loop.pass_time(60.0)
+    stop = VelocityTarget(0.0, 0.0, 0.0).to(Address(1, 1), NO_YAW)
+    vehicle.guard.require(stop)
+    vehicle.guard.sending(stop)
+    assert not vehicle.guard.way and vehicle.guard.ordered_at == loop.time()
+    with pytest.raises(Stale):
+        vehicle.guard.require(VelocityTarget(1.0, 0.0, 0.0).to(Address(1, 1), NO_YAW))
+
+
 @pytest.fixture
 def make(host: Any, msg: Callable[..., Any], loop: Any) -> Callable[..., Any]:
     """Makes a vehicle at a place (m north, east, up) with a velocity (m/s)."""
