@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import ipaddress
 import json
 from collections.abc import Callable
 from dataclasses import replace
@@ -18,6 +19,7 @@ from mavproxy_uavapi.core.errors import Invalid, TooManyRequests
 from mavproxy_uavapi.core.vehicle.endings import Policy
 from mavproxy_uavapi.http.auditing import audited
 from mavproxy_uavapi.http.call import Call, Service
+from mavproxy_uavapi.http.caller import CALLER, Caller
 from mavproxy_uavapi.http.jobs import list_jobs
 from mavproxy_uavapi.http.requests import Empty
 from mavproxy_uavapi.http.router import Match
@@ -40,10 +42,14 @@ def service(host: Any, telemetry: Any, monkeypatch: pytest.MonkeyPatch) -> Servi
     return Service(host, ApiModuleSettings(environ={}).snapshot())
 
 
+class PassedRequest(dict[Any, Any]):
+    """A request that has passed the door, as far as these tests ask it."""
+
+
 def call_of(service: Service, text: str = LONG, **query: str) -> Call:
-    request: Any = SimpleNamespace(
-        path="/mission/fly-track", remote="10.0.0.9", headers={}, query=query, transport=None
-    )
+    request: Any = PassedRequest({CALLER: Caller(ipaddress.ip_address("10.0.0.9"))})
+    request.path, request.remote = "/mission/fly-track", "10.0.0.9"
+    request.headers, request.query, request.transport = {}, query, None
     return Call(service, request, TrackRequest(track=text), Match("/mission/fly-track"))
 
 
