@@ -26,6 +26,7 @@ PLACE_UNUSED = POSITION_IGNORED
 HELD = 3.0  # m that it may have moved since the position that it is told to hold
 STEPS_OF_ONE = 50
 IN_CI = 10_000
+PARTS = 10  # of the machine, each with steps of its own
 WANTED = int(os.environ.get("MACHINE_STEPS", IN_CI))
 WAITS_LEFT = 0  # when all is over
 DELETED_STANDS = 5.0  # s from a DELETE, or from when the vehicle hears again: BRAKE is sent anew after 1.5 s
@@ -63,7 +64,6 @@ def around_home(half: float) -> Area:
 class Authority(RuleBasedStateMachine):
     """Everybody who may do something to a vehicle, in any order."""
 
-    steps = 0  # of all machines so far
     envelopes = {half: Space(Envelope((around_home(half),))) if half else None for half in (0, 25, 120)}
 
     def __init__(self) -> None:
@@ -89,7 +89,6 @@ class Authority(RuleBasedStateMachine):
 
     def then(self, seconds: float) -> None:
         """Let time go by, and look at the rules."""
-        type(self).steps += 1
         self.world.loop.settle()
         self.judge.look()
         if seconds:
@@ -295,12 +294,13 @@ class Authority(RuleBasedStateMachine):
             assert not self.judge.broken, self.judge.broken[0]
 
 
-def test_any_order_of_events_keeps_the_rules_of_the_air() -> None:
+@pytest.mark.parametrize("part", range(PARTS))
+def test_any_order_of_events_keeps_the_rules_of_the_air(part: int) -> None:
     phases = [Phase.explicit, Phase.generate] + ([Phase.shrink] if WANTED != IN_CI else [])
     run_state_machine_as_test(
-        Authority,
+        type(f"Authority{part}", (Authority,), {}),  # another name, other steps
         settings=settings(
-            max_examples=max(1, WANTED // STEPS_OF_ONE),
+            max_examples=max(1, WANTED // STEPS_OF_ONE // PARTS),
             stateful_step_count=STEPS_OF_ONE,
             derandomize=WANTED == IN_CI,  # the same steps in each run
             database=None,
@@ -320,6 +320,18 @@ def state() -> Iterator[Authority]:
     machine = Authority()
     yield machine
     machine.teardown()
+
+
+@pytest.mark.parametrize("deaf", [0.0, 0.4, 2.0])
+@pytest.mark.parametrize("mode", ["AUTO", "RTL", "LAND"])
+def test_an_old_heartbeat_in_brake_is_no_proof_of_the_brake_after_a_deleted_flight(
+    state: Authority, mode: str, deaf: float
+) -> None:
+    state.begin(where="GUIDED")
+    state.ask_for_mode(later=0.02, mode="BRAKE", wait="true")
+    state.ask_for_mode(later=0.0, mode=mode, wait="false")
+    state.delete_and_see_it_stand(deaf=deaf)
+    assert state.world.drone.mode == "BRAKE"
 
 
 @pytest.mark.parametrize("mode", ["AUTO", "RTL", "LAND"])

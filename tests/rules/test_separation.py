@@ -9,6 +9,8 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from mavproxy_uavapi.core.vehicle.geodesy import METRES_PER_DEGREE
+from mavproxy_uavapi.core.vehicle.traffic import expected
 from tests.support.at_once import AtOnce
 from tests.support.crossing_flights import APART, Fleet
 from tests.support.envelopes import place
@@ -92,6 +94,21 @@ def test_a_crossing_that_comes_much_later_is_allowed(pair: Fleet) -> None:
     far = pair.ask(1, "movement/go_to_gps_wait", to(-150, 0))
     assert far.outcome == "200" and pair.world.answer(second).outcome == "200"
     assert pair.nearest >= SEPARATION
+
+
+def test_a_vehicle_that_turns_back_counts_as_far_as_it_is_carried(pair: Fleet) -> None:
+    assert pair.ask(1, "movement/go_to_gps", to(80, 0)).outcome == "200"
+    pair.loop.pass_time(5.0)
+    assert pair.ask(1, "movement/go_to_gps", to(-80, 0)).outcome == "200"
+    turned_at = pair.at(pair.world.simulators[0])[0]
+    carried_to = expected(pair.world.host.registry.find(1), 1.0)[1]
+    carried = (carried_to.lat - place(0, 0)[0]) * METRES_PER_DEGREE
+    farthest = 0.0
+    for _ in range(100):
+        pair.loop.pass_time(0.05)
+        farthest = max(farthest, pair.at(pair.world.simulators[0])[0])
+    assert farthest > turned_at + 5.0
+    assert 1.0 < (carried - turned_at) / (farthest - turned_at) < 1.6  # the model brakes with a share in hand
 
 
 def test_with_wait_a_command_has_its_turn_when_the_way_is_free(make: Callable[..., Fleet]) -> None:

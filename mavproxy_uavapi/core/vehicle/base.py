@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from typing import Any, TypeVar
 
 from pymavlink import mavutil
@@ -286,6 +287,9 @@ class BaseVehicle:
         """
         number = mode_number(self.state.vehicle_type, mode)
         before, on_its_way = self.state.mode, self._on_its_way()
+        # With another switch on its way, a heartbeat in this mode may be older than both.
+        is_ambiguous = number in (before, *on_its_way) and any(other != number for other in on_its_way)
+        counts_from = math.inf if is_ambiguous else -math.inf  # s; older heartbeats show nothing
         has_shown = False
 
         def shown() -> bool:
@@ -294,8 +298,8 @@ class BaseVehicle:
             left_again = has_shown and self.state.mode not in (number, None)
             if elsewhere or left_again:
                 raise ModeChanged(f"the pilot or a failsafe switched the vehicle to {self.mode} meanwhile")
-            has_shown = has_shown or self.state.mode == number
-            return self.state.mode == number
+            has_shown = has_shown or (self.state.mode == number and self.state.heartbeat_at > counts_from)
+            return has_shown and self.state.mode == number
 
         def switched_by_nobody_else() -> None:
             shown()
@@ -308,6 +312,9 @@ class BaseVehicle:
         check = self.commanding(job, switched_by_nobody_else, *needs, noted)
         try:
             switch = command or messages.set_mode(number)
+            if is_ambiguous:
+                await self.commands.send(replace(switch, proven_by_ack=True), check, shown=shown)
+                counts_from = self.clock()
             await self.commands.send_until_shown(switch, check, shown, f"show mode {mode.upper()}")
         except Rejected:
             self._requested_modes.pop(number, None)

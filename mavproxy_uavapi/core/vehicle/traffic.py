@@ -31,6 +31,7 @@ STOPPED = {"BRAKE", "HOLD"}
 RETURNS, LANDS = {"RTL", "SMART_RTL", "QRTL"}, {"LAND", "QLAND"}
 RETRY, LONGEST_WAIT = 0.5, 120.0  # s between two looks of a command that waits, and until it is refused
 OLD = 3.0  # s; whose position is older may be anywhere on its way
+SWING = 0.5  # m beside its way that a vehicle is carried, and less than this does not count
 CORNERS = 8  # of the polygon in place of a plane's circle
 
 
@@ -64,7 +65,7 @@ class Traffic:
         """
         if not self.in_force or not way:
             return
-        ours = _to_amsl(vehicle, way)
+        ours = _swung(vehicle, _to_amsl(vehicle, way))
         for other in self._others(vehicle):
             found = self._meeting(vehicle, ours, other, PLANNED, math.inf)
             if found is not None:
@@ -156,13 +157,29 @@ def expected(vehicle: Any, seconds: float) -> list[Stop]:
         return _way_home(vehicle, here)
     planned = vehicle.guard.remaining()
     if planned and (vehicle.flies_for_us or vehicle.state.landed):
-        return _rounded(vehicle, [here, *_to_amsl(vehicle, planned)])
+        return _rounded(vehicle, _swung(vehicle, [here, *_to_amsl(vehicle, planned)]))
     velocity = _velocity(vehicle)
     if vehicle.mode in STOPPED or vehicle.mode == vehicle.holding_mode:
         north, east, up = braking.of(vehicle.kind, vehicle.state.parameters).to_rest(velocity, braking.LATENCY)
     else:
         north, east, up = (speed * seconds for speed in velocity)
     return [here, Stop(*moved(here.lat, here.lon, north, east), here.up + up)]
+
+
+def _swung(vehicle: Any, stops: list[Stop]) -> list[Stop]:
+    """The way, by the place to which the velocity across it, or against it, carries a copter or rover first."""
+    if vehicle.kind == "plane" or len(stops) < 2:
+        return stops
+    here, to = stops[:2]
+    way = *offset(here.lat, here.lon, to.lat, to.lon), to.up - here.up
+    velocity, length = _velocity(vehicle), max(math.hypot(*way), 0.1)
+    forward = max(0.0, sum(speed * part for speed, part in zip(velocity, way, strict=True)) / length)
+    across = [speed - forward * part / length for speed, part in zip(velocity, way, strict=True)]
+    stopping = braking.of_rover if vehicle.kind == "rover" else braking.of_guided
+    north, east, up = stopping(vehicle.state.parameters).to_rest((across[0], across[1], across[2]), 0.0)
+    if math.hypot(north, east, up) < SWING:
+        return stops
+    return [here, Stop(*moved(here.lat, here.lon, north, east), here.up + up), *stops[1:]]
 
 
 def _rounded(vehicle: Any, stops: list[Stop]) -> list[Stop]:
