@@ -164,9 +164,11 @@ def test_of_two_that_meet_in_flight_ours_is_held_and_the_other_is_left_alone(pai
     pair.by_hand(2, of_another_station(2, 40, -40))
     reply = pair.world.answer(flight)
     assert reply.outcome == "409 too_near" and "stopped (BRAKE)" in reply.body["detail"]
-    pair.loop.pass_time(0.5)
+    assert pair.ask(1, "command/guided").outcome == "409 busy"  # it does not stand yet
+    pair.loop.pass_time(5.0)
     assert mode(pair, 1) == "BRAKE" and mode(pair, 2) == "GUIDED"
     assert pair.stops == 1
+    assert pair.ask(1, "command/guided").outcome == "200"
 
 
 def test_who_returns_is_not_stopped_and_who_moves_in_its_way_is(pair: Fleet) -> None:

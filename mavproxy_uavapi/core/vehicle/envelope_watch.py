@@ -22,6 +22,7 @@ from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle import time_limits
+from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_uavapi.core.vehicle.geodesy import moved
 from mavproxy_uavapi.core.vehicle.jobs import Ending, Job, JobBook
 from mavproxy_uavapi.core.vehicle.mission_way import Stop
@@ -35,6 +36,7 @@ INTERVAL = 0.25  # s between two positions, until the vehicle has told two
 SLOWEST = 0.3  # m/s; slower than this nothing is stopped
 HOME_ASKED, HOME_PAUSE = 60, 2.0  # times that home is asked for, and s between them
 CORRIDOR, MISSION_CORRIDOR = 1.5, 3.0  # m beside a way that was allowed, in which the autopilot is trusted to stop
+STANDS_WITHIN = 5.0  # s more than a stop should need, until it counts as failed
 MARGIN = 1.0  # s more than it needs to stop, in which no vehicle comes too near to another
 
 
@@ -137,6 +139,8 @@ class EnvelopeWatch:
 
         async def body(job: Job) -> str:
             await vehicle.set_mode(job, vehicle.holding_mode)
+            if vehicle.kind != "plane":
+                await _stand(vehicle, job)
             return sentence
 
         job = self._jobs.begin(
@@ -150,6 +154,15 @@ class EnvelopeWatch:
     def _tell_failure(self, job: Job, system: int) -> None:
         if isinstance(job.error, UavApiError):
             self._say(f"vehicle {system} was not stopped: {job.error}")
+
+
+async def _stand(vehicle: Vehicle, job: Job) -> None:
+    """Keep the vehicle for `job` until it stands: until then only what stops it too has a higher rank."""
+    vehicle.authority.take(job, Rank.STOP)
+    longest = STANDS_WITHIN + 2 * _until_it_stands(vehicle)
+    names = {"GLOBAL_POSITION_INT"}
+    await vehicle.flown(vehicle.holding_mode, names, lambda: None if _moves(vehicle) else True, longest, "stand")
+    vehicle.authority.shown(job)
 
 
 def leaving(vehicle: Vehicle) -> tuple[Space, Breach] | None:

@@ -8,7 +8,8 @@ answers only those of its own transfers.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Sequence
+import contextlib
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AbstractContextManager
 from typing import Any, TypeVar
 
@@ -28,6 +29,7 @@ mavlink = mavutil.mavlink
 ANSWER_TIMEOUT = 1.5  # s until we ask again
 SENDINGS = 4  # the first one and three more
 ASKING_TIMEOUT = 9.0  # s; an ArduPilot asks again for an item after 1 s, and gives an upload up after 8 s
+TURN_TIMEOUT = 10.0  # s that a transfer waits for those before it
 CANCELLED = "MAV_MISSION_OPERATION_CANCELLED"  # the vehicle waited too long for an item
 MISSION = mavlink.MAV_MISSION_TYPE_MISSION
 ANSWERS = ("MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_ITEM", "MISSION_ACK")
@@ -61,7 +63,7 @@ class Waypoints:
         self._link = link
         self._waiting = waiting
         self._allow = allow
-        self._lock = asyncio.Lock()  # the protocol knows one transfer at a time
+        self._lock = asyncio.Lock()
         self.changed_at = 0.0
 
     # -- verbs --------------------------------------------------------------------------------------------
@@ -71,9 +73,10 @@ class Waypoints:
 
         Raises:
             Rejected: another ground station transfers a mission now.
+            Busy: other transfers of ours take too long.
             TimedOut, LinkLost.
         """
-        async with self._lock:
+        async with self._turn():
             return await self._download()
 
     async def upload(
@@ -92,7 +95,7 @@ class Waypoints:
         Raises:
             Rejected: with the MAV_MISSION_RESULT as `ack`.
             OutsideEnvelope: it leaves the envelope; nothing was sent.
-            TimedOut, LinkLost.
+            Busy, TimedOut, LinkLost.
         """
 
         def checked_progress(done: int, of: int) -> None:
@@ -100,7 +103,7 @@ class Waypoints:
             progress(done, of)
 
         self._allow(items)
-        async with self._lock:
+        async with self._turn():
             _, old = await self._download()
             await pass_gate()
             check()
@@ -118,9 +121,9 @@ class Waypoints:
 
         Raises:
             Rejected: the vehicle flies it.
-            TimedOut, LinkLost.
+            Busy, TimedOut, LinkLost.
         """
-        async with self._lock:
+        async with self._turn():
             check()
             self.changed_at = self._waiting.clock()
             with self._talk(ANSWERS) as talk:
@@ -128,6 +131,18 @@ class Waypoints:
                 remaining = await self._ask_count(talk) - 1
             if remaining > 0:
                 raise Rejected(f"the vehicle accepted the clearing, but its mission still has {remaining} items")
+
+    @contextlib.asynccontextmanager
+    async def _turn(self) -> AsyncIterator[None]:
+        """One transfer at a time: the protocol knows no more. Raises Busy when others take too long."""
+        try:
+            await asyncio.wait_for(self._lock.acquire(), TURN_TIMEOUT)
+        except asyncio.TimeoutError:
+            raise Busy(f"other transfers of the mission have taken {TURN_TIMEOUT:g} s; try again") from None
+        try:
+            yield
+        finally:
+            self._lock.release()
 
     # -- the protocol -------------------------------------------------------------------------------------
 

@@ -21,6 +21,7 @@ from mavproxy_uavapi.core.vehicle.geodesy import moved, offset
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.mission_way import Stop
 
+Vector = tuple[float, float, float]
 PLANNED = Slack(ahead=1.0, behind=4.0, share=0.15)
 WATCHED = Slack(ahead=0.3, behind=0.5, share=0.1)
 MARGIN = 1.0  # m more than the separation, for what a forecast does not have
@@ -160,9 +161,11 @@ def expected(vehicle: Any, seconds: float) -> list[Stop]:
         return _rounded(vehicle, _swung(vehicle, [here, *_to_amsl(vehicle, planned)]))
     velocity = _velocity(vehicle)
     if vehicle.mode in STOPPED or vehicle.mode == vehicle.holding_mode:
-        north, east, up = braking.of(vehicle.kind, vehicle.state.parameters).to_rest(velocity, braking.LATENCY)
+        way = braking.of(vehicle.kind, vehicle.state.parameters).to_rest(velocity, braking.LATENCY)
     else:
-        north, east, up = (speed * seconds for speed in velocity)
+        kept, to_rest = [speed * seconds for speed in velocity], _gently_to_rest(vehicle, velocity)
+        way = max((kept[0], kept[1], kept[2]), to_rest, key=lambda one: math.hypot(*one))
+    north, east, up = way
     return [here, Stop(*moved(here.lat, here.lon, north, east), here.up + up)]
 
 
@@ -175,11 +178,16 @@ def _swung(vehicle: Any, stops: list[Stop]) -> list[Stop]:
     velocity, length = _velocity(vehicle), max(math.hypot(*way), 0.1)
     forward = max(0.0, sum(speed * part for speed, part in zip(velocity, way, strict=True)) / length)
     across = [speed - forward * part / length for speed, part in zip(velocity, way, strict=True)]
-    stopping = braking.of_rover if vehicle.kind == "rover" else braking.of_guided
-    north, east, up = stopping(vehicle.state.parameters).to_rest((across[0], across[1], across[2]), 0.0)
+    north, east, up = _gently_to_rest(vehicle, (across[0], across[1], across[2]))
     if math.hypot(north, east, up) < SWING:
         return stops
     return [here, Stop(*moved(here.lat, here.lon, north, east), here.up + up), *stops[1:]]
+
+
+def _gently_to_rest(vehicle: Any, velocity: Vector) -> Vector:
+    """Metres north, east, up that it needs to stand in GUIDED."""
+    stopping = braking.of_rover if vehicle.kind == "rover" else braking.of_guided
+    return stopping(vehicle.state.parameters).to_rest(velocity, 0.0)
 
 
 def _rounded(vehicle: Any, stops: list[Stop]) -> list[Stop]:
@@ -219,7 +227,7 @@ def _place(vehicle: Any) -> Stop:
     return Stop(at.lat / 1e7, at.lon / 1e7, at.alt / 1000.0)
 
 
-def _velocity(vehicle: Any) -> tuple[float, float, float]:
+def _velocity(vehicle: Any) -> Vector:
     """m/s north, east, up."""
     at = vehicle.state.messages["GLOBAL_POSITION_INT"].message
     return at.vx / 100.0, at.vy / 100.0, -at.vz / 100.0

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from pymavlink import mavutil
 
-from mavproxy_uavapi.core.errors import LinkLost, Rejected, TimedOut
+from mavproxy_uavapi.core.errors import Busy, LinkLost, Rejected, TimedOut
 from mavproxy_uavapi.core.vehicle.mission_files import HOME, MissionItem, from_message
 
 mavlink = mavutil.mavlink
@@ -235,3 +235,18 @@ def test_one_transfer_at_a_time(loop: Any, copter: Any, store: Store) -> None:
     _, found = loop.run(both())
     assert found == (HOME, NEW)
     assert store.counts == 1
+
+
+def test_a_read_behind_a_transfer_that_takes_long_is_refused_and_the_next_one_has_its_turn(
+    loop: Any, copter: Any, store: Store
+) -> None:
+    store.lost["MISSION_COUNT"] = -1
+    upload = loop.create_task(copter.waypoints.upload(NEW))
+    loop.pass_time(0.1)
+    asked_at = loop.time()
+    with pytest.raises(Busy, match="try again"):
+        loop.run(copter.waypoints.download())
+    assert loop.time() - asked_at == pytest.approx(10.0, abs=0.1) and not upload.done()
+    assert loop.run(copter.waypoints.download()) == (HOME, OLD)
+    with pytest.raises(TimedOut):
+        loop.run(upload)
