@@ -18,6 +18,7 @@ from pymavlink import mavutil
 from mavproxy_uavapi.core.errors import Busy, LinkLost, Rejected, TimedOut, UavApiError
 from mavproxy_uavapi.core.mavlink.link import Address, Link
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
+from mavproxy_uavapi.core.timeout import wait_with_timeout
 from mavproxy_uavapi.core.vehicle.message_exchange import MessageExchange
 from mavproxy_uavapi.core.vehicle.message_waiter import MessageWaiter
 from mavproxy_uavapi.core.vehicle.mission_files import HOME, MissionItem, difference, from_message
@@ -135,10 +136,15 @@ class Waypoints:
     @contextlib.asynccontextmanager
     async def _turn(self) -> AsyncIterator[None]:
         """One transfer at a time: the protocol knows no more. Raises Busy when others take too long."""
+        turn = asyncio.ensure_future(self._lock.acquire())
         try:
-            await asyncio.wait_for(self._lock.acquire(), TURN_TIMEOUT)
+            await wait_with_timeout(TURN_TIMEOUT, turn)
         except asyncio.TimeoutError:
             raise Busy(f"other transfers of the mission have taken {TURN_TIMEOUT:g} s; try again") from None
+        except asyncio.CancelledError:
+            if turn.done() and not turn.cancelled():  # both came in the same turn of the loop
+                self._lock.release()
+            raise
         try:
             yield
         finally:

@@ -250,3 +250,17 @@ def test_a_read_behind_a_transfer_that_takes_long_is_refused_and_the_next_one_ha
     assert loop.run(copter.waypoints.download()) == (HOME, OLD)
     with pytest.raises(TimedOut):
         loop.run(upload)
+
+
+def test_who_is_cancelled_as_its_turn_comes_leaves_the_turn_to_the_next(loop: Any, copter: Any, store: Store) -> None:
+    async def cancelled() -> None:
+        task = asyncio.ensure_future(copter.waypoints.download())
+        await asyncio.sleep(0)
+        await asyncio.sleep(0)  # it has its turn, and does not know it yet
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+
+    for _ in range(3):
+        loop.run(cancelled())
+    assert loop.run(copter.waypoints.download()) == (HOME, OLD)
