@@ -77,7 +77,8 @@ def readings_lines(report: Report) -> list[str]:
         if sink["put_last"]:
             lines.append(f"  {sink['put_last']} times one was refused alone: it is sent when there is nothing else")
     for quantity in report["quantities"]:
-        why = "; ".join(f"vehicle {system}: {why}" for system, why in quantity["why_not"].items())
+        by_vehicle = "; ".join(f"vehicle {system}: {why}" for system, why in quantity["why_not"].items())
+        why = quantity["problem"] or by_vehicle
         taken = f"  {quantity['quantity']} every {quantity['period_s']:g} s: {quantity['taken']} taken"
         lines.append(taken + (f" ({why})" if why else ""))
     return lines

@@ -3,6 +3,7 @@
 Unavailable                503
 |- NoFix                   503 no_fix        the vehicle does not know its position
 |- NotStored               503 not_stored    the spool cannot take readings just now
+|- NoReading               503 no_reading    a sensor gives no value just now
 `- NotDelivered            503 not_delivered a station, receiver or broker did not take what was sent
 """
 
@@ -15,6 +16,20 @@ class NoFix(Unavailable):
     """The vehicle has no position fix, so there is nothing to send."""
 
     code = "no_fix"
+
+
+class NoReading(Unavailable):
+    """A sensor gives no value just now.
+
+    Attributes:
+        cause: the same for all errors that have one reason; the text may differ.
+    """
+
+    code = "no_reading"
+
+    def __init__(self, cause: str, sentence: str) -> None:
+        super().__init__(sentence)
+        self.cause = cause
 
 
 class NotStored(Unavailable):

@@ -10,7 +10,8 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from mavproxy_gradys.forwarding.readings import LONGEST_TEXT, NAME, Reading, Value, device_of
+from mavproxy_gradys.forwarding.quantities import LONGEST_TEXT, NAME
+from mavproxy_gradys.forwarding.readings import Reading, Value, device_of
 from mavproxy_gradys.service import Gradys
 from mavproxy_gradys.tracks.flight import VERB, flight_of
 from mavproxy_gradys.tracks.formats import waypoints_of

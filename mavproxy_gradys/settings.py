@@ -10,7 +10,7 @@ from typing import Any
 from MAVProxy.modules.lib.mp_settings import MPSetting
 
 from mavproxy_gradys.errors import NotDelivered
-from mavproxy_gradys.forwarding.readings import Quantity, parse_quantities
+from mavproxy_gradys.forwarding.quantities import Quantity, parse_quantities
 from mavproxy_gradys.forwarding.sink_address import SinkAddress, sink_addresses
 from mavproxy_gradys.net.addresses import StationAddress, checked_ip, split_url, stations
 from mavproxy_gradys.net.http_client import tls_context
@@ -138,6 +138,17 @@ class GradysModuleSettings(ModuleSettings[GradysSettings]):
     def make(self, values: Mapping[str, Any], origins: Mapping[str, str]) -> GradysSettings:
         """The snapshot."""
         return GradysSettings(**values)
+
+    def check_source(self, name: str, value: Any, in_file: bool) -> None:
+        """Refuse commands that are not in an INI file: a prompt may be open to more people than the machine is.
+
+        Raises:
+            SettingError: another source has one.
+        """
+        if name == "quantities" and not in_file:
+            commands = [quantity.name for quantity in parse_quantities(value) if quantity.command]
+            if commands:
+                raise SettingError(f"quantities: {', '.join(commands)}: only an INI file may have exec:", name)
 
     def check(self, settings: GradysSettings, changed: Set[str]) -> None:
         """Refuse certificates that cannot check TLS.

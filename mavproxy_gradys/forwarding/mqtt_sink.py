@@ -27,7 +27,8 @@ from paho.mqtt.properties import Properties
 
 from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.forwarding.confirmations import Confirmations
-from mavproxy_gradys.forwarding.readings import CONFIRMED_TOPIC, POSITION, STATUS, Reading, Stored, device_of
+from mavproxy_gradys.forwarding.quantities import POSITION
+from mavproxy_gradys.forwarding.readings import CONFIRMED_TOPIC, STATUS, Reading, Stored, device_of
 from mavproxy_gradys.net.addresses import split_url
 from mavproxy_gradys.net.http_client import tls_context
 from mavproxy_gradys.net.resolver import Resolver

@@ -8,8 +8,10 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from mavproxy_gradys.errors import NotStored
-from mavproxy_gradys.forwarding.readings import POSITION, STATUS, Quantity, Reading, Sampler
+from mavproxy_gradys.forwarding.quantities import POSITION, Quantity
+from mavproxy_gradys.forwarding.readings import STATUS, Reading, Sampler
 from mavproxy_gradys.forwarding.sender import Sender
+from mavproxy_gradys.forwarding.sensor import SensorSampler, source_of
 from mavproxy_gradys.forwarding.spool import Spool
 from mavproxy_gradys.forwarding.spool_thread import SpoolThread
 from mavproxy_gradys.net.schedule import Ticker
@@ -40,8 +42,9 @@ class ReadingPipeline:
         self._left: list[Reading] = []  # readings that were not on the disk at the last stop
         self._why_left = ""
         self._senders: list[Sender] = []
-        self._samplers: list[Sampler] = []
+        self._samplers: list[Sampler | SensorSampler] = []
         self._tasks = HeldTasks()
+        self._sensors = HeldTasks()
 
     def start(self, settings: GradysSettings) -> None:
         """Sample and send, if there is a sink."""
@@ -58,13 +61,16 @@ class ReadingPipeline:
             self._senders.append(sender)
             self._tasks.start(sender.run(settings), f"the delivery to {address}")
         for quantity in settings.quantities if settings.sink else ():
-            sampler = Sampler(quantity)
-            self._samplers.append(sampler)
-            self._tasks.start(self._sample(sampler, self._started_thread()), f"the sampling of {quantity.name}")
+            name = f"the sampling of {quantity.name}"
+            if quantity.is_sensor:
+                self._sensors.start(self._sense(self._sensor(quantity), self._started_thread()), name)
+            else:
+                self._tasks.start(self._sample(self._sampler(quantity), self._started_thread()), name)
 
     async def stop(self) -> None:
         """Stop, and close the spool; readings that cannot be written stay in memory until the next start."""
         self._settings = None
+        await self._sensors.end()  # first, because it is quick and leaves no command running
         self._samplers.clear()
         self._senders.clear()
         try:
@@ -135,6 +141,32 @@ class ReadingPipeline:
 
     # -- sampling -----------------------------------------------------------------------------------------
 
+    def _sampler(self, quantity: Quantity) -> Sampler:
+        sampler = Sampler(quantity)
+        self._samplers.append(sampler)
+        return sampler
+
+    def _sensor(self, quantity: Quantity) -> SensorSampler:
+        assert self._settings is not None
+        source = source_of(quantity, self._settings.max_age, self._wall)
+        sampler = SensorSampler(quantity, source, self._host.clock)
+        self._samplers.append(sampler)
+        return sampler
+
+    async def _sense(self, sampler: SensorSampler, spool_thread: SpoolThread) -> None:
+        """Sample a sensor; its readings belong to MAVProxy's current vehicle."""
+        loop = asyncio.get_running_loop()
+        ticker = Ticker(sampler.quantity.period, loop.time())
+        try:
+            while True:
+                await asyncio.sleep(ticker.wait(loop.time()))
+                system = self._host.registry.resolve()
+                reading = await sampler.sample(system if system in self._host.fleet.vehicles else 0)
+                if reading is not None:
+                    spool_thread.put(reading)
+        finally:
+            await sampler.source.close()
+
     async def _sample(self, sampler: Sampler, spool_thread: SpoolThread) -> None:
         loop = asyncio.get_running_loop()
         ticker = Ticker(sampler.quantity.period, loop.time())
@@ -194,8 +226,11 @@ def spooled(spool_thread: SpoolThread) -> int | None:
     return None if spool_thread.count is None else spool_thread.count + spool_thread.waiting
 
 
-def quantity_report(sampler: Sampler) -> dict[str, Any]:
-    """The report of one quantity, for the status."""
-    quantity: Quantity = sampler.quantity
+def quantity_report(sampler: Sampler | SensorSampler) -> dict[str, Any]:
+    """The report of one quantity, for the status: a sensor has a `problem`, the others a reason by vehicle."""
+    quantity = sampler.quantity
+    report = {"quantity": quantity.name, "period_s": quantity.period, "taken": sampler.taken}
+    if isinstance(sampler, SensorSampler):
+        return {**report, "why_not": {}, "problem": sampler.problem or None}
     why_not = {str(system): why for system, why in sorted(sampler.why_not.items())}
-    return {"quantity": quantity.name, "period_s": quantity.period, "taken": sampler.taken, "why_not": why_not}
+    return {**report, "why_not": why_not, "problem": None}

@@ -1,64 +1,18 @@
-"""Sampled quantities, and the readings that they give. Pure: the clock is an argument.
-
-A quantity is written `NAME=MESSAGE.field*SCALE+OFFSET@PERIOD[REPRESENTATION]`:
-
-    alt=GLOBAL_POSITION_INT.relative_alt*0.001@1[m]
-    cell1=BATTERY_STATUS[0].voltages[0]*0.001@10[V]
-
-Scale, offset, period (s, default 1) and representation (a unit or a type, for readers) are optional.
-`position@1` is built in: [degrees, degrees, m above home].
-"""
+"""Readings, and how a quantity of a vehicle becomes one. Pure: the clock is an argument."""
 
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass, field
 from typing import Any
 
-from mavproxy_uavapi.core.errors import SettingError
+from mavproxy_gradys.forwarding.quantities import Quantity
 from mavproxy_uavapi.core.mavlink.vehicle_state import Received, VehicleState
 
-POSITION = "position"
 STATUS = "status"  # the quantity in which the MQTT sink reports whether a vehicle is online
 CONFIRMED_TOPIC = "confirmed/"  # below it a station confirms the readings that it has stored
-POSITION_REPRESENTATION = "degrees, degrees, m above home"
-NAME = r"[A-Za-z0-9_.-]{1,64}"  # valid in an MQTT topic
-LONGEST_TEXT = 4096  # characters of a value or a representation
-NUMBER = r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?"
-GRAMMAR = re.compile(
-    rf"(?P<name>{NAME})"
-    r"(?:=(?P<message>[A-Z0-9_]+)(?:\[(?P<instance>\d+)\])?\.(?P<attribute>[A-Za-z0-9_]+)(?:\[(?P<index>\d+)\])?"
-    rf"(?:\*(?P<scale>{NUMBER}))?(?P<offset>[-+]{NUMBER.removeprefix('[-+]?')})?)?"
-    rf"(?:@(?P<period>{NUMBER}))?(?:\[(?P<representation>[^\[\]]{{0,{LONGEST_TEXT}}})\])?"
-)
-SHORTEST_PERIOD = 0.05  # s
-LONGEST_PERIOD = 86400.0  # s
 
 Value = float | int | str | bool | list[float]
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """A quantity that is sampled for every vehicle.
-
-    Attributes:
-        name: its unique name.
-        message: MAVLink message, with `[instance]` if several devices send it; empty for `position`.
-        attribute, index: the field, and the index if it is an array.
-        scale, offset: the value is field * scale + offset.
-        period: s between samples.
-        representation: unit or type, for readers.
-    """
-
-    name: str
-    message: str = ""
-    attribute: str = ""
-    index: int | None = None
-    scale: float = 1.0
-    offset: float = 0.0
-    period: float = 1.0
-    representation: str = ""
 
 
 @dataclass(frozen=True)
@@ -104,51 +58,6 @@ class Stored:
 def device_of(system: int) -> str:
     """The device name of a vehicle."""
     return f"uav-{system}"
-
-
-def parse_quantities(text: str) -> tuple[Quantity, ...]:
-    """Parse a list of quantities, separated by comma, semicolon or white space (not within brackets).
-
-    Raises:
-        SettingError: one is malformed, or two have the same name.
-    """
-    parts = [part for part in re.split(r"[,;\s]+(?![^\[\]]*\])", text.strip()) if part]
-    quantities = [parse_quantity(part) for part in parts]
-    names = [quantity.name for quantity in quantities]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise SettingError(f"{', '.join(twice)} occurs twice")
-    return tuple(quantities)
-
-
-def parse_quantity(text: str) -> Quantity:
-    """Parse one quantity.
-
-    Raises:
-        SettingError: it is malformed.
-    """
-    match = GRAMMAR.fullmatch(text)
-    if match is None:
-        raise SettingError(f"{text!r} is not NAME=MESSAGE.field*SCALE+OFFSET@PERIOD[REPRESENTATION]")
-    groups = match.groupdict()
-    try:
-        numbers = [float(groups[name] or default) for name, default in (("scale", 1), ("offset", 0), ("period", 1))]
-    except ValueError as error:
-        raise SettingError(f"{text!r}: {error}") from error
-    scale, offset, period = numbers
-    if not math.isfinite(scale) or not math.isfinite(offset):
-        raise SettingError(f"{text!r}: scale and offset are finite numbers")
-    if not SHORTEST_PERIOD <= period <= LONGEST_PERIOD:
-        raise SettingError(f"{text!r}: a period is {SHORTEST_PERIOD:g} to {LONGEST_PERIOD:g} s")
-    if groups["message"] is None:
-        if groups["name"] != POSITION:
-            raise SettingError(f"{text!r} names no message; only {POSITION} is built in")
-        return Quantity(POSITION, period=period, representation=POSITION_REPRESENTATION)
-    instance = "" if groups["instance"] is None else f"[{groups['instance']}]"
-    index = None if groups["index"] is None else int(groups["index"])
-    message, attribute = groups["message"] + instance, groups["attribute"]
-    representation = groups["representation"] or ""
-    return Quantity(groups["name"], message, attribute, index, scale, offset, period, representation)
 
 
 @dataclass
@@ -221,10 +130,7 @@ class Sampler:
             return value
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
             return None
-        if self.quantity.scale == 1.0 and self.quantity.offset == 0.0:
-            return value
-        scaled = float(f"{value * self.quantity.scale + self.quantity.offset:.12g}")  # without 20.123000000000001
-        return scaled if math.isfinite(scaled) else None
+        return self.quantity.scaled(value)
 
 
 def _element(values: Any, index: int) -> Any:

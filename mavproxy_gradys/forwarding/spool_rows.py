@@ -11,7 +11,8 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
-from mavproxy_gradys.forwarding.readings import LONGEST_TEXT, NAME, Reading, Stored
+from mavproxy_gradys.forwarding.quantities import LONGEST_TEXT, NAME
+from mavproxy_gradys.forwarding.readings import Reading, Stored
 
 COLUMNS = "seq, device, system, quantity, representation, value, time"
 ROW_OVERHEAD = 100  # bytes of a row besides its texts, about

@@ -7,6 +7,7 @@ import logging
 from collections.abc import Callable, Mapping
 
 DROPS_EVERY = 60.0  # s between lines about drops
+CAUSE_EVERY = 600.0  # s between lines about one cause of a failure that comes and goes
 
 
 class Outage:
@@ -28,6 +29,37 @@ class Outage:
         elif self.lasts and not why:
             self._log.warning("%s", self._ended)
         self.lasts = bool(why)
+
+
+class Causes:
+    """A failure with changing causes: a cause is logged when it begins, but not again within `CAUSE_EVERY`.
+
+    Args:
+        log: the logger.
+        began, ended: the texts; `began` is followed by the reason.
+        clock: s.
+    """
+
+    def __init__(self, log: logging.Logger, began: str, ended: str, clock: Callable[[], float]) -> None:
+        self._log, self._began, self._ended, self._clock = log, began, ended, clock
+        self._logged_at: dict[str, float] = {}
+        self._present = ""
+        self._is_logged = False
+
+    def failed(self, cause: str, why: str) -> None:
+        """Note a failure: its cause, and the reason in words."""
+        now = self._clock()
+        if cause != self._present and now - self._logged_at.get(cause, -CAUSE_EVERY) >= CAUSE_EVERY:
+            self._log.warning("%s: %s", self._began, why)
+            self._logged_at[cause] = now
+            self._is_logged = True
+        self._present = cause
+
+    def succeeded(self) -> None:
+        """Note a success; it is logged if the failure was."""
+        if self._is_logged:
+            self._log.warning("%s", self._ended)
+        self._present, self._is_logged = "", False
 
 
 class Defects:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Any, NamedTuple
 
-from mavproxy_gradys.forwarding.readings import POSITION
+from mavproxy_gradys.forwarding.quantities import POSITION
 from mavproxy_gradys.station.newest import Newest
 from mavproxy_gradys.station.reading_row import number_of
 from mavproxy_gradys.station.store import FleetNow

@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from mavproxy_gradys.forwarding.readings import LONGEST_TEXT
+from mavproxy_gradys.forwarding.quantities import LONGEST_TEXT
 from mavproxy_gradys.forwarding.spool_rows import LONGEST_JSON, is_value
 
 LONGEST_NAME = 200  # characters of a device, an id or a quantity; an index entry is limited to 2700 bytes

@@ -6,7 +6,7 @@ import contextlib
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from mavproxy_gradys.forwarding.readings import POSITION, POSITION_REPRESENTATION
+from mavproxy_gradys.forwarding.quantities import POSITION, POSITION_REPRESENTATION
 from mavproxy_gradys.station.newest import Newest, newest_of
 from mavproxy_gradys.station.reading_row import finite, reading_row, whole
 

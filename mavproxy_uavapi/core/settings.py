@@ -32,12 +32,14 @@ class Change:
     Attributes:
         origin: where it comes from, as the listing shows it.
         place: the beginning of an error about it.
+        in_file: whether an INI file has it.
     """
 
     name: str
     value: Any
     origin: str
     place: str = ""
+    in_file: bool = False
 
 
 class ModuleSettings(ABC, Generic[Snapshot]):
@@ -93,6 +95,13 @@ class ModuleSettings(ABC, Generic[Snapshot]):
 
         Raises:
             SettingError: with the reason; its place is the setting.
+        """
+
+    def check_source(self, name: str, value: Any, in_file: bool) -> None:
+        """Refuse a valid value because of where it comes from: an INI file, or another source.
+
+        Raises:
+            SettingError: with the reason.
         """
 
     def settings_in(self, ini: IniFile) -> Iterator[tuple[str, str]]:
@@ -151,7 +160,7 @@ class ModuleSettings(ABC, Generic[Snapshot]):
     def _of_file(self, ini: IniFile) -> Iterator[Change]:
         for name, text in self.settings_in(ini):
             if not is_unset(text):
-                yield Change(name, text, self._given_origins.get(name, str(ini.file)), f"{ini.file}: ")
+                yield Change(name, text, self._given_origins.get(name, str(ini.file)), f"{ini.file}: ", True)
 
     def _of_environment(self, environ: Mapping[str, str]) -> Iterator[Change]:
         for name in self._rows:
@@ -166,6 +175,7 @@ class ModuleSettings(ABC, Generic[Snapshot]):
         for change in changes:
             try:
                 values[change.name] = self._checked(change.name, change.value)
+                self.check_source(change.name, values[change.name], change.in_file)
             except SettingError as error:
                 raise SettingError(f"{change.place}{error}", change.name) from error
             origins[change.name] = change.origin

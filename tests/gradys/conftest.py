@@ -21,7 +21,7 @@ mavlink = mavutil.mavlink
 
 
 class AtOnce(Executor):
-    """Instead of the spool's thread: does the work where it is asked for, so that no real time goes by."""
+    """Instead of a thread: does the work where it is asked for, so that no real time goes by."""
 
     def __init__(self, *_: Any, **__: Any) -> None:
         """Take what a pool of threads takes."""
@@ -37,8 +37,9 @@ class AtOnce(Executor):
 
 @pytest.fixture
 def at_once(monkeypatch: pytest.MonkeyPatch) -> type[AtOnce]:
-    """Keepers work without a thread; for others, what to put in place of their pool."""
-    monkeypatch.setattr("mavproxy_gradys.forwarding.spool_thread.ThreadPoolExecutor", AtOnce)
+    """The spool and sensors work without a thread; for others, what to put in place of their pool."""
+    for module in ("spool_thread", "sensor_file"):
+        monkeypatch.setattr(f"mavproxy_gradys.forwarding.{module}.ThreadPoolExecutor", AtOnce)
     return AtOnce
 
 

@@ -60,3 +60,32 @@ def test_passwords_are_not_shown() -> None:
     settings = GradysModuleSettings({"token": "s3cret", "sink": "mqtt://me:pass@broker/x"})
     assert settings.shown("token") == "(set)"
     assert settings.shown("sink") == "mqtt://me:***@broker/x"
+
+
+COMMAND = 'soil=file:/run/soil.txt@5[percent], hum=exec:"read-humidity --bus 1"@30[percent]'
+
+
+def test_only_an_ini_file_has_commands(tmp_path: Path, monkeypatch: Any) -> None:
+    ini = tmp_path / "uav.ini"
+    ini.write_text(f"[gradys]\nquantities = {COMMAND}\n")
+    settings = GradysModuleSettings({"config": str(ini)})
+    assert settings.snapshot().quantities[1].command == ("read-humidity", "--bus", "1")
+    settings.set("period", 2)  # the file's commands stay
+    before = settings.snapshot()
+    with pytest.raises(SettingError, match="hum: only an INI file may have exec:"):
+        settings.set("quantities", COMMAND)
+    assert settings.snapshot() == before
+    for given in ({"quantities": COMMAND}, {"quantities": COMMAND, "origins": {"quantities": str(ini)}}):
+        with pytest.raises(SettingError, match="INI file"):
+            GradysModuleSettings(given)
+    monkeypatch.setenv("GRADYS_QUANTITIES", COMMAND)
+    with pytest.raises(SettingError, match=r"GRADYS_QUANTITIES: .*INI file"):
+        GradysModuleSettings({})
+
+
+def test_a_file_may_be_set_at_the_prompt() -> None:
+    settings = GradysModuleSettings({})
+    settings.set("quantities", "soil=file:/run/soil.txt@5[percent]")
+    assert settings.snapshot().quantities[0].file == "/run/soil.txt"
+    settings.set("quantities", "None")
+    assert settings.snapshot().quantities == ()

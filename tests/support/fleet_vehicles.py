@@ -22,7 +22,8 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from mavproxy_gradys.errors import NotStored
-from mavproxy_gradys.forwarding.readings import POSITION, POSITION_REPRESENTATION, Reading
+from mavproxy_gradys.forwarding.quantities import POSITION, POSITION_REPRESENTATION
+from mavproxy_gradys.forwarding.readings import Reading
 from mavproxy_gradys.forwarding.sender import Sender
 from mavproxy_gradys.forwarding.sink_address import sink_address
 from mavproxy_gradys.forwarding.spool import Spool

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import asyncio
 import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -7,11 +8,14 @@ from typing import Any
 
 import pytest
 
+from mavproxy_gradys import console
 from mavproxy_gradys.errors import NotDelivered, NotStored
 from mavproxy_gradys.forwarding.pipeline import ReadingPipeline
 from mavproxy_gradys.forwarding.readings import Reading
+from mavproxy_gradys.forwarding.sensor_command import SensorCommand
 from mavproxy_gradys.forwarding.sinks import HttpSink
 from mavproxy_gradys.forwarding.spool import Spool
+from mavproxy_gradys.forwarding.spool_thread import SpoolThread
 
 
 @pytest.fixture
@@ -58,6 +62,61 @@ def test_a_position_that_is_reported_once_is_sampled_once(
         loop.pass_time(1)
     assert len(values(poster)) == 3
     assert "no new" in pipeline.report()["quantities"][0]["why_not"]["10"]
+
+
+def test_a_sensor_is_read_for_the_current_vehicle(
+    loop: Any, pipeline: Any, start: Any, host: Any, poster: Any, tmp_path: Path
+) -> None:
+    soil = tmp_path / "soil.txt"
+    soil.write_text("23.5")
+    start(sink="http://a/r", quantities=f"soil=file:{soil}@5[percent] absent=file:{tmp_path}/absent")
+    loop.pass_time(11)
+    (reading,) = (reading for _, _, body in poster.posts for reading in json.loads(body)["readings"])
+    assert (reading["device"], reading["quantity"], reading["value"]) == ("uav-10", "soil", 23.5)
+    assert reading["time"] == pytest.approx(soil.stat().st_mtime, abs=0.001)
+    soil_report, absent_report = pipeline.report()["quantities"]
+    assert soil_report["taken"] == 1 and soil_report["problem"] == "nothing new was written"
+    assert absent_report["taken"] == 0 and "No such file" in absent_report["problem"]
+    lines = console.readings_lines(pipeline.report())
+    assert "  soil every 5 s: 1 taken (nothing new was written)" in lines
+    soil.write_text("24")
+    loop.pass_time(5)
+    assert values(poster)[-1] == 24
+
+
+def test_without_a_vehicle_a_sensor_gives_nothing(
+    loop: Any, pipeline: Any, start: Any, host: Any, poster: Any, tmp_path: Path
+) -> None:
+    host.fleet.vehicles.clear()
+    (tmp_path / "soil.txt").write_text("23.5")
+    start(sink="http://a/r", quantities=f"soil=file:{tmp_path}/soil.txt")
+    loop.pass_time(2)
+    assert values(poster) == []
+    assert pipeline.report()["quantities"][0]["problem"] == "no vehicle was heard yet"
+
+
+def test_a_stop_ends_commands_before_it_waits_for_the_disk(
+    loop: Any, pipeline: Any, start: Any, monkeypatch: Any, tmp_path: Path
+) -> None:
+    events: list[str] = []
+
+    async def run(self: Any) -> Any:
+        try:
+            await asyncio.sleep(3600)
+        finally:
+            events.append("killed")
+
+    async def save(self: Any) -> None:
+        events.append("saved")
+
+    monkeypatch.setattr(SensorCommand, "read", run)
+    monkeypatch.setattr(SpoolThread, "save", save)
+    ini = tmp_path / "uav.ini"
+    ini.write_text('[gradys]\nquantities = hum=exec:"read-humidity --bus 1"@5[percent]\n')
+    start(sink="http://a/r", config=str(ini))
+    loop.pass_time(1)
+    loop.run(pipeline.stop())
+    assert events[:2] == ["killed", "saved"]
 
 
 def test_readings_that_a_full_disk_does_not_take_outlast_a_setting(

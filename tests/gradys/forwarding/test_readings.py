@@ -3,50 +3,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import pytest
-
-from mavproxy_gradys.forwarding.readings import Quantity, Sampler, parse_quantities, parse_quantity
-from mavproxy_uavapi.core.errors import SettingError
+from mavproxy_gradys.forwarding.quantities import parse_quantity
+from mavproxy_gradys.forwarding.readings import Sampler
 
 ALT = parse_quantity("alt=GLOBAL_POSITION_INT.relative_alt*0.001@1[m]")
-
-
-def test_a_quantity_as_it_is_written() -> None:
-    assert Quantity("alt", "GLOBAL_POSITION_INT", "relative_alt", None, 0.001, 0.0, 1.0, "m") == ALT
-    cell = parse_quantity("cell1=BATTERY_STATUS[0].voltages[1]*1e-3-0.5@10[V, loaded]")
-    assert cell == Quantity("cell1", "BATTERY_STATUS[0]", "voltages", 1, 0.001, -0.5, 10.0, "V, loaded")
-    assert parse_quantity("kelvin=SCALED_PRESSURE.temperature*0.01+273.15").offset == 273.15
-    assert parse_quantity("position@2").period == 2.0
-
-
-def test_a_list_by_comma_semicolon_or_space() -> None:
-    text = (
-        "position@1, alt=GLOBAL_POSITION_INT.relative_alt*0.001[m, above home];v=SYS_STATUS.load hdg=VFR_HUD.heading"
-    )
-    assert [quantity.name for quantity in parse_quantities(text)] == ["position", "alt", "v", "hdg"]
-    assert parse_quantities("") == ()
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "alt",
-        "alt=",
-        "alt=X",
-        "alt=X.y*",
-        "alt=X.y@0",
-        "alt=X.y@nan",
-        "a/b=X.y",
-        "a b",
-        "alt=X.y*1.2.3",
-        "alt=X.y*1e400",
-        "alt=X.y+1e400",
-        "alt=X.y,alt=X.z",
-    ],
-)
-def test_what_is_no_quantity_is_refused(text: str) -> None:
-    with pytest.raises(SettingError):
-        parse_quantities(text)
 
 
 def sample(sampler: Sampler, telemetry: Any, now: float) -> Any:

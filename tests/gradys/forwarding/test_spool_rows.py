@@ -5,7 +5,8 @@ from typing import Any
 
 import pytest
 
-from mavproxy_gradys.forwarding.readings import LONGEST_TEXT, Reading
+from mavproxy_gradys.forwarding.quantities import LONGEST_TEXT
+from mavproxy_gradys.forwarding.readings import Reading
 from mavproxy_gradys.forwarding.spool_rows import is_storable, row_of, stored_of
 from mavproxy_gradys.http import LONGEST_LIST, checked
 

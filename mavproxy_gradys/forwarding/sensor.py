@@ -1,0 +1,124 @@
+"""Samples the sensors of the companion computer: files and commands."""
+
+from __future__ import annotations
+
+import logging
+import re
+from collections.abc import Callable
+from typing import Protocol
+
+from mavproxy_gradys.errors import NoReading
+from mavproxy_gradys.forwarding.quantities import LONGEST_TEXT, Quantity
+from mavproxy_gradys.forwarding.readings import Reading, Value, device_of
+from mavproxy_gradys.forwarding.sensor_command import SensorCommand
+from mavproxy_gradys.forwarding.sensor_file import Measured, SensorFile
+from mavproxy_gradys.net.outage_log import Causes
+from mavproxy_uavapi.core.values import NUMBER
+
+log = logging.getLogger("gradys.sensor")
+LARGEST = 2**63  # an integer must be smaller; see the readings that are posted
+STALE_PERIODS = 2.0  # a writer that is as slow as the reader is not stale
+
+
+class Source(Protocol):
+    """Where a sensor's value comes from."""
+
+    async def read(self) -> Measured | None:
+        """The newest content; None if it was taken before.
+
+        Raises:
+            NoReading: there is none.
+        """
+
+    async def close(self) -> None:
+        """Release what it holds."""
+
+
+def source_of(quantity: Quantity, max_age: float, wall: Callable[[], float]) -> Source:
+    """The source of a sensor.
+
+    Args:
+        quantity: the sensor.
+        max_age: s after which a file is stale, or two periods if that is longer.
+        wall: s since 1970.
+    """
+    if quantity.command:
+        return SensorCommand(quantity.command, wall=wall)
+    return SensorFile(quantity.file, max(max_age, STALE_PERIODS * quantity.period), wall)
+
+
+class SensorSampler:
+    """Samples one sensor.
+
+    Attributes:
+        taken: number of readings.
+        problem: why the last turn gave none; empty if it gave one.
+
+    Args:
+        quantity: the sensor.
+        source: its source.
+        clock: s, for the log.
+    """
+
+    def __init__(self, quantity: Quantity, source: Source, clock: Callable[[], float]) -> None:
+        self.quantity, self.source = quantity, source
+        self.taken = 0
+        self.problem = ""
+        self._causes = Causes(log, f"no reading of {quantity.name}", f"{quantity.name} is read again", clock)
+
+    async def sample(self, system: int) -> Reading | None:
+        """A reading that belongs to vehicle `system`; None if there is none, or no vehicle yet (0)."""
+        if not system:
+            self.problem = "no vehicle was heard yet"
+            return None
+        try:
+            measured = await self.source.read()
+            value = None if measured is None else value_of(self.quantity, measured.content)
+        except NoReading as error:
+            self.problem = str(error)
+            self._causes.failed(error.cause, self.problem)
+            return None
+        self._causes.succeeded()
+        if measured is None or value is None:
+            self.problem = "nothing new was written"
+            return None
+        self.problem = ""
+        self.taken += 1
+        quantity = self.quantity
+        return Reading(device_of(system), system, quantity.name, quantity.representation, value, measured.time)
+
+
+def value_of(quantity: Quantity, content: bytes) -> Value:
+    """The number, scaled, or the text that a sensor gave.
+
+    Raises:
+        NoReading: it is neither.
+    """
+    try:
+        text = content.decode().strip()
+    except UnicodeDecodeError:
+        raise NoReading("value", "the content is not UTF-8") from None
+    if not text:
+        raise NoReading("value", "the content is empty")
+    if quantity.is_text:
+        return checked_text(text)
+    if not re.fullmatch(NUMBER, text):
+        raise NoReading("value", f"{text[:40]!r} is not a number")
+    number = int(text) if re.fullmatch(r"[-+]?\d{1,20}", text) else float(text)
+    value = quantity.scaled(number)
+    if value is None or abs(value) >= LARGEST and isinstance(value, int):
+        raise NoReading("value", f"{text[:40]!r} is too large")
+    return value
+
+
+def checked_text(text: str) -> str:
+    """The text, if a receiver can take it.
+
+    Raises:
+        NoReading: it is too long, or has control characters other than tabs and line ends.
+    """
+    if len(text) > LONGEST_TEXT:
+        raise NoReading("value", f"the text has more than {LONGEST_TEXT} characters")
+    if not all(character.isprintable() or character in "\t\r\n" for character in text):
+        raise NoReading("value", "the text has control characters")
+    return text

@@ -1,0 +1,108 @@
+"""Commands as real processes, in real time."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mavproxy_gradys.errors import NoReading
+from mavproxy_gradys.forwarding.sensor_command import MOST_OUTPUT, SensorCommand
+from tests.support.processes import eventually
+
+NOW = 1_800_000_000.0
+
+
+def read(*command: str, longest: float = 60.0) -> Any:
+    return asyncio.run(SensorCommand(command, longest, lambda: NOW).read())
+
+
+def runs(pid: int) -> bool:
+    """Whether a process runs; one that only waits to be reaped does not."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def test_it_gives_what_it_prints() -> None:
+    measured = read("sh", "-c", "echo 21.5; echo hot >&2")
+    assert (measured.content, measured.time) == (b"21.5\n", NOW)
+
+
+def test_no_shell_runs_it() -> None:
+    assert read("echo", "$HOME", "|", "x").content == b"$HOME | x\n"
+
+
+@pytest.mark.parametrize(
+    ("command", "cause", "words"),
+    [
+        (["no-such-program"], "start", "no-such-program: No such file"),
+        (["/etc/passwd"], "start", "passwd: Permission denied"),
+        (["sh", "-c", "echo 5; echo no bus >&2; exit 3"], "status", "sh ended with status 3: no bus"),
+        (["sh", "-c", "exit 3"], "status", "sh ended with status 3"),
+        (["yes"], "long", f"yes prints more than {MOST_OUTPUT} bytes"),
+        (["sh", "-c", "kill -9 $$"], "status", "sh ended with status -9"),
+    ],
+)
+def test_a_failure_says_why(command: list[str], cause: str, words: str) -> None:
+    with pytest.raises(NoReading) as raised:
+        read(*command)
+    assert raised.value.cause == cause
+    assert str(raised.value).startswith(words) and str(raised.value)[-1] != ":"
+
+
+def test_one_that_takes_too_long_is_killed_with_its_children(tmp_path: Path) -> None:
+    pids = tmp_path / "pids"
+    with pytest.raises(NoReading, match=r"sh did not end within 0\.5 s"):
+        read("sh", "-c", f"sleep 600 & echo $! $$ > {pids}; wait", longest=0.5)
+    for pid in map(int, pids.read_text().split()):
+        eventually(lambda pid=pid: not runs(pid), what="its end")
+
+
+def test_a_child_that_outlives_it_is_killed(tmp_path: Path) -> None:
+    pids = tmp_path / "pids"
+    measured = read("sh", "-c", f"sleep 600 > /dev/null 2>&1 & echo $! > {pids}; echo 7")
+    assert measured.content == b"7\n"
+    eventually(lambda: not runs(int(pids.read_text())), what="its end")
+
+
+def test_a_child_that_keeps_the_output_open_ends_with_the_time(tmp_path: Path) -> None:
+    pids = tmp_path / "pids"
+    with pytest.raises(NoReading, match="did not end"):
+        read("sh", "-c", f"sleep 600 & echo $! > {pids}; echo 7", longest=0.5)
+    eventually(lambda: not runs(int(pids.read_text())), what="its end")
+
+
+def test_a_cancelled_wait_kills_it(tmp_path: Path) -> None:
+    pids = tmp_path / "pids"
+
+    async def cancel() -> None:
+        command = ("sh", "-c", f"sleep 600 & echo $! $$ > {pids}.new; mv {pids}.new {pids}; wait")
+        reading = asyncio.ensure_future(SensorCommand(command, 600.0).read())
+        await asyncio.to_thread(eventually, pids.exists)
+        reading.cancel()
+        await asyncio.gather(reading, return_exceptions=True)
+        assert reading.cancelled()
+
+    asyncio.run(cancel())
+    for pid in map(int, pids.read_text().split()):
+        eventually(lambda pid=pid: not runs(pid), what="its end")
+
+
+def test_nothing_is_left_open(descriptors: Any) -> None:
+    asyncio.run(asyncio.sleep(0))
+    before = descriptors()
+    for _ in range(3):
+        read("echo", "1")
+        with pytest.raises(NoReading):
+            read("yes")
+    assert descriptors() == before
+    assert not any(runs(int(pid)) for pid in _children())
+
+
+def _children() -> list[str]:
+    return Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
