@@ -17,6 +17,7 @@ from mavproxy_uavapi.core.values import NUMBER
 
 log = logging.getLogger("gradys.sensor")
 LARGEST = 2**63  # an integer must be smaller; see the readings that are posted
+VALUE = "value"  # the cause if the content is not a value
 STALE_PERIODS = 2.0  # a writer that is as slow as the reader is not stale
 
 
@@ -64,6 +65,7 @@ class SensorSampler:
         self.quantity, self.source = quantity, source
         self.taken = 0
         self.problem = ""
+        self._cause = ""
         self._causes = Causes(log, f"no reading of {quantity.name}", f"{quantity.name} is read again", clock)
 
     async def sample(self, system: int) -> Reading | None:
@@ -75,14 +77,16 @@ class SensorSampler:
             measured = await self.source.read()
             value = None if measured is None else value_of(self.quantity, measured.content)
         except NoReading as error:
-            self.problem = str(error)
+            self._cause, self.problem = error.cause, str(error)
             self._causes.failed(error.cause, self.problem)
             return None
+        if value is None and self._cause == VALUE:  # what is there is still no value
+            return None
         self._causes.succeeded()
+        self._cause, self.problem = "", ""
         if measured is None or value is None:
             self.problem = "nothing new was written"
             return None
-        self.problem = ""
         self.taken += 1
         quantity = self.quantity
         return Reading(device_of(system), system, quantity.name, quantity.representation, value, measured.time)
@@ -97,17 +101,17 @@ def value_of(quantity: Quantity, content: bytes) -> Value:
     try:
         text = content.decode().strip()
     except UnicodeDecodeError:
-        raise NoReading("value", "the content is not UTF-8") from None
+        raise NoReading(VALUE, "the content is not UTF-8") from None
     if not text:
-        raise NoReading("value", "the content is empty")
+        raise NoReading(VALUE, "the content is empty")
     if quantity.is_text:
         return checked_text(text)
     if not re.fullmatch(NUMBER, text):
-        raise NoReading("value", f"{text[:40]!r} is not a number")
+        raise NoReading(VALUE, f"{text[:40]!r} is not a number")
     number = int(text) if re.fullmatch(r"[-+]?\d{1,20}", text) else float(text)
     value = quantity.scaled(number)
     if value is None or abs(value) >= LARGEST and isinstance(value, int):
-        raise NoReading("value", f"{text[:40]!r} is too large")
+        raise NoReading(VALUE, f"{text[:40]!r} is too large")
     return value
 
 
@@ -118,7 +122,7 @@ def checked_text(text: str) -> str:
         NoReading: it is too long, or has control characters other than tabs and line ends.
     """
     if len(text) > LONGEST_TEXT:
-        raise NoReading("value", f"the text has more than {LONGEST_TEXT} characters")
+        raise NoReading(VALUE, f"the text has more than {LONGEST_TEXT} characters")
     if not all(character.isprintable() or character in "\t\r\n" for character in text):
-        raise NoReading("value", "the text has control characters")
+        raise NoReading(VALUE, "the text has control characters")
     return text

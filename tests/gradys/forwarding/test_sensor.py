@@ -116,6 +116,27 @@ def test_one_line_for_each_cause(loop: Any, caplog: Any) -> None:
     assert sampler.problem == ""
 
 
+def test_a_bad_value_stays_bad_until_something_new_is_written(loop: Any, caplog: Any) -> None:
+    sampler = SensorSampler(SOIL, Script(b"broken", None, None, b"24", None), loop.time)
+    with caplog.at_level(logging.INFO, "gradys.sensor"):
+        for _ in range(3):
+            assert loop.run(sampler.sample(10)) is None
+            assert sampler.problem == "'broken' is not a number"
+        assert loop.run(sampler.sample(10)).value == 24
+        assert loop.run(sampler.sample(10)) is None
+    assert sampler.problem == "nothing new was written"
+    assert caplog.messages == ["no reading of soil: 'broken' is not a number", "soil is read again"]
+
+
+def test_a_file_that_answers_again_is_read_again(loop: Any, caplog: Any) -> None:
+    sampler = SensorSampler(SOIL, Script(b"23", NoReading("slow", "it does not answer"), None), loop.time)
+    with caplog.at_level(logging.INFO, "gradys.sensor"):
+        for _ in range(3):
+            loop.run(sampler.sample(10))
+    assert sampler.problem == "nothing new was written"
+    assert caplog.messages == ["no reading of soil: it does not answer", "soil is read again"]
+
+
 def test_a_cause_that_comes_and_goes_is_logged_now_and_then(loop: Any, caplog: Any) -> None:
     contents = [b"", b"1"] * 100
     sampler = SensorSampler(SOIL, Script(*contents), loop.time)
