@@ -108,12 +108,20 @@ def test_auto_then_arm_then_take_off_by_the_mission(rig, drone, tmp_path):
 
 
 def guide(drone: Any, lat: float, lon: float, alt: float) -> int:
-    """A guided MISSION_ITEM; the MAV_MISSION_RESULT. `alt` is m above home."""
-    drone.mav.mission_item_send(
-        drone.target_system, drone.target_component, 0, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT,
-        mavlink.MAV_CMD_NAV_WAYPOINT, 2, 0, 0, 0, 0, 0, lat, lon, alt,
-    )  # fmt: skip
-    return int(heard(drone, "MISSION_ACK").type)
+    """A guided MISSION_ITEM, again every 2 s until it is acknowledged, because UDP may lose either.
+
+    Returns the MAV_MISSION_RESULT. `alt` is m above home.
+    """
+    deadline = time.monotonic() + PATIENCE
+    while True:
+        assert time.monotonic() < deadline
+        drone.mav.mission_item_send(
+            drone.target_system, drone.target_component, 0, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+            mavlink.MAV_CMD_NAV_WAYPOINT, 2, 0, 0, 0, 0, 0, lat, lon, alt,
+        )  # fmt: skip
+        answer = drone.recv_match(type="MISSION_ACK", blocking=True, timeout=2)
+        if answer is not None:
+            return int(answer.type)
 
 
 def test_guided_mission_items_fly_the_recorded_track(rig, drone):
@@ -124,7 +132,7 @@ def test_guided_mission_items_fly_the_recorded_track(rig, drone):
     drone.mav.command_long_send(
         drone.target_system, drone.target_component, mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, 0, 8
     )
-    rig.eventually(lambda: rig.ned()[2] < -7.5, what="the take-off")
+    rig.eventually(lambda: heard(drone, "GLOBAL_POSITION_INT").relative_alt > 7500, what="the take-off")
     for lat, lon, alt in lines:
         assert guide(drone, lat / 1e7, lon / 1e7, alt / 1e3 - GROUND) == mavlink.MAV_MISSION_ACCEPTED
 
