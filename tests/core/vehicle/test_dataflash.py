@@ -221,7 +221,7 @@ def test_download_of_another_program_is_not_disturbed(loop: Any, copter: Any, ve
 
 def test_other_program_that_comes_in_between_keeps_the_vehicle(loop: Any, copter: Any, vehicle: LogVehicle) -> None:
     task, _ = begin(loop, copter)
-    vehicle.logs[1], vehicle.interval = bytes(150_000), 0.1
+    vehicle.logs[1], vehicle.interval = bytes(150_000), 0.3
     vehicle.send_to_others(1)
     with pytest.raises(Busy, match="another program downloads log 1"):
         loop.run(task)
