@@ -88,7 +88,7 @@ class DataflashLogs:
         Args:
             entry: the log.
             save: called with some bytes of it at a time, in any order.
-            progress: called with the number of bytes that are saved, and of all.
+            progress: called with the number of bytes that have arrived, and of all.
             while_armed: go on while the vehicle is armed.
 
         Raises:
@@ -100,7 +100,7 @@ class DataflashLogs:
         async with self._turn(while_armed):
             self.fetching = entry
             try:
-                await self._fetch(_Fetch(self._state, entry, while_armed), save, progress)
+                await self._fetch(_Fetch(self._state, entry, while_armed, progress), save)
             except (LinkLost, OthersLog):
                 raise
             except BaseException:
@@ -127,7 +127,7 @@ class DataflashLogs:
                     known, news_at = len(listing.entries), self._waiting.clock()
         return listing.entries
 
-    async def _fetch(self, fetch: _Fetch, save: Save, progress: Progress) -> None:
+    async def _fetch(self, fetch: _Fetch, save: Save) -> None:
         entry, pieces = fetch.entry, fetch.pieces
         asked_at = news_at = self._waiting.clock()
         with self._talk("LOG_DATA") as talk:
@@ -142,7 +142,6 @@ class DataflashLogs:
                 new = await self._take_chunk(talk, fetch, end)
                 if new:
                     await save(new)
-                    progress(pieces.done, pieces.size)
                     news_at = self._waiting.clock()
 
     async def _take_chunk(self, talk: MessageExchange[Any], fetch: _Fetch, end: int) -> Sequence[Bytes]:
@@ -212,12 +211,13 @@ class _Fetch:
         others_log: the error if it fails because the vehicle sends another log.
     """
 
-    def __init__(self, state: VehicleState, entry: LogEntry, while_armed: bool) -> None:
+    def __init__(self, state: VehicleState, entry: LogEntry, while_armed: bool, progress: Progress) -> None:
         self.entry = entry
         self.pieces = LogPieces(entry.size)
         self.others_log: OthersLog | None = None
         self._state = state
         self._while_armed = while_armed
+        self._progress = progress
         self._reboots = state.reboots
 
     def check(self) -> None:
@@ -238,6 +238,7 @@ class _Fetch:
         end = min(start + min(message.count, PIECE), self.entry.size)
         if not self.pieces.take(start, end):
             return None
+        self._progress(self.pieces.done, self.pieces.size)
         return start, bytes(message.data[: end - start])
 
 
