@@ -226,6 +226,7 @@ def test_other_program_that_comes_in_between_keeps_the_vehicle(loop: Any, copter
     vehicle.send_to_others(1)
     with pytest.raises(Busy, match="another program downloads log 1"):
         loop.run(task)
+    loop.pass_time(0.1)
     assert "LOG_REQUEST_END" not in vehicle.names()
 
 
