@@ -28,7 +28,6 @@ log = logging.getLogger("gradys.spool")
 LONGEST_END = 3.0  # s that MAVProxy waits for the module's end
 COMPLETIONS = [
     "<status|stats|start|stop|flush|config|help>",
-    "set (GRADYSSETTING)",
     "track <record|fly> (FILENAME)",
     "track <stop|help>",
 ]

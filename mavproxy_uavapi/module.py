@@ -27,7 +27,6 @@ COMPLETIONS = [
     "fleet <arm|brake|disarm|guided|land|rtl|stop>",
     "token <add|list|remove>",
     "authority <take|release>",
-    "set (UAVAPISETTING)",
     "fly (FILENAME)",
 ]
 LOG_SHOWN = 20  # entries

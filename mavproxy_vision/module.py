@@ -30,7 +30,6 @@ from mavproxy_vision.tracking.tracker import Tracker
 NAME = "vision"
 COMPLETIONS = [
     "<status|start|stop|config|tags|land|search|mission|abort|help>",
-    "set (VISIONSETTING)",
     "<calibrate|snapshot|tag> (FILENAME)",
 ]
 MISSION = ("5", "8", "-5")  # m: altitude, north, east; the seed's

@@ -36,7 +36,7 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
             command.
         remembered: what outlives an unload.
         actions: what each word after the command does; `set` and `config` are added.
-        completions: rules for tab completion; `(NAMESETTING)` in one, in capitals, stands for any setting.
+        completions: rules for tab completion; those for `set` are added.
     """
 
     def __init__(
@@ -54,12 +54,15 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
         self.module_settings = settings
         self.remembered = remembered
         self._actions: dict[str, Action] = {**actions, "set": self._set, "config": lambda _: self._list_settings()}
-        self._setting_completion = f"({name.upper()}SETTING)"
+        # MAVProxy stumbles over a rule that is shorter than what was typed, so that of all settings has a value.
+        self._completed = {f"({name.upper()}SETTING)": settings.names, f"({name.upper()}VALUE)": list}
         self._begun = False
         self._told_failure = ""
         self.host = hosts.join(mpstate, self)
-        self.add_command(name, self.command, description, [*completions, *settings.value_completions()])
-        self.add_completion_function(self._setting_completion, lambda _: settings.names())
+        rules = [*completions, f"set {' '.join(self._completed)}", *settings.value_completions()]
+        self.add_command(name, self.command, description, rules)
+        for place, words in self._completed.items():
+            self.add_completion_function(place, lambda _, words=words: words())
 
     def begin(self) -> None:
         """Called once, in the first idle task: open sockets here, not earlier. It must not block.
@@ -106,7 +109,8 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
         """Give everything back. Runs in another thread than the main loop, which waits for it."""
         super().unload()
         self.remove_command(self.name)
-        self.mpstate.completion_functions.pop(self._setting_completion, None)
+        for place in self._completed:
+            self.mpstate.completion_functions.pop(place, None)
         try:
             if self.host.bridge.running:
                 self.host.bridge.run(self.end())

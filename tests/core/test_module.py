@@ -67,7 +67,7 @@ def demo(mpstate: Any, main_loop: Any) -> Iterator[Demo]:
 
 def test_loading_adds_its_command_and_hears_every_vehicle(demo: Demo, mpstate: Any) -> None:
     assert mpstate.command_map["demo"] == (demo.command, "a demo")
-    assert mpstate.completions["demo"] == ["<status|go>"]
+    assert mpstate.completions["demo"] == ["<status|go>", "set (DEMOSETTING) (DEMOVALUE)"]
     assert demo.multi_vehicle
 
 

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
+from MAVProxy.modules.lib import rline
 
 import uavapi
 from mavproxy_uavapi.module import HELP
@@ -104,12 +105,27 @@ def test_module_is_what_mavproxy_looks_for(module: Any, mpstate: Any) -> None:
         "fleet <arm|brake|disarm|guided|land|rtl|stop>",
         "token <add|list|remove>",
         "authority <take|release>",
-        "set (UAVAPISETTING)",
         "fly (FILENAME)",
+        "set (UAVAPISETTING) (UAVAPIVALUE)",
     ]
     assert "set on_lease_end <hold|land|rtl>" in mpstate.completions["uavapi"]
     assert "set allow_raw <true|false>" in mpstate.completions["uavapi"]
     assert "port" in mpstate.completion_functions["(UAVAPISETTING)"]("")
+
+
+@pytest.mark.parametrize(
+    ("typed", "expected"),
+    [
+        (["set", "on_conflict", "w"], {"refuse", "wait"}),
+        (["set", "port", "8"], set()),
+        (["fleet", "r"], {"rtl", "arm"}),
+    ],
+)
+def test_mavproxy_completes_values(
+    module: Any, mpstate: Any, typed: list[str], expected: set[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(rline, "rline_mpstate", mpstate, raising=False)
+    assert set(rline.complete_rules(mpstate.completions[module.name], typed)) >= expected
 
 
 def test_nothing_listens_before_the_first_idle_task(loader: Loader, port: int, mpstate: Any) -> None:
