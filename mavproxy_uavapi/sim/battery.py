@@ -10,6 +10,7 @@ from .parameters import ParameterStore
 
 FULL_VOLTAGE = 12.6
 HIGHEST_VOLTAGE = 60.0
+HIGHEST_CURRENT = 300.0
 EMPTY_SHARE = 0.81
 """What is left of the voltage of a full pack when it is empty."""
 RESISTANCE = 0.01
@@ -56,15 +57,15 @@ class Battery:
 
     def _draw(self, current: float, sag: float, dt: float) -> None:
         """Draw amperes at this loss of volts for dt seconds."""
-        self.current = current
-        self.consumed += current * dt / 3.6
+        self.current = min(current, HIGHEST_CURRENT)
+        self.consumed += self.current * dt / 3.6
         full = max(0.0, min(HIGHEST_VOLTAGE, self._parameters["SIM_BATT_VOLTAGE"]))
         charge = max(0.0, 1 - self.consumed / self._capacity) if self._capacity > 0 else 1.0
         rest = full * (EMPTY_SHARE + (1 - EMPTY_SHARE) * charge**0.6)
         if self.forced_voltage is not None:
             rest = self.forced_voltage
-        self.voltage = rest - sag
-        self.consumed_wh += self.voltage * current * dt / 3600
+        self.voltage = max(0.0, rest - sag)
+        self.consumed_wh += self.voltage * self.current * dt / 3600
 
     def becomes_low(self, now: float) -> bool:
         """True once, when the pack has been below BATT_LOW_VOLT for BATT_LOW_TIMER seconds, or at BATT_LOW_MAH.
