@@ -28,6 +28,7 @@ from soak import Notes, look_for_bad_words
 
 FUZZERS = 12
 STALLED = 1.0  # s that a reader may wait
+LOST = 0.05  # share of the requests that may find no link, as after a reboot
 READ_EVERY = 0.02  # s
 HEARD = 0.3  # s that an answer is waited for; a verb that flies goes on
 OURS = {"rejected", "tool_failed"}  # codes of a 500 that is not our fault
@@ -198,7 +199,7 @@ def _run_schemathesis(port: int, seconds: float, seed: int, pipe: Any) -> None:
     url = f"http://127.0.0.1:{port}"
     schema = schemathesis.openapi.from_url(f"{url}/openapi.json")
     operations = [result.ok() for result in schema.get_all_operations()]
-    end, statuses, failures = time.monotonic() + seconds, Counter[str](), list[str]()
+    end, statuses, failures, lost = time.monotonic() + seconds, Counter[str](), list[str](), list[bool]()
     rounds = settings(
         database=None,
         deadline=None,
@@ -219,6 +220,7 @@ def _run_schemathesis(port: int, seconds: float, seed: int, pipe: Any) -> None:
                 failures.append(f"{session_request.method} {session_request.url}: {error}")
                 return
             statuses[str(answer.status_code)] += 1
+            lost.append(answer.status_code == 503 and json.loads(answer.text).get("code") == "link_lost")
             if answer.status_code == 500 and json.loads(answer.text).get("code") not in OURS:
                 failures.append(
                     f"{session_request.method} {session_request.url} {session_request.body!r}: {answer.text}"
@@ -231,6 +233,8 @@ def _run_schemathesis(port: int, seconds: float, seed: int, pipe: Any) -> None:
                 if time.monotonic() < end:
                     with contextlib.suppress(Unsatisfiable):  # of what has no parameters nothing wrong can be made
                         seeded(seed)(rounds(given(case=operation.as_strategy(generation_mode=mode))(ask)))()
+    if sum(lost) > LOST * len(lost):
+        failures.append(f"{sum(lost)} of {len(lost)} requests found no link: what is seen is little")
     pipe.send((statuses, failures))
 
 

@@ -15,7 +15,6 @@ import asyncio
 import contextlib
 import json
 import socket
-import ssl
 import uuid
 from collections import defaultdict
 from collections.abc import Awaitable, Sequence
@@ -29,12 +28,11 @@ from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.forwarding.confirmations import Confirmations
 from mavproxy_gradys.forwarding.readings import CONFIRMED_TOPIC, POSITION, STATUS, Reading, Stored, device_of
 from mavproxy_gradys.net.addresses import split_url
-from mavproxy_gradys.net.http_client import tls_context
+from mavproxy_gradys.net.mqtt_client import make_client
 from mavproxy_gradys.net.resolver import Resolver
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
-KEEP_ALIVE = 15  # s; the broker closes a silent connection after 1.5 times this
 WINDOW = 20  # readings in flight at once on one connection
 CLOSE_TIMEOUT = 1.0  # s
 CONFIRMATION_TIMEOUT = 20.0  # s for a station's confirmation; long, because sending again would add to its load
@@ -202,23 +200,15 @@ class MqttSink:
             raise aiomqtt.MqttError(str(error) or f"no answer within {self._timeout:g} s") from error
 
     def _make(self, status: str) -> aiomqtt.Client:
-        parts = self._parts
-        return aiomqtt.Client(
-            parts.hostname or "",
+        return make_client(
+            self._parts,
             self._port,
-            username=unquote(parts.username) if parts.username else None,
-            password=unquote(parts.password) if parts.password else None,
-            timeout=self._timeout,
-            keepalive=KEEP_ALIVE,
+            self._timeout,
+            self._ca_file,
             max_inflight_messages=WINDOW,
             will=aiomqtt.Will(status, OFFLINE, qos=1, retain=True),
-            tls_context=self._tls() if parts.scheme == "mqtts" else None,
             protocol=aiomqtt.ProtocolVersion.V5 if self._station_confirms else aiomqtt.ProtocolVersion.V311,
         )
-
-    def _tls(self) -> ssl.SSLContext:
-        context = tls_context(self._ca_file)
-        return context if isinstance(context, ssl.SSLContext) else ssl.create_default_context()
 
     def _explain(self, error: BaseException | None) -> str:
         return f"{self._broker_name}: {str(error) or type(error).__name__}"

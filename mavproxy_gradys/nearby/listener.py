@@ -5,16 +5,16 @@ from __future__ import annotations
 import asyncio
 import logging
 import random
-import ssl
 from urllib.parse import unquote
 
 import aiomqtt
 
-from mavproxy_gradys.forwarding.mqtt_sink import KEEP_ALIVE, disconnect
+from mavproxy_gradys.errors import NotDelivered
+from mavproxy_gradys.forwarding.mqtt_sink import disconnect
 from mavproxy_gradys.forwarding.readings import device_of
 from mavproxy_gradys.nearby.advice import Advice, Track
 from mavproxy_gradys.net.addresses import split_url
-from mavproxy_gradys.net.http_client import tls_context
+from mavproxy_gradys.net.mqtt_client import make_client
 from mavproxy_gradys.net.outage_log import Outage
 from mavproxy_gradys.net.schedule import Backoff
 from mavproxy_uavapi.core.host import Host
@@ -48,36 +48,24 @@ class Listener:
         """Listen, until cancelled."""
         backoff = Backoff(random.random, LONGEST_PAUSE)
         while True:
-            client = self._make()
             try:
-                await client.__aenter__()
-                await client.subscribe(self._topic, qos=0)
-                backoff.succeeded()
-                self._outage.update("")
-                async for message in client.messages:
-                    if not message.retain:  # nobody knows how old a retained position is
-                        self._take(message.payload)
-            except aiomqtt.MqttError as error:
+                client = make_client(self._parts, self._port, self._timeout, self._ca_file)
+                await self._listen(client, backoff)
+            except (aiomqtt.MqttError, NotDelivered) as error:
                 self._outage.update(str(error) or "no answer")
-            finally:
-                await disconnect(client)
             await asyncio.sleep(backoff.failed(self._host.clock()))
 
-    def _make(self) -> aiomqtt.Client:
-        parts = self._parts
-        return aiomqtt.Client(
-            parts.hostname or "",
-            self._port,
-            username=unquote(parts.username) if parts.username else None,
-            password=unquote(parts.password) if parts.password else None,
-            timeout=self._timeout,
-            keepalive=KEEP_ALIVE,
-            tls_context=self._tls() if parts.scheme == "mqtts" else None,
-        )
-
-    def _tls(self) -> ssl.SSLContext:
-        context = tls_context(self._ca_file)
-        return context if isinstance(context, ssl.SSLContext) else ssl.create_default_context()
+    async def _listen(self, client: aiomqtt.Client, backoff: Backoff) -> None:
+        try:
+            await client.__aenter__()
+            await client.subscribe(self._topic, qos=0)
+            backoff.succeeded()
+            self._outage.update("")
+            async for message in client.messages:
+                if not message.retain:  # nobody knows how old a retained position is
+                    self._take(message.payload)
+        finally:
+            await disconnect(client)
 
     def _take(self, payload: object) -> None:
         if isinstance(payload, bytes | str) and self._advice.take(payload, self._host.clock()):

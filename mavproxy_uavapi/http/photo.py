@@ -17,7 +17,7 @@ async def take_photo(call: Call) -> web.StreamResponse:
     """Take a picture with a camera tool, or the newest frame of the vision module; answers a JPEG."""
     p = call.params(Photo)
     if p.command != VISION and p.command not in TOOLS:
-        raise BadRequest(f"no camera tool {p.command!r}; there are {', '.join([*TOOLS, VISION])}")
+        raise BadRequest(f"camera tool {p.command!r} is not allowed, but {', '.join([*TOOLS, VISION])}")
     width, height = camera_tools.size_of(p.resolution)
     if p.command == VISION:
         picture = await _newest_frame(call)

@@ -116,9 +116,9 @@ class NewSpeed(Request):
 
 
 class SimFactor(Request):
-    """`sim_factor`: simulated seconds per second."""
+    """`sim_factor`: simulated seconds per second; slower than 0.25 its heartbeats come too late for a link."""
 
-    sim_factor: Annotated[Number, Field(gt=0, le=1000, description="simulated s per s"), NotNothing]
+    sim_factor: Annotated[Number, Field(ge=0.25, le=1000, description="simulated s per s"), NotNothing]
 
 
 class GpsTarget(Blocking):

@@ -48,7 +48,7 @@ BOUNDS: dict[str, tuple[float, float]] = {
     "pwm": (800, 2200),
     "rate": (LEAST, 1000.0),
     "right": METRES,
-    "sim_factor": (LEAST, 1000.0),
+    "sim_factor": (0.25, 1000.0),
     "sysid": (1, 255),
     "timeout": (LEAST, 86_400.0),
     "tolerance": (LEAST, 100.0),

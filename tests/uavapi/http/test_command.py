@@ -97,6 +97,7 @@ def test_post_takes_the_same_parameters(row: Any, api: Any, ask: Any) -> None:
         ("set_climb_speed", {"new_v": "Infinity"}),
         ("set_descent_speed", {"new_v": ""}),
         ("set_sim_speedup", {"sim_factor": "0"}),
+        ("set_sim_speedup", {"sim_factor": "0.2"}),
         ("set_sim_speedup", {}),
         ("set_mode", {"mode": "HOVERING"}),
         ("set_mode", {"mode": ""}),
