@@ -73,6 +73,7 @@ class ApiSettings:
         script_logs: folder of their logs.
         python_path: the Python for .py scripts.
         script_grace: s from Ctrl-C to the kill of a script that is stopped.
+        vehicle_logs: folder of the downloaded logs of vehicles.
         script_size: kB of one script.
         script_quota: MB of all scripts together.
         envelope: file with where vehicles may fly; `vehicle` for their own fences, empty for none.
@@ -109,6 +110,7 @@ class ApiSettings:
     script_logs: str
     python_path: str
     script_grace: float
+    vehicle_logs: str
     script_size: int
     script_quota: int
     envelope: str
@@ -273,6 +275,7 @@ class ApiModuleSettings(ModuleSettings[ApiSettings]):
             MPSetting("log_console", str, "", "components that log to the console", tab="Logs"),
             MPSetting("log_path", str, "", "log file, or its folder"),
             MPSetting("debug", str, "", "components that log in detail"),
+            MPSetting("vehicle_logs", str, "~/uav_logs", "folder of downloaded vehicle logs"),
             MPSetting("scripts_path", str, "~/uav_scripts", "folder of the uploaded scripts", tab="Scripts"),
             MPSetting("script_logs", str, "~/uav_scripts/logs", "folder of their logs"),
             MPSetting("python_path", str, sys.executable, "what runs .py scripts"),

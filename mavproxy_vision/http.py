@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import functools
+from collections.abc import Awaitable, Callable
 from typing import Annotated, Any
 
 from aiohttp import web
 from pydantic import Field, model_validator
 
-from mavproxy_uavapi.core.errors import BadRequest
+from mavproxy_uavapi.core.errors import BadRequest, NotFound
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 from mavproxy_uavapi.http.extension import (
     EITHER,
@@ -17,6 +19,7 @@ from mavproxy_uavapi.http.extension import (
     NED_REACH,
     POST,
     WATCH,
+    Answer,
     Blocking,
     Call,
     Empty,
@@ -107,16 +110,30 @@ class VisionHandlers:
     def routes(self) -> list[Route]:
         """The routes."""
         return [
-            Route("/vision/status", self.status, Empty, WATCH),
-            Route("/vision/tags", self.tags, Empty, WATCH),
-            Route("/vision/frame.jpg", self.frame, Empty, WATCH),
-            Route("/vision/stream.mjpg", self.stream, StreamRequest, WATCH),
-            Route("/vision/frame", self.post_frame, FrameRequest, FLY, POST, raw=True, trail=False),
-            Route("/vision/land", self.land, LandRequest, FLY, POST, job=True),
-            Route("/vision/search", self.search, SearchRequest, FLY, POST, job=True),
-            Route("/vision/mission", self.mission, MissionRequest, FLY, POST, job=True),
+            Route("/vision/status", self._served(self.status), Empty, WATCH),
+            Route("/vision/tags", self._served(self.tags), Empty, WATCH),
+            Route("/vision/frame.jpg", self._served(self.frame), Empty, WATCH),
+            Route("/vision/stream.mjpg", self._served(self.stream), StreamRequest, WATCH),
+            Route("/vision/frame", self._served(self.post_frame), FrameRequest, FLY, POST, raw=True, trail=False),
+            Route("/vision/land", self._served(self.land), LandRequest, FLY, POST, job=True),
+            Route("/vision/search", self._served(self.search), SearchRequest, FLY, POST, job=True),
+            Route("/vision/mission", self._served(self.mission), MissionRequest, FLY, POST, job=True),
             Route("/vision/stop", self.stop, Empty, FLY, EITHER, stops=True),
         ]
+
+    def _served(self, action: Callable[[Call], Awaitable[Answer]]) -> Callable[[Call], Awaitable[Answer]]:
+        """The action, which refuses a path that names another vehicle than the one with the camera."""
+
+        @functools.wraps(action)
+        async def served(call: Call) -> Answer:
+            carrier = self.tracker.system
+            if carrier and call.named_system not in (0, carrier):
+                sentence = f"the camera is on vehicle {carrier}, not on vehicle {call.named_system}"
+                raise NotFound(f"{sentence} (`vision set vehicle` says on which)")
+            call.prefer(self.tracker.settings.vehicle)
+            return await action(call)
+
+        return served
 
     # -- reading -------------------------------------------------------------------------------------------
 

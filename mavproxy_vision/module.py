@@ -36,7 +36,7 @@ COMPLETIONS = [
 MISSION = ("5", "8", "-5")  # m: altitude, north, east; the seed's
 RESTARTS = {  # settings that need the camera to be opened again
     "source", "family", "tags", "any_id", "far", "calibration", "fov", "width", "height", "fps", "latency", "mount",
-    "offset", "gimbal", "threads",
+    "offset", "gimbal", "threads", "vehicle",
 }  # fmt: skip
 
 

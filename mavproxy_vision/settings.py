@@ -31,6 +31,7 @@ class VisionSettings:
     """A snapshot of the settings; the table of `VisionModuleSettings` describes each."""
 
     source: str
+    vehicle: int
     family: str
     tags: str
     any_id: bool
@@ -143,6 +144,7 @@ class VisionModuleSettings(ModuleSettings[VisionSettings]):
     def table() -> list[Any]:
         return [
             MPSetting("source", str, "", "camera:0, a path, URL or folder, sim, http; none for no camera"),
+            MPSetting("vehicle", int, 0, "system id that carries it; 0: MAVProxy's current one", range=(0, 255)),
             MPSetting("family", str, "36h11", f"one or several of {', '.join(FAMILIES)}; landed on is the first"),
             MPSetting("tags", str, "0:0.30", "ID:SIZE or ID:SIZE@RIGHT,UP in m; the main tag first"),
             MPSetting("any_id", bool, False, "look for all ids of the families, not only for those of tags"),

@@ -58,7 +58,7 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
         self._begun = False
         self._told_failure = ""
         self.host = hosts.join(mpstate, self)
-        self.add_command(name, self.command, description, completions)
+        self.add_command(name, self.command, description, [*completions, *settings.value_completions()])
         self.add_completion_function(self._setting_completion, lambda _: settings.names())
 
     def begin(self) -> None:

@@ -21,6 +21,8 @@ CONFIG_VARIABLE = "UAVAPI_CONFIG"  # names the INI file where no keyword `config
 DEFAULT = "default"  # the origin of a value that was never set
 ENVIRONMENT = "environment"
 KEYWORD = "module load"
+TRUTHS = ["true", "false"]
+TYPE_NAMES = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
 
 Snapshot = TypeVar("Snapshot")
 
@@ -111,6 +113,12 @@ class ModuleSettings(ABC, Generic[Snapshot]):
         """All settings."""
         return [row.name for row in cls.table()]
 
+    @classmethod
+    def value_completions(cls) -> list[str]:
+        """Rules for tab completion of the values that are one of some words."""
+        words = {row.name: TRUTHS if row.type is bool else row.choice for row in cls.table()}
+        return [f"set {name} <{'|'.join(some)}>" for name, some in words.items() if some]
+
     def set(self, name: str, value: Any) -> None:
         """Set one at the prompt; a refused value changes nothing.
 
@@ -131,7 +139,7 @@ class ModuleSettings(ABC, Generic[Snapshot]):
         return escaped(str(value))
 
     def listing(self, pattern: str = "") -> list[str]:
-        """A line for each setting: its value, and where that came from.
+        """A line for each setting: its value, and where that came from; of a single one what it means, too.
 
         Args:
             pattern: a name, the beginning of names, or a pattern such as `sim_*`.
@@ -146,7 +154,13 @@ class ModuleSettings(ABC, Generic[Snapshot]):
         if not names:
             raise self._unknown(pattern)
         width = max(map(len, self._rows))
-        return [f"{name:{width}} {self.shown(name):24} {self.origins.get(name, DEFAULT)}" for name in names]
+        lines = [f"{name:{width}} {self.shown(name):24} {self.origins.get(name, DEFAULT)}" for name in names]
+        return [*lines, f"  {self._meaning(self._rows[pattern])}"] if pattern in self._rows else lines
+
+    def _meaning(self, row: Any) -> str:
+        """Meaning, unit, accepted values and default of a setting."""
+        default = "(set)" if row.name in self.secrets and row.default else row.default
+        return f"{row.label}: {_accepted(row)}; default {'empty' if default == '' else default}"
 
     def _of_file(self, ini: IniFile) -> Iterator[Change]:
         for name, text in self.settings_in(ini):
@@ -203,7 +217,11 @@ class ModuleSettings(ABC, Generic[Snapshot]):
         return SettingError(f"no setting {name!r}; {nearest(name, self._rows)}", name)
 
     def _not_taken(self, row: Any, value: Any) -> SettingError:
-        limits = f" from {row.range[0]} to {row.range[1]}" if row.range else ""
-        expected = f"is one of {', '.join(row.choice)}" if row.choice else f"takes a {row.type.__name__}{limits}"
         shown = "…" if row.name in self.secrets else repr(value)
-        return SettingError(f"{row.name} = {shown}: it {expected}", row.name)
+        verb = "is" if row.choice else "takes"
+        return SettingError(f"{row.name} = {shown}: it {verb} {_accepted(row)}", row.name)
+
+
+def _accepted(row: Any) -> str:
+    limits = f" from {row.range[0]} to {row.range[1]}" if row.range else ""
+    return f"one of {', '.join(row.choice)}" if row.choice else f"{TYPE_NAMES[row.type]}{limits}"

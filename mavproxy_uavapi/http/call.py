@@ -112,6 +112,10 @@ class Call:
         """The system id that the request means; 0 for MAVProxy's current vehicle."""
         return self.named_system or self.service.settings.sysid
 
+    def prefer(self, system: int) -> None:
+        """Mean the vehicle with that system id if neither the path nor the port names one; 0 changes nothing."""
+        self.named_system = self.named_system or system
+
     @property
     def known_vehicle(self) -> Vehicle:
         """The vehicle, whether its link is alive or not."""

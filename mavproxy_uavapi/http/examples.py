@@ -106,7 +106,7 @@ PATH_PARAMETERS = {
         "/parameters/{name}": "WPNAV_SPEED",
     },
     "sysid": {"/vehicles/{sysid}": "1"},
-    "id": {"/jobs/{id}": "7"},
+    "id": {"/jobs/{id}": "7", "/logs/{id}": "3"},
     "file": {"/docs/{file}": "swagger-ui.css"},
 }
 
@@ -123,6 +123,7 @@ RESULTS: Mapping[str, str] = {
     "/command/reboot": "The autopilot has booted",
     "PUT /parameters/{name}": "WPNAV_SPEED is 500",
     "POST /parameters": "1 of 1 parameters are set",
+    "/logs/{id}/download": "Log 3 downloaded",
     "/command/land_at": "Landing mission started for coord (-35.3629, 149.1652)",
     "/command/set_reverse": "Driving backwards",
     "/command/set_air_speed": "Air speed set to 5m/s",
@@ -234,6 +235,10 @@ MEMBERS: Mapping[str, Mapping[str, Any]] = {
     "/telemetry/message/{name}": {
         "info": {"mavpackettype": "ATTITUDE", "roll": 0.01, "count": 812, "rate": 4.0},
         **AGE,
+    },
+    "/logs": {
+        "logs": [{"id": 3, "size": 1204224, "time": "2026-05-04T13:20:07Z", "downloaded": False}],
+        "age_s": 0.0,
     },
     "GET /parameters": {"parameters": {"WPNAV_SPEED": 500.0}},
     "POST /parameters": {"parameters": {"WPNAV_SPEED": 500.0}, "failed": {}},

@@ -19,6 +19,7 @@ from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.vehicle.registry import CLASSES
 from mavproxy_uavapi.http import examples, requests
 from mavproxy_uavapi.http.fleet import FleetRequest
+from mavproxy_uavapi.http.openapi_jobs import ACCEPTED, HURRY
 from mavproxy_uavapi.http.route import Route
 
 ABOUT = """\
@@ -36,6 +37,7 @@ TAGS = {
     "jobs": "The running verbs and the last ones that ended.",
     "mission": "Scripts, each in its own tmux session; and the mission that the autopilot itself flies.",
     "parameters": "The autopilot's parameters; each new value is read back.",
+    "logs": "The dataflash logs that a vehicle holds, and their download to this machine.",
     "envelope": "Where vehicles may fly. Nothing that leads out of it is sent, whoever asks for it.",
     "message": "Any MAVLink message, for what has no verb. Off unless the setting `allow_raw` is true.",
     "authority": "Which operator holds a vehicle. Taking it and giving it back sends nothing.",
@@ -71,6 +73,7 @@ BY_TAG: Mapping[str, tuple[type[UavApiError], ...]] = {
     "vehicles": (errors.NotFound,),
     "authority": (errors.NoVehicle, errors.Busy),
     "parameters": (*OF_A_VEHICLE, errors.NotFound, errors.TimedOut, errors.OutsideEnvelope),
+    "logs": (*OF_A_COMMAND, errors.NotFound, errors.Stale, errors.Aborted, errors.ToolFailed),
     "fleet": (),
     "docs": (errors.NotFound,),
 }
@@ -109,6 +112,7 @@ KINDS: Mapping[str, Mapping[str, Any]] = {
     "/telemetry/stream": {EVENTS: TEXT},
     "/mission/scripts/{name}/log": {"text/plain": TEXT, EVENTS: TEXT},
     "/parameters.param": {"text/plain": TEXT},
+    "/logs/{id}": {"application/octet-stream": {}},
     "/vision/frame.jpg": {"image/jpeg": {}},
     "/vision/stream.mjpg": {"multipart/x-mixed-replace": {}},
     "/docs": {"text/html": TEXT},
@@ -147,55 +151,6 @@ FAILURE = {
         "statustext": {"type": "array", "items": {"type": "string"}, "description": "the autopilot's texts since"},
         "outside": {"type": "object", "description": "what it would break (`what`), where (`at`), and `by` how much"},
         "stderr": {"type": "string", "description": "the error output of the program that failed"},
-    },
-}
-
-
-HURRY = [
-    {
-        "name": "wait",
-        "in": "query",
-        "required": False,
-        "schema": {"type": "boolean", "default": True},
-        "description": "false: answer 202 at once with the job's number; the job goes on",
-    },
-    {
-        "name": "on_disconnect",
-        "in": "query",
-        "required": False,
-        "schema": {"type": "string", "enum": ["continue", "hold"]},
-        "description": "what the vehicle does when the client hangs up; it overrides the setting of that name",
-    },
-    {
-        "name": "lease",
-        "in": "query",
-        "required": False,
-        "schema": {"type": "number", "minimum": 0, "maximum": 3600},
-        "description": "s without a call of this client until `on_lease_end` is done; 0 gives the lease back",
-    },
-    {
-        "name": "client",
-        "in": "query",
-        "required": False,
-        "schema": {"type": "string", "pattern": "^[A-Za-z0-9_.:-]{1,64}$"},
-        "description": "tells clients of one address apart, for leases",
-    },
-    {
-        "name": "Prefer",
-        "in": "header",
-        "required": False,
-        "schema": {"type": "string", "enum": ["respond-async"]},
-        "description": "respond-async: same as wait=false",
-    },
-]
-ACCEPTED = {
-    "description": "It goes on as a job.",
-    "headers": {"Location": {"description": "where the job is", "schema": {"type": "string"}}},
-    "content": {
-        "application/json": {
-            "schema": {"$ref": "#/components/schemas/Success"},
-            "example": {"device": "uav", "id": "1", "result": "Job 12 accepted", "job": "12"},
-        }
     },
 }
 

@@ -10,6 +10,7 @@ from mavproxy_uavapi.http import (
     docs_page,
     envelope,
     jobs,
+    logs,
     message,
     mission,
     movement,
@@ -134,6 +135,12 @@ PARAMETERS = [
     Route("/parameters/{name}", parameters.set_parameter, parameters.NewValue, ADMIN, ("PUT",)),
 ]
 
+LOGS = [
+    Route("/logs", logs.list_logs, logs.LogRequest, WATCH),
+    Route("/logs/{id}", logs.read_log, requests.Empty, WATCH),
+    Route("/logs/{id}/download", logs.download_log, logs.LogRequest, FLY, POST, job=True),
+]
+
 ENVELOPE = [
     Route("/envelope", envelope.show, requests.Empty, WATCH),
     Route("/envelope", envelope.put, requests.Empty, ADMIN, ("PUT",), raw=True),
@@ -171,6 +178,7 @@ ROUTES = [
     *MISSION,
     *PERIPHERICAL,
     *PARAMETERS,
+    *LOGS,
     *ENVELOPE,
     *MESSAGE,
     *AUTHORITY,

@@ -22,9 +22,11 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from .commands import UNSUPPORTED, from_message
 from .copter.copter import SimulatedCopter
+from .dataflash import Dataflash
 from .faults import Faults, PlannedAck
 from .kinds import KINDS
 from .link import COMPONENT, PeerLink
+from .log_protocol import LogProtocol
 from .mission import Mission
 from .mission_protocol import MissionProtocol
 from .options import Options
@@ -90,15 +92,18 @@ class Simulator:
             "TIMESYNC": self._timesync,
             "FILE_TRANSFER_PROTOCOL": self._file_transfer,
         }
+        self.dataflash = Dataflash()
         self._boot(Mission())
 
     def _boot(self, mission: Mission) -> None:
-        """Boot: time zero, disarmed, where the vehicle began. Parameters and mission stay."""
+        """Boot: time zero, disarmed, where the vehicle began. Parameters, mission and logs stay."""
         self._boots += 1
         seed = self.options.seed + self._boots - 1
         self.vehicle = self._kind.vehicle(self.options, self.parameters, mission, seed)
         self.telemetry = Telemetry(self.vehicle, self._epoch)
         self.missions = MissionProtocol(self.vehicle)
+        self.dataflash.close()
+        self._logs = LogProtocol(self.vehicle, self.dataflash)
         self._transmitter = Transmitter(self.vehicle, self.telemetry, self.faults, self.links)
         self.commands = self._kind.commands(self.vehicle, self.telemetry, self._transmitter, self.reboot_soon)
         self._reboot_wanted = False
@@ -143,6 +148,8 @@ class Simulator:
         self.telemetry.freeze_position(vehicle.now < self.faults.gps_frozen_until)
         vehicle.step(STEP)
         self.missions.step()
+        self.dataflash.step(vehicle, self._epoch)
+        self._logs.step()
         while vehicle.events:
             self._transmitter.emit(vehicle.events.popleft())
         self._transmitter.send_planned()
@@ -169,7 +176,7 @@ class Simulator:
             return
         self._received_count += 1
         self.received.append(ReceivedMessage(self._received_count, vehicle.now, wall, link.name, message))
-        if self.missions.handle(link, message):
+        if self.missions.handle(link, message) or self._logs.handle(link, message):
             return
         handler = self._handlers.get(message.get_type())
         own = self._kind.messages.get(message.get_type())

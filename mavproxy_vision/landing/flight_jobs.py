@@ -125,8 +125,8 @@ class FlightJobs:
         tracker.host.closing_messages.append(self.closing_messages)
 
     def copter(self) -> Copter:
-        """MAVProxy's current vehicle. Raises NoVehicle, LinkLost, NotSupported."""
-        return copter_of(self.tracker.host.registry.commandable())
+        """The vehicle that carries the camera. Raises NoVehicle, LinkLost, NotSupported."""
+        return copter_of(self.tracker.host.registry.commandable(self.tracker.settings.vehicle))
 
     # -- flights, to be run as jobs --------------------------------------------------------------------------
 

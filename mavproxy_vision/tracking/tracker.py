@@ -68,7 +68,7 @@ class Tracker:
         self.changed = asyncio.Event()
         self.latencies: deque[float] = deque(maxlen=1000)  # s from a frame's arrival to the setpoint that uses it
         self._measurer: TargetMeasurer | None = None
-        self._carrier = 0  # system id of the vehicle in flight; 0 for MAVProxy's current one
+        self._carrier = 0  # system id of the vehicle in flight; 0 for that of the setting
         self._tags = TagWatch(lambda info: host.tell("tag", self.system, info))
         self._unplaced: deque[FrameResult] = deque(maxlen=50)  # results that are newer than the telemetry
         self._system = 0
@@ -202,11 +202,11 @@ class Tracker:
     @property
     def system(self) -> int:
         """The system id of the vehicle with the camera; 0 without a vehicle."""
-        return self.host.registry.resolve(self._carrier)
+        return self.host.registry.resolve(self._carrier or self.settings.vehicle)
 
     @contextlib.contextmanager
     def carried_by(self, system: int) -> Iterator[None]:
-        """Within the context the camera is on that vehicle, whichever vehicle is MAVProxy's current one."""
+        """Within the context the camera is on that vehicle, whichever MAVProxy or the setting changes to."""
         self._carrier = system
         self._follow_carrier()
         try:
@@ -248,7 +248,7 @@ class Tracker:
 
     def vehicle(self) -> Vehicle:
         """The vehicle with the camera; its link must be alive."""
-        return self.host.registry.commandable(self._carrier)
+        return self.host.registry.commandable(self._carrier or self.settings.vehicle)
 
     @property
     def health(self) -> Health:

@@ -121,7 +121,7 @@ def test_setting_that_stays_as_it_was_is_not_used(demo: Demo, main_loop: Any) ->
 @pytest.mark.parametrize(
     ("words", "line"),
     [
-        (["rate", "11"], "demo: rate = '11': it takes a int from 1 to 10"),
+        (["rate", "11"], "demo: rate = '11': it takes a whole number from 1 to 10"),
         (["rat", "5"], "demo: no setting 'rat'; did you mean rate?"),
         (["xyz"], "demo: no setting 'xyz'; there are rate, name"),
         (["name", "a"], "demo: name is not changed now"),

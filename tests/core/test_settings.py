@@ -11,7 +11,7 @@ from MAVProxy.modules.lib.mp_settings import MPSetting
 
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.ini_file import IniFile
-from mavproxy_uavapi.core.settings import ModuleSettings
+from mavproxy_uavapi.core.settings import TYPE_NAMES, ModuleSettings
 
 
 def even(text: str) -> int:
@@ -159,10 +159,10 @@ def test_refusal_names_where_the_value_stands(ini: Any) -> None:
     file = ini("[gradys]\nlow = many\n")
     with pytest.raises(SettingError) as caught:
         demo({"config": file})
-    assert str(caught.value) == f"{file}: low = 'many': it takes a int from 0 to 10"
-    with pytest.raises(SettingError, match="^GRADYS_LOW: low = '11': it takes a int from 0 to 10$"):
+    assert str(caught.value) == f"{file}: low = 'many': it takes a whole number from 0 to 10"
+    with pytest.raises(SettingError, match="^GRADYS_LOW: low = '11': it takes a whole number from 0 to 10$"):
         demo(GRADYS_LOW="11")
-    with pytest.raises(SettingError, match="^low = -1: it takes a int"):
+    with pytest.raises(SettingError, match="^low = -1: it takes a whole number"):
         demo({"low": -1})
     with pytest.raises(SettingError) as caught:
         demo({"config": ini("[gradys]\nlow = 9\n")})
@@ -170,7 +170,7 @@ def test_refusal_names_where_the_value_stands(ini: Any) -> None:
 
 
 def test_wrong_value_is_refused_though_a_later_one_replaces_it(ini: Any) -> None:
-    with pytest.raises(SettingError, match="it takes a int"):
+    with pytest.raises(SettingError, match="it takes a whole number"):
         demo({"config": ini("[gradys]\nlow = many\n"), "low": 2})
 
 
@@ -186,7 +186,7 @@ def test_refusal_is_a_422_that_names_the_setting() -> None:
     with pytest.raises(SettingError) as caught:
         demo({"low": "many"})
     assert (caught.value.status, caught.value.code) == (422, "invalid")
-    sentence = "low = 'many': it takes a int from 0 to 10"
+    sentence = "low = 'many': it takes a whole number from 0 to 10"
     assert caught.value.detail == [{"loc": ["low"], "msg": sentence, "type": "value_error"}]
 
 
@@ -206,10 +206,15 @@ def test_listing_is_of_a_name_a_beginning_or_a_pattern() -> None:
     assert [line.split()[0] for line in settings.listing()] == settings.names()
     assert [line.split()[0] for line in settings.listing("lo")] == ["low", "loud"]
     assert [line.split()[0] for line in settings.listing("*a*")] == ["name", "pair", "password"]
-    assert settings.listing("low") == ["low      1                        default"]
-    assert settings.listing("name") == [r"name     a\x1b\nb                 module load"]
+    assert settings.listing("low")[0] == "low      1                        default"
+    assert settings.listing("name")[0] == r"name     a\x1b\nb                 module load"
     with pytest.raises(SettingError, match=r"^no setting 'lwo'; did you mean low\?$"):
         settings.listing("lwo")
+
+
+def test_a_single_setting_is_explained() -> None:
+    assert demo({}).listing("low")[1:] == ["  : a whole number from 0 to 10; default 1"]
+    assert demo({}).listing("loud")[1:] == ["  : true or false; default False"]
 
 
 # -- every module's table ----------------------------------------------------------------------------------
@@ -250,7 +255,7 @@ def test_numbers_are_finite_and_in_their_range(kind: type[ModuleSettings[Any]], 
             low, high = row.range
             for value in ("nan", "inf", float("nan"), "1e400", "", "x", None, True, low - 1, high + 1):
                 assert refused(settings, row.name, value) == (
-                    f"{row.name} = {value!r}: it takes a {row.type.__name__} from {low} to {high}"
+                    f"{row.name} = {value!r}: it takes {TYPE_NAMES[row.type]} from {low} to {high}"
                 )
             settings.set(row.name, low)
             settings.set(row.name, str(high))
@@ -265,7 +270,7 @@ def test_truth_has_the_same_words_everywhere(kind: type[ModuleSettings[Any]]) ->
             settings.set(name, word)
             assert getattr(settings.snapshot(), name) is meant
         for word in ("", "maybe", 2):
-            assert refused(settings, name, word) == f"{name} = {word!r}: it takes a bool"
+            assert refused(settings, name, word) == f"{name} = {word!r}: it takes true or false"
 
 
 def test_misspelt_name_is_answered_with_the_nearest(kind: type[ModuleSettings[Any]], ini: Any) -> None:

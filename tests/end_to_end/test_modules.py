@@ -100,7 +100,7 @@ def test_console_commands(mavproxy):
     prompt.ask("uavapi stauts", "did you mean status?")
     prompt.ask("uavapi set", "link_timeout")
     prompt.ask("uavapi set prot 8001", "did you mean port?")
-    prompt.ask("uavapi set port many", "it takes a int")
+    prompt.ask("uavapi set port many", "it takes a whole number")
     prompt.ask("uavapi set host 0.0.0.0", "everybody on that network")
     prompt.ask("uavapi stop", "uavapi: stopped")
     with pytest.raises(requests.ConnectionError):
@@ -127,8 +127,8 @@ def test_a_port_in_use_is_one_clear_line_and_mavproxy_lives_on(mavproxy, harness
     "line,answer",
     [
         ('module load uavapi:{"prot":8001}', "did you mean port?"),
-        ('module load uavapi:{"port":"x"}', "it takes a int"),
-        ('module load uavapi:{"port":70000}', "it takes a int from 1 to 65535"),
+        ('module load uavapi:{"port":"x"}', "it takes a whole number"),
+        ('module load uavapi:{"port":70000}', "it takes a whole number from 1 to 65535"),
         ('module load uavapi:{"config":"/no/such/file.ini"}', "No such file or directory"),
     ],
 )

@@ -56,7 +56,7 @@ def test_before_the_first_idle_task_it_says_that_mavproxy_is_starting(mpstate: A
     assert "still starting" in capsys.readouterr().out
     module.command(["set", "gs", "10.0.0.5:8000"])
     module.command(["set", "gs"])
-    assert capsys.readouterr().out.split() == ["gs", "10.0.0.5:8000", "gradys", "set"]
+    assert capsys.readouterr().out.split()[:4] == ["gs", "10.0.0.5:8000", "gradys", "set"]
     module.unload()
 
 

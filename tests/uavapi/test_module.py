@@ -99,7 +99,7 @@ def test_module_is_what_mavproxy_looks_for(module: Any, mpstate: Any) -> None:
     assert module.name == "uavapi"
     assert module.multi_vehicle
     assert set(mpstate.command_map) == {"uavapi"}
-    assert mpstate.completions["uavapi"] == [
+    assert mpstate.completions["uavapi"][:6] == [
         "<status|start|stop|vehicles|config|log|help>",
         "fleet <arm|brake|disarm|guided|land|rtl|stop>",
         "token <add|list|remove>",
@@ -107,6 +107,8 @@ def test_module_is_what_mavproxy_looks_for(module: Any, mpstate: Any) -> None:
         "set (UAVAPISETTING)",
         "fly (FILENAME)",
     ]
+    assert "set on_lease_end <hold|land|rtl>" in mpstate.completions["uavapi"]
+    assert "set allow_raw <true|false>" in mpstate.completions["uavapi"]
     assert "port" in mpstate.completion_functions["(UAVAPISETTING)"]("")
 
 
@@ -163,7 +165,7 @@ def test_command_goes_out_in_the_main_loop(
     ("kwargs", "words"),
     [
         ({"prot": 1}, "uavapi: no setting 'prot'; did you mean port?"),
-        ({"port": "x"}, "uavapi: port = 'x': it takes a int from 1 to 65535"),
+        ({"port": "x"}, "uavapi: port = 'x': it takes a whole number from 1 to 65535"),
         ({"host": "0.0.0.0"}, "everybody on that network"),
         ({"config": "/no/such.ini"}, "/no/such.ini: No such file or directory"),
     ],
@@ -223,7 +225,7 @@ def test_bad_value_at_the_prompt_changes_nothing(module: Any, port: int, capsys:
     module.command(["set", "port", "x"])
     out = capsys.readouterr().out
     assert "uavapi: no setting 'prot'; did you mean port?\n" in out
-    assert "uavapi: port = 'x': it takes a int from 1 to 65535\n" in out
+    assert "uavapi: port = 'x': it takes a whole number from 1 to 65535\n" in out
     assert listens(port)
 
 
@@ -233,7 +235,10 @@ def test_set_shows_the_settings(module: Any, port: int, capsys: Any) -> None:
     assert re.search(rf"port +{port} +module load", out)
     assert re.search(r"host +127.0.0.1 +default", out)
     module.command(["set", "max_age"])
-    assert capsys.readouterr().out.split() == ["max_age", "5.0", "default"]
+    assert capsys.readouterr().out.splitlines() == [
+        "max_age            5.0                      default",
+        "  s after which telemetry is stale: a number from 0.1 to 3600; default 5.0",
+    ]
 
 
 def test_stop_and_start(module: Any, port: int, output: Any) -> None:

@@ -69,7 +69,7 @@ def test_ini_file_of_the_original_service_loads(ini: Any) -> None:
         ("[api]\nprot = 1\n", "no key 'prot' in \\[api\\]"),
         ("[simulated]\nport = 1\n", "no key 'port' in \\[simulated\\]; there are simulated, ardupilot_path"),
         ("[apy]\nport = 1\n", "no section \\[apy\\]; did you mean api\\?"),
-        ("[api]\nport = high\n", "it takes a int"),
+        ("[api]\nport = high\n", "it takes a whole number"),
         ("[api]\nhost = 0.0.0.0\n", "everybody on that network"),
         ("[api]\nuav_conection = x\n", "did you mean uav_connection\\?"),
     ],

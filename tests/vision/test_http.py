@@ -13,7 +13,7 @@ import pytest
 from aiohttp import TCPConnector, web
 from aiohttp.test_utils import TestClient, TestServer, make_mocked_request
 
-from mavproxy_uavapi.core.errors import BadRequest, Invalid, TooManyRequests, UavApiError
+from mavproxy_uavapi.core.errors import BadRequest, Invalid, NotFound, TooManyRequests, UavApiError
 from mavproxy_uavapi.http import call as calls
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.caller import CALLER, Caller
@@ -265,3 +265,39 @@ def test_frame_streams_count_among_the_open_ones():
         assert service.streams.count == 0
 
     asyncio.run(run())
+
+
+def served(named, setting, carrier):
+    """The system id that a land request means, by the path's, the setting's, and the one with the camera."""
+    tracker = SimpleNamespace(system=carrier, settings=SimpleNamespace(vehicle=setting))
+    means = SimpleNamespace(settings=SimpleNamespace(sysid=7))
+    routed = VisionHandlers(tracker, None)
+
+    async def land(call):
+        return call.system
+
+    call = Call(means, make_mocked_request("POST", "/vision/land"), LandRequest())
+    call.named_system = named
+    return asyncio.run(routed._served(land)(call))
+
+
+def test_path_without_a_vehicle_means_the_one_of_the_setting():
+    assert served(0, 2, 2) == 2
+    assert served(0, 0, 1) == 7, "the API's own, as for any path"
+
+
+def test_path_of_the_vehicle_with_the_camera_is_answered():
+    assert served(2, 2, 2) == 2
+    assert served(1, 0, 1) == 1
+    assert served(3, 0, 0) == 3, "nobody was heard: the action says so"
+
+
+@pytest.mark.parametrize("setting", [0, 1])
+def test_path_of_another_vehicle_is_not_found(setting):
+    with pytest.raises(NotFound, match="the camera is on vehicle 1, not on vehicle 2"):
+        served(2, setting, 1)
+
+
+def test_every_route_but_the_stop_looks_at_the_vehicle():
+    routes = VisionHandlers(None, None).routes()
+    assert [r.path for r in routes if not hasattr(r.action, "__wrapped__")] == ["/vision/stop"]

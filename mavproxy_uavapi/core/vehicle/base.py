@@ -18,6 +18,7 @@ from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle import messages, time_limits
 from mavproxy_uavapi.core.vehicle.authority import CommandAuthority
 from mavproxy_uavapi.core.vehicle.command_sender import CommandSender
+from mavproxy_uavapi.core.vehicle.dataflash import DataflashLogs
 from mavproxy_uavapi.core.vehicle.envelope_check import Spaces
 from mavproxy_uavapi.core.vehicle.geodesy import offset
 from mavproxy_uavapi.core.vehicle.guard import STOPPING, EnvelopeGuard, GuardedLink
@@ -70,6 +71,7 @@ class BaseVehicle:
         self.commands = CommandSender(state, self.link, self.waiting)
         self.waypoints = Waypoints(state, self.link, self.waiting, self._allow_upload)
         self.parameters = Parameters(state, self.link, self.waiting)
+        self.logs = DataflashLogs(state, self.link, self.waiting)
         self._requested_modes: dict[int, float] = {}  # requested modes, the newest last, and when (s)
         self._requests: dict[str, asyncio.Task[Any]] = {}  # REQUEST_MESSAGE in flight, by message name
 

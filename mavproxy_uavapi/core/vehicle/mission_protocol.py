@@ -7,9 +7,7 @@ answers only those of its own transfers.
 
 from __future__ import annotations
 
-import asyncio
-import contextlib
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from typing import Any, TypeVar
 
@@ -18,11 +16,11 @@ from pymavlink import mavutil
 from mavproxy_uavapi.core.errors import Busy, LinkLost, Rejected, TimedOut, UavApiError
 from mavproxy_uavapi.core.mavlink.link import Address, Link
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
-from mavproxy_uavapi.core.timeout import wait_with_timeout
 from mavproxy_uavapi.core.vehicle.message_exchange import MessageExchange
 from mavproxy_uavapi.core.vehicle.message_waiter import MessageWaiter
 from mavproxy_uavapi.core.vehicle.mission_files import HOME, MissionItem, difference, from_message
 from mavproxy_uavapi.core.vehicle.start_gate import pass_gate
+from mavproxy_uavapi.core.vehicle.turns import Turns
 
 T = TypeVar("T")
 mavlink = mavutil.mavlink
@@ -30,7 +28,6 @@ mavlink = mavutil.mavlink
 ANSWER_TIMEOUT = 1.5  # s until we ask again
 SENDINGS = 4  # the first one and three more
 ASKING_TIMEOUT = 9.0  # s; an ArduPilot asks again for an item after 1 s, and gives an upload up after 8 s
-TURN_TIMEOUT = 10.0  # s that a transfer waits for those before it
 CANCELLED = "MAV_MISSION_OPERATION_CANCELLED"  # the vehicle waited too long for an item
 MISSION = mavlink.MAV_MISSION_TYPE_MISSION
 ANSWERS = ("MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_ITEM", "MISSION_ACK")
@@ -64,7 +61,7 @@ class Waypoints:
         self._link = link
         self._waiting = waiting
         self._allow = allow
-        self._lock = asyncio.Lock()
+        self._turns = Turns("transfers of the mission")
         self.changed_at = 0.0
 
     # -- verbs --------------------------------------------------------------------------------------------
@@ -77,7 +74,7 @@ class Waypoints:
             Busy: other transfers of ours take too long.
             TimedOut, LinkLost.
         """
-        async with self._turn():
+        async with self._turns.one():
             return await self._download()
 
     async def upload(
@@ -104,7 +101,7 @@ class Waypoints:
             progress(done, of)
 
         self._allow(items)
-        async with self._turn():
+        async with self._turns.one():
             _, old = await self._download()
             await pass_gate()
             check()
@@ -124,7 +121,7 @@ class Waypoints:
             Rejected: the vehicle flies it.
             Busy, TimedOut, LinkLost.
         """
-        async with self._turn():
+        async with self._turns.one():
             check()
             self.changed_at = self._waiting.clock()
             with self._talk(ANSWERS) as talk:
@@ -132,23 +129,6 @@ class Waypoints:
                 remaining = await self._ask_count(talk) - 1
             if remaining > 0:
                 raise Rejected(f"the vehicle accepted the clearing, but its mission still has {remaining} items")
-
-    @contextlib.asynccontextmanager
-    async def _turn(self) -> AsyncIterator[None]:
-        """One transfer at a time: the protocol knows no more. Raises Busy when others take too long."""
-        turn = asyncio.ensure_future(self._lock.acquire())
-        try:
-            await wait_with_timeout(TURN_TIMEOUT, turn)
-        except asyncio.TimeoutError:
-            raise Busy(f"other transfers of the mission have taken {TURN_TIMEOUT:g} s; try again") from None
-        except asyncio.CancelledError:
-            if turn.done() and not turn.cancelled():  # both came in the same turn of the loop
-                self._lock.release()
-            raise
-        try:
-            yield
-        finally:
-            self._lock.release()
 
     # -- the protocol -------------------------------------------------------------------------------------
 

@@ -194,7 +194,7 @@ def test_the_environment_stands_between_file_and_command_line(tmp_path: Path) ->
     [
         ("[vison]\nspeed = 2\n", "no section [vison]; did you mean vision?"),
         ("[vision]\nspede = 2\n", "no key 'spede' in [vision]; did you mean speed?"),
-        ("[vision]\nspeed = nan\n", "speed = 'nan': it takes a float from 0.1 to 10"),
+        ("[vision]\nspeed = nan\n", "speed = 'nan': it takes a number from 0.1 to 10"),
         ("[vision]\ntags = 0:0.3.0\n", "tags: '0:0.3.0' is not ID:SIZE"),
         ("[gradys]\nperoid = 2\n", "no key 'peroid' in [gradys]; did you mean period?"),
         ("[gradys]\nsink = mqtt://me:s3cret@b/a?b\n", "sink: mqtt://me:***@b/a?***: a topic has none of + # ?"),
@@ -214,7 +214,7 @@ def test_sections_of_the_modules_are_checked_before_anything_starts(tmp_path, te
 def test_environment_of_a_module_is_checked_with_its_section(tmp_path: Path) -> None:
     file = tmp_path / "uav.ini"
     file.write_text("[gradys]\nperiod = 2\n", encoding="utf-8")
-    with pytest.raises(OptionError, match="^GRADYS_PERIOD: period = 'x': it takes a float"):
+    with pytest.raises(OptionError, match="^GRADYS_PERIOD: period = 'x': it takes a number"):
         parse(["--config", str(file)], environ={"GRADYS_PERIOD": "x"})
 
 

@@ -248,3 +248,13 @@ def test_a_change_of_mavproxys_vehicle_does_not_change_who_lands(flying):
     assert str(result).startswith("Landed on tag 0"), result
     assert math.hypot(rig.truth.north - 1.6, rig.truth.east + 1.2) < 0.2
     assert {m.target_system for m in sent(rig, "SET_POSITION_TARGET_LOCAL_NED")} == {1}
+
+
+def test_vehicle_of_the_setting_lands_whichever_is_mavproxys(flying):
+    rig = flying(sim_tags=FAR_TAG, vehicle=1)
+    other_vehicle(rig)
+    rig.host.registry.current = 2
+    rig.pass_time(1.5)
+    assert (rig.tracker.system, rig.tracker.vehicle().state.system, rig.copter.state.system) == (1, 1, 1)
+    result = rig.outcome(rig.land())
+    assert str(result).startswith("Landed on tag 0"), result
