@@ -148,6 +148,7 @@ def embedded_command(options: RunOptions, vehicle: SimulatedVehicle) -> list[str
         f"--sysid={vehicle.sysid}",
         f"--speedup={options.speedup:g}",
         f"--home={vehicle.home}",
+        *([f"--battery={options.battery:g}"] if options.battery else []),
     ]
 
 

@@ -54,6 +54,7 @@ class RunOptions:
     location: str = "AbraDF"
     gs_connection: tuple[str, ...] = ()
     speedup: float = 1.0
+    battery: float = 0.0
     headless: bool = False
     log_console: tuple[str, ...] = ()
     log_path: str | None = None
@@ -124,6 +125,7 @@ TABLE = (
     Row("location", "simulated", str.strip, "home: a name or lat,lon,alt,heading in deg, m AMSL (AbraDF)"),
     Row("gs_connection", "simulated", values.words, "addresses to forward MAVLink to (MAVProxy's --out)"),
     Row("speedup", "simulated", values.factor, "how many times faster than real time to simulate (1)"),
+    Row("battery", "simulated", values.factor, "mAh of the embedded vehicle's battery; else it never becomes empty"),
     Row("headless", "simulated", boolean, "no MAVProxy prompt; so too where stdin is not a terminal"),
     Row("log_console", "logs", values.components, f"components that log to the console: {_NAMES}"),
     Row("log_path", "logs", path, "log file, beside which telemetry logs go, or the directory for both"),
@@ -339,6 +341,8 @@ def check(options: RunOptions) -> None:
         raise OptionError(f"--count: system ids end at {HIGHEST_SYSTEM}, and these begin at {options.sysid}")
     elif options.ardupilot_path is not None and options.speedup != int(options.speedup):
         raise OptionError(f"--speedup: ArduPilot takes whole numbers only, got {options.speedup:g}")
+    elif options.ardupilot_path is not None and options.battery:
+        raise OptionError("--battery is for the embedded vehicle; ArduPilot has the parameter SIM_BATT_CAP_AH")
 
 
 def _number_of_vehicles(options: RunOptions) -> int:

@@ -54,7 +54,7 @@ def distance(text: str) -> float:
 
 
 def factor(text: str) -> float:
-    """A finite number above 0 (how many times faster than real time a simulation runs)."""
+    """A finite number above 0 (how many times faster than real time a simulation runs; mAh)."""
     try:
         number = float(text)
     except ValueError:

@@ -29,6 +29,7 @@ def main(arguments: list[str] | None = None) -> int:
         wind=chosen.wind,
         gps_noise=chosen.gps_noise,
         ready_after=chosen.ready_after,
+        battery=chosen.battery,
     )
     port = chosen.port if chosen.port is not None else SITL_BASE_PORT + 10 * chosen.instance
     server = Server(Simulator(options, epoch=time.time()))
@@ -74,6 +75,9 @@ def _parser() -> argparse.ArgumentParser:
     add("--port", type=_natural, default=None, metavar="PORT", help="TCP port, overrides --instance")
     add("--control", type=_natural, default=None, metavar="PORT", help="TCP port for tests: faults and truth")
     add("--ready-after", type=_not_negative, default=5.0, metavar="SECONDS", help="until armable (default 5)")
+    add(
+        "--battery", type=_positive, default=0.0, metavar="MAH", help="its capacity (default: it never becomes empty)"
+    )
     return parser
 
 

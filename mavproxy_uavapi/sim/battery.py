@@ -1,7 +1,7 @@
-"""A lithium pack like SITL's: 12.6 V full, sagging under load, counted in mAh against BATT_CAPACITY.
+"""A lithium pack like SITL's: SIM_BATT_VOLTAGE when full, what is drawn is counted in mAh against BATT_CAPACITY.
 
-As in SITL the voltage falls with the charge only if SIM_BATT_CAP_AH gives a capacity. By default the battery never
-becomes empty.
+As in SITL the voltage falls with the charge only if SIM_BATT_CAP_AH gives a capacity: by default the percentage falls
+to 0, and the battery goes on. What a type of vehicle draws is that of SITL's model of it.
 """
 
 from __future__ import annotations
@@ -9,11 +9,17 @@ from __future__ import annotations
 from .parameters import ParameterStore
 
 FULL_VOLTAGE = 12.6
-EMPTY_VOLTAGE = 10.2
-RESISTANCE = 0.012
-"""Ohm; 20 A cost a quarter of a volt."""
-AVIONICS_CURRENT = 0.4
-HOVER_CURRENT = 18.0
+HIGHEST_VOLTAGE = 60.0
+HIGHEST_CURRENT = 300.0
+EMPTY_SHARE = 0.81
+"""What is left of the voltage of a full pack when it is empty."""
+RESISTANCE = 0.01
+"""Ohm."""
+HOVER_POWER = 29.3 * 12.09
+"""Watts of SITL's quadcopter; its current is proportional to the thrust."""
+FULL_THROTTLE_CURRENT = 50.0
+FULL_THROTTLE_SAG = 0.7
+"""Amperes and volts of SITL's planes and rovers at full throttle."""
 
 
 class Battery:
@@ -35,16 +41,30 @@ class Battery:
         capacity = max(self._parameters["BATT_CAPACITY"], 1.0)
         return max(0, min(100, round(100 * (1 - self.consumed / capacity))))
 
-    def drain(self, throttle_share: float, dt: float) -> None:
-        """Draw the current of this throttle (1 hovers) for dt seconds."""
-        self.current = AVIONICS_CURRENT + HOVER_CURRENT * throttle_share**1.5
+    def hover(self, thrust_share: float, dt: float) -> None:
+        """Draw what this thrust takes (1 hovers) for dt seconds."""
+        current = HOVER_POWER * thrust_share / max(self.voltage, 1.0)
+        self._draw(current, RESISTANCE * current if self._capacity > 0 else 0.0, dt)
+
+    def drive(self, throttle: float, dt: float, power: int = 1) -> None:
+        """Draw what a throttle of 0..1 takes for dt seconds; the current rises with this power of the throttle."""
+        self._draw(FULL_THROTTLE_CURRENT * throttle**power, FULL_THROTTLE_SAG * throttle, dt)
+
+    @property
+    def _capacity(self) -> float:
+        """mAh; 0 for a pack that does not become empty."""
+        return 1000.0 * self._parameters["SIM_BATT_CAP_AH"]
+
+    def _draw(self, current: float, sag: float, dt: float) -> None:
+        """Draw amperes at this loss of volts for dt seconds."""
+        self.current = min(current, HIGHEST_CURRENT)
         self.consumed += self.current * dt / 3.6
-        holds = 1000.0 * self._parameters["SIM_BATT_CAP_AH"]
-        charge = max(0.0, 1 - self.consumed / holds) if holds > 0 else 1.0
-        rest = EMPTY_VOLTAGE + (FULL_VOLTAGE - EMPTY_VOLTAGE) * charge**0.6
+        full = max(0.0, min(HIGHEST_VOLTAGE, self._parameters["SIM_BATT_VOLTAGE"]))
+        charge = max(0.0, 1 - self.consumed / self._capacity) if self._capacity > 0 else 1.0
+        rest = full * (EMPTY_SHARE + (1 - EMPTY_SHARE) * charge**0.6)
         if self.forced_voltage is not None:
             rest = self.forced_voltage
-        self.voltage = rest - RESISTANCE * self.current
+        self.voltage = max(0.0, rest - sag)
         self.consumed_wh += self.voltage * self.current * dt / 3600
 
     def becomes_low(self, now: float) -> bool:

@@ -155,6 +155,13 @@ class Commands:
         del link
         return self.set_mode(int(command.param1), int(command.param2))
 
+    def knows_frame(self, frame: int) -> bool:
+        """Whether a location may be given in that frame; a STATUSTEXT says when not."""
+        if frame in GLOBAL_FRAMES:
+            return True
+        self._vehicle.say(mavlink.MAV_SEVERITY_INFO, f"Unknown mavlink coordinate frame {frame}")
+        return False
+
     def mode_command(self, number: int) -> Handler:
         """A command that changes the mode and nothing else."""
 
@@ -178,7 +185,7 @@ class Commands:
             return ACCEPTED if vehicle.set_home_here(lock=True) else FAILED
         if command.param1 != 0:
             return FAILED
-        if command.frame not in GLOBAL_FRAMES or not abs(command.z) <= HIGHEST_ALTITUDE:
+        if not abs(command.z) <= HIGHEST_ALTITUDE or not self.knows_frame(command.frame):
             return DENIED
         if not valid_location(command.x, command.y, command.z):
             return FAILED

@@ -5,15 +5,14 @@ Only missions are flown; fence and rally lists are kept so that a ground station
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from .events import StatusTextEvent
-from .frames import HIGHEST_ALTITUDE
 from .mission import Item, home_item
+from .mission_items import as_item, as_message, refusal, unreadable
 
 if TYPE_CHECKING:
     from .link import PeerLink
@@ -52,6 +51,7 @@ class MissionProtocol:
         self.vehicle = vehicle
         self._lists: dict[int, list[Item]] = {kind: [] for kind in OTHER_LISTS}
         self._upload: Upload | None = None
+        self._warned = False
         self._handlers = {
             "MISSION_COUNT": self._count,
             "MISSION_WRITE_PARTIAL_LIST": self._partial,
@@ -150,9 +150,14 @@ class MissionProtocol:
             upload.link.send(mavlink.MAVLink_mission_request_message(*upload.sender, upload.next, upload.kind))
 
     def _item(self, link: PeerLink, message: Any) -> None:
+        problem = unreadable(message)
+        if problem is not None:
+            self._ack(link, message, problem)
+            return
         if message.mission_type == MISSION and message.current in (GUIDED_TARGET, ALTITUDE_CHANGE):
             self._ack(link, message, self._take_guided(message))
             return
+        self._warn_of_floats(message)
         upload = self._upload
         if upload is None or upload.kind != message.mission_type:
             self._ack(link, message, mavlink.MAV_MISSION_ERROR)
@@ -165,28 +170,29 @@ class MissionProtocol:
 
     def _take_guided(self, message: Any) -> int:
         """An item that is for now and not for the mission; a MAV_MISSION_RESULT."""
-        refusal = self._refusal(message)
-        if refusal is not None:
-            return refusal
-        item = _as_item(message)
+        problem = refusal(message, self.vehicle.mission_commands)
+        if problem is not None:
+            return problem
+        item = as_item(message)
         if message.current == ALTITUDE_CHANGE:
             self.vehicle.change_altitude(item)
             return int(mavlink.MAV_MISSION_ACCEPTED)
         done = self.vehicle.fly_guided_item(item)
         return int(mavlink.MAV_MISSION_ACCEPTED if done else mavlink.MAV_MISSION_ERROR)
 
-    def _refusal(self, message: Any) -> int | None:
-        if message.command not in self.vehicle.mission_commands:
-            return int(mavlink.MAV_MISSION_UNSUPPORTED)
-        return _misplaced(message)
+    def _warn_of_floats(self, message: Any) -> None:
+        """Say once in a boot that a MISSION_ITEM loses digits."""
+        if message.get_type() == "MISSION_ITEM" and not self._warned:
+            self._warned = True
+            self.vehicle.say(mavlink.MAV_SEVERITY_WARNING, "got MISSION_ITEM; GCS should send MISSION_ITEM_INT")
 
     def _take(self, link: PeerLink, message: Any, upload: Upload) -> None:
-        refusal = self._refusal(message) if upload.kind == MISSION and message.seq > 0 else None
-        if refusal is not None:
+        problem = refusal(message, self.vehicle.mission_commands) if upload.kind == MISSION else None
+        if problem is not None:
             self._abandon(upload)
-            self._ack(link, message, refusal)
+            self._ack(link, message, problem)
             return
-        upload.items[message.seq : message.seq + 1] = [_as_item(message)]
+        upload.items[message.seq : message.seq + 1] = [as_item(message)]
         upload.heard_at = self.vehicle.now
         upload.next += 1
         if upload.next <= upload.last:
@@ -225,7 +231,7 @@ class MissionProtocol:
             self._send_count(link, message)
             self._ack(link, message, mavlink.MAV_MISSION_INVALID_SEQUENCE)
             return
-        link.send(_as_message(items[message.seq], message))
+        link.send(as_message(items[message.seq], message))
 
     def _clear(self, link: PeerLink, message: Any) -> None:
         if self._foreign_upload(link, message):
@@ -240,47 +246,3 @@ class MissionProtocol:
 
 def _sender(message: Any) -> tuple[int, int]:
     return message.get_srcSystem(), message.get_srcComponent()
-
-
-def _misplaced(message: Any) -> int | None:
-    scale = 1e7 if message.get_type() == "MISSION_ITEM_INT" else 1.0
-    # NaN must fail too.
-    if not abs(message.x) <= 90 * scale:
-        return int(mavlink.MAV_MISSION_INVALID_PARAM5_X)
-    if not abs(message.y) <= 180 * scale:
-        return int(mavlink.MAV_MISSION_INVALID_PARAM6_Y)
-    if not abs(message.z) <= HIGHEST_ALTITUDE:
-        return int(mavlink.MAV_MISSION_INVALID_PARAM7)
-    return None
-
-
-def _as_item(message: Any) -> Item:
-    scale = 1 if message.get_type() == "MISSION_ITEM_INT" else 10_000_000
-    # NaN means "not given", mostly in the yaw of a waypoint.
-    param1, param2, param3, param4 = (
-        value if math.isfinite(value) else 0.0
-        for value in (message.param1, message.param2, message.param3, message.param4)
-    )
-    return Item(
-        message.command,
-        message.frame,
-        param1,
-        param2,
-        param3,
-        param4,
-        round(message.x * scale),
-        round(message.y * scale),
-        message.z,
-    )
-
-
-def _as_message(item: Item, request: Any) -> Any:
-    head = (*_sender(request), request.seq, item.frame, item.command, int(request.seq == 0), 1)
-    parameters = (item.param1, item.param2, item.param3, item.param4)
-    if request.get_type() == "MISSION_REQUEST_INT":
-        return mavlink.MAVLink_mission_item_int_message(
-            *head, *parameters, item.x, item.y, item.z, request.mission_type
-        )
-    return mavlink.MAVLink_mission_item_message(
-        *head, *parameters, item.x / 1e7, item.y / 1e7, item.z, request.mission_type
-    )

@@ -117,6 +117,11 @@ class MissionRunner:
         mission.state = State.RUNNING
         self.run_from(max(mission.current, 1))
 
+    def restart(self) -> None:
+        """Begin again, unless it runs."""
+        if self._vehicle.mission.state is not State.RUNNING:
+            self.waiting_to_start = True
+
     def jump_to(self, seq: int) -> None:
         """Take up another current item, which the ground station chose while the mission runs."""
         self._vehicle.mission.state = State.RUNNING

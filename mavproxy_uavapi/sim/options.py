@@ -57,7 +57,8 @@ class Options:
     """Everything that makes one simulation differ from another.
 
     vehicle is a name of `kinds.KINDS`, speedup simulated seconds per wall second, gps_noise metres (1 sigma),
-    ready_after the simulated seconds from boot until the estimator has a position.
+    ready_after the simulated seconds from boot until the estimator has a position, battery the mAh after which the
+    battery is empty; with 0 it never is.
     """
 
     vehicle: str = "copter"
@@ -68,3 +69,4 @@ class Options:
     wind: Wind = field(default_factory=Wind)
     gps_noise: float = 0.0
     ready_after: float = 5.0
+    battery: float = 0.0

@@ -69,6 +69,9 @@ class Simulator:
             self.parameters.set(name, options.sysid)
         self.parameters.set("SIM_WIND_SPD", options.wind.speed)
         self.parameters.set("SIM_WIND_DIR", options.wind.direction)
+        if options.battery > 0:
+            self.parameters.set("BATT_CAPACITY", options.battery)
+            self.parameters.set("SIM_BATT_CAP_AH", options.battery / 1000)
         self.faults = Faults()
         self.links: list[PeerLink] = []
         self.received: deque[ReceivedMessage] = deque(maxlen=REMEMBERED_MESSAGES)

@@ -204,7 +204,10 @@ class Vehicle:
         raise NotImplementedError
 
     def fly_guided_item(self, item: Item) -> bool:
-        """Fly to a guided mission item (`current` 2); False where the vehicle does not take it."""
+        """Go to a guided mission item (`current` 2); False where the vehicle does not take it.
+
+        ArduCopter takes a waypoint and a yaw, the others the place of any item.
+        """
         raise NotImplementedError
 
     def change_altitude(self, item: Item) -> None:
@@ -311,7 +314,7 @@ class Vehicle:
         if not self.mission.select(seq):
             return False
         auto = self.mission_mode
-        if self.mode is auto and self.armed and self.mission.state is State.RUNNING:
+        if self.mode is auto and self.mission.state is State.RUNNING:
             auto.jump_to(seq)
         return True
 

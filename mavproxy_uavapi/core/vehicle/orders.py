@@ -96,6 +96,7 @@ SPEED_KINDS = {number: kind for kind, number in SPEED_TYPES.items()}
 ALL_IGNORED = POSITION_IGNORED | VELOCITY_IGNORED | ACCELERATION_IGNORED
 PLACE_ONLY, VELOCITY_ONLY = ALL_IGNORED & ~POSITION_IGNORED, ALL_IGNORED & ~VELOCITY_IGNORED
 BODY_FRAMES = (mavlink.MAV_FRAME_BODY_NED, mavlink.MAV_FRAME_BODY_OFFSET_NED)
+GUIDED_TARGET = 2  # value of `current` in a mission item that GUIDED flies to at once
 ABOVE_HOME = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 
 # Commands that move nothing, or that stop or land the vehicle.
@@ -159,8 +160,11 @@ def _speed(message: Any) -> Order:
 
 def _reposition(message: Any) -> Order:
     changes_mode = int(message.param2) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
-    if message.get_type() != "COMMAND_INT" or message.frame not in ABOVE_HOME or changes_mode:
+    has_speed, has_radius = message.param1 > 0, message.param3 > 0  # a rover takes the speed, a plane the radius
+    if message.get_type() != "COMMAND_INT" or message.frame not in ABOVE_HOME:
         return Unknown("that kind of reposition")
+    if changes_mode or has_speed or has_radius:
+        return Unknown("a reposition with a mode, a speed or a radius")
     return GoTo(GlobalTarget(message.x / 1e7, message.y / 1e7, message.z))
 
 
@@ -168,9 +172,18 @@ def _climb(message: Any) -> Order:
     return Climb(message.param7) if message.get_type() == "COMMAND_LONG" else Unknown("that kind of takeoff")
 
 
+def _item(message: Any) -> Order:
+    """An item of a mission, or with `current` 2 a place to go to now."""
+    is_target = message.mission_type == mavlink.MAV_MISSION_TYPE_MISSION and message.current == GUIDED_TARGET
+    if not is_target or message.command != mavlink.MAV_CMD_NAV_WAYPOINT or message.frame not in ABOVE_HOME:
+        return _mission(message)
+    per_degree = 1e7 if message.get_type() == "MISSION_ITEM_INT" else 1.0
+    return GoTo(GlobalTarget(message.x / per_degree, message.y / per_degree, message.z))
+
+
 def _mission(message: Any) -> Order:
     if message.mission_type != mavlink.MAV_MISSION_TYPE_MISSION or getattr(message, "current", 0):
-        return Unknown("that kind of mission item")  # a fence, a rally point, a target for GUIDED
+        return Unknown("that kind of mission item")  # a fence, a rally point, an altitude for now
     return ChangeMission()
 
 
@@ -193,5 +206,6 @@ READERS: dict[str, Callable[[Any], Order | None]] = {
     "COMMAND_LONG": _command,
     "COMMAND_INT": _command,
     "PARAM_SET": _parameter,
-    **dict.fromkeys(("MISSION_CLEAR_ALL", "MISSION_COUNT", "MISSION_ITEM_INT"), _mission),
+    **dict.fromkeys(("MISSION_CLEAR_ALL", "MISSION_COUNT"), _mission),
+    **dict.fromkeys(("MISSION_ITEM", "MISSION_ITEM_INT"), _item),
 }

@@ -155,7 +155,7 @@ class Aircraft(Vehicle):
         lifting = self.armed and not self.landed and not demand.idle
         thrust = demand.thrust if lifting else Demand().thrust
         self.body.step(thrust, demand.yaw_rate if lifting else 0.0, dt)
-        self.battery.drain(self.throttle, dt)
+        self.battery.hover(self.throttle, dt)
 
     def _detect_landing(self, demand: Demand, dt: float) -> None:
         if not self.armed or (not self.landed and self._detector.update(self.body.on_ground, demand.thrust, dt)):

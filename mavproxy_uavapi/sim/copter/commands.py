@@ -63,12 +63,12 @@ class CopterCommands(Commands):
         change = bool(int(command.param2) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
         if copter.mode is not copter.guided and not change:
             return DENIED
-        if not valid_location(command.x, command.y, command.z) or _means_here(command):
+        if not valid_location(command.x, command.y, command.z) or not self.knows_frame(command.frame):
+            return DENIED
+        if _means_here(command):
             return DENIED
         target = global_target(copter, command.frame, command.x, command.y, command.z)
-        if target is None:
-            return DENIED
-        if not copter.set_mode(Guided.number):
+        if target is None or not copter.set_mode(Guided.number):
             return FAILED
         copter.guided.go_to(target)
         return ACCEPTED
@@ -82,6 +82,8 @@ class CopterCommands(Commands):
             return FAILED
         # Otherwise a vehicle on the ground waits until the pilot raises the throttle.
         copter.auto_armed = copter.armed
+        assert isinstance(copter.mode, Auto)
+        copter.mode.restart()
         return ACCEPTED
 
     def _condition_yaw(self, command: CommandInt, link: PeerLink) -> int:

@@ -186,9 +186,7 @@ class SimulatedCopter(Aircraft):
         if item.command == mavlink.MAV_CMD_CONDITION_YAW:
             self.fix_yaw(item.param1, item.param2, int(item.param3), item.param4 > 0)
             return True
-        # Items without a location have the mission frame; ArduCopter reads heights in it as AMSL.
-        frame = mavlink.MAV_FRAME_GLOBAL if item.frame == mavlink.MAV_FRAME_MISSION else item.frame
-        target = global_target(self, frame, item.x, item.y, item.z)
+        target = global_target(self, item.frame, item.x, item.y, item.z)
         if item.command != mavlink.MAV_CMD_NAV_WAYPOINT or target is None:
             return False
         self.guided.go_to(target)

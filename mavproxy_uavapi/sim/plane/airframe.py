@@ -108,7 +108,7 @@ class Airframe(Vehicle):
             body.run(self.throttle_share, demand.course, dt)
             if demand.climb > 0 and self.airspeed >= self.lift_off_speed:
                 body.take_off()
-        self.battery.drain(self.throttle_share, dt)
+        self.battery.drive(self.throttle_share, dt, power=2)
         self._detect_flight()
 
     @property

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from ..commands import ACCEPTED, DENIED, FAILED, CommandInt, Commands
-from ..frames import AMSL_FRAMES, GLOBAL_FRAMES, HIGHEST_ALTITUDE, global_target, valid_location
+from ..frames import AMSL_FRAMES, HIGHEST_ALTITUDE, global_target, valid_location
 from ..link import PeerLink
 from ..telemetry import Telemetry
 from ..transmitter import Transmitter
@@ -69,14 +69,13 @@ class PlaneCommands(Commands):
         """The speed (param1) is not looked at; param3 is the radius, param4 other than 0 counter-clockwise."""
         del link
         plane = self._plane
-        if not valid_location(command.x, command.y, command.z) or (command.x == 0 and command.y == 0):
+        if not valid_location(command.x, command.y, command.z) or not self.knows_frame(command.frame):
+            return DENIED
+        if (command.x == 0 and command.y == 0) or (command.z == 0 and command.frame not in AMSL_FRAMES):
             return DENIED
         target = global_target(plane, command.frame, command.x, command.y, command.z)
         if target is None:
-            plane.say(mavlink.MAV_SEVERITY_INFO, f"Unknown mavlink coordinate frame {command.frame}")
-            return DENIED
-        if command.z == 0 and command.frame not in AMSL_FRAMES:
-            return DENIED
+            return FAILED
         change = bool(int(command.param2) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
         if not change and plane.mode is not plane.guided:
             return FAILED
@@ -97,7 +96,7 @@ class PlaneCommands(Commands):
         del link
         plane, frame = self._plane, int(command.param2)
         origin = plane.estimator.origin
-        if frame not in GLOBAL_FRAMES or not abs(command.param1) <= HIGHEST_ALTITUDE:
+        if not self.knows_frame(frame) or not abs(command.param1) <= HIGHEST_ALTITUDE:
             return DENIED
         amsl = command.param1 if frame in AMSL_FRAMES else command.param1 + plane.home_altitude
         if origin is not None and math.isfinite(amsl):

@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from .. import mode as modes
 from ..frames import global_target
 from ..geodesy import Ned
-from ..mission import ALL_ITEMS, Item, Mission, State
+from ..mission import ALL_ITEMS, LOCATED, Item, Mission, State
 from ..options import Options
 from ..parameters import ParameterStore
 from ..reports import Navigation
@@ -154,9 +154,8 @@ class SimulatedPlane(Airframe):
         return True
 
     def fly_guided_item(self, item: Item) -> bool:
-        frame = mavlink.MAV_FRAME_GLOBAL if item.frame == mavlink.MAV_FRAME_MISSION else item.frame
-        target = global_target(self, frame, item.x, item.y, item.z)
-        if not self.mode.guided or item.command != mavlink.MAV_CMD_NAV_WAYPOINT or target is None:
+        target = global_target(self, item.frame, item.x, item.y, item.z)
+        if not self.mode.guided or item.command not in LOCATED or target is None:
             return False
         self.guided.go_to(target)
         return True
@@ -165,7 +164,7 @@ class SimulatedPlane(Airframe):
         here = self.estimator.location
         place = (round(here.latitude * 1e7), round(here.longitude * 1e7))
         target = global_target(self, item.frame, *place, item.z)
-        if target is not None:
+        if target is not None and item.command in LOCATED:
             self.navigator.change_altitude(target.down)
 
     def change_speed(self, kind: int, speed: float, throttle: float = 0.0) -> bool:

@@ -105,7 +105,7 @@ class Chassis(Vehicle):
             body.throttle(self._drive.speed, self._drive.turn_rate, free, dt)
         else:
             body.drive(self._drive.speed, self._drive.turn_rate, limits, dt)
-        self.battery.drain(abs(self.throttle_share), dt)
+        self.battery.drive(abs(self.throttle_share), dt)
 
     def remember(self) -> None:
         """Keep the way back, and home while disarmed."""

@@ -47,13 +47,16 @@ class RoverCommands(Commands):
             return DENIED
         if not valid_location(command.x, command.y, command.z) or (command.x == 0 and command.y == 0):
             return DENIED
-        target = global_target(rover, command.frame, command.x, command.y, command.z)
-        if target is None:
-            rover.say(mavlink.MAV_SEVERITY_INFO, f"Unknown mavlink coordinate frame {command.frame}")
-            return DENIED
+        return self._drive_to(command) if self.knows_frame(command.frame) else DENIED
+
+    def _drive_to(self, command: CommandInt) -> int:
+        rover = self._rover
         if not rover.set_mode(Guided.number):
             return FAILED
         if command.param1 > 0 and not rover.guided.set_speed(command.param1):
+            return FAILED
+        target = global_target(rover, command.frame, command.x, command.y, command.z)
+        if target is None:
             return FAILED
         rover.guided.go_to(target)
         return ACCEPTED

@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from .. import mode as modes
 from ..frames import global_target
 from ..geodesy import Ned
-from ..mission import ALL_ITEMS, Item, Mission
+from ..mission import ALL_ITEMS, LOCATED, Item, Mission
 from ..options import Options
 from ..parameters import ParameterStore
 from ..reports import Navigation
@@ -108,7 +108,7 @@ class SimulatedRover(Chassis):
 
     def fly_guided_item(self, item: Item) -> bool:
         target = global_target(self, item.frame, item.x, item.y, item.z)
-        if self.mode is not self.guided or item.command != mavlink.MAV_CMD_NAV_WAYPOINT or target is None:
+        if self.mode is not self.guided or item.command not in LOCATED or target is None:
             return False
         self.guided.go_to(target)
         return True

@@ -85,6 +85,31 @@ def test_plane_keeps_the_radius_of_its_circles_from_every_border(make: Any) -> N
         assert allowed(plane, messages.reposition(place)) is fits
 
 
+def test_raw_targets_stay_inside_and_bring_no_radius_or_speed(make: Any) -> None:
+    vehicle = make("plane", square(500.0), WP_LOITER_RAD=80.0)
+
+    def sent(message: Any) -> bool:
+        try:
+            vehicle.guard.require(message)
+        except OutsideEnvelope:
+            return False
+        return True
+
+    def at(north: float) -> tuple[int, int, float]:
+        lat, lon = FRAME.degrees(Spot(north, 0.0, 20.0))
+        return round(lat * 1e7), round(lon * 1e7), 30.0
+
+    def reposition(north: float, speed: float = -1.0, radius: float = 0.0) -> Any:
+        return mavlink.MAVLink_command_int_message(1, 1, 3, 192, 0, 0, speed, 0, radius, 0, *at(north))
+
+    def item(north: float) -> Any:
+        return mavlink.MAVLink_mission_item_int_message(1, 1, 0, 3, 16, 2, 1, 0, 0, 0, 0, *at(north))
+
+    assert sent(reposition(300.0)) and sent(item(300.0))
+    assert not sent(reposition(450.0)) and not sent(item(450.0))
+    assert not sent(reposition(300.0, radius=400.0)) and not sent(reposition(300.0, speed=30.0))
+
+
 def test_plane_that_flies_at_a_border_is_leaving_a_radius_before_it(make: Any) -> None:
     for north, leaves in ((150, False), (230, True)):
         plane = make("plane", square(300), at=(north, 0, 40), velocity=(20, 0, 0), WP_LOITER_RAD=80.0)

@@ -65,6 +65,7 @@ def test_vehicle_commands():
         *("-m", "mavproxy_uavapi.sim", "--instance=3", "--sysid=10", "--speedup=2.5"),
         "--home=-15.8400810,-47.9266420,1042,30",
     ]
+    assert "--battery=1500" in command_lines.embedded_command(RunOptions(battery=1500.0), *simulated(3))
     given = RunOptions(ardupilot_path="/ap", speedup=5.0)
     plane = simulated(1, kind="plane", sysid=7)[0]
     sitl = command_lines.sim_vehicle_command(given, "python3", plane, Path("/run/vehicle"))

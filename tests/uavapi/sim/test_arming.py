@@ -2,6 +2,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.sim import Options
+from mavproxy_uavapi.sim.mission import Item
 
 ARM = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
 PREARM = mavlink.MAV_SYS_STATUS_PREARM_CHECK
@@ -55,7 +56,7 @@ def test_auto_without_a_mission_is_entered_on_the_ground_but_does_not_arm(ground
 @pytest.mark.parametrize(("number", "name"), [(3, "AUTO"), (6, "RTL"), (9, "LAND"), (17, "BRAKE")])
 def test_some_modes_do_not_arm(ground, number, name):
     ground.run(6.0)
-    ground.copter.mission.items = [object(), object()]
+    ground.copter.mission.items = [Item(mavlink.MAV_CMD_NAV_TAKEOFF, 3, 0, 0, 0, 0, 0, 0, 10.0)] * 2
     ground.mode(number)
     assert ground.arm() == mavlink.MAV_RESULT_FAILED
     ground.run(0.02)

@@ -281,6 +281,22 @@ def test_a_reposition_to_no_place_or_height_is_denied(flying, x, y, z):
     assert flying.body.position == pytest.approx((0.0, 0.0, -10.0), abs=0.1)
 
 
+def test_a_reposition_in_a_local_frame_is_denied_with_a_text(flying):
+    where = (-353631610, 1491652300, 10.0)
+    assert flying.command_int(mavlink.MAV_CMD_DO_REPOSITION, 1, (-1, 1, 0, 0), where) == mavlink.MAV_RESULT_DENIED
+    flying.run(0.02)
+    assert "Unknown mavlink coordinate frame 1" in flying.texts()
+
+
+@pytest.mark.parametrize(("flags", "result"), [(0, mavlink.MAV_RESULT_DENIED), (1, mavlink.MAV_RESULT_ACCEPTED)])
+def test_a_reposition_leaves_another_mode_only_with_its_flag(flying, flags, result):
+    flying.mode(17)
+    where = (-353631610, 1491652300, 10.0)
+    assert flying.command_int(mavlink.MAV_CMD_DO_REPOSITION, 3, (-1, flags, 0, 0), where) == result
+    flying.run(12.0)
+    assert flying.body.north == pytest.approx(11.1 if flags else 0.0, abs=0.2)
+
+
 def test_a_reposition_does_not_end_a_pause(flying):
     flying.command(mavlink.MAV_CMD_DO_PAUSE_CONTINUE, 0)
     where = (-353631610, 1491652300, 10.0)

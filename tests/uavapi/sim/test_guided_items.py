@@ -52,12 +52,52 @@ def test_a_guided_yaw_turns_the_vehicle(flying):
         (31000, (LATITUDE, LONGITUDE, 20.0), mavlink.MAV_MISSION_UNSUPPORTED),
         (WAYPOINT, (99.0, LONGITUDE, 20.0), mavlink.MAV_MISSION_INVALID_PARAM5_X),
         (WAYPOINT, (LATITUDE, LONGITUDE, math.nan), mavlink.MAV_MISSION_INVALID_PARAM7),
+        (WAYPOINT, (LATITUDE, LONGITUDE, 83000.0), mavlink.MAV_MISSION_INVALID_PARAM7),
     ],
 )
 def test_other_guided_items_are_refused_and_change_nothing(flying, command, place, result):
     assert item(flying, GUIDED, command, place) == result
     flying.run(3.0)
     assert flying.body.position == pytest.approx((0.0, 0.0, -10.0), abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "result"),
+    [
+        ((math.nan, 0.0, 0.0, 0.0), mavlink.MAV_MISSION_INVALID_PARAM1),
+        ((0.0, math.inf, 0.0, 0.0), mavlink.MAV_MISSION_INVALID_PARAM2),
+        ((0.0, 0.0, math.nan, 0.0), mavlink.MAV_MISSION_INVALID_PARAM3),
+        ((0.0, 0.0, 0.0, -math.inf), mavlink.MAV_MISSION_INVALID_PARAM4),
+        ((0.0, 0.0, 0.0, math.nan), mavlink.MAV_MISSION_ACCEPTED),
+    ],
+)
+def test_only_the_yaw_of_a_waypoint_may_be_missing(flying, parameters, result):
+    assert item(flying, GUIDED, WAYPOINT, (LATITUDE, LONGITUDE, 15.0), parameters=parameters) == result
+
+
+@pytest.mark.parametrize("current", [GUIDED, ALTITUDE])
+def test_a_local_frame_is_refused(flying, current):
+    place = (LATITUDE, LONGITUDE, 15.0)
+    result = item(flying, current, WAYPOINT, place, mavlink.MAV_FRAME_LOCAL_NED)
+    assert result == mavlink.MAV_MISSION_UNSUPPORTED_FRAME
+
+
+def test_a_command_without_a_place_may_have_anything_there(flying):
+    turn = mavlink.MAV_CMD_CONDITION_YAW
+    assert item(flying, GUIDED, turn, (500.0, 500.0, math.nan), 77) == mavlink.MAV_MISSION_ACCEPTED
+
+
+def test_floats_are_warned_of_once_in_an_upload_only(flying):
+    item(flying, GUIDED, WAYPOINT, (LATITUDE, LONGITUDE, 15.0))
+    flying.run(0.02)
+    warning = "got MISSION_ITEM; GCS should send MISSION_ITEM_INT"
+    assert warning not in flying.texts()
+    heard = []
+    for _ in range(2):
+        assert item(flying, 0, WAYPOINT, (LATITUDE, LONGITUDE, 15.0)) == mavlink.MAV_MISSION_ERROR
+        flying.run(0.02)
+        heard += flying.texts()
+    assert heard.count(warning) == 1
 
 
 def test_a_guided_waypoint_outside_guided_is_refused(flying):

@@ -74,7 +74,9 @@ def test_a_taken_port_is_one_line_and_status_1():
     assert str(port) in ended.stderr
 
 
-@pytest.mark.parametrize("arguments", [["--speedup", "0"], ["--sysid", "300"], ["--home", "1,2"], ["--wind", "x"]])
+@pytest.mark.parametrize(
+    "arguments", [["--speedup", "0"], ["--sysid", "300"], ["--home", "1,2"], ["--battery", "0"], ["--wind", "x"]]
+)
 def test_bad_options_are_refused(arguments):
     ended = subprocess.run([*SIM, *arguments], capture_output=True, text=True, timeout=10, check=False)
     assert ended.returncode == 2

@@ -1,3 +1,5 @@
+import math
+
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -114,6 +116,74 @@ def test_auto_on_the_ground_waits_for_the_throttle_or_mission_start(ground):
     assert ground.body.down < 0.0
 
 
+def test_with_the_option_auto_takes_off_without_the_throttle(ground):
+    ground.run(6.0)
+    upload(ground, simple_mission(ground))
+    ground.send(mavlink.MAVLink_param_set_message(1, 1, b"AUTO_OPTIONS", 2, 6))
+    ground.mode(4)
+    ground.arm()
+    assert ground.mode(3) == 0
+    ground.run(8.0)
+    assert ground.body.down < 0.0
+
+
+def test_with_both_options_a_vehicle_armed_in_auto_takes_off(ground):
+    ground.run(6.0)
+    upload(ground, simple_mission(ground))
+    ground.send(mavlink.MAVLink_param_set_message(1, 1, b"AUTO_OPTIONS", 3, 6))
+    assert ground.mode(3) == 0
+    ground.run(0.02)
+    assert "Mission: 1 Takeoff" in ground.texts()
+    ground.run(2.0)
+    assert ground.copter.mission.current == 1
+    assert ground.arm() == mavlink.MAV_RESULT_ACCEPTED
+    ground.run(8.0)
+    assert ground.body.down < 0.0
+
+
+def test_a_vehicle_disarmed_in_auto_begins_again_when_it_is_armed(ground):
+    ground.run(6.0)
+    upload(ground, simple_mission(ground))
+    ground.send(mavlink.MAVLink_param_set_message(1, 1, b"AUTO_OPTIONS", 3, 6))
+    ground.mode(3)
+    ground.arm()
+    ground.run(1.0)
+    ground.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0)
+    ground.run(1.0)
+    assert ground.copter.mission.current == 0
+    ground.arm()
+    ground.run(8.0)
+    assert ground.body.down < 0.0
+
+
+def test_mission_start_in_auto_repeats_a_mission_that_is_complete(ground):
+    ground.run(6.0)
+    upload(ground, simple_mission(ground)[:3])
+    ground.mode(4)
+    ground.arm()
+    ground.command(mavlink.MAV_CMD_MISSION_START)
+    ground.run(40.0)
+    assert [m.seq for m in ground.of("MISSION_ITEM_REACHED")] == [1, 2]
+    ground.heard.clear()
+    assert ground.command(mavlink.MAV_CMD_MISSION_START) == mavlink.MAV_RESULT_ACCEPTED
+    ground.run(20.0)
+    assert [m.seq for m in ground.of("MISSION_ITEM_REACHED")] == [1, 2]
+
+
+def test_the_mission_frame_means_amsl(ground):
+    ground.run(6.0)
+    mission = simple_mission(ground)[:2] + [item(2, 16, place(ground, 0, 0), 604.0, frame=2)]
+    assert upload(ground, mission) == ACCEPTED
+    ground.send(mavlink.MAVLink_mission_request_int_message(1, 1, 2, 0))
+    ground.run(0.01)
+    assert ground.of("MISSION_ITEM_INT")[-1].frame == mavlink.MAV_FRAME_GLOBAL
+    ground.mode(4)
+    ground.arm()
+    ground.command(mavlink.MAV_CMD_MISSION_START)
+    ground.run(30.0)
+    assert ground.body.down == pytest.approx(-20.0, abs=0.3)
+
+
 def test_auto_on_the_ground_wants_a_takeoff_first(ground):
     ground.run(6.0)
     upload(ground, [simple_mission(ground)[0], item(1, 16, place(ground, 10, 0), 10.0)])
@@ -184,6 +254,10 @@ def test_bad_uploads_are_refused(ground):
     assert upload(ground, bad) == mavlink.MAV_MISSION_UNSUPPORTED
     bad[2] = item(2, 16, (950000000, 0), 10.0)
     assert upload(ground, bad) == mavlink.MAV_MISSION_INVALID_PARAM5_X
+    bad[2] = item(2, 16, place(ground, 1, 0), 10.0, (math.nan, 0, 0, 0))
+    assert upload(ground, bad) == mavlink.MAV_MISSION_INVALID_PARAM1
+    bad[2] = item(2, 16, place(ground, 1, 0), 10.0, frame=1)
+    assert upload(ground, bad) == mavlink.MAV_MISSION_UNSUPPORTED_FRAME
     ground.send(mavlink.MAVLink_mission_count_message(1, 1, 10000, 0))
     assert ground.run(0.01)[-1].type == mavlink.MAV_MISSION_NO_SPACE
     ground.send(mavlink.MAVLink_mission_request_int_message(1, 1, 50, 0))

@@ -217,6 +217,8 @@ def test_guided_items_and_altitudes(flying):
     assert (target.north, target.east, target.down) == pytest.approx((0.0, 400.0, -90.0), abs=0.1)
     flying.send(item(1, 1, 0, 3, 16, 3, 1, 0, 0, 0, 0, 0, 0, 60.0, 0))
     assert vehicle(flying).mode.target.down == pytest.approx(-60.0, abs=0.1)
+    flying.send(item(1, 1, 0, 2, 16, 3, 1, 0, 0, 0, 0, 0, 0, 584.0 + 60.0, 0))
+    assert vehicle(flying).mode.target.down == pytest.approx(-60.0, abs=0.1)
     flying.local((100.0, 100.0, -50.0))
     assert vehicle(flying).mode.target.down == pytest.approx(-60.0, abs=0.1)
     position = mavlink.MAVLink_set_position_target_global_int_message

@@ -299,6 +299,24 @@ def test_a_guided_item_is_driven_to(rover):
     assert distance(rover, 10.0, 0.0) < 0.5
 
 
+@pytest.mark.parametrize(
+    ("command", "frame", "result"),
+    [
+        (16, 2, mavlink.MAV_MISSION_ACCEPTED),
+        (17, 3, mavlink.MAV_MISSION_ACCEPTED),
+        (178, 3, mavlink.MAV_MISSION_ERROR),
+        (16, 1, mavlink.MAV_MISSION_UNSUPPORTED_FRAME),
+    ],
+)
+def test_the_place_of_any_guided_item_counts(rover, command, frame, result):
+    lat, lon = place(rover, 10.0, 0.0)
+    item = mavlink.MAVLink_mission_item_int_message
+    rover.send(item(1, 1, 0, frame, command, 2, 1, 0, 0, 0, 0, lat, lon, 0.0, 0))
+    rover.run(0.02)
+    assert rover.of("MISSION_ACK")[-1].type == result
+    assert (rover.simulator.vehicle.mode.target is not None) == (result == mavlink.MAV_MISSION_ACCEPTED)
+
+
 def test_the_pilot_drives_in_manual(rover):
     rover.mode(MANUAL)
     for _ in range(3):

@@ -95,6 +95,33 @@ def test_the_voltage_falls_only_where_the_pack_has_a_capacity(flying):
     assert requested(flying, "SYS_STATUS").voltage_battery < 11_000
 
 
+def test_a_chosen_battery_becomes_empty_and_a_reboot_fills_it(new_ground):
+    ground = new_ground(Options(battery=300.0))
+    ground.fly()
+    ground.run(60.0)
+    status = requested(ground, "SYS_STATUS")
+    assert status.battery_remaining == 0
+    assert status.voltage_battery < 10_500
+    ground.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, 21196)
+    ground.command(mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 1)
+    ground.run(1.0)
+    status = requested(ground, "SYS_STATUS")
+    assert status.battery_remaining == 100
+    assert status.voltage_battery == 12_600
+
+
+def test_a_vehicle_at_rest_draws_nothing(ground):
+    ground.run(60.0)
+    status = requested(ground, "SYS_STATUS")
+    assert (status.current_battery, status.battery_remaining) == (0, 100)
+
+
+def test_the_hover_draws_what_sitls_copter_draws(flying):
+    status = requested(flying, "SYS_STATUS")
+    assert status.current_battery / 100 == pytest.approx(28.1, abs=0.3)
+    assert status.voltage_battery == 12_600
+
+
 def test_timesync_is_answered_in_vehicle_time(ground):
     ground.run(2.0)
     ground.send(mavlink.MAVLink_timesync_message(0, 1234))

@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from ...frames import item_target
 from ...geodesy import Ned
-from ...mission import Item
+from ...mission import Item, State
 from ...mission_runner import MissionRunner
 from ...mode import MissionMode
 from ...position_control import SPEED_KINDS, Speed
@@ -18,6 +18,9 @@ from .base import Mode
 from .landing import descend
 from .rtl import Rtl
 from .takeoff import TakeoffClimb
+
+ARMING_ALLOWED, TAKEOFF_WITHOUT_THROTTLE = 1, 2
+"""Bits of AUTO_OPTIONS."""
 
 
 class AutoSubmode(Enum):
@@ -44,8 +47,11 @@ class Auto(Mode, MissionMode):
 
     @property
     def armable(self) -> bool:  # type: ignore[override]
-        """AUTO_OPTIONS bit 0 allows arming here; by default it is refused."""
-        return bool(int(self.aircraft.parameters["AUTO_OPTIONS"]) & 1)
+        """By default arming is refused here."""
+        return self._has_option(ARMING_ALLOWED)
+
+    def _has_option(self, bit: int) -> bool:
+        return bool(int(self.aircraft.parameters["AUTO_OPTIONS"]) & bit)
 
     def enter(self, checked: bool) -> bool:
         aircraft, mission = self.aircraft, self.aircraft.mission
@@ -66,10 +72,18 @@ class Auto(Mode, MissionMode):
 
     def step(self, dt: float) -> Demand:
         aircraft = self.aircraft
-        if not aircraft.armed:
+        if aircraft.estimator.origin is None:
             return self.wait_on_ground()
+        if aircraft.armed and aircraft.mission.state is State.NOT_STARTED:
+            self.runner.restart()  # it was disarmed here
         self.runner.step()
+        return self._fly_item(dt) if aircraft.armed else self.wait_on_ground()
+
+    def _fly_item(self, dt: float) -> Demand:
+        aircraft = self.aircraft
         if self.submode is AutoSubmode.TAKEOFF:
+            # Without the option the motors idle until the pilot raises the throttle, or MISSION_START comes.
+            aircraft.auto_armed = aircraft.auto_armed or self._has_option(TAKEOFF_WITHOUT_THROTTLE)
             return self.takeoff.step(self, dt)
         if self.submode is AutoSubmode.LAND:
             return descend(self, dt)
@@ -91,6 +105,10 @@ class Auto(Mode, MissionMode):
     def jump_to(self, seq: int) -> None:
         self.runner.jump_to(seq)
 
+    def restart(self) -> None:
+        """Begin the mission again if it is complete; a mission that runs goes on."""
+        self.runner.restart()
+
     def item_restarts(self) -> bool:
         return self.submode is AutoSubmode.WAYPOINT
 
@@ -107,9 +125,7 @@ class Auto(Mode, MissionMode):
             self.rtl.enter(checked=True)
         elif item.command == mavlink.MAV_CMD_NAV_LAND and not (item.x or item.y):
             self._begin_descent()
-        elif item.command == mavlink.MAV_CMD_NAV_DELAY:
-            self.submode = AutoSubmode.HOLD
-        else:
+        elif item.command != mavlink.MAV_CMD_NAV_DELAY:  # a delay keeps what the vehicle does
             self._begin_leg(item)
         return True
 
@@ -147,6 +163,8 @@ class Auto(Mode, MissionMode):
     def _waited_at(self, item: Item) -> bool:
         """Waypoints: within WPNAV_RADIUS when flown through, at a stop when there is something to wait for."""
         aircraft = self.aircraft
+        if aircraft.grounded:
+            return False
         if self._arrived_at is None:
             radius = aircraft.parameters["WPNAV_RADIUS"] / 100
             position = aircraft.estimator.position

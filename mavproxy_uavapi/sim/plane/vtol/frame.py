@@ -31,6 +31,8 @@ MOTORS = range(33, 41)
 """SERVOn_FUNCTION of the lift motors."""
 HOVER_PULSE = 1550
 """Microseconds."""
+HEAVIER = 1.5
+"""Times the mass of SITL's quadcopter, with the same motors."""
 
 
 class LiftFrame(SimulatedPlane):
@@ -109,7 +111,7 @@ class LiftFrame(SimulatedPlane):
         body.step(demand.thrust, demand.yaw_rate, dt)
         body.airborne = not body.on_ground
         body.airspeed = _forward_airspeed(body)
-        self.battery.drain(body.throttle_share, dt)
+        self.battery.hover(HEAVIER * body.throttle_share, dt)
         self._detect_flight()
 
     def _fly(self, demand: Demand, dt: float) -> None:
