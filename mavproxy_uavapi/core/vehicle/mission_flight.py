@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -22,6 +23,7 @@ LANDINGS = {mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH, mavl
 STARTING_MODES = (AUTO, "GUIDED")  # in any other mode the pilot has it; `guided` takes over
 START_TIMEOUT = 10.0  # s until the vehicle must show that the mission runs
 LONGEST = 4 * 3600.0  # s for a mission whose client gave no timeout: longer than any copter flies
+DISARM_SHOWN = 5.0  # s from the end of a final item until a heartbeat must show that the vehicle has disarmed
 UNKNOWN_TOTAL = 65535
 STATES = {
     mavlink.MISSION_STATE_UNKNOWN: "unknown",
@@ -107,17 +109,18 @@ def _is_active(vehicle: Vehicle, since: float) -> bool:
 
 async def _flown_to_its_end(vehicle: Vehicle, job: Job, items: Sequence[MissionItem], timeout: float) -> None:
     final = {seq for seq, item in enumerate(items, 1) if item.command in LANDINGS} | {len(items)}
-    flown = 0  # the item flown last; a disarmed vehicle reports the first item again
+    in_final_at = -math.inf  # s; a vehicle that has landed and disarmed reports the first item again
 
     def complete() -> bool | None:
-        nonlocal flown
+        nonlocal in_final_at
         _report(vehicle, job)
         if _is_complete(vehicle):
             return True
-        if vehicle.state.armed is False and flown in final:
+        if vehicle.state.armed is False and vehicle.clock() - in_final_at <= DISARM_SHOWN:
             return True
         _held(vehicle)
-        flown = progress(vehicle)["current"] or flown
+        if progress(vehicle)["current"] in final:
+            in_final_at = vehicle.clock()
         return None
 
     names = {"HEARTBEAT", "MISSION_CURRENT", "MISSION_ITEM_REACHED"}

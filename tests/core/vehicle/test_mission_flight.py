@@ -100,6 +100,32 @@ def test_disarming_in_the_landing_item_is_the_end(loop: Any, flying: Any, flight
     assert pilotage.result(job) == "done"
 
 
+def test_first_item_that_comes_before_the_disarmed_heartbeat_is_no_failure(
+    loop: Any, flying: Any, flight: Flight, pilotage: Any
+) -> None:
+    job = flight.start(until_complete=True)
+    loop.pass_time(1.0)
+    flight.tell(3)
+    loop.pass_time(1.0)
+    flight.tell(1)
+    loop.pass_time(0.5)
+    landed(flying, loop)
+    assert pilotage.result(job) == "done"
+
+
+def test_disarming_long_after_a_final_item_is_a_failure(
+    loop: Any, flying: Any, flight: Flight, pilotage: Any
+) -> None:
+    job = flight.start(until_complete=True)
+    loop.pass_time(1.0)
+    flight.tell(3)
+    flight.tell(1)
+    loop.pass_time(6.0)
+    landed(flying, loop)
+    with pytest.raises(NotArmed):
+        pilotage.result(job)
+
+
 def test_disarming_before_it_is_a_failure(loop: Any, flying: Any, flight: Flight, pilotage: Any) -> None:
     job = flight.start(until_complete=True)
     loop.pass_time(1.0)
