@@ -51,7 +51,7 @@ def test_environment_file_is_for_us_alone_and_gone_at_once(make_run: MakeRun, st
     environment = run.path.with_name(run.path.name.replace("_run", "_env"))
     assert environment.stat().st_mode & 0o777 == 0o600
     process = started(run)
-    eventually(lambda: runs.load(run.path).running)
+    eventually(lambda: runs.tail(run.out_log))  # the script runs
     assert not environment.exists()
     process.terminate()  # the runner ends its script; killed it could not
     process.communicate(timeout=20)
