@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 import os
 import shutil
 import signal
@@ -29,6 +30,20 @@ if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Alternate the files that wait for real processes with those that compute, so that no processor rests.
+
+    The latter from the last to the first: the longest are under `vision` and `rules`.
+    """
+    files: dict[Path, list[pytest.Item]] = {}
+    for item in items:
+        files.setdefault(item.path, []).append(item)
+    waiting = [file for file in files if "end_to_end" in file.parts]
+    computing = [file for file in reversed(files) if file not in waiting]
+    pairs = itertools.zip_longest(waiting, computing)
+    items[:] = [item for pair in pairs for file in pair if file is not None for item in files[file]]
 
 
 @pytest.fixture
