@@ -32,20 +32,6 @@ else:
     import tomli as tomllib
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Alternate the files that wait for real processes with those that compute, so that no processor rests.
-
-    The latter from the last to the first: the longest are under `vision` and `rules`.
-    """
-    files: dict[Path, list[pytest.Item]] = {}
-    for item in items:
-        files.setdefault(item.path, []).append(item)
-    waiting = [file for file in files if "end_to_end" in file.parts]
-    computing = [file for file in reversed(files) if file not in waiting]
-    pairs = itertools.zip_longest(waiting, computing)
-    items[:] = [item for pair in pairs for file in pair if file is not None for item in files[file]]
-
-
 @pytest.fixture
 def loop() -> Iterator[TimeTravellingLoop]:
     """The asyncio loop of the test; it must end without a defect."""
@@ -212,7 +198,8 @@ def boards() -> Any:
     return boards
 
 
-LONGEST = ("end_to_end/test_hostile", "end_to_end/test_vision", "end_to_end/", "rules/")  # begun first, in this order
+# Begun first, in this order.
+LONGEST = ("end_to_end/test_hostile", "end_to_end/test_vision", "end_to_end/", "rules/", "vision/landing/")
 
 
 def pytest_configure() -> None:
@@ -224,7 +211,7 @@ def pytest_configure() -> None:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Begin with what takes longest, and leave out what this machine has not got.
 
-    The files with real processes take minutes: begun last, one of them would run alone at the end. Without
+    Files that wait for real processes alternate with files that compute, so that no processor rests. Without
     ArduPilot there is nothing that the tests marked `sitl` could run on. A bare machine lacks tmux, a browser or a
     broker: what needs them is skipped there, but never in CI.
     """
@@ -232,6 +219,13 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         config.hook.pytest_deselected(items=[item for item in items if item.get_closest_marker("sitl")])
         items[:] = [item for item in items if not item.get_closest_marker("sitl")]
     items.sort(key=lambda item: next((n for n, part in enumerate(LONGEST) if part in item.nodeid), len(LONGEST)))
+    files: dict[Path, list[pytest.Item]] = {}
+    for item in items:
+        files.setdefault(item.path, []).append(item)
+    waiting = [file for file in files if file.parent.name == "end_to_end"]
+    computing = [file for file in files if file not in waiting]
+    pairs = itertools.zip_longest(waiting, computing)
+    items[:] = [item for pair in pairs for file in pair if file is not None for item in files[file]]
     if os.environ.get("CI"):
         return
     for item in items:
