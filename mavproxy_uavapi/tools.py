@@ -51,12 +51,14 @@ async def run_tool(command: Sequence[str], timeout: float, cwd: Path | None = No
         raise ToolFailed(f"{name} is not installed on this machine") from error
     except OSError as error:
         raise ToolFailed(f"cannot run {name}: {error.strerror}") from error
+    ended = False
     try:
         out, err = await wait_with_timeout(timeout, process.communicate())
+        ended = True
     except asyncio.TimeoutError:
         raise TimedOut(f"{name} did not end within {timeout:g} s") from None
     finally:
-        if process.returncode is None:
+        if not ended:  # or a child of it holds its output open
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
             await asyncio.shield(process.wait())
