@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from mavproxy_gradys.forwarding.quantities import LONGEST_TEXT, NAME
+from mavproxy_gradys.forwarding.quantities import LONGEST_TEXT, NAME, STATUS
 from mavproxy_gradys.forwarding.readings import Reading, Value, device_of
 from mavproxy_gradys.service import Gradys
 from mavproxy_gradys.tracks.flight import VERB, flight_of
@@ -126,6 +126,8 @@ class GradysHandlers:
         call.require_right(system)
         at = now if request.time is None else request.time
         device = request.device or device_of(system)
+        if request.quantity == STATUS:
+            raise Invalid(f"{STATUS} tells whether a vehicle is online; take another name", "quantity")
         if request.quantity in self._gradys.pipeline.reserved and VEHICLE.fullmatch(device):
             raise Invalid(f"{request.quantity} of {device} comes from the vehicle itself only", "quantity")
         return Reading(device, system, request.quantity, request.representation, request.value, at)

@@ -26,8 +26,8 @@ from paho.mqtt.properties import Properties
 
 from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.forwarding.confirmations import Confirmations
-from mavproxy_gradys.forwarding.quantities import POSITION
-from mavproxy_gradys.forwarding.readings import CONFIRMED_TOPIC, STATUS, Reading, Stored, device_of
+from mavproxy_gradys.forwarding.quantities import POSITION, STATUS
+from mavproxy_gradys.forwarding.readings import CONFIRMED_TOPIC, Reading, Stored, device_of
 from mavproxy_gradys.net.addresses import split_url
 from mavproxy_gradys.net.mqtt_client import make_client
 from mavproxy_gradys.net.resolver import Resolver

@@ -9,7 +9,7 @@ from typing import Any
 
 from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.forwarding.quantities import POSITION, Quantity
-from mavproxy_gradys.forwarding.readings import STATUS, Reading, Sampler
+from mavproxy_gradys.forwarding.readings import Reading, Sampler
 from mavproxy_gradys.forwarding.sender import Sender
 from mavproxy_gradys.forwarding.sensor import SensorSampler, source_of
 from mavproxy_gradys.forwarding.spool import Spool
@@ -128,9 +128,9 @@ class ReadingPipeline:
 
     @property
     def reserved(self) -> set[str]:
-        """The quantities that come from a vehicle itself only: the sampled ones, its position and its status."""
+        """The quantities that come from a vehicle itself only: the sampled ones and its position."""
         sampled = () if self._settings is None else self._settings.quantities
-        return {POSITION, STATUS, *(quantity.name for quantity in sampled)}
+        return {POSITION, *(quantity.name for quantity in sampled)}
 
     def flush(self) -> None:
         """Try all sinks now."""

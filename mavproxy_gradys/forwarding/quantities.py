@@ -27,6 +27,7 @@ from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.values import path_of
 
 POSITION = "position"
+STATUS = "status"  # no quantity: in its place the MQTT sink reports whether a vehicle is online
 POSITION_REPRESENTATION = "degrees, degrees, m above home"
 TEXTS = ("text", "raw")  # representations of a sensor whose value is a text
 NAME = r"[A-Za-z0-9_.-]{1,64}"  # valid in an MQTT topic
@@ -104,6 +105,8 @@ def parse_quantities(text: str) -> tuple[Quantity, ...]:
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise SettingError(f"{', '.join(twice)} occurs twice")
+    if STATUS in names:
+        raise SettingError(f"{STATUS} tells whether a vehicle is online; take another name")
     return tuple(quantities)
 
 

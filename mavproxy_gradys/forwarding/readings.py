@@ -9,7 +9,6 @@ from typing import Any
 from mavproxy_gradys.forwarding.quantities import Quantity
 from mavproxy_uavapi.core.mavlink.vehicle_state import Received, VehicleState
 
-STATUS = "status"  # the quantity in which the MQTT sink reports whether a vehicle is online
 CONFIRMED_TOPIC = "confirmed/"  # below it a station confirms the readings that it has stored
 
 Value = float | int | str | bool | list[float]

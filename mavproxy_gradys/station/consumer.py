@@ -12,7 +12,8 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from mavproxy_gradys.errors import NotStored
-from mavproxy_gradys.forwarding.readings import CONFIRMED_TOPIC, STATUS
+from mavproxy_gradys.forwarding.quantities import STATUS
+from mavproxy_gradys.forwarding.readings import CONFIRMED_TOPIC
 from mavproxy_gradys.net.outage_log import Defects, Outage
 from mavproxy_gradys.net.schedule import Backoff
 from mavproxy_gradys.station.inbox import Inbox, Message

@@ -76,8 +76,11 @@ def test_nobody_poses_as_a_vehicle(loop: Any, host: Any, telemetry: Any, setting
         call = Call(service, {CALLER: Caller(None)}, parse(Readings, "body", {"value": 1, **body}))  # type: ignore[arg-type]
         return loop.run(GradysHandlers(gradys).readings(call))
 
-    for body in ({"quantity": "position"}, {"quantity": "alt", "device": "uav-1"}, {"quantity": "status"}):
+    for body in ({"quantity": "position"}, {"quantity": "alt", "device": "uav-1"}):
         with pytest.raises(Invalid, match="from the vehicle itself only"):
+            post(**body)
+    for body in ({"quantity": "status"}, {"quantity": "status", "device": "buoy"}):
+        with pytest.raises(Invalid, match="take another name"):
             post(**body)
     assert post(quantity="position", device="buoy")["result"] == "Kept 1 reading"
     assert post(quantity="temperature")["result"] == "Kept 1 reading"

@@ -41,6 +41,7 @@ def test_a_list_by_comma_semicolon_or_space() -> None:
         "alt=X.y*1e400",
         "alt=X.y+1e400",
         "alt=X.y,alt=X.z",
+        "status=X.y",
     ],
 )
 def test_what_is_no_quantity_is_refused(text: str) -> None:
