@@ -1,0 +1,66 @@
+"""A copter, a plane and a rover in one MAVProxy, commanded one by one and all at once."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.support.processes import HOME, MAVPROXY, SPEEDUP, Rig, free_instance, free_port, headless, load
+
+TYPES = {"copter": "ArduCopter", "plane": "ArduPlane", "rover": "Rover"}  # by system id, from 1
+NEAR = {"lat": -35.36342, "long": 149.1655, "alt": 0}  # 30 m from home
+
+
+def start(rig: Rig, made_by: str, system: int, kind: str) -> int:
+    """Start a vehicle; the instance that it is."""
+    instance = free_instance()
+    if made_by == "embedded":
+        command = [sys.executable, "-m", "mavproxy_uavapi.sim", f"--instance={instance}", f"--home={HOME}"]
+        more = [f"--vehicle={kind}", f"--sysid={system}", f"--speedup={SPEEDUP:g}"]
+        rig.start(kind, [*command, *more]).says("listening on tcp")
+    else:
+        script = str(Path(os.environ["ARDUPILOT_HOME"], "Tools", "autotest", "sim_vehicle.py"))
+        (rig.directory / kind).mkdir()
+        command = [sys.executable, script, "-v", TYPES[kind], "-N", "-w", f"-I{instance}", f"--sysid={system}"]
+        more = ["--speedup=5", "-l", HOME, "--use-dir", str(rig.directory / kind), "--no-mavproxy"]
+        rig.start(kind, [*command, *more], headless()).says("Waiting for connection", timeout=60)
+    return instance
+
+
+@pytest.fixture(params=["embedded", pytest.param("ardupilot", marks=pytest.mark.sitl)])
+def rig(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Rig]:
+    """Three vehicles of three types behind one MAVProxy."""
+    rig = Rig(tmp_path, free_port())
+    try:
+        instances = [start(rig, request.param, system, kind) for system, kind in enumerate(TYPES, 1)]
+        masters = [f"--master=tcp:127.0.0.1:{5760 + 10 * instance}" for instance in instances]
+        rig.mavproxy = rig.start("mavproxy", [*MAVPROXY, *masters, "--retries=20", load(rig.port)])
+        rig.wait_until_up(120)
+        yield rig
+    finally:
+        rig.stop()
+
+
+def listed(rig: Rig) -> dict[int, Any]:
+    return {vehicle["id"]: vehicle for vehicle in rig.ok(rig.get("/vehicles"))["vehicles"]}
+
+
+def test_three_types_in_one_mavproxy(rig: Rig) -> None:
+    rig.eventually(lambda: len(listed(rig)) == len(TYPES), 60, "three vehicles")
+    assert [listed(rig)[system]["type"] for system in (1, 2, 3)] == list(TYPES)
+    assert rig.post("/fleet/arm", vehicles="all", timeout=240).json()["result"].endswith("3 of 3 vehicles")
+    rig.ok(rig.get("/vehicles/1/command/arm"))  # a copter that waits for the others disarms
+    rig.ok(rig.get("/vehicles/1/command/takeoff", alt=10, timeout=240))
+    rig.ok(rig.get("/vehicles/2/command/takeoff", alt=40, timeout=240))
+    rig.ok(rig.post("/vehicles/3/movement/go_to_gps_wait", timeout=240, **NEAR))
+    assert rig.get("/vehicles/3/command/takeoff", alt=10).json()["code"] == "not_supported"
+    assert rig.get("/vehicles/2/command/land").json()["code"] == "busy"  # its mission has no landing
+    assert {vehicle["mode"] for vehicle in listed(rig).values()} == {"GUIDED"}
+    home = rig.post("/fleet/rtl", vehicles="all", timeout=400).json()
+    assert [home["vehicles"][system]["status"] for system in "123"] == [200, 200, 200], home
+    assert not listed(rig)[1]["armed"]
