@@ -16,9 +16,8 @@ TYPES = {"copter": "ArduCopter", "plane": "ArduPlane", "rover": "Rover"}  # by s
 NEAR = {"lat": -35.36342, "long": 149.1655, "alt": 0}  # 30 m from home
 
 
-def start(rig: Rig, made_by: str, system: int, kind: str) -> int:
-    """Start a vehicle; the instance that it is."""
-    instance = free_instance()
+def start(rig: Rig, made_by: str, instance: int, system: int, kind: str) -> None:
+    """Start a vehicle."""
     if made_by == "embedded":
         command = [sys.executable, "-m", "mavproxy_uavapi.sim", f"--instance={instance}", f"--home={HOME}"]
         more = [f"--vehicle={kind}", f"--sysid={system}", f"--speedup={SPEEDUP:g}"]
@@ -28,8 +27,7 @@ def start(rig: Rig, made_by: str, system: int, kind: str) -> int:
         (rig.directory / kind).mkdir()
         command = [sys.executable, script, "-v", TYPES[kind], "-N", "-w", f"-I{instance}", f"--sysid={system}"]
         more = ["--speedup=5", "-l", HOME, "--use-dir", str(rig.directory / kind), "--no-mavproxy"]
-        rig.start(kind, [*command, *more], headless()).says("Waiting for connection", timeout=60)
-    return instance
+        rig.start(kind, [*command, *more], headless())
 
 
 @pytest.fixture(params=["embedded", pytest.param("ardupilot", marks=pytest.mark.sitl)])
@@ -37,8 +35,10 @@ def rig(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Rig]:
     """Three vehicles of three types behind one MAVProxy."""
     rig = Rig(tmp_path, free_port())
     try:
-        instances = [start(rig, request.param, system, kind) for system, kind in enumerate(TYPES, 1)]
-        masters = [f"--master=tcp:127.0.0.1:{5760 + 10 * instance}" for instance in instances]
+        first, masters = free_instance(), []
+        for number, kind in enumerate(TYPES):
+            start(rig, request.param, first + number, number + 1, kind)
+            masters.append(f"--master=tcp:127.0.0.1:{5760 + 10 * (first + number)}")
         rig.mavproxy = rig.start("mavproxy", [*MAVPROXY, *masters, "--retries=20", load(rig.port)])
         rig.wait_until_up(120)
         yield rig
