@@ -158,6 +158,7 @@ class Plane(GuidedVehicle):
         if await self.is_done_at_home():
             return
         await self.switch_to(job, RTL)
+        await self.know_home()
         near = CIRCLING * await self._radius()
         distance = self.distance_home() or 0.0
         expected = CIRCLES + time_limits.leg_time(await self.limits(), distance, 0.0)

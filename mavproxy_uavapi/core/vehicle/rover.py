@@ -73,6 +73,7 @@ class Rover(TravellingVehicle):
         if await self.is_done_at_home():
             return
         await self.switch_to(job, "RTL")
+        await self.know_home()
         near = AT_HOME * await self._radius()
         expected = time_limits.leg_time(await self.limits(), self.distance_home() or 0.0, 0.0)
 

@@ -169,6 +169,15 @@ class Vehicle(Verbs):
         await self.commands.send(order, self.commanding(job))
         await self.home()
 
+    async def know_home(self) -> None:
+        """Request HOME_POSITION, unless it was heard since the last boot.
+
+        Raises:
+            NotFound, TimedOut, LinkLost: as `home`.
+        """
+        if "HOME_POSITION" not in self.state.messages:
+            await self.home()
+
     async def home(self) -> Any:
         """Request HOME_POSITION.
 
