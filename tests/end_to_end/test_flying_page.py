@@ -30,6 +30,10 @@ class Pilot:
         """Wait until an element shows that text."""
         await self.page.until(f"document.querySelector({element!r}).innerText.includes({text!r})")
 
+    async def sees_live(self) -> None:
+        """Wait until the page says that its numbers are live; it says `not live` before."""
+        await self.page.until("document.querySelector('connection-state').innerText.trim() === 'live'")
+
     async def hold(self, label: str) -> None:
         """Hold a button until it acts."""
         element = BUTTON.format(tag="hold-button", label=label)
@@ -100,7 +104,7 @@ async def see_the_link_lost(pilot: Pilot) -> None:
     await pilot.sees("#hold-result", "0 of 1 hold")
     await pilot.sees("#hold-result", "vehicle 1: no heartbeat")
     pilot.rig.control.ask("clear")
-    await pilot.sees("connection-state", "live")
+    await pilot.sees_live()
 
 
 async def give_the_token(pilot: Pilot) -> None:
@@ -110,7 +114,7 @@ async def give_the_token(pilot: Pilot) -> None:
     await pilot.sees("#trouble", "this API wants its token")
     await pilot.page.ask("Input.insertText", text="sesame")
     await pilot.click("Use it")
-    await pilot.sees("connection-state", "live")
+    await pilot.sees_live()
     assert await pilot.page.evaluate("JSON.stringify(localStorage).includes('sesame') || document.cookie") in (
         False,
         "",
@@ -138,7 +142,7 @@ async def flight(rig: Any, directory: Path) -> list[str]:
     async with chromium(directory) as page:
         pilot = Pilot(page, rig)
         await page.visit(rig.url + "/")
-        await pilot.sees("connection-state", "live")
+        await pilot.sees_live()
         await take_off(pilot)
         rig.control.fault("pilot_sticks", throttle=1500)
         await go_to_a_click(pilot, 150, -90)

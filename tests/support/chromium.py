@@ -59,7 +59,9 @@ class Page:
         for domain in ("Page", "Log", "Runtime"):
             await self.ask(f"{domain}.enable")
         await self.resize(width, height)
+        await self.evaluate("window.isBefore = true")
         await self.ask("Page.navigate", url=url)
+        await self.until("!window.isBefore")  # until then the page before would take what is typed
 
     async def resize(self, width: int, height: int) -> None:
         """Make the window as large as that, in CSS pixels."""
