@@ -157,7 +157,7 @@ class EnvelopeWatch:
 
 
 async def _stand(vehicle: Vehicle, job: Job) -> None:
-    """Keep the vehicle for `job` until it stands: until then only what stops it too has a higher rank."""
+    """Keep the vehicle for `job` until it stands: lower ranks are refused, what stops or lands it is not."""
     vehicle.authority.take(job, Rank.STOP)
     longest = STANDS_WITHIN + 2 * _until_it_stands(vehicle)
     names = {"GLOBAL_POSITION_INT"}
