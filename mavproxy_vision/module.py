@@ -34,8 +34,8 @@ COMPLETIONS = [
 ]
 MISSION = ("5", "8", "-5")  # m: altitude, north, east; the seed's
 RESTARTS = {  # settings that need the camera to be opened again
-    "source", "family", "tags", "any_id", "far", "calibration", "fov", "width", "height", "fps", "latency", "mount",
-    "offset", "gimbal", "threads", "vehicle",
+    "source", "family", "tags", "any_id", "far", "calibration", "fov", "width", "height", "fps", "exposure", "gain",
+    "brightness", "latency", "mount", "offset", "gimbal", "threads", "vehicle",
 }  # fmt: skip
 
 
