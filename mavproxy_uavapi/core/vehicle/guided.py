@@ -12,7 +12,7 @@ from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle import messages, setpoint_in_force, time_limits
 from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_uavapi.core.vehicle.envelope_check import Spaces
-from mavproxy_uavapi.core.vehicle.geodesy import offset
+from mavproxy_uavapi.core.vehicle.geodesy import moved, offset
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.messages import NO_YAW, GlobalTarget, NedTarget, Target, VelocityTarget, Yaw
 from mavproxy_uavapi.core.vehicle.start_gate import pass_gate
@@ -150,6 +150,22 @@ class GuidedVehicle(Vehicle):
             return True
         self._shown = self._shown or flown
         return max(*map(abs, offset(self._shown.lat, self._shown.lon, flown.lat, flown.lon))) > SAME_PLACE
+
+    @property
+    def target_place(self) -> tuple[float, float] | None:
+        """Latitude and longitude (degrees) of our target in GUIDED; None without one, or without a position."""
+        target, is_guided = self._sent, self.mode == GUIDED and self._sent_at >= self.state.mode_since
+        if not self.state.armed or not is_guided or self.has_foreign_target:
+            return None
+        if isinstance(target, GlobalTarget):
+            return target.lat, target.lon
+        if not isinstance(target, NedTarget):
+            return None
+        try:
+            (north, east, _), here = self.leg_to(target), self.fresh("GLOBAL_POSITION_INT")
+        except Stale:
+            return None
+        return moved(here.lat / 1e7, here.lon / 1e7, north, east)
 
     def speed_by(self, target: NedTarget | GlobalTarget) -> float:
         """Speed (m/s), from the message that has the position in the target's frame."""
