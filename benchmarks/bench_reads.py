@@ -10,13 +10,13 @@ import argparse
 import asyncio
 import sys
 import time
+from dataclasses import dataclass
 from typing import Any
 
 from rig import Bare, Client, Clients, Tap, fly, machine, message_id, percentile, put_first, rig, table
 
-BARE, ALONE, CROWDED = "bare aiohttp handler", "/telemetry/gps", "with 200 waiting calls"
 WAITING = 200
-POLLERS = 4
+POLLERS = 4  # beside the commands
 COMMAND_LONG, COMMAND_ACK = 76, 77
 COMMANDS = 150  # in each round and case
 
@@ -43,12 +43,28 @@ class Reads:
         return percentile([percentile(times, share) * 1e3 for times in self.times], 0.5)
 
 
-def read(clients: Clients, made: Any, bare: Bare, cases: dict[str, Reads], seconds: float) -> None:
+@dataclass(frozen=True)
+class Case:
+    """Clients that read as fast as they get answers."""
+
+    clients: int
+    waiting: int = 0  # calls that wait meanwhile
+    bare: bool = False  # of an aiohttp handler in a process of its own
+
+    def __str__(self) -> str:
+        what = "bare aiohttp handler" if self.bare else "/telemetry/gps"
+        return what + (f", {self.waiting} waiting calls" if self.waiting else "")
+
+
+CASES = [Case(1, bare=True), Case(1), Case(16, bare=True), Case(16), Case(16, WAITING)]
+
+
+def read(clients: Clients, made: Any, bare: Bare, cases: dict[Case, Reads], seconds: float) -> None:
     """One round of reads."""
-    for name, case in cases.items():
-        port = bare.port if name == BARE else made.port
-        clients.begin(port, seconds, pollers=POLLERS, waiting=WAITING if name == CROWDED else 0)
-        case.take(clients.end(), seconds)
+    for case, reads in cases.items():
+        port = bare.port if case.bare else made.port
+        clients.begin(port, seconds, pollers=case.clients, waiting=case.waiting)
+        reads.take(clients.end(), seconds)
 
 
 class RoundTrips:
@@ -94,15 +110,16 @@ class RoundTrips:
         return [there + back for there, back in zip(self.there, self.back, strict=True)]
 
 
-def reads_table(cases: dict[str, Reads]) -> str:
+def reads_table(cases: dict[Case, Reads]) -> str:
     """The reads as a table."""
-    bare = cases[BARE]
     rows = []
-    for name, case in cases.items():
-        row = [name, f"{case.rate:.0f}", f"{case.latency(0.5):.2f}", f"{case.latency(0.99):.2f}"]
-        row += [f"{case.rate / bare.rate:.2f}", f"{case.latency(0.99) / bare.latency(0.99):.1f}"]
+    for case, reads in cases.items():
+        bare = cases[Case(case.clients, bare=True)]
+        row = [str(case), str(case.clients), f"{reads.rate:.0f}"]
+        row += [f"{reads.latency(0.5):.2f}", f"{reads.latency(0.99):.2f}"]
+        row += [f"{reads.rate / bare.rate:.2f}", f"{reads.latency(0.99) / bare.latency(0.99):.1f}"]
         rows.append(row)
-    return table([f"{POLLERS} clients", "reads/s", "p50 ms", "p99 ms", "reads : bare", "p99 : bare"], rows)
+    return table(["", "clients", "reads/s", "p50 ms", "p99 ms", "reads : bare", "p99 : bare"], rows)
 
 
 def trips_table(trips: dict[str, RoundTrips]) -> str:
@@ -126,9 +143,9 @@ def main() -> int:
     options = parser.parse_args()
     print(f"reads: {machine()}")
     clients, bare = Clients(), Bare()
-    cases = {name: Reads() for name in (BARE, ALONE, CROWDED)}
+    cases = {case: Reads() for case in CASES}
     try:
-        with rig(max_rate=100000) as (made, tap):
+        with rig(max_rate=100000, max_jobs=2 * WAITING, max_connections=2 * WAITING) as (made, tap):
             if options.first:
                 put_first(*(process.pid for process in made.processes))
             fly(made)
