@@ -10,11 +10,13 @@ import argparse
 import asyncio
 import sys
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from rig import Bare, Client, Clients, Tap, fly, machine, message_id, percentile, put_first, rig, table
 
+BARE, OURS = "bare aiohttp handler", "uavapi"
 WAITING = 200
 POLLERS = 4  # beside the commands
 COMMAND_LONG, COMMAND_ACK = 76, 77
@@ -45,25 +47,29 @@ class Reads:
 
 @dataclass(frozen=True)
 class Case:
-    """Clients that read as fast as they get answers."""
+    """Clients that read `/telemetry/gps` as fast as they get answers.
 
+    Attributes:
+        server: whom they ask.
+        clients: how many they are.
+        waiting: calls that wait meanwhile.
+    """
+
+    server: str
     clients: int
-    waiting: int = 0  # calls that wait meanwhile
-    bare: bool = False  # of an aiohttp handler in a process of its own
+    waiting: int = 0
 
     def __str__(self) -> str:
-        what = "bare aiohttp handler" if self.bare else "/telemetry/gps"
-        return what + (f", {self.waiting} waiting calls" if self.waiting else "")
+        return self.server + (f", {self.waiting} waiting calls" if self.waiting else "")
 
 
-CASES = [Case(1, bare=True), Case(1), Case(16, bare=True), Case(16), Case(16, WAITING)]
+CASES = [Case(BARE, 1), Case(OURS, 1), Case(BARE, 16), Case(OURS, 16), Case(OURS, 16, WAITING)]
 
 
-def read(clients: Clients, made: Any, bare: Bare, cases: dict[Case, Reads], seconds: float) -> None:
+def read(clients: Clients, ports: Mapping[str, int], cases: Mapping[Case, Reads], seconds: float) -> None:
     """One round of reads."""
     for case, reads in cases.items():
-        port = bare.port if case.bare else made.port
-        clients.begin(port, seconds, pollers=case.clients, waiting=case.waiting)
+        clients.begin(ports[case.server], seconds, pollers=case.clients, waiting=case.waiting)
         reads.take(clients.end(), seconds)
 
 
@@ -110,11 +116,11 @@ class RoundTrips:
         return [there + back for there, back in zip(self.there, self.back, strict=True)]
 
 
-def reads_table(cases: dict[Case, Reads]) -> str:
+def reads_table(cases: Mapping[Case, Reads]) -> str:
     """The reads as a table."""
     rows = []
     for case, reads in cases.items():
-        bare = cases[Case(case.clients, bare=True)]
+        bare = cases[Case(BARE, case.clients)]
         row = [str(case), str(case.clients), f"{reads.rate:.0f}"]
         row += [f"{reads.latency(0.5):.2f}", f"{reads.latency(0.99):.2f}"]
         row += [f"{reads.rate / bare.rate:.2f}", f"{reads.latency(0.99) / bare.latency(0.99):.1f}"]
@@ -151,7 +157,7 @@ def main() -> int:
             fly(made)
             trips = {"alone": RoundTrips(), f"with {POLLERS} clients": RoundTrips()}
             for _ in range(options.rounds):
-                read(clients, made, bare, cases, options.seconds)
+                read(clients, {BARE: bare.port, OURS: made.port}, cases, options.seconds)
                 command(clients, made, tap, trips)
     finally:
         clients.close()
