@@ -1,7 +1,7 @@
 """What our modules cost while nobody calls: processor time and memory, and how long they take to load.
 
-Each case has a MAVProxy and an embedded vehicle of its own, in turns with a MAVProxy that has none of our modules. The
-time to load runs from the line at the prompt until HTTP has answered.
+Each case has a MAVProxy and an embedded vehicle of its own, in turns with a MAVProxy without our modules. The time to
+load runs from the line at the prompt until HTTP has answered.
 """
 
 from __future__ import annotations
