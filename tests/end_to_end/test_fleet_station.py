@@ -18,6 +18,7 @@ import requests
 from tests.support.chromium import chromium
 from tests.support.fleet import Fleet
 from tests.support.fleet_faults import FaultyFleet
+from tests.support.processes import eventually
 
 pytest.importorskip("asyncpg")
 pytest.importorskip("paho.mqtt.client")
@@ -103,6 +104,27 @@ def test_a_worker_ends_at_a_signal_and_its_session_waits_for_it(fleet: Fleet) ->
     while fleet.database.sql("SELECT count(*) FROM readings") != "100":
         assert time.monotonic() < deadline
         time.sleep(0.2)
+
+
+@BROKER
+@DATABASE
+def test_a_worker_stores_a_long_queue_that_ignores_its_receive_maximum(tmp_path: Path) -> None:
+    from paho.mqtt import publish
+
+    fleet = Fleet(tmp_path, 1, "--batch=20")
+    try:
+        fleet.start()
+        (worker,) = fleet.workers
+        worker.stop()
+        reading = {"device": "uav-1", "quantity": "alt", "value": 1, "time": time.time()}
+        messages = [("fleet/1/alt", json.dumps({**reading, "seq": n}), 1, False) for n in range(2000)]
+        publish.multiple(messages, port=fleet.broker.port)
+        worker.start()
+        count = "SELECT count(*) FROM readings"
+        eventually(lambda: fleet.database.sql(count) == "2000", 60, "all rows")
+        assert worker.metrics()["station_messages_dropped_total"] == 0
+    finally:
+        fleet.stop()
 
 
 async def page_of(url: str, directory: Path) -> str:
