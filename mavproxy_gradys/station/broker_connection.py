@@ -191,7 +191,7 @@ class BrokerConnection:
         log.info("connected to %s:%d", self._parts.hostname, self._port)
 
     def _on_disconnect(self, client: mqtt.Client, _data: Any, _flags: Any, code: Any, _properties: Any) -> None:
-        if client is self._client:
+        if client is self._client and not self._ended.is_set():  # after a refusal its reason stays
             self._failed(str(code))
             self._ended.set()
 

@@ -6,6 +6,7 @@ import asyncio
 import html
 import json
 import random
+import subprocess
 import sys
 import time
 from collections.abc import Iterator
@@ -16,7 +17,7 @@ import pytest
 import requests
 
 from tests.support.chromium import chromium
-from tests.support.fleet import Fleet
+from tests.support.fleet import Broker, Fleet, Worker
 from tests.support.fleet_faults import FaultyFleet
 from tests.support.processes import eventually
 
@@ -125,6 +126,50 @@ def test_a_worker_stores_a_long_queue_that_ignores_its_receive_maximum(tmp_path:
         assert worker.metrics()["station_messages_dropped_total"] == 0
     finally:
         fleet.stop()
+
+
+def tls_broker(directory: Path) -> Broker:
+    """A broker with TLS and a password; its certificate is `certificate.pem`."""
+    certificate, key, passwords = (directory / name for name in ("certificate.pem", "key.pem", "passwords"))
+    make = ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=broker"]
+    make += ["-addext", "subjectAltName=IP:127.0.0.1", "-keyout", str(key), "-out", str(certificate)]
+    for command in (make, ["mosquitto_passwd", "-b", "-c", str(passwords), "station", "s3cr:t"]):
+        subprocess.run(command, check=True, capture_output=True)
+    files = {"certfile": str(certificate), "keyfile": str(key), "password_file": str(passwords)}
+    return Broker(directory, **files, allow_anonymous="false")
+
+
+@BROKER
+@pytest.mark.needs("openssl", "mosquitto_passwd")
+def test_a_worker_reads_by_tls_with_a_password(tmp_path: Path) -> None:
+    from paho.mqtt import publish
+
+    broker, certificate = tls_broker(tmp_path), str(tmp_path / "certificate.pem")
+    url = f"mqtts://station:{{}}@127.0.0.1:{broker.port}"
+    trusted = f"--ca-file={certificate}"
+    worker = Worker(tmp_path, "s.db", url.format("s3cr%3At"), trusted)
+    refused = {
+        "certificate": Worker(tmp_path, "a.db", url.format("s3cr%3At"), "--name=a"),
+        "Not authorized": Worker(tmp_path, "b.db", url.format("wrong"), trusted, "--name=b"),
+    }
+    workers = [worker, *refused.values()]
+    try:
+        broker.start()
+        for one in workers:
+            one.start()
+        worker.wait()
+        for why, one in refused.items():
+            eventually(lambda: why in one.health().get("broker", ""), 30, why)  # noqa: B023
+        reading = {"device": "uav-1", "quantity": "alt", "value": 1, "time": time.time(), "seq": 7}
+        publish.single(
+            "fleet/1/alt", json.dumps(reading), 1, port=broker.port, hostname="127.0.0.1",
+            auth={"username": "station", "password": "s3cr:t"}, tls={"ca_certs": certificate},
+        )  # fmt: skip
+        eventually(lambda: worker.metrics()["station_readings_stored_total"] == 1, 30, "the reading")
+    finally:
+        for one in workers:
+            one.stop()
+        broker.stop()
 
 
 async def page_of(url: str, directory: Path) -> str:

@@ -33,9 +33,13 @@ class Broker:
 
     Attributes:
         port: TCP port on the loopback.
+
+    Args:
+        directory: for its files.
+        settings: further settings of its configuration.
     """
 
-    def __init__(self, directory: Path) -> None:
+    def __init__(self, directory: Path, **settings: str) -> None:
         assert MOSQUITTO is not None, "apt-get install mosquitto"
         self.port = free_port()
         self._directory = directory / "mosquitto"
@@ -46,9 +50,9 @@ class Broker:
             ours["user"] = "root"
         shipped = (line.split(maxsplit=1) for line in CONFIG.read_text(encoding="utf-8").splitlines())
         lines = {words[0]: words[1] for words in shipped if words and words[0] != "#"}
-        settings = {**lines, **ours, "allow_anonymous": "true"}
-        del settings["password_file"]
-        self._config.write_text("".join(f"{name} {value}\n" for name, value in settings.items()), encoding="ascii")
+        del lines["password_file"]
+        merged = {**lines, **ours, "allow_anonymous": "true", **settings}
+        self._config.write_text("".join(f"{name} {value}\n" for name, value in merged.items()), encoding="ascii")
         self._process: Process | None = None
 
     @property
