@@ -19,6 +19,7 @@ import requests
 from tests.support.chromium import chromium
 from tests.support.fleet import Broker, Fleet, Worker
 from tests.support.fleet_faults import FaultyFleet
+from tests.support.network_namespace import NetworkNamespace
 from tests.support.processes import eventually
 
 pytest.importorskip("asyncpg")
@@ -37,11 +38,25 @@ def fleet(tmp_path: Path) -> Iterator[Fleet]:
         made.stop()
 
 
+@pytest.fixture(params=["relay", "namespace"])
+def namespace(request: pytest.FixtureRequest) -> Iterator[NetworkNamespace | None]:
+    """The link of the vehicles that are cut off: None is a relay that is stopped."""
+    if request.param == "relay":
+        yield None
+        return
+    try:
+        made = NetworkNamespace()
+    except OSError as error:
+        pytest.skip(str(error))
+    yield made
+    made.remove()
+
+
 @pytest.mark.long
 @BROKER
 @DATABASE
-def test_each_reading_is_one_row_whoever_dies(tmp_path: Path) -> None:
-    fleet = FaultyFleet(tmp_path, workers=2, vehicles=6, rate=5)
+def test_each_reading_is_one_row_whoever_dies(tmp_path: Path, namespace: NetworkNamespace | None) -> None:
+    fleet = FaultyFleet(tmp_path, workers=2, vehicles=6, rate=5, namespace=namespace)
     try:
         fleet.start()
         fleet.suffer(random.Random(3), seconds=1, longest=2.0)  # each fault once

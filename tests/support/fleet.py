@@ -36,10 +36,11 @@ class Broker:
 
     Args:
         directory: for its files.
+        also: a further address at which it listens; empty for none.
         settings: further settings of its configuration.
     """
 
-    def __init__(self, directory: Path, **settings: str) -> None:
+    def __init__(self, directory: Path, also: str = "", **settings: str) -> None:
         assert MOSQUITTO is not None, "apt-get install mosquitto"
         self.port = free_port()
         self._directory = directory / "mosquitto"
@@ -52,7 +53,8 @@ class Broker:
         lines = {words[0]: words[1] for words in shipped if words and words[0] != "#"}
         del lines["password_file"]
         merged = {**lines, **ours, "allow_anonymous": "true", **settings}
-        self._config.write_text("".join(f"{name} {value}\n" for name, value in merged.items()), encoding="ascii")
+        text = "".join(f"{name} {value}\n" for name, value in merged.items())
+        self._config.write_text(text + (f"listener {self.port} {also}\n" if also else ""), encoding="ascii")
         self._process: Process | None = None
 
     @property
@@ -157,10 +159,11 @@ class Fleet:
         directory: for configurations and logs.
         workers: how many.
         options: of each worker.
+        also: a further address at which the broker listens; empty for none.
     """
 
-    def __init__(self, directory: Path, workers: int, *options: str) -> None:
-        self.broker = Broker(directory)
+    def __init__(self, directory: Path, workers: int, *options: str, also: str = "") -> None:
+        self.broker = Broker(directory, also)
         self.database = PostgresCluster(free_port(), "max_connections = 100")
         self.workers = [Worker(directory, self.database.url, self.broker.url, *options) for _ in range(workers)]
 
