@@ -106,3 +106,15 @@ def test_the_api_takes_the_vehicle_over_when_it_is_told_to(program: Program) -> 
     reply = world.ask("POST", "/movement/go_to_ned_wait", {"x": 0.0, "y": 0.0, "z": -ALT})
     assert reply.outcome == "200"
     assert math.dist(world.at, (0.0, 0.0, -ALT)) < 1.5
+
+
+def test_its_goto_at_once_after_the_apis_is_not_taken_for_the_apis(program: Program) -> None:
+    """The autopilot's first report of a target is the other station's."""
+    world = program.world
+    waiting = world.begin("POST", "/movement/go_to_ned_wait", FAR)
+    world.loop.pass_time(0.2)
+    program.simple_goto(40.0)
+    reply = world.answer(waiting, 30.0)
+    assert (reply.status, reply.body["code"]) == (409, "superseded")
+    world.loop.pass_time(15.0)
+    assert world.at == pytest.approx((40.0, 0.0, -ALT), abs=0.7)
