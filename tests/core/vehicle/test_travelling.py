@@ -47,9 +47,7 @@ def test_travel_counts_the_vehicles_seconds(loop: Any, flying: Any, copter: Any,
     assert loop.time() - started == pytest.approx(2.0, abs=0.2)
 
 
-def test_late_setpoints_do_not_lengthen_a_travel(
-    loop: Any, flying: Any, copter: Any, pilotage: Any, link: Any
-) -> None:
+def test_late_setpoints_do_not_add_to_a_travel(loop: Any, flying: Any, copter: Any, pilotage: Any, link: Any) -> None:
     def late(message: Any, system: int) -> None:
         flying.on_send(message, system)
         loop.now += 0.4  # the machine is busy
