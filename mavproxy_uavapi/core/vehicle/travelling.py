@@ -53,9 +53,8 @@ class TravellingVehicle(GuidedVehicle):
         ends_at = due + duration
         period = (await self.limits()).guided_timeout / RESENDS_PER_TIMEOUT
         while due < ends_at:
-            due = (
-                due + period if due + period > self._boot_time else self._boot_time + period
-            )  # late: none is made up
+            is_late = due + period < self._boot_time  # the setpoints that are missing are not sent afterwards
+            due = (self._boot_time if is_late else due) + period
             due = ends_at if due > ends_at - ROUNDING else due
             await self._travelled(due)
             await self.send_setpoint(job, velocity if due < ends_at else self.standstill, yaw)
