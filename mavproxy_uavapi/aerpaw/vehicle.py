@@ -70,6 +70,7 @@ class Vehicle(VehicleTelemetry):
         self._is_ours = False  # it was in GUIDED for us; in another mode it belongs to its pilot from then on
         self._has_commanded = False
         self._current_heading: float | None = None  # degrees, for the next movement
+        self._refused_speed: float | None = None  # m/s, for the next movement
         self._moves: list[asyncio.Future[None]] = []  # running and waiting movements, oldest first
         self._background: set[asyncio.Task[None]] = set()  # verbs that still run; a newer one ends them
         self._readying: asyncio.Task[None] | None = None
@@ -105,6 +106,8 @@ class Vehicle(VehicleTelemetry):
         try:
             await self._get_ready()
             await self._ended(before)
+            if self._refused_speed is not None:
+                await self._set_speed(self._refused_speed)
             if self._mission_start_time is None:
                 self._mission_start_time = time.time()
             yield
@@ -228,6 +231,8 @@ class Vehicle(VehicleTelemetry):
     async def set_groundspeed(self, velocity: float) -> None:
         """Set the ground speed (m/s) for flights to positions.
 
+        A rover refuses it before it drives; then it is set with the next movement.
+
         Raises:
             InvalidSpeedError: it is not above 0, or above the API's limit.
         """
@@ -235,10 +240,18 @@ class Vehicle(VehicleTelemetry):
         if not 0 < speed <= MOST_SPEED:
             raise InvalidSpeedError(speed, 0, MOST_SPEED)
         self._log_event("command", type="set_groundspeed", speed_m_s=speed)
+        self._refused_speed = None
+        await self._set_speed(speed)
+
+    async def _set_speed(self, speed: float) -> None:
+        """Set the ground speed. A refusal is logged, and the next movement tries again: scripts do not expect one."""
+        is_last_try = self._refused_speed is not None
+        self._refused_speed = None
         try:
             await self._command(CommandError, lambda drone: drone.set_speed(speed))
-        except CommandError as error:  # some autopilots refuse it, and scripts do not expect that
-            log.warning("the ground speed was not set: %s", error)
+        except CommandError as error:
+            self._refused_speed = None if is_last_try else speed
+            log.log(logging.WARNING if is_last_try else logging.INFO, "the ground speed was not set: %s", error)
 
     async def _stop(self) -> None:
         """End the verbs in the background; the vehicle stops."""

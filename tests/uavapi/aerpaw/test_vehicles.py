@@ -254,6 +254,24 @@ def test_ground_speed_goes_to_the_api_and_a_refusal_does_not_end_a_script(api: A
         asyncio.run(flying.set_groundspeed(0))
 
 
+def test_refused_speed_is_set_with_the_next_movement(api: Any, rover: Any) -> None:
+    api.refusals["/command/set_ground_speed"] = (502, {"detail": "refused", "code": "rejected", "ack": "FAILED"})
+    asyncio.run(rover.set_groundspeed(3))
+    del api.refusals["/command/set_ground_speed"]
+    for _ in range(2):
+        asyncio.run(rover.goto_coordinates(rover.position))
+    assert api.verbs() == ["/command/set_ground_speed"] * 2 + [GO_TO] * 2
+    assert float(api.last("/command/set_ground_speed")["new_v"]) == 3.0
+
+
+def test_speed_that_is_refused_twice_is_given_up(api: Any, rover: Any) -> None:
+    api.refusals["/command/set_ground_speed"] = (502, {"detail": "refused", "code": "rejected", "ack": "FAILED"})
+    asyncio.run(rover.set_groundspeed(3))
+    for _ in range(2):
+        asyncio.run(rover.goto_coordinates(rover.position))
+    assert api.verbs() == ["/command/set_ground_speed"] * 2 + [GO_TO] * 2
+
+
 def test_tolerance_that_is_none_is_refused_before_anything_else() -> None:
     with pytest.raises(ValueError, match="at least"):
         asyncio.run(Drone.goto_coordinates(Drone.__new__(Drone), None, tolerance=0.0))  # type: ignore[arg-type]
