@@ -30,7 +30,7 @@ IMPORTS = {
     "aerpawlib.v1.external": "ExternalProcess",
     "aerpawlib.external": "ExternalProcess",
     "aerpawlib.aerpaw": "AERPAW_Platform",
-    "aerpawlib.v1.exceptions": "MAVSDKNotInstalledError AerpawlibError NavigationError TakeoffError HeartbeatLostError",
+    "aerpawlib.v1.exceptions": "MAVSDKNotInstalledError AerpawlibError NavigationError HeartbeatLostError",
     "aerpawlib.v1.safety": "SafetyCheckerClient SafetyCheckerServer serialize_request deserialize_msg",
     "aerpawlib.v1.safety.server": "SafetyCheckerServer main_cli",
     "aerpawlib.v1.safety.wire_format": "serialize_msg serialize_response",
