@@ -14,6 +14,7 @@ from mavproxy_uavapi.aerpaw.vehicle_thread import VehicleThread
 from mavproxy_uavapi.client.drone import Drone as Client
 from mavproxy_uavapi.core.errors import Stale
 
+WRONG_MODE = "Mode not armable"  # ArduPilot's reason, of a rover after RTL
 HEARTBEAT_AGE = 3.0  # s; without a heartbeat for longer the vehicle is not connected
 
 
@@ -51,9 +52,11 @@ class VehicleTelemetry:
 
     @property
     def armable(self) -> bool:
-        """Whether it is ready to arm."""
+        """Whether it is ready to arm. Its mode does not matter, because arming switches to GUIDED first."""
         status = self._thread.status
-        return status is not None and status.ready_to_arm
+        if status is None or status.ready_to_arm:
+            return status is not None
+        return bool(status.why_not) and all(WRONG_MODE in reason for reason in status.why_not)
 
     @property
     def ekf_ready(self) -> bool:

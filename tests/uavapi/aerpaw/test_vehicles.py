@@ -15,13 +15,14 @@ from mavproxy_uavapi.aerpaw.exceptions import (
     ArmError,
     InvalidSpeedError,
     NavigationError,
+    NotArmableError,
     NotConnectedError,
     NotImplementedForVehicleError,
     TakeoffError,
     VelocityError,
 )
 from mavproxy_uavapi.aerpaw.geometry import VectorNED
-from mavproxy_uavapi.aerpaw.vehicles import Drone, DummyVehicle, Vehicle
+from mavproxy_uavapi.aerpaw.vehicles import Drone, DummyVehicle, Rover, Vehicle
 
 MODE_CHANGED = (409, {"detail": "the vehicle left GUIDED", "code": "mode_changed"})
 GO_TO, TRAVEL = "/movement/go_to_gps_wait", "/movement/travel_at_ned"
@@ -243,6 +244,28 @@ def test_arming_that_is_refused_raises(api: Any, drone: Drone) -> None:
     api.refusals["/command/arm"] = (500, {"detail": "refused", "code": "rejected"})
     with pytest.raises(ArmError):
         asyncio.run(drone.set_armed(True))
+
+
+@pytest.mark.parametrize(
+    ("reasons", "armable"),
+    [
+        (["PreArm: Mode not armable"], True),
+        (["PreArm: Mode not armable", "PreArm: no GPS"], False),
+        (["wait"], False),
+    ],
+)
+def test_vehicle_that_only_its_mode_keeps_from_arming_is_armed(
+    api: Any, vehicle: Any, reasons: list[str], armable: bool
+) -> None:
+    api.why_not = reasons
+    rover = vehicle(Rover)
+    assert rover.armable is armable
+    if armable:
+        asyncio.run(rover.set_armed(True))
+        assert api.verbs() == ["/command/arm"]
+    else:
+        with pytest.raises(NotArmableError, match=reasons[-1]):
+            asyncio.run(rover.set_armed(True))
 
 
 def test_ground_speed_goes_to_the_api_and_a_refusal_does_not_end_a_script(api: Any, flying: Drone) -> None:
