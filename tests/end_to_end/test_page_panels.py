@@ -1,9 +1,10 @@
-"""The page at / in a real browser: who holds the vehicle, its logs, areas on the map, readings, settings."""
+"""The page at / in a real browser: who holds the vehicle, its logs, areas and tiles on the map, readings."""
 
 from __future__ import annotations
 
 import asyncio
 import json
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import pytest
 
 from tests.support.chromium import chromium
 from tests.support.page_pilot import Pilot
+from tests.support.pictures import grey_png
 
 pytestmark = pytest.mark.needs("chromium")
 
@@ -24,6 +26,36 @@ FIELD = {
     },
 }
 LABEL = "document.querySelector('top-view canvas').getAttribute('aria-label')"
+
+
+FENCE = [
+    (-35.362, 149.165),
+    (-35.36, 149.16),
+    (-35.36, 149.17),
+    (-35.366, 149.17),
+    (-35.36, 149.16),
+]  # it returns first
+TILES = "[...document.querySelector('top-view').tiles.tiles.values()]"
+
+
+def map_of(directory: Path, zoom: int = 10) -> Path:
+    """A folder with the one tile in which the vehicle is."""
+    lat, lon = FENCE[0]
+    x = int(2**zoom * (lon + 180) / 360)
+    y = int(2**zoom * (1 - math.asinh(math.tan(math.radians(lat))) / math.pi) / 2)
+    file = directory / "map" / str(zoom) / str(x) / f"{y}.png"
+    file.parent.mkdir(parents=True)
+    file.write_bytes(grey_png())
+    return directory / "map"
+
+
+async def see_the_fence(pilot: Pilot) -> None:
+    file = pilot.rig.directory / "fence.txt"
+    file.write_text("".join(f"{lat:.7f} {lon:.7f}\n" for lat, lon in FENCE))
+    pilot.rig.mavproxy.type(f"fence load {file}")
+    pilot.rig.eventually(lambda: len(pilot.rig.ok(pilot.rig.get("/mission/fence"))["fence"]["features"]) == 1)
+    await pilot.click("Mission")
+    await pilot.page.until(f"{LABEL}.includes('2 areas of fences')")
 
 
 async def hold_and_release(pilot: Pilot) -> None:
@@ -65,6 +97,8 @@ async def look(rig: Any, directory: Path) -> list[str]:
         await page.visit(rig.url + "/")
         await pilot.sees_live()
         await page.until(f"{LABEL}.includes('1 area of fences')")
+        await page.until(f"{TILES}.some(tile => tile instanceof ImageBitmap)")
+        await see_the_fence(pilot)
         await hold_and_release(pilot)
         await download_a_log(pilot)
         await pilot.finds_it_accessible()
@@ -76,7 +110,7 @@ async def look(rig: Any, directory: Path) -> list[str]:
 @pytest.fixture
 def rig(harness: Any, tmp_path: Path) -> Iterator[Any]:
     """A vehicle that has a log, because it was armed once."""
-    made = harness.embedded(tmp_path, speedup=2, vehicle_logs=str(tmp_path / "logs"))
+    made = harness.embedded(tmp_path, speedup=2, vehicle_logs=str(tmp_path / "logs"), tiles=str(map_of(tmp_path)))
     try:
         harness.eventually(lambda: made.status()["ready_to_arm"], 60, what="getting ready to arm")
         made.ok(made.get("/command/arm"))
