@@ -6,6 +6,7 @@ import asyncio
 import hashlib
 
 from mavproxy_uavapi.core.envelope import formats
+from mavproxy_uavapi.core.envelope.model import Envelope
 from mavproxy_uavapi.core.errors import BadRequest, Busy, Stale
 from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission
 from mavproxy_uavapi.core.vehicle import mission_files, mission_flight
@@ -54,6 +55,8 @@ async def fence(call: Call) -> Answer:
     """The areas of the autopilot's fence, freshly read from it; its cylinder is in the parameters FENCE_*."""
     vehicle = call.vehicle
     items, system = await vehicle.waypoints.download_fence(), vehicle.state.system
+    if not items:
+        return call.answer("Success", fence=formats.geojson(Envelope()))
     areas = formats.of_fence(items, f"the fence of vehicle {system}", lambda: call.service.host.home_of(system))
     return call.answer("Success", fence=formats.geojson(areas))
 
