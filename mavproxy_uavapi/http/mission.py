@@ -6,7 +6,6 @@ import asyncio
 import hashlib
 
 from mavproxy_uavapi.core.envelope import formats
-from mavproxy_uavapi.core.envelope.model import Envelope
 from mavproxy_uavapi.core.errors import BadRequest, Busy, Stale
 from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission
 from mavproxy_uavapi.core.vehicle import mission_files, mission_flight
@@ -56,7 +55,7 @@ async def fence(call: Call) -> Answer:
     vehicle = call.vehicle
     items, system = await vehicle.waypoints.download_fence(), vehicle.state.system
     if not items:
-        return call.answer("Success", fence=formats.geojson(Envelope()))
+        return call.answer("Success", fence=formats.EMPTY)
     areas = formats.of_fence(items, f"the fence of vehicle {system}", lambda: call.service.host.home_of(system))
     return call.answer("Success", fence=formats.geojson(areas))
 
