@@ -139,11 +139,11 @@ async def look(rig: Any, directory: Path, options: argparse.Namespace) -> None:
         await page.until(LIVE)
         await page.until(f"document.querySelectorAll('vehicle-bar button').length === {options.vehicles}")
         rows = [await frames(page, "looking", options.seconds)]
-        if options.minutes:
-            print(table(["minute", "heap MB", "nodes"], await leak(page, options.minutes)), flush=True)
         if options.pictures:
             await take_pictures(page, options.pictures)
             await page.resize(1440, 900)
+        if options.minutes:
+            print(table(["minute", "heap MB", "nodes"], await leak(page, options.minutes)), flush=True)
         await page.evaluate(SHAKE)
         rows.append(await frames(page, "zooming", options.seconds))
         headings = [
