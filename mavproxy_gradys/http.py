@@ -1,4 +1,4 @@
-"""The module's endpoints while uavapi is loaded: /gradys/status, /gradys/readings, /mission/fly-track."""
+"""The module's endpoints while uavapi is loaded: /gradys/…, and /mission/fly-track."""
 
 from __future__ import annotations
 
@@ -70,6 +70,12 @@ class Readings(Request):
         return value if not isinstance(value, dict) or "readings" in value else {"readings": [value]}
 
 
+class Since(Request):
+    """`since`: s since 1970; only later readings are answered."""
+
+    since: Annotated[float, Field(ge=0, le=1e11, description="s since 1970; only later readings")] = 0.0
+
+
 class GradysHandlers:
     """The actions of the routes."""
 
@@ -81,6 +87,7 @@ class GradysHandlers:
         return [
             Route("/gradys/status", self.status, Empty, WATCH),
             Route("/gradys/readings", self.readings, Readings, FLY, POST),
+            Route("/gradys/recent", self.recent, Since, WATCH),
             Route("/gradys/flush", self.flush, Empty, FLY, EITHER),
             Route(VERB, self.fly_track, TrackRequest, FLY, POST, job=True),
         ]
@@ -106,6 +113,11 @@ class GradysHandlers:
             "result": f"Kept {len(numbers)} reading{plural}",
             "seq": numbers,
         }
+
+    async def recent(self, call: Call) -> dict[str, Any]:
+        """The newest numbers by device and quantity; their points are [s since 1970, value]."""
+        series = self._gradys.pipeline.recent.report(call.params(Since).since)
+        return {"device": "uav", "id": self._id(call), "result": "Success", "series": series}
 
     async def fly_track(self, call: Call) -> Answer:
         """Take off, fly through a track's places, return and land."""

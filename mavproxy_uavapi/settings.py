@@ -10,7 +10,7 @@ from typing import Any
 
 from MAVProxy.modules.lib.mp_settings import MPSetting
 
-from mavproxy_uavapi import envelope_file, tokens
+from mavproxy_uavapi import envelope_file, tile_store, tokens
 from mavproxy_uavapi.core.addresses import is_loopback, local_url_of, url_of
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.ini_file import IniFile
@@ -77,6 +77,7 @@ class ApiSettings:
         python_path: the Python for .py scripts.
         script_grace: s from Ctrl-C to the kill of a script that is stopped.
         vehicle_logs: folder of the downloaded logs of vehicles.
+        tiles: the map of the page: an MBTiles file or a folder of tiles; empty for none.
         script_size: kB of one script.
         script_quota: MB of all scripts together.
         envelope: file with where vehicles may fly; `vehicle` for their own fences, empty for none.
@@ -114,6 +115,7 @@ class ApiSettings:
     python_path: str
     script_grace: float
     vehicle_logs: str
+    tiles: str
     script_size: int
     script_quota: int
     envelope: str
@@ -279,6 +281,7 @@ class ApiModuleSettings(ModuleSettings[ApiSettings]):
             MPSetting("log_path", str, "", "log file, or its folder"),
             MPSetting("debug", str, "", "components that log in detail"),
             MPSetting("vehicle_logs", str, "~/uav_logs", "folder of downloaded vehicle logs"),
+            MPSetting("tiles", str, "", "map of the page: an MBTiles file or a folder z/x/y.png"),
             MPSetting("scripts_path", str, "~/uav_scripts", "folder of the uploaded scripts", tab="Scripts"),
             MPSetting("script_logs", str, "~/uav_scripts/logs", "folder of their logs"),
             MPSetting("python_path", str, sys.executable, "what runs .py scripts"),
@@ -300,6 +303,8 @@ class ApiModuleSettings(ModuleSettings[ApiSettings]):
         settings.check()
         if "envelope" in changed:
             envelope_file.check(settings.envelope)
+        if "tiles" in changed:
+            tile_store.check(settings.tiles)
         if "tokens" in changed:
             tokens.check(settings.tokens)
 

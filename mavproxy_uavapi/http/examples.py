@@ -259,6 +259,19 @@ MEMBERS: Mapping[str, Mapping[str, Any]] = {
         "run": {**ENDED, "out": "landed\n", "err": ""},
     },
     "GET /mission/waypoints": {"home": {**ITEMS[0], "seq": 0, "command": "NAV_WAYPOINT"}, "items": ITEMS},
+    "/mission/fence": {
+        "fence": {
+            "type": "FeatureCollection",
+            "features": [
+                {
+                    "type": "Feature",
+                    "properties": {"kind": "exclusion", "name": "fence circle 0", "radius": 25.0},
+                    "geometry": {"type": "Point", "coordinates": [149.1665, -35.3625]},
+                }
+            ],
+            "limits": {},
+        }
+    },
     "/mission/progress": {
         "info": {
             "current": 2,
