@@ -27,7 +27,7 @@ PLAIN, OURS = 0, 1
 NAMES = ("without our modules", "uavapi and gradys")
 MODES = ("BRAKE", "GUIDED")  # by turns, so that each try changes the mode
 SETTLE = 1.0  # s after a change before it counts
-BETWEEN_TRIES = 0.02  # s
+WARM_UP, BETWEEN_TRIES = 2.0, 0.02  # s
 
 
 class Case:
@@ -121,11 +121,13 @@ def bench(count: int, options: argparse.Namespace) -> Iterator[Bench]:
                 directory = Path(name, str(number))
                 directory.mkdir()
                 rigs.append(start(directory, [pair[number] for pair in pairs], copters.out_port, number == OURS))
-            rigs[PLAIN].mavproxy.says("Detected vehicle 1:1")
+            for system in range(1, count + 1):
+                rigs[PLAIN].mavproxy.says(f"Detected vehicle {system}:1")
             rigs[OURS].wait_until_up()
             harness.eventually(
                 lambda: len(rigs[OURS].get("/vehicles").json()["vehicles"]) == count, what="all of them"
             )
+            time.sleep(WARM_UP)
             if options.first:
                 put_first(copters.process.pid or 0, *(rig.mavproxy.pid for rig in rigs))
             yield Bench(rigs, copters, count, options)
@@ -145,7 +147,7 @@ def start(directory: Path, links: list[int], out_port: int, with_modules: bool) 
     ]
     if with_modules:
         command += [harness.load(rig.port), f'--cmd=module load gradys:{{"spool":"{directory}/spool.db"}}']
-    rig.mavproxy = rig.start("mavproxy", command)
+    rig.mavproxy = rig.start("mavproxy", command, {"MAVLINK20": "1"})  # else one loads a second dialect
     return rig
 
 

@@ -133,7 +133,8 @@ class Generator:
         self.from_vehicle: Callable[[float, bytes], None] = lambda _at, _frame: None
         self._forwarding = Forwarding()
         self._forwarding.attach(self)  # type: ignore[arg-type]  it is watched as a tap is
-        self._awaited, self._active = 0, 0
+        self._awaited: set[int] = set()
+        self._active = 0
         self._copters = [Copter(number, of_it, self._told) for number, of_it in enumerate(ports, 1)]
         for copter in self._copters:
             self.watch(copter.socket, copter.read)
@@ -144,8 +145,8 @@ class Generator:
         self._selector.register(sock, selectors.EVENT_READ, read)
 
     def _told(self, system: int, at: float) -> None:
-        if system == self._awaited:
-            self._awaited = 0
+        if system in self._awaited:
+            self._awaited.remove(system)
             self._pipe.send(at)
 
     def run(self) -> None:
@@ -169,7 +170,7 @@ class Generator:
     def obey(self, order: Any) -> bool:
         """One order from the pipe; False for the end.
 
-        `("active", n)`: telemetry goes to MAVProxy n. `("await", system)`: answer when that copter was told a mode.
+        `("active", n)`: telemetry goes to MAVProxy n. `("await", systems)`: answer when each of them was told a mode.
         `("between", start, end)`: answer the delays (s) of what was sent then, and how many were lost.
         """
         if order is None:
@@ -178,7 +179,7 @@ class Generator:
         if what == "active":
             self._active = arguments[0]
         elif what == "await":
-            self._awaited = arguments[0]
+            self._awaited = set(arguments[0])
         else:
             self._pipe.send((self._forwarding.between(*arguments), self._forwarding.lost(*arguments)))
         return True
@@ -211,12 +212,12 @@ class Copters:
         """Send the telemetry to that MAVProxy; heartbeats go to all."""
         self._pipe.send(("active", mavproxy))
 
-    def expect(self, system: int) -> None:
-        """Count the next change of mode of that copter."""
-        self._pipe.send(("await", system))
+    def expect(self, *systems: int) -> None:
+        """Count the next change of mode of each of these copters."""
+        self._pipe.send(("await", systems))
 
     def told_at(self) -> float:
-        """When the expected change of mode arrived at its socket, s of time.time()."""
+        """When the next expected change of mode arrived at its socket, s of time.time()."""
         return float(self._answer())
 
     def forwarded(self, start: float, end: float) -> tuple[list[float], int]:

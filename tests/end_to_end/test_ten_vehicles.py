@@ -14,7 +14,8 @@ import requests
 
 from mavproxy_uavapi.core.vehicle.geodesy import offset
 from tests.support.ground_station import Recorder
-from tests.support.processes import SCRIPTS, Rig, free_port
+from tests.support.processes import SCRIPTS, Rig, eventually, free_port
+from tests.support.several_vehicles import listed
 from tests.support.truth import Truth
 
 FIRST, COUNT = 10, 10
@@ -50,6 +51,7 @@ def rig(tmp_path: Path, station: Recorder, truth: Truth) -> Iterator[Rig]:
     command += ["--module", "gradys:" + json.dumps(push, separators=(",", ":")), "--", f"--streamrate={STREAM_RATE}"]
     try:
         rig.start("launcher", command).says(f"API of vehicles {FIRST} to {FIRST + COUNT - 1}", timeout=240)
+        eventually(lambda: set(SYSTEMS) <= set(listed(rig)), what="all vehicles in the list")
         yield rig
     finally:
         rig.stop()
@@ -70,6 +72,7 @@ def nearest(path: list[tuple[float, float]], corner: tuple[float, float]) -> int
     return min(range(len(path)), key=lambda number: math.dist(path[number], corner))
 
 
+@pytest.mark.long
 def test_ten_vehicles_fly_squares_at_once_and_push_their_positions(rig: Rig, station: Recorder, truth: Truth) -> None:
     with ThreadPoolExecutor(COUNT) as pool:
         for flown in [pool.submit(fly_square, rig, system) for system in SYSTEMS]:
