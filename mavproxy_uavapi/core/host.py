@@ -15,6 +15,7 @@ from mavproxy_uavapi.core.envelope import formats
 from mavproxy_uavapi.core.envelope.store import OPERATOR, Envelopes, missing
 from mavproxy_uavapi.core.errors import LinkLost, UavApiError
 from mavproxy_uavapi.core.mainloop.bridge import Bridge
+from mavproxy_uavapi.core.mainloop.link_keeper import LinkKeeper
 from mavproxy_uavapi.core.mavlink.fence_watch import FenceWatch
 from mavproxy_uavapi.core.mavlink.link import Link, MavproxyLink
 from mavproxy_uavapi.core.mavlink.link_watch import LinkWatch
@@ -93,6 +94,7 @@ class Host:
         self.closing_messages: list[Callable[[], list[tuple[Any, int]]]] = [self.endings.closing_messages]
         self._mpstate = mpstate
         self._announced_target = 0
+        self._link_keeper = LinkKeeper(clock)
         self._parameters = ParameterWatch()
         self._fences = FenceWatch()
 
@@ -113,6 +115,7 @@ class Host:
         if target != self._announced_target:
             self._announced_target = target
             self.bridge.call_soon(setattr, self.registry, "current", target)
+        self._link_keeper.turn(self._mpstate.mav_master)
         self._share_parameters()
         self._share_fences()
         self.bridge.turn()
@@ -133,6 +136,7 @@ class Host:
             for message, system in self.bridge.run(collect()):
                 with contextlib.suppress(LinkLost):  # the vehicle does not hear us
                     self._mavproxy_link.write(message, system)
+        self._link_keeper.release()
         self.bridge.stop()
 
     def _share_parameters(self) -> None:

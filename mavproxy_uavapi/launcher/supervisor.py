@@ -107,6 +107,9 @@ class Supervisor:
         await self._start_watchdog()
         for vehicle in self.simulated:
             await self._start_vehicle(vehicle)
+        if self.options.ardupilot_path is None:
+            for process, vehicle in self.vehicles.items():
+                await self._vehicle_ready(process, self._log_of(vehicle))
         await self._start_mavproxy()
         assert self.mavproxy is not None
         ends = {asyncio.create_task(self.mavproxy.wait()), asyncio.create_task(self._all_vehicles_ended())}
@@ -134,9 +137,7 @@ class Supervisor:
         log = self._log_of(vehicle)
         if self.options.ardupilot_path is None:
             command = command_lines.embedded_command(self.options, vehicle)
-            process = await self._start(command, environment.for_python(os.environ), log.name)
-            self.vehicles[process] = vehicle
-            await self._vehicle_ready(process, log)
+            self.vehicles[await self._start(command, environment.for_python(os.environ), log.name)] = vehicle
         else:
             env = environment.for_sim_vehicle(os.environ, self.run_dir)
             command = command_lines.sim_vehicle_command(

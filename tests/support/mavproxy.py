@@ -31,6 +31,7 @@ def mavproxy_state() -> Any:
         status=SimpleNamespace(logdir=None),
         continue_mode=False,
         mav_param_by_sysid={},
+        mav_master=[master],
         the_master=master,
         master=lambda system=None: master,
     )
