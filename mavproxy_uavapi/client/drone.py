@@ -7,12 +7,14 @@ import contextlib
 import math
 import os
 from collections.abc import AsyncIterator, Awaitable, Callable
-from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, TypeVar
 
 from mavproxy_uavapi.client.errors import Unreachable, error_of
 from mavproxy_uavapi.client.http import Http
+from mavproxy_uavapi.client.logs import Log
 from mavproxy_uavapi.client.places import Ned, Position
+from mavproxy_uavapi.client.reports import Attitude, Battery, Gps, Status
 from mavproxy_uavapi.client.telemetry import Telemetry
 from mavproxy_uavapi.core.errors import LinkLost, NoVehicle, Stale, UavApiError
 from mavproxy_uavapi.core.mavlink.flight_modes import mode_name
@@ -30,46 +32,6 @@ SHOWN_WITHIN = 2.0  # s until the stream must show the effect that a verb's answ
 LONGEST_TRAVEL = 3600.0  # s for which the API repeats a velocity in one call
 ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
 UNKNOWN_HEADING = 65535
-
-
-@dataclass(frozen=True)
-class Attitude:
-    """Roll, pitch and yaw in rad; yaw clockwise from north."""
-
-    roll: float
-    pitch: float
-    yaw: float
-
-
-@dataclass(frozen=True)
-class Battery:
-    """Voltage in V, current in A, level in %; None if unknown."""
-
-    voltage: float | None
-    current: float | None
-    level: int | None
-
-
-@dataclass(frozen=True)
-class Gps:
-    """The receiver's fix (3: 3-D and better) and its number of satellites; None if unknown."""
-
-    fix_type: int
-    satellites: int | None
-
-
-@dataclass(frozen=True)
-class Status:
-    """The vehicle's status by the API; see /telemetry/status."""
-
-    kind: str
-    mode: str
-    armed: bool | None
-    landed_state: str
-    link_alive: bool
-    ekf_ok: bool
-    ready_to_arm: bool
-    why_not: tuple[str, ...]
 
 
 def _scaled(value: float | None, divisor: float) -> float | None:
@@ -182,6 +144,34 @@ class Drone:
         """
         body = await self._http.get("/telemetry/home_info")
         return Position(body["lat"], body["lon"], 0.0), float(body["altitude"])
+
+    # -- logs ---------------------------------------------------------------------------------------------
+
+    async def logs(self) -> list[Log]:
+        """The logs that it holds, oldest first.
+
+        Raises:
+            Busy: it is armed, or another program reads its logs.
+        """
+        body = await self._answer(self._http.get("/logs"))
+        return [Log.of(report) for report in body["logs"]]
+
+    async def download_log(self, log: Log, file: Path | str) -> Path:
+        """Save a log in `file`, which may exist; returns its path.
+
+        A log that the API's machine does not have yet is first transferred from the vehicle: some minutes for a long
+        flight. If the task is cancelled, the transfer ends, and `file` is unchanged.
+
+        Raises:
+            Busy: it is armed, or another program reads its logs.
+            NotFound: it does not have the log any more.
+            OSError: `file` cannot be written.
+        """
+        if not log.downloaded:
+            await self._answer(self._http.ask("POST", f"/logs/{log.id}/download", {}))
+        target = Path(file)
+        await self._http.save(f"/logs/{log.id}", target)
+        return target
 
     # -- arming, takeoff, landing -------------------------------------------------------------------------
 
