@@ -63,6 +63,25 @@ def test_plane_takes_off_flies_circles_returns_lands_and_arms_again(plane: Rig) 
     plane.ok(plane.get("/command/disarm"))
 
 
+def test_plane_whose_landing_cannot_be_uploaded_stays_in_its_mode(plane: Rig) -> None:
+    if plane.control is None:
+        pytest.skip("the link of this rig loses nothing")
+    take_off(plane)
+    plane.control.fault("drop", message="MISSION_ITEM_INT")
+    since = plane.control.ask("received", since=0)["last"]
+    answer = plane.get("/command/land_at", lat=FIELD[0], long=FIELD[1])
+    plane.control.ask("clear")
+    assert (answer.status_code, answer.json()["code"]) == (500, "rejected")
+    received = plane.control.ask("received", since=since)["messages"]
+    commands = {message["fields"]["command"] for message in received if message["name"] == "COMMAND_LONG"}
+    assert not commands & {176, 224, 300}, "no mode, no current item, no start"
+    assert plane.status()["mode"] == "GUIDED"
+    plane.ok(plane.get("/command/land_at", lat=FIELD[0], long=FIELD[1]))
+    wait_until_disarmed(plane)
+    plane.ok(plane.get("/command/arm", timeout=60))
+    plane.ok(plane.get("/command/disarm"))
+
+
 def test_plane_lands_by_the_landing_sequence_of_the_mission_that_it_flies(plane: Rig) -> None:
     plane.ok(plane.delete("/mission/waypoints"))
     take_off(plane)

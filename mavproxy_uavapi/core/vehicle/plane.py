@@ -6,9 +6,10 @@ off in TAKEOFF, and flies to positions in GUIDED by DO_REPOSITION only.
 
 from __future__ import annotations
 
+import contextlib
 import math
 
-from mavproxy_uavapi.core.errors import Busy, Invalid, ModeChanged, Stale
+from mavproxy_uavapi.core.errors import Busy, Invalid, ModeChanged, Rejected, Stale
 from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission
 from mavproxy_uavapi.core.vehicle import landing_pattern, messages, mission_flight, time_limits
 from mavproxy_uavapi.core.vehicle.authority import Rank
@@ -65,9 +66,9 @@ class Plane(GuidedVehicle):
             self.authority.take(job, Rank.ARM)
             if flies_mission(self.mode):
                 await self.switch_to(job, GUIDED, self._require_disarmed)
-            await self.commands.send(
-                messages.set_mission_current(1, reset=False), self.commanding(job, self._require_disarmed)
-            )
+            first = messages.set_mission_current(1, reset=False)
+            with contextlib.suppress(Rejected):  # the mission may just have been cleared
+                await self.commands.send(first, self.commanding(job, self._require_disarmed))
         await super().arm(job, timeout)
 
     def _require_disarmed(self) -> None:
