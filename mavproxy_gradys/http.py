@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import math
-import re
 import time
 from typing import Annotated, Any
 
@@ -22,7 +21,6 @@ from mavproxy_uavapi.http.extension import EITHER, FLY, POST, WATCH, Answer, Cal
 
 MOST_READINGS = 1000  # readings in one request
 LONGEST_LIST = 64
-VEHICLE = re.compile(rf"{device_of(0)[:-1]}[0-9]+")  # the device names of vehicles
 Name = Annotated[str, Field(pattern=rf"^{NAME}$", description="letters, digits, _ . -")]
 
 
@@ -125,12 +123,18 @@ class GradysHandlers:
         system = request.sysid or call.known_vehicle.state.system
         call.require_right(system)
         at = now if request.time is None else request.time
-        device = request.device or device_of(system)
+        device = request.device or self._gradys.pipeline.device_of(system)
         if request.quantity == STATUS:
             raise Invalid(f"{STATUS} tells whether a vehicle is online; take another name", "quantity")
-        if request.quantity in self._gradys.pipeline.reserved and VEHICLE.fullmatch(device):
+        if request.quantity in self._gradys.pipeline.reserved and self._is_vehicle(device):
             raise Invalid(f"{request.quantity} of {device} comes from the vehicle itself only", "quantity")
         return Reading(device, system, request.quantity, request.representation, request.value, at)
+
+    def _is_vehicle(self, device: str) -> bool:
+        """Whether it is the device name of a vehicle."""
+        number = device.rpartition("-")[2]
+        is_number = number.isascii() and number.isdigit()
+        return is_number and device in (device_of(int(number)), self._gradys.pipeline.device_of(int(number)))
 
     def _id(self, call: Call) -> str | None:
         try:

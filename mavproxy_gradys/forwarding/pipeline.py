@@ -9,7 +9,7 @@ from typing import Any
 
 from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.forwarding.quantities import POSITION, Quantity
-from mavproxy_gradys.forwarding.readings import Reading, Sampler
+from mavproxy_gradys.forwarding.readings import UAV, Reading, Sampler, device_of
 from mavproxy_gradys.forwarding.sender import Sender
 from mavproxy_gradys.forwarding.sensor import SensorSampler, source_of
 from mavproxy_gradys.forwarding.spool import Spool
@@ -132,6 +132,10 @@ class ReadingPipeline:
         sampled = () if self._settings is None else self._settings.quantities
         return {POSITION, *(quantity.name for quantity in sampled)}
 
+    def device_of(self, system: int) -> str:
+        """The device name of a vehicle."""
+        return device_of(system, UAV if self._settings is None else self._settings.device)
+
     def flush(self) -> None:
         """Try all sinks now."""
         for sender in self._senders:
@@ -142,14 +146,15 @@ class ReadingPipeline:
     # -- sampling -----------------------------------------------------------------------------------------
 
     def _sampler(self, quantity: Quantity) -> Sampler:
-        sampler = Sampler(quantity)
+        assert self._settings is not None
+        sampler = Sampler(quantity, self._settings.device)
         self._samplers.append(sampler)
         return sampler
 
     def _sensor(self, quantity: Quantity) -> SensorSampler:
         assert self._settings is not None
         source = source_of(quantity, self._settings.max_age, self._wall)
-        sampler = SensorSampler(quantity, source, self._host.clock)
+        sampler = SensorSampler(quantity, source, self._host.clock, self._settings.device)
         self._samplers.append(sampler)
         return sampler
 
