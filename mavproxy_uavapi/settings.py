@@ -23,14 +23,17 @@ Network = ipaddress.IPv4Network | ipaddress.IPv6Network
 # Keys of the original service's or the launcher's INI file that are not settings of the module, with the reason; each
 # is reported in a line.
 LAUNCHERS = "`mavproxy-uavapi --config` starts simulated vehicles"
+_OF_API = {
+    "uav_connection": "MAVProxy has the link (--master)",
+    "connection_type": "MAVProxy has the link (--master)",
+    "gradys_gs": "the module gradys reads it from here (`module load gradys`, with this file as its config)",
+    "vehicle": "the vehicle's heartbeat gives its type",
+    "udp": "there is no HTTP/3",
+}
 NOT_OURS: dict[str, dict[str, str]] = {
-    "api": {
-        "uav_connection": "MAVProxy has the link (--master)",
-        "connection_type": "MAVProxy has the link (--master)",
-        "gradys_gs": "the module gradys reads it from here (`module load gradys`, with this file as its config)",
-        "vehicle": "the vehicle's heartbeat gives its type",
-        "udp": "there is no HTTP/3",
-    },
+    "api": _OF_API,
+    "mode": {**_OF_API, "simulated": LAUNCHERS},
+    "udp": _OF_API,
     "simulated": {
         "simulated": LAUNCHERS,
         "ardupilot_path": LAUNCHERS,

@@ -73,7 +73,7 @@ REQUESTS: Mapping[type[requests.Request], Mapping[str, Any]] = {
     requests.Servo: {"channel": 9, "pwm": 1500},
     requests.ExecuteScript: {"script_name": "square.py", "args": ["10"]},
     requests.ScriptName: {"script_name": "square.py"},
-    requests.Photo: {"command": "rpicam-still", "resolution": "1280x720", "capture_time": 20},
+    requests.Photo: {"command": "rpicam-still", "resolution": "1280x720", "exposure": 20},
     requests.StreamFilter: {"names": "ATTITUDE,GPS_RAW_INT", "rate": 2},
 }
 

@@ -228,12 +228,17 @@ class StartMission(Blocking):
 
 
 class Photo(Request):
-    """A picture: the tool, pixels, ms of exposure, and the focus distance in m."""
+    """A picture: the tool, pixels, ms before it, ms of exposure, and the focus distance in m."""
 
     command: Annotated[str, Field(description="fswebcam, rpicam-still, libcamera-still, or vision")]
     resolution: Annotated[str, Field(description="width x height in pixels")] = "1280x720"
-    capture_time: Annotated[float, Field(gt=0, le=10_000, description="ms of exposure"), Written] = 150
+    capture_time: Annotated[float, Field(ge=0, le=10_000, description="ms to settle before the picture"), Written] = (
+        1000
+    )
     focus_distance: Annotated[float | None, Field(ge=0.01, le=1000, description="m"), Written] = None
+    exposure: Annotated[
+        float | None, Field(gt=0, le=10_000, description="ms of a Raspberry Pi's camera; none: its own"), Written
+    ] = None
 
 
 class Read(Request):

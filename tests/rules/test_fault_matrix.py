@@ -68,6 +68,9 @@ REQUESTS = {
     "travel, with duration": Request(
         "flying", {"vx": 1, "vy": 0, "vz": 0, "duration": 5}, {"vx": 1, "vy": 0, "vz": 0, "duration": 60}
     ),
+    "travel_at_body, with duration": Request(
+        "flying", {"front": 1, "right": 0, "duration": 5}, {"front": 1, "right": 0, "duration": 60}
+    ),
     "fly-track": Request("flying", {"track": track(6e-5), "ground": 584}, {"track": track(3e-3), "ground": 584}),
     "set_heading": Request("flying", "?heading=90"),
     "set_yaw_rate": Request("flying", "?yaw_rate=20"),
@@ -232,7 +235,7 @@ def strike(world: Any, verb: str, fault: str) -> tuple[float, Any]:
     """Ask, and let it happen; when it happened, and the request in flight."""
     request = REQUESTS[verb]
     flight = request.far is not None
-    far = flight and (verb, fault) != ("travel, with duration", "another station flies it")
+    far = flight and not (", with duration" in verb and fault == "another station flies it")
     BEFORE.get(fault, lambda _: None)(world)
     meanwhile = MEANWHILE.get(fault)
     delay = UNDER_WAY if flight else WAITING
