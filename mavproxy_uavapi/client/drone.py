@@ -6,10 +6,12 @@ import asyncio
 import contextlib
 import os
 from collections.abc import AsyncIterator, Awaitable, Callable
+from pathlib import Path
 from typing import Any, TypeVar
 
 from mavproxy_uavapi.client.errors import Unreachable, error_of
 from mavproxy_uavapi.client.http import Http
+from mavproxy_uavapi.client.logs import Log
 from mavproxy_uavapi.client.places import Ned, Position
 from mavproxy_uavapi.client.readings import Readings, Status
 from mavproxy_uavapi.client.telemetry import Telemetry
@@ -69,6 +71,34 @@ class Drone(Readings):
         """
         body = await self._http.get("/telemetry/home_info")
         return Position(body["lat"], body["lon"], 0.0), float(body["altitude"])
+
+    # -- logs ---------------------------------------------------------------------------------------------
+
+    async def logs(self) -> list[Log]:
+        """The logs that it holds, oldest first.
+
+        Raises:
+            Busy: it is armed, or another program reads its logs.
+        """
+        body = await self._answer(self._http.get("/logs"))
+        return [Log.of(report) for report in body["logs"]]
+
+    async def download_log(self, log: Log, file: Path | str) -> Path:
+        """Save a log in `file`, which may exist; returns its path.
+
+        A log that the API's machine does not have yet is first transferred from the vehicle: some minutes for a long
+        flight. If the task is cancelled, the transfer ends, and `file` is unchanged.
+
+        Raises:
+            Busy: it is armed, or another program reads its logs.
+            NotFound: it does not have the log any more.
+            OSError: `file` cannot be written.
+        """
+        if not log.downloaded:
+            await self._answer(self._http.ask("POST", f"/logs/{log.id}/download", {}))
+        target = Path(file)
+        await self._http.save(f"/logs/{log.id}", target)
+        return target
 
     # -- arming, takeoff, landing -------------------------------------------------------------------------
 

@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
+import tempfile
 from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, BinaryIO
 
 import aiohttp
 
 from mavproxy_uavapi.client.errors import Unreachable, error_of
 
 CONNECT_TIMEOUT = 5.0  # s for the TCP connection; a verb's answer may take as long as its flight
+PART = 64 * 1024  # bytes of a file that are received and written at a time
 PING_PERIOD = 10.0  # s between pings that check whether a silent stream is alive
 
 
@@ -73,6 +78,35 @@ class Http:
         if response.status >= 400:
             raise error_of(response.status, answer)
         return answer
+
+    async def save(self, path: str, file: Path) -> None:
+        """Send a GET and save the body of its success in `file`, which changes only if all of it has arrived.
+
+        Raises:
+            UavApiError: the error of the API's answer.
+            Unreachable: nothing answers, or the connection breaks.
+            OSError: `file` cannot be written.
+        """
+        url = self.url + path
+        handle, name = await asyncio.to_thread(tempfile.mkstemp, dir=file.parent, prefix=f".{file.name}-")
+        try:
+            with os.fdopen(handle, "wb") as part:
+                await self._receive(url, part)
+            await asyncio.to_thread(os.replace, name, file)
+        except BaseException:
+            with suppress(FileNotFoundError):
+                os.unlink(name)
+            raise
+
+    async def _receive(self, url: str, file: BinaryIO) -> None:
+        try:
+            async with self._session.get(url) as response:
+                if response.status >= 400:
+                    raise error_of(response.status, await response.json())
+                async for data in response.content.iter_chunked(PART):
+                    await asyncio.to_thread(file.write, data)
+        except (aiohttp.ClientError, asyncio.TimeoutError) as error:
+            raise Unreachable(f"{url}: {str(error) or 'no answer'}") from error
 
     def stream(self, path: str, **query: Any) -> aiohttp.client._WSRequestContextManager:
         """A WebSocket, as a context manager."""

@@ -173,7 +173,7 @@ class Commands:
 
     def _set_mission_current(self, command: CommandInt, link: PeerLink) -> int:
         del link
-        if not self._vehicle.current_item(int(command.param1)):
+        if not self._vehicle.current_item(int(command.param1), begins=command.param2 == 1):
             return DENIED
         self._transmitter.broadcast("MISSION_CURRENT")
         return ACCEPTED

@@ -31,6 +31,7 @@ NAVIGATION = COPTER_NAVIGATION | {
     mavlink.MAV_CMD_NAV_VTOL_LAND,
 }
 TAKEOFFS = (mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_NAV_VTOL_TAKEOFF)
+LANDINGS = (mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_NAV_VTOL_LAND)
 CONDITION = frozenset(
     {
         mavlink.MAV_CMD_CONDITION_DELAY,
@@ -62,6 +63,14 @@ ALL_ITEMS = (
         mavlink.MAV_CMD_DO_GRIPPER,
         mavlink.MAV_CMD_DO_MOUNT_CONTROL,
         mavlink.MAV_CMD_DO_SET_RELAY,
+        mavlink.MAV_CMD_DO_REPEAT_SERVO,
+        mavlink.MAV_CMD_DO_GO_AROUND,
+        mavlink.MAV_CMD_DO_PARACHUTE,
+        mavlink.MAV_CMD_DO_AUTOTUNE_ENABLE,
+        mavlink.MAV_CMD_DO_SET_RESUME_REPEAT_DIST,
+        mavlink.MAV_CMD_DO_GUIDED_LIMITS,
+        mavlink.MAV_CMD_DO_ENGINE_CONTROL,
+        mavlink.MAV_CMD_JUMP_TAG,
         mavlink.MAV_CMD_DO_FENCE_ENABLE,
         mavlink.MAV_CMD_DO_VTOL_TRANSITION,
         mavlink.MAV_CMD_IMAGE_START_CAPTURE,
@@ -146,6 +155,8 @@ class Mission:
         self.changes = 0
         """Grows with each change of the items, so that a running mission notices it."""
         self.jumps_left: dict[int, int] = {}
+        self.in_landing_sequence = False
+        """Whether it has come to a landing or its DO_LAND_START; a plane does not arm then."""
 
     @property
     def present(self) -> bool:
@@ -159,10 +170,12 @@ class Mission:
 
     def takes_off_from(self, seq: int) -> bool:
         """Whether the first navigation item from number seq on lifts off."""
-        for item in self.items[max(seq, 1) :]:
-            if item.command in NAVIGATION and item.command != mavlink.MAV_CMD_NAV_DELAY:
-                return item.command in TAKEOFFS
-        return False
+        return self._first_navigation(seq) in TAKEOFFS
+
+    def _first_navigation(self, seq: int) -> int | None:
+        """The command of the first navigation item from number seq on, but for delays."""
+        commands = (item.command for item in self.items[max(seq, 1) :])
+        return next((one for one in commands if one in NAVIGATION and one != mavlink.MAV_CMD_NAV_DELAY), None)
 
     def remember_home(self, home: Item) -> None:
         """An empty list gets home as its item 0 when home is set, as in ArduPilot; a clear empties it again."""
@@ -176,26 +189,34 @@ class Mission:
         if self.current >= len(items):
             self.reset()
 
-    def clear(self) -> bool:
-        """Forget everything; refused (False) while the mission runs, as in ArduPilot."""
-        if self.state is State.RUNNING:
+    def clear(self, *, armed: bool) -> bool:
+        """Forget the items; refused (False) while an armed vehicle flies them, as in ArduPilot."""
+        if armed and self.state is State.RUNNING:
             return False
         self.items = []
         self.changes += 1
+        landing = self.in_landing_sequence
         self.reset()
+        self.in_landing_sequence = landing
         return True
 
     def reset(self) -> None:
         """Go back to the start."""
         self.current = 0
+        self.in_landing_sequence = False
         self.state = State.NOT_STARTED
         self.jumps_left = {}
 
-    def select(self, seq: int) -> bool:
-        """Make seq the current item; False when there is none such. 0 stands for the first real item."""
+    def select(self, seq: int, *, begins: bool = False) -> bool:
+        """Make seq the current item; False when there is none such. 0 stands for the first real item.
+
+        With begins the item counts as begun at once, as with the reset of DO_SET_MISSION_CURRENT.
+        """
         if not 0 <= seq < len(self.items):
             return False
         self.current = seq
+        lands = begins and self._first_navigation(seq) in LANDINGS
+        self.in_landing_sequence = lands or self.items[seq].command == mavlink.MAV_CMD_DO_LAND_START
         if self.state is State.COMPLETE:
             self.state = State.STOPPED
         return True

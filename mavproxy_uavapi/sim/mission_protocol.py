@@ -238,7 +238,7 @@ class MissionProtocol:
             return
         cleared = True
         if message.mission_type == MISSION:
-            cleared = self.vehicle.mission.clear()
+            cleared = self.vehicle.mission.clear(armed=self.vehicle.armed)
         else:
             self._lists[message.mission_type] = []
         self._ack(link, message, mavlink.MAV_MISSION_ACCEPTED if cleared else mavlink.MAV_MISSION_ERROR)

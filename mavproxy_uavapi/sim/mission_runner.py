@@ -160,7 +160,7 @@ class MissionRunner:
             else:
                 self._do(seq, item)
             seq += 1
-        mission.state = State.COMPLETE
+        mission.state, mission.in_landing_sequence = State.COMPLETE, False
         self._flyer.mission_ended()
 
     def _jump(self, seq: int, item: Item) -> int:

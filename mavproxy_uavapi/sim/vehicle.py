@@ -309,9 +309,9 @@ class Vehicle:
         """AUTO, current or not."""
         return next(mode for mode in self.modes.values() if isinstance(mode, MissionMode))
 
-    def current_item(self, seq: int) -> bool:
-        """Make seq the current mission item, at once when the mission is being flown."""
-        if not self.mission.select(seq):
+    def current_item(self, seq: int, *, begins: bool = False) -> bool:
+        """Make seq the current mission item, at once while the mission is flown; begins is of `Mission.select`."""
+        if not self.mission.select(seq, begins=begins):
             return False
         auto = self.mission_mode
         if self.mode is auto and self.mission.state is State.RUNNING:

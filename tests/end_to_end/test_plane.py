@@ -1,43 +1,50 @@
-"""ArduPilot's plane in a real MAVProxy."""
+"""A plane behind the API: the embedded one in lock step, ArduPilot's in a real MAVProxy."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-pytestmark = pytest.mark.sitl
+from tests.support.lockstep_rig import LockstepRig
+from tests.support.processes import Rig
+from tests.support.sitl_types import ardupilot_type
+
 FIELD = (-35.363261, 149.165230)  # degrees, where it stands at the beginning
-SPEEDUP = 5
 
 
-@pytest.fixture(scope="module")
-def plane(harness: Any, tmp_path_factory: Any) -> Iterator[Any]:
-    """ArduPilot's plane, with our module on its link."""
-    rig, instance = harness.Rig(tmp_path_factory.mktemp("plane"), harness.free_port()), harness.free_instance()
-    home = Path(os.environ["ARDUPILOT_HOME"])
-    defaults = home / "Tools" / "autotest" / "models" / "plane.parm"
-    command = [str(home / "build" / "sitl" / "bin" / "arduplane"), "--model=plane", f"-I{instance}"]
-    try:
-        rig.start("plane", [*command, f"--speedup={SPEEDUP}", f"--home={harness.HOME}", f"--defaults={defaults}"])
-        rig.mavproxy = rig.start("mavproxy", harness.mavproxy_command(instance, harness.load(rig.port)))
-        rig.wait_until_up(120)
-        harness.eventually(lambda: rig.status()["ready_to_arm"], 60, "getting ready to arm")
-        yield rig
-    finally:
-        rig.stop()
+@pytest.fixture(scope="module", params=["lockstep", pytest.param("ardupilot", marks=pytest.mark.sitl)])
+def plane(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
+    """A plane that the tests share."""
+    directory = tmp_path_factory.mktemp("plane")
+    rig = LockstepRig(directory, "plane") if request.param == "lockstep" else ardupilot_type(directory, "plane")
+    yield rig
+    rig.stop()
 
 
-def height(plane):
-    return plane.ok(plane.get("/telemetry/gps"))["info"]["position"]["relative_alt"]
+def height(plane: Rig) -> float:
+    return float(plane.ok(plane.get("/telemetry/gps"))["info"]["position"]["relative_alt"])
 
 
-def test_plane_takes_off_flies_circles_returns_lands_and_arms_again(plane, harness):
-    plane.ok(plane.get("/command/arm"))
+def item(command: str, north: float | None = None, alt: float = 0.0, **params: float) -> dict[str, Any]:
+    """A mission item, so many degrees north of the field."""
+    place = {} if north is None else {"lat": FIELD[0] + north, "long": FIELD[1], "alt": alt}
+    return {"command": command, **place, **params}
+
+
+def take_off(plane: Rig) -> None:
+    plane.ok(plane.get("/command/arm", timeout=60))
     plane.ok(plane.get("/command/takeoff", alt=60))
+
+
+def wait_until_disarmed(plane: Rig) -> None:
+    plane.eventually(lambda: plane.status()["armed"] is False, 120, "landing and disarming")
+    assert plane.status()["landed_state"] == "on_ground"
+
+
+def test_plane_takes_off_flies_circles_returns_lands_and_arms_again(plane: Rig) -> None:
+    take_off(plane)
     assert height(plane) == pytest.approx(60, abs=15)
     assert plane.status()["mode"] == "GUIDED"
     plane.ok(plane.post("/movement/go_to_gps_wait", lat=FIELD[0] + 0.004, long=FIELD[1], alt=80))
@@ -51,13 +58,51 @@ def test_plane_takes_off_flies_circles_returns_lands_and_arms_again(plane, harne
     assert plane.ok(plane.get("/command/rtl"))["result"] == "Returned to launch"
     landing = plane.ok(plane.get("/command/land_at", lat=FIELD[0], long=FIELD[1]))
     assert landing["result"] == f"Landing mission started for coord ({FIELD[0]}, {FIELD[1]})"
-    harness.eventually(lambda: plane.status()["armed"] is False, 120, "landing and disarming")
-    assert plane.status()["landed_state"] == "on_ground"
+    wait_until_disarmed(plane)
     plane.ok(plane.get("/command/arm", timeout=60))
     plane.ok(plane.get("/command/disarm"))
 
 
+def test_plane_whose_landing_cannot_be_uploaded_stays_in_its_mode(plane: Rig) -> None:
+    if plane.control is None:
+        pytest.skip("the link of this rig loses nothing")
+    take_off(plane)
+    plane.control.fault("drop", message="MISSION_ITEM_INT")
+    since = plane.control.ask("received", since=0)["last"]
+    answer = plane.get("/command/land_at", lat=FIELD[0], long=FIELD[1])
+    plane.control.ask("clear")
+    assert (answer.status_code, answer.json()["code"]) == (500, "rejected")
+    received = plane.control.ask("received", since=since)["messages"]
+    commands = {message["fields"]["command"] for message in received if message["name"] == "COMMAND_LONG"}
+    assert not commands & {176, 224, 300}, "no mode, no current item, no start"
+    assert plane.status()["mode"] == "GUIDED"
+    plane.ok(plane.get("/command/land_at", lat=FIELD[0], long=FIELD[1]))
+    wait_until_disarmed(plane)
+    plane.ok(plane.get("/command/arm", timeout=60))
+    plane.ok(plane.get("/command/disarm"))
+
+
+def test_plane_lands_by_the_landing_sequence_of_the_mission_that_it_flies(plane: Rig) -> None:
+    plane.ok(plane.delete("/mission/waypoints"))
+    take_off(plane)
+    items = [
+        item("NAV_WAYPOINT", 0.004, 80.0),
+        item("NAV_LOITER_UNLIM", 0.008, 80.0),
+        item("DO_LAND_START"),
+        item("NAV_WAYPOINT", -0.006, 40.0),
+        item("NAV_WAYPOINT", -0.003, 20.0),
+        item("NAV_LAND", 0.0),
+    ]
+    plane.ok(plane.post("/mission/waypoints", items=items))
+    plane.ok(plane.post("/mission/start"))
+    plane.eventually(lambda: plane.ok(plane.get("/mission/progress"))["info"]["current"] == 2, 60, "item 2")
+    assert plane.ok(plane.get("/command/land", timeout=240))["result"]
+    wait_until_disarmed(plane)
+    assert plane.status()["mode"] == "AUTO"
+    plane.ok(plane.delete("/mission/waypoints"))
+
+
 @pytest.mark.parametrize("path", ["/movement/resume", "/movement/set_heading?heading=3"])
-def test_what_a_plane_does_not_have_is_404(plane, path):
+def test_what_a_plane_does_not_have_is_404(plane: Rig, path: str) -> None:
     answer = plane.get(path)
     assert (answer.status_code, answer.json()["code"]) == (404, "not_supported")

@@ -3,30 +3,12 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-
-def ardurover(harness: Any, directory: Path) -> Any:
-    """ArduPilot's rover, with our module on its link."""
-    rig, instance = harness.Rig(directory, harness.free_port()), harness.free_instance()
-    home = Path(os.environ["ARDUPILOT_HOME"])
-    defaults = home / "Tools" / "autotest" / "default_params" / "rover.parm"
-    command = [str(home / "build" / "sitl" / "bin" / "ardurover"), "--model=rover", f"-I{instance}"]
-    try:
-        rig.start(
-            "rover", [*command, f"--speedup={harness.SPEEDUP}", f"--home={harness.HOME}", f"--defaults={defaults}"]
-        )
-        rig.mavproxy = rig.start("mavproxy", harness.mavproxy_command(instance, harness.load(rig.port)))
-        rig.wait_until_up(120)
-    except BaseException:
-        rig.stop()
-        raise
-    return rig
+from tests.support.sitl_types import ardupilot_type
 
 
 @pytest.fixture(scope="module", params=["embedded", pytest.param("ardupilot", marks=pytest.mark.sitl)])
@@ -34,7 +16,11 @@ def rover(request: Any, harness: Any, tmp_path_factory: Any) -> Iterator[Any]:
     """A rover that the tests share."""
     directory = tmp_path_factory.mktemp(request.param)
     embedded = request.param == "embedded"
-    rig = harness.embedded(directory, "--vehicle=rover") if embedded else ardurover(harness, directory)
+    rig = (
+        harness.embedded(directory, "--vehicle=rover")
+        if embedded
+        else ardupilot_type(directory, "rover", speedup=harness.SPEEDUP)
+    )
     yield rig
     rig.stop()
 

@@ -64,14 +64,14 @@ class _BackDoor:
 
 
 class LockstepRig(Rig):
-    """A vehicle and our side of a MAVProxy."""
+    """A vehicle and our side of a MAVProxy; `vehicle` is copter, plane, quadplane or rover."""
 
-    def __init__(self, directory: Path) -> None:
+    def __init__(self, directory: Path, vehicle: str = "copter") -> None:
         super().__init__(directory, port=8000)
         self._loop = TimeTravellingLoop()
         asyncio.set_event_loop(self._loop)
         self._loop.set_default_executor(AtOnce())
-        self.world = World(self._loop, mavproxy_state(), {})
+        self.world = World(self._loop, mavproxy_state(), {}, vehicle)
         self.world.directory = directory
         self.control = _BackDoor(self.world.control)  # type: ignore[assignment]
         self.world.boot()

@@ -77,12 +77,12 @@ class World:
     tracker: Any
     flights: Any
 
-    def __init__(self, loop: Any, mpstate: Any, settings: dict[str, Any]) -> None:
+    def __init__(self, loop: Any, mpstate: Any, settings: dict[str, Any], vehicle: str = "copter") -> None:
         self.loop, self.seed = loop, 1
         self.host = host = Host(mpstate, clock=loop.time, link=self, loop=loop)
         self.screen: Callable[[], str] = str
         self.directory = Path()
-        self.simulator = Simulator(Options(seed=self.seed, ready_after=1.0))
+        self.simulator = Simulator(Options(seed=self.seed, vehicle=vehicle, ready_after=1.0))
         for name, value in PARAMETERS.items():
             self.simulator.parameters.set(name, value)
         self.control = Control(self.simulator)

@@ -10,6 +10,7 @@ from mavproxy_uavapi.core.envelope.space import Breach, LocalFrame, Rule, Space,
 from mavproxy_uavapi.core.errors import OutsideEnvelope, Stale
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle import cruise, mission_way, orders
+from mavproxy_uavapi.core.vehicle.guided_radius import GuidedRadius
 from mavproxy_uavapi.core.vehicle.mission_files import MissionItem
 from mavproxy_uavapi.core.vehicle.mission_way import Stop
 from mavproxy_uavapi.core.vehicle.speeds import Speeds
@@ -41,12 +42,16 @@ class Checked(Protocol):
 class EnvelopeCheck:
     """The questions that the envelopes of a vehicle answer.
 
+    Attributes:
+        guided_radius: the radius that a DO_REPOSITION gave.
+
     Args:
         vehicle: which.
         spaces: gives the envelopes in force for it; it must be inside all of them.
     """
 
     def __init__(self, vehicle: Checked, spaces: Spaces) -> None:
+        self.guided_radius = GuidedRadius()
         self._vehicle = vehicle
         self._spaces = spaces
 
@@ -63,6 +68,13 @@ class EnvelopeCheck:
     @property
     def circle(self) -> float:
         """The radius (m) of the circles that it flies where others stand still."""
+        if self._vehicle.kind != "plane":
+            return 0.0
+        return max(self.own_circle, self.guided_radius.in_force(self._vehicle.state))
+
+    @property
+    def own_circle(self) -> float:
+        """The same, where it was told no other radius: WP_LOITER_RAD."""
         if self._vehicle.kind != "plane":
             return 0.0
         return abs(self._vehicle.state.parameters.get("WP_LOITER_RAD", PLANE_RADIUS)) or PLANE_RADIUS
@@ -91,19 +103,27 @@ class EnvelopeCheck:
 
     # -- what raises --------------------------------------------------------------------------------------
 
-    def require_way(self, ways: Iterable[Sequence[Stop]], *, may_return: bool = True, stays: bool = False) -> None:
+    def require_way(
+        self,
+        ways: Iterable[Sequence[Stop]],
+        *,
+        may_return: bool = True,
+        stays: bool = False,
+        circle: float | None = None,
+    ) -> None:
         """Raise OutsideEnvelope unless each way stays inside every envelope.
 
         Args:
             ways: each with its points in order.
             may_return: whether a way that begins outside may lead inside.
             stays: whether the vehicle only holds its place: it may do so outside, but no farther outside than it is.
+            circle: the radius (m) that it keeps from the borders; None for that of its circles now.
         """
         ways = [list(way) for way in ways]
         for space in self.spaces if ways else ():
             if space.missing:
                 raise OutsideEnvelope(space.missing)
-            frame, rules = self.rules(space, ways[0][0], self.circle)
+            frame, rules = self.rules(space, ways[0][0], self.circle if circle is None else circle)
             for way in ways:
                 spots = [frame.spot((stop.lat, stop.lon), stop.up) for stop in way]
                 breach = space.breach(spots, rules, may_return=may_return)

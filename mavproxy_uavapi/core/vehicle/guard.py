@@ -113,6 +113,7 @@ class EnvelopeGuard:
     def sending(self, message: Any) -> Ordered:
         """Note a message that is about to be sent, before others are asked about theirs; what was ordered before."""
         before, order = self.ordered, orders.order_of(message)
+        self.check.guided_radius.sent(message, self._vehicle.clock())
         if isinstance(order, orders.ChangeMission):
             self._checked_mission = None
         if order is None or isinstance(order, STANDING):
@@ -201,7 +202,8 @@ class EnvelopeGuard:
     def _require_place(self, order: orders.GoTo | orders.Climb) -> None:
         way = self._way_of(order)
         stays = isinstance(order, orders.GoTo) and _length(way) <= STAY
-        self.check.require_way([way], stays=stays)
+        circle = self.check.own_circle if isinstance(order, orders.GoTo) and order.own_radius else None
+        self.check.require_way([way], stays=stays, circle=circle)
         self.check.require_speeds()
         if not stays:
             self._require_apart(way)

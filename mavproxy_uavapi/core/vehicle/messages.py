@@ -35,6 +35,7 @@ YAW_IGNORED = mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE
 YAW_RATE_IGNORED = mavlink.POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE
 
 FORCE_DISARM = 21196  # MAV_CMD_COMPONENT_ARM_DISARM: the magic number that disarms in flight
+OWN_RADIUS = 1.0  # m; up to this radius of a DO_REPOSITION ArduPlane uses WP_LOITER_RAD, with 0 the radius before
 SPEED_TYPES = {"air": 0, "ground": 1, "climb": 2, "descent": 3}  # MAV_CMD_DO_CHANGE_SPEED, param 1
 
 
@@ -129,11 +130,14 @@ def change_speed(kind: str, speed: float) -> Command:
 
 
 def reposition(place: GlobalTarget) -> Command:
-    """Go to a place, for planes; taken in GUIDED only, since it does not ask for a change of mode."""
+    """Go to a place and circle there with WP_LOITER_RAD, for planes.
+
+    It is taken in GUIDED only, since it does not ask for a change of mode.
+    """
     speed_unchanged, change_no_mode = -1.0, 0.0
     return PlaceCommand(
         mavlink.MAV_CMD_DO_REPOSITION,
-        (speed_unchanged, change_no_mode),
+        (speed_unchanged, change_no_mode, OWN_RADIUS),
         proven_by_ack=True,
         lat=place.lat,
         lon=place.lon,
@@ -176,9 +180,9 @@ def set_servo(channel: int, pwm: int) -> Command:
     return Command(mavlink.MAV_CMD_DO_SET_SERVO, (channel, pwm), proven_by_ack=True)
 
 
-def set_mission_current(seq: int) -> Command:
-    """Make mission item `seq` (from 1) the current one, and reset its jump counters."""
-    return Command(mavlink.MAV_CMD_DO_SET_MISSION_CURRENT, (seq, 1))
+def set_mission_current(seq: int, *, reset: bool = True) -> Command:
+    """Make mission item `seq` (from 1) the current one; `reset` also resets the mission and begins the item."""
+    return Command(mavlink.MAV_CMD_DO_SET_MISSION_CURRENT, (seq, 1 if reset else 0))
 
 
 def start_mission() -> Command:

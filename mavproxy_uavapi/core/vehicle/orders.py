@@ -13,6 +13,7 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.core.vehicle.messages import (
     ACCELERATION_IGNORED,
+    OWN_RADIUS,
     POSITION_IGNORED,
     SPEED_TYPES,
     VELOCITY_IGNORED,
@@ -25,9 +26,10 @@ mavlink = mavutil.mavlink
 
 @dataclass(frozen=True)
 class GoTo:
-    """Fly straight to a place, and stay."""
+    """Fly straight to a place, and stay; a plane circles there, with `own_radius` by WP_LOITER_RAD."""
 
     target: NedTarget | GlobalTarget
+    own_radius: bool = False
 
 
 @dataclass(frozen=True)
@@ -163,12 +165,23 @@ def _speed(message: Any) -> Order:
 
 def _reposition(message: Any) -> Order:
     changes_mode = int(message.param2) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
-    has_speed, has_radius = message.param1 > 0, message.param3 > 0  # a rover takes the speed, a plane the radius
+    has_speed, has_radius = (
+        message.param1 > 0,
+        commanded_radius(message),
+    )  # a rover takes the speed, a plane the radius
     if message.get_type() != "COMMAND_INT" or message.frame not in ABOVE_HOME:
         return Unknown("that kind of reposition")
     if changes_mode or has_speed or has_radius:
         return Unknown("a reposition with a mode, a speed or a radius")
-    return GoTo(GlobalTarget(message.x / 1e7, message.y / 1e7, message.z))
+    return GoTo(GlobalTarget(message.x / 1e7, message.y / 1e7, message.z), own_radius=has_radius is not None)
+
+
+def commanded_radius(message: Any) -> float | None:
+    """The radius (m) of the circles that a message has a plane in GUIDED fly; 0 for its own, None for no change."""
+    is_command = message.get_type() in ("COMMAND_INT", "COMMAND_LONG")
+    if not is_command or message.command != mavlink.MAV_CMD_DO_REPOSITION or not message.param3 > 0:
+        return None
+    return float(message.param3) if message.param3 > OWN_RADIUS else 0.0
 
 
 def _climb(message: Any) -> Order:

@@ -6,9 +6,11 @@ off in TAKEOFF, and flies to positions in GUIDED by DO_REPOSITION only.
 
 from __future__ import annotations
 
+import contextlib
 import math
 
-from mavproxy_uavapi.core.errors import Busy, Invalid, ModeChanged, Stale
+from mavproxy_uavapi.core.errors import Busy, Invalid, ModeChanged, Rejected, Stale
+from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission
 from mavproxy_uavapi.core.vehicle import landing_pattern, messages, mission_flight, time_limits
 from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_uavapi.core.vehicle.geodesy import moved
@@ -56,11 +58,17 @@ class Plane(GuidedVehicle):
         return bool((await self.parameters.read([("Q_ENABLE",)])).get("Q_ENABLE"))
 
     async def arm(self, job: Job, timeout: float | None = None) -> None:
-        """As for every vehicle; first sets its mission to item 1: ArduPlane does not arm at a landing's item."""
-        current = self.state.field("MISSION_CURRENT", "seq") or 0
-        if self.state.armed is False and current > 1:
+        """As for every vehicle; first sets its mission to item 1: ArduPlane does not arm at a landing's item.
+
+        A landing that is item 1 must not begin by that, or it would still prevent the arming.
+        """
+        if self.state.armed is False and self.state.field("MISSION_CURRENT", "seq"):
             self.authority.take(job, Rank.ARM)
-            await self.commands.send(messages.set_mission_current(1), self.commanding(job, self._require_disarmed))
+            if flies_mission(self.mode):
+                await self.switch_to(job, GUIDED, self._require_disarmed)
+            first = messages.set_mission_current(1, reset=False)
+            with contextlib.suppress(Rejected):  # the mission may just have been cleared
+                await self.commands.send(first, self.commanding(job, self._require_disarmed))
         await super().arm(job, timeout)
 
     def _require_disarmed(self) -> None:

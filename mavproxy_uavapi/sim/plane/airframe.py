@@ -128,8 +128,6 @@ class Airframe(Vehicle):
 
     # What the modes ask of the plane that has them.
 
-    in_landing_sequence: bool
-
     def select_landing(self) -> bool:
         """Make the mission's DO_LAND_START the current item; False without one."""
         raise NotImplementedError

@@ -44,8 +44,7 @@ class SimulatedPlane(Airframe):
         self.failsafes = Failsafes(self)
         self.modes: dict[int, Mode] = self.build_modes()
         self.mode = self.modes[0]
-        self.in_landing_sequence = False
-        """Whether the mission has come to its DO_LAND_START."""
+        self.mission.in_landing_sequence = False
 
     def build_modes(self) -> dict[int, Mode]:
         """The modes by their number."""
@@ -98,10 +97,9 @@ class SimulatedPlane(Airframe):
             return "Flight mode change failed"
         if mode.automatic_throttle and not self.flying:
             self.throttle_suppressed = True
-        if self.in_landing_sequence and not self.flying and not self.armed and not mode.navigates:
+        if self.mission.in_landing_sequence and not self.flying and not self.armed and not mode.navigates:
             self.say(mavlink.MAV_SEVERITY_INFO, "In landing sequence: mission reset")
             self.mission.reset()
-            self.in_landing_sequence = False
         return None
 
     def set_mode(self, number: int) -> bool:
@@ -124,7 +122,7 @@ class SimulatedPlane(Airframe):
         failures = []
         if self.landing_starts() and int(self.parameters["RTL_AUTOLAND"]) == 0:
             failures.append("DO_LAND_START set and RTL_AUTOLAND disabled")
-        if self.in_landing_sequence and not self.mission.takes_off_from(self.mission.current):
+        if self.mission.in_landing_sequence and not self.mission.takes_off_from(self.mission.current):
             failures.append("In landing sequence")
         return failures
 
@@ -202,7 +200,7 @@ class SimulatedPlane(Airframe):
             return None
         seq = min(starts, key=self._way_to)
         self.mission.current, self.mission.state = seq, State.STOPPED
-        self.in_landing_sequence = True
+        self.mission.in_landing_sequence = True
         return seq
 
     def landing_starts(self) -> list[int]:

@@ -110,6 +110,20 @@ def test_raw_targets_stay_inside_and_bring_no_radius_or_speed(make: Any) -> None
     assert not sent(reposition(300.0, radius=400.0)) and not sent(reposition(300.0, speed=30.0))
 
 
+def test_plane_keeps_the_radius_that_it_was_told_from_every_border(make: Any) -> None:
+    plane = make("plane", square(300), WP_LOITER_RAD=80.0)
+    order = messages.reposition(GlobalTarget(*FRAME.degrees(Spot(200, 0, 0)), 40.0))
+    wide, keeping = order.to(Address(1, 1), 0), order.to(Address(1, 1), 0)
+    wide.param3, keeping.param3 = 150.0, 0.0
+    plane.guard.require(keeping)
+    plane.guard.sending(wide)
+    with pytest.raises(OutsideEnvelope):
+        plane.guard.require(keeping)
+    assert allowed(plane, order), "it brings back the plane's own radius"
+    plane.guard.sending(order.to(Address(1, 1), 0))
+    plane.guard.require(keeping)
+
+
 def test_plane_that_flies_at_a_border_is_leaving_a_radius_before_it(make: Any) -> None:
     for north, leaves in ((150, False), (230, True)):
         plane = make("plane", square(300), at=(north, 0, 40), velocity=(20, 0, 0), WP_LOITER_RAD=80.0)

@@ -118,7 +118,7 @@ class Auto(NavigatingMode, MissionMode):
         if item.command == mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH:
             return plane.set_mode(RTL_NUMBER)
         if item.command == mavlink.MAV_CMD_NAV_TAKEOFF:
-            plane.in_landing_sequence = False
+            plane.mission.in_landing_sequence = False
             self._begin_takeoff(item)
         elif item.command == mavlink.MAV_CMD_NAV_DELAY:
             self.submode = AutoSubmode.HOLD
@@ -155,7 +155,7 @@ class Auto(NavigatingMode, MissionMode):
         self._passed = False
         if item.command == mavlink.MAV_CMD_NAV_LAND:
             self.submode = AutoSubmode.LAND
-            plane.in_landing_sequence = True
+            plane.mission.in_landing_sequence = True
             self._landing = Landing(plane, start, target)
             return
         slope = plane.altitude > 20 or target.down > plane.estimator.position.down
@@ -296,7 +296,7 @@ class Auto(NavigatingMode, MissionMode):
         elif item.command == mavlink.MAV_CMD_DO_SET_HOME:
             plane.set_home_here(lock=False)
         elif item.command == mavlink.MAV_CMD_DO_LAND_START:
-            plane.in_landing_sequence = True
+            plane.mission.in_landing_sequence = True
 
     def mission_ended(self) -> None:
         """Return."""

@@ -31,7 +31,7 @@ class QuadAuto(Auto):
         plane = self.quadplane
         self._climb_to = self._vtol_landing = None
         if item.command == mavlink.MAV_CMD_NAV_VTOL_TAKEOFF:
-            plane.in_landing_sequence = False
+            plane.mission.in_landing_sequence = False
             plane.hover.start()
             self.submode = AutoSubmode.HOLD
             self._climb_to = plane.estimator.position.down - item.z
@@ -39,7 +39,7 @@ class QuadAuto(Auto):
             return True
         if item.command == mavlink.MAV_CMD_NAV_VTOL_LAND:
             target = item_target(plane, item)
-            plane.in_landing_sequence = True
+            plane.mission.in_landing_sequence = True
             self.submode = AutoSubmode.HOLD
             height = plane.estimator.position.down
             self._vtol_landing = VtolLanding(plane, target._replace(down=height), target.down)
