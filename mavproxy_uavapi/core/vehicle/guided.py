@@ -187,7 +187,11 @@ class GuidedVehicle(Vehicle):
         """Begin a movement. ArduCopter goes back to its own speeds when the kind of setpoint changes."""
         other_kind = not self._flies_kind_of(target)
         await self.send_setpoint(job, target, yaw)
-        for kind, speed in self.speeds.to_send(other_kind).items():
+        await self.send_speeds(job, new_kind=other_kind)
+
+    async def send_speeds(self, job: Job, *, new_kind: bool) -> None:
+        """Send the speeds that go with a movement; `new_kind`: whether its setpoint is of another kind."""
+        for kind, speed in self.speeds.to_send(new_kind).items():
             await self.commands.send(messages.change_speed(kind, speed), self.commanding(job, self.flying))
             self.speeds.take(kind, speed)
 

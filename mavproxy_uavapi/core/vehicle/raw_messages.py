@@ -85,8 +85,8 @@ async def send(vehicle: Vehicle, job: Job, message: Any) -> None:
     """
 
     def require_not_the_pilots() -> None:
-        if vehicle.state.armed and not vehicle.state.landed and vehicle.mode != "GUIDED":
-            raise ModeChanged(f"the vehicle is flying in {vehicle.mode}; `guided` takes it over")
+        if vehicle.is_under_way and vehicle.mode != "GUIDED":
+            raise ModeChanged(f"the vehicle is under way in {vehicle.mode}; `guided` takes it over")
 
     require_not_the_pilots()
     vehicle.authority.take(job, Rank.ARM)

@@ -28,16 +28,16 @@ class Vehicle(Verbs):
     async def arm(self, job: Job, timeout: float | None = None) -> None:
         """Wait until it is ready, switch to GUIDED, arm, and wait until it is armed.
 
-        A vehicle that flies in another mode than GUIDED belongs to its pilot: `ModeChanged`. So does one that
-        is armed by another client meanwhile.
+        A vehicle that flies, or a rover that drives, in another mode than GUIDED belongs to its pilot: `ModeChanged`.
+        So does one that is armed by another client meanwhile.
 
         Raises:
             Rejected: it did not get ready, or refused; with the autopilot's reasons.
         """
         if self.state.armed and self.mode == "GUIDED":
             return
-        if self.state.armed and not self.state.landed:
-            raise ModeChanged(f"the vehicle is flying in {self.mode}; `guided` takes it over")
+        if self.is_under_way:
+            raise ModeChanged(f"the vehicle is under way in {self.mode}; `guided` takes it over")
         self.authority.take(job, Rank.ARM)
         await arming.arm(self, job, timeout)
         self.authority.shown(job)
