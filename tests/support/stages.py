@@ -10,7 +10,7 @@ from mavproxy_uavapi.sim.geodesy import Ned, from_ned
 from mavproxy_uavapi.sim.mission import Item
 
 RELATIVE = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
-CLIMBING = 45.0  # s in which a plane reaches TKOFF_ALT and circles
+CLIMBING = 15.0  # s in which a plane reaches TKOFF_ALT
 HOVER = 15.0  # m
 DRIVING = 4.0  # s in which a rover gathers speed
 
@@ -22,9 +22,31 @@ def cruising(world: Any, mode: str = "GUIDED") -> None:
     world.by_hand(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1)
     world.simulator.run(CLIMBING)
     assert world.vehicle.flying
+    hold_mission(world)
     world.in_mode("GUIDED")
     if mode != "GUIDED":
         world.in_mode(mode)
+
+
+def armed_with_mission(world: Any) -> None:
+    """Armed on the ground, in GUIDED; a plane holds a mission that ends with a landing."""
+    world.armed()
+    if world.kind == "plane":
+        hold_mission(world)
+
+
+def held(world: Any) -> None:
+    """A rover that stands armed in HOLD."""
+    world.armed()
+    world.in_mode("HOLD")
+
+
+def driven_away(world: Any) -> None:
+    """A rover that stands armed in GUIDED, 30 m north of home."""
+    world.armed()
+    world.vehicle.guided.go_to(Ned(30.0, 0.0, 0.0))
+    world.simulator.run(20.0)
+    assert abs(world.at[0] - 30.0) < 3.0
 
 
 def hovering(world: Any) -> None:

@@ -303,6 +303,11 @@ class World:
     # -- what is to be seen ---------------------------------------------------------------------------------
 
     @property
+    def kind(self) -> str:
+        """What the vehicle is, as `--vehicle` names it."""
+        return self.simulator.options.vehicle
+
+    @property
     def vehicle(self) -> Any:
         """The vehicle's truth."""
         return self.simulator.vehicle

@@ -257,6 +257,11 @@ class BaseVehicle:
         """Whether it is armed and flies, for whomever."""
         return bool(self.state.armed and not self.state.landed)
 
+    def anothers(self) -> ModeChanged:
+        """The error for a vehicle that is under way for somebody else."""
+        moving = "driving" if self.kind == "rover" else "flying"
+        return ModeChanged(f"the vehicle is {moving} in {self.mode}; `guided` takes it over")
+
     @property
     def flies_for_us(self) -> bool:
         """Whether it flies by a command of ours: in a mode that we chose or command in, towards no other's target."""

@@ -89,7 +89,7 @@ class Plane(GuidedVehicle):
         self.authority.take(job, Rank.ARM, self.inside(messages.takeoff(alt)))
         allowed = self.allowed(CIRCLES + time_limits.leg_time(await self.limits(), 0.0, alt), timeout)
         if vtol:
-            await self.commands.send(messages.takeoff(alt), self.commanding(job, self.flying))
+            await self.lift_off(job, alt)
         else:
             await self.switch_to(job, TAKEOFF)
             handover = max(alt - HEIGHT_TOLERANCE, LOWEST_HANDOVER)
@@ -193,21 +193,16 @@ class Plane(GuidedVehicle):
         distance = self.distance_home() or 0.0
         expected = CIRCLES + time_limits.leg_time(await self.limits(), distance, 0.0)
 
-        def at_home() -> bool | None:
-            self.report_home(job)
-            if self.state.armed is False and self.mode in returning:
-                return True
-            distance = self.distance_home()
-            return True if distance is not None and distance <= near else None
+        landed = await self.landing_watch(job, *returning)
 
-        def guarded() -> bool | None:
-            done = at_home()
-            if done is None:
-                self.held_by(self.mode if self.mode in returning else RTL)
-            return done
+        def at_home() -> bool | None:
+            distance = self.distance_home()
+            if self.state.armed and distance is not None and distance <= near:
+                return True
+            return landed()
 
         names = {"HEARTBEAT", "GLOBAL_POSITION_INT"}
-        await self.waiting.until(names, guarded, self.allowed(expected, timeout), "return home")
+        await self.waiting.until(names, at_home, self.allowed(expected, timeout), "return home")
 
     # -- going and staying --------------------------------------------------------------------------------
 
@@ -221,6 +216,7 @@ class Plane(GuidedVehicle):
             self.authority.take(job, Rank.STOP)  # a waiting arm ends
         self.require_armed()
         await self.hold(job)
+        self.held_by(self.holding_mode)
 
     async def go_to(
         self,

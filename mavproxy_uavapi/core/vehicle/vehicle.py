@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 from mavproxy_uavapi.core.errors import Busy, ModeChanged, NotArmed, NotFound, NotSupported, Rejected, TimedOut
@@ -37,7 +38,7 @@ class Vehicle(Verbs):
         if self.state.armed and self.mode == "GUIDED":
             return
         if self.is_under_way:
-            raise ModeChanged(f"the vehicle is under way in {self.mode}; `guided` takes it over")
+            raise self.anothers()
         self.authority.take(job, Rank.ARM)
         await arming.arm(self, job, timeout)
         self.authority.shown(job)
@@ -110,20 +111,32 @@ class Vehicle(Verbs):
 
     async def landed_in(self, job: Job, mode: str, timeout: float) -> None:
         """Wait until it has landed and disarmed in that mode; motors that stop in flight are no landing."""
+        landed = await self.landing_watch(job, mode)
+        names = {"HEARTBEAT", "GLOBAL_POSITION_INT"}
+        await self.waiting.until(names, landed, timeout, f"land and disarm in {mode}")
+
+    async def landing_watch(self, job: Job, *modes: str) -> Callable[[], bool | None]:
+        """What to call after each heartbeat and position: True when it has landed and disarmed in one of the modes.
+
+        That raises NotArmed for motors that stop in flight, and ModeChanged in any other mode.
+        """
         landing = Touchdown(await self.limits())
 
         def landed() -> bool | None:
             self.report_home(job)
-            landing.sinks_at((self.state.field("GLOBAL_POSITION_INT", "vz") or 0) / 100.0)
-            if self.state.armed is not False or self.mode != mode:
-                self.held_by(mode)
+            down, north, east = (
+                (self.state.field("GLOBAL_POSITION_INT", name) or 0) / 100.0 for name in ("vz", "vx", "vy")
+            )
+            landing.moves_at(down, math.hypot(north, east))
+            if self.state.armed is not False or self.mode not in modes:
+                self.held_by(self.mode if self.mode in modes else modes[0])
                 return None
+            landing.disarmed(self.clock())
             if landing.fell:
                 raise NotArmed("the vehicle was disarmed in flight, and fell")
             return landing.is_over(self.clock(), self.state.age("GLOBAL_POSITION_INT", self.clock()))
 
-        names = {"HEARTBEAT", "GLOBAL_POSITION_INT"}
-        await self.waiting.until(names, landed, timeout, f"land and disarm in {mode}")
+        return landed
 
     def report_home(self, job: Job) -> None:
         """Set the job's progress: the altitude, and the distance to home."""
