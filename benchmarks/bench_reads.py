@@ -10,13 +10,15 @@ import argparse
 import asyncio
 import sys
 import time
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from rig import Bare, Client, Clients, Tap, fly, machine, message_id, percentile, put_first, rig, table
 
-BARE, ALONE, CROWDED = "bare aiohttp handler", "/telemetry/gps", "with 200 waiting calls"
+BARE, OURS = "bare aiohttp handler", "uavapi"
 WAITING = 200
-POLLERS = 4
+POLLERS = 4  # beside the commands
 COMMAND_LONG, COMMAND_ACK = 76, 77
 COMMANDS = 150  # in each round and case
 
@@ -43,12 +45,32 @@ class Reads:
         return percentile([percentile(times, share) * 1e3 for times in self.times], 0.5)
 
 
-def read(clients: Clients, made: Any, bare: Bare, cases: dict[str, Reads], seconds: float) -> None:
+@dataclass(frozen=True)
+class Case:
+    """Clients that read `/telemetry/gps` as fast as they get answers.
+
+    Attributes:
+        server: whom they ask.
+        clients: how many they are.
+        waiting: calls that wait meanwhile.
+    """
+
+    server: str
+    clients: int
+    waiting: int = 0
+
+    def __str__(self) -> str:
+        return self.server + (f", {self.waiting} waiting calls" if self.waiting else "")
+
+
+CASES = [Case(BARE, 1), Case(OURS, 1), Case(BARE, 16), Case(OURS, 16), Case(OURS, 16, WAITING)]
+
+
+def read(clients: Clients, ports: Mapping[str, int], cases: Mapping[Case, Reads], seconds: float) -> None:
     """One round of reads."""
-    for name, case in cases.items():
-        port = bare.port if name == BARE else made.port
-        clients.begin(port, seconds, pollers=POLLERS, waiting=WAITING if name == CROWDED else 0)
-        case.take(clients.end(), seconds)
+    for case, reads in cases.items():
+        clients.begin(ports[case.server], seconds, pollers=case.clients, waiting=case.waiting)
+        reads.take(clients.end(), seconds)
 
 
 class RoundTrips:
@@ -94,15 +116,16 @@ class RoundTrips:
         return [there + back for there, back in zip(self.there, self.back, strict=True)]
 
 
-def reads_table(cases: dict[str, Reads]) -> str:
+def reads_table(cases: Mapping[Case, Reads]) -> str:
     """The reads as a table."""
-    bare = cases[BARE]
     rows = []
-    for name, case in cases.items():
-        row = [name, f"{case.rate:.0f}", f"{case.latency(0.5):.2f}", f"{case.latency(0.99):.2f}"]
-        row += [f"{case.rate / bare.rate:.2f}", f"{case.latency(0.99) / bare.latency(0.99):.1f}"]
+    for case, reads in cases.items():
+        bare = cases[Case(BARE, case.clients)]
+        row = [str(case), str(case.clients), f"{reads.rate:.0f}"]
+        row += [f"{reads.latency(0.5):.2f}", f"{reads.latency(0.99):.2f}"]
+        row += [f"{reads.rate / bare.rate:.2f}", f"{reads.latency(0.99) / bare.latency(0.99):.1f}"]
         rows.append(row)
-    return table([f"{POLLERS} clients", "reads/s", "p50 ms", "p99 ms", "reads : bare", "p99 : bare"], rows)
+    return table(["", "clients", "reads/s", "p50 ms", "p99 ms", "reads : bare", "p99 : bare"], rows)
 
 
 def trips_table(trips: dict[str, RoundTrips]) -> str:
@@ -126,15 +149,15 @@ def main() -> int:
     options = parser.parse_args()
     print(f"reads: {machine()}")
     clients, bare = Clients(), Bare()
-    cases = {name: Reads() for name in (BARE, ALONE, CROWDED)}
+    cases = {case: Reads() for case in CASES}
     try:
-        with rig(max_rate=100000) as (made, tap):
+        with rig(max_rate=100000, max_jobs=2 * WAITING, max_connections=2 * WAITING) as (made, tap):
             if options.first:
                 put_first(*(process.pid for process in made.processes))
             fly(made)
             trips = {"alone": RoundTrips(), f"with {POLLERS} clients": RoundTrips()}
             for _ in range(options.rounds):
-                read(clients, made, bare, cases, options.seconds)
+                read(clients, {BARE: bare.port, OURS: made.port}, cases, options.seconds)
                 command(clients, made, tap, trips)
     finally:
         clients.close()

@@ -25,6 +25,7 @@ from mavproxy_uavapi.http.cors import TRUSTED_ORIGIN, add_cors_headers
 from mavproxy_uavapi.http.error_answers import errors_as_answers
 from mavproxy_uavapi.http.listener import Listener, listening_socket
 from mavproxy_uavapi.http.rate_limits import limit_rate, yield_to_main_loop
+from mavproxy_uavapi.http.repeat import remember
 from mavproxy_uavapi.http.responses import Handler, success
 from mavproxy_uavapi.http.router import MATCH, Router
 from mavproxy_uavapi.http.routes import PAGE, ROUTES
@@ -81,16 +82,18 @@ async def _answer(request: web.BaseRequest) -> web.StreamResponse:
     if route is None:
         raise web.HTTPMethodNotAllowed(request.method, match.allowed)
     require_role(request, route)
-    host, caller = request[SERVICE].host, request.get(CALLER)
-    host.leases.renew(holder_of(request))
-    if caller is not None:
-        host.holds.renew(caller.operator)
+    request[SERVICE].heard_from(request.get(CALLER), holder_of(request))
     await invite(request)
     params = await parameters(request, route.model, body=request.method in WITH_BODY and not route.raw)
     call = Call(request[SERVICE], request, params, match)
     with call.naming_source():
         answer = await (audited(call, route.action) if route.commands and route.trail else route.action(call))
-    return answer if isinstance(answer, web.StreamResponse) else success(answer)
+    if isinstance(answer, web.StreamResponse):
+        return answer
+    response = success(answer)
+    if route.message:
+        remember(call, route, response)
+    return response
 
 
 def _guarded(handler: Handler) -> Handler:

@@ -80,6 +80,12 @@ class Service:
         token = self.tokens.find(digest) or self.scripts.token_of(digest)
         return token if token is not None and self.tokens.counts(token) else None
 
+    def heard_from(self, caller: Caller | None, holder: str) -> None:
+        """Renew what a caller has for a time: the leases of `holder`, and the vehicles that it holds."""
+        self.host.leases.renew(holder)
+        if caller is not None:
+            self.host.holds.renew(caller.operator)
+
 
 class Call:
     """One request: its service, and its parameters, validated by the route's model.
@@ -111,6 +117,11 @@ class Call:
     def system(self) -> int:
         """The system id that the request means; 0 for MAVProxy's current vehicle."""
         return self.named_system or self.service.settings.sysid
+
+    @property
+    def message(self) -> str:
+        """The MAVLink message that the route shows; empty for none."""
+        return "" if self._route is None else self._route.message
 
     def prefer(self, system: int) -> None:
         """Mean the vehicle with that system id if neither the path nor the port names one; 0 changes nothing."""

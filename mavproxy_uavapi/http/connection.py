@@ -12,8 +12,10 @@ from aiohttp import web
 
 from mavproxy_uavapi.http.responses import Handler
 
+Repeat = Callable[[], bytes | None]
 HEADER_TIMEOUT = 10.0  # s from the first byte of a request to the end of its headers
 IDLE_TIMEOUT = 30.0  # s that a connection may wait for its next request
+LONGEST_REPEATED = 2048  # bytes of a request that is remembered
 LINGER = 1.0  # s in which the rest of a refused body is discarded; an immediate close would lose the answer
 LINGER_SIZE = 4 * 1024 * 1024  # bytes that are discarded at most
 
@@ -59,6 +61,10 @@ class Connection(asyncio.Protocol):
         self._transport: Any = None
         self._timer: asyncio.TimerHandle | None = None
         self._thrown_away = 0
+        self._request = b""  # the last one, if it came alone and in one piece, as all before it
+        self._awaited = False  # whether an answer to it is awaited
+        self._mixed = False
+        self._repeat: Repeat | None = None
 
     @classmethod
     def of(cls, request: web.BaseRequest) -> Connection | None:
@@ -72,7 +78,7 @@ class Connection(asyncio.Protocol):
 
     def ended(self) -> None:
         """The answer is ready; the connection may idle until the next request's first byte."""
-        self.answering = False
+        self.answering = self._awaited = False
         self.idle_since = self._loop.time()
 
     def judged(self, admitted: bool) -> None:
@@ -125,9 +131,30 @@ class Connection(asyncio.Protocol):
         self._expect_headers()
         self._inner.connection_made(transport)
 
+    def remember(self, repeat: Repeat) -> None:
+        """Answer the present request by `repeat` when it comes again, if this connection has had such ones only."""
+        if self._request:
+            self._repeat = repeat
+
+    def _answers_again(self, data: bytes) -> bool:
+        """Answer the bytes of the last request if they come again; otherwise prepare for another one."""
+        if self._repeat is not None and data == self._request and not self._transport.get_write_buffer_size():
+            answer = self._repeat()
+            if answer is not None:
+                self.idle_since = self._loop.time()
+                self._transport.write(answer)
+                return True
+        self._repeat = None
+        # One request line and the end of its headers: with nothing before it, this is a whole request.
+        whole = data.count(b" HTTP/1.") == 1 and data.endswith(b"\r\n\r\n") and len(data) <= LONGEST_REPEATED
+        self._mixed = self._mixed or self._awaited or not whole
+        self._awaited = True
+        self._request = b"" if self._mixed else data
+        return False
+
     def data_received(self, data: bytes) -> None:
         """See asyncio.Protocol."""
-        if self._inner is None:
+        if self._inner is None or self._answers_again(data):
             return
         if self.refused:
             self._thrown_away += len(data)

@@ -8,7 +8,7 @@ from aiohttp import web
 
 from mavproxy_uavapi.core.errors import TooManyRequests
 from mavproxy_uavapi.http.access import may_use
-from mavproxy_uavapi.http.call import SERVICE
+from mavproxy_uavapi.http.call import SERVICE, Service
 from mavproxy_uavapi.http.caller import CALLER, Caller
 from mavproxy_uavapi.http.responses import Handler
 from mavproxy_uavapi.http.router import MATCH
@@ -38,15 +38,24 @@ def _rate_key(caller: Caller, request: web.BaseRequest) -> str:
     return f"{caller.name}@{caller.group} {system if system in request[SERVICE].host.fleet.vehicles else 0}"
 
 
+def rate_of(caller: Caller, service: Service) -> float:
+    """The requests per second that a caller may send; 0 for no limit."""
+    return service.settings.local_rate if caller.is_local else service.settings.max_rate
+
+
+def seconds_to_wait(request: web.BaseRequest, caller: Caller) -> float:
+    """Count a request; 0, or the seconds to wait if its caller asks more often than it may."""
+    service = request[SERVICE]
+    rate = rate_of(caller, service)
+    return service.callers.take(_rate_key(caller, request), rate, service.host.clock()) if rate else 0.0
+
+
 async def limit_rate(request: web.BaseRequest, handler: Handler) -> web.StreamResponse:
     """Refuse a caller that asks more often than it may."""
-    service = request[SERVICE]
     caller: Caller | None = request.get(CALLER)  # None for a reader of the documentation, counted by the door check
-    if caller is None or stops(request):
-        return await handler(request)
-    rate = service.settings.local_rate if caller.is_local else service.settings.max_rate
-    if rate:
-        wait = service.callers.take(_rate_key(caller, request), rate, service.host.clock())
+    if caller is not None and not stops(request):
+        wait = seconds_to_wait(request, caller)
         if wait:
+            rate = rate_of(caller, request[SERVICE])
             raise TooManyRequests(f"more than {rate:g} requests a second", math.ceil(wait))
     return await handler(request)

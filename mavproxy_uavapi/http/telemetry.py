@@ -59,55 +59,56 @@ def _age(call: Call, received: Received) -> float:
 
 
 async def _info(
-    call: Call, name: str, view: Callable[[Any], dict[str, Any]], result: str = "Success", member: str = "info"
+    call: Call, view: Callable[[Any], dict[str, Any]], result: str = "Success", member: str = "info"
 ) -> dict[str, Any]:
-    received = await _newest(call, name)
+    """The newest message of the route; it awaits nothing if that is there (`http.repeat`)."""
+    received = await _newest(call, call.message)
     return call.answer(result, **{member: view(received.message)}, age_s=_age(call, received))
 
 
 async def general(call: Call) -> dict[str, Any]:
     """Speeds (m/s), heading (degrees), throttle (%), altitude (m AMSL)."""
-    return await _info(call, "VFR_HUD", views.general)
+    return await _info(call, views.general)
 
 
 async def gps(call: Call) -> dict[str, Any]:
     """Fused position (degrees, m AMSL, m above home), velocity (m/s: north, east, down), heading (degrees)."""
-    return await _info(call, "GLOBAL_POSITION_INT", views.gps)
+    return await _info(call, views.gps)
 
 
 async def gps_raw(call: Call) -> dict[str, Any]:
     """The GPS receiver's own position (degrees, m AMSL), speed (m/s) and course (degrees)."""
-    return await _info(call, "GPS_RAW_INT", views.gps_raw)
+    return await _info(call, views.gps_raw)
 
 
 async def ned(call: Call) -> dict[str, Any]:
     """Fused position (m) and velocity (m/s): north, east, down of the EKF origin."""
-    return await _info(call, "LOCAL_POSITION_NED", views.ned)
+    return await _info(call, views.ned)
 
 
 async def attitude(call: Call) -> dict[str, Any]:
     """Roll, pitch, yaw (degrees) and their rates (deg/s)."""
-    return await _info(call, "ATTITUDE", views.attitude)
+    return await _info(call, views.attitude)
 
 
 async def sys_status(call: Call) -> dict[str, Any]:
     """SYS_STATUS as it is."""
-    return await _info(call, "SYS_STATUS", views.fields, "success", "status")
+    return await _info(call, views.fields, "success", "status")
 
 
 async def sensor_status(call: Call) -> dict[str, Any]:
     """Which sensors are present, enabled, healthy."""
-    return await _info(call, "SYS_STATUS", views.sensors, "success", "status")
+    return await _info(call, views.sensors, "success", "status")
 
 
 async def battery_info(call: Call) -> dict[str, Any]:
     """Voltage (mV), current (cA), charge (%)."""
-    return await _info(call, "SYS_STATUS", views.battery, "success")
+    return await _info(call, views.battery, "success")
 
 
 async def error_info(call: Call) -> dict[str, Any]:
     """Communication and autopilot errors."""
-    return await _info(call, "SYS_STATUS", views.errors, "success")
+    return await _info(call, views.errors, "success")
 
 
 async def compass(call: Call) -> dict[str, Any]:

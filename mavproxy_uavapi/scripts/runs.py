@@ -122,25 +122,7 @@ def create(
         OSError: they cannot be written.
     """
     logs.mkdir(parents=True, exist_ok=True)
-    started_at = time.time()
-    stamp = datetime.fromtimestamp(started_at).strftime("%Y%m%d_%H%M%S")
-    name = f"{names.stem(script)}_{stamp}"
-    path = logs / f"{name}{RECORD}"
-    if path.exists():  # an earlier run began in the same second; names hold whole seconds
-        time.sleep(1.0 - started_at % 1.0)
-        return create(
-            logs,
-            script,
-            args,
-            sysid,
-            command=command,
-            cwd=cwd,
-            port=port,
-            grace=grace,
-            environment=environment,
-            operator=operator,
-            token=token,
-        )
+    started_at, name = _new_name(logs, script)
     out_log, err_log = logs / f"{name}_out.log", logs / f"{name}_err.log"
     record = {
         "script": script,
@@ -162,8 +144,22 @@ def create(
     secret = os.open(logs / f"{name}{ENVIRONMENT}", os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     with os.fdopen(secret, "w", encoding="utf-8") as file:
         json.dump(dict(environment), file)
+    path = logs / f"{name}{RECORD}"
     path.write_text(json.dumps(record), encoding="utf-8")
     return load(path)
+
+
+def _new_name(logs: Path, script: str) -> tuple[float, str]:
+    """When a run of the script begins (s since 1970), and its name, which no other has.
+
+    Names hold whole seconds; after an earlier run of the same second it waits for the next.
+    """
+    while True:
+        started_at = time.time()
+        name = f"{names.stem(script)}_{datetime.fromtimestamp(started_at):%Y%m%d_%H%M%S}"
+        if not (logs / f"{name}{RECORD}").exists():
+            return started_at, name
+        time.sleep(1.0 - started_at % 1.0)
 
 
 def discard(run: Run) -> None:

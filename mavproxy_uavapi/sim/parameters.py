@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass
+from functools import cache
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -37,12 +38,7 @@ class ParameterStore:
     """All parameters, by name and by index; they outlive a reboot."""
 
     def __init__(self, blocks: Blocks = copter.BLOCKS) -> None:
-        rows = sorted(
-            (name, kind, _as_stored(float(text), kind))
-            for block, kind in zip(blocks, _KINDS, strict=True)
-            for name, text in (entry.split("=") for entry in block.split())
-        )
-        self.ordered = [Parameter(index, *row) for index, row in enumerate(rows)]
+        self.ordered = [Parameter(index, *row) for index, row in enumerate(_rows(blocks))]
         self._by_name = {parameter.name: parameter for parameter in self.ordered}
 
     def __len__(self) -> int:
@@ -64,6 +60,16 @@ class ParameterStore:
         if parameter is not None:
             parameter.value = _as_stored(value, parameter.kind)
         return parameter
+
+
+@cache
+def _rows(blocks: Blocks) -> list[tuple[str, int, float]]:
+    """Name, type and default of each parameter, by name."""
+    return sorted(
+        (name, kind, _as_stored(float(text), kind))
+        for block, kind in zip(blocks, _KINDS, strict=True)
+        for name, text in (entry.split("=") for entry in block.split())
+    )
 
 
 def _as_stored(value: float, kind: int) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import selectors
+import threading
 from typing import Any
 
 NOTHING_HAPPENS = 5.0  # real s after which a loop that waits for nothing but other threads is called stuck
@@ -21,11 +22,17 @@ class TimeTravellingLoop(asyncio.SelectorEventLoop):
         self.now = 1000.0
         self.patience = 0.0
         self.defects: list[dict[str, Any]] = []
+        self._thread = threading.get_ident()
         super().__init__(_JumpingSelector(self))
         self.set_exception_handler(lambda _, context: self.defects.append(context))
 
     def time(self) -> float:
         return self.now
+
+    def call_soon_threadsafe(self, callback: Any, *args: Any, context: Any = None) -> asyncio.Handle:
+        """As `call_soon` in the loop's own thread, which need not be woken."""
+        own = threading.get_ident() == self._thread
+        return (self.call_soon if own else super().call_soon_threadsafe)(callback, *args, context=context)
 
     def run(self, coroutine: Any) -> Any:
         """The coroutine's result."""
@@ -51,6 +58,8 @@ class _JumpingSelector(selectors.DefaultSelector):
         self._loop = loop
 
     def select(self, timeout: float | None = None) -> Any:
+        if timeout == 0 and len(self.get_map()) <= 1:
+            return []  # work is ready, and there is no socket but the loop's own
         if timeout is None:
             ready = super().select(NOTHING_HAPPENS)
             if not ready:

@@ -65,6 +65,11 @@ class Bridge:
         """Whether the asyncio thread is alive."""
         return self._thread.running
 
+    @property
+    def busy(self) -> bool:
+        """Whether the main loop handles messages now."""
+        return self._busy
+
     def start(self) -> None:
         """Start the asyncio thread and be woken by MAVProxy's select(). Main loop only."""
         self._select_extra[self._calls.fileno()] = (self._calls.on_readable, None)
