@@ -16,6 +16,7 @@ from mavproxy_uavapi.core.vehicle.guided import GUIDED, TOLERANCE, GuidedVehicle
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.messages import GlobalTarget, NedTarget
 from mavproxy_uavapi.core.vehicle.time_limits import FlightLimits
+from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
 
 AUTO, TAKEOFF, RTL, QLAND = "AUTO", "TAKEOFF", "RTL", "QLAND"
 SPEED_MODES = {GUIDED, AUTO}  # others refuse DO_CHANGE_SPEED
@@ -193,13 +194,14 @@ class Plane(GuidedVehicle):
         distance = self.distance_home() or 0.0
         expected = CIRCLES + time_limits.leg_time(await self.limits(), distance, 0.0)
 
-        landed = await self.landing_watch(job, *returning)
+        landing = Touchdown(await self.limits())
 
         def at_home() -> bool | None:
+            self.report_home(job)
             distance = self.distance_home()
             if self.state.armed and distance is not None and distance <= near:
                 return True
-            return landed()
+            return self.has_landed(landing, *returning)
 
         names = {"HEARTBEAT", "GLOBAL_POSITION_INT"}
         await self.waiting.until(names, at_home, self.allowed(expected, timeout), "return home")

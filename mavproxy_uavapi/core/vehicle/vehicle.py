@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 from mavproxy_uavapi.core.errors import Busy, ModeChanged, NotArmed, NotFound, NotSupported, Rejected, TimedOut
@@ -111,32 +110,32 @@ class Vehicle(Verbs):
 
     async def landed_in(self, job: Job, mode: str, timeout: float) -> None:
         """Wait until it has landed and disarmed in that mode; motors that stop in flight are no landing."""
-        landed = await self.landing_watch(job, mode)
-        names = {"HEARTBEAT", "GLOBAL_POSITION_INT"}
-        await self.waiting.until(names, landed, timeout, f"land and disarm in {mode}")
-
-    async def landing_watch(self, job: Job, *modes: str) -> Callable[[], bool | None]:
-        """What to call after each heartbeat and position: True when it has landed and disarmed in one of the modes.
-
-        That raises NotArmed for motors that stop in flight, and ModeChanged in any other mode.
-        """
         landing = Touchdown(await self.limits())
 
         def landed() -> bool | None:
             self.report_home(job)
-            down, north, east = (
-                (self.state.field("GLOBAL_POSITION_INT", name) or 0) / 100.0 for name in ("vz", "vx", "vy")
-            )
-            landing.moves_at(down, math.hypot(north, east))
-            if self.state.armed is not False or self.mode not in modes:
-                self.held_by(self.mode if self.mode in modes else modes[0])
-                return None
-            landing.disarmed(self.clock())
-            if landing.fell:
-                raise NotArmed("the vehicle was disarmed in flight, and fell")
-            return landing.is_over(self.clock(), self.state.age("GLOBAL_POSITION_INT", self.clock()))
+            return self.has_landed(landing, mode)
 
-        return landed
+        names = {"HEARTBEAT", "GLOBAL_POSITION_INT"}
+        await self.waiting.until(names, landed, timeout, f"land and disarm in {mode}")
+
+    def has_landed(self, landing: Touchdown, *modes: str) -> bool | None:
+        """Whether it has landed and disarmed in one of the modes; called after each heartbeat and position.
+
+        Raises:
+            NotArmed: its motors stopped in flight.
+            ModeChanged: the pilot or a failsafe has the vehicle.
+        """
+        names = ("vz", "vx", "vy")
+        down, north, east = ((self.state.field("GLOBAL_POSITION_INT", name) or 0) / 100.0 for name in names)
+        landing.moves_at(down, math.hypot(north, east))
+        if self.state.armed is not False or self.mode not in modes:
+            self.held_by(self.mode if self.mode in modes else modes[0])
+            return None
+        landing.disarmed(self.clock())
+        if landing.fell:
+            raise NotArmed("the vehicle was disarmed in flight, and fell")
+        return landing.is_over(self.clock(), self.state.age("GLOBAL_POSITION_INT", self.clock()))
 
     def report_home(self, job: Job) -> None:
         """Set the job's progress: the altitude, and the distance to home."""
