@@ -1,7 +1,9 @@
-"""A fleet's readings through `kill -9` of worker, broker and database and through fading links: once each?
+"""A fleet's readings through `kill -9` of worker, broker and database and through cut links: once each?
 
 Real Mosquitto, real PostgreSQL, real workers. The vehicles have spool, sender and MQTT sink of mavproxy_gradys as
-they are, without MAVProxy; see tests/support/fleet_vehicles.py. In the end SQL counts what was sampled and the rows.
+they are, without MAVProxy; see tests/support/fleet_vehicles.py. Half of them are in a network namespace whose cable
+is cut; where none can be made, they are behind a relay that is stopped. In the end SQL counts what was sampled and
+the rows.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from pathlib import Path
 from rig import machine, table
 
 from tests.support.fleet_faults import Audit, FaultyFleet
+from tests.support.network_namespace import NetworkNamespace
 
 PATIENCE = 600.0  # s
 
@@ -29,6 +32,15 @@ def report(audit: Audit, ack: str) -> str:
     return table(headings, [[f"the {ack}", *map(str, counts), *delays]])
 
 
+def network_namespace() -> NetworkNamespace | None:
+    """A namespace for half of the vehicles; None, and a sentence, where it cannot be made."""
+    try:
+        return NetworkNamespace()
+    except OSError as error:
+        print(f"soak: {error}; the link is a relay that is stopped")
+        return None
+
+
 def main() -> int:
     """Run it; 0 when each reading is a row, once, or was counted as dropped."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -39,10 +51,12 @@ def main() -> int:
     parser.add_argument("--longest", type=float, default=12.0, help="s of a fault, and of a rest (%(default)g)")
     parser.add_argument("--ack", choices=("station", "broker"), default="station", help="whose word counts")
     parser.add_argument("--seed", type=int, default=1, help="(%(default)s)")
+    parser.add_argument("--relay", action="store_true", help="a relay that is stopped, not a network namespace")
     options = parser.parse_args()
     print(f"soak: {machine()}")
+    namespace = None if options.relay else network_namespace()
     with tempfile.TemporaryDirectory(prefix="uavapi-fleet-") as name:
-        fleet = FaultyFleet(Path(name), options.workers, options.vehicles, options.rate, options.ack)
+        fleet = FaultyFleet(Path(name), options.workers, options.vehicles, options.rate, options.ack, namespace)
         try:
             fleet.start()
             began = time.monotonic()
@@ -51,6 +65,8 @@ def main() -> int:
             audit = fleet.audit(PATIENCE)
         finally:
             fleet.stop()
+            if namespace is not None:
+                namespace.remove()
     faults = ", ".join(f"{count} of the {kind}" for kind, count in sorted(fleet.faults.items()))
     print(f"{options.vehicles} vehicles, {options.workers} workers, {took:.0f} s of faults: {faults}")
     print(report(audit, options.ack))

@@ -1,10 +1,9 @@
-"""The module's endpoints while uavapi is loaded: /gradys/status, /gradys/readings, /mission/fly-track."""
+"""The module's endpoints while uavapi is loaded: /gradys/…, and /mission/fly-track."""
 
 from __future__ import annotations
 
 import asyncio
 import math
-import re
 import time
 from typing import Annotated, Any
 
@@ -22,7 +21,6 @@ from mavproxy_uavapi.http.extension import EITHER, FLY, POST, WATCH, Answer, Cal
 
 MOST_READINGS = 1000  # readings in one request
 LONGEST_LIST = 64
-VEHICLE = re.compile(rf"{device_of(0)[:-1]}[0-9]+")  # the device names of vehicles
 Name = Annotated[str, Field(pattern=rf"^{NAME}$", description="letters, digits, _ . -")]
 
 
@@ -72,6 +70,12 @@ class Readings(Request):
         return value if not isinstance(value, dict) or "readings" in value else {"readings": [value]}
 
 
+class Since(Request):
+    """`since`: s since 1970; only later readings are answered."""
+
+    since: Annotated[float, Field(ge=0, le=1e11, description="s since 1970; only later readings")] = 0.0
+
+
 class GradysHandlers:
     """The actions of the routes."""
 
@@ -83,6 +87,7 @@ class GradysHandlers:
         return [
             Route("/gradys/status", self.status, Empty, WATCH),
             Route("/gradys/readings", self.readings, Readings, FLY, POST),
+            Route("/gradys/recent", self.recent, Since, WATCH),
             Route("/gradys/flush", self.flush, Empty, FLY, EITHER),
             Route(VERB, self.fly_track, TrackRequest, FLY, POST, job=True),
         ]
@@ -109,6 +114,11 @@ class GradysHandlers:
             "seq": numbers,
         }
 
+    async def recent(self, call: Call) -> dict[str, Any]:
+        """The newest numbers by device and quantity; their points are [s since 1970, value]."""
+        series = self._gradys.pipeline.recent.report(call.params(Since).since)
+        return {"device": "uav", "id": self._id(call), "result": "Success", "series": series}
+
     async def fly_track(self, call: Call) -> Answer:
         """Take off, fly through a track's places, return and land."""
         track_request = call.params(TrackRequest)
@@ -125,12 +135,18 @@ class GradysHandlers:
         system = request.sysid or call.known_vehicle.state.system
         call.require_right(system)
         at = now if request.time is None else request.time
-        device = request.device or device_of(system)
+        device = request.device or self._gradys.pipeline.device_of(system)
         if request.quantity == STATUS:
             raise Invalid(f"{STATUS} tells whether a vehicle is online; take another name", "quantity")
-        if request.quantity in self._gradys.pipeline.reserved and VEHICLE.fullmatch(device):
+        if request.quantity in self._gradys.pipeline.reserved and self._is_vehicle(device):
             raise Invalid(f"{request.quantity} of {device} comes from the vehicle itself only", "quantity")
         return Reading(device, system, request.quantity, request.representation, request.value, at)
+
+    def _is_vehicle(self, device: str) -> bool:
+        """Whether it is the device name of a vehicle."""
+        number = device.rpartition("-")[2]
+        is_number = number.isascii() and number.isdigit()
+        return is_number and device in (device_of(int(number)), self._gradys.pipeline.device_of(int(number)))
 
     def _id(self, call: Call) -> str | None:
         try:

@@ -135,4 +135,4 @@ async def hear(host: Host, settings: GradysSettings) -> None:
     except ModuleNotFoundError as missing:
         host.warn(f"`gradys set hear` needs {missing.name}: pip install 'mavproxy-uavapi[mqtt]'")
         return
-    await Listener(host, settings.hear, settings.timeout, settings.ca_file).run()
+    await Listener(host, settings.hear, settings.timeout, settings.ca_file, settings.device).run()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +12,7 @@ from MAVProxy.modules.lib.mp_settings import MPSetting
 
 from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.forwarding.quantities import Quantity, parse_quantities
+from mavproxy_gradys.forwarding.readings import UAV
 from mavproxy_gradys.forwarding.sink_address import SinkAddress, sink_addresses
 from mavproxy_gradys.net.addresses import StationAddress, checked_ip, split_url, stations
 from mavproxy_gradys.net.http_client import tls_context
@@ -21,6 +23,8 @@ from mavproxy_uavapi.core.settings import ModuleSettings
 from mavproxy_uavapi.core.state_directory import state_directory
 from mavproxy_uavapi.core.text import escaped
 from mavproxy_uavapi.core.values import path_of
+
+DEVICE = re.compile(r"[A-Za-z0-9._-]{1,60}")
 
 
 @dataclass(frozen=True)
@@ -36,6 +40,7 @@ class GradysSettings:
         token: bearer token for stations and HTTP sinks; empty for none.
         ca_file: certificates to check TLS with; empty for the system's.
         sink: the receivers of readings.
+        device: the beginning of the vehicles' device names; `uav` makes uav-7.
         hear: broker at which other MAVProxys tell the positions of their vehicles; empty for none.
         quantities: the sampled quantities.
         spool: file that keeps readings until they are acknowledged.
@@ -51,6 +56,7 @@ class GradysSettings:
     token: str
     ca_file: str
     sink: tuple[SinkAddress, ...]
+    device: str
     hear: str
     quantities: tuple[Quantity, ...]
     spool: Path
@@ -71,6 +77,17 @@ def header_value(text: str) -> str:
     """
     if not (text.isascii() and (text.isprintable() or not text)):
         raise SettingError("it takes printable ASCII")
+    return text
+
+
+def device_name(text: str) -> str:
+    """The beginning of device names, checked; it is a part of topics, too.
+
+    Raises:
+        SettingError: it has other letters than a device name may have.
+    """
+    if not DEVICE.fullmatch(text):
+        raise SettingError("it takes 1 to 60 of the letters A-Z a-z 0-9 . _ -")
     return text
 
 
@@ -107,6 +124,7 @@ class GradysModuleSettings(ModuleSettings[GradysSettings]):
         "token": header_value,
         "ca_file": lambda text: str(path_of(text)) if text else "",
         "sink": sink_addresses,
+        "device": device_name,
         "hear": broker,
         "quantities": parse_quantities,
         "spool": spool_path,
@@ -128,6 +146,7 @@ class GradysModuleSettings(ModuleSettings[GradysSettings]):
                 "",
                 "where readings go, by comma: http(s)://HOST/PATH[#ack=status], mqtt(s)://HOST/TOPIC[#ack=station]",
             ),
+            MPSetting("device", str, UAV, "how device names begin: `uav` makes uav-7; unique to a companion"),
             MPSetting("hear", str, "", "broker with the positions of other MAVProxys: mqtt(s)://HOST[/TOPIC]"),
             MPSetting("quantities", str, "position@1", "what is sampled while there is a sink"),
             MPSetting("spool", str, default_spool(), "file that keeps readings until they are acknowledged"),

@@ -37,4 +37,6 @@ def _line(host: Host, vehicle: Vehicle) -> str:
     if hold is not None and hold.remaining is not None:
         held += f" ({hold.operator.role.word}, {hold.remaining:.0f} s without a call)"
     commanded = "" if job is None else f"; {job.client} commands: {job.verb}"
+    if job is None and vehicle.state.armed and vehicle.has_foreign_target:
+        commanded = "; another station commands"
     return f"  vehicle {vehicle.state.system}: {held}{commanded}"

@@ -14,7 +14,6 @@ from mavproxy_uavapi.core.errors import BadRequest, ToolFailed
 from mavproxy_uavapi.tools import run_tool
 
 TIME_LIMIT = 30.0  # s
-SETTLING = 1000  # ms for a Raspberry Pi's camera to settle exposure and white balance before the picture
 SKIPPED_FRAMES = 5  # of a USB camera, whose first ones are dark
 RESOLUTION = re.compile(r"([1-9][0-9]{1,4})x([1-9][0-9]{1,4})")
 JPEG = b"\xff\xd8\xff"
@@ -26,34 +25,40 @@ class Shot:
 
     Attributes:
         width, height: pixels.
-        capture_time: ms of exposure.
+        capture_time: ms before the picture, in which the camera settles exposure and white balance.
         focus_distance: m; None leaves the focus to the camera.
+        exposure: ms; None leaves the exposure to the camera.
     """
 
     width: int
     height: int
     capture_time: float
     focus_distance: float | None = None
+    exposure: float | None = None
 
 
 def fswebcam(shot: Shot, file: str) -> list[str]:
-    """A USB camera, which sets its exposure itself.
+    """A USB camera.
 
     Raises:
-        BadRequest: a focus distance is set; V4L2's focus has no metres.
+        BadRequest: a focus distance or an exposure is set; V4L2's focus has no metres, and its exposure many names.
     """
     if shot.focus_distance is not None:
         raise BadRequest("fswebcam cannot focus at a distance; leave focus_distance out")
-    size = f"{shot.width}x{shot.height}"
-    return ["fswebcam", "-q", "-r", size, "--no-banner", "-S", str(SKIPPED_FRAMES), file]
+    if shot.exposure is not None:
+        raise BadRequest("fswebcam leaves the exposure to the camera; leave exposure out")
+    size, delay = f"{shot.width}x{shot.height}", f"{shot.capture_time / 1000:g}"
+    return ["fswebcam", "-q", "-r", size, "--no-banner", "-D", delay, "-S", str(SKIPPED_FRAMES), file]
 
 
 def raspberry(program: str) -> Callable[[Shot, str], list[str]]:
     """A Raspberry Pi's camera: exposure in microseconds, focus in dioptres (1/m)."""
 
     def arguments(shot: Shot, file: str) -> list[str]:
-        command = [program, "-n", "-t", str(SETTLING), "--width", str(shot.width), "--height", str(shot.height)]
-        command += ["--shutter", str(round(shot.capture_time * 1000))]
+        settling = max(round(shot.capture_time), 1)  # 0 means for ever
+        command = [program, "-n", "-t", str(settling), "--width", str(shot.width), "--height", str(shot.height)]
+        if shot.exposure is not None:
+            command += ["--shutter", str(round(shot.exposure * 1000))]
         if shot.focus_distance is not None:
             command += ["--autofocus-mode", "manual", "--lens-position", f"{1 / shot.focus_distance:g}"]
         return [*command, "-o", file]

@@ -12,13 +12,14 @@ try:
     from mavproxy_uavapi.api import Api
 except ModuleNotFoundError as missing:  # MAVProxy prints the text of an ImportError as one line
     raise ImportError(f"uavapi needs {missing.name}: pip install mavproxy-uavapi") from missing
-from mavproxy_uavapi import authority_console, fleet_console, token_console
+from mavproxy_uavapi import authority_console, fleet_console, token_console, window_view
 from mavproxy_uavapi.console import report, vehicles
 from mavproxy_uavapi.core.background import BackgroundCommands
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.logs import Logs, print_above_prompt
 from mavproxy_uavapi.core.module import SharedModule
 from mavproxy_uavapi.core.remembered_settings import RememberedSettings
+from mavproxy_uavapi.core.windows import View
 from mavproxy_uavapi.settings import ApiModuleSettings, ApiSettings
 
 NAME = "uavapi"
@@ -90,6 +91,10 @@ class UavApiModule(SharedModule[ApiSettings]):
             self._start()
         else:
             self.host.bridge.call_soon(self.api.use_envelope, self.module_settings.snapshot().envelope)
+
+    def view(self) -> View:
+        """Who commands, and the commanded targets."""
+        return window_view.view(self.host)
 
     async def end(self) -> None:
         """Stop listening, or trying to."""

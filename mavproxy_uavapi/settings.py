@@ -10,7 +10,7 @@ from typing import Any
 
 from MAVProxy.modules.lib.mp_settings import MPSetting
 
-from mavproxy_uavapi import envelope_file, tokens
+from mavproxy_uavapi import envelope_file, tile_store, tokens
 from mavproxy_uavapi.core.addresses import is_loopback, local_url_of, url_of
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.ini_file import IniFile
@@ -23,14 +23,17 @@ Network = ipaddress.IPv4Network | ipaddress.IPv6Network
 # Keys of the original service's or the launcher's INI file that are not settings of the module, with the reason; each
 # is reported in a line.
 LAUNCHERS = "`mavproxy-uavapi --config` starts simulated vehicles"
+_OF_API = {
+    "uav_connection": "MAVProxy has the link (--master)",
+    "connection_type": "MAVProxy has the link (--master)",
+    "gradys_gs": "the module gradys reads it from here (`module load gradys`, with this file as its config)",
+    "vehicle": "the vehicle's heartbeat gives its type",
+    "udp": "there is no HTTP/3",
+}
 NOT_OURS: dict[str, dict[str, str]] = {
-    "api": {
-        "uav_connection": "MAVProxy has the link (--master)",
-        "connection_type": "MAVProxy has the link (--master)",
-        "gradys_gs": "the module gradys reads it from here (`module load gradys`, with this file as its config)",
-        "vehicle": "the vehicle's heartbeat gives its type",
-        "udp": "there is no HTTP/3",
-    },
+    "api": _OF_API,
+    "mode": {**_OF_API, "simulated": LAUNCHERS},
+    "udp": _OF_API,
     "simulated": {
         "simulated": LAUNCHERS,
         "ardupilot_path": LAUNCHERS,
@@ -74,6 +77,7 @@ class ApiSettings:
         python_path: the Python for .py scripts.
         script_grace: s from Ctrl-C to the kill of a script that is stopped.
         vehicle_logs: folder of the downloaded logs of vehicles.
+        tiles: the map of the page: an MBTiles file or a folder of tiles; empty for none.
         script_size: kB of one script.
         script_quota: MB of all scripts together.
         envelope: file with where vehicles may fly; `vehicle` for their own fences, empty for none.
@@ -111,6 +115,7 @@ class ApiSettings:
     python_path: str
     script_grace: float
     vehicle_logs: str
+    tiles: str
     script_size: int
     script_quota: int
     envelope: str
@@ -276,6 +281,7 @@ class ApiModuleSettings(ModuleSettings[ApiSettings]):
             MPSetting("log_path", str, "", "log file, or its folder"),
             MPSetting("debug", str, "", "components that log in detail"),
             MPSetting("vehicle_logs", str, "~/uav_logs", "folder of downloaded vehicle logs"),
+            MPSetting("tiles", str, "", "map of the page: an MBTiles file or a folder z/x/y.png"),
             MPSetting("scripts_path", str, "~/uav_scripts", "folder of the uploaded scripts", tab="Scripts"),
             MPSetting("script_logs", str, "~/uav_scripts/logs", "folder of their logs"),
             MPSetting("python_path", str, sys.executable, "what runs .py scripts"),
@@ -297,6 +303,8 @@ class ApiModuleSettings(ModuleSettings[ApiSettings]):
         settings.check()
         if "envelope" in changed:
             envelope_file.check(settings.envelope)
+        if "tiles" in changed:
+            tile_store.check(settings.tiles)
         if "tokens" in changed:
             tokens.check(settings.tokens)
 

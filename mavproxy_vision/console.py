@@ -37,6 +37,7 @@ def status(tracker: Tracker, flights: FlightJobs) -> dict[str, Any]:
         "repeated": health.repeated,
         "skipped": health.skipped,
         "reconnects": health.reconnects,
+        "controls": tracker.controls,
         "families": list(settings.families),
         "tags": [vars(tag) for tag in settings.tag_list],
         "in_view": [detection["id"] for detection in in_view(result)],
@@ -69,6 +70,9 @@ def report(tracker: Tracker, flights: FlightJobs) -> str:
         f"{body['repeated']} repeated, {body['reconnects']} reconnects",
         f"AprilTags of {', '.join(body['families'])}: {tracker.settings.tags}; in view: {body['in_view'] or 'none'}",
     ]
+    if body["controls"]:
+        taken = ", ".join(f"{name} {value}" for name, value in body["controls"].items())
+        lines.append(f"camera controls: {taken}")
     if body["detector_ms"] is not None:
         lines.append(f"detector {body['detector_ms']} ms, newest frame {1000 * body['frame_age_s']:.0f} ms old")
     if flights.report is not None:

@@ -19,6 +19,7 @@ from mavproxy_uavapi.core.errors import SettingError, UavApiError
 from mavproxy_uavapi.core.module import SharedModule
 from mavproxy_uavapi.core.remembered_settings import RememberedSettings
 from mavproxy_uavapi.core.vehicle.jobs import Job
+from mavproxy_uavapi.core.windows import View
 from mavproxy_uavapi.http.extension import NED_REACH
 from mavproxy_vision import console, file_commands
 from mavproxy_vision.http import VisionHandlers
@@ -26,6 +27,7 @@ from mavproxy_vision.landing.flight_jobs import FlightJobs, FlightTask
 from mavproxy_vision.landing.mission import MissionPlan
 from mavproxy_vision.settings import METHODS, VisionModuleSettings, VisionSettings
 from mavproxy_vision.tracking.tracker import Tracker
+from mavproxy_vision.window_view import TagView
 
 NAME = "vision"
 COMPLETIONS = [
@@ -34,8 +36,8 @@ COMPLETIONS = [
 ]
 MISSION = ("5", "8", "-5")  # m: altitude, north, east; the seed's
 RESTARTS = {  # settings that need the camera to be opened again
-    "source", "family", "tags", "any_id", "far", "calibration", "fov", "width", "height", "fps", "latency", "mount",
-    "offset", "gimbal", "threads", "vehicle",
+    "source", "family", "tags", "any_id", "far", "calibration", "fov", "width", "height", "fps", "exposure", "gain",
+    "brightness", "latency", "mount", "offset", "gimbal", "threads", "vehicle",
 }  # fmt: skip
 
 
@@ -69,6 +71,7 @@ class VisionModule(SharedModule[VisionSettings]):
         )
         self.tracker = Tracker(self.host, self.module_settings.snapshot())
         self.flights = FlightJobs(self.tracker, self._directory)
+        self._tag_view = TagView(self.tracker)
         self._background = BackgroundCommands(self.host, NAME)
         self._pages = VisionHandlers(self.tracker, self.flights)
         self._routes = {route.path: route for route in self._pages.routes()}
@@ -83,6 +86,10 @@ class VisionModule(SharedModule[VisionSettings]):
         self.host.bridge.call_soon(self.tracker.listen)
         if self.module_settings.snapshot().source:
             self._start()
+
+    def view(self) -> View:
+        """Where the tags lie."""
+        return self._tag_view()
 
     async def end(self) -> None:
         """Close everything."""

@@ -15,6 +15,7 @@ from mavproxy_uavapi.core.settings import ModuleSettings
 from mavproxy_uavapi.core.values import NUMBER, path_of
 from mavproxy_vision.apriltag.tag_layout import FAMILIES, Tag, parse_families, parse_tags
 from mavproxy_vision.camera.calibration import load
+from mavproxy_vision.camera.controls import LONGEST, Controls, parse_controls
 from mavproxy_vision.camera.renderer import Look
 from mavproxy_vision.camera.simulated import Timing, parse_placed
 from mavproxy_vision.camera.source import masked_source
@@ -41,6 +42,9 @@ class VisionSettings:
     width: int
     height: int
     fps: float
+    exposure: str
+    gain: str
+    brightness: str
     latency: float
     mount: str
     offset: str
@@ -49,6 +53,7 @@ class VisionSettings:
     attempts: int
     tolerance: float
     speed: float
+    mission_speed: float
     descent: float
     leash: float
     time_limit: float
@@ -98,6 +103,11 @@ class VisionSettings:
         return Mount(roll, pitch, yaw, (offset[0], offset[1], offset[2]), self.gimbal)
 
     @property
+    def controls(self) -> Controls:
+        """What the camera is asked for."""
+        return parse_controls(self.exposure, self.gain, self.brightness)
+
+    @property
     def timing(self) -> Timing:
         """The timing of the simulated camera's frames."""
         jitter, dropout = self.sim_jitter / 1000, self.sim_dropout
@@ -130,6 +140,7 @@ CHECKS: tuple[tuple[set[str], Callable[[VisionSettings], object]], ...] = (
     ({"directory"}, lambda now: path_of(now.directory, "directory")),
     ({"family", "tags"}, lambda now: now.tag_list),
     ({"calibration"}, lambda now: now.model),
+    ({"exposure", "gain", "brightness"}, lambda now: now.controls),
     ({"mount", "offset"}, lambda now: now.camera_mount),
     ({"family", "sim_tags"}, lambda now: parse_placed(now.sim_tags, now.families[0])),
 )
@@ -154,6 +165,9 @@ class VisionModuleSettings(ModuleSettings[VisionSettings]):
             MPSetting("width", int, 640, "px", range=(64, 8192)),
             MPSetting("height", int, 480, "px", range=(48, 8192)),
             MPSetting("fps", float, 20.0, "frames per second", range=(0.5, 240)),
+            MPSetting("exposure", str, "", f"ms up to {LONGEST:g}, or auto; empty leaves it to the camera"),
+            MPSetting("gain", str, "", "in the camera's units; of libcamerasrc a factor; empty leaves it"),
+            MPSetting("brightness", str, "", "in the camera's units; of libcamerasrc -1 to 1; empty leaves it"),
             MPSetting("latency", float, 80.0, "ms from light to our having the frame", range=(0, 2000)),
             MPSetting("mount", str, "0", "degrees: yaw, or roll,pitch,yaw; yaw 90: top of the image to the right"),
             MPSetting("offset", str, "0,0,0", "m of the lens forward,right,down of the vehicle's centre"),
@@ -163,7 +177,10 @@ class VisionModuleSettings(ModuleSettings[VisionSettings]):
             ),
             MPSetting("attempts", int, 5, "times of looking for the tag", range=(1, 100)),
             MPSetting("tolerance", float, 0.12, "m off the tag within which it may touch down", range=(0.02, 5)),
-            MPSetting("speed", float, 1.5, "m/s, horizontally", range=(0.1, 10)),
+            MPSetting("speed", float, 1.5, "m/s, horizontally, of a search and a landing", range=(0.1, 10)),
+            MPSetting(
+                "mission_speed", float, 0.0, "m/s on the way of a mission; 0: the vehicle's own", range=(0, 30)
+            ),
             MPSetting("descent", float, 1.0, "m/s, at most", range=(0.1, 3)),
             MPSetting("leash", float, 15.0, "m that a search may go away", range=(0.5, 500)),
             MPSetting("time_limit", float, 180.0, "s for a landing or a search", range=(5, 3600)),

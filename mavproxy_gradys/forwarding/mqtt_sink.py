@@ -27,7 +27,7 @@ from paho.mqtt.properties import Properties
 from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.forwarding.confirmations import Confirmations
 from mavproxy_gradys.forwarding.quantities import POSITION, STATUS
-from mavproxy_gradys.forwarding.readings import CONFIRMED_TOPIC, Reading, Stored, device_of
+from mavproxy_gradys.forwarding.readings import CONFIRMED_TOPIC, UAV, Reading, Stored, device_of
 from mavproxy_gradys.net.addresses import split_url
 from mavproxy_gradys.net.mqtt_client import make_client
 from mavproxy_gradys.net.resolver import Resolver
@@ -50,9 +50,13 @@ class MqttSink:
         timeout: s for an answer of the broker.
         ca_file: as for `Client`.
         station_confirms: whether the station acknowledges, not the broker.
+        device: the beginning of the device names of our vehicles.
     """
 
-    def __init__(self, url: str, timeout: float, ca_file: str, station_confirms: bool = False) -> None:
+    def __init__(
+        self, url: str, timeout: float, ca_file: str, station_confirms: bool = False, device: str = UAV
+    ) -> None:
+        self._device = device
         self._parts, self._port = split_url(url, ("mqtt", "mqtts"))
         self._topic = unquote(self._parts.path.lstrip("/")) or DEFAULT_TOPIC
         self._timeout = timeout
@@ -131,13 +135,19 @@ class MqttSink:
             raise NotDelivered(self._explain(next(result for result in results if result is not None)))
         return taken
 
+    def _is_position(self, reading: Reading) -> bool:
+        """Whether the reading is a vehicle's own position, which is retained for new subscribers."""
+        return reading.quantity == POSITION and reading.device == device_of(reading.system, self._device)
+
     async def _publish(
         self, client: aiomqtt.Client, window: asyncio.Semaphore, stored: Stored, properties: Properties | None
     ) -> None:
         topic = topic_of(self._topic, stored.reading)
         payload = json.dumps(stored.body(), allow_nan=False)
         async with window:
-            await client.publish(topic, payload, qos=1, retain=is_position(stored.reading), properties=properties)
+            await client.publish(
+                topic, payload, qos=1, retain=self._is_position(stored.reading), properties=properties
+            )
 
     def _properties(self, status: str) -> Properties | None:
         """The properties of a reading: the topic for the station's confirmation, and the expiry."""
@@ -262,11 +272,6 @@ async def disconnect(client: aiomqtt.Client) -> None:
     if isinstance(open_socket, socket.socket):
         with contextlib.suppress(OSError):
             open_socket.shutdown(socket.SHUT_RDWR)
-
-
-def is_position(reading: Reading) -> bool:
-    """Whether the reading is a vehicle's own position, which is retained for new subscribers."""
-    return reading.quantity == POSITION and reading.device == device_of(reading.system)
 
 
 def topic_of(template: str, reading: Reading) -> str:

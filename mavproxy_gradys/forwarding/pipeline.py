@@ -9,7 +9,8 @@ from typing import Any
 
 from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.forwarding.quantities import POSITION, Quantity
-from mavproxy_gradys.forwarding.readings import Reading, Sampler
+from mavproxy_gradys.forwarding.readings import UAV, Reading, Sampler, device_of
+from mavproxy_gradys.forwarding.recent import RecentReadings
 from mavproxy_gradys.forwarding.sender import Sender
 from mavproxy_gradys.forwarding.sensor import SensorSampler, source_of
 from mavproxy_gradys.forwarding.spool import Spool
@@ -28,6 +29,9 @@ MEGABYTE = 1e6
 class ReadingPipeline:
     """Samples the quantities while there is a sink; keeps posted readings even without a sink.
 
+    Attributes:
+        recent: the newest readings, sampled and posted.
+
     Args:
         host: the vehicles.
         wall: s since 1970.
@@ -36,6 +40,7 @@ class ReadingPipeline:
     def __init__(self, host: Host, wall: Callable[[], float] = time.time) -> None:
         self._host = host
         self._wall = wall
+        self.recent = RecentReadings()
         self._settings: GradysSettings | None = None
         self.spool_thread: SpoolThread | None = None
         self._settings_before: GradysSettings | None = None  # of the last start
@@ -124,13 +129,26 @@ class ReadingPipeline:
         Raises:
             NotStored: they are not.
         """
-        return await self._started_thread().keep(readings)
+        numbers = await self._started_thread().keep(readings)
+        for reading in readings:
+            self.recent.add(reading)
+        return numbers
+
+    def _put(self, spool_thread: SpoolThread, reading: Reading | None) -> None:
+        """Take a sampled reading, if there is one."""
+        if reading is not None:
+            self.recent.add(reading)
+            spool_thread.put(reading)
 
     @property
     def reserved(self) -> set[str]:
         """The quantities that come from a vehicle itself only: the sampled ones and its position."""
         sampled = () if self._settings is None else self._settings.quantities
         return {POSITION, *(quantity.name for quantity in sampled)}
+
+    def device_of(self, system: int) -> str:
+        """The device name of a vehicle."""
+        return device_of(system, UAV if self._settings is None else self._settings.device)
 
     def flush(self) -> None:
         """Try all sinks now."""
@@ -142,14 +160,15 @@ class ReadingPipeline:
     # -- sampling -----------------------------------------------------------------------------------------
 
     def _sampler(self, quantity: Quantity) -> Sampler:
-        sampler = Sampler(quantity)
+        assert self._settings is not None
+        sampler = Sampler(quantity, self._settings.device)
         self._samplers.append(sampler)
         return sampler
 
     def _sensor(self, quantity: Quantity) -> SensorSampler:
         assert self._settings is not None
         source = source_of(quantity, self._settings.max_age, self._wall)
-        sampler = SensorSampler(quantity, source, self._host.clock)
+        sampler = SensorSampler(quantity, source, self._host.clock, self._settings.device)
         self._samplers.append(sampler)
         return sampler
 
@@ -161,9 +180,7 @@ class ReadingPipeline:
             while True:
                 await asyncio.sleep(ticker.wait(loop.time()))
                 system = self._host.registry.resolve()
-                reading = await sampler.sample(system if system in self._host.fleet.vehicles else 0)
-                if reading is not None:
-                    spool_thread.put(reading)
+                self._put(spool_thread, await sampler.sample(system if system in self._host.fleet.vehicles else 0))
         finally:
             await sampler.source.close()
 
@@ -173,9 +190,7 @@ class ReadingPipeline:
         while True:
             await asyncio.sleep(ticker.wait(loop.time()))
             for state in list(self._host.fleet.vehicles.values()):
-                reading = self._read(sampler, state)
-                if reading is not None:
-                    spool_thread.put(reading)
+                self._put(spool_thread, self._read(sampler, state))
 
     def _read(self, sampler: Sampler, state: VehicleState) -> Reading | None:
         assert self._settings is not None

@@ -9,6 +9,7 @@ from typing import Any
 from mavproxy_gradys.forwarding.quantities import Quantity
 from mavproxy_uavapi.core.mavlink.vehicle_state import Received, VehicleState
 
+UAV = "uav"  # the beginning of the device names of vehicles
 CONFIRMED_TOPIC = "confirmed/"  # below it a station confirms the readings that it has stored
 
 Value = float | int | str | bool | list[float]
@@ -54,9 +55,9 @@ class Stored:
         }
 
 
-def device_of(system: int) -> str:
-    """The device name of a vehicle."""
-    return f"uav-{system}"
+def device_of(system: int, name: str = UAV) -> str:
+    """The device name of a vehicle; `name` is the setting `device`."""
+    return f"{name}-{system}"
 
 
 @dataclass
@@ -66,11 +67,13 @@ class Sampler:
     A message is sampled once; a further reading needs a new message.
 
     Attributes:
+        device: the beginning of the device names.
         taken: number of readings.
         why_not: why the last turn gave none, by system id.
     """
 
     quantity: Quantity
+    device: str = UAV
     taken: int = 0
     why_not: dict[int, str] = field(default_factory=dict)
     _sampled_at: dict[int, float] = field(default_factory=dict)
@@ -115,7 +118,8 @@ class Sampler:
         self.why_not.pop(system, None)
         self.taken += 1
         quantity = self.quantity
-        return Reading(device_of(system), system, quantity.name, quantity.representation, value, at)
+        device = device_of(system, self.device)
+        return Reading(device, system, quantity.name, quantity.representation, value, at)
 
     def skip(self, system: int, why: str) -> None:
         """Note why there is no reading."""

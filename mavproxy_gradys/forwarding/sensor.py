@@ -9,7 +9,7 @@ from typing import Protocol
 
 from mavproxy_gradys.errors import NoReading
 from mavproxy_gradys.forwarding.quantities import LONGEST_TEXT, Quantity
-from mavproxy_gradys.forwarding.readings import Reading, Value, device_of
+from mavproxy_gradys.forwarding.readings import UAV, Reading, Value, device_of
 from mavproxy_gradys.forwarding.sensor_command import SensorCommand
 from mavproxy_gradys.forwarding.sensor_file import Measured, SensorFile
 from mavproxy_gradys.net.outage_log import Causes
@@ -59,10 +59,12 @@ class SensorSampler:
         quantity: the sensor.
         source: its source.
         clock: s, for the log.
+        device: the beginning of the device names.
     """
 
-    def __init__(self, quantity: Quantity, source: Source, clock: Callable[[], float]) -> None:
+    def __init__(self, quantity: Quantity, source: Source, clock: Callable[[], float], device: str = UAV) -> None:
         self.quantity, self.source = quantity, source
+        self._device = device
         self.taken = 0
         self.problem = ""
         self._cause = ""
@@ -89,7 +91,8 @@ class SensorSampler:
             return None
         self.taken += 1
         quantity = self.quantity
-        return Reading(device_of(system), system, quantity.name, quantity.representation, value, measured.time)
+        device = device_of(system, self._device)
+        return Reading(device, system, quantity.name, quantity.representation, value, measured.time)
 
 
 def value_of(quantity: Quantity, content: bytes) -> Value:

@@ -39,7 +39,7 @@ def make_sink(address: SinkAddress, settings: GradysSettings) -> Sink:
         from mavproxy_gradys.forwarding.mqtt_sink import MqttSink  # noqa: PLC0415  an extra
     except ModuleNotFoundError as missing:
         raise NotDelivered(f"MQTT needs {missing.name}: pip install 'mavproxy-uavapi[mqtt]'") from missing
-    return MqttSink(address.url, settings.timeout, settings.ca_file, address.station_confirms)
+    return MqttSink(address.url, settings.timeout, settings.ca_file, address.station_confirms, settings.device)
 
 
 class HttpSink:

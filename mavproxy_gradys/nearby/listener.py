@@ -11,7 +11,7 @@ import aiomqtt
 
 from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.forwarding.mqtt_sink import disconnect
-from mavproxy_gradys.forwarding.readings import device_of
+from mavproxy_gradys.forwarding.readings import UAV, device_of
 from mavproxy_gradys.nearby.advice import Advice, Track
 from mavproxy_gradys.net.addresses import split_url
 from mavproxy_gradys.net.mqtt_client import make_client
@@ -32,10 +32,12 @@ class Listener:
         url: mqtt(s)://[USER:PASSWORD@]HOST[:PORT][/TOPIC]
         timeout: s for an answer of the broker.
         ca_file: certificates to check TLS with; empty for the system's.
+        device: the beginning of the device names of our vehicles.
     """
 
-    def __init__(self, host: Host, url: str, timeout: float, ca_file: str) -> None:
+    def __init__(self, host: Host, url: str, timeout: float, ca_file: str, device: str = UAV) -> None:
         self._host = host
+        self._device = device
         self._parts, self._port = split_url(url, ("mqtt", "mqtts"))
         self._topic = unquote(self._parts.path.lstrip("/")) or DEFAULT_TOPIC
         self._timeout = timeout
@@ -70,7 +72,7 @@ class Listener:
     def _take(self, payload: object) -> None:
         if isinstance(payload, bytes | str) and self._advice.take(payload, self._host.clock()):
             separation, now = self._host.registry.traffic.separation, self._host.clock()
-            names = {device_of(system) for system in self._host.fleet.vehicles}
+            names = {device_of(system, self._device) for system in self._host.fleet.vehicles}
             for sentence in self._advice.warnings(self._in_the_air(), names, separation, now):
                 log.warning("%s", sentence)
                 self._host.warn(sentence)
@@ -82,5 +84,5 @@ class Listener:
             if received is not None and state.armed and not state.landed:
                 at = received.message
                 place, velocity = (at.lat / 1e7, at.lon / 1e7), (at.vx / 100, at.vy / 100)
-                tracks[device_of(state.system)] = Track(place, velocity, received.at)
+                tracks[device_of(state.system, self._device)] = Track(place, velocity, received.at)
         return tracks

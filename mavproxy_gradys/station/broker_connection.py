@@ -1,7 +1,8 @@
 """A connection to an MQTT 5 broker: paho's client, run by the asyncio loop, with manual acknowledgements.
 
 A shared subscription delivers each message to one of its workers. The session outlasts a connection: unacknowledged
-messages are delivered again. The receive maximum limits the number of messages in flight to us.
+messages are delivered again. The receive maximum limits the number of messages in flight to us. While the inbox is
+full, nothing is read, so that TCP makes the broker wait.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from mavproxy_gradys.net.addresses import split_url
 from mavproxy_gradys.net.http_client import tls_context
 from mavproxy_gradys.net.outage_log import Outage
 from mavproxy_gradys.net.schedule import Backoff
-from mavproxy_gradys.station.inbox import Message
+from mavproxy_gradys.station.inbox import Inbox, Message
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 KEEP_ALIVE = 15  # s
@@ -72,18 +73,20 @@ class BrokerConnection:
 
     Args:
         address: the broker.
-        take: called with each message.
+        inbox: gets each message.
 
     Raises:
         SettingError: the URL is malformed.
         NotDelivered: the CA file cannot be read.
     """
 
-    def __init__(self, address: BrokerAddress, take: Callable[[Message], None]) -> None:
+    def __init__(self, address: BrokerAddress, inbox: Inbox) -> None:
         self._address = address
         self._parts, self._port = split_url(address.url, ("mqtt", "mqtts"))
         self._context = ssl_context(address.ca_file) if self._parts.scheme == "mqtts" else None
-        self._take = take
+        self._inbox = inbox
+        inbox.on_taken = self._read_on
+        self._paused = False
         self._client: mqtt.Client | None = None  # of the present attempt
         self._ended = asyncio.Event()
         self._loop = asyncio.get_running_loop()
@@ -188,7 +191,7 @@ class BrokerConnection:
         log.info("connected to %s:%d", self._parts.hostname, self._port)
 
     def _on_disconnect(self, client: mqtt.Client, _data: Any, _flags: Any, code: Any, _properties: Any) -> None:
-        if client is self._client:
+        if client is self._client and not self._ended.is_set():  # after a refusal its reason stays
             self._failed(str(code))
             self._ended.set()
 
@@ -199,7 +202,7 @@ class BrokerConnection:
             topic = message.topic
         except UnicodeDecodeError:
             topic = "?"
-        self._take(Message(client, message.mid, topic, bytes(message.payload), reply_to))
+        self._inbox.put(Message(client, message.mid, topic, bytes(message.payload), reply_to))
 
     # -- to the broker ------------------------------------------------------------------------------------
 
@@ -239,13 +242,30 @@ class BrokerConnection:
             self._loop.add_writer(sock, client.loop_write)
 
     def _read(self, client: mqtt.Client) -> None:
-        """Read all available packets; TLS may hold more than the socket shows."""
+        """Read the available packets while the inbox has room; TLS may hold more than the socket shows."""
         for _ in range(AT_ONCE):
+            if not self._inbox.has_room(client):
+                self._pause(client)
+                return
             before = self._taken
             client.loop_read()
             if self._taken == before:
                 return
         self._loop.call_soon(self._read, client)
+
+    def _pause(self, client: mqtt.Client) -> None:
+        """Read nothing until the consumer has taken a batch."""
+        sock = client.socket()
+        if client is self._client and isinstance(sock, socket.socket) and sock.fileno() >= 0:
+            self._paused = True
+            self._loop.remove_reader(sock)
+
+    def _read_on(self) -> None:
+        """Read again after a pause."""
+        client, paused, self._paused = self._client, self._paused, False
+        if paused and client is not None and (sock := client.socket()) is not None:
+            self._watch(client, sock)
+            self._loop.call_soon(self._read, client)
 
     def _leave(self, client: mqtt.Client) -> None:
         """Disconnect, and close the socket."""

@@ -30,11 +30,13 @@ class Message(NamedTuple):
 class Inbox:
     """Holds messages, and returns them in batches.
 
-    One connection delivers at most the receive maximum. So more than `most` messages include some of earlier
-    connections. Then the oldest are dropped, because the broker or their sender sends them again.
+    A broker that ignores the receive maximum (Mosquitto 2.0.11, when messages have queued there) must not fill our
+    memory: a connection with as many messages as `most` has no room until some are taken. Beyond `most` only messages
+    of earlier connections are dropped, because the broker sends them again.
 
     Attributes:
         dropped: number of dropped messages.
+        on_taken: called when a batch has been taken.
 
     Args:
         most: largest number of messages.
@@ -48,12 +50,17 @@ class Inbox:
         self._news = asyncio.Event()
         self._awaited_count = 1
         self.dropped = 0
+        self.on_taken: Callable[[], None] = lambda: None
 
     def __len__(self) -> int:
         return len(self._messages)
 
+    def has_room(self, connection: object) -> bool:
+        """Whether a message of that connection can be added, if necessary instead of one of an earlier connection."""
+        return len(self._messages) < self._most or self._messages[0].connection is not connection
+
     def put(self, message: Message) -> None:
-        """Add a message."""
+        """Add a message; the caller has checked `has_room`."""
         self._messages.append(message)
         if len(self._messages) > self._most:
             self._messages.popleft()
@@ -65,7 +72,9 @@ class Inbox:
         """The oldest messages: as soon as there are `size` of them, or `seconds` after the first one."""
         await self._until(1, None)
         await self._until(size, seconds)
-        return [self._messages.popleft() for _ in range(min(size, len(self._messages)))]
+        taken = [self._messages.popleft() for _ in range(min(size, len(self._messages)))]
+        self.on_taken()
+        return taken
 
     async def _until(self, count: int, seconds: float | None) -> None:
         """Wait until there are `count` messages, at most `seconds`."""

@@ -25,7 +25,7 @@ from mavproxy_gradys.station.store import Store
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
-INBOX_FACTOR = 2  # times the receive maximum, because messages of an earlier connection may still wait
+INBOX_FACTOR = 2  # times the receive maximum: messages of an earlier connection may wait, too
 
 
 class ExtraMissing(Exception):
@@ -97,7 +97,7 @@ def start_consumer(options: argparse.Namespace, intake: Intake, watch: FleetWatc
         receive_maximum,
         options.ca_file,
     )
-    broker = BrokerConnection(address, inbox.put)
+    broker = BrokerConnection(address, inbox)
     consumer = Consumer(inbox, intake, broker, size=options.batch, seconds=options.batch_seconds)
     tasks.start(broker.run(), "the connection to the broker")
     tasks.start(consumer.run(), "the storing of messages")

@@ -68,7 +68,7 @@ def _state(mark: StateMark) -> Callable[[F], F]:
 
     def decorate(func: F) -> F:
         if hasattr(func, STATE):
-            raise StateMachineError("A method can be one state only")
+            raise StateMachineError("A method cannot be decorated with more than one of @state/@timed_state")
         return _marked(func, STATE, mark)
 
     return decorate

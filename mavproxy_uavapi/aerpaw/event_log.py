@@ -1,33 +1,25 @@
-"""The log of `--structured-log`: one line of JSON per event."""
+"""`aerpawlib.structured_log`: the log of `--structured-log`, one line of JSON per event."""
 
 from __future__ import annotations
 
 import json
 import time
-from pathlib import Path
-from types import TracebackType
-from typing import Any
+from typing import Any, TextIO
+
+__all__ = ["StructuredEventLogger"]
 
 
-class EventLog:
-    """Writes events with their time (s since 1970) to a file at once; an existing file is overwritten."""
+class StructuredEventLogger:
+    """Writes events with their time (s since 1970) to an open file, at once."""
 
-    def __init__(self, path: Path) -> None:
-        self._file = path.open("w", encoding="utf-8")
+    def __init__(self, output: TextIO) -> None:
+        self._output = output
 
-    def log_event(self, event: str, **members: Any) -> None:
+    def log_event(self, event_type: str, **members: Any) -> None:
         """Write an event."""
-        self._file.write(json.dumps({"timestamp": time.time(), "event": event, **members}) + "\n")
-        self._file.flush()
+        self._output.write(json.dumps({"timestamp": time.time(), "event": event_type, **members}) + "\n")
+        self._output.flush()
 
     def close(self) -> None:
         """Close the file."""
-        self._file.close()
-
-    def __enter__(self) -> EventLog:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self.close()
+        self._output.close()

@@ -17,6 +17,10 @@ class AerpawlibError(Exception):
         self.message, self.original_error = message, original_error
         super().__init__(message)
 
+    def __str__(self) -> str:
+        cause = str(self.original_error or "")
+        return self.message if cause in self.message else f"{self.message} (caused by: {cause})"
+
 
 class AerpawConnectionError(AerpawlibError):
     """No connection to the vehicle."""
@@ -46,6 +50,13 @@ class PortInUseError(AerpawConnectionError):
         super().__init__(message or f"Port {port} is already in use")
 
 
+class MAVSDKNotInstalledError(AerpawConnectionError):
+    """MAVSDK is missing; never raised here, because nothing needs it."""
+
+    def __init__(self, message: str = "MAVSDK is not installed") -> None:
+        super().__init__(message)
+
+
 class AERPAWPlatformError(AerpawlibError):
     """A request to the AERPAW platform failed."""
 
@@ -54,6 +65,7 @@ class NotInAERPAWEnvironmentError(AERPAWPlatformError):
     """There is no AERPAW platform."""
 
     def __init__(self, feature: str) -> None:
+        self.feature = feature
         super().__init__(f"{feature} is only available in the AERPAW environment")
 
 
@@ -156,6 +168,7 @@ class InvalidAltitudeError(ValidationError):
     """An altitude (m) is out of range."""
 
     def __init__(self, value: float, min_val: float, max_val: float) -> None:
+        self.value, self.min_val, self.max_val = value, min_val, max_val
         super().__init__(f"Altitude must be between {min_val} m and {max_val} m, got {value}")
 
 
@@ -163,6 +176,7 @@ class InvalidSpeedError(ValidationError):
     """A speed (m/s) is out of range."""
 
     def __init__(self, value: float, min_val: float, max_val: float) -> None:
+        self.value, self.min_val, self.max_val = value, min_val, max_val
         super().__init__(f"Speed must be between {min_val} m/s and {max_val} m/s, got {value}")
 
 
@@ -170,6 +184,7 @@ class NotImplementedForVehicleError(AerpawlibError):
     """This type of vehicle does not have the feature."""
 
     def __init__(self, feature: str, vehicle_type: str) -> None:
+        self.feature, self.vehicle_type = feature, vehicle_type
         super().__init__(f"'{feature}' is not implemented for {vehicle_type} vehicles")
 
 
@@ -188,8 +203,8 @@ class InvalidStateError(StateMachineError):
     """There is no such state."""
 
     def __init__(self, state_name: str, available_states: Iterable[str]) -> None:
-        self.state_name = state_name
-        super().__init__(f"There is no state '{state_name}'; there are {', '.join(sorted(available_states))}")
+        self.state_name, self.available_states = state_name, list(available_states)
+        super().__init__(f"There is no state '{state_name}'; there are {', '.join(sorted(self.available_states))}")
 
 
 class NoInitialStateError(StateMachineError):

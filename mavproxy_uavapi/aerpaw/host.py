@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from mavproxy_uavapi.aerpaw import on_exit
-from mavproxy_uavapi.aerpaw.event_log import EventLog
+from mavproxy_uavapi.aerpaw.event_log import StructuredEventLogger
 from mavproxy_uavapi.aerpaw.exceptions import AerpawlibError, ConnectionTimeoutError, HeartbeatLostError
 from mavproxy_uavapi.aerpaw.platform import AERPAW_Platform
 from mavproxy_uavapi.aerpaw.runner import Runner
@@ -81,8 +81,8 @@ class Host:
     def _fly(self, vehicle: Vehicle | DummyVehicle) -> int:
         with contextlib.ExitStack() as stack:
             if self._options.structured_log and isinstance(vehicle, Vehicle):
-                events = stack.enter_context(EventLog(Path(self._options.structured_log)))
-                vehicle.set_event_log(events)
+                file = stack.enter_context(Path(self._options.structured_log).open("w", encoding="utf-8"))
+                vehicle.set_event_log(StructuredEventLogger(file))
                 stack.callback(vehicle.set_event_log, None)
             try:
                 asyncio.run(self._run(vehicle))

@@ -18,6 +18,16 @@ class LogLevel(Enum):
     ERROR = logging.ERROR
     CRITICAL = logging.CRITICAL
 
+    @classmethod
+    def from_string(cls, level: str) -> LogLevel:
+        """The level of that name, in capitals or not; `warn` is WARNING.
+
+        Raises:
+            KeyError: there is no such level.
+        """
+        name = level.upper()
+        return cls["WARNING" if name == "WARN" else name]
+
 
 class LogComponent(str, Enum):
     """The names of the loggers."""
@@ -39,6 +49,13 @@ class LogComponent(str, Enum):
     EXTERNAL = "aerpawlib.v1.external"
     USER = "aerpawlib.v1.user"
     SITL = "aerpawlib.sitl"
+
+
+class ColoredFormatter(logging.Formatter):
+    """A formatter; there are no colours."""
+
+    def __init__(self, fmt: str | None = None, datefmt: str | None = None, use_colors: bool = True) -> None:
+        super().__init__(fmt or FORMAT, datefmt)
 
 
 def get_logger(component: LogComponent | str = LogComponent.ROOT) -> logging.Logger:

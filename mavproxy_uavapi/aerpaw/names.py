@@ -15,6 +15,7 @@ from types import ModuleType
 
 PACKAGE = "aerpawlib"
 OURS = "mavproxy_uavapi.aerpaw"
+SAFETY = ("safety_wire", "safety", "safety_server")
 # Our modules that provide the names of each of aerpawlib's modules.
 V1: Mapping[str, Sequence[str]] = {
     "aerpaw": ("platform",),
@@ -26,9 +27,11 @@ V1: Mapping[str, Sequence[str]] = {
     "runner": ("runners",),
     "runner.decorators": ("decorators",),
     "runner.impl": ("runners",),
-    "safety": ("safety",),
+    "safety": SAFETY,
     "safety.client": ("safety",),
-    "safetyChecker": ("safety",),
+    "safety.server": ("safety_server",),
+    "safety.wire_format": ("safety_wire",),
+    "safetyChecker": SAFETY,
     "util": ("util",),
     "util.geofence": ("geofence",),
     "util.geometry": ("geometry",),
@@ -52,6 +55,7 @@ class AlreadyInstalled(Exception):
 def _served() -> dict[str, Sequence[str]]:
     served: dict[str, Sequence[str]] = {PACKAGE: ALL, f"{PACKAGE}.v1": ALL}
     served |= {f"{PACKAGE}.v1.{name}": ours for name, ours in V1.items()}
+    served[f"{PACKAGE}.structured_log"] = ("event_log",)
     return served | {f"{PACKAGE}.{name}": V1[name] for name in LEGACY}
 
 

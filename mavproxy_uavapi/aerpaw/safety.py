@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import zlib
 from types import TracebackType
 from typing import Any
 
@@ -16,38 +14,10 @@ from mavproxy_uavapi.aerpaw.constants import (
     VALIDATE_WAYPOINT_REQ,
 )
 from mavproxy_uavapi.aerpaw.geometry import Coordinate
+from mavproxy_uavapi.aerpaw.safety_rules import Verdict
+from mavproxy_uavapi.aerpaw.safety_wire import deserialize_msg, serialize_request
 
-Verdict = tuple[bool, str]
-
-
-def serialize_msg(raw_json: str) -> bytes:
-    """Encode a text."""
-    return zlib.compress(raw_json.encode())
-
-
-def serialize_request(request_function: str, params: list[Any]) -> bytes:
-    """Encode a request."""
-    return serialize_msg(json.dumps({"request_function": request_function, "params": params}))
-
-
-def serialize_response(request_function: str, *, result: bool, message: str = "") -> bytes:
-    """Encode a response."""
-    return serialize_msg(json.dumps({"request_function": request_function, "result": result, "message": message}))
-
-
-def deserialize_msg(compressed_msg: bytes) -> dict[str, Any]:
-    """Decode a message.
-
-    Raises:
-        ValueError: it is malformed.
-    """
-    try:
-        message = json.loads(zlib.decompress(compressed_msg))
-    except zlib.error as error:
-        raise ValueError(f"Failed to decompress message: {error}") from error
-    if not isinstance(message, dict):
-        raise ValueError(f"{message!r} is not a message")
-    return message
+__all__ = ["SafetyCheckerClient"]
 
 
 class SafetyCheckerClient:

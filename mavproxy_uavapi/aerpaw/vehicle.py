@@ -1,13 +1,12 @@
-"""`aerpawlib.v1.vehicle`: telemetry, waits and verbs of all types of vehicles."""
+"""`aerpawlib.v1.vehicle`: waits and verbs of all types of vehicles."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
 import logging
-import math
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from collections.abc import AsyncIterator, Awaitable, Callable
 from typing import Any, TypeVar
 
 from mavproxy_uavapi.aerpaw.constants import (
@@ -17,7 +16,7 @@ from mavproxy_uavapi.aerpaw.constants import (
     DEFAULT_POSITION_TOLERANCE_M,
     POLLING_DELAY_S,
 )
-from mavproxy_uavapi.aerpaw.event_log import EventLog
+from mavproxy_uavapi.aerpaw.event_log import StructuredEventLogger
 from mavproxy_uavapi.aerpaw.exceptions import (
     AerpawConnectionError,
     ArmError,
@@ -30,10 +29,10 @@ from mavproxy_uavapi.aerpaw.exceptions import (
 )
 from mavproxy_uavapi.aerpaw.geometry import Coordinate, VectorNED
 from mavproxy_uavapi.aerpaw.platform import AERPAW_Platform
-from mavproxy_uavapi.aerpaw.readings import Attitude, Battery, GPSInfo, Version
+from mavproxy_uavapi.aerpaw.vehicle_telemetry import VehicleTelemetry
 from mavproxy_uavapi.aerpaw.vehicle_thread import VehicleThread
 from mavproxy_uavapi.client.drone import Drone as Client
-from mavproxy_uavapi.core.errors import Rejected, Stale, Superseded, UavApiError
+from mavproxy_uavapi.core.errors import Rejected, Superseded, UavApiError
 
 log = logging.getLogger("aerpawlib.v1.vehicle")
 T = TypeVar("T")
@@ -44,7 +43,7 @@ MOST_SPEED = 50.0  # m/s, the API's limit
 SCHEMES = ("http://", "https://")
 
 
-class Vehicle:
+class Vehicle(VehicleTelemetry):
     """A vehicle of any type: telemetry and arming. Its subclasses move.
 
     Movements wait for earlier ones; each ends after its timeout at the latest.
@@ -66,134 +65,17 @@ class Vehicle:
                 f"{connection_string!r} is not the address of an HTTP API; use http://127.0.0.1:8000, because "
                 "MAVProxy has the MAVLink connection"
             )
-        self._closed = False
+        super().__init__(VehicleThread(connection_string, CONNECTION_TIMEOUT_S))
         self._will_arm = True
         self._is_ours = False  # it was in GUIDED for us; in another mode it belongs to its pilot from then on
         self._has_commanded = False
         self._current_heading: float | None = None  # degrees, for the next movement
+        self._refused_speed: float | None = None  # m/s, for the next movement
         self._moves: list[asyncio.Future[None]] = []  # running and waiting movements, oldest first
         self._background: set[asyncio.Task[None]] = set()  # verbs that still run; a newer one ends them
         self._readying: asyncio.Task[None] | None = None
         self._mission_start_time: float | None = None
-        self._events: EventLog | None = None
-        self._thread = VehicleThread(connection_string, CONNECTION_TIMEOUT_S)
-
-    # -- telemetry ----------------------------------------------------------------------------------------
-
-    @contextlib.contextmanager
-    def _telemetry(self) -> Iterator[Client]:
-        """The client, for its properties; within the context Stale becomes NotConnectedError."""
-        try:
-            yield self._thread.drone
-        except Stale as error:
-            raise NotConnectedError(str(error)) from error
-
-    @property
-    def connected(self) -> bool:
-        """Whether its heartbeats arrive."""
-        age = self._thread.drone.telemetry.age("HEARTBEAT")
-        return not self._closed and age is not None and age <= HEARTBEAT_AGE
-
-    @property
-    def heartbeat_age(self) -> float:
-        """Seconds since its last heartbeat."""
-        age = self._thread.drone.telemetry.age("HEARTBEAT")
-        return math.inf if age is None else age
-
-    @property
-    def closed(self) -> bool:
-        """Whether `close` was called."""
-        return self._closed
-
-    @property
-    def armable(self) -> bool:
-        """Whether it is ready to arm."""
-        status = self._thread.status
-        return status is not None and status.ready_to_arm
-
-    @property
-    def ekf_ready(self) -> bool:
-        """Whether its estimator has a position."""
-        status = self._thread.status
-        return status is not None and status.ekf_ok
-
-    @property
-    def position(self) -> Coordinate:
-        """Its position.
-
-        Raises:
-            NotConnectedError: its telemetry is too old; so for all properties that follow.
-        """
-        with self._telemetry() as drone:
-            return Coordinate(drone.position.lat, drone.position.lon, drone.position.alt)
-
-    @property
-    def velocity(self) -> VectorNED:
-        """Its velocity, m/s."""
-        with self._telemetry() as drone:
-            return VectorNED(drone.velocity.north, drone.velocity.east, drone.velocity.down)
-
-    @property
-    def heading(self) -> float:
-        """Its heading, degrees clockwise from north, from 0 to less than 360."""
-        with self._telemetry() as drone:
-            return drone.heading
-
-    @property
-    def attitude(self) -> Attitude:
-        """Its attitude, rad."""
-        with self._telemetry() as drone:
-            attitude = drone.attitude
-            return Attitude(attitude.pitch, attitude.yaw, attitude.roll)
-
-    @property
-    def battery(self) -> Battery:
-        """Its battery: V, A, %; unknown values are 0."""
-        with self._telemetry() as drone:
-            battery = drone.battery
-            return Battery(battery.voltage or 0.0, battery.current or 0.0, battery.level or 0)
-
-    @property
-    def gps(self) -> GPSInfo:
-        """Its GPS receiver; no fix before the first report."""
-        if self._thread.drone.telemetry.age("GPS_RAW_INT") is None:
-            return GPSInfo()
-        with self._telemetry() as drone:
-            return GPSInfo(drone.gps.fix_type, drone.gps.satellites or 0)
-
-    @property
-    def armed(self) -> bool:
-        """Whether it is armed."""
-        with self._telemetry() as drone:
-            return drone.armed
-
-    @property
-    def mode(self) -> str:
-        """The name of its flight mode in ArduPilot."""
-        with self._telemetry() as drone:
-            return drone.mode
-
-    @property
-    def home_coords(self) -> Coordinate | None:
-        """The home position; None before it has one."""
-        home = self._thread.home
-        return None if home is None else Coordinate(home[0].lat, home[0].lon, 0)
-
-    @property
-    def home_amsl(self) -> float:
-        """The altitude of home, m AMSL; 0 before it has one."""
-        return 0.0 if self._thread.home is None else self._thread.home[1]
-
-    @property
-    def autopilot_info(self) -> Version:
-        """An empty version: the API does not report it."""
-        return Version()
-
-    def debug_dump(self) -> str:
-        """All telemetry in a line, with the time in ns first."""
-        values = [self.armed, self.attitude, self.autopilot_info, self.battery, self.gps, self.heading]
-        values += [self.home_coords, self.position, self.velocity, self.mode]
-        return ",".join(map(str, [time.time_ns(), *values]))
+        self._events: StructuredEventLogger | None = None
 
     # -- the order of movements ---------------------------------------------------------------------------
 
@@ -224,6 +106,8 @@ class Vehicle:
         try:
             await self._get_ready()
             await self._ended(before)
+            if self._refused_speed is not None:
+                await self._set_speed(self._refused_speed)
             if self._mission_start_time is None:
                 self._mission_start_time = time.time()
             yield
@@ -347,6 +231,8 @@ class Vehicle:
     async def set_groundspeed(self, velocity: float) -> None:
         """Set the ground speed (m/s) for flights to positions.
 
+        A rover refuses it before it drives; then it is set with the next movement.
+
         Raises:
             InvalidSpeedError: it is not above 0, or above the API's limit.
         """
@@ -354,10 +240,18 @@ class Vehicle:
         if not 0 < speed <= MOST_SPEED:
             raise InvalidSpeedError(speed, 0, MOST_SPEED)
         self._log_event("command", type="set_groundspeed", speed_m_s=speed)
+        self._refused_speed = None
+        await self._set_speed(speed)
+
+    async def _set_speed(self, speed: float) -> None:
+        """Set the ground speed. A refusal is logged, and the next movement tries again: scripts do not expect one."""
+        is_last_try = self._refused_speed is not None
+        self._refused_speed = None
         try:
             await self._command(CommandError, lambda drone: drone.set_speed(speed))
-        except CommandError as error:  # some autopilots refuse it, and scripts do not expect that
-            log.warning("the ground speed was not set: %s", error)
+        except CommandError as error:
+            self._refused_speed = None if is_last_try else speed
+            log.log(logging.WARNING if is_last_try else logging.INFO, "the ground speed was not set: %s", error)
 
     async def _stop(self) -> None:
         """End the verbs in the background; the vehicle stops."""
@@ -387,7 +281,7 @@ class Vehicle:
             power = {"battery_v": battery.voltage, "battery_pct": battery.level}
             self._log_event("telemetry", **place, **motion, **state, **power)
 
-    def set_event_log(self, event_log: EventLog | None) -> None:
+    def set_event_log(self, event_log: StructuredEventLogger | None) -> None:
         """Write commands and telemetry to that log."""
         self._events = event_log
 

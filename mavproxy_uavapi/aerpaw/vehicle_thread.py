@@ -10,8 +10,9 @@ from collections.abc import Awaitable, Callable
 from typing import TypeVar
 
 from mavproxy_uavapi.aerpaw.exceptions import AerpawConnectionError, ConnectionTimeoutError, NotConnectedError
-from mavproxy_uavapi.client.drone import Drone, Status, connect
+from mavproxy_uavapi.client.drone import Drone, connect
 from mavproxy_uavapi.client.places import Position
+from mavproxy_uavapi.client.readings import Status
 from mavproxy_uavapi.core.errors import NotFound, UavApiError
 
 log = logging.getLogger("aerpawlib.v1.connection")

@@ -6,8 +6,10 @@ pyzmq is imported when a runner is bound to its proxy; other scripts do not need
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 import socket
+import time
 from typing import Any
 
 from mavproxy_uavapi.aerpaw import wire
@@ -25,11 +27,13 @@ from mavproxy_uavapi.aerpaw.constants import (
 from mavproxy_uavapi.aerpaw.decorators import EXPOSED_FIELD, EXPOSED_STATE, STATE, background
 from mavproxy_uavapi.aerpaw.exceptions import StateMachineError
 from mavproxy_uavapi.aerpaw.runner import StateMachine, call
+from mavproxy_uavapi.aerpaw.zmq_outbox import ZmqOutbox
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 log = logging.getLogger("aerpawlib.v1.zmq")
 
 SUBSCRIBE_TIMEOUT = 2.0  # s for the proxy to subscribe; messages that are published before are lost
+HELLO_PERIOD = 0.05  # s between hellos to itself
 LINGER = 500  # ms to send the last messages
 
 
@@ -67,7 +71,8 @@ class ZmqStateMachine(StateMachine):
         self._zmq = zmq
         self._context = zmq.asyncio.Context()
         self._identifier, self._proxy = vehicle_identifier, proxy_server_addr
-        self._outgoing: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
+        self._outbox = ZmqOutbox(time.monotonic)
+        self._hears_itself = asyncio.Event()
         self._queries: dict[tuple[str, str], list[asyncio.Future[Any]]] = {}  # by runner and field
 
     def _build(self) -> None:
@@ -77,7 +82,7 @@ class ZmqStateMachine(StateMachine):
         for name, method in self.marked(EXPOSED_STATE):
             mark = getattr(method, STATE, None)
             if mark is None:
-                raise StateMachineError("@expose_zmq needs a state")
+                raise StateMachineError("@expose_zmq can only be used on @state/@timed_state methods")
             self._aliases[name] = mark.name
 
     async def run(self, vehicle: Any) -> None:
@@ -87,7 +92,9 @@ class ZmqStateMachine(StateMachine):
             StateMachineError: it has no identifier and no proxy; see also `StateMachine.run`.
         """
         if self._identifier is None:
-            raise StateMachineError("ZMQ runners need --zmq-identifier NAME --zmq-proxy-server ADDRESS")
+            raise StateMachineError(
+                "ZMQ bindings not initialized: ZMQ runners need --zmq-identifier NAME --zmq-proxy-server ADDRESS"
+            )
         try:
             await super().run(vehicle)
         finally:
@@ -116,7 +123,7 @@ class ZmqStateMachine(StateMachine):
 
     def _send(self, kind: str, identifier: str | None = None, **members: Any) -> None:
         to = {} if identifier is None else {"identifier": identifier}
-        self._outgoing.put_nowait({"msg_type": kind, "from": self._identifier, **to, **members})
+        self._outbox.put({"msg_type": kind, "from": self._identifier, **to, **members})
 
     # -- the network --------------------------------------------------------------------------------------
 
@@ -128,14 +135,23 @@ class ZmqStateMachine(StateMachine):
         try:
             publisher.connect(f"tcp://{self._proxy}:{ZMQ_PROXY_IN_PORT}")
             await publisher.poll(SUBSCRIBE_TIMEOUT * 1000)
+            with contextlib.suppress(asyncio.TimeoutError):
+                await wait_with_timeout(SUBSCRIBE_TIMEOUT, self._hear_itself(publisher))
             await publisher.send(wire.written({"msg_type": ZMQ_TYPE_HELLO, "from": self._identifier}))
             while True:
-                await publisher.send(wire.written(await self._outgoing.get()))
+                await publisher.send(wire.written(await self._outbox.next()))
         finally:
-            while not self._outgoing.empty():
-                publisher.send(wire.written(self._outgoing.get_nowait()))
+            for message in self._outbox.rest():
+                publisher.send(wire.written(message))
             publisher.send(wire.written({"msg_type": ZMQ_TYPE_GOODBYE, "from": self._identifier}))
             publisher.close()
+
+    async def _hear_itself(self, publisher: Any) -> None:
+        """Wait until its own messages arrive: then it misses no answer to its hello."""
+        to_itself = {"msg_type": ZMQ_TYPE_HELLO, "from": self._identifier, "identifier": self._identifier}
+        while not self._hears_itself.is_set():
+            await publisher.send(wire.written(to_itself))
+            await asyncio.sleep(HELLO_PERIOD)
 
     @background
     async def _subscribe(self, vehicle: Any) -> None:
@@ -150,12 +166,21 @@ class ZmqStateMachine(StateMachine):
                 except ValueError as error:
                     log.warning("a message was ignored: %s", error)
                     continue
-                if message.get("identifier") == self._identifier:
+                if self._is_for_me(message):
                     answer = asyncio.create_task(self._take(message, vehicle))
                     answers.add(answer)
                     answer.add_done_callback(answers.discard)
         finally:
             subscriber.close(0)
+
+    def _is_for_me(self, message: dict[str, Any]) -> bool:
+        """Whether a message is to be answered; notes who is there."""
+        kind, sender = message.get("msg_type"), str(message.get("from"))
+        if sender == self._identifier:
+            self._hears_itself.set()
+        else:
+            self._outbox.heard(sender, joins=kind == ZMQ_TYPE_HELLO)
+        return message.get("identifier") == self._identifier and kind != ZMQ_TYPE_HELLO
 
     async def _take(self, message: dict[str, Any], vehicle: Any) -> None:
         kind, sender, field = message.get("msg_type"), str(message.get("from")), str(message.get("field"))

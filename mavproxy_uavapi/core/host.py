@@ -177,12 +177,13 @@ class Host:
         for system, items in fences.items():
             source = f"the fence of vehicle {system}"
             try:
-                self.envelopes.put(OPERATOR, system, formats.of_fence(items, source, partial(self._home_of, system)))
+                self.envelopes.put(OPERATOR, system, formats.of_fence(items, source, partial(self.home_of, system)))
             except UavApiError as error:
                 self.envelopes.put(OPERATOR, system, missing(f"{source}: {error}", source))
                 self.warn(f"{source} cannot be its envelope: {error}")
 
-    def _home_of(self, system: int) -> tuple[float, float] | None:
+    def home_of(self, system: int) -> tuple[float, float] | None:
+        """Latitude and longitude of a vehicle's home, degrees; None while it is unknown."""
         state = self.fleet.vehicles.get(system)
         home = None if state is None else state.messages.get("HOME_POSITION")
         return None if home is None else (home.message.latitude / 1e7, home.message.longitude / 1e7)

@@ -9,8 +9,8 @@ from pathlib import Path
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.text import nearest
 
-# [api], [simulated] and [logs] are the original service's.
-SECTIONS = ("api", "simulated", "logs", "vision", "gradys")
+# All but [vision] and [gradys] are the original service's.
+SECTIONS = ("api", "mode", "udp", "simulated", "logs", "vision", "gradys")
 
 
 class IniFile:

@@ -13,6 +13,7 @@ from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.remembered_settings import RememberedSettings
 from mavproxy_uavapi.core.settings import ModuleSettings
 from mavproxy_uavapi.core.text import nearest
+from mavproxy_uavapi.core.windows import View, Windows
 
 log = logging.getLogger("uavapi.api")
 
@@ -60,6 +61,7 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
         self._told_failure = ""
         self.host = hosts.join(mpstate, self)
         rules = [*completions, f"set {' '.join(self._completed)}", *settings.value_completions()]
+        self.windows = Windows(name, mpstate, self.host.bridge, self.host.clock, self.view)
         self.add_command(name, self.command, description, rules)
         for place, words in self._completed.items():
             self.add_completion_function(place, lambda _, words=words: words())
@@ -72,6 +74,10 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
 
     async def end(self) -> None:
         """Called in the asyncio thread when the module is unloaded."""
+
+    def view(self) -> View:
+        """What MAVProxy's console and map show of this module. Called in the asyncio thread."""
+        return View()
 
     def check_change(self, name: str) -> None:
         """Refuse to change a setting now.
@@ -94,6 +100,7 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
             if not self._begun:
                 self._begun = True
                 self.begin()
+            self.windows.turn()
         except Exception as error:  # noqa: BLE001  MAVProxy does not report it
             self._report_failure(error)
 
@@ -108,6 +115,7 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
     def unload(self) -> None:
         """Give everything back. Runs in another thread than the main loop, which waits for it."""
         super().unload()
+        self.windows.clear()
         self.remove_command(self.name)
         for place in self._completed:
             self.mpstate.completion_functions.pop(place, None)

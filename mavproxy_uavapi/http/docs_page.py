@@ -9,6 +9,7 @@ from pathlib import Path
 from aiohttp import web
 
 from mavproxy_uavapi.core.errors import NotFound
+from mavproxy_uavapi.http import static_files
 from mavproxy_uavapi.http.call import Call
 
 PACKAGE = "swagger_ui"
@@ -18,16 +19,7 @@ ASSETS = {
     "favicon-32x32.png": "image/png",
 }
 # Only our own scripts run there; Swagger UI itself sets styles on elements and has its icons in the CSS.
-POLICY = (
-    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
-    "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
-)
-HEADERS = {
-    "Content-Security-Policy": POLICY,
-    "X-Content-Type-Options": "nosniff",
-    "Referrer-Policy": "same-origin",  # its own calls must say which page they come from (`security.check_page`)
-    "Cache-Control": "no-cache",
-}
+HEADERS = static_files.headers("script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:")
 PAGE = """\
 <!doctype html>
 <html lang="en">
@@ -62,18 +54,18 @@ window.ui = SwaggerUIBundle({
 """
 
 
-async def page(_call: Call) -> web.StreamResponse:
+async def page(call: Call) -> web.StreamResponse:
     """The documentation as a page on which each endpoint can be tried."""
     if await asyncio.to_thread(_folder) is None:
         raise NotFound("the page needs swagger-ui-py (pip install swagger-ui-py); /openapi.json works without it")
-    return web.Response(text=PAGE, content_type="text/html", charset="utf-8", headers=HEADERS)
+    return static_files.answer(call.request, PAGE.encode(), "text/html", HEADERS)
 
 
 async def asset(call: Call) -> web.StreamResponse:
     """A file of the documentation page."""
     name = call.names["file"]
     if name == START:
-        return web.Response(text=SCRIPT, content_type="text/javascript", charset="utf-8", headers=HEADERS)
+        return static_files.answer(call.request, SCRIPT.encode(), "text/javascript", HEADERS)
     kind = ASSETS.get(name)
     folder = await asyncio.to_thread(_folder)
     if kind is None or folder is None:

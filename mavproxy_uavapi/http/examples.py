@@ -73,7 +73,7 @@ REQUESTS: Mapping[type[requests.Request], Mapping[str, Any]] = {
     requests.Servo: {"channel": 9, "pwm": 1500},
     requests.ExecuteScript: {"script_name": "square.py", "args": ["10"]},
     requests.ScriptName: {"script_name": "square.py"},
-    requests.Photo: {"command": "rpicam-still", "resolution": "1280x720", "capture_time": 20},
+    requests.Photo: {"command": "rpicam-still", "resolution": "1280x720", "exposure": 20},
     requests.StreamFilter: {"names": "ATTITUDE,GPS_RAW_INT", "rate": 2},
 }
 
@@ -259,6 +259,19 @@ MEMBERS: Mapping[str, Mapping[str, Any]] = {
         "run": {**ENDED, "out": "landed\n", "err": ""},
     },
     "GET /mission/waypoints": {"home": {**ITEMS[0], "seq": 0, "command": "NAV_WAYPOINT"}, "items": ITEMS},
+    "/mission/fence": {
+        "fence": {
+            "type": "FeatureCollection",
+            "features": [
+                {
+                    "type": "Feature",
+                    "properties": {"kind": "exclusion", "name": "fence circle 0", "radius": 25.0},
+                    "geometry": {"type": "Point", "coordinates": [149.1665, -35.3625]},
+                }
+            ],
+            "limits": {},
+        }
+    },
     "/mission/progress": {
         "info": {
             "current": 2,

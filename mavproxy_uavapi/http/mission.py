@@ -1,10 +1,11 @@
-"""/mission/waypoints, /mission/start, /mission/progress: the mission that the autopilot itself flies."""
+"""/mission/waypoints, /mission/start, /mission/progress: the mission that the autopilot itself flies; its fence."""
 
 from __future__ import annotations
 
 import asyncio
 import hashlib
 
+from mavproxy_uavapi.core.envelope import formats
 from mavproxy_uavapi.core.errors import BadRequest, Busy, Stale
 from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission
 from mavproxy_uavapi.core.vehicle import mission_files, mission_flight
@@ -47,6 +48,16 @@ async def download(call: Call) -> Answer:
         "items": [i.report(n) for n, i in enumerate(items, 1)],
     }
     return call.answer("Success", **members)
+
+
+async def fence(call: Call) -> Answer:
+    """The areas of the autopilot's fence, freshly read from it; its cylinder is in the parameters FENCE_*."""
+    vehicle = call.vehicle
+    items, system = await vehicle.waypoints.download_fence(), vehicle.state.system
+    if not items:
+        return call.answer("Success", fence=formats.EMPTY)
+    areas = formats.of_fence(items, f"the fence of vehicle {system}", lambda: call.service.host.home_of(system))
+    return call.answer("Success", fence=formats.geojson(areas))
 
 
 async def clear(call: Call) -> Answer:

@@ -79,6 +79,7 @@ BY_TAG: Mapping[str, tuple[type[UavApiError], ...]] = {
 }
 BY_PATH: Mapping[str, tuple[type[UavApiError], ...]] = {
     "/mission/waypoints": (*OF_A_COMMAND, errors.BadRequest, errors.Aborted, errors.OutsideEnvelope),
+    "/mission/fence": OF_A_COMMAND,
     "/mission/start": OF_A_FLIGHT,
     "/mission/progress": (errors.NoVehicle, errors.Stale),
     "/peripherical/servo_output": OF_A_COMMAND,

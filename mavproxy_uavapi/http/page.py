@@ -3,28 +3,23 @@
 from __future__ import annotations
 
 import asyncio
-import hashlib
 from pathlib import Path
 
 from aiohttp import web
 
 from mavproxy_uavapi.core.errors import NotFound
+from mavproxy_uavapi.http import static_files
 from mavproxy_uavapi.http.call import Call
 
 FOLDER = Path(__file__).parents[1] / "page"
 INDEX = "index.html"
 KINDS = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 # Only our own files run there, nothing is sent anywhere else, and no text can become HTML or script.
-POLICY = (
-    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; connect-src 'self'; "
-    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'; require-trusted-types-for 'script'"
-)
 HEADERS = {
-    "Content-Security-Policy": POLICY,
-    "X-Content-Type-Options": "nosniff",
-    "Referrer-Policy": "same-origin",  # its own calls must say which page they come from (`security.check_page`)
+    **static_files.headers(
+        "script-src 'self'; style-src 'self'; img-src 'self' blob:; require-trusted-types-for 'script'"
+    ),
     "Cross-Origin-Opener-Policy": "same-origin",
-    "Cache-Control": "no-cache",  # asked again each time, and answered 304 where nothing has changed
     "Vary": "Accept",
 }
 
@@ -58,7 +53,4 @@ async def _answer(request: web.BaseRequest, file: Path) -> web.StreamResponse:
         body = await asyncio.to_thread(file.read_bytes)
     except OSError as error:
         raise NotFound(f"the page has no file {file.name}") from error
-    headers = {**HEADERS, "ETag": f'"{hashlib.sha256(body).hexdigest()[:32]}"'}
-    if request.headers.get("If-None-Match") == headers["ETag"]:
-        return web.Response(status=304, headers=headers)
-    return web.Response(body=body, content_type=kind, charset="utf-8", headers=headers)
+    return static_files.answer(request, body, kind, HEADERS)

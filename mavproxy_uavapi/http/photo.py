@@ -22,7 +22,8 @@ async def take_photo(call: Call) -> web.StreamResponse:
     if p.command == VISION:
         picture = await _newest_frame(call)
     else:
-        picture = await camera_tools.take(p.command, Shot(width, height, p.capture_time, p.focus_distance))
+        shot = Shot(width, height, p.capture_time, p.focus_distance, p.exposure)
+        picture = await camera_tools.take(p.command, shot)
     headers = {"Content-Disposition": 'attachment; filename="photo.jpg"', "Cache-Control": "no-store"}
     return web.Response(body=picture, content_type="image/jpeg", headers=headers)
 

@@ -6,12 +6,14 @@ Unknown members are ignored. NaN and infinities are refused everywhere: they mus
 from __future__ import annotations
 
 import math
+import re
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from mavproxy_uavapi.core.errors import Invalid
 
+HIGHEST_SYSTEM = 255
 SMALLEST = 1e-30  # more than single precision's least number
 NED_REACH = 100_000.0  # m; beyond this the earth's curvature matters
 
@@ -228,18 +230,35 @@ class StartMission(Blocking):
 
 
 class Photo(Request):
-    """A picture: the tool, pixels, ms of exposure, and the focus distance in m."""
+    """A picture: the tool, pixels, ms before it, ms of exposure, and the focus distance in m."""
 
     command: Annotated[str, Field(description="fswebcam, rpicam-still, libcamera-still, or vision")]
     resolution: Annotated[str, Field(description="width x height in pixels")] = "1280x720"
-    capture_time: Annotated[float, Field(gt=0, le=10_000, description="ms of exposure"), Written] = 150
+    capture_time: Annotated[float, Field(ge=0, le=10_000, description="ms to settle before the picture"), Written] = (
+        1000
+    )
     focus_distance: Annotated[float | None, Field(ge=0.01, le=1000, description="m"), Written] = None
+    exposure: Annotated[
+        float | None, Field(gt=0, le=10_000, description="ms of a Raspberry Pi's camera; none: its own"), Written
+    ] = None
 
 
 class Read(Request):
     """A telemetry read: `max_age` is the highest acceptable age (s) of the data."""
 
     max_age: Annotated[float | None, Field(gt=0, le=86400, description="highest acceptable age in s"), Written] = None
+
+
+def list_of_systems(text: str) -> str:
+    """The text, if it is a list of system ids by comma, or empty.
+
+    Raises:
+        ValueError: it is none.
+    """
+    words = [word.strip() for word in text.split(",")] if text else []
+    if not all(re.fullmatch(r"[0-9]{1,3}", word) and 1 <= int(word) <= HIGHEST_SYSTEM for word in words):
+        raise ValueError(f"Input should be system ids of 1 to {HIGHEST_SYSTEM} by comma")
+    return ",".join(words)
 
 
 class StreamFilter(Request):
@@ -252,9 +271,18 @@ class StreamFilter(Request):
     view: Annotated[str, Field(description="payloads of this API, such as gps,attitude,status")] = ""
     events: Annotated[str, Field(description="mode, armed, job …; * for all")] = ""
     sysid: Annotated[int | None, Field(ge=1, le=255, description="system id; omitted for all"), Written] = None
+    vehicles: Annotated[
+        str, AfterValidator(list_of_systems), Field(description="system ids by comma, such as 1,2; omitted for all")
+    ] = ""
     rate: Annotated[
         float | None, Field(gt=0, le=1000, description="Hz of each name; the newest is kept"), Written
     ] = None
+
+    @property
+    def systems(self) -> frozenset[int]:
+        """The system ids of `vehicles` and `sysid`; empty for all."""
+        listed = {int(word) for word in self.vehicles.split(",") if word}
+        return frozenset(listed | ({self.sysid} if self.sysid else set()))
 
 
 def parse(model: type[Request], source: str, values: dict[str, Any]) -> Request:

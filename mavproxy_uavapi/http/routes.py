@@ -22,6 +22,7 @@ from mavproxy_uavapi.http import (
     scripts,
     stream,
     telemetry,
+    tiles,
     vehicles,
 )
 from mavproxy_uavapi.http.call import Call
@@ -116,6 +117,7 @@ MISSION = [
     Route("/mission/waypoints", mission.upload, requests.Empty, FLY, POST, raw=True, job=True),
     Route("/mission/waypoints", mission.download, requests.Empty, FLY),
     Route("/mission/waypoints", mission.clear, requests.Empty, FLY, ("DELETE",), job=True),
+    Route("/mission/fence", mission.fence, requests.Empty, FLY),
     Route("/mission/start", mission.start, requests.StartMission, FLY, POST, job=True),
     Route("/mission/progress", mission.progress, requests.Read, WATCH),
 ]
@@ -168,6 +170,8 @@ DOCS = [
 PAGE = [  # no part of the API, and not described
     Route("/", page.index, requests.Empty, WATCH),
     Route("/page/{file}", page.asset, requests.Empty, WATCH),
+    Route("/tiles", tiles.show, requests.Empty, WATCH),
+    Route("/tiles/{z}/{x}/{y}", tiles.tile, requests.Empty, WATCH),
 ]
 
 ROUTES = [

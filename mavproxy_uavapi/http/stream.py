@@ -42,8 +42,8 @@ def _subscription(call: Call) -> Subscription:
     _require_some("events", event, stream_news.NAMES)
     if not (name or view or event):
         name = Names("*")
-    system = asked.sysid or call.named_system or None
-    return Subscription(Wishes(name, view, event, system, asked.rate), asyncio.get_running_loop().call_later)
+    systems = asked.systems or frozenset({call.named_system} if call.named_system else ())
+    return Subscription(Wishes(name, view, event, systems, asked.rate), asyncio.get_running_loop().call_later)
 
 
 def _require_some(parameter: str, asked: Names, known: tuple[str, ...]) -> None:

@@ -44,18 +44,20 @@ class Wishes:
     Attributes:
         name: of messages.
         view, event: of those.
-        system: the system id; None for all.
+        systems: the system ids; empty for all.
         rate: highest rate in Hz of each message of each component, and of each view; None for all.
     """
 
     name: Names = field(default_factory=Names)
     view: Names = field(default_factory=Names)
     event: Names = field(default_factory=Names)
-    system: int | None = None
+    systems: frozenset[int] = frozenset()
     rate: float | None = None
 
     def __contains__(self, event: Event) -> bool:
-        return event.name in getattr(self, event.kind) and self.system in (None, event.system or self.system)
+        if event.name not in getattr(self, event.kind):
+            return False
+        return not self.systems or not event.system or event.system in self.systems  # 0 is of no vehicle
 
     @property
     def needs_ticks(self) -> bool:

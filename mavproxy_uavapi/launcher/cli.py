@@ -20,6 +20,7 @@ from mavproxy_uavapi.launcher.supervisor import Supervisor
 
 # sim_vehicle.py as instance 0 first kills all vehicles that it takes for its own.
 FIRST_SITL_INSTANCE = 1
+WITHOUT_IT = "without this option, or this line of the file, the embedded vehicle flies and needs no ArduPilot"
 
 
 def run(argv: Sequence[str] | None = None) -> int:
@@ -45,11 +46,11 @@ def prepare(options: RunOptions) -> RunOptions:
     if options.simulated and options.ardupilot_path is not None:
         script = command_lines.sim_vehicle(options.ardupilot_path)
         if not script.is_file():
-            raise OptionError(f"--ardupilot_path: there is no {script}")
+            raise OptionError(f"--ardupilot_path: there is no {script}; {WITHOUT_IT}")
         for kind in dict.fromkeys(kinds(options)):
             binary = command_lines.sitl_binary(options.ardupilot_path, kind)
             if not binary.is_file():
-                raise OptionError(f"--ardupilot_path: {binary} is missing, build it first")
+                raise OptionError(f"--ardupilot_path: {binary} is missing, build it first; {WITHOUT_IT}")
     if not instances.is_free(options.port, options.host):
         raise LaunchError(f"--port: {options.host}:{options.port} is taken by another program")
     return dataclasses.replace(options, headless=options.headless or not has_terminal())

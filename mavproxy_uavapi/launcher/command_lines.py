@@ -16,6 +16,7 @@ from mavproxy_uavapi.core.addresses import local_url_of
 from mavproxy_uavapi.core.settings import DEFAULT
 from mavproxy_uavapi.launcher.fleet import SimulatedVehicle, kinds
 from mavproxy_uavapi.launcher.options import RunOptions
+from mavproxy_uavapi.launcher.values import one_word
 from mavproxy_uavapi.settings import ApiModuleSettings
 
 # With these variables run_in_terminal_window.sh puts the vehicle into a window, a tmux server or a screen that is not
@@ -106,12 +107,8 @@ def gradys_keywords(options: RunOptions) -> dict[str, object]:
 
 
 def module_load(name: str, settings: Mapping[str, object]) -> str:
-    """`module load NAME:{…}`, safe from MAVProxy's splitting.
-
-    MAVProxy splits `--cmd` at `;` and the command at white space. JSON may write both as escapes.
-    """
-    text = json.dumps(settings, separators=(",", ":"))
-    return f"module load {name}:{text.replace(' ', chr(92) + 'u0020').replace(';', chr(92) + 'u003b')}"
+    """`module load NAME:{…}`, safe from MAVProxy's splitting."""
+    return f"module load {name}:{one_word(settings)}"
 
 
 def settings_file(options: RunOptions) -> str | None:

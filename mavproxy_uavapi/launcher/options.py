@@ -133,7 +133,7 @@ TABLE = (
     Row("script_logs", "logs", path, "directory for the output of uploaded scripts"),
 )
 VARIABLES = {f"UAVAPI_{row.name.upper()}": row for row in TABLE}
-SECTIONS = ("api", "simulated", "logs")  # of the INI file; the other sections belong to modules
+SECTIONS = ("api", "mode", "udp", "simulated", "logs")  # of the INI file; the other sections belong to modules
 
 
 class _Parser(argparse.ArgumentParser):

@@ -5,14 +5,14 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from mavproxy_uavapi.core import logs
 
 # The accepted names, including those of the original service, and the components that they mean.
 LOG_COMPONENTS = {**{name: name for name in logs.COMPONENTS}, **logs.ALIASES}
 VEHICLES = ("copter", "plane", "quadplane", "rover")
-_MODULE = re.compile(r"[A-Za-z_]\w*(:\{[^;\s]*\})?")
+_MODULE = re.compile(r"([A-Za-z_]\w*)(?::(\{.*\}))?", re.DOTALL)
 
 
 def port(text: str) -> int:
@@ -89,12 +89,16 @@ def host_port(text: str) -> str:
 def modules(text: str) -> tuple[str, ...]:
     """One MAVProxy module, `NAME` or `NAME:{"key":value}`, or several names with commas between."""
     names = (text,) if "{" in text else tuple(part for part in text.split(",") if part)
-    # MAVProxy splits a command line at `;` and at white space; a name must not contain either.
-    if not names or not all(_MODULE.fullmatch(name) for name in names):
-        raise ValueError('expected NAME or NAME:{"key":value} without spaces')
-    for name in names:
-        json.loads(name.partition(":")[2] or "{}")
-    return names
+    found = [_MODULE.fullmatch(name) for name in names]
+    if not found or None in found:
+        raise ValueError('expected NAME or NAME:{"key":value}')
+    return tuple(f"{match[1]}:{one_word(json.loads(match[2]))}" if match[2] else match[1] for match in found if match)
+
+
+def one_word(settings: Mapping[str, object]) -> str:
+    """JSON that MAVProxy does not split: it splits `--cmd` at `;`, and a command at white space."""
+    text = json.dumps(settings, separators=(",", ":"))
+    return text.replace(" ", r"\u0020").replace(";", r"\u003b")
 
 
 def one_of(*choices: str) -> Callable[[str], str]:

@@ -1,10 +1,10 @@
 // The verbs of the chosen vehicle. What starts something is held; what stops it is one click.
 
-import {Panel} from "./panel.js";
-import {element, heightInput, heightOf, labelled, setAttribute, setText} from "./dom.js";
+import {CommandPanel} from "./command_panel.js";
+import {element, heightInput, heightOf, labelled, setAttribute} from "./dom.js";
 import "./hold_button.js";
 
-export class FlightActions extends Panel {
+export class FlightActions extends CommandPanel {
   build() {
     this.alt = heightInput(this.context.preferences.alt, "height of the take-off in m");
     this.arm = this.held("Arm", () => this.send("/command/arm"));
@@ -16,12 +16,10 @@ export class FlightActions extends Panel {
     this.brake = this.clicked("Brake", () => this.send("/command/brake"));
     this.stop = this.clicked("Stop", () => this.send("/movement/stop"));
     this.resume = this.held("Resume", () => this.send("/movement/resume"));
-    this.answer = element("p", {class: "answer", role: "status"});
     this.append(
       element("div", {class: "buttons"}, this.arm, this.takeoff, labelled("to", this.alt, "m")),
       element("div", {class: "buttons"}, this.land, this.rtl, this.guided, this.disarm),
       element("div", {class: "buttons"}, this.brake, this.stop, this.resume), this.answer);
-    this.context.fleet.addEventListener("job", event => this.heard(event.detail));
     this.context.fleet.addEventListener("chosen", () => this.say("", ""));
   }
 
@@ -41,23 +39,11 @@ export class FlightActions extends Panel {
 
   /** Show what becomes of a job. */
   await(job, verb) {
-    this.awaited = job;
     this.say(`vehicle ${this.vehicle.id}: ${verb} (job ${job})`, "wait");
-    const known = this.context.fleet.jobs.get(job);
-    if (known) this.heard(known);
+    super.await(job);
   }
 
-  /** The end of the job that was begun here last. */
-  heard(job) {
-    if (job.job !== this.awaited || job.state === "running") return;
-    if (job.state === "succeeded") this.say(`vehicle ${job.system}: ${job.result}`, "good");
-    else this.say(`vehicle ${job.system}: ${sentenceOf(job)}`, "bad");
-  }
-
-  say(text, kind) {
-    setText(this.answer, text);
-    setAttribute(this.answer, "class", `answer ${kind}`);
-  }
+  wordsOf(job, sentence) { return `vehicle ${job.system}: ${sentence}`; }
 
   render(at) {
     const report = this.vehicle?.get("vehicle"), live = report && this.vehicle.isAlive(at) && !this.context.stream.trouble(at);
@@ -78,12 +64,6 @@ export class FlightActions extends Panel {
     setAttribute(button, "disabled", !allowed);
     setAttribute(button, "title", allowed ? "hold for a second" : why);
   }
-}
-
-/** Why a job failed, in words. */
-export function sentenceOf(job) {
-  const texts = job.error?.statustext ?? [];
-  return `${job.error?.detail ?? "failed"}${texts.length ? ` (${texts.join("; ")})` : ""}`;
 }
 
 customElements.define("flight-actions", FlightActions);

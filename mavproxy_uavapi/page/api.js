@@ -53,9 +53,9 @@ export class Api extends EventTarget {
   }
 
   /** A call's body as a Blob, with its status. */
-  async blob(path) {
+  async blob(path, timeout = TIMEOUT) {
     return this.inTurn(async () => {
-      const response = await this.fetch("GET", path, {});
+      const response = await this.fetch("GET", path, {timeout});
       if (!response.ok) throw new ApiError(response.status, await bodyOf(response));
       return response.blob();
     });

@@ -22,6 +22,7 @@ import "./mission.js";
 import "./script_list.js";
 import "./vision_view.js";
 import "./gradys_view.js";
+import "./log_list.js";
 import "./parameter_list.js";
 import "./tab_bar.js";
 import "./token_dialog.js";

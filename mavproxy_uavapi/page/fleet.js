@@ -17,6 +17,7 @@ export class Vehicle {
     this.texts = []; // {at, severity, text}
     this.mission = []; // the items that it holds, once they were read
     this.fence = null; // {radius, alt}
+    this.areas = {envelope: [], own: []}; // of envelopes, and of its own fence once that was read
     this.tags = []; // {id, lat, lon}
   }
 

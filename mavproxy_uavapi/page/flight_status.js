@@ -3,6 +3,7 @@
 import {Panel} from "./panel.js";
 import {element, setAttribute, setText} from "./dom.js";
 import {ageText} from "./freshness.js";
+import "./vehicle_hold.js";
 
 const SCRIPTED = {AUTO: "its mission", RTL: "the autopilot: it returns", LAND: "the autopilot: it lands",
   SMART_RTL: "the autopilot: it returns", AUTO_RTL: "the autopilot: it returns", QLAND: "the autopilot: it lands",
@@ -14,10 +15,12 @@ export class FlightStatus extends Panel {
     this.armed = element("span", {class: "badge"});
     this.landed = element("span", {class: "badge quiet"});
     this.age = element("span", {class: "age"});
+    this.hold = document.createElement("vehicle-hold");
     this.commander = element("p", {class: "commander"});
     this.may = element("p", {class: "may"});
     this.reasons = element("ul", {class: "reasons"});
-    this.append(element("div", {class: "row"}, this.mode, this.armed, this.landed, this.age), this.commander, this.may, this.reasons);
+    this.append(element("div", {class: "row"}, this.mode, this.armed, this.landed, this.age), this.commander, this.hold, this.may, this.reasons);
+    this.hold.start(this.context);
   }
 
   render(at) {
@@ -33,6 +36,7 @@ export class FlightStatus extends Panel {
     const silent = this.vehicle.views.vehicle.age(at) + (report.link.alive ? 0 : 1000 * report.link.heartbeat_age_s);
     setText(this.age, live ? "" : `${ageText(silent)} old`);
     setText(this.commander, `Commanded by ${commanderOf(report)}`);
+    this.hold.render(at);
     this.showReadiness(report, live);
   }
 

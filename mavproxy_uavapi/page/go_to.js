@@ -1,14 +1,13 @@
 // Click to go: the chosen place, its distance and height, and a button to hold before anything is sent.
 
-import {Panel} from "./panel.js";
+import {CommandPanel} from "./command_panel.js";
 import {element, heightInput, heightOf, labelled, number, setAttribute, setText} from "./dom.js";
 import "./hold_button.js";
 
-export class GoTo extends Panel {
+export class GoTo extends CommandPanel {
   build() {
     this.hidden = true;
     this.where = element("p", {class: "where"});
-    this.answer = element("p", {class: "answer", role: "status"});
     this.alt = heightInput(this.context.preferences.alt, "height in m above home");
     this.look = element("input", {type: "checkbox"});
     this.go = element("hold-button", {label: "Go there", on: {confirmed: () => this.send()}});
@@ -38,18 +37,10 @@ export class GoTo extends Panel {
   async send() {
     const {lat, lon} = this.place, body = {lat, long: lon, alt: heightOf(this.alt), look_at_target: this.look.checked};
     this.say("sending …", "wait");
-    try {
-      const {job} = await this.context.api.command(this.path("/movement/go_to_gps_wait"), body);
-      document.querySelector("flight-actions").await(job, "on its way");
-      this.cancel(); // the target is drawn from what the autopilot tells
-    } catch (error) {
-      this.say(error.message, "bad");
-    }
-  }
-
-  say(text, kind) {
-    setText(this.answer, text);
-    setAttribute(this.answer, "class", `answer ${kind}`);
+    const begun = await this.attempt(() => this.context.api.command(this.path("/movement/go_to_gps_wait"), body));
+    if (!begun) return;
+    document.querySelector("flight-actions").await(begun.job, "on its way");
+    this.cancel(); // the target is drawn from what the autopilot tells
   }
 
   render(at) {

@@ -1,7 +1,8 @@
-// The module gradys: its ground stations, what waits in the spool, and what became of it. Offered while it is loaded.
+// The module gradys: its ground stations, what waits in the spool, what became of it, and its readings. Offered while it is loaded.
 
 import {Panel} from "./panel.js";
 import {element, setText} from "./dom.js";
+import "./reading_curves.js";
 
 const EVERY = 1000; // ms from one look to the next while the tab is open
 
@@ -10,8 +11,10 @@ export class GradysView extends Panel {
     this.head = element("p", {class: "where"});
     this.stations = element("ul", {class: "plain"});
     this.sinks = element("ul", {class: "plain"});
+    this.curves = document.createElement("reading-curves");
     this.flush = element("button", {type: "button", on: {click: () => this.tryNow()}}, "Try all now");
-    this.append(this.head, element("h3", {}, "Ground stations"), this.stations, element("h3", {}, "Sinks of readings"), this.sinks, this.flush);
+    this.append(this.head, element("h3", {}, "Ground stations"), this.stations, element("h3", {}, "Sinks of readings"), this.sinks, this.flush, element("h3", {}, "Readings"), this.curves);
+    this.curves.start(this.context);
     this.addEventListener("opened", () => this.look());
     setInterval(() => { if (!this.hidden && !document.hidden) this.look(); }, EVERY);
   }
@@ -22,11 +25,14 @@ export class GradysView extends Panel {
       const trip = info.round_trip_ms?.median;
       setText(this.head, `${info.sent} positions sent, ${info.acknowledged} acknowledged${trip === undefined ? "" : `, ${trip} ms there and back`}; ${info.spooled ?? 0} readings wait.`);
       fill(this.stations, info.stations, one => [one.station, one.last_error ?? `${one.acknowledged} of ${one.sent} acknowledged`]);
+      await this.curves.look();
       fill(this.sinks, info.sinks, one => [one.sink, one.last_error ?? `${one.acknowledged} of ${one.sent} acknowledged`]);
     } catch (error) {
       setText(this.head, error.message);
     }
   }
+
+  render(at) { this.curves.render(at); }
 
   async tryNow() {
     try {

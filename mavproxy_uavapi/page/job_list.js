@@ -2,7 +2,7 @@
 
 import {Panel} from "./panel.js";
 import {element, setAttribute, setText} from "./dom.js";
-import {sentenceOf} from "./actions.js";
+import {sentenceOf} from "./command_panel.js";
 
 const SHOWN = 25;
 

@@ -1,13 +1,13 @@
 // The mission that the autopilot itself flies: drawn on the top view or read from a file, uploaded, started, watched.
 
-import {Panel} from "./panel.js";
+import {CommandPanel} from "./command_panel.js";
+import {areasOf} from "./areas.js";
 import {element, heightInput, heightOf, labelled, setAttribute, setText} from "./dom.js";
 import "./hold_button.js";
-import {sentenceOf} from "./actions.js";
 
 const ENDS = {nothing: null, land: "NAV_LAND", rtl: "NAV_RETURN_TO_LAUNCH"};
 
-export class MissionPlan extends Panel {
+export class MissionPlan extends CommandPanel {
   build() {
     this.view = document.querySelector("top-view");
     this.draft = [];
@@ -20,13 +20,11 @@ export class MissionPlan extends Panel {
     this.end.value = "rtl";
     this.rows = element("ol", {class: "waypoints"});
     this.upload = element("hold-button", {label: "Upload draft", on: {confirmed: () => this.sendDraft()}});
-    this.begin = element("hold-button", {label: "Start mission", on: {confirmed: () => this.send("/mission/start", {json: {}})}});
+    this.starter = element("hold-button", {label: "Start mission", on: {confirmed: () => this.send("/mission/start", {json: {}})}});
     this.progress = element("p", {class: "where"}, "The vehicle holds no items."); // nothing below it moves later
-    this.answer = element("p", {class: "answer", role: "status"});
     this.append(this.progress, element("div", {class: "buttons"}, this.drawing, labelled("height", this.alt, "m"), labelled("then", this.end)),
-      this.rows, element("div", {class: "buttons"}, this.upload, this.begin), element("div", {class: "buttons"}, read, clear),
+      this.rows, element("div", {class: "buttons"}, this.upload, this.starter), element("div", {class: "buttons"}, read, clear),
       labelled("upload a file", this.file), this.answer);
-    this.context.fleet.addEventListener("job", event => this.heard(event.detail));
     this.context.fleet.addEventListener("chosen", () => { this.draw(false); this.replace([]); this.say("", ""); });
     this.addEventListener("opened", () => { if (this.vehicle && !this.vehicle.mission.length) this.read(); });
   }
@@ -95,45 +93,32 @@ export class MissionPlan extends Panel {
     if (file) await this.send("/mission/waypoints", {body: await file.text()});
   }
 
-  async send(path, content) {
-    this.say("sending …", "wait");
-    try {
-      const {job} = await this.context.api.call("POST", `${this.path(path)}?wait=false`, content);
-      this.awaited = job;
-      const known = this.context.fleet.jobs.get(job);
-      if (known) this.heard(known);
-    } catch (error) {
-      this.say(error.message, "bad");
-    }
+  send(path, content) {
+    const full = `${this.path(path)}?wait=false`;
+    return this.begin(() => this.context.api.call("POST", full, content));
   }
 
-  heard(job) {
-    if (job.job !== this.awaited || job.state === "running") return;
-    this.awaited = "";
-    const good = job.state === "succeeded";
-    this.say(good ? job.result : sentenceOf(job), good ? "good" : "bad");
-    if (good && job.verb === "/mission/waypoints") {
-      this.draw(false);
-      this.replace([]);
-      this.read();
-    }
+  succeeded(job) {
+    if (job.verb !== "/mission/waypoints") return;
+    this.draw(false);
+    this.replace([]);
+    this.read();
   }
 
-  /** Read the mission that the vehicle holds. */
+  /** Read the mission and the fence that the vehicle holds. */
   async read() {
     const {vehicle} = this;
     if (!vehicle) return;
+    const {api} = this.context;
+    const mission = await this.attempt(() => api.get(`/vehicles/${vehicle.id}/mission/waypoints`));
+    if (mission) vehicle.mission = mission.items;
+    this.view.touch();
     try {
-      vehicle.mission = (await this.context.api.get(this.path("/mission/waypoints"))).items;
-      this.view.touch();
-    } catch (error) {
-      this.say(error.message, "bad");
+      vehicle.areas.own = areasOf((await api.get(`/vehicles/${vehicle.id}/mission/fence`)).fence);
+    } catch {
+      vehicle.areas.own = []; // it keeps none, or tells none: nothing is drawn that is not known
     }
-  }
-
-  say(text, kind) {
-    setText(this.answer, text);
-    setAttribute(this.answer, "class", `answer ${kind}`);
+    this.view.touch();
   }
 
   render(at) {
@@ -143,8 +128,8 @@ export class MissionPlan extends Panel {
     const far = progress?.distance_m === null || progress?.distance_m === undefined ? "" : `, ${progress.distance_m} m to go`;
     setText(this.progress, `The vehicle holds ${count || "no"} items${count ? stage + far : ""}.`);
     setAttribute(this.upload, "disabled", !(live && this.draft.length));
-    setAttribute(this.begin, "disabled", !(live && vehicle.armed && count));
-    setAttribute(this.begin, "title", live && vehicle.armed ? "hold for a second" : "arm it first");
+    setAttribute(this.starter, "disabled", !(live && vehicle.armed && count));
+    setAttribute(this.starter, "title", live && vehicle.armed ? "hold for a second" : "arm it first");
   }
 }
 

@@ -1,4 +1,6 @@
-// What is asked besides the stream, seldom: which modules are loaded, and the fence of the chosen vehicle.
+// What is asked besides the stream, seldom: which modules are loaded, and where the chosen vehicle may fly.
+
+import {areasOfAll} from "./areas.js";
 
 const EVERY = 20000; // ms
 const CIRCLE = 2; // FENCE_TYPE's bit of the circle around home
@@ -8,7 +10,9 @@ export function watchModules({api, fleet, painter}, tabs, panels) {
   const look = () => {
     if (document.hidden) return;
     for (const [path, panel] of Object.entries(panels)) offer(api, path, tabs, panel);
-    if (fleet.chosen) readFence(api, fleet.chosen, painter);
+    if (!fleet.chosen) return;
+    readFence(api, fleet.chosen, painter);
+    readEnvelopes(api, fleet.chosen, painter);
   };
   for (const panel of Object.values(panels)) tabs.offer(panel, false);
   fleet.addEventListener("chosen", look);
@@ -22,6 +26,16 @@ async function offer(api, path, tabs, panel) {
     tabs.offer(panel, true);
   } catch (error) {
     if (error.status === 404) tabs.offer(panel, false);
+  }
+}
+
+/** The envelopes that this server keeps the vehicle in. */
+async function readEnvelopes(api, vehicle, painter) {
+  try {
+    vehicle.areas.envelope = areasOfAll((await api.get(`/vehicles/${vehicle.id}/envelope`)).envelopes);
+    painter.touch();
+  } catch {
+    vehicle.areas.envelope = [];
   }
 }
 

@@ -1,17 +1,16 @@
 // The autopilot's parameters: found by name, changed one at a time, and shown as the autopilot holds them then.
 
-import {Panel} from "./panel.js";
+import {CommandPanel} from "./command_panel.js";
 import {element, labelled, setAttribute, setText} from "./dom.js";
 import "./hold_button.js";
 
 const SHOWN = 60;
 
-export class ParameterList extends Panel {
+export class ParameterList extends CommandPanel {
   build() {
     this.filter = element("input", {type: "search", value: "WPNAV*", autocomplete: "off", spellcheck: false, on: {change: () => this.look()}});
     this.rows = element("dl", {class: "parameters"});
     this.note = element("p", {class: "empty"});
-    this.answer = element("p", {class: "answer", role: "status"});
     this.append(labelled("names, with * and ?", this.filter), this.note, this.rows, this.answer);
     this.addEventListener("opened", () => this.look());
     this.context.fleet.addEventListener("chosen", () => { if (!this.hidden) this.look(); });
@@ -38,18 +37,11 @@ export class ParameterList extends Panel {
 
   async set(name, input) {
     this.say(`${name} …`, "wait");
-    try {
-      const body = await this.context.api.call("PUT", this.path(`/parameters/${name}`), {json: {value: Number(input.value)}, timeout: 20000});
-      input.value = text(body.value);
-      this.say(body.result, "good");
-    } catch (error) {
-      this.say(error.message, "bad");
-    }
-  }
-
-  say(words, kind) {
-    setText(this.answer, words);
-    setAttribute(this.answer, "class", `answer ${kind}`);
+    const options = {json: {value: Number(input.value)}, timeout: 20000};
+    const body = await this.attempt(() => this.context.api.call("PUT", this.path(`/parameters/${name}`), options));
+    if (!body) return;
+    input.value = text(body.value);
+    this.say(body.result, "good");
   }
 }
 

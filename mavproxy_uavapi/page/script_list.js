@@ -1,18 +1,17 @@
 // Scripts on the vehicle's computer: upload, run, follow the log, stop.
 
-import {Panel} from "./panel.js";
-import {element, labelled, setAttribute, setText} from "./dom.js";
+import {CommandPanel} from "./command_panel.js";
+import {element, labelled} from "./dom.js";
 import {readEvents} from "./stream.js";
 import "./hold_button.js";
 
 const EVERY = 2000; // ms from one look to the next while the tab is open
 const LINES = 400; // of a log
 
-export class ScriptList extends Panel {
+export class ScriptList extends CommandPanel {
   build() {
     this.rows = element("ol", {class: "scripts"});
     this.file = element("input", {type: "file", accept: ".py,.sh", on: {change: () => this.upload()}});
-    this.answer = element("p", {class: "answer", role: "status"});
     this.log = element("pre", {class: "log", tabIndex: 0, hidden: true, "aria-label": "log"});
     this.append(this.rows, labelled("upload a script", this.file), this.answer, this.log);
     this.addEventListener("opened", () => this.look());
@@ -86,11 +85,6 @@ export class ScriptList extends Panel {
     this.log.append(element("span", {}, `${text.replace(/\n$/, "")}\n`));
     while (this.log.children.length > LINES) this.log.firstChild.remove();
     this.log.scrollTop = this.log.scrollHeight;
-  }
-
-  say(text, kind) {
-    setText(this.answer, text);
-    setAttribute(this.answer, "class", `answer ${kind}`);
   }
 }
 

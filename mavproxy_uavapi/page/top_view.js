@@ -5,6 +5,7 @@ import {Camera} from "./camera.js";
 import {Projection, distance} from "./projection.js";
 import {calmMotion, element, number, setAttribute} from "./dom.js";
 import {ageText} from "./freshness.js";
+import {TileLayer} from "./tiles.js";
 import {colours} from "./colours.js";
 import {sharp} from "./canvas.js";
 import * as layers from "./top_view_layers.js";
@@ -17,6 +18,7 @@ const STEP = {ArrowUp: [1, 0], ArrowDown: [-1, 0], ArrowRight: [0, 1], ArrowLeft
 export class TopView extends Panel {
   build() {
     this.camera = new Camera();
+    this.tiles = new TileLayer(this.context.api, this.context.painter);
     this.pointers = new Map();
     this.chosenPlace = null; // {lat, lon}, not yet sent
     this.draft = []; // of a mission: {lat, long, number}
@@ -68,6 +70,8 @@ export class TopView extends Panel {
     return vehicle.mission.filter(item => item.lat).map(item => ({place: this.projection.metres(item.lat, item.long), number: item.seq}));
   }
 
+  areasOf(vehicle) { return [...vehicle.areas.envelope, ...vehicle.areas.own]; }
+
   // -- drawing
 
   render(at) {
@@ -81,6 +85,7 @@ export class TopView extends Panel {
     }
     camera.keep(this.places());
     if (camera.step(calmMotion.matches)) this.touch(); // and again in the next frame
+    this.tiles.draw(pen, camera, this.projection);
     layers.drawGrid(pen, camera, theme);
     this.drawGround(pen, theme);
     const taken = [];
@@ -113,6 +118,7 @@ export class TopView extends Panel {
       if (vehicle.fence) layers.drawFence(pen, camera, place, vehicle.fence, theme);
       layers.drawHome(pen, camera, place, theme);
     }
+    for (const area of vehicle ? this.areasOf(vehicle) : []) layers.drawArea(pen, camera, this.projection, area, theme);
     for (const tag of vehicle?.tags ?? []) layers.drawTag(pen, camera, {id: tag.id, place: this.projection.metres(tag.lat, tag.lon)}, theme);
     if (vehicle) layers.drawMission(pen, camera, this.missionOf(vehicle), {current: vehicle.get("mission")?.current}, theme);
     layers.drawMission(pen, camera, this.draftPlaces(), {draft: true, selected: this.selected}, theme);
@@ -137,7 +143,9 @@ export class TopView extends Panel {
   words() {
     const place = this.placeOf(this.vehicle);
     const where = place ? `vehicle ${this.vehicle.id} is ${number(place[0], 0)} m north, ${number(place[1], 0)} m east of home` : "no position";
-    return `top view: ${where}; arrow keys choose a place, Enter takes it, plus and minus zoom`;
+    const areas = this.vehicle ? this.areasOf(this.vehicle).length : 0;
+    const fenced = areas ? `; ${areas} ${areas === 1 ? "area" : "areas"} of fences and envelopes` : "";
+    return `top view: ${where}${fenced}; arrow keys choose a place, Enter takes it, plus and minus zoom`;
   }
 
   // -- hands

@@ -54,6 +54,25 @@ export function drawFence(pen, camera, home, fence, theme) {
   haloed(pen, `fence ${fence.radius} m`, x + 4, y - radius - 5, theme.bad, theme.map);
 }
 
+/** An area of an envelope or a fence; where one must not be is filled. */
+export function drawArea(pen, camera, projection, area, theme) {
+  const pixels = ([lat, lon]) => camera.pixels(projection.metres(lat, lon));
+  pen.beginPath();
+  if (area.centre) pen.arc(...pixels(area.centre), area.radius * camera.scale, 0, 7);
+  for (const ring of area.rings) {
+    ring.forEach((corner, n) => (n ? pen.lineTo(...pixels(corner)) : pen.moveTo(...pixels(corner))));
+    pen.closePath();
+  }
+  pen.fillStyle = pen.strokeStyle = theme.bad;
+  pen.globalAlpha = 0.14;
+  if (!area.inclusion) pen.fill("evenodd");
+  pen.globalAlpha = 1;
+  pen.setLineDash([10, 6]);
+  pen.lineWidth = 1.5;
+  pen.stroke();
+  pen.setLineDash([]);
+}
+
 export function drawHome(pen, camera, place, theme) {
   const [x, y] = camera.pixels(place);
   disc(pen, x, y, 10, theme.surface, theme.ink, 2);

@@ -4,6 +4,8 @@ import {Panel} from "./panel.js";
 import {element, setAttribute, setText} from "./dom.js";
 import {colourOf} from "./colours.js";
 
+const MANY = 4; // vehicles; of more the buttons are smaller, in several rows where there is room
+
 export class VehicleBar extends Panel {
   build() {
     this.setAttribute("role", "group");
@@ -12,6 +14,7 @@ export class VehicleBar extends Panel {
   }
 
   render(at) {
+    this.classList.toggle("many", this.context.fleet.vehicles.size > MANY);
     for (const vehicle of this.context.fleet.all) this.show(vehicle, this.buttonOf(vehicle), at);
   }
 

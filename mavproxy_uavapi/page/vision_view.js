@@ -1,15 +1,14 @@
 // The camera: the newest frame with its tags, and landing on one. Offered while the module vision is loaded.
 
-import {Panel} from "./panel.js";
-import {element, labelled, setAttribute, setText} from "./dom.js";
+import {CommandPanel} from "./command_panel.js";
+import {element, labelled, setText} from "./dom.js";
 import {ageText, now} from "./freshness.js";
 import "./hold_button.js";
-import {sentenceOf} from "./actions.js";
 
 const FRAME_EVERY = 150; // ms between two frames, at least
 const OLD = 2000; // ms
 
-export class VisionView extends Panel {
+export class VisionView extends CommandPanel {
   build() {
     this.picture = element("img", {alt: "the camera's newest frame", hidden: true});
     this.note = element("p", {class: "where"});
@@ -17,10 +16,8 @@ export class VisionView extends Panel {
     this.land = element("hold-button", {label: "Land on the tag", on: {confirmed: () => this.send("/vision/land")}});
     this.search = element("hold-button", {label: "Search for it", on: {confirmed: () => this.send("/vision/search")}});
     const stop = element("button", {type: "button", class: "stop", on: {click: () => this.stop()}}, "Stop");
-    this.answer = element("p", {class: "answer", role: "status"});
     this.append(element("figure", {}, this.picture), this.note, element("div", {class: "buttons"}, labelled("tag", this.tag), this.land, this.search, stop), this.answer);
     this.addEventListener("opened", () => this.watch());
-    this.context.fleet.addEventListener("job", event => this.heard(event.detail));
   }
 
   /** Fetch frames for as long as the tab is open. */
@@ -49,34 +46,17 @@ export class VisionView extends Panel {
     this.context.painter.touch();
   }
 
-  async send(path) {
-    const body = this.tag.value === "" ? {} : {id: Number(this.tag.value)};
-    this.say("sending …", "wait");
-    try {
-      this.awaited = (await this.context.api.command(this.path(path), body)).job;
-    } catch (error) {
-      this.say(error.message, "bad");
-    }
+  send(path) {
+    const body = this.tag.value === "" ? {} : {id: Number(this.tag.value)}, full = this.path(path);
+    return this.begin(() => this.context.api.command(full, body));
   }
 
   async stop() {
-    try {
-      this.say((await this.context.api.urgent(this.path("/vision/stop"))).result, "good");
-    } catch (error) {
-      this.say(error.message, "bad");
-    }
+    const done = await this.attempt(() => this.context.api.urgent(this.path("/vision/stop")));
+    if (done) this.say(done.result, "good");
   }
 
-  heard(job) {
-    if (job.job !== this.awaited) return;
-    if (job.state === "running") this.say([job.progress.stage ?? job.progress.phase, "under way"].find(Boolean), "wait");
-    else this.say(job.state === "succeeded" ? job.result : sentenceOf(job), job.state === "succeeded" ? "good" : "bad");
-  }
-
-  say(text, kind) {
-    setText(this.answer, text);
-    setAttribute(this.answer, "class", `answer ${kind}`);
-  }
+  goesOn(job) { this.say([job.progress.stage ?? job.progress.phase, "under way"].find(Boolean), "wait"); }
 
   render(at) {
     const age = at - (this.at ?? -Infinity), old = age > OLD;

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import select
 import shlex
 import subprocess
@@ -14,10 +15,19 @@ from typing import IO, Any
 
 import numpy as np
 
+from mavproxy_vision.camera.controls import (
+    LIBCAMERA,
+    NO_CONTROLS,
+    NO_SUCH,
+    Controls,
+    is_libcamera,
+    with_properties,
+)
 from mavproxy_vision.camera.source import Frame, masked_source
 from mavproxy_vision.errors import NoCamera
 
-LAUNCH = "gst-launch-1.0"
+LAUNCH, INSPECT = "gst-launch-1.0", "gst-inspect-1.0"
+INSPECT_TIMEOUT = 10.0  # s; the first call on a machine scans all plugins
 READ_TIMEOUT = 0.2  # s that a read waits
 END_TIMEOUT = 1.0  # s that the program has to end by itself
 CHUNK = 1 << 16  # bytes, the size of a pipe
@@ -43,13 +53,24 @@ class Pipeline:
         latency: s from capture to arrival; it is subtracted from the time of arrival.
         size: width and height, px.
         clock: monotonic seconds.
+        controls: what a camera of libcamerasrc is asked for.
+
+    Attributes:
+        taken: what is requested of the controls, by name.
     """
 
     live = True
 
     def __init__(
-        self, spec: str, latency: float, size: tuple[int, int], clock: Callable[[], float] = time.monotonic
+        self,
+        spec: str,
+        latency: float,
+        size: tuple[int, int],
+        clock: Callable[[], float] = time.monotonic,
+        *,
+        controls: Controls = NO_CONTROLS,
     ) -> None:
+        self._controls, self.taken = controls, controls.without_effect(NO_SUCH)
         self._spec, self._latency, self._size, self._clock = spec, latency, size, clock
         self._stride = -(-size[0] // 4) * 4  # GStreamer aligns rows to four bytes
         self._process: subprocess.Popen[bytes] | None = None
@@ -64,9 +85,10 @@ class Pipeline:
         """
         self._received.clear()
         try:
+            command = launch_command(self._controlled(), self._size)
             self._stderr = tempfile.TemporaryFile()  # noqa: SIM115 — `close` closes it
             self._process = subprocess.Popen(
-                launch_command(self._spec, self._size),
+                command,
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=self._stderr,
@@ -74,12 +96,19 @@ class Pipeline:
             )
         except OSError as error:
             self.close()
-            if error.filename == LAUNCH and isinstance(error, FileNotFoundError):
+            if error.filename in (LAUNCH, INSPECT) and isinstance(error, FileNotFoundError):
                 raise NoCamera(f"a pipeline needs {LAUNCH}: install gstreamer1.0-tools") from error
             raise NoCamera(f"{LAUNCH} cannot be started: {error.strerror}") from error
         except ValueError as error:  # shlex
             self.close()
             raise NoCamera(f"the pipeline cannot be parsed: {error}") from error
+
+    def _controlled(self) -> str:
+        """The pipeline with the controls."""
+        if not self._controls.requested or not is_libcamera(self._spec):
+            return self._spec
+        pipeline, self.taken = with_properties(self._spec, self._controls, known_properties(LIBCAMERA))
+        return pipeline
 
     def read(self) -> Frame | None:
         """The next frame; None if none arrives within READ_TIMEOUT.
@@ -134,6 +163,22 @@ def _end(process: subprocess.Popen[Any]) -> None:
         process.wait()
     assert process.stdout is not None
     process.stdout.close()
+
+
+def known_properties(element: str) -> set[str]:
+    """The properties of an element of GStreamer; none if the element is not installed.
+
+    Raises:
+        NoCamera: the program does not answer.
+        OSError: it is not installed.
+    """
+    try:
+        done = subprocess.run(
+            [INSPECT, element], stdin=subprocess.DEVNULL, capture_output=True, check=False, timeout=INSPECT_TIMEOUT
+        )
+    except subprocess.TimeoutExpired as error:
+        raise NoCamera(f"{INSPECT} {element} does not answer within {INSPECT_TIMEOUT:g} s") from error
+    return set(re.findall(r"^  ([a-z][a-z-]*) *: ", done.stdout.decode(errors="replace"), re.MULTILINE))
 
 
 def launch_command(spec: str, size: tuple[int, int]) -> list[str]:

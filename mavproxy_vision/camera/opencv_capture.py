@@ -15,6 +15,7 @@ os.environ.setdefault("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT", "1")  # s that a read
 
 import cv2  # noqa: E402
 
+from mavproxy_vision.camera.controls import NO_CONTROLS, NO_SUCH, Controls, set_v4l2  # noqa: E402
 from mavproxy_vision.camera.source import Frame, grey, masked_source  # noqa: E402
 from mavproxy_vision.errors import NoCamera  # noqa: E402
 
@@ -57,6 +58,10 @@ class Capture:
         size: width and height that are requested from a camera, px.
         rate: frames per second that are requested from a camera, or at which a file is played.
         clock: monotonic seconds.
+        controls: what a camera is asked for; streams and files have none.
+
+    Attributes:
+        taken: what the camera took of the controls, by name.
     """
 
     live = True
@@ -68,7 +73,10 @@ class Capture:
         size: tuple[int, int],
         rate: float,
         clock: Callable[[], float] = time.monotonic,
+        *,
+        controls: Controls = NO_CONTROLS,
     ) -> None:
+        self._controls, self.taken = controls, controls.without_effect(NO_SUCH)
         self._spec, self._latency, self._size, self._rate, self._clock = spec, latency, size, rate, clock
         self._shown = masked_source(spec)
         self._capture: Any = None
@@ -97,6 +105,7 @@ class Capture:
             self._capture.set(cv2.CAP_PROP_FRAME_HEIGHT, self._size[1])
             self._capture.set(cv2.CAP_PROP_FPS, self._rate)
             self._capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
+            self.taken = set_v4l2(self._capture, self._controls)
 
     def _opened(self) -> Any:
         number = re.fullmatch(r"(?:camera:|/dev/video)([0-9]{1,3})", self._spec)

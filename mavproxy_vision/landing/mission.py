@@ -87,6 +87,8 @@ async def fly(flight: TagFlight, plan: MissionPlan, descent_method: Callable[[Ta
     home = await vehicle.home()
     lat, lon = plan.place((home.latitude / 1e7, home.longitude / 1e7))
     vehicle.held_by("GUIDED")
+    if flight.tracker.settings.mission_speed:
+        await vehicle.set_speed(job, "ground", flight.tracker.settings.mission_speed)
     await vehicle.go_to(job, GlobalTarget(lat, lon, plan.alt), wait=True)
     vehicle.held_by("GUIDED")
     if plan.on_tag:

@@ -39,7 +39,7 @@ class TagWatch:
         for detection in seen.detections:
             key = (detection.family, detection.id)
             if key not in self._seen_at:
-                place = _place(detection, mount, history, clock.vehicle(now))
+                place = place_of(detection, mount, history, clock.vehicle(now))
                 distance = None if detection.distance is None else round(detection.distance, 2)
                 self._tell({"family": key[0], "id": key[1], "seen": True, "distance": distance, "ned": place})
             self._seen_at[key] = now
@@ -48,7 +48,7 @@ class TagWatch:
             self._tell({"family": key[0], "id": key[1], "seen": False})
 
 
-def _place(detection: TagDetection, mount: Mount, history: History, at: float) -> list[float] | None:
+def place_of(detection: TagDetection, mount: Mount, history: History, at: float) -> list[float] | None:
     """Where a tag lies, m north, east, down of the EKF origin."""
     attitude, motion = history.attitude(at), history.motion(at)
     if attitude is None or motion is None or not is_sound(detection):

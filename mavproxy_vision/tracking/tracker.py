@@ -20,6 +20,7 @@ from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_vision.apriltag.detection import FrameResult
 from mavproxy_vision.apriltag.detector import Detector, DetectorOptions
 from mavproxy_vision.apriltag.tag_layout import Tag
+from mavproxy_vision.camera.controls import NO_SUCH
 from mavproxy_vision.camera.gstreamer import Pipeline
 from mavproxy_vision.camera.opencv_capture import Capture
 from mavproxy_vision.camera.renderer import Renderer
@@ -128,6 +129,14 @@ class Tracker:
         source = make_source(settings, self._where, self.host.clock)
         worker = Worker(source, detector, lambda result, image: self.deliver(worker, result, image), self.host.clock)
         return worker
+
+    @property
+    def controls(self) -> dict[str, str]:
+        """What the camera took of exposure, gain and brightness, by name; only what the settings ask for."""
+        source = None if self.worker is None else self.worker.source
+        if isinstance(source, Capture | Pipeline):
+            return source.taken
+        return self.settings.controls.without_effect(NO_SUCH)
 
     def options(self, settings: VisionSettings) -> DetectorOptions:
         """The detector's options for these settings."""
@@ -338,8 +347,9 @@ def make_source(settings: VisionSettings, where: Any, clock: Callable[[], float]
     size = (settings.model.width, settings.model.height)
     is_file = os.path.isfile(path)
     if "!" in spec and not is_file:
-        return Pipeline(spec, latency, size, clock)
-    return Capture(path if is_file else spec, latency, size, settings.fps, clock)
+        return Pipeline(spec, latency, size, clock, controls=settings.controls)
+    camera = path if is_file else spec
+    return Capture(camera, latency, size, settings.fps, clock, controls=settings.controls)
 
 
 def in_view(result: FrameResult | None) -> list[dict[str, Any]]:

@@ -6,7 +6,6 @@ import contextlib
 import http.server
 import json
 import re
-import shutil
 import socket
 import threading
 from pathlib import Path
@@ -14,6 +13,8 @@ from string import Template
 from typing import Any
 
 import pytest
+
+from tests.support import chromium
 
 RIG_SPEEDUP = 2  # nobody flies far here, and each message costs processor time
 pytestmark = pytest.mark.needs("chromium")
@@ -23,18 +24,6 @@ PATIENCE = 90.0  # s for a browser to start, try everything, and tell; other tes
 ARM = 400  # MAV_CMD_COMPONENT_ARM_DISARM
 # A line of the browser's log about an answer; of a refused WebSocket it only keeps the status.
 ANSWERED = re.compile(r'(?:"headers":\["HTTP/1\.1 |Unexpected response code: )(\d+)')
-FLAGS = [
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--disable-dev-shm-usage",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
-
 # Each try marks its request with ?by=NAME, which the API ignores and the browser's own log of its traffic keeps.
 PAGE = Template("""<!doctype html><meta charset="utf-8"><title>page</title><iframe name="sink"></iframe>
 <script>
@@ -244,17 +233,14 @@ class Browser:
     """A headless Chromium; `inside` is a command that runs it somewhere else, and `evil` the address of that name."""
 
     def __init__(self, harness: Any, directory: Path, inside: tuple[str, ...] = (), evil: str = "127.0.0.1") -> None:
-        program = shutil.which("chromium")
-        if program is None:
-            pytest.fail("there is no chromium to test with: apt-get install chromium")
-        self._command = [*inside, program, *FLAGS, f"--host-resolver-rules=MAP {EVIL} {evil}"]
+        self._inside, self._rules = inside, f"--host-resolver-rules=MAP {EVIL} {evil}"
         self._harness, self._directory = harness, directory
 
     def visit(self, url: str, site: Site) -> None:
         """Open a page and wait until it has told `site` what came of its tries."""
         self.traffic = self._directory / "traffic.json"
-        command = [*self._command, f"--user-data-dir={self._directory / 'profile'}"]
-        command += [f"--log-net-log={self.traffic}", url]
+        started = chromium.command(self._directory / "profile", self._rules, f"--log-net-log={self.traffic}", url)
+        command = [*self._inside, *started]
         process = self._harness.Process(command, self._directory / "chromium.log", self._directory)
         try:
             report_ = site.reported.wait(PATIENCE)

@@ -3,25 +3,15 @@
 from __future__ import annotations
 
 import asyncio
-import base64
-import contextlib
-import itertools
 import json
-import os
-import signal
-import subprocess
-import time
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import pytest
-from aiohttp import ClientSession
+
+from tests.support.chromium import chromium
 
 RIG_SPEEDUP = 2  # nobody flies far here, and each message costs processor time
-CHROMIUM = "chromium"
-QUIET = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--disable-background-networking"]
-QUIET += ["--disable-component-update", "--disable-sync", "--no-first-run", "--remote-debugging-port=0"]
-QUIET += ["--window-size=1300,1700"]
-PATIENCE = 90.0  # s; a browser's start on a busy machine
 TRY_IT = """
 (async () => {
   const wait = async (look) => {
@@ -71,97 +61,50 @@ TRY_ALL = """
 """
 
 
-class Page:
-    """A browser's tab, by the DevTools protocol."""
+class Tried(NamedTuple):
+    """What came of a script on the page."""
 
-    def __init__(self, socket) -> None:
-        self._socket = socket
-        self._numbers = itertools.count(1)
-        self.refused: list[str] = []
-
-    async def ask(self, method, **params):
-        number = next(self._numbers)
-        await self._socket.send_json({"id": number, "method": method, "params": params})
-        while True:
-            reported = await self._socket.receive_json(timeout=PATIENCE)
-            if reported.get("method") == "Log.entryAdded":
-                self.refused.append(reported["params"]["entry"]["text"])
-            if reported.get("method") == "Network.requestWillBeSent":
-                self.refused += [
-                    u for u in [reported["params"]["request"]["url"]] if not u.startswith((self.url, "data:"))
-                ]
-            if reported.get("id") == number:
-                assert "error" not in reported, reported
-                return reported["result"]
-
-    async def look_at(self, url, script):
-        self.url = url.rsplit("/", 1)[0]
-        for domain in ("Page", "Log", "Network", "Runtime"):
-            await self.ask(f"{domain}.enable")
-        await self.ask("Page.navigate", url=url)
-        return (await self.ask("Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True))[
-            "result"
-        ]
+    value: Any
+    complaints: list[str]
+    elsewhere: list[str]  # requests to other servers
 
 
-@contextlib.contextmanager
-def browser(directory: Path):
-    command = [CHROMIUM, *QUIET, f"--user-data-dir={directory}", "about:blank"]
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
-    try:
-        port = directory / "DevToolsActivePort"
-        deadline = time.monotonic() + PATIENCE
-        while not (port.exists() and port.read_text()):
-            assert process.poll() is None and time.monotonic() < deadline, "the browser did not start"
-            time.sleep(0.1)
-        yield f"http://127.0.0.1:{port.read_text().split()[0]}"
-    finally:
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
-
-
-async def tried(devtools, url, picture, script):
-    async with ClientSession() as session:
-        async with session.get(f"{devtools}/json") as answer:
-            tab = next(tab for tab in await answer.json() if tab["type"] == "page")
-        async with session.ws_connect(tab["webSocketDebuggerUrl"], max_msg_size=0) as socket:
-            page = Page(socket)
-            result = await page.look_at(url, script)
-            shot = await page.ask("Page.captureScreenshot")
-            picture.write_bytes(base64.b64decode(shot["data"]))
-            return result, page.refused
+async def tried(rig: Any, directory: Path, script: str) -> Tried:
+    async with chromium(directory) as page:
+        await page.visit(f"{rig.url}/docs", 1300, 1700)
+        value = await page.evaluate(script)
+        elsewhere = [url for url in page.requests if not url.startswith((rig.url, "data:"))]
+        return Tried(value, page.complaints, elsewhere)
 
 
 @pytest.mark.long
 @pytest.mark.needs("chromium")
-def test_page_shows_all_endpoints_without_internet_and_one_can_be_tried(embedded_rig, tmp_path):
+def test_page_shows_all_endpoints_without_internet_and_one_can_be_tried(embedded_rig: Any, tmp_path: Path) -> None:
     described = embedded_rig.ok(embedded_rig.get("/openapi.json"))
     operations = sum(len(methods) for methods in described["paths"].values())
-    with browser(tmp_path / "profile") as devtools:
-        url = f"{embedded_rig.url}/docs"
-        result, refused = asyncio.run(tried(devtools, url, tmp_path / "docs.png", TRY_IT))
-    shown, body, errors = result["value"]
+    result = asyncio.run(tried(embedded_rig, tmp_path, TRY_IT))
+    shown, body, errors = result.value
     assert shown == operations
     assert errors == ""
     assert json.loads(body[body.index("{") :])["info"]["vehicle_type"] == "copter"
-    assert refused == []  # neither by the page's policy, nor for want of a network
+    assert (result.complaints, result.elsewhere) == (
+        [],
+        [],
+    )  # nothing was refused, and it needs no network
 
 
 @pytest.mark.needs("chromium")
-def test_every_endpoint_takes_what_the_page_would_ask(embedded_rig, tmp_path):
+def test_every_endpoint_takes_what_the_page_would_ask(embedded_rig: Any, tmp_path: Path) -> None:
     embedded_rig.set("allow_raw", "True")
     described = embedded_rig.ok(embedded_rig.get("/openapi.json"))
     operations = {f"{method.upper()} {path}" for path, methods in described["paths"].items() for method in methods}
-    with browser(tmp_path / "profile") as devtools:
-        url = f"{embedded_rig.url}/docs"
-        result, refused = asyncio.run(tried(devtools, url, tmp_path / "docs.png", TRY_ALL))
-    answers = result["value"]
+    result = asyncio.run(tried(embedded_rig, tmp_path, TRY_ALL))
+    answers = result.value
     assert set(answers) == operations
     print("\n".join(f"{status} {name} {text}" for name, (status, text) in answers.items()))
     misunderstood = {name: answer for name, answer in answers.items() if answer[0] in (400, 401, 403, 405, 422)}
     assert misunderstood == {}
-    assert [url for url in refused if "Failed to load resource" not in url] == []  # the browser's word for a 4xx
+    assert (result.complaints, result.elsewhere) == ([], [])
 
 
 def test_page_and_its_files_are_served_with_their_policy(embedded_rig):

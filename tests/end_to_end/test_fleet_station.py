@@ -6,6 +6,7 @@ import asyncio
 import html
 import json
 import random
+import subprocess
 import sys
 import time
 from collections.abc import Iterator
@@ -16,8 +17,10 @@ import pytest
 import requests
 
 from tests.support.chromium import chromium
-from tests.support.fleet import Fleet
+from tests.support.fleet import Broker, Fleet, Worker
 from tests.support.fleet_faults import FaultyFleet
+from tests.support.network_namespace import NetworkNamespace
+from tests.support.processes import eventually
 
 pytest.importorskip("asyncpg")
 pytest.importorskip("paho.mqtt.client")
@@ -35,11 +38,25 @@ def fleet(tmp_path: Path) -> Iterator[Fleet]:
         made.stop()
 
 
+@pytest.fixture(params=["relay", "namespace"])
+def namespace(request: pytest.FixtureRequest) -> Iterator[NetworkNamespace | None]:
+    """The link of the vehicles that are cut off: None is a relay that is stopped."""
+    if request.param == "relay":
+        yield None
+        return
+    try:
+        made = NetworkNamespace()
+    except OSError as error:
+        pytest.skip(str(error))
+    yield made
+    made.remove()
+
+
 @pytest.mark.long
 @BROKER
 @DATABASE
-def test_each_reading_is_one_row_whoever_dies(tmp_path: Path) -> None:
-    fleet = FaultyFleet(tmp_path, workers=2, vehicles=6, rate=5)
+def test_each_reading_is_one_row_whoever_dies(tmp_path: Path, namespace: NetworkNamespace | None) -> None:
+    fleet = FaultyFleet(tmp_path, workers=2, vehicles=6, rate=5, namespace=namespace)
     try:
         fleet.start()
         fleet.suffer(random.Random(3), seconds=1, longest=2.0)  # each fault once
@@ -103,6 +120,71 @@ def test_a_worker_ends_at_a_signal_and_its_session_waits_for_it(fleet: Fleet) ->
     while fleet.database.sql("SELECT count(*) FROM readings") != "100":
         assert time.monotonic() < deadline
         time.sleep(0.2)
+
+
+@BROKER
+@DATABASE
+def test_a_worker_stores_a_long_queue_that_ignores_its_receive_maximum(tmp_path: Path) -> None:
+    from paho.mqtt import publish
+
+    fleet = Fleet(tmp_path, 1, "--batch=20")
+    try:
+        fleet.start()
+        (worker,) = fleet.workers
+        worker.stop()
+        reading = {"device": "uav-1", "quantity": "alt", "value": 1, "time": time.time()}
+        messages = [("fleet/1/alt", json.dumps({**reading, "seq": n}), 1, False) for n in range(2000)]
+        publish.multiple(messages, port=fleet.broker.port)
+        worker.start()
+        count = "SELECT count(*) FROM readings"
+        eventually(lambda: fleet.database.sql(count) == "2000", 60, "all rows")
+        assert worker.metrics()["station_messages_dropped_total"] == 0
+    finally:
+        fleet.stop()
+
+
+def tls_broker(directory: Path) -> Broker:
+    """A broker with TLS and a password; its certificate is `certificate.pem`."""
+    certificate, key, passwords = (directory / name for name in ("certificate.pem", "key.pem", "passwords"))
+    make = ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=broker"]
+    make += ["-addext", "subjectAltName=IP:127.0.0.1", "-keyout", str(key), "-out", str(certificate)]
+    for command in (make, ["mosquitto_passwd", "-b", "-c", str(passwords), "station", "s3cr:t"]):
+        subprocess.run(command, check=True, capture_output=True)
+    files = {"certfile": str(certificate), "keyfile": str(key), "password_file": str(passwords)}
+    return Broker(directory, **files, allow_anonymous="false")
+
+
+@BROKER
+@pytest.mark.needs("openssl", "mosquitto_passwd")
+def test_a_worker_reads_by_tls_with_a_password(tmp_path: Path) -> None:
+    from paho.mqtt import publish
+
+    broker, certificate = tls_broker(tmp_path), str(tmp_path / "certificate.pem")
+    url = f"mqtts://station:{{}}@127.0.0.1:{broker.port}"
+    trusted = f"--ca-file={certificate}"
+    worker = Worker(tmp_path, "s.db", url.format("s3cr%3At"), trusted)
+    refused = {
+        "certificate": Worker(tmp_path, "a.db", url.format("s3cr%3At"), "--name=a"),
+        "Not authorized": Worker(tmp_path, "b.db", url.format("wrong"), trusted, "--name=b"),
+    }
+    workers = [worker, *refused.values()]
+    try:
+        broker.start()
+        for one in workers:
+            one.start()
+        worker.wait()
+        for why, one in refused.items():
+            eventually(lambda: why in one.health().get("broker", ""), 30, why)  # noqa: B023
+        reading = {"device": "uav-1", "quantity": "alt", "value": 1, "time": time.time(), "seq": 7}
+        publish.single(
+            "fleet/1/alt", json.dumps(reading), 1, port=broker.port, hostname="127.0.0.1",
+            auth={"username": "station", "password": "s3cr:t"}, tls={"ca_certs": certificate},
+        )  # fmt: skip
+        eventually(lambda: worker.metrics()["station_readings_stored_total"] == 1, 30, "the reading")
+    finally:
+        for one in workers:
+            one.stop()
+        broker.stop()
 
 
 async def page_of(url: str, directory: Path) -> str:

@@ -3,56 +3,18 @@
 from __future__ import annotations
 
 import asyncio
-import json
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.support.chromium import Page, chromium
+from tests.support.chromium import chromium
+from tests.support.page_pilot import BUTTON, Pilot
 
 RIG_SPEEDUP = 5  # so that the page counts no number as old on a busy machine
 pytestmark = pytest.mark.needs("chromium")
 
-ESCAPE = 27
 CANVAS = "document.querySelector('top-view canvas')"
-BUTTON = "[...document.querySelectorAll('{tag}')].find(b => b.textContent === '{label}' && b.checkVisibility())"
-
-
-class Pilot:
-    """Somebody in front of the page."""
-
-    def __init__(self, page: Page, rig: Any) -> None:
-        self.page, self.rig = page, rig
-
-    async def sees(self, element: str, text: str) -> None:
-        """Wait until an element shows that text."""
-        await self.page.until(f"document.querySelector({element!r}).innerText.includes({text!r})")
-
-    async def sees_live(self) -> None:
-        """Wait until the page says that its numbers are live; it says `not live` before."""
-        await self.page.until("document.querySelector('connection-state').innerText.trim() === 'live'")
-
-    async def hold(self, label: str) -> None:
-        """Hold a button until it acts."""
-        element = BUTTON.format(tag="hold-button", label=label)
-        await self.page.until(f"!{element}.button.disabled")
-        await self.page.evaluate(f"window.acted = false; {element}.addEventListener('confirmed', () => acted = true)")
-        x, y = await self.page.middle(element)
-        await self.page.press(x, y)
-        await self.page.until("acted")
-        await self.page.release(x, y)
-
-    async def click(self, label: str) -> None:
-        """Click a button."""
-        await self.page.click(BUTTON.format(tag="button", label=label))
-
-    async def hold_all_by_key(self) -> None:
-        """Hold Escape."""
-        await self.page.key("keyDown", "Escape", ESCAPE)
-        await self.page.until("!document.getElementById('hold-result').hidden")
-        await self.page.key("keyUp", "Escape", ESCAPE)
 
 
 async def take_off(pilot: Pilot) -> None:
@@ -129,15 +91,6 @@ async def see_the_api_gone(pilot: Pilot) -> None:
     await pilot.sees("#hold-result", "HOLD ALL WAS NOT DELIVERED")
 
 
-async def accessible(pilot: Pilot) -> None:
-    """Let axe-core look at the page as it is; it may find nothing serious."""
-    spec = find_spec("axe_core_python")
-    assert spec is not None and spec.origin is not None
-    await pilot.page.evaluate(Path(spec.origin).with_name("axe.min.js").read_text(encoding="utf-8") + ";0")
-    found = json.loads(await pilot.page.evaluate("axe.run().then(r => JSON.stringify(r.violations))"))
-    assert [one["id"] for one in found if one["impact"] in ("serious", "critical")] == []
-
-
 async def flight(rig: Any, directory: Path) -> list[str]:
     async with chromium(directory) as page:
         pilot = Pilot(page, rig)
@@ -148,7 +101,7 @@ async def flight(rig: Any, directory: Path) -> list[str]:
         await go_to_a_click(pilot, 150, -90)
         await pilot.sees("flight-actions", "Arrived at coord")
         await fly_a_drawn_mission(pilot)
-        await accessible(pilot)
+        await pilot.finds_it_accessible()
         rig.control.fault("pilot_mode", mode="LOITER")
         await pilot.sees("flight-status", "Commanded by its pilot (LOITER)")
         await pilot.hold("Guided")
@@ -161,7 +114,7 @@ async def flight(rig: Any, directory: Path) -> list[str]:
         await see_the_link_lost(pilot)
         await page.resize(390, 844)
         await page.until("document.documentElement.scrollWidth <= innerWidth")
-        await accessible(pilot)
+        await pilot.finds_it_accessible()
         await pilot.hold("Land")
         await pilot.sees("flight-actions", "Landed")
         await give_the_token(pilot)

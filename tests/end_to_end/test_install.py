@@ -108,6 +108,7 @@ def loads(python: Path, harness, directory: Path, answer: str) -> bool:
 def test_mavproxy_and_all_three_modules_start_with_the_lean_set_alone(lean_python, harness, tmp_path):
     seen = "import importlib.util as u; print([n for n in ('pytest','vtk','matplotlib') if u.find_spec(n)])"
     assert subprocess.run([lean_python, "-c", seen], check=True, capture_output=True, text=True).stdout == "[]\n"
+    subprocess.run([lean_python, "-c", "import requests, mavproxy_uavapi.client"], check=True)  # as scripts do
     rig = harness.Rig(tmp_path, harness.free_port())
     try:
         instance = harness.start_embedded(rig, speedup=2)

@@ -28,13 +28,15 @@ def rig(harness, tmp_path_factory):
 
 
 def test_photo_is_taken_with_the_right_arguments(rig):
-    answer = rig.get("/peripherical/take_photo", command="rpicam-still", capture_time=20, focus_distance=2)
+    answer = rig.get(
+        "/peripherical/take_photo", command="rpicam-still", capture_time=20, exposure=5, focus_distance=2
+    )
     assert answer.status_code == 200
     assert answer.headers["Content-Type"] == "image/jpeg"
     assert answer.headers["Content-Disposition"] == 'attachment; filename="photo.jpg"'
     assert answer.content == b"\xff\xd8\xff photo"
     given = (rig.tools / "rpicam-still.log").read_text()
-    assert "--shutter 20000" in given
+    assert "-t 20 " in given and "--shutter 5000" in given
     assert "--lens-position 0.5" in given
 
 

@@ -9,6 +9,9 @@ import subprocess
 
 import pytest
 
+from mavproxy_uavapi.launcher import command_lines
+from mavproxy_uavapi.launcher.options import parse
+
 pytestmark = pytest.mark.needs("tmux")
 
 # As the original service's own example has it, but for the folders, and what our own table adds.
@@ -233,5 +236,39 @@ def test_one_file_that_the_environment_names_configures_all_three_modules(harnes
         printed = rig.mavproxy.ask("module reload vision", "Failed to load module")
         assert "no key 'tgas' in [vision]; did you mean tags?" in printed
         assert rig.get("/gradys/status").status_code == 200  # the others live on
+    finally:
+        rig.stop()
+
+
+PIPELINE = 'videotestsrc is-live=true name="the eye" ! video/x-raw,width=64,height=48,framerate=10/1 ! identity'
+
+
+def by_file(folder, _):
+    file = folder / "uav.ini"
+    file.write_text(f"[vision]\nsource = {PIPELINE}\nwidth = 64\nheight = 48\n", encoding="utf-8")
+    return [f'--load-module=vision:{{"config":"{file}"}}'], {}
+
+
+def by_environment(*_):
+    return ["--load-module=vision"], {"VISION_SOURCE": PIPELINE, "VISION_WIDTH": "64", "VISION_HEIGHT": "48"}
+
+
+def by_the_launchers_option(*_):
+    keywords = json.dumps({"source": PIPELINE, "width": 64, "height": 48})
+    loads = command_lines.module_loads(parse(["--module", f"vision:{keywords}"], environ={}), None)
+    return [f"--cmd={load}" for load in loads if "vision" in load], {}
+
+
+@pytest.mark.needs("gst-launch-1.0", "gstreamer1.0-tools")
+@pytest.mark.parametrize("way", [by_file, by_environment, by_the_launchers_option])
+def test_a_pipeline_with_spaces_and_quotes_is_configured_without_a_person(harness, tmp_path, way):
+    pytest.importorskip("cv2")
+    rig = harness.Rig(tmp_path, harness.free_port())
+    try:
+        arguments, given = way(tmp_path, rig)
+        command = harness.mavproxy_command(harness.start_embedded(rig, speedup=2), *arguments)
+        rig.mavproxy = rig.start("mavproxy", command, given)
+        rig.mavproxy.says(f"vision: looking for 36h11 through {PIPELINE}")
+        harness.eventually(lambda: "camera ok" in rig.mavproxy.ask("vision status", "in view"), what="a picture")
     finally:
         rig.stop()

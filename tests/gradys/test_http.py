@@ -87,6 +87,24 @@ def test_nobody_poses_as_a_vehicle(loop: Any, host: Any, telemetry: Any, setting
     loop.run(gradys.stop())
 
 
+def test_nobody_poses_as_a_vehicle_of_the_devices_name(
+    loop: Any, host: Any, telemetry: Any, settings: Any, at_once: Any
+) -> None:
+    gradys = Gradys(host)
+    loop.run(gradys.start(settings(device="north", sink="http://a/r")))
+    service: Any = SimpleNamespace(host=host, settings=SimpleNamespace(sysid=0))
+
+    def post(**body: Any) -> Any:
+        call = Call(service, {CALLER: Caller(None)}, parse(Readings, "body", {"value": 1, **body}))  # type: ignore[arg-type]
+        return loop.run(GradysHandlers(gradys).readings(call))
+
+    for device in (None, "north-1", "uav-1"):
+        with pytest.raises(Invalid, match="from the vehicle itself only"):
+            post(quantity="position", device=device)
+    assert post(quantity="position", device="north")["result"] == "Kept 1 reading"
+    loop.run(gradys.stop())
+
+
 def test_a_track_has_limits() -> None:
     for body in (
         {},

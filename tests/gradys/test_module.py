@@ -94,7 +94,13 @@ def test_loading_and_unloading_leaves_nothing_behind(mpstate: Any, descriptors: 
 def test_routes_come_and_go_with_it(make: Any) -> None:
     module = make()
     host = module.host
-    assert set(host.extensions) == {"/gradys/status", "/gradys/readings", "/gradys/flush", "/mission/fly-track"}
+    assert set(host.extensions) == {
+        "/gradys/status",
+        "/gradys/readings",
+        "/gradys/recent",
+        "/gradys/flush",
+        "/mission/fly-track",
+    }
     module.unload()
     assert host.extensions == {}
 

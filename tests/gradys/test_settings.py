@@ -33,7 +33,8 @@ def test_an_ini_file_that_means_nothing_is_refused(tmp_path: Path, text: str) ->
     "name,value",
     [("gs", "x:y"), ("ip", "a b"), ("period", float("nan")), ("period", "inf"), ("timeout", 0), ("token", "a\nb"),
      ("sink", "ftp://x"), ("quantities", "x"), ("ca_file", "/no/such"), ("spool_mb", -1), ("nope", 1),
-     ("sink", "mqtt://broker/fleet/+/x"), ("sink", "mqtt://broker/a#b"), ("sink", "mqtts://broker/a?b"),
+     ("sink", "mqtt://broker/fleet/+/x"), ("sink", "mqtt://broker/a#b"),
+     ("device", ""), ("device", "a/b"), ("device", "a b"), ("device", "é"), ("device", "x" * 61), ("sink", "mqtts://broker/a?b"),
      ("sink", "mqtt://broker/a%23"), ("gs", "a..b:80"),
      ("spool", "a\0b"), ("sink", "http://a/r#ack=200"), ("sink", "mqtt://broker/a#ack=status")],
 )  # fmt: skip

@@ -67,6 +67,9 @@ REQUESTS = {
     "travel, with duration": Request(
         "flying", {"vx": 1, "vy": 0, "vz": 0, "duration": 5}, {"vx": 1, "vy": 0, "vz": 0, "duration": 60}
     ),
+    "travel_at_body, with duration": Request(
+        "flying", {"front": 1, "right": 0, "duration": 5}, {"front": 1, "right": 0, "duration": 60}
+    ),
     "fly-track": Request("flying", {"track": track(6e-5), "ground": 584}, {"track": track(3e-3), "ground": 584}),
     "set_heading": Request("flying", "?heading=90"),
     "set_yaw_rate": Request("flying", "?yaw_rate=20"),

@@ -70,6 +70,7 @@ VERBS = {
     "drive_wait": Verb("/movement/drive_wait", 10.0, MOVING),
     "drive_body_wait": Verb("/movement/drive_body_wait", 10.0, MOVING),
     "travel, with duration": Verb("/movement/travel_at_ned", 7.0, TRAVEL),
+    "travel_at_body, with duration": Verb("/movement/travel_at_body", 7.0, TRAVEL),
     "fly-track": Verb("/mission/fly-track", 60.0, TRACK),
     "set_heading": Verb("/movement/set_heading", 5.0, TURN),
     "set_yaw_rate": Verb("/movement/set_yaw_rate", 3.0, TURN_RATE),
@@ -94,7 +95,7 @@ VERBS = {
     "script: land": Verb("/command/land", 20.0, LANDING),
     **outcomes_of_types.VERBS,
 }
-TABLES = (4, 10, 8, 3, 4, *outcomes_of_types.TABLES)  # verbs in each table of the page
+TABLES = (4, 11, 8, 3, 4, *outcomes_of_types.TABLES)  # verbs in each table of the page
 
 
 def page() -> str:

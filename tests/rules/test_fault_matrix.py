@@ -75,7 +75,7 @@ def strike(world: Any, verb: str, fault: str) -> tuple[float, Any]:
     """Ask, and let it happen; when it happened, and the request in flight."""
     request = REQUESTS[verb]
     flight = request.far is not None
-    far = flight and not (verb.endswith("travel, with duration") and fault == "another station flies it")
+    far = flight and not (", with duration" in verb and fault == "another station flies it")
     BEFORE.get(fault, lambda _: None)(world)
     meanwhile = MEANWHILE.get(fault)
     delay = UNDER_WAY if flight else WAITING

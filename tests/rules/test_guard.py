@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from tests.rules.test_fault_matrix import REQUESTS, STAGES, begin, prepare
 from tests.support.envelopes import feature, square
 
 ROOT = Path(__file__).parents[2]
+VEHICLE = ROOT / "mavproxy_uavapi" / "core" / "vehicle"
 FAR_AWAY = {"type": "FeatureCollection", "features": [feature("elsewhere", square(50, 3000, 3000))]}
 STOP_MODES = {5, 6, 9, 17, 21}  # ArduCopter's LOITER (a plane's hold), RTL, LAND, BRAKE, SMART_RTL
 
@@ -70,6 +72,13 @@ def test_every_message_that_is_not_known_is_unknown() -> None:
     for cls in mavlink.mavlink_map.values():
         if cls.msgname not in known:
             assert isinstance(orders.order_of(Message(cls.msgname)), orders.Unknown)
+
+
+def test_every_message_that_a_verb_makes_is_known() -> None:
+    known = {name.lower() for name in orders.HARMLESS_MESSAGES | orders.READERS.keys()}
+    for file in VEHICLE.glob("*.py"):
+        made = set(re.findall(r"MAVLink_(\w+)_message\b", file.read_text(encoding="utf-8")))
+        assert made <= known, file.name
 
 
 def test_setpoint_of_a_kind_that_no_verb_uses_is_refused(host: Any, copter: Any, flying: Any, loop: Any) -> None:

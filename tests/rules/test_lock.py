@@ -97,7 +97,9 @@ def test_what_is_left_out_is_in_no_lock_and_still_required_by_mavproxy():
 
 def test_the_lean_lock_has_no_tools_of_tests_and_linters(asked_for: Asked):
     tools = {line.name for extra in ("test", "lint") for line in asked_for[extra]}
-    tools -= {line.name for extra in ("vision", "mqtt", "fleet") for line in asked_for[extra]} | {"setuptools"}
+    tools -= {line.name for extra in ("vision", "mqtt", "aerpaw", "fleet") for line in asked_for[extra]} | {
+        "setuptools"
+    }
     assert {"pytest", "ruff"} <= tools
     assert not tools & {line.name for line in locked("lean.txt")}
 

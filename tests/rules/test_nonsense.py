@@ -33,10 +33,11 @@ LEAST = math.ulp(0.0)  # of what must be more than 0
 # What the contract allows, both ends included; None where the value may be left out or null.
 BOUNDS: dict[str, tuple[float, float]] = {
     "alt": (0.0, 10_000.0),
-    "capture_time": (LEAST, 10_000.0),
+    "capture_time": (0.0, 10_000.0),
     "channel": (1, 16),
     "down": DOWN,
     "duration": (LEAST, 3600.0),
+    "exposure": (LEAST, 10_000.0),
     "focus_distance": (0.01, 1000.0),
     "front": METRES,
     "heading": (0.0, 360.0),
@@ -254,7 +255,7 @@ def put_back(world: Any, path: str) -> None:
         world.loop.pass_time(0.1)
 
 
-SENDS_NOTHING = {"timeout", "tolerance", "max_age", "capture_time", "focus_distance", "lease", "vehicle"}
+SENDS_NOTHING = {"timeout", "tolerance", "max_age", "capture_time", "exposure", "focus_distance", "lease", "vehicle"}
 
 
 class Trial:

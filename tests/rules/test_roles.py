@@ -50,7 +50,7 @@ FOR_ADMINS = {
 }
 FOR_WATCHERS = re.compile(
     r"GET (/telemetry/.*|/jobs.*|/vehicles.*|/parameters|/parameters\.param|/envelope|/authority|/mission/progress"
-    r"|/logs|/logs/{id}|/vision/(status|tags|frame\.jpg|stream\.mjpg)|/gradys/status)"
+    r"|/logs|/logs/{id}|/vision/(status|tags|frame\.jpg|stream\.mjpg)|/gradys/(status|recent)|/tiles.*)"
 )
 
 

@@ -18,8 +18,15 @@ from tests.support.processes import Process, free_port
 
 PATIENCE = 60.0  # s
 # Chromium asks its makers' hosts for updates, hundreds of times where there is no internet; no test needs them.
-QUIET = ["--disable-background-networking", "--disable-component-update", "--disable-quic", "--disable-sync"]
-QUIET += ["--no-first-run", "--disable-dev-shm-usage"]
+FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run", "--disable-quic"]
+FLAGS += ["--disable-background-networking", "--disable-component-update", "--disable-sync"]
+
+
+def command(profile: Path, *more: str) -> list[str]:
+    """What starts headless Chromium with a profile in that folder, and more flags or an address."""
+    program = shutil.which("chromium")
+    assert program is not None, "apt-get install chromium"
+    return [program, *FLAGS, f"--user-data-dir={profile}", *more]
 
 
 class Page:
@@ -30,6 +37,7 @@ class Page:
         self._number = 0
         self.complaints: list[str] = []  # errors of scripts, and what the page's policy refused
         self.failed_requests: list[str] = []
+        self.requests: list[str] = []  # the addresses that were asked
 
     async def ask(self, method: str, **params: Any) -> dict[str, Any]:
         """One command; its result."""
@@ -47,6 +55,8 @@ class Page:
     def _note(self, event: dict[str, Any]) -> None:
         if event.get("method") == "Runtime.exceptionThrown":
             self.complaints.append(json.dumps(event["params"]["exceptionDetails"]))
+        elif event.get("method") == "Network.requestWillBeSent":
+            self.requests.append(event["params"]["request"]["url"])
         elif event.get("method") == "Log.entryAdded":
             entry = event["params"]["entry"]
             if entry["source"] == "network":
@@ -56,7 +66,7 @@ class Page:
 
     async def visit(self, url: str, width: int = 1440, height: int = 900) -> None:
         """Open an address, in a window of that size, and begin to note complaints."""
-        for domain in ("Page", "Log", "Runtime"):
+        for domain in ("Page", "Log", "Network", "Runtime"):
             await self.ask(f"{domain}.enable")
         await self.resize(width, height)
         await self.evaluate("window.isBefore = true")
@@ -97,8 +107,8 @@ class Page:
         await self.ask("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=code)
 
     async def evaluate(self, script: str) -> Any:
-        """What a script gives."""
-        result = await self.ask("Runtime.evaluate", expression=script, awaitPromise=True)
+        """What a script gives, as JSON has it."""
+        result = await self.ask("Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True)
         assert "exceptionDetails" not in result, result
         return result["result"].get("value")
 
@@ -125,12 +135,9 @@ class Page:
 @contextlib.asynccontextmanager
 async def chromium(directory: Path) -> AsyncIterator[Page]:
     """An empty page of a browser."""
-    program = shutil.which("chromium")
-    assert program is not None, "apt-get install chromium"
     port = free_port()
-    command = [program, "--headless", "--no-sandbox", "--disable-gpu", "--window-size=1400,900", *QUIET]
-    command += [f"--remote-debugging-port={port}", f"--user-data-dir={directory / 'profile'}", "about:blank"]
-    process = Process(command, directory / "chromium.log", directory)
+    flags = ["--window-size=1400,900", f"--remote-debugging-port={port}", "about:blank"]
+    process = Process(command(directory / "profile", *flags), directory / "chromium.log", directory)
     try:
         process.says("DevTools listening")
         async with aiohttp.ClientSession() as session:

@@ -33,9 +33,14 @@ class Broker:
 
     Attributes:
         port: TCP port on the loopback.
+
+    Args:
+        directory: for its files.
+        also: a further address at which it listens; empty for none.
+        settings: further settings of its configuration.
     """
 
-    def __init__(self, directory: Path) -> None:
+    def __init__(self, directory: Path, also: str = "", **settings: str) -> None:
         assert MOSQUITTO is not None, "apt-get install mosquitto"
         self.port = free_port()
         self._directory = directory / "mosquitto"
@@ -46,9 +51,10 @@ class Broker:
             ours["user"] = "root"
         shipped = (line.split(maxsplit=1) for line in CONFIG.read_text(encoding="utf-8").splitlines())
         lines = {words[0]: words[1] for words in shipped if words and words[0] != "#"}
-        settings = {**lines, **ours, "allow_anonymous": "true"}
-        del settings["password_file"]
-        self._config.write_text("".join(f"{name} {value}\n" for name, value in settings.items()), encoding="ascii")
+        del lines["password_file"]
+        merged = {**lines, **ours, "allow_anonymous": "true", **settings}
+        text = "".join(f"{name} {value}\n" for name, value in merged.items())
+        self._config.write_text(text + (f"listener {self.port} {also}\n" if also else ""), encoding="ascii")
         self._process: Process | None = None
 
     @property
@@ -153,10 +159,11 @@ class Fleet:
         directory: for configurations and logs.
         workers: how many.
         options: of each worker.
+        also: a further address at which the broker listens; empty for none.
     """
 
-    def __init__(self, directory: Path, workers: int, *options: str) -> None:
-        self.broker = Broker(directory)
+    def __init__(self, directory: Path, workers: int, *options: str, also: str = "") -> None:
+        self.broker = Broker(directory, also)
         self.database = PostgresCluster(free_port(), "max_connections = 100")
         self.workers = [Worker(directory, self.database.url, self.broker.url, *options) for _ in range(workers)]
 

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from tests.support.fleet import Fleet
+from tests.support.network_namespace import NetworkNamespace
 from tests.support.processes import Process, eventually, free_port
 
 ROOT = Path(__file__).parents[2]
@@ -73,6 +74,8 @@ class Audit(NamedTuple):
 class FaultyFleet:
     """A fleet, half of whose vehicles are behind a link that fades.
 
+    The link is the cable of a network namespace, or a relay as a process.
+
     Attributes:
         faults: how often each kind happened.
 
@@ -81,35 +84,55 @@ class FaultyFleet:
         workers, vehicles: how many.
         rate: readings/s of each vehicle.
         ack: `station` or `broker`: whose word takes a reading out of the spool.
+        namespace: for the vehicles behind the link; None for a relay.
     """
 
-    def __init__(self, directory: Path, workers: int, vehicles: int, rate: float, ack: str = "station") -> None:
+    def __init__(
+        self,
+        directory: Path,
+        workers: int,
+        vehicles: int,
+        rate: float,
+        ack: str = "station",
+        namespace: NetworkNamespace | None = None,
+    ) -> None:
         self._directory = directory
-        self._fleet = Fleet(directory, workers)
+        self._fleet = Fleet(directory, workers, also="" if namespace is None else namespace.host)
         self._vehicles, self._rate, self._ack = vehicles, rate, ack
-        self._ledger = directory / "sampled.csv"
+        self._namespace = namespace
+        self._flying: list[Process] = []
         self._processes: list[Process] = []
         self.faults: Counter[str] = Counter()
 
-    def _start(self, name: str, *arguments: str) -> Process:
+    def _start(self, name: str, log: str, *arguments: str, within: NetworkNamespace | None = None) -> Process:
         command = [sys.executable, "-m", f"tests.support.{name}", *arguments]
-        process = Process(command, self._directory / f"{name}.log", ROOT)
+        process = Process(command if within is None else within.command(command), self._directory / log, ROOT)
         self._processes.append(process)
         return process
+
+    def _fly(self, name: str, first: int, count: int, address: str, within: NetworkNamespace | None) -> None:
+        """Start vehicles that send to a broker at `address`."""
+        spools = self._directory / f"spools-{name}"
+        spools.mkdir()
+        option = "#ack=station" if self._ack == "station" else ""
+        flown = [f"mqtt://{address}/fleet/{{device}}/{{quantity}}{option}", f"--first={first}", f"--count={count}"]
+        flown += [f"--rate={self._rate}", f"--directory={spools}", f"--ledger={spools}.csv"]
+        self._flying.append(self._start("fleet_vehicles", f"{name}.log", *flown, within=within))
 
     def start(self) -> None:
         """Start all; the vehicles fly when this returns."""
         self._fleet.start()
-        near, far = free_port(), self._fleet.broker.port
-        self._relay = self._start("tcp_relay", str(near), str(far))
-        option = "#ack=station" if self._ack == "station" else ""
-        sinks = [f"mqtt://127.0.0.1:{port}/fleet/{{device}}/{{quantity}}{option}" for port in (far, near)]
-        spools = self._directory / "spools"
-        spools.mkdir()
-        flown = [f"--count={self._vehicles}", f"--rate={self._rate}"]
-        flown += [f"--directory={spools}", f"--ledger={self._ledger}"]
-        self._flying = self._start("fleet_vehicles", *sinks, *flown)
-        self._flying.says("vehicles fly")
+        port, half, through = self._fleet.broker.port, self._vehicles // 2, self._namespace
+        if through is None:
+            near = free_port()
+            self._relay = self._start("tcp_relay", "relay.log", str(near), str(port))
+            address = f"127.0.0.1:{near}"
+        else:
+            address = f"{through.host}:{port}"
+        self._fly("near", 1, self._vehicles - half, f"127.0.0.1:{port}", None)
+        self._fly("far", self._vehicles - half + 1, half, address, through)
+        for process in self._flying:
+            process.says("vehicles fly")
 
     # -- the faults ---------------------------------------------------------------------------------------
 
@@ -127,6 +150,9 @@ class FaultyFleet:
         return self._fleet.database.start
 
     def _cut(self, _chance: random.Random) -> Callable[[], None]:
+        if self._namespace is not None:
+            self._namespace.cut()
+            return self._namespace.mend
         os.kill(self._relay.pid, signal.SIGSTOP)
         return lambda: os.kill(self._relay.pid, signal.SIGCONT)
 
@@ -151,13 +177,15 @@ class FaultyFleet:
 
     # -- the end ------------------------------------------------------------------------------------------
 
-    def drain(self, patience: float) -> tuple[dict[str, int], float]:
-        """End the sampling and wait until the spools are empty; what was dropped, and how long (s) it took."""
-        began = time.monotonic()
-        os.kill(self._flying.pid, signal.SIGUSR1)
-        self._flying.says("drained", timeout=patience)
-        report = json.loads(self._flying.output().splitlines()[-1])
-        return report["dropped"], time.monotonic() - began
+    def drain(self, patience: float) -> tuple[int, float]:
+        """End the sampling and wait until the spools are empty; how many were dropped, and how long (s) it took."""
+        began, dropped = time.monotonic(), 0
+        for process in self._flying:
+            os.kill(process.pid, signal.SIGUSR1)
+        for process in self._flying:
+            process.says("drained", timeout=patience)
+            dropped += sum(json.loads(process.output().splitlines()[-1])["dropped"].values())
+        return dropped, time.monotonic() - began
 
     def audit(self, patience: float = 120.0) -> Audit:
         """Drain, and count in SQL."""
@@ -166,14 +194,15 @@ class FaultyFleet:
         sql = self._fleet.database.sql
         sql("CREATE TABLE sampled (device text, seq bigint, ms bigint)")
         with tempfile.NamedTemporaryFile(dir=self._fleet.database.directory, suffix=".csv") as file:
-            file.write(self._ledger.read_bytes())
+            for ledger in self._directory.glob("spools-*.csv"):
+                file.write(ledger.read_bytes())
             file.flush()
             os.chmod(file.name, 0o644)
             sql(f"COPY sampled FROM '{file.name}' (FORMAT csv)")
         sql("CREATE INDEX ON sampled (device, seq); ANALYZE sampled, readings")
         counts = sql(AUDIT).split("|")
         numbers = [*map(int, counts[:6]), *map(float, counts[6:])]
-        return Audit(*numbers, sum(dropped.values()), drained)  # type: ignore[arg-type]
+        return Audit(*numbers, dropped, drained)  # type: ignore[arg-type]
 
     def _settle(self) -> None:
         """Wait until no worker has anything to store: the broker's own acknowledgement comes before the row."""

@@ -47,21 +47,22 @@ def fake(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
 @pytest.mark.parametrize("tool", ["rpicam-still", "libcamera-still"])
 def test_raspberry_cameras_get_microseconds_and_dioptres(temporary: Path, fake: Any, tool: str) -> None:
     given = fake(tool)
-    picture = asyncio.run(take(tool, Shot(640, 480, 12.5, focus_distance=0.25)))
+    picture = asyncio.run(take(tool, Shot(640, 480, 300, focus_distance=0.25, exposure=12.5)))
     assert picture == b"\xff\xd8\xff picture"
     words = given()
     pairs = dict(zip(words, words[1:], strict=False))
     assert (pairs["--width"], pairs["--height"], pairs["--shutter"]) == ("640", "480", "12500")
+    assert pairs["-t"] == "300"
     assert (pairs["--autofocus-mode"], pairs["--lens-position"]) == ("manual", "4")
     assert words[-2] == "-o"
     assert list(temporary.iterdir()) == []
 
 
-def test_without_a_focus_distance_the_camera_focuses(temporary: Path, fake: Any) -> None:
+def test_without_a_focus_distance_and_an_exposure_the_camera_chooses_them(temporary: Path, fake: Any) -> None:
     given = fake("rpicam-still")
-    asyncio.run(take("rpicam-still", SHOT))
-    assert "--lens-position" not in given()
-    assert "--autofocus-mode" not in given()
+    asyncio.run(take("rpicam-still", Shot(1280, 720, 0)))
+    assert not {"--lens-position", "--autofocus-mode", "--shutter"} & set(given())
+    assert given()[given().index("-t") + 1] == "1"  # 0 would be for ever
 
 
 def test_usb_camera_gets_its_resolution(temporary: Path, fake: Any) -> None:
@@ -69,7 +70,10 @@ def test_usb_camera_gets_its_resolution(temporary: Path, fake: Any) -> None:
     asyncio.run(take("fswebcam", SHOT))
     words = given()
     assert words[words.index("-r") + 1] == "1280x720"
+    assert words[words.index("-D") + 1] == "0.15"
     assert "--no-banner" in words
+    with pytest.raises(BadRequest, match="exposure"):
+        asyncio.run(take("fswebcam", Shot(1, 1, 1, exposure=1.0)))
     with pytest.raises(BadRequest, match="focus"):
         asyncio.run(take("fswebcam", Shot(1, 1, 1, focus_distance=1.0)))
     assert list(temporary.iterdir()) == []

@@ -58,6 +58,7 @@ def test_ini_file_of_the_original_service_loads(ini: Any) -> None:
         "[simulated]\nardupilot_path = ~/ardupilot\nlocation = AbraDF\ngs_connection = []\nspeedup = 1\n"
         "headless = yes\n"
         "[logs]\nlog_console = COPTER\nlog_path = None\ndebug = []\nscript_logs = ~/logs\n"
+        "[mode]\nsimulated = false\nvehicle = copter\n[udp]\nudp = false\n"
     )
     settings = ApiModuleSettings({"config": file}).snapshot()
     assert (settings.port, settings.sysid) == (8123, 7)

@@ -90,6 +90,12 @@ function fill() {
   for (let n = 0; n < count; n++) write(rows.children[n], shown[first + n], first + n);
 }
 
+let fills = false;
+function fillSoon() { // once a frame, however many scroll events there are
+  if (!fills) requestAnimationFrame(() => { fills = false; fill(); });
+  fills = true;
+}
+
 function newRow() {
   const row = document.createElement("div");
   row.setAttribute("role", "row");
@@ -114,7 +120,7 @@ COLUMNS.forEach((name, n) => {
   cell.addEventListener("click", () => { down = order === n ? !down : false; order = n; refresh(); });
   element("head").append(cell);
 });
-element("scroller").addEventListener("scroll", () => requestAnimationFrame(fill));
+element("scroller").addEventListener("scroll", fillSoon);
 element("filter").addEventListener("input", refresh);
 element("only-alarms").addEventListener("change", refresh);
 element("alarms").addEventListener("click", () => { element("only-alarms").checked = true; refresh(); });

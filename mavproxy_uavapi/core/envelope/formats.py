@@ -18,6 +18,7 @@ mavlink = mavutil.mavlink
 KINDS = {"inclusion": True, "exclusion": False}
 EXCLUDED = "exclu"  # in the name of a KML Placemark, in any case: its polygon is an exclusion
 MEMBERS = ("type", "features", "limits", "name")  # of a FeatureCollection; others are refused: they might be limits
+EMPTY = {"type": "FeatureCollection", "features": [], "limits": Limits().report()}
 HOME_CIRCLE = 5005  # MAV_CMD_NAV_FENCE_HOME_CIRCLE_INCLUSION, which older pymavlinks do not name
 POLYGONS = {
     mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION: True,

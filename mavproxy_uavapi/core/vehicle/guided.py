@@ -12,7 +12,7 @@ from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle import messages, setpoint_in_force, time_limits
 from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_uavapi.core.vehicle.envelope_check import Spaces
-from mavproxy_uavapi.core.vehicle.geodesy import offset
+from mavproxy_uavapi.core.vehicle.geodesy import moved, offset
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.messages import NO_YAW, GlobalTarget, NedTarget, Target, VelocityTarget, Yaw
 from mavproxy_uavapi.core.vehicle.start_gate import pass_gate
@@ -25,6 +25,7 @@ FLOOR = 0.0  # m above home: the lowest target, less TOLERANCE for the noise of 
 TARGET_SHOWN = 2.0  # s after a setpoint in which telemetry may still report the one before
 LIFT_OFF_TIMEOUT = 5.0  # s in which an unacknowledged takeoff must show
 SAME_PLACE = 2.0  # m on each axis: reported targets within this are the same
+NEAR_EXPECTED = 10.0  # m on each axis: our target in the local frame, whose origin the autopilot does not tell
 TAKING_OFF = messages.mavlink.MAV_LANDED_STATE_TAKEOFF
 
 
@@ -43,6 +44,7 @@ class GuidedVehicle(Vehicle):
         self._sent: Target | None = None  # our newest setpoint
         self._sent_at = 0.0
         self._shown: GlobalTarget | None = None  # our target as the autopilot reports it
+        self._expected: GlobalTarget | None = None  # where it will report our target in the local frame, about
 
     def require_guided_flight(self) -> None:
         """Raise NotArmed, ModeChanged or Busy unless it flies in GUIDED."""
@@ -144,10 +146,8 @@ class GuidedVehicle(Vehicle):
         flown = setpoint_in_force.shown(self.state, self._sent_at + TARGET_SHOWN)
         if flown is None:
             return
-        if isinstance(flown, GlobalTarget):
-            self._shown = self._shown or flown
-            if max(*map(abs, offset(self._shown.lat, self._shown.lon, flown.lat, flown.lon))) <= SAME_PLACE:
-                return
+        if isinstance(flown, GlobalTarget) and self._is_ours(flown):
+            return
         raise Superseded("another ground station gave the vehicle another target")
 
     @property
@@ -163,8 +163,31 @@ class GuidedVehicle(Vehicle):
             return speed > ARRIVAL_SPEED and abs(speed - own) > ARRIVAL_SPEED
         if self._sent is None or isinstance(self._sent, VelocityTarget):
             return True
-        self._shown = self._shown or flown
-        return max(*map(abs, offset(self._shown.lat, self._shown.lon, flown.lat, flown.lon))) > SAME_PLACE
+        return not self._is_ours(flown)
+
+    def _is_ours(self, flown: GlobalTarget) -> bool:
+        """Whether a reported target is our newest one; the first report that is near ours counts as ours."""
+        if self._shown is None:
+            if self._expected is not None and _apart(self._expected, flown) > NEAR_EXPECTED:
+                return False
+            self._shown = flown
+        return _apart(self._shown, flown) <= SAME_PLACE
+
+    @property
+    def target_place(self) -> tuple[float, float] | None:
+        """Latitude and longitude (degrees) of our target in GUIDED; None without one, or without a position."""
+        target, is_guided = self._sent, self.mode == GUIDED and self._sent_at >= self.state.mode_since
+        if not self.state.armed or not is_guided or self.has_foreign_target:
+            return None
+        if isinstance(target, GlobalTarget):
+            return target.lat, target.lon
+        if not isinstance(target, NedTarget):
+            return None
+        try:
+            (north, east, _), here = self.leg_to(target), self.fresh("GLOBAL_POSITION_INT")
+        except Stale:
+            return None
+        return moved(here.lat / 1e7, here.lon / 1e7, north, east)
 
     def speed_by(self, target: NedTarget | GlobalTarget) -> float:
         """Speed (m/s), from the message that has the position in the target's frame."""
@@ -194,9 +217,17 @@ class GuidedVehicle(Vehicle):
     def sent(self, target: Target) -> None:
         """Remember the setpoint that went out last."""
         self._sent, self._sent_at = target, self.clock()
-        self._shown = (
-            target if isinstance(target, GlobalTarget) else None
-        )  # in another frame: the first report counts
+        self._shown = target if isinstance(target, GlobalTarget) else None
+        self._expected = self._place_of(target) if isinstance(target, NedTarget) else None
+
+    def _place_of(self, target: NedTarget) -> GlobalTarget | None:
+        """About where a target in the local frame is, by the vehicle's own place in both; None without these."""
+        local, place = self.state.messages.get("LOCAL_POSITION_NED"), self.state.messages.get("GLOBAL_POSITION_INT")
+        if local is None or place is None:
+            return None
+        here, there = local.message, place.message
+        lat, lon = moved(there.lat / 1e7, there.lon / 1e7, target.x - here.x, target.y - here.y)
+        return GlobalTarget(lat, lon, there.relative_alt / 1000.0 + here.z - target.z)
 
     async def take_up(self, job: Job, target: Target, yaw: Yaw) -> None:
         """Begin a movement. ArduCopter goes back to its own speeds when the kind of setpoint changes."""
@@ -215,3 +246,8 @@ class GuidedVehicle(Vehicle):
         ours = self._sent if self._sent_at >= self.state.mode_since else None
         before = setpoint_in_force.shown(self.state, max(self._sent_at, self.state.mode_since)) or ours
         return before is not None and isinstance(before, VelocityTarget) == isinstance(target, VelocityTarget)
+
+
+def _apart(one: GlobalTarget, other: GlobalTarget) -> float:
+    """Metres between two places, on the axis where they are farther apart."""
+    return max(*map(abs, offset(one.lat, one.lon, other.lat, other.lon)))

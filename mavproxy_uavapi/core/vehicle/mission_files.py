@@ -109,6 +109,7 @@ def read(text: str) -> list[MissionItem]:
     except (ValueError, RecursionError) as error:
         raise BadRequest(f"a mission is a QGC WPL 110 file, a .plan file, or JSON: {error}") from error
     if isinstance(mission, dict) and isinstance(mission.get("mission"), dict):
+        _require_mission_alone(mission)
         mission = _flattened(mission["mission"].get("items"))
         return checked(_loaded(mission, _from_plan_item))
     if isinstance(mission, dict):
@@ -217,6 +218,28 @@ def _loaded(items: Iterable[Any], convert: Any) -> list[Any]:
         except (TypeError, ValueError, KeyError, OverflowError) as error:
             raise Invalid(f"{type(error).__name__}: {error}", "items", str(seq)) from error
     return list(loader.wpoints)
+
+
+def _require_mission_alone(plan: Mapping[str, Any]) -> None:
+    """Refuse a .plan file with a fence or rally points: who wrote it counts on them.
+
+    Raises:
+        BadRequest: it names what the file has besides the mission.
+    """
+    fence, rally = plan.get("geoFence"), plan.get("rallyPoints")
+    found = [
+        (fence, "polygons", "fence polygon"),
+        (fence, "circles", "fence circle"),
+        (rally, "points", "rally point"),
+    ]
+    lists = [(part.get(key), name) for part, key, name in found if isinstance(part, dict)]
+    counts = [(len(items), name) for items, name in lists if isinstance(items, list)]
+    extra = ", ".join(f"{count} {name}{'s' if count > 1 else ''}" for count, name in counts if count)
+    if extra:
+        raise BadRequest(
+            f"the .plan file also has {extra}, which a mission cannot hold: remove them there, PUT /envelope takes "
+            "the fence, and MAVProxy's `fence load` and `rally load` upload files of their own"
+        )
 
 
 def _flattened(items: Any) -> list[Any]:

@@ -1,8 +1,9 @@
 """MAVLink's mission protocol: upload with read-back, download, clear.
 
-Messages count only if the addressed autopilot sends them to us and they are about the mission (not the fence or the
-rally points). Without an answer a request is repeated. MAVProxy's own `wp` module receives the same messages, but
-answers only those of its own transfers.
+Messages count only if the addressed autopilot sends them to us and they are about the list that was asked for: the
+mission, or the fence, which is only read. Without an answer a request is repeated.
+
+MAVProxy's own `wp` module receives the same messages, but answers only those of its own transfers.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ ANSWER_TIMEOUT = 1.5  # s until we ask again
 SENDINGS = 4  # the first one and three more
 ASKING_TIMEOUT = 9.0  # s; an ArduPilot asks again for an item after 1 s, and gives an upload up after 8 s
 CANCELLED = "MAV_MISSION_OPERATION_CANCELLED"  # the vehicle waited too long for an item
-MISSION = mavlink.MAV_MISSION_TYPE_MISSION
+MISSION, FENCE = mavlink.MAV_MISSION_TYPE_MISSION, mavlink.MAV_MISSION_TYPE_FENCE
+NAMES = {MISSION: "mission", FENCE: "fence"}
 ANSWERS = ("MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_ITEM", "MISSION_ACK")
 REQUESTS = ("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK")
 
@@ -76,6 +78,15 @@ class Waypoints:
         """
         async with self._turns.one():
             return await self._download()
+
+    async def download_fence(self) -> list[Any]:
+        """The messages MISSION_ITEM_INT of the fence that the autopilot itself keeps.
+
+        Raises:
+            Rejected, Busy, TimedOut, LinkLost: as `download`; also where the vehicle has no fence protocol.
+        """
+        async with self._turns.one():
+            return await self._fetch(FENCE)
 
     async def upload(
         self, items: Sequence[MissionItem], progress: Progress = lambda done, of: None, check: Check = lambda: None
@@ -155,7 +166,7 @@ class Waypoints:
             await self._send(question)
             deadline = self._waiting.clock() + ANSWER_TIMEOUT
             while (message := await talk.next(max(deadline - self._waiting.clock(), 0.0))) is not None:
-                if message.mission_type != MISSION:
+                if message.mission_type != question.mission_type:
                     continue
                 value = test(message)
                 if value is not None:
@@ -164,20 +175,23 @@ class Waypoints:
                     refusal = self._refusal(message, action)
         raise refusal or TimedOut(f"vehicle {self._state.system} did not {action} after {SENDINGS} requests")
 
-    async def _ask_count(self, talk: MessageExchange[Any]) -> int:
-        question = mavlink.MAVLink_mission_request_list_message(*self._address, MISSION)
-        return await self._ask(talk, question, _count_of, "report how many mission items it has")
+    async def _ask_count(self, talk: MessageExchange[Any], kind: int = MISSION) -> int:
+        question = mavlink.MAVLink_mission_request_list_message(*self._address, kind)
+        return await self._ask(talk, question, _count_of, f"report how many {NAMES[kind]} items it has")
 
     async def _download(self) -> tuple[MissionItem | None, list[MissionItem]]:
-        with self._talk(ANSWERS) as talk:
-            items = []
-            for seq in range(await self._ask_count(talk)):
-                question = mavlink.MAVLink_mission_request_int_message(*self._address, seq, MISSION)
-                items.append(await self._ask(talk, question, _item_number(seq), f"send mission item {seq}"))
-            await self._send(
-                mavlink.MAVLink_mission_ack_message(*self._address, mavlink.MAV_MISSION_ACCEPTED, MISSION)
-            )
+        items = [from_message(message) for message in await self._fetch(MISSION)]
         return (items[0], items[1:]) if items else (None, [])
+
+    async def _fetch(self, kind: int) -> list[Any]:
+        """The messages of all items of a list."""
+        with self._talk(ANSWERS) as talk:
+            messages = []
+            for seq in range(await self._ask_count(talk, kind)):
+                question = mavlink.MAVLink_mission_request_int_message(*self._address, seq, kind)
+                messages.append(await self._ask(talk, question, _item_number(seq), f"send {NAMES[kind]} item {seq}"))
+            await self._send(mavlink.MAVLink_mission_ack_message(*self._address, mavlink.MAV_MISSION_ACCEPTED, kind))
+        return messages
 
     async def _clear(self, talk: MessageExchange[Any]) -> None:
         question = mavlink.MAVLink_mission_clear_all_message(*self._address, MISSION)
@@ -290,12 +304,8 @@ def _count_of(message: Any) -> int | None:
     return int(message.count) if message.get_type() == "MISSION_COUNT" else None
 
 
-def _item_number(seq: int) -> Callable[[Any], MissionItem | None]:
-    def of(message: Any) -> MissionItem | None:
-        is_item = message.get_type().startswith("MISSION_ITEM") and message.seq == seq
-        return from_message(message) if is_item else None
-
-    return of
+def _item_number(seq: int) -> Callable[[Any], Any | None]:
+    return lambda message: message if message.get_type().startswith("MISSION_ITEM") and message.seq == seq else None
 
 
 def _with(error: Rejected | TimedOut | LinkLost | Busy, addition: str) -> UavApiError:

@@ -13,6 +13,7 @@ from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.messages import NedTarget, Target, VelocityTarget
 
 RESENDS_PER_TIMEOUT = 3  # velocity setpoints sent in each GUID_TIMEOUT
+ROUNDING = 1e-6  # s; a shorter remainder is a rounding error, not a setpoint
 REST_PERIOD = 0.3  # s between two setpoints of a standstill
 REST_SHOWN = 1.0  # s
 REST_TIMEOUT = 10.0  # s
@@ -38,7 +39,8 @@ class TravellingVehicle(GuidedVehicle):
         """Fly at a velocity: one setpoint, which the autopilot drops after GUID_TIMEOUT.
 
         `heading` is the direction to point, degrees clockwise from north. With `duration` (s on the vehicle's clock)
-        the setpoint is repeated for that time, then a stop is sent.
+        the setpoint is repeated for that time, then a stop is sent. A setpoint that is sent late, because the machine
+        is busy, does not lengthen that time.
         """
         self.require_guided_flight()
         self.authority.take(job, Rank.MOVEMENT, self.inside(velocity))
@@ -47,23 +49,28 @@ class TravellingVehicle(GuidedVehicle):
         await self.take_up(job, velocity, yaw)
         if duration is None:
             return
+        due = self._boot_time
+        ends_at = due + duration
         period = (await self.limits()).guided_timeout / RESENDS_PER_TIMEOUT
-        remaining = duration
-        while remaining > 0:
-            stretch = min(period, remaining)
-            await self._travelled(stretch)
-            remaining = round(remaining - stretch, 6)  # a rounding error is no setpoint
-            await self.send_setpoint(job, velocity if remaining > 0 else self.standstill, yaw)
+        while due < ends_at:
+            is_late = due + period < self._boot_time  # the setpoints that are missing are not sent afterwards
+            due = (self._boot_time if is_late else due) + period
+            due = ends_at if due > ends_at - ROUNDING else due
+            await self._travelled(due)
+            await self.send_setpoint(job, velocity if due < ends_at else self.standstill, yaw)
 
-    async def _travelled(self, seconds: float) -> None:
-        """Let `seconds` on the vehicle's clock pass while it stays armed and in GUIDED."""
-        clock = self.state.time_ratio
-        ends_at = clock.boot_time(self.clock()) + seconds
-        while (remaining := ends_at - clock.boot_time(self.clock())) > 0:
+    @property
+    def _boot_time(self) -> float:
+        """The vehicle's clock now, s since its boot."""
+        return self.state.time_ratio.boot_time(self.clock())
+
+    async def _travelled(self, until: float) -> None:
+        """Wait until that time on the vehicle's clock (s) while it stays armed and in GUIDED."""
+        while (remaining := until - self._boot_time) > 0:
             self.flying()
             with contextlib.suppress(TimedOut):  # the time has passed, unless the vehicle's clock runs slower
                 await self.waiting.message(
-                    {"HEARTBEAT"}, lambda beat: beat, max(remaining / clock.ratio, 0.01), "beat"
+                    {"HEARTBEAT"}, lambda beat: beat, max(remaining / self.state.time_ratio.ratio, 0.01), "beat"
                 )
 
     async def rest(self, job: Job) -> None:

@@ -76,6 +76,22 @@ def test_plan_with_what_only_qgroundcontrol_can_expand_is_reported() -> None:
         read(plan({"type": "ComplexItem", "complexItemType": "StructureScan"}))
 
 
+EMPTY = {"geoFence": {"circles": [], "polygons": [], "version": 2}, "rallyPoints": {"points": [], "version": 2}}
+FULL = {
+    "geoFence": {"circles": [{}], "polygons": [{}, {}]},
+    "rallyPoints": {"points": [[-35.36, 149.16, 30]]},
+}
+
+
+def test_plan_with_a_fence_or_rally_points_is_refused_by_name() -> None:
+    file = json.loads(plan(simple(22, 0, 0, 0, None, 0, 0, 10)))
+    assert read(json.dumps(file | EMPTY)) == [TAKEOFF]
+    with pytest.raises(BadRequest, match="also has 2 fence polygons, 1 fence circle, 1 rally point, which"):
+        read(json.dumps(file | FULL))
+    with pytest.raises(BadRequest, match="also has 1 rally point, which"):
+        read(json.dumps(file | EMPTY | {"rallyPoints": FULL["rallyPoints"]}))
+
+
 def test_json_items_by_name_or_number() -> None:
     items = [
         {"command": "NAV_TAKEOFF", "alt": 10},

@@ -28,6 +28,7 @@ class Store:
 
     Attributes:
         items: with home first.
+        fence: the items of the fence.
         lost: how many messages to it are lost, by name; negative loses all.
         mute: names of its own messages that are lost, and how many.
         refuse: item number -> MAV_MISSION_RESULT.
@@ -36,6 +37,7 @@ class Store:
     def __init__(self, loop: Any, drone: Any) -> None:
         self._loop, self._drone = loop, drone
         self.items = [HOME, *OLD]
+        self.fence = [MissionItem(5001, 0, (3.0, 0, 0, 0), x, y, 0.0) for x, y in ((0, 0), (0, 9), (9, 0))]
         self.lost: dict[str, int] = {}
         self.mute: dict[str, int] = {}
         self.refuse: dict[int, int] = {}
@@ -65,13 +67,16 @@ class Store:
     def ack(self, result: int) -> None:
         self.say("mission_ack", type=result)
 
-    def mission_request_list(self, _message: Any) -> None:
-        self.say("mission_count", count=len(self.items))
+    def _list(self, message: Any) -> list[MissionItem]:
+        return self.fence if message.mission_type == mavlink.MAV_MISSION_TYPE_FENCE else self.items
+
+    def mission_request_list(self, message: Any) -> None:
+        self.say("mission_count", count=len(self._list(message)), mission_type=message.mission_type)
 
     def mission_request_int(self, message: Any) -> None:
-        sent = self.items[message.seq].to((255, 230), message.seq)
+        sent = self._list(message)[message.seq].to((255, 230), message.seq)
         fields = {name: getattr(sent, name) for name in sent.fieldnames if not name.startswith("target")}
-        self.say("mission_item_int", **fields)
+        self.say("mission_item_int", **{**fields, "mission_type": message.mission_type})
 
     def mission_clear_all(self, _message: Any) -> None:
         self.items = self.items[:1]
@@ -122,6 +127,14 @@ def test_download_has_home_and_the_items(loop: Any, copter: Any, store: Store) -
     assert store.got[-1] == "MISSION_ACK"
     store.items = []
     assert loop.run(copter.waypoints.download()) == (None, [])
+
+
+def test_the_fence_is_read_by_its_own_list(loop: Any, copter: Any, store: Store) -> None:
+    loop.call_later(0.005, store.say, "mission_count")  # another's question about the mission is no answer
+    messages = loop.run(copter.waypoints.download_fence())
+    assert [from_message(message) for message in messages] == store.fence
+    assert {message.mission_type for message in messages} == {mavlink.MAV_MISSION_TYPE_FENCE}
+    assert store.items == [HOME, *OLD]
 
 
 @pytest.mark.parametrize("name", ["MISSION_REQUEST_LIST", "MISSION_REQUEST_INT"])

@@ -45,3 +45,16 @@ def test_travel_counts_the_vehicles_seconds(loop: Any, flying: Any, copter: Any,
     started = loop.time()
     pilotage.do(copter.travel, VelocityTarget(1.0, 0.0, 0.0), duration=10.0)
     assert loop.time() - started == pytest.approx(2.0, abs=0.2)
+
+
+def test_late_setpoints_do_not_add_to_a_travel(loop: Any, flying: Any, copter: Any, pilotage: Any, link: Any) -> None:
+    def late(message: Any, system: int) -> None:
+        flying.on_send(message, system)
+        loop.now += 0.4  # the machine is busy
+
+    loop.run(copter.limits())
+    link.on_send = late
+    started = loop.time()
+    pilotage.do(copter.travel, VelocityTarget(1.0, 0.0, 0.0), duration=10.0)
+    assert loop.time() - started == pytest.approx(10.8, abs=0.2)  # the first and the last one are late
+    assert [(m.vx, m.vy, m.vz) for m in flying.setpoints()][-1] == STILL

@@ -100,6 +100,15 @@ def test_only_where_a_vehicle_is_stays_with_the_broker(loop: Any, sink: MqttSink
     assert sorted(broker.output[1:]) == [("fleet/7/position", False), ("fleet/7/position", True)]
 
 
+def test_only_a_vehicle_of_our_own_name_stays_with_the_broker(loop: Any, broker: Broker) -> None:
+    sink = MqttSink("mqtt://127.0.0.1/fleet/{device}/{quantity}", 3.0, "", device="north")
+    sent(loop, sink, *(Reading(device, 7, "position", "", [1, 2, 3], 0.0) for device in ("uav-7", "north-7")))
+    assert sorted(output for output in broker.output if output[0].endswith("position")) == [
+        ("fleet/north-7/position", True),
+        ("fleet/uav-7/position", False),
+    ]
+
+
 def test_a_connection_that_comes_too_late_is_closed_and_meanwhile_none_is_made(
     loop: Any, sink: MqttSink, broker: Broker
 ) -> None:

@@ -64,6 +64,19 @@ def test_a_position_that_is_reported_once_is_sampled_once(
     assert "no new" in pipeline.report()["quantities"][0]["why_not"]["10"]
 
 
+def test_device_names_begin_as_the_setting_says(
+    loop: Any, start: Any, telemetry: Any, poster: Any, tmp_path: Path
+) -> None:
+    soil = tmp_path / "soil.txt"
+    soil.write_text("23.5")
+    start(sink="http://a/r", device="north-field", quantities=f"alt=VFR_HUD.alt soil=file:{soil}@1")
+    telemetry.send_all()
+    loop.pass_time(3)
+    readings = [reading for _, _, body in poster.posts for reading in json.loads(body)["readings"]]
+    assert {(reading["device"], reading["id"]) for reading in readings} == {("north-field-10", "10")}
+    assert {reading["quantity"] for reading in readings} == {"alt", "soil"}
+
+
 def test_a_sensor_is_read_for_the_current_vehicle(
     loop: Any, pipeline: Any, start: Any, host: Any, poster: Any, tmp_path: Path
 ) -> None:

@@ -143,10 +143,26 @@ def test_a_status_is_no_reading_and_no_poison(rig: Any, loop: Any) -> None:
 
 def test_memory_is_bounded_while_the_database_is_away(rig: Any, loop: Any) -> None:
     rig.store.away = 1000
-    for mid in range(100):
+    newer = object()
+    for mid in range(20):
+        rig.inbox.put(message(mid))
+    assert not rig.inbox.has_room(CONNECTION)
+    loop.settle()  # four are taken
+    assert rig.inbox.has_room(CONNECTION)
+    for mid in range(20):  # the connection was lost, and the broker sends them again
+        assert rig.inbox.has_room(newer)
+        rig.inbox.put(message(mid)._replace(connection=newer))
+    assert not rig.inbox.has_room(newer)
+    assert (len(rig.inbox), rig.inbox.dropped) == (20, 16)
+
+
+def test_a_reader_that_waits_for_room_is_told_of_it(rig: Any, loop: Any) -> None:
+    rooms = []
+    rig.inbox.on_taken = lambda: rooms.append(rig.inbox.has_room(CONNECTION))
+    for mid in range(20):
         rig.inbox.put(message(mid))
     loop.settle()
-    assert (len(rig.inbox), rig.inbox.dropped) == (16, 80)  # four are in hand
+    assert rooms == [True] * 5
 
 
 @pytest.mark.parametrize("topic", ["", "fleet/1/position", "confirmed/#", "confirmed/+/a", "confirmed/" + "x" * 200,

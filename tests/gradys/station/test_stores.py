@@ -10,6 +10,8 @@ from typing import Any
 import pytest
 
 from mavproxy_gradys.errors import NotStored
+from mavproxy_gradys.forwarding.quantities import parse_quantity
+from mavproxy_gradys.forwarding.readings import Sampler, Stored
 from mavproxy_gradys.station.newest import Newest
 from mavproxy_gradys.station.reading_row import ReadingRow, reading_row
 from mavproxy_gradys.station.sqlite_store import SqliteStore
@@ -37,6 +39,16 @@ def test_readings_are_kept_once_each(store: Store, run: Any) -> None:
     assert run(store.counts()) == (3, 2)
     assert run(store.add([row(1, device="uav-2")])) == 1
     assert run(store.counts()).stored == 4
+
+
+def test_two_vehicles_of_one_system_id_on_two_machines_are_two_devices(store: Store, run: Any) -> None:
+    taken = [
+        Sampler(parse_quantity("alt=VFR_HUD.alt"), device=name).take(1, 20.0, 0.0, 1_699_999_000.0)
+        for name in ("a", "b")
+    ]
+    bodies = [Stored(1, reading).body() for reading in taken if reading is not None]
+    assert run(store.add([reading_row(body) for body in bodies])) == 2
+    assert [(found[0], found[1]) for found in run(every(store))] == [("a-1", 1), ("b-1", 1)]
 
 
 def test_a_row_comes_back_as_it_was(store: Store, run: Any, clock: Any) -> None:

@@ -27,6 +27,7 @@ class FakeApi:
         asked: method, path and parameters of the verbs, as they came.
         refusals: by path, the status and body that a verb gets instead.
         takes: by path, s that a verb takes; for ever with None.
+        why_not: reasons why it cannot be armed.
         gone: paths of verbs whose client hung up.
     """
 
@@ -36,6 +37,7 @@ class FakeApi:
         self.refusals: dict[str, tuple[int, dict[str, Any]]] = {}
         self.takes: dict[str, float | None] = {}
         self.gone: list[str] = []
+        self.why_not: list[str] = []
         self.sending = True
         self.url = ""
         self._jobs: dict[str, str] = {}
@@ -87,8 +89,8 @@ class FakeApi:
             "landed_state": "in_air" if self.alt > 0 else "on_ground",
             "link": {"alive": True},
             "ekf_ok": True,
-            "ready_to_arm": True,
-            "why_not": [],
+            "ready_to_arm": not self.why_not,
+            "why_not": self.why_not,
         }
         return web.json_response({"id": "7", "result": "Success", "info": info})
 

@@ -198,7 +198,7 @@ def test_machine_has_one_first_state(loop: Any, firsts: int, error: type[Excepti
 def test_marks_that_make_no_sense_are_refused() -> None:
     with pytest.raises(InvalidStateNameError):
         state("")
-    with pytest.raises(StateMachineError, match="one state"):
+    with pytest.raises(StateMachineError, match="more than one"):
 
         @state("a")
         @timed_state("b", 1)

@@ -10,6 +10,9 @@ from typing import Any
 
 import pytest
 
+from mavproxy_uavapi.aerpaw.exceptions import AerpawlibError
+from mavproxy_uavapi.aerpaw.helpers import ThreadSafeValue, heading_difference, wait_for_value_change
+from mavproxy_uavapi.aerpaw.log import LogLevel
 from mavproxy_uavapi.aerpaw.util import (
     Coordinate,
     VectorNED,
@@ -152,3 +155,33 @@ def test_file_without_a_polygon_is_refused(tmp_path: Path, text: str) -> None:
 )
 def test_segments_that_meet(segments: tuple[float, ...], meet: bool) -> None:
     assert do_intersect(*segments) is meet
+
+
+def test_headings_wrap_at_north() -> None:
+    assert (heading_difference(359, 1), heading_difference(1, 359), heading_difference(90, 270)) == (2, 2, 180)
+
+
+def test_value_of_several_threads() -> None:
+    value = ThreadSafeValue(1)
+    assert (value.compare_and_set(2, 3), value.get()) == (False, 1)
+    assert (value.compare_and_set(1, 3), value.get()) == (True, 3)
+    value.set(4)
+    assert value.get() == 4
+
+
+def test_change_of_a_value_is_awaited(loop: Any) -> None:
+    values = iter([1, 2, 3, 3])
+    assert loop.run(wait_for_value_change(lambda: next(values), 3)) == 3
+    with pytest.raises(TimeoutError, match="too slow"):
+        loop.run(wait_for_value_change(lambda: 1, 3, timeout=0, timeout_message="too slow"))
+
+
+def test_error_tells_its_cause_once() -> None:
+    assert str(AerpawlibError("it failed", ValueError("no GPS"))) == "it failed (caused by: no GPS)"
+    assert str(AerpawlibError("it failed: no GPS", ValueError("no GPS"))) == "it failed: no GPS"
+    assert str(AerpawlibError("it failed")) == "it failed"
+
+
+@pytest.mark.parametrize(("name", "level"), [("debug", "DEBUG"), ("warn", "WARNING")])
+def test_level_is_found_by_its_name(name: str, level: str) -> None:
+    assert LogLevel.from_string(name).name == level

@@ -15,13 +15,14 @@ from mavproxy_uavapi.aerpaw.exceptions import (
     ArmError,
     InvalidSpeedError,
     NavigationError,
+    NotArmableError,
     NotConnectedError,
     NotImplementedForVehicleError,
     TakeoffError,
     VelocityError,
 )
 from mavproxy_uavapi.aerpaw.geometry import VectorNED
-from mavproxy_uavapi.aerpaw.vehicles import Drone, DummyVehicle, Vehicle
+from mavproxy_uavapi.aerpaw.vehicles import Drone, DummyVehicle, Rover, Vehicle
 
 MODE_CHANGED = (409, {"detail": "the vehicle left GUIDED", "code": "mode_changed"})
 GO_TO, TRAVEL = "/movement/go_to_gps_wait", "/movement/travel_at_ned"
@@ -245,6 +246,28 @@ def test_arming_that_is_refused_raises(api: Any, drone: Drone) -> None:
         asyncio.run(drone.set_armed(True))
 
 
+@pytest.mark.parametrize(
+    ("reasons", "armable"),
+    [
+        (["PreArm: Mode not armable"], True),
+        (["PreArm: Mode not armable", "PreArm: no GPS"], False),
+        (["wait"], False),
+    ],
+)
+def test_vehicle_that_only_its_mode_keeps_from_arming_is_armed(
+    api: Any, vehicle: Any, reasons: list[str], armable: bool
+) -> None:
+    api.why_not = reasons
+    rover = vehicle(Rover)
+    assert rover.armable is armable
+    if armable:
+        asyncio.run(rover.set_armed(True))
+        assert api.verbs() == ["/command/arm"]
+    else:
+        with pytest.raises(NotArmableError, match=reasons[-1]):
+            asyncio.run(rover.set_armed(True))
+
+
 def test_ground_speed_goes_to_the_api_and_a_refusal_does_not_end_a_script(api: Any, flying: Drone) -> None:
     asyncio.run(flying.set_groundspeed("3"))  # type: ignore[arg-type]  # as hide_rover hands it on
     assert api.last("/command/set_ground_speed")["new_v"] == "3.0"
@@ -252,6 +275,24 @@ def test_ground_speed_goes_to_the_api_and_a_refusal_does_not_end_a_script(api: A
     asyncio.run(flying.set_groundspeed(4))
     with pytest.raises(InvalidSpeedError):
         asyncio.run(flying.set_groundspeed(0))
+
+
+def test_refused_speed_is_set_with_the_next_movement(api: Any, rover: Any) -> None:
+    api.refusals["/command/set_ground_speed"] = (502, {"detail": "refused", "code": "rejected", "ack": "FAILED"})
+    asyncio.run(rover.set_groundspeed(3))
+    del api.refusals["/command/set_ground_speed"]
+    for _ in range(2):
+        asyncio.run(rover.goto_coordinates(rover.position))
+    assert api.verbs() == ["/command/set_ground_speed"] * 2 + [GO_TO] * 2
+    assert float(api.last("/command/set_ground_speed")["new_v"]) == 3.0
+
+
+def test_speed_that_is_refused_twice_is_given_up(api: Any, rover: Any) -> None:
+    api.refusals["/command/set_ground_speed"] = (502, {"detail": "refused", "code": "rejected", "ack": "FAILED"})
+    asyncio.run(rover.set_groundspeed(3))
+    for _ in range(2):
+        asyncio.run(rover.goto_coordinates(rover.position))
+    assert api.verbs() == ["/command/set_ground_speed"] * 2 + [GO_TO] * 2
 
 
 def test_tolerance_that_is_none_is_refused_before_anything_else() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pytest
@@ -60,6 +61,18 @@ def test_cancelled_movement_ends_and_the_vehicle_stops(ours: Drone, flying: Any,
     assert not service.host.jobs.running()
     last = flying.setpoints()[-1]
     assert (last.vx, last.vy, last.vz) == (0, 0, 0)
+
+
+@pytest.mark.parametrize(("before", "heading"), [(1.0, 359.0), (359.0, 1.0)])
+def test_heading_across_north_is_reached_the_short_way(
+    ours: Drone, flying: Any, loop: Any, before: float, heading: float
+) -> None:
+    flying.yaw = math.radians(before)
+    loop.pass_time(1.0)
+    started = loop.time()
+    loop.run(ours.turn_to(heading))
+    assert abs((ours.heading - heading + 180.0) % 360.0 - 180.0) <= 5.0
+    assert loop.time() - started < 5.0
 
 
 def test_velocity_is_kept_until_it_is_cancelled(ours: Drone, flying: Any, loop: Any) -> None:

@@ -97,3 +97,21 @@ def test_progress_says_how_old_it_is(api: Any, loop: Any, drone: Any) -> None:
 def test_start_of_a_vehicle_that_is_not_armed_is_409(api: Any, drone: Any) -> None:
     assert api.post("/mission/start", {}).body["code"] == "not_armed"
     assert drone.orders() == []
+
+
+def test_fence_is_geojson(api: Any, copter: Any, msg: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    vertex = mavutil.mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION
+    corners = [(-353600000, 1491600000), (-353600000, 1491700000), (-353700000, 1491700000)]
+
+    held: list[Any] = []
+
+    async def download_fence() -> list[Any]:
+        return held
+
+    monkeypatch.setattr(copter.waypoints, "download_fence", download_fence)
+    assert api.get("/mission/fence").body["fence"]["features"] == []
+    for seq, (x, y) in enumerate(corners):
+        held.append(msg("mission_item_int", seq=seq, command=vertex, param1=3.0, x=x, y=y))
+    (feature,) = api.get("/mission/fence").body["fence"]["features"]
+    assert feature["properties"]["kind"] == "inclusion"
+    assert feature["geometry"]["coordinates"][0][0] == pytest.approx([149.16, -35.36])

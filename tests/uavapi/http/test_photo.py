@@ -34,7 +34,7 @@ def test_photo_is_a_jpeg_attachment_and_needs_no_vehicle(api: Any, loop: Any, ta
     response, body = photo(api, loop, "command=rpicam-still&focus_distance=2")
     assert (response.status, response.content_type, body) == (200, "image/jpeg", b"\xff\xd8\xffpicture")
     assert response.headers["Content-Disposition"] == 'attachment; filename="photo.jpg"'
-    assert taken == [("rpicam-still", Shot(1280, 720, 150, 2.0))]
+    assert taken == [("rpicam-still", Shot(1280, 720, 1000, 2.0))]
 
 
 @pytest.mark.parametrize("query", ["command=rm", "command=", "command=fswebcam&resolution=big"])
@@ -44,7 +44,20 @@ def test_other_tools_and_bad_resolutions_are_400(api: Any, taken: list[Any], que
     assert taken == []
 
 
-@pytest.mark.parametrize("query", ["", "command=fswebcam&capture_time=0", "command=fswebcam&focus_distance=nan"])
+def test_a_tool_that_there_is_not_is_told_which_are_allowed(api: Any) -> None:
+    detail = api.get("/peripherical/take_photo?command=rm").body["detail"]
+    assert detail == "camera tool 'rm' is not allowed, but fswebcam, rpicam-still, libcamera-still, vision"
+
+
+@pytest.mark.parametrize(
+    "query",
+    [
+        "",
+        "command=fswebcam&capture_time=-1",
+        "command=rpicam-still&exposure=0",
+        "command=fswebcam&focus_distance=nan",
+    ],
+)
 def test_values_out_of_range_are_422(api: Any, taken: list[Any], query: str) -> None:
     assert api.get(f"/peripherical/take_photo?{query}").status == 422
     assert taken == []

@@ -72,6 +72,16 @@ def test_system_is_a_filter(flying: Any, make_drone: Any, api: Any, loop: Any, e
 
 
 @both
+def test_several_vehicles_are_a_filter(flying: Any, make_drone: Any, api: Any, loop: Any, events: Any) -> None:
+    for system in (2, 3):
+        make_drone(system)
+    found = loop.run(events(api, "?names=ATTITUDE&vehicles=1,%203", 12))
+    assert {event["system"] for event in found} == {1, 3}
+    found = loop.run(events(api, "?names=ATTITUDE&vehicles=3&sysid=2", 12))
+    assert {event["system"] for event in found} == {2, 3}
+
+
+@both
 def test_rate_is_a_limit_for_each_name(flying: Any, api: Any, loop: Any, events: Any) -> None:
     started = loop.time()
     loop.run(events(api, "?names=ATTITUDE&rate=1", 4))
@@ -79,7 +89,19 @@ def test_rate_is_a_limit_for_each_name(flying: Any, api: Any, loop: Any, events:
 
 
 @pytest.mark.parametrize(
-    "query", ["?rate=0", "?rate=nan", "?sysid=300", "?sysid=x", "?view=gsp", "?events=mode,moods"]
+    "query",
+    [
+        "?rate=0",
+        "?rate=nan",
+        "?sysid=300",
+        "?sysid=x",
+        "?vehicles=0",
+        "?vehicles=1,",
+        "?vehicles=256",
+        "?vehicles=all",
+        "?view=gsp",
+        "?events=mode,moods",
+    ],
 )
 def test_filter_that_makes_no_sense_is_422(api: Any, query: str) -> None:
     assert api.get(f"/telemetry/stream{query}").status == 422

@@ -68,8 +68,8 @@ def test_no_rate_holds_an_event_back(loop: Any) -> None:
         (Wishes(Names("ATTITUDE, GPS_RAW_INT")), True),
         (Wishes(Names("GPS_RAW_IN")), False),
         (Wishes(view=Names("*"), event=Names("*")), False),
-        (Wishes(Names("*"), system=3), True),
-        (Wishes(Names("*"), system=4), False),
+        (Wishes(Names("*"), systems=frozenset({3})), True),
+        (Wishes(Names("*"), systems=frozenset({4, 5})), False),
     ],
 )
 def test_names_may_have_wildcards(msg: Any, wishes: Wishes, wanted: bool) -> None:
@@ -77,7 +77,7 @@ def test_names_may_have_wildcards(msg: Any, wishes: Wishes, wanted: bool) -> Non
 
 
 def test_event_of_no_vehicle_is_for_those_who_want_one(loop: Any) -> None:
-    assert Event("event", "alive", 0, 0.0, dict) in Wishes(event=Names("*"), system=4)
+    assert Event("event", "alive", 0, 0.0, dict) in Wishes(event=Names("*"), systems=frozenset({4}))
 
 
 def test_event_tells_each_client_what_that_has_lost(msg: Any) -> None:

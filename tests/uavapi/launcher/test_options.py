@@ -134,6 +134,7 @@ def test_wrong_file_is_one_line(tmp_path, capsys, text, output):
         (["--simulated", "--spacing", "-1"], "--spacing: expected a number of metres"),
         (["--simulated", "--count", "250"], "--count: system ids end at 255, and these begin at 10"),
         (["--simulated", "--ardupilot_path", "/nonexistent"], "there is no /nonexistent/Tools"),
+        (["--simulated", "--ardupilot_path", "/nonexistent"], "or this line of the file, the embedded vehicle flies"),
         (["--simulated", "--ardupilot_path", "/nonexistent", "--speedup", "1.5"], "whole numbers only"),
         (["--simulated", "--ardupilot_path", "/nonexistent", "--battery", "1500"], "for the embedded vehicle"),
         (["--simulated", "--battery", "0"], "--battery: expected a number above 0"),

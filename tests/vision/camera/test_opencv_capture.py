@@ -69,7 +69,9 @@ def camera(monkeypatch, spec, settings=None, clock=time.monotonic, **given):
     """A capture of OpenCV's that does as told, and what it was asked for."""
     requested = {}
     given = {"get": lambda _: 0.0, "release": lambda: None, **given}
-    device = SimpleNamespace(isOpened=lambda: True, set=requested.__setitem__, **given)
+    device = SimpleNamespace(
+        isOpened=lambda: True, set=lambda name, value: requested.update({name: value}) is None, **given
+    )
     monkeypatch.setattr(cv2, "VideoCapture", lambda *_: device)
     source = make_source(VisionModuleSettings({"source": spec, **(settings or {})}).snapshot(), lambda _: None, clock)
     source.open()
@@ -104,6 +106,13 @@ def test_the_calibrated_size_is_requested_from_a_camera(monkeypatch, tmp_path):
     save(CameraModel(1280, 720, 900.0, 900.0, 640.0, 360.0), tmp_path / "camera.json")
     _, requested = camera(monkeypatch, "camera:0", {"calibration": str(tmp_path / "camera.json")})
     assert (requested[cv2.CAP_PROP_FRAME_WIDTH], requested[cv2.CAP_PROP_FRAME_HEIGHT]) == (1280, 720)
+
+
+def test_exposure_and_gain_are_requested_from_a_camera_and_read_back(monkeypatch):
+    has = {cv2.CAP_PROP_EXPOSURE: 28.0, cv2.CAP_PROP_GAIN: 7.0}
+    source, requested = camera(monkeypatch, "camera:0", {"exposure": "3", "gain": "7"}, get=has.get)
+    assert source.taken == {"exposure": "2.8 ms", "gain": "7"}
+    assert (requested[cv2.CAP_PROP_EXPOSURE], requested[cv2.CAP_PROP_GAIN]) == (30, 7.0)
 
 
 def test_a_drivers_time_stamps_are_taken_once_they_are_known_to_be_on_our_clock(monkeypatch):

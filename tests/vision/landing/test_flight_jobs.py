@@ -114,6 +114,19 @@ def test_a_mission_that_is_stopped_holds_before_it_writes_its_track(flying):
     assert rig.flights.report.track == "not written: no home directory"
 
 
+@pytest.mark.parametrize(("setting", "fastest"), [(2.0, 2.5), (0.0, None)])
+def test_a_mission_flies_to_its_place_at_its_own_speed(flying, setting, fastest):
+    rig = flying(mission_speed=setting)
+    rig.begin(rig.flights.mission(rig.copter, MissionPlan(alt=5, north=40, east=0, on_tag=False)))
+    speeds = []
+    for _ in range(100):
+        rig.pass_time(0.1)
+        velocity = rig.copter.state.messages["GLOBAL_POSITION_INT"].message
+        speeds.append(math.hypot(velocity.vx, velocity.vy) / 100)
+    assert max(speeds) < fastest if fastest else max(speeds) > 4
+    rig.stop()
+
+
 @pytest.mark.parametrize("ended", ["stop", "unload"])
 def test_a_flight_that_is_ended_while_it_is_prepared_never_begins(lockstep, ended):
     rig = lockstep(sim_tags=TAG, plnd=True, **SMALL)

@@ -1,0 +1,162 @@
+"""Subscribes to the readings of a fleet and posts each vehicle's position to ground stations."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import random
+import time
+from collections.abc import Callable, Sequence
+from urllib.parse import SplitResult
+
+import aiomqtt
+
+from mavproxy_gradys.errors import NotDelivered
+from mavproxy_gradys.forwarding.mqtt_sink import disconnect
+from mavproxy_gradys.forwarding.quantities import STATUS
+from mavproxy_gradys.net.addresses import StationAddress
+from mavproxy_gradys.net.http_client import FORM, Poster
+from mavproxy_gradys.net.mqtt_client import make_client
+from mavproxy_gradys.net.outage_log import Outage
+from mavproxy_gradys.net.schedule import Backoff, Ticker
+from mavproxy_gradys.push.position_update import encode
+from mavproxy_gradys.relay.positions import Positions
+from mavproxy_gradys.station.refusal_log import RefusalLog
+
+LONGEST_PAUSE = 20.0  # s between attempts to connect
+AT_ONCE = 8  # updates in flight to a station
+log = logging.getLogger("relay")
+
+
+class Pushes:
+    """Posts updates to one station. Positions are not kept: an update that fails is not sent again.
+
+    Attributes:
+        sent, failed: number of updates that the station answered with 200, and that it did not.
+    """
+
+    def __init__(self, station: StationAddress, poster: Poster) -> None:
+        self._station = station
+        self._poster = poster
+        self._outage = Outage(log, f"{station.url} does not take updates", f"{station.url} takes updates again")
+        self.sent = self.failed = 0
+
+    async def push(self, forms: Sequence[dict[str, str]]) -> None:
+        """Post these updates; after a failed one the others of this turn are left out."""
+        waiting = list(reversed(forms))
+
+        async def post() -> None:
+            while waiting:
+                form = waiting.pop()
+                try:
+                    await self._poster.post(self._station.update_url, encode(form), FORM)
+                except NotDelivered as error:
+                    self.failed += 1 + len(waiting)
+                    waiting.clear()
+                    self._outage.update(str(error))
+                    return
+                self.sent += 1
+                self._outage.update("")
+
+        await asyncio.gather(*(post() for _ in range(AT_ONCE)))
+
+    async def close(self) -> None:
+        """Close the connections."""
+        await self._poster.close()
+
+
+class Relay:
+    """The subscription, and a task for each station.
+
+    Args:
+        broker: the parts and the port of mqtt(s)://[USER:PASSWORD@]HOST[:PORT].
+        topic: the topic filter of the readings.
+        timeout: s for an answer of the broker.
+        ca_file: certificates to check TLS with; empty for the system's.
+        wall: s since 1970.
+    """
+
+    def __init__(
+        self,
+        broker: tuple[SplitResult, int],
+        topic: str,
+        timeout: float = 5.0,
+        ca_file: str = "",
+        wall: Callable[[], float] = time.time,
+    ) -> None:
+        self._broker, self._topic = broker, topic
+        self._timeout, self._ca_file = timeout, ca_file
+        self._wall = wall
+        self._positions = Positions()
+        self._outage = Outage(log, "no readings from the broker", "readings from the broker again")
+        self._refusals = RefusalLog(log, time.monotonic)
+
+    async def listen(self) -> None:
+        """Take readings, until cancelled."""
+        backoff = Backoff(random.random, LONGEST_PAUSE)
+        while True:
+            try:
+                await self._listen(make_client(*self._broker, self._timeout, self._ca_file), backoff)
+            except (aiomqtt.MqttError, NotDelivered) as error:
+                self._outage.update(str(error) or "no answer")
+            await asyncio.sleep(backoff.failed(time.monotonic()))
+
+    async def _listen(self, client: aiomqtt.Client, backoff: Backoff) -> None:
+        try:
+            await client.__aenter__()
+            await client.subscribe(self._topic, qos=0)
+            backoff.succeeded()
+            self._outage.update("")
+            async for message in client.messages:
+                if not message.retain:  # nobody knows how old a retained position is
+                    self.take(str(message.topic), message.payload)
+        finally:
+            await disconnect(client)
+
+    def take(self, topic: str, payload: object) -> None:
+        """Take one message; a vehicle's status is not a reading."""
+        if topic.rpartition("/")[2] == STATUS or not isinstance(payload, bytes):
+            return
+        try:
+            self._positions.put(payload, self._wall())
+        except (ValueError, RecursionError) as error:
+            self._refusals.add(topic, str(error))
+
+    async def push(self, stations: Sequence[Pushes], period: float) -> None:
+        """Every `period` s, post what has changed to all stations, until cancelled.
+
+        A station that is too slow skips turns; it gets the newest positions in its next one.
+        """
+        loop = asyncio.get_running_loop()
+        ticker, turns = Ticker(period, loop.time()), [_Turn(station) for station in stations]
+        try:
+            while True:
+                await asyncio.sleep(ticker.wait(loop.time()))
+                forms = {one.device: self._positions.form(one) for one in self._positions.take_changed()}
+                for turn in turns:
+                    turn.begin(forms)
+        finally:
+            await asyncio.gather(*(turn.end() for turn in turns))
+
+
+class _Turn:
+    """The updates that one station has not been sent yet, and the task that posts."""
+
+    def __init__(self, station: Pushes) -> None:
+        self._station = station
+        self._forms: dict[str, dict[str, str]] = {}
+        self._task: asyncio.Task[None] | None = None
+
+    def begin(self, forms: dict[str, dict[str, str]]) -> None:
+        """Add updates, and post all if the last turn has ended."""
+        self._forms.update(forms)
+        if self._forms and (self._task is None or self._task.done()):
+            waiting, self._forms = list(self._forms.values()), {}
+            self._task = asyncio.get_running_loop().create_task(self._station.push(waiting))
+
+    async def end(self) -> None:
+        """Cancel, and close the connections."""
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.gather(self._task, return_exceptions=True)
+        await self._station.close()

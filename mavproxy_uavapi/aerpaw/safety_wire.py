@@ -1,0 +1,39 @@
+"""`aerpawlib.v1.safety.wire_format`: the messages of the safety checker, JSON that is compressed by zlib."""
+
+from __future__ import annotations
+
+import json
+import zlib
+from typing import Any
+
+__all__ = ["deserialize_msg", "serialize_msg", "serialize_request", "serialize_response"]
+
+
+def serialize_msg(raw_json: str) -> bytes:
+    """Encode a text."""
+    return zlib.compress(raw_json.encode())
+
+
+def serialize_request(request_function: str, params: list[Any]) -> bytes:
+    """Encode a request."""
+    return serialize_msg(json.dumps({"request_function": request_function, "params": params}))
+
+
+def serialize_response(request_function: str, *, result: bool, message: str = "") -> bytes:
+    """Encode a response."""
+    return serialize_msg(json.dumps({"request_function": request_function, "result": result, "message": message}))
+
+
+def deserialize_msg(compressed_msg: bytes) -> dict[str, Any]:
+    """Decode a message.
+
+    Raises:
+        ValueError: it is malformed.
+    """
+    try:
+        message = json.loads(zlib.decompress(compressed_msg))
+    except zlib.error as error:
+        raise ValueError(f"Failed to decompress message: {error}") from error
+    if not isinstance(message, dict):
+        raise ValueError(f"{message!r} is not a message")
+    return message

@@ -1,0 +1,16 @@
+// Areas where a vehicle may, or may not, fly: of envelopes and of its own fence. They come as GeoJSON, in degrees.
+
+/** The areas of a FeatureCollection: {inclusion, rings: [[[lat, lon], …], …], centre: [lat, lon] or null, radius in m}. */
+export function areasOf(collection) {
+  return (collection?.features ?? []).flatMap(({properties, geometry}) => {
+    const common = {name: properties.name ?? "", inclusion: properties.kind === "inclusion", rings: [], centre: null, radius: 0};
+    if (geometry.type === "Point") return [{...common, centre: turned(geometry.coordinates), radius: properties.radius}];
+    const polygons = geometry.type === "Polygon" ? [geometry.coordinates] : geometry.coordinates;
+    return polygons.map(rings => ({...common, rings: rings.map(ring => ring.map(turned))}));
+  });
+}
+
+/** The areas of all envelopes in force, as `/envelope` answers them. */
+export const areasOfAll = envelopes => envelopes.flatMap(one => areasOf(one.envelope));
+
+const turned = ([lon, lat]) => [lat, lon];

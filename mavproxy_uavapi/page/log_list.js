@@ -1,0 +1,67 @@
+// The logs that the autopilot has written: listed, downloaded to MAVProxy's machine, and saved from there.
+
+import {CommandPanel} from "./command_panel.js";
+import {element, setText} from "./dom.js";
+import {now} from "./freshness.js";
+
+const PATIENCE = 60000; // ms for the list
+const LONGEST = 600000; // ms for a file from MAVProxy's machine
+
+export class LogList extends CommandPanel {
+  build() {
+    this.note = element("p", {class: "empty"}, "A vehicle is asked for its logs only when you say so.");
+    this.rows = element("ul", {class: "plain logs"});
+    this.ask = element("button", {type: "button", on: {click: () => this.look()}}, "List the logs");
+    this.append(this.note, element("div", {class: "buttons"}, this.ask), this.rows, this.answer);
+    this.context.fleet.addEventListener("chosen", () => { this.rows.replaceChildren(); this.say("", ""); });
+  }
+
+  async look() {
+    const {vehicle} = this;
+    if (!vehicle) return;
+    this.say("asking …", "wait");
+    const listed = await this.attempt(() => this.context.api.call("GET", `/vehicles/${vehicle.id}/logs`, {timeout: PATIENCE}));
+    if (!listed || vehicle !== this.vehicle) return;
+    this.say("", "");
+    setText(this.note, listed.logs.length ? `Vehicle ${vehicle.id} holds ${listed.logs.length} logs.` : `Vehicle ${vehicle.id} holds no logs.`);
+    this.rows.replaceChildren(...listed.logs.map(log => this.row(log, vehicle)).reverse());
+  }
+
+  row(log, vehicle) {
+    const path = `/vehicles/${vehicle.id}/logs/${log.id}`, when = log.time ? new Date(log.time).toLocaleString() : "at an unknown time";
+    const act = log.downloaded
+      ? element("button", {type: "button", class: "small", "aria-label": `save log ${log.id}`, on: {click: () => this.save(path, log)}}, "Save")
+      : element("button", {type: "button", class: "small", "aria-label": `download log ${log.id}`, on: {click: () => this.fetch(path)}}, "Download");
+    return element("li", {class: "row"}, element("b", {}, String(log.id)), element("span", {}, `${sizeText(log.size)}, ${when}`), act);
+  }
+
+  fetch(path) { return this.begin(() => this.context.api.command(`${path}/download`)); }
+
+  goesOn({progress}) { if (progress.of) this.say(`${sizeText(progress.bytes)} of ${sizeText(progress.of)}`, "wait"); }
+
+  async succeeded() {
+    await this.look();
+    this.say("The log is on MAVProxy's machine; save it from there.", "good");
+  }
+
+  /** Give the file to the browser; with a token it must be fetched first, because a link cannot carry one. */
+  async save(path, log) {
+    const {api} = this.context, name = `vehicle-${this.vehicle.id}-log-${log.id}.bin`;
+    if (!api.hasToken) return void element("a", {href: path, download: name}).click();
+    this.say(`fetching ${sizeText(log.size)} …`, "wait");
+    const began = now(), body = await this.attempt(() => api.blob(path, LONGEST));
+    if (!body) return;
+    const url = URL.createObjectURL(body);
+    element("a", {href: url, download: name}).click();
+    setTimeout(() => URL.revokeObjectURL(url), PATIENCE);
+    this.say(`${sizeText(body.size)} in ${((now() - began) / 1000).toFixed(1)} s`, "good");
+  }
+}
+
+/** A number of bytes in words. */
+export function sizeText(bytes) {
+  if (bytes < 1e3) return `${bytes} B`;
+  return bytes < 1e6 ? `${(bytes / 1e3).toFixed(0)} kB` : `${(bytes / 1e6).toFixed(1)} MB`;
+}
+
+customElements.define("log-list", LogList);

@@ -1,0 +1,32 @@
+// Who holds the vehicle: other operators of the same role command it only to stop it. Taking it sends nothing to it.
+
+import {CommandPanel} from "./command_panel.js";
+import {element, setFlag, setText} from "./dom.js";
+import "./hold_button.js";
+
+const LEASE = 60; // s; every call of this page renews it
+
+export class VehicleHold extends CommandPanel {
+  build() {
+    this.holder = element("span");
+    this.take = element("hold-button", {label: "Take it", on: {confirmed: () => this.send("take", {lease: LEASE})}});
+    this.release = element("button", {type: "button", class: "quiet", on: {click: () => this.send("release", {})}}, "Give it back");
+    this.append(element("div", {class: "row"}, this.holder, this.take, this.release), this.answer);
+    this.context.fleet.addEventListener("chosen", () => this.say("", ""));
+  }
+
+  async send(verb, json) {
+    const path = this.path(`/authority/${verb}`);
+    const done = await this.attempt(() => this.context.api.call("POST", path, {json}));
+    if (done) this.say(done.result, "good");
+  }
+
+  render() {
+    const holder = this.vehicle?.get("vehicle")?.held_by ?? null;
+    setText(this.holder, holder === null ? "Held by nobody" : `Held by ${holder}`);
+    setFlag(this.take, "hidden", holder !== null);
+    setFlag(this.release, "hidden", holder === null);
+  }
+}
+
+customElements.define("vehicle-hold", VehicleHold);

@@ -1,0 +1,88 @@
+"""The Python client with several vehicles of one API: two embedded copters behind one MAVProxy."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager
+
+import pytest
+
+from mavproxy_uavapi.client import Fleet, Ned, connect, connect_fleet
+from mavproxy_uavapi.core.errors import NoVehicle
+from tests.support.processes import HOME, MAVPROXY, Rig, free_instance, free_port, load
+
+SPEEDUP = 3  # the client has to keep up with it
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
+    """Two copters, 1 and 2, behind one MAVProxy."""
+    rig = Rig(tmp_path_factory.mktemp("fleet"), free_port())
+    try:
+        first, masters = free_instance(), []
+        for system in (1, 2):
+            instance = first + system - 1
+            command = [sys.executable, "-m", "mavproxy_uavapi.sim", f"--instance={instance}", f"--home={HOME}"]
+            vehicle = rig.start(f"copter{system}", [*command, f"--sysid={system}", f"--speedup={SPEEDUP}"])
+            vehicle.says("listening on tcp")
+            masters.append(f"--master=tcp:127.0.0.1:{5760 + 10 * instance}")
+        rig.mavproxy = rig.start("mavproxy", [*MAVPROXY, *masters, "--retries=20", load(rig.port)])
+        rig.wait_until_up(120)
+        rig.eventually(lambda: len(rig.ok(rig.get("/vehicles"))["vehicles"]) == 2, 60, "two vehicles")
+        yield rig
+    finally:
+        rig.stop()
+
+
+@asynccontextmanager
+async def fleet_of(rig: Rig) -> AsyncIterator[Fleet]:
+    async with connect_fleet(f"{rig.url}/vehicles/1", f"{rig.url}/vehicles/2") as fleet:
+        yield fleet
+
+
+def test_one_vehicle_of_two_flies(rig: Rig) -> None:
+    async def flight() -> None:
+        async with fleet_of(rig) as fleet:
+            assert (sorted(fleet), fleet[1].id, fleet[2].id) == ([1, 2], 1, 2)
+            await fleet[2].arm()
+            await fleet[2].takeoff(5)
+            target = fleet[2].position + Ned(8, 0, 0)
+            await fleet[2].go_to(target)
+            assert fleet[2].position.distance(target) < 2
+            assert (fleet[1].armed, fleet[2].armed) == (False, True)
+            assert abs(fleet[1].position.alt) < 1
+            await fleet[2].land()
+            assert not fleet[2].armed
+
+    asyncio.run(flight())
+
+
+def test_cancelled_verb_ends_on_its_vehicle_only(rig: Rig) -> None:
+    async def up(fleet: Fleet, system: int) -> None:
+        await fleet[system].arm()
+        await fleet[system].takeoff(5)
+
+    async def flight() -> None:
+        async with fleet_of(rig) as fleet:
+            await asyncio.gather(up(fleet, 1), up(fleet, 2))
+            travels = {system: asyncio.create_task(fleet[system].travel(Ned(2, 0, 0))) for system in fleet}
+            for drone in fleet.values():
+                assert await drone.telemetry.shows(lambda drone=drone: drone.velocity.north > 1.5, 30)  # type: ignore[misc]
+            travels[1].cancel()
+            assert await fleet[1].telemetry.shows(lambda: fleet[1].velocity.horizontal < 0.3, 30)
+            assert fleet[2].velocity.north > 1.5 and not travels[2].done()
+            travels[2].cancel()
+            await asyncio.gather(fleet[1].land(), fleet[2].land())
+
+    asyncio.run(flight())
+
+
+def test_vehicle_that_there_is_not_is_named(rig: Rig) -> None:
+    async def connecting() -> None:
+        async with connect(f"{rig.url}/vehicles/9", timeout=1):
+            pass
+
+    with pytest.raises(NoVehicle, match="9"):
+        asyncio.run(connecting())

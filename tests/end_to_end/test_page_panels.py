@@ -1,0 +1,124 @@
+"""The page at / in a real browser: who holds the vehicle, its logs, areas and tiles on the map, readings."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.support.chromium import chromium
+from tests.support.page_pilot import Pilot
+from tests.support.pictures import grey_png
+
+pytestmark = pytest.mark.needs("chromium")
+
+FIELD = {
+    "type": "Feature",
+    "properties": {"kind": "inclusion", "name": "field"},
+    "geometry": {
+        "type": "Polygon",
+        "coordinates": [[[149.15, -35.37], [149.18, -35.37], [149.18, -35.35], [149.15, -35.35], [149.15, -35.37]]],
+    },
+}
+LABEL = "document.querySelector('top-view canvas').getAttribute('aria-label')"
+
+
+FENCE = [
+    (-35.362, 149.165),
+    (-35.36, 149.16),
+    (-35.36, 149.17),
+    (-35.366, 149.17),
+    (-35.36, 149.16),
+]  # it returns first
+TILES = "[...document.querySelector('top-view').tiles.tiles.values()]"
+
+
+def map_of(directory: Path, zoom: int = 10) -> Path:
+    """A folder with the one tile in which the vehicle is."""
+    lat, lon = FENCE[0]
+    x = int(2**zoom * (lon + 180) / 360)
+    y = int(2**zoom * (1 - math.asinh(math.tan(math.radians(lat))) / math.pi) / 2)
+    file = directory / "map" / str(zoom) / str(x) / f"{y}.png"
+    file.parent.mkdir(parents=True)
+    file.write_bytes(grey_png())
+    return directory / "map"
+
+
+async def see_the_fence(pilot: Pilot) -> None:
+    file = pilot.rig.directory / "fence.txt"
+    file.write_text("".join(f"{lat:.7f} {lon:.7f}\n" for lat, lon in FENCE))
+    pilot.rig.mavproxy.type(f"fence load {file}")
+    pilot.rig.eventually(lambda: len(pilot.rig.ok(pilot.rig.get("/mission/fence"))["fence"]["features"]) == 1)
+    await pilot.click("Mission")
+    await pilot.page.until(f"{LABEL}.includes('2 areas of fences')")
+
+
+async def hold_and_release(pilot: Pilot) -> None:
+    await pilot.sees("vehicle-hold", "Held by nobody")
+    await pilot.hold("Take it")
+    await pilot.page.until("/Held by (?!nobody)/.test(document.querySelector('vehicle-hold').innerText)")
+    assert pilot.rig.ok(pilot.rig.get("/authority"))["vehicles"][0]["held_by"] is not None
+    await pilot.click("Give it back")
+    await pilot.sees("vehicle-hold", "Held by nobody")
+
+
+async def download_a_log(pilot: Pilot) -> None:
+    await pilot.click("Logs")
+    await pilot.click("List the logs")
+    await pilot.sees("log-list", "holds")
+    await pilot.page.until("document.querySelectorAll('log-list li').length > 0")
+    await pilot.click("Download")
+    await pilot.sees("log-list", "The log is on MAVProxy's machine")
+    await pilot.sees("log-list li", "Save")
+
+
+async def see_readings(pilot: Pilot) -> None:
+    tab = "[...document.querySelectorAll('[role=tab]')].find(tab => tab.textContent === 'Gradys')"
+    await pilot.page.until(f"!{tab}.hidden")
+    await pilot.click("Gradys")
+    for value in (20.5, 21.5):
+        assert pilot.rig.post("/gradys/readings", quantity="temperature", value=value).status_code == 200
+    await pilot.sees("reading-curves", "temperature")
+    await pilot.sees("reading-curves", "21.50")
+
+
+async def look(rig: Any, directory: Path) -> list[str]:
+    settings = json.dumps({"sink": "http://127.0.0.1:9/", "spool": f"{directory}/spool.db"}, separators=(",", ":"))
+    rig.mavproxy.ask(f"module load gradys:{settings}", "Loaded module gradys")
+    envelope = {"type": "FeatureCollection", "features": [FIELD]}
+    assert rig.call("PUT", "/envelope", json=envelope).status_code == 200
+    async with chromium(directory) as page:
+        pilot = Pilot(page, rig)
+        await page.visit(rig.url + "/")
+        await pilot.sees_live()
+        await page.until(f"{LABEL}.includes('1 area of fences')")
+        await page.until(f"{TILES}.some(tile => tile instanceof ImageBitmap)")
+        await see_the_fence(pilot)
+        await hold_and_release(pilot)
+        await download_a_log(pilot)
+        await pilot.finds_it_accessible()
+        await see_readings(pilot)
+        await pilot.finds_it_accessible()
+        return page.complaints
+
+
+@pytest.fixture
+def rig(harness: Any, tmp_path: Path) -> Iterator[Any]:
+    """A vehicle that has a log, because it was armed once."""
+    made = harness.embedded(tmp_path, speedup=2, vehicle_logs=str(tmp_path / "logs"), tiles=str(map_of(tmp_path)))
+    try:
+        harness.eventually(lambda: made.status()["ready_to_arm"], 60, what="getting ready to arm")
+        made.ok(made.get("/command/arm"))
+        made.ok(made.get("/command/disarm"))
+        yield made
+    finally:
+        made.stop()
+
+
+def test_the_panels_show_what_they_promise(rig: Any, tmp_path: Path) -> None:
+    assert asyncio.run(look(rig, tmp_path)) == []

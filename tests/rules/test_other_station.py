@@ -1,0 +1,120 @@
+"""A program at another output of MAVProxy, with the messages of DroneKit's calls, beside the API.
+
+`mode = VehicleMode(…)` is SET_MODE, `armed = True` COMPONENT_ARM_DISARM, `simple_takeoff` NAV_TAKEOFF, and
+`simple_goto` a MISSION_ITEM that is for now. The program's vehicle is the embedded one.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from mavproxy_uavapi.authority_console import command as authority
+from tests.support.world import MODES, PLACE, World
+
+ALT = 8.0  # m above home
+FAR = {"x": -300.0, "y": 0.0, "z": -ALT}  # m NED
+
+
+class Program:
+    """What a DroneKit program does to the vehicle."""
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+
+    def send(self, message: Any) -> None:
+        """It arrives with the next tick, past the host."""
+        self.world._arriving.append(message)
+        self.world.loop.pass_time(0.5)
+
+    def mode(self, name: str) -> None:
+        flag = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+        self.send(mavlink.MAVLink_set_mode_message(1, flag, MODES[name]))
+
+    def command(self, number: int, *parameters: float) -> None:
+        self.send(World._command(number, *parameters))
+
+    def take_off(self) -> None:
+        self.mode("GUIDED")
+        self.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1)
+        self.command(mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, ALT)
+        self.world.loop.pass_time(12.0)
+
+    def simple_goto(self, north: float) -> None:
+        frame, number = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_CMD_NAV_WAYPOINT
+        place = PLACE[0] + north / 111_319, PLACE[1], ALT
+        self.send(mavlink.MAVLink_mission_item_message(1, 0, 0, frame, number, 2, 0, 0, 0, 0, 0, *place))
+
+
+@pytest.fixture
+def program(make_world: Any) -> Program:
+    """It has taken off, and nobody has called the API."""
+    world = make_world(World.boot)
+    world.loop.pass_time(2.0)
+    made = Program(world)
+    made.take_off()
+    return made
+
+
+def test_it_flies_and_lands_and_the_api_sends_nothing(program: Program) -> None:
+    world = program.world
+    assert world.at == pytest.approx((0.0, 0.0, -ALT), abs=0.5)
+    program.simple_goto(20.0)
+    world.loop.pass_time(3.0)
+    assert "another station commands" in world.loop.run(authority(world.host, []))
+    world.loop.pass_time(12.0)
+    assert world.at == pytest.approx((20.0, 0.0, -ALT), abs=0.7)
+    program.mode("LAND")
+    world.loop.pass_time(25.0)
+    assert not world.copter.armed
+    assert world.orders() == []
+    assert "commands" not in world.loop.run(authority(world.host, []))
+
+
+def test_its_goto_ends_a_movement_of_the_api_which_leaves_it_alone(program: Program) -> None:
+    world = program.world
+    waiting = world.begin("POST", "/movement/go_to_ned_wait", FAR)
+    world.loop.pass_time(6.0)
+    assert world.at[0] < -5
+    program.simple_goto(20.0)
+    assert world.answer(waiting, 5.0).outcome == "409 superseded"
+    sent = len(world.orders())
+    world.loop.pass_time(30.0)
+    assert math.dist(world.at, (20.0, 0.0, -ALT)) < 1.0
+    assert len(world.orders()) == sent
+
+
+def test_its_landing_ends_a_movement_of_the_api(program: Program) -> None:
+    world = program.world
+    waiting = world.begin("POST", "/movement/go_to_ned_wait", FAR)
+    world.loop.pass_time(6.0)
+    program.mode("LAND")
+    assert world.answer(waiting, 5.0).outcome == "409 mode_changed"
+    sent = len(world.orders())
+    world.loop.pass_time(25.0)
+    assert not world.copter.armed
+    assert len(world.orders()) == sent
+
+
+def test_the_api_takes_the_vehicle_over_when_it_is_told_to(program: Program) -> None:
+    world = program.world
+    program.simple_goto(200.0)
+    world.loop.pass_time(3.0)
+    reply = world.ask("POST", "/movement/go_to_ned_wait", {"x": 0.0, "y": 0.0, "z": -ALT})
+    assert reply.outcome == "200"
+    assert math.dist(world.at, (0.0, 0.0, -ALT)) < 1.5
+
+
+def test_its_goto_at_once_after_the_apis_is_not_taken_for_the_apis(program: Program) -> None:
+    """The autopilot's first report of a target is the other station's."""
+    world = program.world
+    waiting = world.begin("POST", "/movement/go_to_ned_wait", FAR)
+    world.loop.pass_time(0.2)
+    program.simple_goto(40.0)
+    reply = world.answer(waiting, 30.0)
+    assert (reply.status, reply.body["code"]) == (409, "superseded")
+    world.loop.pass_time(15.0)
+    assert world.at == pytest.approx((40.0, 0.0, -ALT), abs=0.7)

@@ -1,0 +1,56 @@
+"""Somebody who flies from the page at /, in a real browser."""
+
+from __future__ import annotations
+
+import json
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from tests.support.chromium import Page
+
+ESCAPE = 27
+BUTTON = "[...document.querySelectorAll('{tag}')].find(b => b.textContent === '{label}' && b.checkVisibility())"
+
+
+class Pilot:
+    """Somebody in front of the page."""
+
+    def __init__(self, page: Page, rig: Any) -> None:
+        self.page, self.rig = page, rig
+
+    async def sees(self, element: str, text: str) -> None:
+        """Wait until an element shows that text."""
+        await self.page.until(f"document.querySelector({element!r}).innerText.includes({text!r})")
+
+    async def sees_live(self) -> None:
+        """Wait until the page says that its numbers are live; it says `not live` before."""
+        await self.page.until("document.querySelector('connection-state').innerText.trim() === 'live'")
+
+    async def hold(self, label: str) -> None:
+        """Hold a button until it acts."""
+        element = BUTTON.format(tag="hold-button", label=label)
+        await self.page.until(f"!{element}.button.disabled")
+        await self.page.evaluate(f"window.acted = false; {element}.addEventListener('confirmed', () => acted = true)")
+        x, y = await self.page.middle(element)
+        await self.page.press(x, y)
+        await self.page.until("acted")
+        await self.page.release(x, y)
+
+    async def click(self, label: str) -> None:
+        """Click a button."""
+        await self.page.click(BUTTON.format(tag="button", label=label))
+
+    async def hold_all_by_key(self) -> None:
+        """Hold Escape."""
+        await self.page.key("keyDown", "Escape", ESCAPE)
+        await self.page.until("!document.getElementById('hold-result').hidden")
+        await self.page.key("keyUp", "Escape", ESCAPE)
+
+    async def finds_it_accessible(self) -> None:
+        """Let axe-core look at the page as it is; it may find nothing serious."""
+        spec = find_spec("axe_core_python")
+        assert spec is not None and spec.origin is not None
+        await self.page.evaluate(Path(spec.origin).with_name("axe.min.js").read_text(encoding="utf-8") + ";0")
+        found = json.loads(await self.page.evaluate("axe.run().then(r => JSON.stringify(r.violations))"))
+        assert [one["id"] for one in found if one["impact"] in ("serious", "critical")] == []

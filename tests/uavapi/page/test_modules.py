@@ -1,0 +1,125 @@
+"""The page's modules that only compute, in a real browser; nothing flies."""
+
+from __future__ import annotations
+
+import asyncio
+import functools
+import http.server
+import json
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mavproxy_uavapi.http.page import FOLDER
+from tests.support.chromium import Page, chromium
+
+pytestmark = pytest.mark.needs("chromium")
+
+# module -> scripts that must give true; `m` is the module
+CHECKS = {
+    "areas": [
+        "m.areasOf(null).length === 0",
+        """{const [a] = m.areasOf({features: [{properties: {kind: 'exclusion', radius: 25},
+              geometry: {type: 'Point', coordinates: [149, -35]}}]});
+           same([a.inclusion, a.rings, a.centre, a.radius], [false, [], [-35, 149], 25])}""",
+        """same(m.areasOf({features: [{properties: {kind: 'inclusion'}, geometry: {type: 'MultiPolygon',
+           coordinates: [[[[1, 2]]], [[[3, 4]], [[5, 6]]]]}}]}).map(a => a.rings),
+           [[[[2, 1]]], [[[4, 3]], [[6, 5]]]])""",
+        "m.areasOfAll([{envelope: null}]).length === 0",
+    ],
+    "curve": [
+        "same(m.axisOf(0, 3), {bottom: 0, top: 3, step: 1})",
+        "same(m.axisOf(0, 12), {bottom: 0, top: 15, step: 5})",
+        "same(m.axisOf(-7, 3), {bottom: -10, top: 5, step: 5})",
+        "m.axisOf(5, 5).top > m.axisOf(5, 5).bottom",
+        "Math.abs(m.axisOf(21.5, 21.6).step - 0.05) < 1e-9",
+    ],
+    "freshness": [
+        "m.ageText(Infinity) === 'never heard' && m.ageText(3210) === '3.2 s' && m.ageText(7.2e6) === '2 h'",
+        "{const f = new m.Fresh(); f.set(1, 0); !f.isOld(2900) && f.isOld(3100)}",
+        "{const f = new m.Fresh(); f.set(1, 1000); f.set(2, 900); f.value === 1}",  # older, and late
+        """{const c = new m.StreamClock(); c.learn(0, 50);
+           c.happened(1000, 9000) === 1050 && c.happened(1000, 1040) === 1040}""",
+    ],
+    "projection": [
+        """{const p = new m.Projection(-35, 149), [lat, lon] = p.degrees(100, -50), [n, e] = p.metres(lat, lon);
+           Math.hypot(n - 100, e + 50) < 1e-6 && lat > -35 && lon < 149}""",
+    ],
+    "camera": [
+        """{const c = Object.assign(new m.Camera(), {width: 400, height: 300});
+           same(c.metres(...c.pixels([7, 9])), [7, 9])}""",
+        """{const c = Object.assign(new m.Camera(), {width: 400, height: 300}), before = c.metres(30, 40);
+           c.zoom(2, 30, 40);
+           const after = c.metres(30, 40); Math.hypot(before[0] - after[0], before[1] - after[1]) < 1e-9}""",
+        """{const c = Object.assign(new m.Camera(), {width: 400, height: 300}); c.keep([[0, 0], [900, 900]]);
+           while (c.step(true)); c.shows([900, 900]) && c.shows([0, 0])}""",
+    ],
+    "flight_status": [
+        "m.commanderOf({mode: 'LOITER', armed: true, commanded_by: null}) === 'its pilot (LOITER)'",
+        "m.commanderOf({mode: 'GUIDED', armed: false, commanded_by: null}) === 'nobody'",
+    ],
+    "log_list": ["m.sizeText(999) === '999 B' && m.sizeText(1500) === '2 kB' && m.sizeText(2.54e6) === '2.5 MB'"],
+    "tiles": [
+        "same(m.tileAt(0, 0, 1), [1, 1]) && same(m.tileAt(0, -180, 3), [0, 4])",
+        "same(m.tileAt(51.5074, -0.1278, 10).map(Math.floor), [511, 340])",  # London
+        """{const [lat, lon] = m.cornerOf(...m.tileAt(-35.36, 149.16, 17), 17);
+           Math.abs(lat + 35.36) < 1e-9 && Math.abs(lon - 149.16) < 1e-9}""",
+        "m.zoomFor(1, 0, {least: 0, most: 22}) === 17 && m.zoomFor(1, 0, {least: 0, most: 12}) === 12",
+    ],
+    "command_panel": [
+        "m.sentenceOf({error: {detail: 'refused', statustext: ['a', 'b']}}) === 'refused (a; b)'",
+        "m.sentenceOf({}) === 'failed'",
+    ],
+    "top_view_layers": [
+        "m.gridStep(1) === 100 && m.gridStep(10) === 10",
+        """{const taken = []; const ys = [0, 0, 3].map(y => m.freePlace(taken, 0, y, 50));
+           same(ys, [0, 15, 33]) || ys.every((y, n) => ys.slice(0, n).every(other => Math.abs(y - other) >= 15))}""",
+    ],
+}
+
+
+class Handler(http.server.SimpleHTTPRequestHandler):
+    """The page's folder as the API has it."""
+
+    def translate_path(self, path: str) -> str:
+        """The file of an address."""
+        return super().translate_path(path.removeprefix("/page"))
+
+    def log_message(self, *_: Any) -> None:
+        """Say nothing."""
+
+
+@pytest.fixture
+def address() -> Iterator[str]:
+    """A server of the page's files, without the API."""
+    handler = functools.partial(Handler, directory=str(FOLDER))
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        yield f"http://127.0.0.1:{server.server_address[1]}"
+        server.shutdown()
+        thread.join()
+
+
+async def failures(page: Page, address: str) -> list[str]:
+    """The checks that did not give true."""
+    await page.visit(f"{address}/page/theme.css")
+    found = []
+    for module, checks in CHECKS.items():
+        for check in checks:
+            script = f"import('/page/{module}.js').then(m => eval({json.dumps(check)}))"
+            same = "const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);"
+            if await page.evaluate(f"(() => {{ {same} return {script}; }})()") is not True:
+                found.append(f"{module}: {check}")
+    return found
+
+
+def test_modules_compute_what_they_say(address: str, tmp_path: Path) -> None:
+    async def look() -> list[str]:
+        async with chromium(tmp_path) as page:
+            return await failures(page, address)
+
+    assert asyncio.run(look()) == []

@@ -1,0 +1,57 @@
+"""What `uavapi` shows in MAVProxy's console and map."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from mavproxy_uavapi.core.roles import THE_PROMPT
+from mavproxy_uavapi.core.vehicle.messages import GlobalTarget, NedTarget, VelocityTarget
+from mavproxy_uavapi.window_view import view
+from tests.support.piloting import place
+
+
+def test_without_a_vehicle_there_is_nothing(host: Any) -> None:
+    assert (view(host).line, view(host).places) == ("", {})
+
+
+def test_the_line_says_who_commands_and_who_holds(host: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+    assert view(host).line == "Commands 1: nobody"
+    pilotage.start(copter.go_to, NedTarget(300.0, 0.0, -20.0), wait=True)
+    assert view(host).line.startswith("Commands 1: console go_to")
+    host.holds.take(copter, THE_PROMPT, 0)
+    assert view(host).line.endswith(f"(held by {THE_PROMPT.name})")
+
+
+def test_the_place_is_that_of_our_target_in_either_frame(
+    host: Any, flying: Any, copter: Any, pilotage: Any, loop: Any
+) -> None:
+    assert view(host).places == {}
+    there = pytest.approx(place(flying, 30.0, 40.0), abs=1e-6)  # 0.1 m
+    pilotage.start(copter.go_to, NedTarget(30.0, 40.0, -20.0))
+    assert view(host).places == {"target 1": there}
+    loop.pass_time(3.0)  # it is on its way
+    assert view(host).places == {"target 1": there}
+    pilotage.start(copter.go_to, GlobalTarget(*place(flying, -10.0, 0.0), 20.0))
+    assert view(host).places == {"target 1": pytest.approx(place(flying, -10.0, 0.0), abs=1e-6)}
+
+
+def test_a_velocity_another_mode_and_another_station_have_no_target_of_ours(
+    host: Any, flying: Any, copter: Any, pilotage: Any, loop: Any
+) -> None:
+    pilotage.start(copter.travel, VelocityTarget(1.0, 0.0, 0.0))
+    assert view(host).places == {}
+    pilotage.start(copter.go_to, GlobalTarget(*place(flying, 300.0, 40.0), 20.0))
+    assert "target 1" in view(host).places
+    loop.pass_time(3.0)
+    lat, lon = flying.place((0.0, 300.0))
+    flying.send(
+        "position_target_global_int", coordinate_frame=0, lat_int=lat, lon_int=lon, alt=604.0, type_mask=0xDF8
+    )
+    loop.settle()
+    assert (view(host).line, view(host).places) == ("Commands 1: another station", {})
+    pilotage.start(copter.go_to, NedTarget(300.0, 40.0, -20.0))
+    flying.mode = "LOITER"
+    loop.pass_time(2.0)
+    assert view(host).places == {}
