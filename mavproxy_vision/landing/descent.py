@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 
-from mavproxy_uavapi.core.errors import NotArmed, TimedOut, UavApiError
+from mavproxy_uavapi.core.errors import TimedOut, UavApiError
 from mavproxy_uavapi.core.vehicle import time_limits
 from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
 from mavproxy_vision.landing.executor import TagFlight
@@ -135,14 +135,7 @@ class PrecisionDescent(Descent):
             NotArmed: its motors stopped in flight.
             ModeChanged: the pilot or a failsafe has the vehicle.
         """
-        vehicle = self.flight.vehicle
-        touchdown.sinks_at((vehicle.state.field("GLOBAL_POSITION_INT", "vz") or 0) / 100.0)
-        if vehicle.state.armed is not False or vehicle.mode != "LAND":
-            vehicle.held_by("LAND")
-            return False
-        if touchdown.fell:
-            raise NotArmed("the vehicle was disarmed in flight, and fell")
-        return bool(touchdown.is_over(vehicle.clock(), vehicle.state.age("GLOBAL_POSITION_INT", vehicle.clock())))
+        return bool(self.flight.vehicle.has_landed(touchdown, "LAND"))
 
     def _must_come_back(self, landing: Landing, now: float) -> bool:
         """Whether it must not descend further: it takes too long, or the target or the vehicle is lost."""

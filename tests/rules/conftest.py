@@ -24,11 +24,14 @@ def make_world(
     loop.set_default_executor(AtOnce())
 
     def make(
-        stage: Callable[[World], None] = World.flying, camera: dict[str, Any] | None = None, **settings: Any
+        stage: Callable[[World], None] = World.flying,
+        camera: dict[str, Any] | None = None,
+        vehicle: str = "copter",
+        **settings: Any,
     ) -> World:
         if camera is not None:
             pytest.importorskip("cv2")
-        world = World(loop, mpstate, settings)
+        world = World(loop, mpstate, settings, vehicle)
         worlds.append(world)
         world.screen, world.directory = lambda: capsys.readouterr().out, tmp_path
         if camera is not None:

@@ -140,6 +140,12 @@ class World:
         self._deliver(self._command(command, *parameters))
         self.simulator.step()
 
+    def in_mode(self, name: str) -> None:
+        """The pilot chooses a flight mode."""
+        number = next(number for number, mode in self.vehicle.modes.items() if mode.name == name)
+        self.by_hand(mavlink.MAV_CMD_DO_SET_MODE, 1, number)
+        assert self.vehicle.mode.name == name
+
     def boot(self) -> None:
         """Wait until it is ready to arm."""
         self.simulator.run(2.0)
@@ -147,7 +153,7 @@ class World:
     def armed(self) -> None:
         """Armed on the ground, in GUIDED."""
         self.boot()
-        self.by_hand(mavlink.MAV_CMD_DO_SET_MODE, 1, MODES["GUIDED"])
+        self.in_mode("GUIDED")
         self.by_hand(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1)
 
     def flying(self, mode: str = "GUIDED", height: float = 8.0) -> None:
@@ -157,13 +163,13 @@ class World:
         self.simulator.run(6.0 + height / 2)
         assert abs(self.at[2] + height) < 0.3
         if mode != "GUIDED":
-            self.by_hand(mavlink.MAV_CMD_DO_SET_MODE, 1, MODES[mode])
+            self.in_mode(mode)
 
     def on_mission(self) -> None:
         """Flying a mission of two places, far apart."""
         self.flying()
         self.copter.mission.items[:] = [item_at(*PLACE), *(item_at(PLACE[0] + north, PLACE[1]) for north in LEGS)]
-        self.by_hand(mavlink.MAV_CMD_DO_SET_MODE, 1, MODES["AUTO"])
+        self.in_mode("AUTO")
         self.by_hand(mavlink.MAV_CMD_MISSION_START)
 
     def stream(self, velocity: dict[str, float], every: float) -> None:
@@ -297,14 +303,24 @@ class World:
     # -- what is to be seen ---------------------------------------------------------------------------------
 
     @property
-    def copter(self) -> Any:
+    def kind(self) -> str:
+        """What the vehicle is, as `--vehicle` names it."""
+        return self.simulator.options.vehicle
+
+    @property
+    def vehicle(self) -> Any:
         """The vehicle's truth."""
+        return self.simulator.vehicle
+
+    @property
+    def copter(self) -> Any:
+        """The truth about a copter."""
         return self.simulator.copter
 
     @property
     def at(self) -> tuple[float, float, float]:
         """Where it truly is: m north, east, down."""
-        return tuple(self.copter.body.position)
+        return tuple(self.vehicle.body.position)
 
     def orders(self, since: float = -math.inf) -> list[Any]:
         """What the host sent after `since` (s), but for its watch over the telemetry."""

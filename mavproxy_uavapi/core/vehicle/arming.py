@@ -23,8 +23,7 @@ async def arm(vehicle: BaseVehicle, job: Job, timeout: float | None) -> None:
     def check_unclaimed() -> None:
         """Raise ModeChanged if the pilot or another client armed the vehicle or switched its mode."""
         armed = vehicle.state.armed
-        flies = armed and not vehicle.state.landed
-        if vehicle.mode == GUIDED or ((armed, vehicle.state.mode) == before and not flies):
+        if vehicle.mode == GUIDED or ((armed, vehicle.state.mode) == before and not vehicle.is_under_way):
             return
         if armed:
             raise ModeChanged(f"the pilot or another client has armed the vehicle, in {vehicle.mode}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -248,9 +248,24 @@ class BaseVehicle:
         return False
 
     @property
+    def stands(self) -> bool:
+        """Whether it is on the ground, and stays there unless somebody commands it."""
+        return bool(self.state.landed)
+
+    @property
+    def is_under_way(self) -> bool:
+        """Whether it is armed and flies, for whomever."""
+        return bool(self.state.armed and not self.state.landed)
+
+    def anothers(self) -> ModeChanged:
+        """The error for a vehicle that is under way for somebody else."""
+        moving = "driving" if self.kind == "rover" else "flying"
+        return ModeChanged(f"the vehicle is {moving} in {self.mode}; `guided` takes it over")
+
+    @property
     def flies_for_us(self) -> bool:
         """Whether it flies by a command of ours: in a mode that we chose or command in, towards no other's target."""
-        if not self.state.armed or (self.state.landed and self.kind != "rover") or self.authority.commander is None:
+        if not self.state.armed or self.stands or self.authority.commander is None:
             return False
         if self.mode in STOPPING or self.mode == self.holding_mode:
             return False
@@ -272,7 +287,12 @@ class BaseVehicle:
         return check
 
     async def switch_to(
-        self, job: Job, mode: str, *needs: Callable[[], None], command: messages.Command | None = None
+        self,
+        job: Job,
+        mode: str,
+        *needs: Callable[[], None],
+        command: messages.Command | None = None,
+        onward: Collection[str] = (),
     ) -> None:
         """Switch the flight mode for `job` and wait until a heartbeat shows it.
 
@@ -280,7 +300,8 @@ class BaseVehicle:
             job: the job that commands.
             mode: the mode's name.
             needs: called before each sending; what one raises ends the switch.
-            command: what switches it; None for DO_SET_MODE.
+            command: what does more than switch it, such as to begin a landing; None for DO_SET_MODE.
+            onward: modes to which the autopilot may go on from that mode by itself, before a heartbeat.
 
         Raises:
             Invalid: no such mode.
@@ -288,20 +309,25 @@ class BaseVehicle:
             Rejected, TimedOut, LinkLost.
         """
         number = mode_number(self.state.vehicle_type, mode)
+        goals = {number, *(mode_number(self.state.vehicle_type, name) for name in onward)}
         before, on_its_way = self.state.mode, self._on_its_way()
-        # With another switch on its way, a heartbeat in this mode may be older than both.
-        is_ambiguous = number in (before, *on_its_way) and any(other != number for other in on_its_way)
+        # With another switch on its way, a heartbeat in this mode may be older than both; and the mode that a vehicle
+        # is in already does not show what else a command does.
+        does_more = command is not None or bool(onward)
+        is_ambiguous = not goals.isdisjoint((before, *on_its_way)) and (
+            does_more or any(other != number for other in on_its_way)
+        )
         counts_from = math.inf if is_ambiguous else -math.inf  # s; older heartbeats show nothing
         has_shown = False
 
         def shown() -> bool:
             nonlocal has_shown
-            elsewhere = self.state.mode not in (before, number, None, *on_its_way)
-            left_again = has_shown and self.state.mode not in (number, None)
+            elsewhere = self.state.mode not in (before, None, *goals, *on_its_way)
+            left_again = has_shown and self.state.mode not in (None, *goals)
             if elsewhere or left_again:
                 raise ModeChanged(f"the pilot or a failsafe switched the vehicle to {self.mode} meanwhile")
-            has_shown = has_shown or (self.state.mode == number and self.state.heartbeat_at > counts_from)
-            return has_shown and self.state.mode == number
+            has_shown = has_shown or (self.state.mode in goals and self.state.heartbeat_at > counts_from)
+            return has_shown and self.state.mode in goals
 
         def switched_by_nobody_else() -> None:
             shown()
@@ -309,7 +335,7 @@ class BaseVehicle:
         def noted() -> None:
             self._requested_modes.pop(number, None)
             self._requested_modes[number] = self.clock()
-            job.modes.add(mode_name(self.state.vehicle_type, number))
+            job.modes |= {mode_name(self.state.vehicle_type, goal) for goal in goals}
 
         check = self.commanding(job, switched_by_nobody_else, *needs, noted)
         try:

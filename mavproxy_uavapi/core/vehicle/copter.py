@@ -18,7 +18,6 @@ from mavproxy_uavapi.core.vehicle.turning import TurningVehicle
 TAKEOFF_SHARE = 0.05  # of the altitude, between TAKEOFF_TOLERANCE's two ends
 TAKEOFF_TOLERANCE = (0.3, 1.0)  # m
 TAKEOFF_END = 3.0  # s at its altitude after which a takeoff counts as done, even if the autopilot still reports it
-LIFT_OFF_TIMEOUT = 5.0  # s in which an unacknowledged takeoff must show
 SLOWDOWN = 0.3  # s that a pause on the ground needs to slow the motors from full throttle
 STOP_TIMEOUT = 20.0  # s from full speed to rest
 SPEED_MODES = {"GUIDED", "RTL", *MISSION_MODES}  # others refuse DO_CHANGE_SPEED
@@ -53,7 +52,7 @@ class Copter(TurningVehicle):
             raise Busy("the vehicle is flying already")
         was_paused = self.authority.paused
         self.authority.take(job, Rank.ARM, self.inside(messages.takeoff(alt)))
-        await self._lift_off(job, alt)
+        await self.lift_off(job, alt)
         if was_paused:  # a pause outlives a takeoff in the autopilot
             await self._continue(job)
         limits = await self.limits()
@@ -79,19 +78,6 @@ class Copter(TurningVehicle):
         names = {"GLOBAL_POSITION_INT", "EXTENDED_SYS_STATE"}
         await self.flown(GUIDED, names, reached, allowed, f"reach {alt:g} m")
         self.authority.shown(job)
-
-    async def _lift_off(self, job: Job, alt: float) -> None:
-        try:
-            await self.commands.send(messages.takeoff(alt), self.commanding(job, self.flying))
-        except TimedOut:  # the ack may be lost: telemetry shows whether the takeoff began
-            ratio = max(self.state.time_ratio.ratio, 0.1)
-            await self.flown(
-                GUIDED,
-                {"EXTENDED_SYS_STATE"},
-                lambda: True if self.state.landed is False else None,
-                max(LIFT_OFF_TIMEOUT, LIFT_OFF_TIMEOUT / ratio),
-                "acknowledge the takeoff, and did not leave the ground",
-            )
 
     async def land(self, job: Job, timeout: float | None = None) -> None:
         """Land where it is; done when it has disarmed.

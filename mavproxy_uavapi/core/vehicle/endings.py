@@ -39,6 +39,7 @@ class Situation(Enum):
     GUIDED = "GUIDED"  # on the ground too: a climb begins there
     PAUSED = "held still"  # by `stop`: `resume` would fly on to its target
     MISSION = "AUTO"
+    TAKEOFF = "TAKEOFF"  # of a plane; a copter takes off in GUIDED
     LAND = "LAND"
     RTL = "RTL"
     PILOTED = "its pilot's mode"
@@ -54,6 +55,7 @@ WHAT_FOLLOWS: Mapping[Situation, Mapping[Policy, str | None]] = {
     Situation.GUIDED: {**NOTHING, Policy.HOLD: HOLD, Policy.SAFE: HOLD, Policy.LAND: LAND, Policy.RTL: RTL},
     Situation.PAUSED: {**NOTHING, Policy.HOLD: HOLD, Policy.SAFE: HOLD, Policy.LAND: LAND, Policy.RTL: RTL},
     Situation.MISSION: {**NOTHING, Policy.HOLD: HOLD, Policy.LAND: LAND, Policy.RTL: RTL},
+    Situation.TAKEOFF: {**NOTHING, Policy.HOLD: HOLD, Policy.LAND: LAND, Policy.RTL: RTL},
     Situation.LAND: {**NOTHING, Policy.HOLD: HOLD},
     Situation.RTL: {**NOTHING, Policy.HOLD: HOLD, Policy.LAND: LAND},
 }
@@ -87,7 +89,9 @@ def situation(vehicle: Vehicle, modes: Collection[str] = ()) -> Situation:
         return Situation.PILOTED
     if mode in LANDINGS | RETURNS:
         flown = Situation.LAND if mode in LANDINGS else Situation.RTL
-        return Situation.IDLE if state.landed else flown
+        return Situation.IDLE if vehicle.stands else flown
+    if mode == "TAKEOFF":
+        return Situation.TAKEOFF
     return Situation.MISSION if flies_mission(mode) else Situation.PILOTED
 
 

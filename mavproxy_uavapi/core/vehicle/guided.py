@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from mavproxy_uavapi.core.errors import Busy, Invalid, Stale, Superseded
+from mavproxy_uavapi.core.errors import Busy, Invalid, Stale, Superseded, TimedOut
 from mavproxy_uavapi.core.mavlink.link import Link
 from mavproxy_uavapi.core.mavlink.pending_waits import PendingWaits
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
@@ -23,6 +23,7 @@ TOLERANCE = 1.0  # m, horizontally and vertically
 ARRIVAL_SPEED = 0.5  # m/s; slower than this the vehicle does not overshoot its tolerance any more
 FLOOR = 0.0  # m above home: the lowest target, less TOLERANCE for the noise of the estimate
 TARGET_SHOWN = 2.0  # s after a setpoint in which telemetry may still report the one before
+LIFT_OFF_TIMEOUT = 5.0  # s in which an unacknowledged takeoff must show
 SAME_PLACE = 2.0  # m on each axis: reported targets within this are the same
 NEAR_EXPECTED = 10.0  # m on each axis: our target in the local frame, whose origin the autopilot does not tell
 TAKING_OFF = messages.mavlink.MAV_LANDED_STATE_TAKEOFF
@@ -69,6 +70,20 @@ class GuidedVehicle(Vehicle):
     async def brake(self, job: Job) -> None:
         """Stop at once, by the holding mode."""
         await self.set_mode(job, self.holding_mode)
+
+    async def lift_off(self, job: Job, alt: float) -> None:
+        """Begin to climb to `alt` m above home in GUIDED; returns when that is acknowledged, or shows."""
+        try:
+            await self.commands.send(messages.takeoff(alt), self.commanding(job, self.flying))
+        except TimedOut:  # the ack may be lost: telemetry shows whether the takeoff began
+            ratio = max(self.state.time_ratio.ratio, 0.1)
+            await self.flown(
+                GUIDED,
+                {"EXTENDED_SYS_STATE"},
+                lambda: True if self.state.landed is False else None,
+                max(LIFT_OFF_TIMEOUT, LIFT_OFF_TIMEOUT / ratio),
+                "acknowledge the takeoff, and did not leave the ground",
+            )
 
     # -- position -----------------------------------------------------------------------------------------
 
@@ -218,7 +233,11 @@ class GuidedVehicle(Vehicle):
         """Begin a movement. ArduCopter goes back to its own speeds when the kind of setpoint changes."""
         other_kind = not self._flies_kind_of(target)
         await self.send_setpoint(job, target, yaw)
-        for kind, speed in self.speeds.to_send(other_kind).items():
+        await self.send_speeds(job, new_kind=other_kind)
+
+    async def send_speeds(self, job: Job, *, new_kind: bool) -> None:
+        """Send the speeds that go with a movement; `new_kind`: whether its setpoint is of another kind."""
+        for kind, speed in self.speeds.to_send(new_kind).items():
             await self.commands.send(messages.change_speed(kind, speed), self.commanding(job, self.flying))
             self.speeds.take(kind, speed)
 

@@ -23,7 +23,8 @@ LANDINGS = {mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH, mavl
 STARTING_MODES = (AUTO, "GUIDED")  # in any other mode the pilot has it; `guided` takes over
 START_TIMEOUT = 10.0  # s until the vehicle must show that the mission runs
 LONGEST = 4 * 3600.0  # s for a mission whose client gave no timeout: longer than any copter flies
-DISARM_SHOWN = 5.0  # s from the end of a final item until a heartbeat must show that the vehicle has disarmed
+END_SHOWN = 5.0  # s from the end of a final item until telemetry must show what follows it, such as a disarming
+AFTER_MISSION = {"plane": "RTL"}  # the mode to which an autopilot goes on at the end of its mission
 UNKNOWN_TOTAL = 65535
 STATES = {
     mavlink.MISSION_STATE_UNKNOWN: "unknown",
@@ -116,8 +117,11 @@ async def _flown_to_its_end(vehicle: Vehicle, job: Job, items: Sequence[MissionI
         _report(vehicle, job)
         if _is_complete(vehicle):
             return True
-        if vehicle.state.armed is False and vehicle.clock() - in_final_at <= DISARM_SHOWN:
+        just_ended = vehicle.clock() - in_final_at <= END_SHOWN
+        if vehicle.state.armed is False and just_ended:
             return True
+        if vehicle.mode == AFTER_MISSION.get(vehicle.kind) and just_ended:
+            return None  # what shows the end of the mission may come after the mode that follows it
         _held(vehicle)
         if progress(vehicle)["current"] in final:
             in_final_at = vehicle.clock()

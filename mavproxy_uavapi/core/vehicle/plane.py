@@ -9,17 +9,20 @@ from __future__ import annotations
 import contextlib
 import math
 
-from mavproxy_uavapi.core.errors import Busy, Invalid, ModeChanged, Rejected, Stale
+from mavproxy_uavapi.core.errors import Busy, Invalid, ModeChanged, Rejected, Stale, TimedOut
 from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission
-from mavproxy_uavapi.core.vehicle import landing_pattern, messages, mission_flight, time_limits
+from mavproxy_uavapi.core.vehicle import arming, landing_pattern, messages, mission_flight, time_limits
 from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_uavapi.core.vehicle.geodesy import moved
 from mavproxy_uavapi.core.vehicle.guided import GUIDED, TOLERANCE, GuidedVehicle
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.messages import GlobalTarget, NedTarget
 from mavproxy_uavapi.core.vehicle.time_limits import FlightLimits
+from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
 
 AUTO, TAKEOFF, RTL, QLAND = "AUTO", "TAKEOFF", "RTL", "QLAND"
+SPEED_MODES = {GUIDED, AUTO}  # others refuse DO_CHANGE_SPEED
+LANDING_RETURNS = (1, 2)  # values of RTL_AUTOLAND with which a return goes on with the mission's landing, in AUTO
 RADIUS = 60.0  # m; used until WP_LOITER_RAD is known
 CIRCLING = 1.5  # radii from the centre within which a circling plane stays, including wind and entry
 HEIGHT_TOLERANCE = 10.0  # m
@@ -40,7 +43,7 @@ class Plane(GuidedVehicle):
 
     async def limits(self) -> FlightLimits:
         """Its speeds, for deadlines; it requests those that are unknown."""
-        parameters = await self.parameters.read([CRUISE[0], CLIMB[0], SINK[0]])
+        parameters = await self.parameters.read([CRUISE[0], CLIMB[0], SINK[0], ("RTL_AUTOLAND",)])
         cruise = parameters.get("AIRSPEED_CRUISE") or parameters.get("TRIM_ARSPD_CM", 100 * CRUISE[1]) / 100
         climb, sink = parameters.get(*CLIMB[0], CLIMB[1]), parameters.get(*SINK[0], SINK[1])
         return time_limits.limits(
@@ -48,10 +51,15 @@ class Plane(GuidedVehicle):
             self.speeds.in_force,
         )
 
-    async def _radius(self) -> float:
-        """The radius of its circles in m."""
-        parameters = await self.parameters.read([("WP_LOITER_RAD",)])
-        return abs(parameters.get("WP_LOITER_RAD", RADIUS)) or RADIUS
+    @property
+    def takes_speeds(self) -> bool:
+        """Whether its autopilot takes a speed in the mode that it is in."""
+        return self.mode in SPEED_MODES
+
+    async def _radius(self, *own: str) -> float:
+        """The radius of its circles in m; `own`: parameters that come before WP_LOITER_RAD unless they are 0."""
+        parameters = await self.parameters.read([(name,) for name in (*own, "WP_LOITER_RAD")])
+        return next((abs(radius) for name in (*own, "WP_LOITER_RAD") if (radius := parameters.get(name))), RADIUS)
 
     async def is_vtol(self) -> bool:
         """Whether it can take off and land vertically."""
@@ -90,7 +98,7 @@ class Plane(GuidedVehicle):
         self.authority.take(job, Rank.ARM, self.inside(messages.takeoff(alt)))
         allowed = self.allowed(CIRCLES + time_limits.leg_time(await self.limits(), 0.0, alt), timeout)
         if vtol:
-            await self.commands.send(messages.takeoff(alt), self.commanding(job, self.flying))
+            await self.lift_off(job, alt)
         else:
             await self.switch_to(job, TAKEOFF)
             handover = max(alt - HEIGHT_TOLERANCE, LOWEST_HANDOVER)
@@ -118,19 +126,40 @@ class Plane(GuidedVehicle):
     async def land(self, job: Job, timeout: float | None = None) -> None:
         """Land and disarm: a QuadPlane where it is, another plane by its mission's landing sequence.
 
+        On the ground it is disarmed: a landing sequence would wait there for a takeoff.
+
         Raises:
             Busy: the mission has no landing sequence; `land_at` makes one.
         """
+        self.authority.take(job, Rank.STOP)  # a waiting arm ends
         if self.state.armed is False:
-            self.authority.take(job, Rank.STOP)  # a waiting arm ends
             return
         vertical = await self.is_vtol()
-        if not vertical and not landing_pattern.is_in((await self.waypoints.download())[1]):
-            raise Busy("the vehicle's mission has no landing sequence (DO_LAND_START); `land_at` makes one")
-        self.authority.take(job, Rank.STOP)
-        mode = QLAND if vertical else AUTO
-        await self.switch_to(job, mode, command=None if vertical else messages.start_landing())
-        await self.landed_in(job, mode, self.allowed(LANDING, timeout))
+        if vertical:
+            await self.switch_to(job, QLAND)
+        elif self.state.landed:
+            await arming.disarm(self, job, force=False)
+            return
+        else:
+            await self._begin_landing(job)
+        await self.landed_in(job, QLAND if vertical else AUTO, self.allowed(LANDING, timeout))
+
+    async def _begin_landing(self, job: Job) -> None:
+        """Jump to the mission's landing sequence. Its mission is looked at only after a refusal, to say why."""
+        try:
+            await self.switch_to(job, AUTO, command=messages.start_landing())
+        except Rejected as refusal:
+            if await self._may_have_landing():
+                raise
+            sentence = "the vehicle's mission has no landing sequence (DO_LAND_START); `land_at` makes one"
+            raise Busy(sentence) from refusal
+
+    async def _may_have_landing(self) -> bool:
+        """Whether its mission has a landing sequence; True as well if it does not tell."""
+        try:
+            return landing_pattern.is_in((await self.waypoints.download())[1])
+        except (Rejected, TimedOut, Busy):
+            return True
 
     async def land_at(self, job: Job, lat: float, lon: float, alt: float = 0.0, *, vtol: bool = False) -> None:
         """Begin to land at a place; done when it flies the landing. The landing replaces its mission.
@@ -154,10 +183,10 @@ class Plane(GuidedVehicle):
         await mission_flight.begin(self, job, lambda: self.held_by(mode) if self.mode != AUTO else None)
 
     async def come_down(self, job: Job) -> None:
-        """Land if it can; without a landing sequence it returns, and circles at home."""
+        """Land if it can; without a landing sequence, or refused, it returns, and circles at home."""
         try:
             await self.land(job)
-        except Busy:
+        except (Busy, Rejected):
             await self.rtl(job)
 
     async def rtl(self, job: Job, timeout: float | None = None) -> None:
@@ -165,27 +194,25 @@ class Plane(GuidedVehicle):
         self.authority.take(job, Rank.STOP)
         if await self.is_done_at_home():
             return
-        await self.switch_to(job, RTL)
+        lands = self.state.parameters.get("RTL_AUTOLAND") in LANDING_RETURNS
+        returning = (RTL, AUTO) if lands else (RTL,)
+        await self.switch_to(job, RTL, onward=returning[1:])
         await self.know_home()
-        near = CIRCLING * await self._radius()
+        near = CIRCLING * await self._radius("RTL_RADIUS")
         distance = self.distance_home() or 0.0
         expected = CIRCLES + time_limits.leg_time(await self.limits(), distance, 0.0)
 
+        landing = Touchdown(await self.limits())
+
         def at_home() -> bool | None:
             self.report_home(job)
-            if self.state.armed is False and self.mode == RTL:
-                return True
             distance = self.distance_home()
-            return True if distance is not None and distance <= near else None
-
-        def guarded() -> bool | None:
-            done = at_home()
-            if done is None:
-                self.held_by(RTL)
-            return done
+            if self.state.armed and distance is not None and distance <= near:
+                return True
+            return self.has_landed(landing, *returning)
 
         names = {"HEARTBEAT", "GLOBAL_POSITION_INT"}
-        await self.waiting.until(names, guarded, self.allowed(expected, timeout), "return home")
+        await self.waiting.until(names, at_home, self.allowed(expected, timeout), "return home")
 
     # -- going and staying --------------------------------------------------------------------------------
 
@@ -199,6 +226,7 @@ class Plane(GuidedVehicle):
             self.authority.take(job, Rank.STOP)  # a waiting arm ends
         self.require_armed()
         await self.hold(job)
+        self.held_by(self.holding_mode)
 
     async def go_to(
         self,
@@ -217,7 +245,6 @@ class Plane(GuidedVehicle):
         that is more. It always points in the direction of travel.
         """
         self.require_guided_flight()
-        radius = await self._radius()
         place = self._global(target)
         if place.alt < 0:
             raise Invalid(f"the target lies {-place.alt:.1f} m below home")
@@ -225,6 +252,7 @@ class Plane(GuidedVehicle):
         await self._reposition(job, place)
         if not wait:
             return
+        radius = await self._radius()
         north, east, up = self.leg_to(place)
         expected = CIRCLES + time_limits.leg_time(await self.limits(), math.hypot(north, east), up)
 
@@ -252,3 +280,4 @@ class Plane(GuidedVehicle):
     async def _reposition(self, job: Job, place: GlobalTarget) -> None:
         await self.commands.send(messages.reposition(place), self.commanding(job, self.flying))
         self.sent(place)
+        await self.send_speeds(job, new_kind=False)

@@ -12,7 +12,7 @@ from typing import Any
 
 from pymavlink import mavutil
 
-from mavproxy_uavapi.core.errors import Invalid, ModeChanged
+from mavproxy_uavapi.core.errors import Invalid
 from mavproxy_uavapi.core.mavlink.link import Address
 from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_uavapi.core.vehicle.jobs import Job
@@ -85,8 +85,8 @@ async def send(vehicle: Vehicle, job: Job, message: Any) -> None:
     """
 
     def require_not_the_pilots() -> None:
-        if vehicle.state.armed and not vehicle.state.landed and vehicle.mode != "GUIDED":
-            raise ModeChanged(f"the vehicle is flying in {vehicle.mode}; `guided` takes it over")
+        if vehicle.is_under_way and vehicle.mode != "GUIDED":
+            raise vehicle.anothers()
 
     require_not_the_pilots()
     vehicle.authority.take(job, Rank.ARM)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from mavproxy_uavapi.core.errors import Busy, Rejected
+from mavproxy_uavapi.core.mavlink.flight_modes import MISSION_MODES, flies_mission
 from mavproxy_uavapi.core.vehicle import messages, time_limits
 from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_uavapi.core.vehicle.guided import GUIDED, TOLERANCE
@@ -15,6 +16,7 @@ RADIUS = 2.0  # m; used until WP_RADIUS is known
 SPEED = 2.0  # m/s; used until CRUISE_SPEED is known
 AT_HOME = 2.0  # waypoint radii from home within which a returned rover stops
 STOP_TIMEOUT = 20.0  # s from full speed to rest
+DRIVING_MODES = {"GUIDED", "RTL", "SMART_RTL", *MISSION_MODES}  # in others a pilot drives, or it stands
 
 
 class Rover(TravellingVehicle):
@@ -26,6 +28,21 @@ class Rover(TravellingVehicle):
         """Raise NotArmed or ModeChanged unless it is armed in GUIDED."""
         self.require_armed()
         self.require_mode(GUIDED)
+
+    @property
+    def stands(self) -> bool:
+        """False: it is always on the ground, and may drive there."""
+        return False
+
+    @property
+    def is_under_way(self) -> bool:
+        """Whether it is armed and drives, or flies its mission, which may have it drive on at any moment."""
+        return bool(self.state.armed) and (flies_mission(self.mode) or not self.stands_still)
+
+    @property
+    def takes_speeds(self) -> bool:
+        """Whether its autopilot takes a speed in the mode that it is in."""
+        return self.mode in DRIVING_MODES
 
     def leg_to(self, target: NedTarget | GlobalTarget) -> tuple[float, float, float]:
         """Metres north and east from here to `target`, and 0 down."""
@@ -121,7 +138,7 @@ class Rover(TravellingVehicle):
             Busy: it is in a mode that does not drive by itself, so the autopilot would forget it.
         """
         self.require_armed()
-        if self.mode == self.holding_mode:
+        if self.mode not in DRIVING_MODES:
             raise Busy(f"the vehicle is in {self.mode}, and forgets it with the next mode; `guided` first")
         self.authority.accompany(job, "reverse")
         mode = self.mode

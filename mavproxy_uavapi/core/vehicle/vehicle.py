@@ -28,16 +28,16 @@ class Vehicle(Verbs):
     async def arm(self, job: Job, timeout: float | None = None) -> None:
         """Wait until it is ready, switch to GUIDED, arm, and wait until it is armed.
 
-        A vehicle that flies in another mode than GUIDED belongs to its pilot: `ModeChanged`. So does one that
-        is armed by another client meanwhile.
+        A vehicle that flies, or a rover that drives, in another mode than GUIDED belongs to its pilot: `ModeChanged`.
+        So does one that is armed by another client meanwhile.
 
         Raises:
             Rejected: it did not get ready, or refused; with the autopilot's reasons.
         """
         if self.state.armed and self.mode == "GUIDED":
             return
-        if self.state.armed and not self.state.landed:
-            raise ModeChanged(f"the vehicle is flying in {self.mode}; `guided` takes it over")
+        if self.is_under_way:
+            raise self.anothers()
         self.authority.take(job, Rank.ARM)
         await arming.arm(self, job, timeout)
         self.authority.shown(job)
@@ -114,16 +114,28 @@ class Vehicle(Verbs):
 
         def landed() -> bool | None:
             self.report_home(job)
-            landing.sinks_at((self.state.field("GLOBAL_POSITION_INT", "vz") or 0) / 100.0)
-            if self.state.armed is not False or self.mode != mode:
-                self.held_by(mode)
-                return None
-            if landing.fell:
-                raise NotArmed("the vehicle was disarmed in flight, and fell")
-            return landing.is_over(self.clock(), self.state.age("GLOBAL_POSITION_INT", self.clock()))
+            return self.has_landed(landing, mode)
 
         names = {"HEARTBEAT", "GLOBAL_POSITION_INT"}
         await self.waiting.until(names, landed, timeout, f"land and disarm in {mode}")
+
+    def has_landed(self, landing: Touchdown, *modes: str) -> bool | None:
+        """Whether it has landed and disarmed in one of the modes; called after each heartbeat and position.
+
+        Raises:
+            NotArmed: its motors stopped in flight.
+            ModeChanged: the pilot or a failsafe has the vehicle.
+        """
+        names = ("vz", "vx", "vy")
+        down, north, east = ((self.state.field("GLOBAL_POSITION_INT", name) or 0) / 100.0 for name in names)
+        landing.moves_at(down, math.hypot(north, east))
+        if self.state.armed is not False or self.mode not in modes:
+            self.held_by(self.mode if self.mode in modes else modes[0])
+            return None
+        landing.disarmed(self.clock())
+        if landing.fell:
+            raise NotArmed("the vehicle was disarmed in flight, and fell")
+        return landing.is_over(self.clock(), self.state.age("GLOBAL_POSITION_INT", self.clock()))
 
     def report_home(self, job: Job) -> None:
         """Set the job's progress: the altitude, and the distance to home."""

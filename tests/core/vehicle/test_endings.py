@@ -67,6 +67,7 @@ EXPECTED = {
     Situation.GUIDED: (None, "hold", "hold", "land", "rtl"),
     Situation.PAUSED: (None, "hold", "hold", "land", "rtl"),
     Situation.MISSION: (None, "hold", None, "land", "rtl"),
+    Situation.TAKEOFF: (None, "hold", None, "land", "rtl"),
     Situation.LAND: (None, "hold", None, None, None),
     Situation.RTL: (None, "hold", None, "land", None),
     Situation.PILOTED: NONE,
