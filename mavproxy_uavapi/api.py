@@ -10,14 +10,21 @@ from mavproxy_uavapi.core.vehicle.stream_requester import StreamRequester
 from mavproxy_uavapi.envelope_file import EnvelopeFile
 from mavproxy_uavapi.http.app import ApiServer
 from mavproxy_uavapi.http.call import Service
+from mavproxy_uavapi.remote_settings import RemoteSettings
 from mavproxy_uavapi.settings import ApiSettings
 
 
 class Api:
-    """The part of uavapi in the asyncio thread; all methods except `filenos` belong to that thread."""
+    """The part of uavapi in the asyncio thread; all methods except `filenos` belong to that thread.
 
-    def __init__(self, host: Host) -> None:
+    Args:
+        host: the vehicles and their jobs.
+        remote: the settings for callers; None where no module has them.
+    """
+
+    def __init__(self, host: Host, remote: RemoteSettings | None = None) -> None:
         self.host = host
+        self._remote = remote
         self._server: ApiServer | None = None
         self._tasks = HeldTasks()
         self._envelope = EnvelopeFile(host.envelopes, host.warn)
@@ -37,7 +44,7 @@ class Api:
             return
         apply(settings, self.host)
         self.use_envelope(settings.envelope)
-        server = ApiServer(Service(self.host, settings))
+        server = ApiServer(Service(self.host, settings, self._remote))
         try:
             await server.start()
         except BaseException:  # also a cancellation: the port must be closed

@@ -20,6 +20,7 @@ from mavproxy_uavapi.core.logs import Logs, print_above_prompt
 from mavproxy_uavapi.core.module import SharedModule
 from mavproxy_uavapi.core.remembered_settings import RememberedSettings
 from mavproxy_uavapi.core.windows import View
+from mavproxy_uavapi.remote_settings import RemoteSettings
 from mavproxy_uavapi.settings import ApiModuleSettings, ApiSettings
 
 NAME = "uavapi"
@@ -77,9 +78,9 @@ class UavApiModule(SharedModule[ApiSettings]):
             completions=COMPLETIONS,
         )
         self.logs = Logs(lambda text: self.host.bridge.post(lambda: print_above_prompt(text, self.mpstate.rl.prompt)))
-        self.api = Api(self.host)
         self._background = BackgroundCommands(self.host, NAME)
         self._changing = asyncio.Lock()  # starts, stops and settings, in the typed order
+        self.api = Api(self.host, RemoteSettings(self.host.bridge, settings, self.change_setting, self._settled))
         self.host.bridge.close_in_children(self.api.filenos)
         self.remembered.keep(self.module_settings.shown)
 
@@ -211,6 +212,11 @@ class UavApiModule(SharedModule[ApiSettings]):
         if self._should_listen:
             take_up = self._renew if after.listens_as(before) else self._restart
             self._background.send(lambda: take_up(after), "taking up the setting")
+
+    async def _settled(self) -> None:
+        """Wait until what was begun before has been taken up."""
+        async with self._changing:
+            pass
 
     async def _restart(self, settings: ApiSettings) -> str:
         """Listen again; calls in flight end."""

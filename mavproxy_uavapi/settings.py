@@ -47,6 +47,21 @@ NOT_OURS: dict[str, dict[str, str]] = {
 # Settings for which an API must listen again: its address, its vehicle, and the access.
 ACCESS = ("token", "tokens", "allow_from", "allow_scripts_from", "allow_open", "cors_origins")
 LISTENING = ("host", "port", "sysid", "ports", "certfile", "keyfile", *ACCESS)
+# What a caller of the API may set. Everything else is set at the prompt only: who may call and what callers may do,
+# limits that hold for callers, folders, files and programs, where vehicles may fly, and what the prompt shows.
+# A new setting is the prompt's unless it is named here.
+SETTABLE = frozenset(
+    {
+        "link_timeout",
+        "max_age",
+        "on_disconnect",
+        "on_lease_end",
+        "on_conflict",
+        "on_script_exit",
+        "script_grace",
+        "debug",
+    }
+)
 ON_SCRIPT_EXIT = ("nothing", "hold", "land", "rtl")
 
 

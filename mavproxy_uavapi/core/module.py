@@ -87,7 +87,7 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
         """
 
     def use_settings(self, name: str, before: Snapshot, after: Snapshot) -> None:
-        """Called when the setting `name` was changed at the prompt, once the main loop runs. It must not block."""
+        """Called when the setting `name` was changed, once the main loop runs. It must not block."""
 
     def mavlink_packet(self, packet: Any) -> None:
         """A message arrived, from any vehicle."""
@@ -139,14 +139,20 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
         if len(args) < 2:
             self._list_settings(*args)
             return
-        name, value = args[0], value_of(args[1:])
-        before = self.module_settings.snapshot()
         try:
-            self.check_change(name)
-            self.module_settings.set(name, value)
+            self.change_setting(args[0], value_of(args[1:]))
         except SettingError as error:
             print(f"{self.name}: {error}")
-            return
+
+    def change_setting(self, name: str, value: Any) -> None:
+        """Set a setting, remember that, and have it take effect. Main loop only.
+
+        Raises:
+            SettingError: it cannot be set now, or not to that value; nothing has changed.
+        """
+        before = self.module_settings.snapshot()
+        self.check_change(name)
+        self.module_settings.set(name, value)
         self.remembered.change(name, value)
         after = self.module_settings.snapshot()
         if after != before and self._begun:

@@ -22,6 +22,7 @@ DEFAULT = "default"  # the origin of a value that was never set
 ENVIRONMENT = "environment"
 KEYWORD = "module load"
 TRUTHS = ["true", "false"]
+UNITS = ("s", "m", "kB", "MB", "requests/s")  # the first word of a meaning, where a setting has one
 TYPE_NAMES = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
 
 Snapshot = TypeVar("Snapshot")
@@ -165,6 +166,23 @@ class ModuleSettings(ABC, Generic[Snapshot]):
         width = max(map(len, self._rows))
         lines = [f"{name:{width}} {self.shown(name):24} {self.origins.get(name, DEFAULT)}" for name in names]
         return [*lines, f"  {self._meaning(self._rows[pattern])}"] if pattern in self._rows else lines
+
+    def reports(self) -> list[dict[str, Any]]:
+        """Each setting as an answer has it: name, value, meaning, unit, what it accepts, default and origin."""
+        return [self._report(row) for row in self._rows.values()]
+
+    def _report(self, row: Any) -> dict[str, Any]:
+        secret, word = row.name in self.secrets, row.label.partition(" ")[0]
+        return {
+            "name": row.name,
+            "value": self.shown(row.name) if secret else self._values[row.name],
+            "meaning": row.label,
+            "unit": word if word in UNITS else "",
+            "accepts": _accepted(row),
+            "choices": TRUTHS if row.type is bool else list(row.choice or ()),
+            "default": "" if secret else row.default,
+            "origin": self.origins.get(row.name, DEFAULT),
+        }
 
     def _meaning(self, row: Any) -> str:
         """Meaning, unit, accepted values and default of a setting."""

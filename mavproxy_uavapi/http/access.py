@@ -24,6 +24,13 @@ def require_role(request: web.BaseRequest, route: Route) -> None:
         raise Forbidden(f"{route.path} needs a token for `{route.needs.word}`; that of {name} is for `{role.word}`")
 
 
+def is_owner(call: Call) -> bool:
+    """Whether the caller is an admin with the token, of this machine, or of a network that may do more."""
+    caller: Caller = call.request[CALLER]
+    trusted = caller.has_token or caller.is_local or caller.is_in(call.service.settings.allow_scripts_from)
+    return caller.role >= Role.ADMIN and trusted
+
+
 def require_owner(call: Call, what: str) -> None:
     """Raise Forbidden unless the caller has the token, is of this machine, or of a network that may do more.
 
@@ -31,7 +38,5 @@ def require_owner(call: Call, what: str) -> None:
         call: the call.
         what: begins the sentence "…: call with the token …".
     """
-    caller: Caller = call.request[CALLER]
-    trusted = caller.has_token or caller.is_local or caller.is_in(call.service.settings.allow_scripts_from)
-    if caller.role < Role.ADMIN or not trusted:
+    if not is_owner(call):
         raise Forbidden(f"{what}: call with the token, or from this machine, or set allow_scripts_from")

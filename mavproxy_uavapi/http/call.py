@@ -27,6 +27,7 @@ from mavproxy_uavapi.http.requests import Request, parse
 from mavproxy_uavapi.http.responses import Answer, envelope
 from mavproxy_uavapi.http.router import NOWHERE, Match
 from mavproxy_uavapi.http.streaming import MOST_OPEN, Slots
+from mavproxy_uavapi.remote_settings import RemoteSettings
 from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.settings import ApiSettings
 from mavproxy_uavapi.tokens import Token, Tokens
@@ -49,6 +50,7 @@ class Service:
     Attributes:
         host: the vehicles and their jobs.
         settings: the present settings.
+        remote_settings: the settings for callers; None where no module has them.
         scripts: the mission scripts.
         tokens: those of operators.
         broadcast: the telemetry for subscribers.
@@ -60,6 +62,7 @@ class Service:
 
     host: Host
     settings: ApiSettings
+    remote_settings: RemoteSettings | None = None
     scripts: Scripts = field(init=False)
     tokens: Tokens = field(init=False)
     broadcast: TelemetryBroadcast = field(init=False)

@@ -11,6 +11,7 @@ from typing import Any
 from mavproxy_uavapi.http import requests
 from mavproxy_uavapi.http.message import RawMessage
 from mavproxy_uavapi.http.parameters import NewValue
+from mavproxy_uavapi.http.settings import NewSetting
 from mavproxy_uavapi.http.telemetry_views import SENSORS
 
 PLACE = {"lat": -35.3629, "long": 149.1652, "alt": 20}
@@ -46,6 +47,17 @@ JOB = {
     "result": None,
     "error": None,
 }
+SETTING = {
+    "name": "max_age",
+    "value": 3.0,
+    "meaning": "s after which telemetry is stale",
+    "unit": "s",
+    "accepts": "a number from 0.1 to 3600",
+    "choices": [],
+    "default": 5.0,
+    "origin": "uavapi set",
+    "settable": True,
+}
 ABORTED = {"status": 409, "code": "aborted", "detail": "/movement/go_to_ned_wait was aborted by DELETE /jobs/7"}
 WPL = """\
 QGC WPL 110
@@ -61,6 +73,7 @@ REQUESTS: Mapping[type[requests.Request], Mapping[str, Any]] = {
     requests.LandAt: {"lat": -35.3629, "long": 149.1652},
     requests.Reverse: {"reverse": True},
     NewValue: {"value": 500},
+    NewSetting: {"value": 3},
     requests.ModeName: {"mode": "LOITER"},
     requests.NewSpeed: {"new_v": 5},
     requests.SimFactor: {"sim_factor": 5},
@@ -104,6 +117,7 @@ PATH_PARAMETERS = {
         "/telemetry/message/{name}": "ATTITUDE",
         "/mission/scripts/{name}": "square.py",
         "/parameters/{name}": "WPNAV_SPEED",
+        "/settings/{name}": "max_age",
     },
     "sysid": {"/vehicles/{sysid}": "1"},
     "id": {"/jobs/{id}": "7", "/logs/{id}": "3"},
@@ -290,6 +304,8 @@ BODIES: Mapping[str, Mapping[str, Any]] = {
     "/vehicles": {"vehicles": [VEHICLE]},
     "/vehicles/{sysid}": VEHICLE,
     "/jobs": {"jobs": [JOB]},
+    "/settings": {"settings": [SETTING]},
+    "/settings/{name}": {"result": "max_age is 3.0", **SETTING},
     "GET /jobs/{id}": JOB,
     "DELETE /jobs/{id}": {**JOB, "state": "aborted", "error": ABORTED},
 }

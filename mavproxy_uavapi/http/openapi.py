@@ -39,6 +39,7 @@ TAGS = {
     "parameters": "The autopilot's parameters; each new value is read back.",
     "logs": "The dataflash logs that a vehicle holds, and their download to this machine.",
     "envelope": "Where vehicles may fly. Nothing that leads out of it is sent, whoever asks for it.",
+    "settings": "The settings of this module. Access, limits of callers, and files are set at the prompt only.",
     "message": "Any MAVLink message, for what has no verb. Off unless the setting `allow_raw` is true.",
     "authority": "Which operator holds a vehicle. Taking it and giving it back sends nothing.",
     "vehicles": "All known vehicles. The prefix `/vehicles/{sysid}` of any path means that vehicle; without it the "
@@ -73,6 +74,7 @@ BY_TAG: Mapping[str, tuple[type[UavApiError], ...]] = {
     "vehicles": (errors.NotFound,),
     "authority": (errors.NoVehicle, errors.Busy),
     "parameters": (*OF_A_VEHICLE, errors.NotFound, errors.TimedOut, errors.OutsideEnvelope),
+    "settings": (errors.NotFound, errors.TimedOut),
     "logs": (*OF_A_COMMAND, errors.NotFound, errors.Stale, errors.Aborted, errors.ToolFailed),
     "fleet": (),
     "docs": (errors.NotFound,),

@@ -20,6 +20,7 @@ from mavproxy_uavapi.http import (
     photo,
     requests,
     scripts,
+    settings,
     stream,
     telemetry,
     tiles,
@@ -148,6 +149,12 @@ ENVELOPE = [
     Route("/envelope", envelope.put, requests.Empty, ADMIN, ("PUT",), raw=True),
     Route("/envelope", envelope.remove, requests.Empty, ADMIN, ("DELETE",)),
 ]
+
+SETTINGS = [
+    Route("/settings", settings.show, requests.Empty, WATCH),
+    Route("/settings/{name}", settings.put, settings.NewSetting, ADMIN, ("PUT",)),
+]
+
 MESSAGE = [Route("/message", message.send_message, message.RawMessage, ADMIN, POST, job=True)]
 
 AUTHORITY = [
@@ -184,6 +191,7 @@ ROUTES = [
     *PARAMETERS,
     *LOGS,
     *ENVELOPE,
+    *SETTINGS,
     *MESSAGE,
     *AUTHORITY,
     *VEHICLES,
