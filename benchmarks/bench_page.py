@@ -1,6 +1,8 @@
 """The page at / with a fleet in flight, in headless Chromium: does it stutter, does it leak?
 
-    python benchmarks/bench_page.py [--vehicles 10] [--seconds 20] [--minutes 0] [--pictures docs/pictures]
+    python benchmarks/bench_page.py [--vehicles 10] [--seconds 20] [--minutes 0] [--pictures docs/pictures --name fleet]
+
+The pictures of the docs are those of ten vehicles, and of three with `--vehicles 3 --name page`.
 
 Embedded vehicles at speed 1 and one MAVProxy; each vehicle flies around its own place. requestAnimationFrame tells
 when a frame is drawn: at 60 Hz one is due every 16.7 ms. `busy` is the processor time of the page's main thread;
@@ -39,9 +41,9 @@ setInterval(() => view.zoom(1 + 0.02 * Math.sin(Date.now() / 300)), 16)}"""
 THEME = """{document.querySelector('page-preferences').context.preferences.set('theme', '%s');
 document.querySelector('top-view').camera.fit()}"""
 PICTURES = {
-    "fleet-light": ("light", 1440, 900),
-    "fleet-dark": ("dark", 1440, 900),
-    "fleet-phone": ("light", 390, 844),
+    "light": ("light", 1440, 900),
+    "dark": ("dark", 1440, 900),
+    "phone": ("light", 390, 844),
 }
 MEGABYTE = 1e6
 
@@ -121,14 +123,14 @@ async def leak(page: Page, minutes: int) -> list[list[str]]:
     return rows
 
 
-async def take_pictures(page: Page, folder: Path) -> None:
-    """The page with its fleet, in both themes and on a phone."""
+async def take_pictures(page: Page, folder: Path, beginning: str) -> None:
+    """The page with its fleet, in both themes and on a phone; `beginning` is that of the files' names."""
     for name, (theme, width, height) in PICTURES.items():
         await page.resize(width, height)
         await page.evaluate(THEME % theme)
         await asyncio.sleep(3)  # the camera comes to rest
         picture = await page.picture()
-        await asyncio.to_thread((folder / f"{name}.png").write_bytes, picture)
+        await asyncio.to_thread((folder / f"{beginning}-{name}.png").write_bytes, picture)
 
 
 async def look(rig: Any, directory: Path, options: argparse.Namespace) -> None:
@@ -140,7 +142,7 @@ async def look(rig: Any, directory: Path, options: argparse.Namespace) -> None:
         await page.until(f"document.querySelectorAll('vehicle-bar button').length === {options.vehicles}")
         rows = [await frames(page, "looking", options.seconds)]
         if options.pictures:
-            await take_pictures(page, options.pictures)
+            await take_pictures(page, options.pictures, options.name)
             await page.resize(1440, 900)
         if options.minutes:
             print(table(["minute", "heap MB", "nodes"], await leak(page, options.minutes)), flush=True)
@@ -164,6 +166,7 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=20.0, help="of each look (%(default)g)")
     parser.add_argument("--minutes", type=int, default=0, help="to watch the heap (%(default)s)")
     parser.add_argument("--pictures", type=Path, help="folder for pictures of the fleet")
+    parser.add_argument("--name", default="fleet", help="with which their names begin (%(default)s)")
     options = parser.parse_args()
     print(f"page: {machine()}", flush=True)
     with fleet(options.vehicles) as (rig, _controls):

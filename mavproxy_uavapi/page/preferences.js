@@ -1,8 +1,9 @@
-// What this browser likes: theme, the height of a take-off. Nothing here changes the vehicle or the API.
+// What this browser likes: theme, the height of a take-off. Below it the settings of the API.
 
 import {Panel} from "./panel.js";
 import {element, heightInput, heightOf, labelled} from "./dom.js";
 import {forgetColours} from "./colours.js";
+import "./setting_list.js";
 
 const KEY = "uavapi-page";
 const DEFAULTS = {theme: "auto", alt: 10};
@@ -39,6 +40,7 @@ export class PagePreferences extends Panel {
     theme.value = preferences.theme;
     const alt = heightInput(preferences.alt, "height of a take-off in m");
     alt.addEventListener("change", () => { if (heightOf(alt) !== null) preferences.set("alt", heightOf(alt)); });
+    this.settings = document.createElement("setting-list");
     const forget = element("button", {type: "button", on: {click: () => api.setToken("")}}, "Forget the token");
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { forgetColours(); this.context.painter.touch(); });
     this.append(element("h3", {}, "This browser"), labelled("theme", theme), labelled("height of a take-off", alt, "m"),
@@ -48,7 +50,9 @@ export class PagePreferences extends Panel {
         element("dt", {}, "Space or Enter, held 1 s"), element("dd", {}, "does what the focused button says"),
         element("dt", {}, "arrows on the top view"), element("dd", {}, "choose a place, 1 m a press, 10 m with Shift; Enter takes it"),
         element("dt", {}, "+ and −"), element("dd", {}, "nearer, farther")),
-      element("p", {}, "The API itself: ", element("a", {href: "/docs"}, "/docs"), ". Its settings are changed at MAVProxy's prompt: uavapi set."));
+      this.settings,
+      element("p", {}, "The other settings are changed at MAVProxy's prompt: uavapi set. The calls of the API: ", element("a", {href: "/docs"}, "/docs"), "."));
+    this.settings.start(this.context);
   }
 }
 

@@ -212,6 +212,21 @@ def test_listing_is_of_a_name_a_beginning_or_a_pattern() -> None:
         settings.listing("lwo")
 
 
+def test_reports_have_the_values_and_no_secrets() -> None:
+    settings = demo({"password": "hunter2", "high": 7})
+    reports = {one["name"]: one for one in settings.reports()}
+    assert list(reports) == settings.names()
+    assert (reports["high"]["value"], reports["high"]["default"], reports["high"]["origin"]) == (
+        7.0,
+        5.0,
+        "module load",
+    )
+    assert reports["loud"]["choices"] == ["true", "false"] and reports["mode"]["choices"] == ["land", "hold"]
+    assert reports["low"]["accepts"] == "a whole number from 0 to 10"
+    assert reports["password"]["value"] == "(set)" and "hunter2" not in str(reports)
+    assert demo().reports()[-1]["value"] == ""
+
+
 def test_a_single_setting_is_explained() -> None:
     assert demo({}).listing("low")[1:] == ["  : a whole number from 0 to 10; default 1"]
     assert demo({}).listing("loud")[1:] == ["  : true or false; default False"]

@@ -87,6 +87,24 @@ async def see_readings(pilot: Pilot) -> None:
     await pilot.sees("reading-curves", "21.50")
 
 
+async def set_a_setting(pilot: Pilot) -> None:
+    await pilot.click("Settings")
+    await pilot.sees("setting-list", "s after which telemetry is stale")
+    await pilot.page.evaluate(
+        """{const input = document.querySelector('setting-list input[aria-label^=max_age]');
+           input.value = '4'; input.dispatchEvent(new Event('input'))}"""
+    )
+    await pilot.hold_the(
+        "[...document.querySelectorAll('setting-list input')].find(i => "
+        "i.ariaLabel.startsWith('max_age')).nextSibling"
+    )
+    await pilot.sees("setting-list .answer", "max_age is 4.0")
+    assert any(
+        one["value"] == 4 for one in pilot.rig.ok(pilot.rig.get("/settings"))["settings"] if one["name"] == "max_age"
+    )
+    assert await pilot.page.evaluate("!document.querySelector('setting-list [aria-label^=port]')")
+
+
 async def look(rig: Any, directory: Path) -> list[str]:
     settings = json.dumps({"sink": "http://127.0.0.1:9/", "spool": f"{directory}/spool.db"}, separators=(",", ":"))
     rig.mavproxy.ask(f"module load gradys:{settings}", "Loaded module gradys")
@@ -101,6 +119,8 @@ async def look(rig: Any, directory: Path) -> list[str]:
         await see_the_fence(pilot)
         await hold_and_release(pilot)
         await download_a_log(pilot)
+        await pilot.finds_it_accessible()
+        await set_a_setting(pilot)
         await pilot.finds_it_accessible()
         await see_readings(pilot)
         await pilot.finds_it_accessible()

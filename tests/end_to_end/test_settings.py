@@ -146,6 +146,21 @@ def test_setting_takes_effect_at_once_and_a_refused_one_does_not(rig, harness):
     harness.eventually(lambda: not refused())
 
 
+def test_setting_is_set_by_http_as_at_the_prompt_which_says_so(rig, harness):
+    before = len(rig.terminal.lines) - 1
+    answer = rig.call("PUT", "/settings/max_age", json={"value": 3})
+    assert (answer.status_code, answer.json()["value"]) == (200, 3.0), answer.text
+    shown(rig, harness, "uavapi: max_age is 3.0, set by 127.0.0.1", before)
+    assert configuration(rig, harness)["max_age"] == ("3.0", "uavapi set")
+    listed = {one["name"]: one for one in rig.ok(rig.get("/settings"))["settings"]}
+    assert listed["max_jobs"]["origin"] == str(rig.directory / "uav.ini")
+    assert (listed["max_age"]["value"], listed["max_age"]["settable"]) == (3.0, True)
+    for name, value in (("port", 1), ("python_path", "/bin/true"), ("max_age", "NaN")):
+        assert rig.call("PUT", f"/settings/{name}", json={"value": value}).status_code == 422
+    after = {one["name"]: one for one in rig.ok(rig.get("/settings"))["settings"]}
+    assert after == listed
+
+
 def test_setting_that_changes_in_flight_ends_no_call(rig):
     rig.in_the_air(6)
     answer = rig.post("/movement/travel_at_ned?wait=false", vx=3, vy=0, vz=0, duration=30)

@@ -42,6 +42,7 @@ OPEN = {"/", "/page/{file}", "/docs", "/docs/{file}", "/openapi.json"}
 FOR_ADMINS = {
     "POST /parameters",
     "PUT /parameters/{name}",
+    "PUT /settings/{name}",
     "PUT /envelope",
     "DELETE /envelope",
     "POST /message",
@@ -49,8 +50,8 @@ FOR_ADMINS = {
     *(f"POST /fleet/{verb}" for verb in ("reboot", "set_sim_speedup")),
 }
 FOR_WATCHERS = re.compile(
-    r"GET (/telemetry/.*|/jobs.*|/vehicles.*|/parameters|/parameters\.param|/envelope|/authority|/mission/progress"
-    r"|/logs|/logs/{id}|/vision/(status|tags|frame\.jpg|stream\.mjpg)|/gradys/(status|recent)|/tiles.*)"
+    r"GET (/telemetry/.*|/jobs.*|/vehicles.*|/parameters|/parameters\.param|/settings|/envelope|/authority"
+    r"|/mission/progress|/logs|/logs/{id}|/vision/(status|tags|frame\.jpg|stream\.mjpg)|/gradys/(status|recent)|/tiles.*)"
 )
 
 

@@ -29,7 +29,10 @@ class Pilot:
 
     async def hold(self, label: str) -> None:
         """Hold a button until it acts."""
-        element = BUTTON.format(tag="hold-button", label=label)
+        await self.hold_the(BUTTON.format(tag="hold-button", label=label))
+
+    async def hold_the(self, element: str) -> None:
+        """Hold the button that the script `element` gives, until it acts."""
         await self.page.until(f"!{element}.button.disabled")
         await self.page.evaluate(f"window.acted = false; {element}.addEventListener('confirmed', () => acted = true)")
         x, y = await self.page.middle(element)

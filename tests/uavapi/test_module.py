@@ -500,6 +500,40 @@ def test_unload_takes_its_descriptors_back_from_a_host_that_goes_on(
     assert other.host.bridge.running
 
 
+def put(port: int, name: str, value: Any) -> tuple[int, Any]:
+    url, body = f"http://127.0.0.1:{port}/settings/{name}", json.dumps({"value": value}).encode()
+    request = urllib.request.Request(url, body, {"Content-Type": "application/json"}, method="PUT")
+    try:
+        with urllib.request.urlopen(request, timeout=5) as response:
+            return response.status, json.load(response)
+    except urllib.error.HTTPError as error:
+        with error:
+            return error.code, json.load(error)
+
+
+def test_setting_that_comes_by_http_is_set_as_at_the_prompt_and_outlives_a_reload(
+    loader: Loader, module: Any, main_loop: Any, port: int, output: Any
+) -> None:
+    answers: list[Any] = []
+    in_force: list[float] = []
+
+    def call() -> None:
+        answers.append(put(port, "script_grace", 3))
+        in_force.append(module.api._server.service.settings.script_grace)
+        answers.append(put(port, "python_path", "/tmp/mine"))
+
+    client = threading.Thread(target=call)
+    client.start()
+    printed = output("uavapi: script_grace is 3.0, set by 127.0.0.1\n")
+    main_loop.until(lambda: not client.is_alive())
+    assert [status for status, _ in answers] == [200, 422]
+    assert in_force == [3.0] and "python_path" not in printed
+    loader.unload(module)
+    again = loader.load()
+    assert again.module_settings.snapshot().script_grace == 3
+    assert again.module_settings.origins["script_grace"] == "uavapi set"
+
+
 def test_setting_that_needs_no_other_listening_leaves_calls_in_flight_alone(
     module: Any, main_loop: Any, port: int, msg: Any, tmp_path: Any, output: Any
 ) -> None:

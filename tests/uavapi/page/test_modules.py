@@ -18,6 +18,8 @@ from tests.support.chromium import Page, chromium
 
 pytestmark = pytest.mark.needs("chromium")
 
+HOUR = 36_000  # events of a view at 10 Hz
+
 # module -> scripts that must give true; `m` is the module
 CHECKS = {
     "areas": [
@@ -36,6 +38,45 @@ CHECKS = {
         "same(m.axisOf(-7, 3), {bottom: -10, top: 5, step: 5})",
         "m.axisOf(5, 5).top > m.axisOf(5, 5).bottom",
         "Math.abs(m.axisOf(21.5, 21.6).step - 0.05) < 1e-9",
+    ],
+    # What a vehicle is remembered by is bounded, however long the page is open: an hour of ten events a second.
+    "fleet": [
+        f"""{{const f = new m.Fleet(); let most = [0, 0, 0, 0, 0];
+           for (let n = 0; n < {HOUR}; n += 1) {{
+             const position = {{lat: -35 + n * 1e-5, lon: 149, relative_alt: 20}};
+             f.take({{system: 1, view: 'gps', info: {{position}}}}, n * 100);
+             f.take({{system: 1, view: 'general', info: {{groundspeed: 5}}}}, n * 100);
+             f.take({{system: 1, view: 'ned', info: {{position: {{x: 0, y: 0}}}}}}, n * 100);
+             if (n % 50 === 0) {{
+               f.take({{system: 1, event: 'statustext', time: n, info: {{severity: 6, text: String(n)}}}}, n * 100);
+               f.take({{system: 1, event: 'tag', info: {{id: n, seen: true, ned: [1, 1, 0]}}}}, n * 100);
+               const job = state => f.take({{system: 1, event: 'job', info: {{job: String(n), state}}}}, n * 100);
+               job('running'); job('failed');
+             }}
+             const v = f.of(1), kept = [v.trail, v.history.alt, v.history.speed, v.texts, v.tags];
+             most = most.map((one, k) => Math.max(one, kept[k].length));
+           }}
+           same([...most, f.jobs.size], [1000, 1200, 1200, 200, 50, 60])}}""",
+        # what stands still leaves one place
+        """{const v = new m.Vehicle(1);
+           for (let n = 0; n < 100; n += 1) v.moved({position: {lat: -35, lon: 149, relative_alt: 0}}, n);
+           v.trail.length === 1}""",
+        # jobs that still run are kept, the oldest that ended is forgotten
+        """{const f = new m.Fleet();
+           const state = n => (n < 2 ? 'running' : 'succeeded');
+           for (let n = 0; n < 100; n += 1) f.heardJob({system: 1, info: {job: n, state: state(n)}});
+           f.jobs.size === 60 && f.jobs.has(0) && f.jobs.has(1) && !f.jobs.has(2) && f.jobs.has(99)}""",
+    ],
+    "stream": [
+        """(async () => {
+           const text = n => `data: {"n": ${n}}\n\n`, parts = Array.from({length: 300}, (_, n) => text(n)).join('');
+           const body = new Blob([parts]).stream(), heard = [];
+           await m.readEvents(new Response(body), event => heard.push(event.n));
+           return heard.length === 300 && heard[299] === 299})()""",
+    ],
+    "setting_list": [
+        """same(m.inOrder([{name: 'a', settable: false}, {name: 'b', settable: true}, {name: 'c', settable: true}])
+           .map(one => one.name), ['b', 'c', 'a'])""",
     ],
     "freshness": [
         "m.ageText(Infinity) === 'never heard' && m.ageText(3210) === '3.2 s' && m.ageText(7.2e6) === '2 h'",
@@ -63,6 +104,12 @@ CHECKS = {
     ],
     "log_list": ["m.sizeText(999) === '999 B' && m.sizeText(1500) === '2 kB' && m.sizeText(2.54e6) === '2.5 MB'"],
     "tiles": [
+        # of a map only so many pictures are kept; the memory of the others is given back
+        """{const api = Object.assign(new EventTarget(), {get: async () => { throw 0; }});
+           const layer = new m.TileLayer(api, {touch() {}});
+           let closed = 0;
+           for (let n = 0; n < 1000; n += 1) { layer.tiles.set(`${n}`, {close() { closed += 1; }}); layer.forget(); }
+           layer.tiles.size === 300 && closed === 700 && layer.tiles.has('999')}""",
         "same(m.tileAt(0, 0, 1), [1, 1]) && same(m.tileAt(0, -180, 3), [0, 4])",
         "same(m.tileAt(51.5074, -0.1278, 10).map(Math.floor), [511, 340])",  # London
         """{const [lat, lon] = m.cornerOf(...m.tileAt(-35.36, 149.16, 17), 17);
