@@ -1,0 +1,55 @@
+// The settings of uavapi: all are shown; those that this caller may set by HTTP have an input.
+
+import {CommandPanel} from "./command_panel.js";
+import {element, setAttribute} from "./dom.js";
+import "./hold_button.js";
+
+export class SettingList extends CommandPanel {
+  build() {
+    this.rows = element("dl", {class: "settings"});
+    this.append(element("h3", {}, "The API"), this.answer, this.rows);
+    this.closest("[data-tab]").addEventListener("opened", () => this.look());
+    this.context.api.addEventListener("token-changed", () => { if (this.checkVisibility()) this.look(); });
+  }
+
+  async look() {
+    const listed = await this.attempt(() => this.context.api.get("/settings"));
+    if (!listed) return void this.rows.replaceChildren(); // another caller's rights are not shown as one's own
+    this.say("", "");
+    this.rows.replaceChildren(...inOrder(listed.settings).flatMap(one => this.row(one)));
+  }
+
+  row(setting) {
+    const {name, meaning, accepts, origin} = setting;
+    const about = element("span", {class: "about"}, `${meaning}; ${origin === "default" ? "the default" : `by ${origin}`}`);
+    const value = setting.settable ? this.editor(setting) : [element("span", {class: "value"}, shown(setting.value))];
+    return [element("dt", {title: accepts}, element("b", {}, name), about), element("dd", {}, ...value)];
+  }
+
+  editor(setting) {
+    const label = {"aria-label": `${setting.name}, ${setting.accepts}`}, value = shown(setting.value);
+    const input = setting.choices.length
+      ? element("select", label, ...setting.choices.map(choice => element("option", {value: choice}, choice)))
+      : element("input", {type: "text", autocomplete: "off", spellcheck: false, ...label});
+    input.value = value;
+    const set = element("hold-button", {label: "Set", disabled: "", on: {confirmed: () => this.set(setting, input)}});
+    input.addEventListener("input", () => setAttribute(set, "disabled", input.value === value));
+    return [input, set];
+  }
+
+  async set({name}, input) {
+    this.say(`${name} …`, "wait");
+    const options = {json: {value: input.value}, timeout: 20000};
+    const done = await this.attempt(() => this.context.api.call("PUT", `/settings/${name}`, options));
+    if (!done) return;
+    await this.look();
+    this.say(done.result, "good");
+  }
+}
+
+/** Those that may be set first; otherwise as they come. */
+export const inOrder = settings => [...settings].sort((a, b) => b.settable - a.settable);
+
+const shown = value => String(value);
+
+customElements.define("setting-list", SettingList);
