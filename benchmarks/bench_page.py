@@ -1,8 +1,6 @@
 """The page at / with a fleet in flight, in headless Chromium: does it stutter, does it leak?
 
-    python benchmarks/bench_page.py [--vehicles 10] [--seconds 20] [--minutes 0] [--pictures docs/pictures --name fleet]
-
-The pictures of the docs are those of ten vehicles, and of three with `--vehicles 3 --name page`.
+    python benchmarks/bench_page.py [--vehicles 10] [--seconds 20] [--minutes 0] [--pictures docs/pictures]
 
 Embedded vehicles at speed 1 and one MAVProxy; each vehicle flies around its own place. requestAnimationFrame tells
 when a frame is drawn: at 60 Hz one is due every 16.7 ms. `busy` is the processor time of the page's main thread;
@@ -19,17 +17,18 @@ import contextlib
 import json
 import math
 import sys
+import tempfile
 import threading
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from bench_fleet_verbs import fleet
 from bench_station_page import FRAMES
 from rig import harness, machine, percentile, table
 
 from tests.support.chromium import Page, chromium
+from tests.support.several_vehicles import several_vehicles
 
 ALT = 20.0  # m
 RING, OWN = 60.0, 18.0  # m from home to the middle of a vehicle's flight, and from there to its corners
@@ -142,7 +141,7 @@ async def look(rig: Any, directory: Path, options: argparse.Namespace) -> None:
         await page.until(f"document.querySelectorAll('vehicle-bar button').length === {options.vehicles}")
         rows = [await frames(page, "looking", options.seconds)]
         if options.pictures:
-            await take_pictures(page, options.pictures, options.name)
+            await take_pictures(page, options.pictures, "fleet")
             await page.resize(1440, 900)
         if options.minutes:
             print(table(["minute", "heap MB", "nodes"], await leak(page, options.minutes)), flush=True)
@@ -166,10 +165,13 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=20.0, help="of each look (%(default)g)")
     parser.add_argument("--minutes", type=int, default=0, help="to watch the heap (%(default)s)")
     parser.add_argument("--pictures", type=Path, help="folder for pictures of the fleet")
-    parser.add_argument("--name", default="fleet", help="with which their names begin (%(default)s)")
     options = parser.parse_args()
     print(f"page: {machine()}", flush=True)
-    with fleet(options.vehicles) as (rig, _controls):
+    systems = range(1, options.vehicles + 1)
+    with (
+        tempfile.TemporaryDirectory(prefix="uavapi-bench-") as folder,
+        several_vehicles(Path(folder), systems, speedup=1) as (rig, _),
+    ):
         harness.eventually(lambda: all(one["ready_to_arm"] for one in rig.ok(rig.get("/vehicles"))["vehicles"]))
         with flying(rig, options.vehicles):
             asyncio.run(look(rig, rig.directory, options))

@@ -1,0 +1,95 @@
+"""The pictures of the page in the documentation: three embedded copters in flight, the first on a mission.
+
+    python benchmarks/page_pictures.py [--folder docs/pictures]
+
+They are `page-light.png`, `page-dark.png` and `page-phone.png`.
+`bench_page.py --pictures` makes those of ten vehicles.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+from bench_page import LIVE, lift, take_pictures
+from rig import harness
+
+from tests.support.chromium import chromium
+from tests.support.several_vehicles import several_vehicles
+
+HOME = -35.363261, 149.165230  # degrees
+METRES_PER_DEGREE, SHRUNK = 111_319.0, 0.8155  # of latitude; cosine of HOME's latitude
+SYSTEMS = (1, 2, 3)
+CORNERS = ((0, 30), (35, 45), (40, 5), (15, -25))  # m north and east, of the mission
+FIRST_LEGS = {2: (40, -15), 3: (-18, 50)}  # m north and east, by vehicle
+SECOND_LEGS = {2: (25, -45), 3: (-20, -10)}
+LEG = 9.0  # s
+HEIGHT = 12.0  # m; a vehicle is higher by its number
+APART = 5.0  # m from one vehicle's home to the next one's
+
+
+def item(command: str, north: float = 0, east: float = 0) -> dict[str, Any]:
+    """An item of the mission."""
+    lat, lon = HOME[0] + north / METRES_PER_DEGREE, HOME[1] + east / METRES_PER_DEGREE / SHRUNK
+    return {"command": command, "frame": "relative", "lat": lat, "long": lon, "alt": HEIGHT}
+
+
+def home(number: int) -> str:
+    """`--home` of a vehicle: east of the one before."""
+    return f"{HOME[0]},{HOME[1] + (number - 1) * APART / METRES_PER_DEGREE / SHRUNK:.7f},584,353"
+
+
+def fly(rig: Any) -> None:
+    """Begin the flights that the pictures show."""
+    rig.ok(rig.get("/vehicles/1/command/guided"))
+    takeoff = {**item("NAV_TAKEOFF"), "lat": 0, "long": 0}  # where it is
+    mission = [takeoff, *(item("NAV_WAYPOINT", *corner) for corner in CORNERS)]
+    rig.ok(rig.post("/vehicles/1/mission/waypoints", items=mission))
+    for number in FIRST_LEGS:
+        lift(rig, number)
+    rig.ok(rig.post("/vehicles/1/command/arm"))
+    rig.ok(rig.post("/vehicles/1/mission/start"))
+    for legs in (FIRST_LEGS, SECOND_LEGS):
+        time.sleep(LEG)
+        for number, (north, east) in legs.items():
+            target = {"x": north, "y": east, "z": -HEIGHT - number}
+            rig.ok(rig.post(f"/vehicles/{number}/movement/go_to_ned", **target))
+    time.sleep(LEG / 3)
+
+
+async def look(rig: Any, directory: Path, folder: Path) -> None:
+    """Open the page, and take the pictures when the flights have begun."""
+    async with chromium(directory) as page:
+        await page.visit(f"{rig.url}/")
+        await page.until(LIVE)
+        await asyncio.to_thread(fly, rig)
+        await page.evaluate("document.querySelector('top-view').context.fleet.choose(1)")
+        await page.evaluate("document.querySelector('mission-plan').read()")
+        await take_pictures(page, folder, "page")
+
+
+def main() -> int:
+    """Make them."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--folder", type=Path, default=Path("docs/pictures"), help="(%(default)s)")
+    options = parser.parse_args()
+    modules = ["--load-module=vision", "--load-module=gradys"]
+    with (
+        tempfile.TemporaryDirectory(prefix="uavapi-pictures-") as name,
+        several_vehicles(Path(name), SYSTEMS, speedup=1, arguments=modules, homes=list(map(home, SYSTEMS))) as (
+            rig,
+            _,
+        ),
+    ):
+        harness.eventually(lambda: all(one["ready_to_arm"] for one in rig.ok(rig.get("/vehicles"))["vehicles"]))
+        asyncio.run(look(rig, Path(name), options.folder))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
