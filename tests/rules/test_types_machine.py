@@ -136,6 +136,17 @@ class TypesAuthority(RuleBasedStateMachine):
         self.world.pilot(PILOTS_MODES[self.kind][which])
         self.then(later)
 
+    @precondition(lambda self: self.world.vehicle.mode.name == "GUIDED" and self.world.vehicle.armed)
+    @rule()
+    def pilot_takes_a_movement(self) -> None:
+        """What needs GUIDED ends; `TypesWorld.look` says if it does not."""
+        self.all_well()
+        self.ask_to_move((0.004, -0.003), True, 1.5)
+        self.touched_at = self.world.loop.time()
+        self.world.pilot(PILOTS_MODES[self.kind][0])
+        self.then(2.0)
+        self.then(6.0)
+
     @rule(mode=st.sampled_from(["GUIDED", "RTL", "AUTO", "LOITER"]), later=LATER)
     def pilot_chooses(self, mode: str, later: float) -> None:
         self.touched_at = self.world.loop.time()
