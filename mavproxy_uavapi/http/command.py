@@ -63,7 +63,7 @@ async def rtl(call: Call) -> Answer:
 
 
 async def brake(call: Call) -> Answer:
-    """Stop at once: a copter in BRAKE mode, a plane by circling in LOITER, a rover in HOLD."""
+    """Stop at once: a copter in BRAKE mode, a plane by circling in LOITER or hovering, a rover in HOLD."""
     vehicle = call.vehicle
     result = f"{vehicle.kind.capitalize()} braking. Use /command/guided to enable movement commands again"
     return await call.fly(vehicle, vehicle.brake, result, outlives_client=True, urgent=True)

@@ -155,7 +155,7 @@ async def set_yaw_rate(call: Call) -> Answer:
 async def stop(call: Call) -> Answer:
     """Hold a copter still until it is resumed; its movement waits, and no other begins.
 
-    A plane circles in LOITER and a rover stops in HOLD; their movement ends.
+    A plane circles in LOITER, or hovers, and a rover stops in HOLD; their movement ends.
     """
     vehicle = call.vehicle
     result = STOPPED.get(vehicle.kind, f"{vehicle.kind.capitalize()} has stopped")

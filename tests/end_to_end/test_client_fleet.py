@@ -21,7 +21,7 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
     """Two copters, 1 and 2, behind one MAVProxy."""
     rig = Rig(tmp_path_factory.mktemp("fleet"), free_port())
     try:
-        first, masters = free_instance(), []
+        first, masters = free_instance(2), []
         for system in (1, 2):
             instance = first + system - 1
             command = [sys.executable, "-m", "mavproxy_uavapi.sim", f"--instance={instance}", f"--home={HOME}"]

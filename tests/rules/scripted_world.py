@@ -99,6 +99,30 @@ class Flight:
         return f"{self.job.verb} {self.job.request} (job {self.job.id})"
 
 
+def watch_jobs(host: Host, flights: dict[str, Flight], on_ended: list[Callable[[Flight], None]]) -> None:
+    """Enter each job of `host` in `flights`, by its number, and have `the_job` say who sends."""
+    jobs, begin = host.jobs, host.jobs.begin
+
+    def watched(vehicle: Any, verb: str, request: Any, body: Any, **options: Any) -> Job:
+        async def tagged(job: Job) -> str:
+            the_job.set(job)
+            return str(await body(job))
+
+        job = begin(vehicle, verb, request, tagged, **options)
+        if job.id not in flights:
+            flights[job.id] = Flight(job, vehicle.mode, vehicle.state.armed)
+        return job
+
+    def ended(job: Job) -> None:
+        flight = flights[job.id]
+        flight.ended_in = job.vehicle.mode
+        for look in on_ended:
+            look(flight)
+
+    jobs.begin = watched  # type: ignore[method-assign]
+    jobs.on_ended.insert(0, ended)
+
+
 class ScriptedWorld:
     """A vehicle, a host that flies it, and the API.
 
@@ -128,7 +152,7 @@ class ScriptedWorld:
         self.nan: set[str] = set()
         self.wires: list[Any] = []
         self.streams: dict[int, asyncio.Task[None]] = {}
-        self._watch_jobs()
+        watch_jobs(self.host, self.flights, self.on_ended)
         self.service = Service(self.host, ApiModuleSettings(SETTINGS, environ={}).snapshot())
         endings = self.host.endings
         endings.on_disconnect, endings.on_script_exit = Policy(on_disconnect), Policy(on_script_exit)
@@ -137,28 +161,6 @@ class ScriptedWorld:
         self.drone.power_on()
         self._watch = self.loop.create_task(StreamRequester(self.host.registry, 0).run())
         self.loop.pass_time(0.6)
-
-    def _watch_jobs(self) -> None:
-        jobs, begin = self.host.jobs, self.host.jobs.begin
-
-        def watched(vehicle: Any, verb: str, request: Any, body: Any, **options: Any) -> Job:
-            async def tagged(job: Job) -> str:
-                the_job.set(job)
-                return str(await body(job))
-
-            job = begin(vehicle, verb, request, tagged, **options)
-            if job.id not in self.flights:
-                self.flights[job.id] = Flight(job, vehicle.mode, vehicle.state.armed)
-            return job
-
-        def ended(job: Job) -> None:
-            flight = self.flights[job.id]
-            flight.ended_in = job.vehicle.mode
-            for look in self.on_ended:
-                look(flight)
-
-        jobs.begin = watched  # type: ignore[method-assign]
-        jobs.on_ended.insert(0, ended)
 
     # -- the link -------------------------------------------------------------------------------------------
 

@@ -51,17 +51,17 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def free_instance() -> int:
-    """A SITL instance number whose ports nobody has just now; from 30, to leave the low ones to people.
+def free_instance(count: int = 1) -> int:
+    """The first of `count` SITL instances whose ports nobody has just now; from 30, to leave the low ones to people.
 
     Tests that run side by side (pytest-xdist) look in ranges of their own, so that they do not race.
     """
     worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
     for instance in range(30 + 100 * worker, 130 + 100 * worker):
-        base = 5760 + 10 * instance
+        bases = [5760 + 10 * (instance + more) for more in range(count)]
         with contextlib.ExitStack() as probes:
             try:
-                for port in (base, base + 2, base + 3):
+                for port in [base + offset for base in bases for offset in (0, 2, 3)]:
                     probes.enter_context(socket.socket()).bind(("127.0.0.1", port))
             except OSError:
                 continue

@@ -207,6 +207,16 @@ class BaseVehicle:
         names = mode_names(self.state.vehicle_type)
         return next((mode for mode in HOLDING_MODES if mode in names), self.mode)
 
+    @property
+    def holding_modes(self) -> Collection[str]:
+        """The modes that can be its holding mode."""
+        return {self.holding_mode}
+
+    @property
+    def circles(self) -> bool:
+        """Whether it circles in its holding mode, and does not stand."""
+        return False
+
     def inside(self, order: messages.Target | messages.Command) -> Callable[[], None]:
         """The check that the vehicle stays in its envelope with this order; for `CommandAuthority.take`."""
         if isinstance(order, messages.Command):
@@ -267,7 +277,7 @@ class BaseVehicle:
         """Whether it flies by a command of ours: in a mode that we chose or command in, towards no other's target."""
         if not self.state.armed or self.stands or self.authority.commander is None:
             return False
-        if self.mode in STOPPING or self.mode == self.holding_mode:
+        if self.mode in STOPPING or self.mode in self.holding_modes:
             return False
         if not (
             self.mode == "GUIDED" or flies_mission(self.mode) or (self.mode == "TAKEOFF" and self.kind == "plane")

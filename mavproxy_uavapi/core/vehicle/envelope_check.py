@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import Any, Protocol
 
 from mavproxy_uavapi.core.envelope.space import Breach, LocalFrame, Rule, Space, outside_by
@@ -32,8 +32,8 @@ class Checked(Protocol):
         """`copter`, `plane`, `rover` or `other`."""
 
     @property
-    def holding_mode(self) -> str:
-        """The mode in which it stays where it is."""
+    def holding_modes(self) -> Collection[str]:
+        """The modes in which it stays where it is."""
 
     def fresh(self, name: str) -> Any:
         """The newest message of that name. Raises Stale."""

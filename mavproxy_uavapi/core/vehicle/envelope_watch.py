@@ -132,15 +132,16 @@ class EnvelopeWatch:
 
     def _stop(self, vehicle: Vehicle, deed: str, before: str, error_of: Callable[[str], UavApiError]) -> None:
         system = vehicle.state.system
-        sentence = f"vehicle {system} was about to {deed}: it is stopped ({vehicle.holding_mode})"
+        mode, circles = vehicle.holding_mode, vehicle.circles
+        sentence = f"vehicle {system} was about to {deed}: it is stopped ({mode})"
         log.critical("%s", sentence)
         self._say(sentence)
         commander = vehicle.authority.flies
 
         async def body(job: Job) -> str:
-            await vehicle.set_mode(job, vehicle.holding_mode)
-            if vehicle.kind != "plane":
-                await _stand(vehicle, job)
+            await vehicle.set_mode(job, mode)
+            if not circles:
+                await _stand(vehicle, job, mode)
             return sentence
 
         job = self._jobs.begin(
@@ -156,12 +157,12 @@ class EnvelopeWatch:
             self._say(f"vehicle {system} was not stopped: {job.error}")
 
 
-async def _stand(vehicle: Vehicle, job: Job) -> None:
+async def _stand(vehicle: Vehicle, job: Job, mode: str) -> None:
     """Keep the vehicle for `job` until it stands: lower ranks are refused, what stops or lands it is not."""
     vehicle.authority.take(job, Rank.STOP)
     longest = STANDS_WITHIN + 2 * _until_it_stands(vehicle)
     names = {"GLOBAL_POSITION_INT"}
-    await vehicle.flown(vehicle.holding_mode, names, lambda: None if _moves(vehicle) else True, longest, "stand")
+    await vehicle.flown(mode, names, lambda: None if _moves(vehicle) else True, longest, "stand")
     vehicle.authority.shown(job)
 
 

@@ -214,7 +214,7 @@ class EnvelopeGuard:
             self._require_checked_mission()
         elif mode == "TAKEOFF" and self._vehicle.kind == "plane":
             return  # the verb has asked for its height; where it levels off is watched
-        elif self.check.spaces and mode not in KEPT | {self._vehicle.holding_mode}:
+        elif self.check.spaces and mode not in KEPT.union(self._vehicle.holding_modes):
             raise OutsideEnvelope(f"in {mode} nobody keeps the vehicle in the envelope; a pilot may switch to it")
 
     def _require_checked_mission(self) -> None:

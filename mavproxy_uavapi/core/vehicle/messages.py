@@ -129,15 +129,16 @@ def change_speed(kind: str, speed: float) -> Command:
     return Command(mavlink.MAV_CMD_DO_CHANGE_SPEED, (SPEED_TYPES[kind], speed, -1), proven_by_ack=True)
 
 
-def reposition(place: GlobalTarget) -> Command:
+def reposition(place: GlobalTarget, *, from_any_mode: bool = False) -> Command:
     """Go to a place and circle there with WP_LOITER_RAD, for planes.
 
-    It is taken in GUIDED only, since it does not ask for a change of mode.
+    It is taken in GUIDED only; with `from_any_mode` it switches to GUIDED.
     """
-    speed_unchanged, change_no_mode = -1.0, 0.0
+    speed_unchanged = -1.0
+    flags = float(mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE) if from_any_mode else 0.0
     return PlaceCommand(
         mavlink.MAV_CMD_DO_REPOSITION,
-        (speed_unchanged, change_no_mode, OWN_RADIUS),
+        (speed_unchanged, flags, OWN_RADIUS),
         proven_by_ack=True,
         lat=place.lat,
         lon=place.lon,

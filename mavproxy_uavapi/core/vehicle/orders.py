@@ -164,15 +164,14 @@ def _speed(message: Any) -> Order:
 
 
 def _reposition(message: Any) -> Order:
-    changes_mode = int(message.param2) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
     has_speed, has_radius = (
         message.param1 > 0,
         commanded_radius(message),
     )  # a rover takes the speed, a plane the radius
     if message.get_type() != "COMMAND_INT" or message.frame not in ABOVE_HOME:
         return Unknown("that kind of reposition")
-    if changes_mode or has_speed or has_radius:
-        return Unknown("a reposition with a mode, a speed or a radius")
+    if has_speed or has_radius:
+        return Unknown("a reposition with a speed or a radius")
     return GoTo(GlobalTarget(message.x / 1e7, message.y / 1e7, message.z), own_radius=has_radius is not None)
 
 

@@ -8,26 +8,48 @@ from __future__ import annotations
 
 import contextlib
 import math
+from typing import Any
 
-from mavproxy_uavapi.core.errors import Busy, Invalid, ModeChanged, Rejected, Stale, TimedOut
+from mavproxy_uavapi.core.errors import (
+    Busy,
+    Invalid,
+    ModeChanged,
+    OutsideEnvelope,
+    Rejected,
+    Stale,
+    TimedOut,
+    TooNear,
+)
 from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission
 from mavproxy_uavapi.core.vehicle import arming, landing_pattern, messages, mission_flight, time_limits
 from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_uavapi.core.vehicle.geodesy import moved
-from mavproxy_uavapi.core.vehicle.guided import GUIDED, TOLERANCE, GuidedVehicle
+from mavproxy_uavapi.core.vehicle.guided import GUIDED, TARGET_SHOWN, TOLERANCE, GuidedVehicle
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.messages import GlobalTarget, NedTarget
 from mavproxy_uavapi.core.vehicle.time_limits import FlightLimits
 from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
 
-AUTO, TAKEOFF, RTL, QLAND = "AUTO", "TAKEOFF", "RTL", "QLAND"
+AUTO, LOITER, TAKEOFF, RTL = "AUTO", "LOITER", "TAKEOFF", "RTL"
+QLAND, QLOITER = "QLAND", "QLOITER"
 SPEED_MODES = {GUIDED, AUTO}  # others refuse DO_CHANGE_SPEED
 LANDING_RETURNS = (1, 2)  # values of RTL_AUTOLAND with which a return goes on with the mission's landing, in AUTO
 RADIUS = 60.0  # m; used until WP_LOITER_RAD is known
 CIRCLING = 1.5  # radii from the centre within which a circling plane stays, including wind and entry
 HEIGHT_TOLERANCE = 10.0  # m
 LEVEL = 2.0  # m/s; a plane that climbs or sinks slower than this has done so
-LOWEST_HANDOVER = 15.0  # m above home; TAKEOFF's own climb is not interrupted below it
+LOWEST_CIRCLE = 15.0  # m above home; below it a plane climbs, and does not turn
+CLIMB_AWAY_TO = 30.0  # m above home; the height of ArduPlane's own go-around
+STRAIGHT_ON = 300.0  # m ahead of the plane; it has climbed long before
+CLIMB_AWAY = 20.0  # s for that climb, for deadlines
+SLOW = 1.0  # m/s; the direction of what moves slower is not known
+# Values of vtol_state: a QuadPlane hovers, also at a place in GUIDED; it climbs there, or brakes; it gathers speed.
+HOVER = messages.mavlink.MAV_VTOL_STATE_MC
+LIFTED = {
+    HOVER,
+    messages.mavlink.MAV_VTOL_STATE_TRANSITION_TO_MC,
+    messages.mavlink.MAV_VTOL_STATE_TRANSITION_TO_FW,
+}
 # Quantities and their defaults: cruise airspeed, climb and sink rates, m/s.
 CRUISE = (("AIRSPEED_CRUISE", "TRIM_ARSPD_CM"), 12.0)
 CLIMB, SINK = (("TECS_CLMB_MAX",), 5.0), (("TECS_SINK_MAX",), 5.0)
@@ -39,7 +61,34 @@ LANDING = 300.0  # s for a landing pattern and the disarming after it, for deadl
 class Plane(GuidedVehicle):
     """A fixed-wing plane or QuadPlane."""
 
-    holding_mode = "LOITER"
+    holding_modes = frozenset({LOITER, QLOITER})
+
+    @property
+    def circles(self) -> bool:
+        """Whether the wing carries it, so that it cannot stand."""
+        return self._vtol_state not in LIFTED
+
+    @property
+    def _vtol_state(self) -> int | None:
+        state: int | None = self.state.recent_field("EXTENDED_SYS_STATE", "vtol_state")
+        return state
+
+    @property
+    def holding_mode(self) -> str:
+        """LOITER on the wing. With lift motors that would begin a transition, so it is QLOITER.
+
+        A QuadPlane that hovers in GUIDED stays there: in QLOITER the throttle stick may make it sink.
+        """
+        if self.circles:
+            return LOITER
+        return GUIDED if self._hovers_in_guided else QLOITER
+
+    @property
+    def _hovers_in_guided(self) -> bool:
+        """Whether a report that is newer than the last order shows that it hovers, which it does until the next."""
+        if self._vtol_state != HOVER or not self.mode == self.next_mode == GUIDED:
+            return False
+        return self.state.messages["EXTENDED_SYS_STATE"].at > self.guard.ordered_at + TARGET_SHOWN
 
     async def limits(self) -> FlightLimits:
         """Its speeds, for deadlines; it requests those that are unknown."""
@@ -101,12 +150,12 @@ class Plane(GuidedVehicle):
             await self.lift_off(job, alt)
         else:
             await self.switch_to(job, TAKEOFF)
-            handover = max(alt - HEIGHT_TOLERANCE, LOWEST_HANDOVER)
+            handover = max(alt - HEIGHT_TOLERANCE, LOWEST_CIRCLE)
 
             def has_climbed() -> bool | None:
                 self.report_leg(job, abs(alt - self.height))
                 over = self.state.landed is False and not self.is_taking_off
-                return True if self.height >= LOWEST_HANDOVER and (over or self.height >= handover) else None
+                return True if self.height >= LOWEST_CIRCLE and (over or self.height >= handover) else None
 
             names = {"GLOBAL_POSITION_INT", "EXTENDED_SYS_STATE"}
             await self.flown(TAKEOFF, names, has_climbed, allowed, f"climb in {TAKEOFF}")
@@ -176,7 +225,7 @@ class Plane(GuidedVehicle):
         items = landing_pattern.pattern(place, (here.lat / 1e7, here.lon / 1e7), vtol=vtol)
         self.authority.take(job, Rank.STOP, lambda: self.guard.require_mission(items, from_here=True))
         if self.mode == AUTO:  # a mission cannot change while it is flown
-            await self.switch_to(job, self.holding_mode)
+            await self.hold(job)
         mode = self.mode
         await self.waypoints.upload(items, check=self.commanding(job, lambda: self.held_by(mode)))
         self.guard.require_mission(items, from_here=True)  # again, because the upload has changed the mission
@@ -217,7 +266,7 @@ class Plane(GuidedVehicle):
     # -- going and staying --------------------------------------------------------------------------------
 
     async def stop(self, job: Job) -> None:
-        """Circle here in LOITER; the present movement ends.
+        """Circle here in LOITER, or hover in QLOITER or GUIDED; the present movement ends.
 
         Raises:
             NotArmed: there is nothing to stop.
@@ -226,7 +275,60 @@ class Plane(GuidedVehicle):
             self.authority.take(job, Rank.STOP)  # a waiting arm ends
         self.require_armed()
         await self.hold(job)
-        self.held_by(self.holding_mode)
+        held = self.mode in {*self.holding_modes, self.holding_mode}
+        self.held_by(self.mode if held else self.holding_mode)
+
+    async def brake(self, job: Job) -> None:
+        """As `hold`."""
+        await self.hold(job)
+
+    async def hold(self, job: Job) -> None:
+        """Circle in LOITER, or hover. Low over the ground it climbs straight ahead before it circles.
+
+        Where it cannot climb ahead (the envelope, another vehicle, no position) it circles at once.
+        """
+        self.authority.take(job, Rank.STOP)
+        if self._is_too_low_to_circle:
+            with contextlib.suppress(Rejected, TimedOut, Stale, OutsideEnvelope, TooNear):
+                await self._climb_ahead(job)
+        await super().hold(job)
+
+    @property
+    def _is_too_low_to_circle(self) -> bool:
+        is_up = bool(self.state.armed) and self.state.landed is False
+        return is_up and self.circles and self.mode not in self.holding_modes and self.height < LOWEST_CIRCLE
+
+    async def _climb_ahead(self, job: Job) -> None:
+        """Go on in GUIDED in the direction of travel until it is high enough to circle.
+
+        Raises:
+            Stale: where it flies to is not known.
+            Rejected, TimedOut, OutsideEnvelope, TooNear: it does not climb, or must not go there.
+        """
+        away = messages.reposition(self._straight_on(), from_any_mode=True)
+        await self.switch_to(job, GUIDED, command=away)
+
+        def has_climbed() -> bool | None:
+            return True if self.height >= LOWEST_CIRCLE or self.state.landed else None
+
+        await self.flown(GUIDED, {"GLOBAL_POSITION_INT"}, has_climbed, self.allowed(CLIMB_AWAY, None), "climb")
+
+    def _straight_on(self) -> GlobalTarget:
+        """A place ahead, at the height of a go-around. Raises Stale."""
+        here = self.fresh("GLOBAL_POSITION_INT")
+        north, east = here.vx / 100.0, here.vy / 100.0
+        speed = math.hypot(north, east)
+        if speed < SLOW:
+            raise Stale("the direction in which the vehicle flies is not known")
+        ahead = STRAIGHT_ON / speed
+        return GlobalTarget(*moved(here.lat / 1e7, here.lon / 1e7, ahead * north, ahead * east), CLIMB_AWAY_TO)
+
+    def hold_message(self) -> Any:
+        """The one message that makes it hold, for the end of the module."""
+        if self._is_too_low_to_circle:
+            with contextlib.suppress(Stale):
+                return messages.reposition(self._straight_on(), from_any_mode=True).to(self.address, 0)
+        return super().hold_message()
 
     async def go_to(
         self,

@@ -160,7 +160,7 @@ def expected(vehicle: Any, seconds: float) -> list[Stop]:
     if planned and (vehicle.flies_for_us or vehicle.state.landed):
         return _rounded(vehicle, _swung(vehicle, [here, *_to_amsl(vehicle, planned)]))
     velocity = _velocity(vehicle)
-    if vehicle.mode in STOPPED or vehicle.mode == vehicle.holding_mode:
+    if vehicle.mode in STOPPED or vehicle.mode in vehicle.holding_modes:
         way = braking.of(vehicle.kind, vehicle.state.parameters).to_rest(velocity, braking.LATENCY)
     else:
         kept, to_rest = [speed * seconds for speed in velocity], _gently_to_rest(vehicle, velocity)

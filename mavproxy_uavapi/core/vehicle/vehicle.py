@@ -65,7 +65,7 @@ class Vehicle(Verbs):
         switch = messages.set_mode(mode_number(self.state.vehicle_type, mode))
         if flies_mission(mode.upper()) and self.guard.in_force:
             self.guard.require_mission(await self.mission_to_fly(), from_here=True)
-        stops = mode.upper() in STOPPING_MODES | {self.holding_mode}
+        stops = mode.upper() in STOPPING_MODES.union(self.holding_modes)
         self.authority.take(job, Rank.STOP if stops else Rank.ARM, self.inside(switch))
         await self.switch_to(job, mode)
 

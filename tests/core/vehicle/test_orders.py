@@ -27,13 +27,13 @@ def item(current: int, command: int = WAYPOINT, frame: int = RELATIVE, mission_t
 
 def test_a_reposition_that_says_only_where_is_a_way_there() -> None:
     assert orders.order_of(reposition(-1, 0, 0, 0)) == THERE
+    assert orders.order_of(reposition(-1, 1, 0, 0)) == THERE  # and it switches to GUIDED
 
 
 @pytest.mark.parametrize(
     "message",
     [
         pytest.param(reposition(30, 0, 0, 0), id="a speed, which a rover takes"),
-        pytest.param(reposition(-1, 1, 0, 0), id="a change of mode"),
         pytest.param(reposition(-1, 0, 5000, 0), id="a radius, which a plane takes"),
         pytest.param(reposition(-1, 0, 0, 0, frame=AMSL), id="above the sea"),
         pytest.param(item(2, frame=AMSL), id="an item above the sea"),

@@ -1,0 +1,194 @@
+"""Any order of verbs, pilots, losses and hang-ups with a plane, a QuadPlane and a rover: the rules of the air hold.
+
+The machine of copters is `test_authority_machine.py`; this one drives the embedded vehicles, with fewer steps.
+MACHINE_STEPS=20000 takes more steps, other ones each time.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, Phase, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
+
+from tests.rules.types_world import LOW, PILOTS_MODES, STAGES, TypesWorld
+
+STEPS_OF_ONE = 25
+IN_CI = 125  # steps of each type
+WANTED = int(os.environ.get("MACHINE_STEPS", IN_CI))
+SWITCH_ON_ITS_WAY = 2.0  # s
+STOPPED = 8.0  # s from a DELETE or a hang-up until it holds
+CLIMBED_AWAY = 15.0  # s more for a plane that is low over the ground
+STOPS_LATE = 3.0  # s
+ANSWERED = 60.0  # s
+
+LATER = st.sampled_from([0.0, 0.0, 0.1, 0.5, 1.5, 4.0])  # s to the next step
+PLACES = [(0.001, 0.0), (-0.002, 0.001), (0.004, -0.003), (0.0, 0.0)]  # degrees north and east of home
+STOPS = st.sampled_from(["/command/land", "/command/rtl", "/command/brake", "/movement/stop"])
+BEGINS = ["/command/arm", "/command/disarm", "/command/guided", "/command/takeoff?alt=40"]
+BEGINS += ["/command/takeoff?alt=20&vtol=true", "/command/set_ground_speed?new_v=3"]
+BEGINS += [f"/command/set_mode?mode={mode}" for mode in ("GUIDED", "AUTO", "RTL", "LOITER")]
+CIRCLING = ("plane", "quadplane")
+
+
+class TypesAuthority(RuleBasedStateMachine):
+    """Everybody who may do something to a plane, a QuadPlane or a rover, in any order."""
+
+    kind = "plane"
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.world: Any = None
+        self.wires: list[Any] = []
+        self.touched_at = 0.0
+
+    @initialize(stage=st.integers(0, 2))
+    def begin(self, stage: int) -> None:
+        names = list(STAGES[self.kind])
+        self.world = TypesWorld(self.kind, names[stage % len(names)])
+        self.touched_at = -SWITCH_ON_ITS_WAY
+
+    def then(self, seconds: float) -> None:
+        """Let time go by, and look at the rules."""
+        self.world.loop.settle()
+        self.world.look()
+        if seconds:
+            self.world.loop.pass_time(seconds)
+            self.world.look()
+        assert not self.world.broken, self.world.broken[0]
+
+    def ask(self, method: str, path: str, later: float, body: Any = None) -> Any:
+        wire = self.world.begin(method, path, body)
+        self.wires = [one for one in self.wires if not one.reply.done()] + [wire]
+        self.then(later)
+        return wire
+
+    # -- clients ------------------------------------------------------------------------------------------------
+
+    @rule(path=STOPS, later=LATER)
+    def ask_to_stop(self, path: str, later: float) -> None:
+        self.ask("GET", path, later)
+
+    @rule(place=st.sampled_from(PLACES), wait=st.booleans(), later=LATER)
+    def ask_to_move(self, place: tuple[float, float], wait: bool, later: float) -> None:
+        home = self.world.vehicle.estimator.start
+        where = {"lat": home.latitude + place[0], "long": home.longitude + place[1], "alt": 40}
+        self.ask("POST", "/movement/go_to_gps" + "_wait" * wait, later, where)
+
+    @rule(path=st.sampled_from(BEGINS), later=LATER)
+    def ask_to_begin(self, path: str, later: float) -> None:
+        self.ask("GET", path, later)
+
+    @rule(until_complete=st.booleans(), later=LATER)
+    def ask_for_mission(self, until_complete: bool, later: float) -> None:
+        self.ask("POST", "/mission/start", later, {"until_complete": until_complete})
+
+    @rule()
+    def stop_and_see_it_hold(self) -> None:
+        """A `stop` that was answered with 200 holds until somebody does something."""
+        self.all_well()
+        wire = self.ask("GET", "/movement/stop", 0.0)
+        reply = self.world.answer(wire, ANSWERED)
+        self.then(STOPS_LATE)
+        if reply.outcome == "200" and not self.is_recent:
+            assert self.world.is_held, f"stopped, and it goes on in {self.where}"
+
+    @precondition(lambda self: self.world.commanders)
+    @rule(how=st.sampled_from(["DELETE", "hang up", "DELETE, deaf"]))
+    def leave_and_see_it_hold(self, how: str) -> None:
+        """Nothing flies on for a caller that has gone, except landings and returns of one that hung up."""
+        world = self.world
+        self.all_well()
+        flight = world.commanders[-1]
+        newest = max(map(int, world.flights))
+        if how == "hang up":
+            for wire in self.wires:
+                wire.hang_up()
+        else:
+            world.uplink_until = world.loop.time() + (1.0 if "deaf" in how else 0.0)
+            self.ask("DELETE", f"/jobs/{flight.job.id}", 0.0)
+        low = self.kind in CIRCLING and -world.at[2] < LOW
+        self.then(STOPPED + CLIMBED_AWAY * low)
+        if getattr(flight.job.error, "code", "") != "aborted" or self.is_recent:
+            return  # it had ended before, or goes on
+        after = [one for number, one in world.flights.items() if int(number) > newest and not one.follows]
+        others = after or world.commanders or world.known.mode in PILOTS_MODES[self.kind]
+        assert world.is_held or others, f"{flight} was left, and it goes on in {self.where}"
+
+    @property
+    def where(self) -> str:
+        world = self.world
+        return f"{world.vehicle.mode.name} at {world.speed:.1f} m/s, {-world.at[2]:.1f} m high"
+
+    @property
+    def is_recent(self) -> bool:
+        """Whether a pilot's switch may have overtaken ours."""
+        return bool(self.world.loop.time() - self.touched_at < SWITCH_ON_ITS_WAY + STOPPED + CLIMBED_AWAY)
+
+    # -- the pilot, and misfortunes -------------------------------------------------------------------------------
+
+    @rule(which=st.integers(0, 1), later=LATER)
+    def pilot_flies(self, which: int, later: float) -> None:
+        self.touched_at = self.world.loop.time()
+        self.world.pilot(PILOTS_MODES[self.kind][which])
+        self.then(later)
+
+    @precondition(lambda self: self.world.vehicle.mode.name == "GUIDED" and self.world.vehicle.armed)
+    @rule()
+    def pilot_takes_a_movement(self) -> None:
+        """What needs GUIDED ends; `TypesWorld.look` says if it does not."""
+        self.all_well()
+        self.ask_to_move((0.004, -0.003), True, 1.5)
+        self.touched_at = self.world.loop.time()
+        self.world.pilot(PILOTS_MODES[self.kind][0])
+        self.then(2.0)
+        self.then(6.0)
+
+    @rule(mode=st.sampled_from(["GUIDED", "RTL", "AUTO", "LOITER"]), later=LATER)
+    def pilot_chooses(self, mode: str, later: float) -> None:
+        self.touched_at = self.world.loop.time()
+        self.world.pilot(mode)
+        self.then(later)
+
+    @rule(what=st.sampled_from(["uplink", "link"]), seconds=st.sampled_from([0.4, 2.0]), later=LATER)
+    def loss(self, what: str, seconds: float, later: float) -> None:
+        until = self.world.loop.time() + seconds
+        self.touched_at = until
+        if what == "uplink":
+            self.world.uplink_until = until
+        else:
+            self.world.cut_until = until
+        self.then(later)
+
+    def all_well(self) -> None:
+        self.world.uplink_until = self.world.cut_until = self.world.loop.time()
+
+    @rule(seconds=st.sampled_from([3.0, 10.0]))
+    def nothing_happens(self, seconds: float) -> None:
+        self.then(seconds)
+
+    def teardown(self) -> None:
+        if self.world is not None:
+            broken = self.world.broken
+            self.world.end()
+            assert not broken, broken[0]
+
+
+@pytest.mark.parametrize("kind", list(STAGES))
+def test_any_order_of_events_keeps_the_rules_of_the_air(kind: str) -> None:
+    phases = [Phase.explicit, Phase.generate] + ([Phase.shrink] if WANTED != IN_CI else [])
+    run_state_machine_as_test(
+        type(f"Authority of a {kind}", (TypesAuthority,), {"kind": kind}),
+        settings=settings(
+            max_examples=max(1, WANTED // STEPS_OF_ONE),
+            stateful_step_count=STEPS_OF_ONE,
+            derandomize=WANTED == IN_CI,  # the same steps in each run
+            database=None,
+            deadline=None,
+            phases=phases,
+            suppress_health_check=list(HealthCheck),
+        ),
+    )

@@ -1,0 +1,170 @@
+"""The embedded plane, QuadPlane or rover for random flights, and the rules of the air for what is seen of it.
+
+The rules are written from the design alone: nothing here asks the authority what it thinks.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import math
+from collections.abc import Callable
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from mavproxy_uavapi.core.vehicle.endings import Policy
+from tests.rules.rules_of_the_air import GUIDED_ONLY, ON_PURPOSE, goes_beside
+from tests.rules.scripted_world import Flight, Sent, the_job, watch_jobs
+from tests.support import stages
+from tests.support.mavproxy import mavproxy_state
+from tests.support.virtual_time import TimeTravellingLoop
+from tests.support.world import World
+
+SETTINGS = {"max_rate": 100000.0, "max_jobs": 1000}
+PILOTS_MODES = {"plane": ("FBWA", "CRUISE"), "quadplane": ("FBWA", "QHOVER"), "rover": ("MANUAL", "STEERING")}
+HOLDS = {"plane": ("LOITER",), "quadplane": ("LOITER", "QLOITER"), "rover": ("HOLD",)}
+STAGES: dict[str, dict[str, Callable[[Any], None]]] = {
+    "plane": {"ground": stages.armed_with_mission, "flying": stages.cruising, "mission": stages.on_mission},
+    "quadplane": {"ground": World.armed, "hovering": stages.hovering},
+    "rover": {"ground": World.armed, "driving": stages.driven_away, "mission": stages.on_mission},
+}
+STARTS = {mavlink.MAV_CMD_DO_LAND_START: "AUTO", mavlink.MAV_CMD_MISSION_START: "AUTO"}
+MEANT = ON_PURPOSE | {"start", "stop"}  # also in a pilot's mode; `start` is that of a mission
+BESIDE = {"set_reverse"}
+LATE_SWITCH = 10.0  # s in which a mode may still come that was asked for
+PILOT_NOTICED = 5.0  # s after which nothing that needs GUIDED runs on in a pilot's mode
+STANDS = 0.5  # m/s
+LOW = 15.0  # m above home, below which a plane climbs before it circles
+
+
+def requested_mode(world: Any, message: Any) -> str:
+    """The mode to which a message switches the vehicle; "" for none."""
+    command = getattr(message, "command", None)
+    if command == mavlink.MAV_CMD_DO_SET_MODE:
+        return str(world.vehicle.modes[int(message.param2)].name)
+    if command == mavlink.MAV_CMD_DO_REPOSITION and message.param2:
+        return "GUIDED"
+    return STARTS.get(command, "")
+
+
+class TypesWorld(World):
+    """A world of its own loop, which notes who sends what.
+
+    Attributes:
+        flights: the jobs so far, by number.
+        broken: what was against the rules.
+    """
+
+    def __init__(self, vehicle: str, stage: str) -> None:
+        loop = TimeTravellingLoop()
+        asyncio.set_event_loop(loop)
+        super().__init__(loop, mavproxy_state(), dict(SETTINGS), vehicle)
+        self.flights: dict[str, Flight] = {}
+        self.broken: list[str] = []
+        self.requested: list[tuple[float, str]] = []  # modes, and when they were asked for (s)
+        self.pilots_mode, self.piloted_since = "", -math.inf
+        watch_jobs(self.host, self.flights, [])
+        self.host.endings.on_disconnect = Policy.HOLD
+        STAGES[vehicle][stage](self)
+        self.go_live()
+        self.loop.pass_time(2.0)
+
+    # -- what is sent -----------------------------------------------------------------------------------------
+
+    async def send(self, message: Any, system: int) -> None:
+        """As `World.send`; looks at what is sent."""
+        job, state = the_job.get(), self.known.state
+        flight = None if job is None else self.flights[job.id]
+        sent = Sent(self.loop.time(), message, flight, self.known.mode, state.armed)
+        await super().send(message, system)
+        if sent.asks:
+            return
+        self.broken += [f"{sent.at:.2f} s: {wrong}" for wrong in (self.judge(sent),) if wrong]
+        mode = requested_mode(self, message)
+        if mode:
+            self.requested.append((sent.at, mode))
+        if flight is not None:
+            flight.sent.append(sent)
+
+    def judge(self, sent: Sent) -> str | None:
+        """What is wrong with what was sent; None for nothing."""
+        flight = sent.flight
+        if flight is None:
+            return f"{sent.message} by nobody"
+        if not flight.job.running:
+            return f"{sent.message} by {flight}, which has ended: {flight.job.error}"
+        if flight.verb == "disarm":
+            return None
+        if sent.mode in PILOTS_MODES[self.kind] and flight.verb not in MEANT:
+            return f"{sent.message} by {flight} in the pilot's {sent.mode}"
+        is_its_own = sent.mode in (flight.mode, "UNKNOWN") or any(
+            mode == sent.mode and at >= flight.job.began_at - LATE_SWITCH for at, mode in self.requested
+        )
+        return None if is_its_own else f"{sent.message} by {flight}, begun in {flight.mode}, in {sent.mode}"
+
+    # -- what is known, and what is true ------------------------------------------------------------------------
+
+    @property
+    def known(self) -> Any:
+        """Our side of the vehicle."""
+        return self.host.registry.find(1)
+
+    @property
+    def speed(self) -> float:
+        """The vehicle's true speed, m/s."""
+        return math.hypot(*self.vehicle.body.velocity)
+
+    @property
+    def running(self) -> list[Flight]:
+        """The flights without an outcome, oldest first."""
+        return [self.flights[job.id] for job in self.host.jobs.running()]
+
+    @property
+    def commanders(self) -> list[Flight]:
+        """The flights under way that have commanded, but for those beside a movement."""
+        return [one for one in self.running if one.sent and not goes_beside(one) and one.verb not in BESIDE]
+
+    @property
+    def is_held(self) -> bool:
+        """Whether it is disarmed, holds, or is on its way to a height where it may."""
+        mode = self.vehicle.mode.name
+        if not self.vehicle.armed:
+            return True
+        if self.kind == "rover":
+            return mode == "HOLD" and self.speed < STANDS
+        hovers = self.kind == "quadplane" and mode == "GUIDED" and self.speed < STANDS
+        return mode in HOLDS[self.kind] or hovers
+
+    def pilot(self, mode: str) -> None:
+        """The pilot chooses a mode; the vehicle may refuse it."""
+        self.control.handle_line(json.dumps({"op": "fault", "name": "pilot_mode", "mode": mode}))
+
+    def look(self) -> None:
+        """At any time."""
+        now, mode = self.loop.time(), self.known.mode
+        if mode != self.pilots_mode:
+            self.pilots_mode, self.piloted_since = mode, now
+        wrong = [str(defect) for defect in self.loop.defects]
+        self.loop.defects = []
+        if len(self.commanders) > 1:
+            wrong.append(f"several command: {[str(one) for one in self.commanders]}")
+        if mode in PILOTS_MODES[self.kind] and now - self.piloted_since > PILOT_NOTICED:
+            late = [one for one in self.running if one.verb in GUIDED_ONLY and one.job.began_at < self.piloted_since]
+            wrong += [f"{one} goes on in the pilot's {mode}" for one in late]
+        self.broken += [f"{now:.2f} s: {what}" for what in wrong]
+
+    def end(self) -> None:
+        """Close everything, and the loop."""
+        self.close()
+        self.host.bridge._calls.close()
+        for timer in self.host.link_watch._timers.values():
+            timer.cancel()
+        tasks = asyncio.all_tasks(self.loop)
+        for task in tasks:
+            task.cancel()
+        if tasks:
+            self.loop.run(asyncio.wait(tasks))
+        self.loop.run(self.loop.shutdown_asyncgens())
+        self.loop.close()
+        asyncio.set_event_loop(None)
