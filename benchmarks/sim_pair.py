@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import signal
 import socket
 import subprocess
 import sys
@@ -79,6 +80,8 @@ def compare(description: str | None, sequences: Mapping[str, Sequence]) -> int:
     parser.add_argument("--speedup", type=int, default=10)
     parser.add_argument("--instance", type=int, default=50, help="of SITL; the embedded one has the next")
     chosen = parser.parse_args()
+    for number in (signal.SIGTERM, signal.SIGHUP):  # both end Python at once otherwise, and the vehicle would stay
+        signal.signal(number, lambda *_: sys.exit(1))
     options = [f"--home={','.join(map(str, HOME))}", f"--speedup={chosen.speedup}"]
     for kind in chosen.vehicle or sequences:
         home, port = chosen.ardupilot.resolve(), 5760 + 10 * chosen.instance

@@ -12,7 +12,14 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 HOME = (-35.363261, 149.165230, 584.0, 353.0)
 METRES_PER_DEGREE = 111318.845
-WATCHED = ("LOCAL_POSITION_NED", "SYS_STATUS", "EXTENDED_SYS_STATE", "VFR_HUD", "MISSION_CURRENT")
+WATCHED = (
+    "LOCAL_POSITION_NED",
+    "SYS_STATUS",
+    "EXTENDED_SYS_STATE",
+    "VFR_HUD",
+    "MISSION_CURRENT",
+    "EKF_STATUS_REPORT",
+)
 PATIENCE = 600.0  # s of the wall clock that anything may take
 NAN = math.nan
 Item = tuple[int, tuple[float, ...], tuple[float, float] | None, float]
@@ -35,8 +42,14 @@ class Station:
         for name in WATCHED:
             while self.command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, _number(name), 100_000) != 0:
                 pass
-        self.wait(lambda: any("is using GPS" in text for text in self.texts) and self._healthy)
+        self.wait(lambda: self._has_position and self._healthy)
         self.run(3)
+
+    @property
+    def _has_position(self) -> bool:
+        """By a state, not by the text: that may have come before this station."""
+        report = self.last.get("EKF_STATUS_REPORT")
+        return report is not None and bool(report.flags & mavlink.EKF_POS_HORIZ_ABS)
 
     @property
     def _healthy(self) -> bool:

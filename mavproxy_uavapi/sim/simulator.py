@@ -255,6 +255,8 @@ class Simulator:
                 link.send(self._parameter_value(parameter, UNKNOWN_INDEX))
 
     def _mission_set_current(self, link: PeerLink, message: Any) -> None:
+        """Unlike the command it ends a landing sequence, as in ArduPilot, even if there is no such item."""
+        self.vehicle.mission.in_landing_sequence = False
         if self.vehicle.current_item(message.seq):
             link.send(self.telemetry.mission_current(message.seq))
 

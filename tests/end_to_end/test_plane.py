@@ -99,7 +99,10 @@ def test_plane_lands_by_the_landing_sequence_of_the_mission_that_it_flies(plane:
     assert plane.ok(plane.get("/command/land", timeout=240))["result"]
     wait_until_disarmed(plane)
     assert plane.status()["mode"] == "AUTO"
-    plane.ok(plane.delete("/mission/waypoints"))
+    plane.ok(plane.delete("/mission/waypoints"))  # the autopilot does not forget the landing by that
+    plane.eventually(lambda: plane.get("/mission/progress").json()["info"]["current"] == 0, 60, "an empty mission")
+    plane.ok(plane.get("/command/arm", timeout=60))
+    plane.ok(plane.get("/command/disarm"))
 
 
 @pytest.mark.parametrize("path", ["/movement/resume", "/movement/set_heading?heading=3"])

@@ -234,7 +234,7 @@ class Rig:
         """Wait until the API knows its vehicle."""
 
         def up() -> bool:
-            with contextlib.suppress(requests.ConnectionError):
+            with contextlib.suppress(requests.ConnectionError, requests.Timeout):
                 return requests.get(self.url + "/telemetry/status", timeout=5).status_code == 200
             return False
 

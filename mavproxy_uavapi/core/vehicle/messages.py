@@ -186,6 +186,11 @@ def set_mission_current(seq: int, *, reset: bool = True) -> Command:
     return Command(mavlink.MAV_CMD_DO_SET_MISSION_CURRENT, (seq, 1 if reset else 0))
 
 
+def select_item(address: Address, seq: int) -> Any:
+    """As `set_mission_current`, by the older message: without an answer, and heeded without a mission, too."""
+    return mavlink.MAVLink_mission_set_current_message(*address, seq)
+
+
 def start_mission() -> Command:
     """Run the mission; on the ground this replaces raising the throttle."""
     return Command(mavlink.MAV_CMD_MISSION_START)

@@ -220,6 +220,7 @@ READERS: dict[str, Callable[[Any], Order | None]] = {
     "SET_POSITION_TARGET_GLOBAL_INT": _global,
     "COMMAND_LONG": _command,
     "COMMAND_INT": _command,
+    "MISSION_SET_CURRENT": lambda message: FlyMission(now=False),
     "PARAM_SET": _parameter,
     **dict.fromkeys(("MISSION_CLEAR_ALL", "MISSION_COUNT"), _mission),
     **dict.fromkeys(("MISSION_ITEM", "MISSION_ITEM_INT"), _item),

@@ -6,7 +6,6 @@ off in TAKEOFF, and flies to positions in GUIDED by DO_REPOSITION only.
 
 from __future__ import annotations
 
-import contextlib
 import math
 from typing import Any
 
@@ -115,18 +114,33 @@ class Plane(GuidedVehicle):
         return bool((await self.parameters.read([("Q_ENABLE",)])).get("Q_ENABLE"))
 
     async def arm(self, job: Job, timeout: float | None = None) -> None:
-        """As for every vehicle; first sets its mission to item 1: ArduPlane does not arm at a landing's item.
+        """As for every vehicle; first sets its mission to item 1: ArduPlane does not arm after a landing sequence.
 
-        A landing that is item 1 must not begin by that, or it would still prevent the arming.
+        A landing that is item 1 must not begin by that, or it would still prevent the arming. Where the mission was
+        cleared, only the older message ends its landing sequence.
         """
-        if self.state.armed is False and self.state.field("MISSION_CURRENT", "seq"):
+        if self.state.armed is False:
             self.authority.take(job, Rank.ARM)
             if flies_mission(self.mode):
                 await self.switch_to(job, GUIDED, self._require_disarmed)
-            first = messages.set_mission_current(1, reset=False)
-            with contextlib.suppress(Rejected):  # the mission may just have been cleared
-                await self.commands.send(first, self.commanding(job, self._require_disarmed))
+            await self._select_first_item(job)
         await super().arm(job, timeout)
+
+    async def _select_first_item(self, job: Job) -> None:
+        modes = (self.state.mode, GUIDED, None)  # None: it has rebooted meanwhile
+
+        def check_unclaimed() -> None:
+            self._require_disarmed()
+            if self.state.mode not in modes:
+                raise ModeChanged(f"the pilot or another client switched the vehicle to {self.mode} meanwhile")
+
+        check = self.commanding(job, check_unclaimed)
+        try:
+            await self.commands.send(messages.set_mission_current(1, reset=False), check)
+        except Rejected:
+            check()
+            await self.link.send(messages.select_item(self.address, 1), self.state.system)
+        check()
 
     def _require_disarmed(self) -> None:
         """Raise ModeChanged unless it is disarmed: the mission of a vehicle that another client armed must stay."""

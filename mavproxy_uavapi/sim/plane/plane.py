@@ -31,7 +31,7 @@ class SimulatedPlane(Airframe):
     mav_type = mavlink.MAV_TYPE_FIXED_WING
     version = (4, 7, 0, mavlink.FIRMWARE_VERSION_TYPE_DEV)
     banner: ClassVar[tuple[str, ...]] = ("ArduPlane V4.7.0-dev (embedded)",)
-    mission_commands = ALL_ITEMS
+    mission_commands = ALL_ITEMS - {mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT}
     streams = PLANE_GROUPS
     reports_wind = True
     mode_switch = ("FLTMODE_CH", "FLTMODE")
