@@ -6,6 +6,7 @@ off in TAKEOFF, and flies to positions in GUIDED by DO_REPOSITION only.
 
 from __future__ import annotations
 
+import contextlib
 import math
 from typing import Any
 
