@@ -27,7 +27,7 @@ def test_sections_have_texts_by_key(file: Path) -> None:
     [
         ("[vison]\n", "no section [vison]; did you mean vision?"),
         ("[GRADYS]\n", "no section [GRADYS]; did you mean gradys?"),
-        ("[DEFAULT]\nport = 1\n", "no section [DEFAULT]; there are api, simulated, logs, vision, gradys"),
+        ("[DEFAULT]\nport = 1\n", "no section [DEFAULT]; there are api, mode, udp, simulated, logs, vision, gradys"),
         ("port = 1\n", "no section headers"),
         ("[api]\nport = 1\nport = 2\n", "already exists"),
         ("[api]\n[api]\n", "already exists"),

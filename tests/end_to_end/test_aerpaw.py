@@ -1,4 +1,4 @@
-"""Scripts of aerpawlib's kind fly the embedded vehicle: examples, a script that dies, one that is stopped, ZMQ."""
+"""Scripts of aerpawlib's kind fly: examples, a script that dies, one that is stopped, ZMQ."""
 
 from __future__ import annotations
 
@@ -19,12 +19,13 @@ HOST = [sys.executable, "-m", "mavproxy_uavapi.aerpaw"]
 PATIENCE = 200.0  # s
 
 
-@pytest.fixture(scope="module")
-def embedded_rig(harness: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    """A rig with the embedded vehicle, and folders of its own for scripts."""
+@pytest.fixture(scope="module", params=["embedded", pytest.param("ardupilot", marks=pytest.mark.sitl)])
+def rig(request: Any, harness: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """A rig with folders of its own for scripts."""
     directory = tmp_path_factory.mktemp("aerpaw")
     folders = {"scripts_path": str(directory / "scripts"), "script_logs": str(directory / "logs")}
-    made = harness.embedded(directory, speedup=3, **folders)  # a script has to keep up with it
+    start = harness.embedded if request.param == "embedded" else harness.ardupilot
+    made = start(directory, speedup=3, **folders)  # a script has to keep up with it
     yield made
     made.stop()
 
@@ -48,24 +49,24 @@ def on_the_ground(rig: Any) -> bool:
     return (status["armed"], status["landed_state"]) == (False, "on_ground")
 
 
-def test_square_is_flown(embedded_rig: Any) -> None:
-    status, out, err = end(begin(embedded_rig, EXAMPLES / "square.py", "--vehicle", "drone", "--side", "8"))
+def test_square_is_flown(rig: Any) -> None:
+    status, out, err = end(begin(rig, EXAMPLES / "square.py", "--vehicle", "drone", "--side", "8"))
     assert status == 0, out + err
     assert [line.partition(":")[0] for line in out.splitlines()] == ["north", "east", "south", "west"]
-    assert on_the_ground(embedded_rig)
+    assert on_the_ground(rig)
 
 
 @pytest.mark.long
-def test_velocities_and_a_log_beside_them(embedded_rig: Any, tmp_path: Path) -> None:
+def test_velocities_and_a_log_beside_them(rig: Any, tmp_path: Path) -> None:
     log = tmp_path / "sweep.csv"
-    status, out, err = end(begin(embedded_rig, EXAMPLES / "sweep.py", "--output", str(log)))
+    status, out, err = end(begin(rig, EXAMPLES / "sweep.py", "--output", str(log)))
     assert status == 0, out + err
     heading = float(out.splitlines()[-1].removeprefix("heading "))
     assert abs((heading - 359 + 180) % 360 - 180) <= 5
     rows = list(csv.reader(log.read_text().splitlines()))
     lats = [float(row[0]) for row in rows]
     assert (max(lats) - min(lats)) * 111_319 > 2
-    assert on_the_ground(embedded_rig)
+    assert on_the_ground(rig)
 
 
 DIES = """
@@ -95,34 +96,34 @@ def script(tmp_path: Path) -> Any:
     return make
 
 
-def test_script_that_dies_in_flight_brings_its_vehicle_home(embedded_rig: Any, script: Any) -> None:
-    status, _, err = end(begin(embedded_rig, script("raise RuntimeError('lost')")))
+def test_script_that_dies_in_flight_brings_its_vehicle_home(rig: Any, script: Any) -> None:
+    status, _, err = end(begin(rig, script("raise RuntimeError('lost')")))
     assert status == 1 and "lost" in err
-    assert on_the_ground(embedded_rig)
+    assert on_the_ground(rig)
 
 
 @pytest.mark.long
-def test_script_that_is_stopped_lands_its_vehicle(embedded_rig: Any, script: Any) -> None:
-    process = begin(embedded_rig, script("import asyncio; await asyncio.sleep(600)"), "--on-exit", "land")
+def test_script_that_is_stopped_lands_its_vehicle(rig: Any, script: Any) -> None:
+    process = begin(rig, script("import asyncio; await asyncio.sleep(600)"), "--on-exit", "land")
     assert process.stdout is not None and process.stdout.readline() == "under way\n"
     process.send_signal(signal.SIGTERM)
     status, _, err = end(process)
     assert status == 130, err
-    assert on_the_ground(embedded_rig)
+    assert on_the_ground(rig)
 
 
 @pytest.mark.long
-def test_killed_script_leaves_no_velocity_behind(embedded_rig: Any, script: Any) -> None:
-    process = begin(embedded_rig, script("import time; time.sleep(600)"))
+def test_killed_script_leaves_no_velocity_behind(rig: Any, script: Any) -> None:
+    process = begin(rig, script("import time; time.sleep(600)"))
     assert process.stdout is not None and process.stdout.readline() == "under way\n"
     process.kill()
     end(process)
     deadline = time.monotonic() + 15
-    while (speed := embedded_rig.ok(embedded_rig.get("/telemetry/general"))["info"]["groundspeed"]) > 0.3:
+    while (speed := rig.ok(rig.get("/telemetry/general"))["info"]["groundspeed"]) > 0.3:
         assert time.monotonic() < deadline, f"it still flies at {speed} m/s"
         time.sleep(0.2)
-    assert embedded_rig.status()["mode"] == "GUIDED"
-    embedded_rig.ok(embedded_rig.get("/command/land"))
+    assert rig.status()["mode"] == "GUIDED"
+    rig.ok(rig.get("/command/land"))
 
 
 @pytest.fixture
@@ -139,24 +140,24 @@ def proxy() -> Iterator[None]:
 
 
 @pytest.mark.long
-def test_runners_talk_by_zmq(embedded_rig: Any, proxy: None) -> None:
+def test_runners_talk_by_zmq(rig: Any, proxy: None) -> None:
     names = ["--zmq-proxy-server", "127.0.0.1", "--zmq-identifier"]
-    flyer = begin(embedded_rig, EXAMPLES / "answer.py", *names, "flyer")
-    base = begin(embedded_rig, EXAMPLES / "ask.py", "--vehicle", "none", *names, "base")
+    flyer = begin(rig, EXAMPLES / "answer.py", *names, "flyer")
+    base = begin(rig, EXAMPLES / "ask.py", "--vehicle", "none", *names, "base")
     status, out, err = end(base)
     assert (status, out) == (0, "the flyer is 4 m high\n"), err
     assert end(flyer)[0] == 0
-    assert on_the_ground(embedded_rig)
+    assert on_the_ground(rig)
 
 
 @pytest.mark.needs("tmux")
-def test_script_runs_uploaded_as_it_is(embedded_rig: Any) -> None:
+def test_script_runs_uploaded_as_it_is(rig: Any) -> None:
     files = {"file": ("square.py", (EXAMPLES / "square.py").read_bytes())}
-    embedded_rig.ok(requests.post(embedded_rig.url + "/mission/upload-script", files=files, timeout=10))
-    embedded_rig.ok(embedded_rig.post("/mission/execute-script", script_name="square", args=["--side", "5"]))
+    rig.ok(requests.post(rig.url + "/mission/upload-script", files=files, timeout=10))
+    rig.ok(rig.post("/mission/execute-script", script_name="square", args=["--side", "5"]))
     deadline = time.monotonic() + PATIENCE
-    while (run := embedded_rig.ok(embedded_rig.get("/mission/scripts/square"))["run"])["running"]:
+    while (run := rig.ok(rig.get("/mission/scripts/square"))["run"])["running"]:
         assert time.monotonic() < deadline
         time.sleep(0.5)
     assert run["exit_status"] == 0, run["err"]
-    assert on_the_ground(embedded_rig)
+    assert on_the_ground(rig)

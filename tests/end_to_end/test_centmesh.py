@@ -24,13 +24,6 @@ MISSION = """QGC WPL 110
 PATIENCE = 60.0  # s
 
 
-@pytest.fixture(scope="module")
-def rig(harness, tmp_path_factory) -> Iterator:
-    made = harness.embedded(tmp_path_factory.mktemp("centmesh"))
-    yield made
-    made.stop()
-
-
 @pytest.fixture
 def drone(rig, harness) -> Iterator[Any]:
     """A program's connection, as the tutorial makes it."""

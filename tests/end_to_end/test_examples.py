@@ -1,4 +1,4 @@
-"""Every example flies, against the embedded vehicle."""
+"""Every example flies, the embedded vehicle and ArduPilot's."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ def run(*arguments: str) -> subprocess.CompletedProcess[str]:
     ],
     ids=lambda arguments: arguments[0],
 )
-def test_example_flies_and_ends_on_the_ground(embedded_rig, arguments):
-    done = run(*arguments, "--url", embedded_rig.url)
+def test_example_flies_and_ends_on_the_ground(rig, arguments):
+    done = run(*arguments, "--url", rig.url)
     assert done.returncode == 0, done.stdout + done.stderr
-    status = embedded_rig.status()
+    status = rig.status()
     assert (status["armed"], status["landed_state"]) == (False, "on_ground")
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from tests.rules.test_fault_matrix import track
+from tests.rules.fault_scenes import track
 from tests.support.envelopes import FIELD, feature, field, place
 from tests.support.world import item_at
 

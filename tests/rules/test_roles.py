@@ -22,7 +22,7 @@ from mavproxy_uavapi.http.route import Route
 from mavproxy_uavapi.http.routes import PAGE, ROUTES
 from mavproxy_uavapi.tokens import Token
 from mavproxy_vision.http import VisionHandlers
-from tests.rules.test_fault_matrix import track
+from tests.rules.fault_scenes import track
 from tests.support import tokens
 
 VISION = VisionHandlers(None, None).routes()  # type: ignore[arg-type]
@@ -30,7 +30,7 @@ GRADYS = GradysHandlers(None).routes()  # type: ignore[arg-type]
 EVERY = [*ROUTES, *PAGE, *VISION, *GRADYS]
 ENDLESS = {"/telemetry/stream", "/vision/stream.mjpg"}  # tests/uavapi/http/test_roles.py
 METHODS = ("GET", "HEAD", "OPTIONS", "POST", "PUT", "PATCH", "DELETE")
-NAMES = {"id": "1", "name": "ATTITUDE", "sysid": "1", "file": "x.css"}
+NAMES = {"z": "0", "x": "0", "y": "0", "id": "1", "name": "ATTITUDE", "sysid": "1", "file": "x.css"}
 FAR = {"x": 5000, "y": 0, "z": -8}
 EXAMPLES: dict[str, dict[str, Any]] = {
     "/gradys/readings": {"quantity": "t", "value": 1, "sysid": 1},
