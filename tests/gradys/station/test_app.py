@@ -27,7 +27,7 @@ from mavproxy_gradys.station.updates import Updates, parse
 FORM = {"id": "10", "lat": "-15.84", "lng": "-47.9", "alt": "20.1", "device": "uav", "type": "102", "seq": "0"}
 
 
-def reading(seq: Any, **given: Any) -> dict[str, Any]:
+def reading(seq: Any, **members: Any) -> dict[str, Any]:
     return {
         "device": "uav-1",
         "id": "1",
@@ -36,7 +36,7 @@ def reading(seq: Any, **given: Any) -> dict[str, Any]:
         "representation": "m",
         "value": 1.5,
         "time": 5,
-        **given,
+        **members,
     }
 
 
@@ -64,13 +64,13 @@ class Asker:
     def __init__(self, loop: Any, client: TestClient[Any, Any], watch: FleetWatch) -> None:
         self._loop, self._client, self.watch = loop, client, watch
 
-    def __call__(self, method: str, path: str, **given: Any) -> tuple[int, str]:
-        answer = self.whole(method, path, **given)
+    def __call__(self, method: str, path: str, **options: Any) -> tuple[int, str]:
+        answer = self.whole(method, path, **options)
         return answer.status, answer.body.decode()
 
-    def whole(self, method: str, path: str, **given: Any) -> Any:
+    def whole(self, method: str, path: str, **options: Any) -> Any:
         async def requested() -> Any:
-            async with self._client.request(method, path, **given) as answer:
+            async with self._client.request(method, path, **options) as answer:
                 return SimpleNamespace(status=answer.status, headers=answer.headers, body=await answer.read())
 
         return self._loop.run(requested())
