@@ -207,7 +207,7 @@ def kills(rounds: int, chance: random.Random) -> tuple[list[list[str]], int]:
         poster = Poster(made.rig.url)
         spool, sink = (
             made.directory / "spool.db",
-            f"{made.sink},mqtt://127.0.0.1:{broker}/fleet/{{sysid}}/{{quantity}}",
+            f"{made.sink},mqtt://127.0.0.1:{broker}/fleet/{{device}}/{{quantity}}",
         )
         poster.start()
         try:

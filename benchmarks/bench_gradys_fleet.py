@@ -115,7 +115,7 @@ def run(tools: Any, directory: Path, vehicles: int, seconds: float) -> int:
         config = directory / "mosquitto.conf"
         config.write_text(f"listener {broker_port} 127.0.0.1\nallow_anonymous true\n", encoding="ascii")
         broker = rig.start("mosquitto", [str(MOSQUITTO), "-c", str(config)])
-        settings = {"sink": f"mqtt://127.0.0.1:{broker_port}/fleet/{{sysid}}/{{quantity}}"}
+        settings = {"sink": f"mqtt://127.0.0.1:{broker_port}/fleet/{{device}}/{{quantity}}"}
         settings["spool"] = f"{directory}/spool.db"
         load = "--cmd=module load gradys:" + json.dumps(settings, separators=(",", ":"))
         mavproxy = rig.start("mavproxy", [*tools.MAVPROXY, f"--master=udp:127.0.0.1:{link}", load])

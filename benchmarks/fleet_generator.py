@@ -54,7 +54,7 @@ def reading(vehicle: int, seq: int, at: float) -> tuple[str, bytes]:
         value = [round(-35.36 + vehicle * 1e-4, 7), round(149.16 + seq % 1000 * 1e-6, 7), 20.5]
     body = {"device": f"uav-{vehicle}", "id": str(vehicle), "seq": seq, "quantity": quantity}
     whole = {**body, "representation": "m", "value": value, "time": round(at, 3)}
-    return f"fleet/{vehicle}/{quantity}", json.dumps(whole).encode()
+    return f"fleet/uav-{vehicle}/{quantity}", json.dumps(whole).encode()
 
 
 class Generator:

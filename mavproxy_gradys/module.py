@@ -41,7 +41,7 @@ gradys set               show the settings
 gradys set NAME VALUE    change one; it takes effect at once
 gradys config            the settings in force, and where each came from
 gradys set gs HOST:PORT  the ground station (several by comma)
-gradys set sink URL      where readings go: http(s)://HOST/PATH or mqtt(s)://HOST/fleet/{{sysid}}/{{quantity}}
+gradys set sink URL      where readings go: http(s)://HOST/PATH or mqtt(s)://HOST/fleet/{{device}}/{{quantity}}
 {TRACK_HELP}
 gradys help              this"""
 

@@ -1,9 +1,9 @@
 """The MQTT sink: each reading to its topic with QoS 1; the broker's PUBACK is the acknowledgement.
 
 The URL's path is the topic; {sysid}, {device} and {quantity} stand for the reading's values:
-`mqtt://broker/fleet/{sysid}/{quantity}`. Positions are retained, so that a new subscriber gets the last one at once.
-Beside them a retained topic `status` has `online`; by our last will the broker sets it to `offline` when the
-connection breaks. A connection has one will, so each status topic has its own connection.
+`mqtt://broker/fleet/{device}/{quantity}`. Positions are retained, so that a new subscriber gets the last one at once.
+Beside them each vehicle's retained topic `status` has `online`; by our last will the broker sets it to `offline` when
+the connection breaks. A connection has one will, so each status topic has its own connection.
 
 With `#ack=station` at the end of the URL the station's confirmation is the acknowledgement; see `confirmations.py`.
 Unconfirmed readings are published again, so they expire at the broker after EXPIRY, retained positions too.
@@ -38,7 +38,7 @@ WINDOW = 20  # readings in flight at once on one connection
 CLOSE_TIMEOUT = 1.0  # s
 CONFIRMATION_TIMEOUT = 20.0  # s for a station's confirmation; long, because sending again would add to its load
 EXPIRY = 60  # s
-DEFAULT_TOPIC = "fleet/{sysid}/{quantity}"
+DEFAULT_TOPIC = "fleet/{device}/{quantity}"
 ONLINE, OFFLINE = "online", "offline"
 
 
@@ -74,7 +74,7 @@ class MqttSink:
         """See `Sink.send`; in order on each connection."""
         by_status: defaultdict[str, list[Stored]] = defaultdict(list)
         for stored in batch:
-            by_status[status_topic(self._topic, stored.reading)].append(stored)
+            by_status[status_topic(self._topic, stored.reading, self._device)].append(stored)
         await self._reach(next(iter(by_status)))
         sending = [self._send(status, part) for status, part in by_status.items()]
         results = await asyncio.gather(*sending, return_exceptions=True)
@@ -276,19 +276,28 @@ async def disconnect(client: aiomqtt.Client) -> None:
 
 def topic_of(template: str, reading: Reading) -> str:
     """The topic of a reading."""
-    return fill(template, reading, reading.quantity)
+    return fill(template, reading.system, reading.device, reading.quantity)
 
 
-def status_topic(template: str, reading: Reading) -> str:
-    """The topic for `online` and `offline` of the reading's vehicle, beside the topics of its readings."""
+def status_topic(template: str, reading: Reading, device: str = UAV) -> str:
+    """The topic for `online` and `offline` of the reading's vehicle, beside the topics of its readings.
+
+    A reading of another device of that vehicle has the same one: each status topic needs a connection.
+
+    Args:
+        template: the topic of readings.
+        reading: the reading.
+        device: the beginning of the device names of our vehicles.
+    """
+    vehicle = device_of(reading.system, device)
     if "{quantity}" in template:
-        return fill(template, reading, STATUS)
-    return f"{fill(template, reading, '')}/{STATUS}"
+        return fill(template, reading.system, vehicle, STATUS)
+    return f"{fill(template, reading.system, vehicle, '')}/{STATUS}"
 
 
-def fill(template: str, reading: Reading, quantity: str) -> str:
-    """The template with the reading's names filled in."""
-    names = {"{sysid}": str(reading.system), "{device}": reading.device, "{quantity}": quantity}
+def fill(template: str, system: int, device: str, quantity: str) -> str:
+    """The template with these names filled in."""
+    names = {"{sysid}": str(system), "{device}": device, "{quantity}": quantity}
     for name, value in names.items():
         template = template.replace(name, value)
     return template

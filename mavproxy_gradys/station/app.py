@@ -29,7 +29,7 @@ from aiohttp.typedefs import Handler, Middleware
 from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.station.access import add_headers, require_token, same_origin
 from mavproxy_gradys.station.exports import ParquetMissing, csv_readings, csv_text, parquet_readings
-from mavproxy_gradys.station.fleet import FleetVehicle
+from mavproxy_gradys.station.fleet import FleetVehicle, changes
 from mavproxy_gradys.station.fleet_watch import FleetWatch
 from mavproxy_gradys.station.health import Health
 from mavproxy_gradys.station.history import history_view
@@ -202,15 +202,16 @@ class Station:
         return web.json_response({"from": query.start, "to": query.end, **view})
 
     async def watch(self, request: web.Request) -> web.StreamResponse:
-        """The fleet, once a second: first all vehicles, then the changed ones."""
+        """The fleet, once a second: first all vehicles, then what has changed of each, with its device."""
         response = web.StreamResponse(headers={"Content-Type": "text/event-stream", "Cache-Control": "no-store"})
         await response.prepare(request)
         self._watchers += 1
         known: dict[str, FleetVehicle] = {}
         try:
             while True:
-                news = [vars(vehicle) for vehicle in self._watch.vehicles if known.get(vehicle.device) != vehicle]
+                pairs = [(known.get(vehicle.device), vehicle) for vehicle in self._watch.vehicles]
                 known = {vehicle.device: vehicle for vehicle in self._watch.vehicles}
+                news = [changes(before, vehicle) for before, vehicle in pairs if before != vehicle]
                 await response.write(f"data: {json.dumps(self._event(news))}\n\n".encode())
                 await self._watch.next_update()
         except ConnectionResetError:

@@ -65,6 +65,14 @@ class Alarm(NamedTuple):
     kind: str
 
 
+def changes(before: FleetVehicle | None, now: FleetVehicle) -> dict[str, Any]:
+    """The members of a vehicle that differ from `before`, and its device; all members if there is no `before`."""
+    if before is None:
+        return vars(now)
+    known = vars(before)
+    return {name: value for name, value in vars(now).items() if name == "device" or value != known[name]}
+
+
 def vehicles(fleet: FleetNow) -> list[FleetVehicle]:
     """The vehicles with a reading in the last FORGOTTEN s, by name."""
     known = [vehicle(list(readings)) for _, readings in groupby(fleet.newest, lambda newest: newest.device)]

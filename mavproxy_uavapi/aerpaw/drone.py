@@ -19,6 +19,7 @@ from mavproxy_uavapi.aerpaw.exceptions import (
 from mavproxy_uavapi.aerpaw.geometry import Coordinate
 from mavproxy_uavapi.aerpaw.helpers import normalize_heading, validate_tolerance
 from mavproxy_uavapi.aerpaw.moving import MovingVehicle
+from mavproxy_uavapi.aerpaw.vehicle import distinct
 from mavproxy_uavapi.client.drone import Drone as Client
 from mavproxy_uavapi.client.places import Position
 
@@ -100,14 +101,15 @@ class Drone(MovingVehicle):
         )
         async with self._turn():
             heading, self._current_heading = self._current_heading, None
-            target = Position(coordinates.lat, coordinates.lon, coordinates.alt)
+            target, limit = Position(coordinates.lat, coordinates.lon, coordinates.alt), distinct(timeout)
 
             async def fly(drone: Client) -> None:
-                await drone.go_to(target, heading=heading, look_at_target=True, tolerance=tolerance, timeout=timeout)
+                await drone.go_to(target, heading=heading, look_at_target=True, tolerance=tolerance, timeout=limit)
 
             await self._until(
                 self._command(NavigationError, fly),
                 lambda: self.connected and coordinates.distance(self.position) <= tolerance,
+                limit,
             )
 
     async def set_heading(self, heading: float | None, blocking: bool = True, lock_in: bool = True) -> None:

@@ -7,6 +7,7 @@ from mavproxy_uavapi.aerpaw.exceptions import NavigationError
 from mavproxy_uavapi.aerpaw.geometry import Coordinate, VectorNED
 from mavproxy_uavapi.aerpaw.helpers import validate_tolerance
 from mavproxy_uavapi.aerpaw.moving import MovingVehicle
+from mavproxy_uavapi.aerpaw.vehicle import distinct
 from mavproxy_uavapi.client.places import Position
 
 
@@ -30,13 +31,12 @@ class Rover(MovingVehicle):
         """
         validate_tolerance(tolerance, "tolerance")
         self._log_event("command", type="goto_coordinates", lat=coordinates.lat, lon=coordinates.lon)
-        target = Position(coordinates.lat, coordinates.lon, 0.0)
+        target, limit = Position(coordinates.lat, coordinates.lon, 0.0), distinct(timeout)
         async with self._turn():
             await self._until(
-                self._command(
-                    NavigationError, lambda drone: drone.go_to(target, tolerance=tolerance, timeout=timeout)
-                ),
+                self._command(NavigationError, lambda drone: drone.go_to(target, tolerance=tolerance, timeout=limit)),
                 lambda: self.connected and coordinates.ground_distance(self.position) <= tolerance,
+                limit,
             )
 
     def _velocity_of(self, vector: VectorNED) -> VectorNED:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import random
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable
 from typing import Any, TypeVar
@@ -40,7 +41,14 @@ T = TypeVar("T")
 HEARTBEAT_AGE = 3.0  # s; without a heartbeat for longer the vehicle is not connected
 CHECK_PERIOD = 0.05  # s between checks whether the script may go on
 MOST_SPEED = 50.0  # m/s, the API's limit
+SLIGHTLY = 1e-4  # s by which times of requests differ at most
 SCHEMES = ("http://", "https://")
+
+
+def distinct(seconds: float) -> float:
+    """That many s, slightly changed: a number that no other request has. The API joins equal requests to one job."""
+    change = SLIGHTLY * (1.0 - random.random())
+    return seconds - change if seconds > SLIGHTLY else seconds + change  # it stays within the API's limits
 
 
 class Vehicle(VehicleTelemetry):
@@ -115,22 +123,35 @@ class Vehicle(VehicleTelemetry):
             self._moves.remove(mine)
             mine.cancel()
 
-    async def _until(self, verb: Awaitable[None], reached: Callable[[], bool]) -> None:
-        """Wait until the verb has ended, or `reached` holds; then the verb goes on until a newer one ends it."""
+    async def _until(self, verb: Awaitable[None], reached: Callable[[], bool], mark: float | None = None) -> None:
+        """Wait until the verb has ended, or `reached` holds; then the verb goes on until a newer one ends it.
 
-        async def running() -> None:
-            await verb
+        Args:
+            verb: the verb.
+            reached: whether the script may go on.
+            mark: a number that only the verb's request has, see `distinct`. Then the script goes on only when this
+                request commands the vehicle: a request that arrives later would supersede the script's next one.
+        """
 
-        task = asyncio.ensure_future(running())
+        task = asyncio.ensure_future(verb)
         try:
             while not (await asyncio.wait({task}, timeout=CHECK_PERIOD))[0]:
-                if reached():
+                if reached() and (mark is None or await self._is_commanded_with(mark)):
                     self._continue_in_background(task)
                     return
         except asyncio.CancelledError:
             task.cancel()
             raise
         task.result()
+
+    async def _is_commanded_with(self, mark: float) -> bool:
+        """Whether the request that commands the vehicle now has that number."""
+        try:
+            command = await self._thread.run(self._thread.drone.command)
+        except (UavApiError, NotConnectedError) as error:  # the verb's own request says what is wrong
+            log.debug("it is unknown who commands the vehicle: %s", error)
+            return False
+        return command is not None and mark in command.request.values()
 
     def _continue_in_background(self, task: asyncio.Task[None]) -> None:
         self._background.add(task)

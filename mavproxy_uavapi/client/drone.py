@@ -13,7 +13,7 @@ from mavproxy_uavapi.client.errors import Unreachable, error_of
 from mavproxy_uavapi.client.http import Http
 from mavproxy_uavapi.client.logs import Log
 from mavproxy_uavapi.client.places import Ned, Position
-from mavproxy_uavapi.client.readings import Readings, Status
+from mavproxy_uavapi.client.readings import Command, Readings, Status
 from mavproxy_uavapi.client.telemetry import Telemetry
 from mavproxy_uavapi.core.errors import LinkLost, NoVehicle, UavApiError
 from mavproxy_uavapi.core.timeout import wait_with_timeout
@@ -71,6 +71,15 @@ class Drone(Readings):
         """
         body = await self._http.get("/telemetry/home_info")
         return Position(body["lat"], body["lon"], 0.0), float(body["altitude"])
+
+    async def command(self) -> Command | None:
+        """The job that commands it now; None if there is none."""
+        vehicles = (await self._answer(self._http.get("/authority")))["vehicles"]
+        commander = next((one["commanded_by"] for one in vehicles if one["vehicle"] == self.id), None)
+        if commander is None:
+            return None
+        job = await self._answer(self._http.get(f"/jobs/{commander['job']}"))
+        return Command(job["job"], job["verb"], job["request"])
 
     # -- logs ---------------------------------------------------------------------------------------------
 

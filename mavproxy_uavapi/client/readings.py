@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from mavproxy_uavapi.client.places import Ned, Position
 from mavproxy_uavapi.client.telemetry import Telemetry
@@ -52,6 +54,21 @@ class Status:
     ekf_ok: bool
     ready_to_arm: bool
     why_not: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Command:
+    """The job that commands a vehicle.
+
+    Attributes:
+        job: its number at `/jobs`.
+        verb: the path of the API that began it.
+        request: its parameters, by name.
+    """
+
+    job: str
+    verb: str
+    request: Mapping[str, Any]
 
 
 def _scaled(value: float | None, divisor: float) -> float | None:

@@ -213,3 +213,34 @@ def test_what_devices_are_called_is_text_on_the_page(harness: Any, tmp_path: Pat
     assert f">{escaped}</option>" in dom
     assert "<title>Fleet</title>" in dom and "<img" not in dom
     assert "9 readings, 0 gaps" in dom
+
+
+@pytest.mark.needs("chromium")
+def test_page_keeps_what_has_not_changed(harness: Any, tmp_path: Path) -> None:
+    port = harness.free_port()
+    url = f"http://127.0.0.1:{port}"
+    command = [sys.executable, "-m", "mavproxy_gradys.station", f"--port={port}", "--database=s.db"]
+    station = harness.Process(command, tmp_path / "station.log", tmp_path)
+
+    def post(seq: int, quantity: str, value: float) -> None:
+        reading = {"device": "uav-1", "seq": seq, "quantity": quantity, "value": value, "time": time.time()}
+        assert requests.post(f"{url}/readings", json={"readings": [reading]}, timeout=10).status_code == 200
+
+    async def row(page: Any, speed: str, battery: str) -> None:
+        cells = "[...document.querySelectorAll('#rows .row span')].map(cell => cell.textContent)"
+        await page.until(f'JSON.stringify({cells}.slice(3, 5)) === \'["{speed}","{battery}"]\'')
+
+    async def look() -> None:
+        async with chromium(tmp_path) as page:
+            await page.ask("Page.navigate", url=url)
+            await row(page, "4.5", "80")
+            await asyncio.to_thread(post, 3, "battery", 70.0)
+            await row(page, "4.5", "70")
+
+    try:
+        station.says("listening on")
+        post(1, "speed", 4.5)
+        post(2, "battery", 80.0)
+        asyncio.run(look())
+    finally:
+        station.stop()

@@ -125,14 +125,14 @@ def test_readings_positions_and_the_last_will(rig, harness, tmp_path):
 def test_unloading_says_offline(rig, harness, tmp_path):
     broker = Broker(rig, harness, tmp_path)
     subscriber = Subscriber(broker.port)
-    sink = f"mqtt://uav:secret@127.0.0.1:{broker.port}/fleet/{{sysid}}/{{quantity}}"
+    sink = f"mqtt://uav:secret@127.0.0.1:{broker.port}"
     settings = json.dumps({"sink": sink, "spool": f"{tmp_path}/spool.db"}, separators=(",", ":"))
     rig.mavproxy.ask(f"module load gradys:{settings}", "Loaded module gradys")
-    harness.eventually(lambda: subscriber.readings("fleet/10/position"), 15, "a position")
+    harness.eventually(lambda: subscriber.readings("fleet/uav-10/position"), 15, "a position")
     began = time.monotonic()
     rig.mavproxy.ask("module unload gradys", "Unloaded module gradys")
     assert time.monotonic() - began < 3
-    harness.eventually(lambda: ("fleet/10/status", "offline", False) in subscriber.heard, 5, "offline")
+    harness.eventually(lambda: ("fleet/uav-10/status", "offline", False) in subscriber.heard, 5, "offline")
     subscriber.stop()
 
 

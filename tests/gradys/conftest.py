@@ -147,7 +147,7 @@ def down() -> NotDelivered:
 def settings(tmp_path: Path) -> Callable[..., GradysSettings]:
     """A snapshot: `settings(gs="127.0.0.1:1")`."""
 
-    def make(**given: Any) -> GradysSettings:
-        return GradysModuleSettings({"spool": str(tmp_path / "spool.db"), **given}).snapshot()
+    def make(**values: Any) -> GradysSettings:
+        return GradysModuleSettings({"spool": str(tmp_path / "spool.db"), **values}).snapshot()
 
     return make

@@ -22,8 +22,8 @@ def make(mpstate: Any, main_loop: Any, tmp_path: Path) -> Iterator[Callable[...,
     """Loads the module, up to its first idle task."""
     made: list[Any] = []
 
-    def load(**given: Any) -> Any:
-        module = gradys.init(mpstate, **{"spool": str(tmp_path / "spool.db"), **given})
+    def load(**keywords: Any) -> Any:
+        module = gradys.init(mpstate, **{"spool": str(tmp_path / "spool.db"), **keywords})
         made.append(module)
         main_loop.modules.append(module)
         main_loop.turn()
@@ -240,10 +240,10 @@ def test_a_disk_that_hangs_at_the_unload_is_not_waited_for_and_its_readings_are_
     hung.set()
 
 
-@pytest.mark.parametrize("given", [{"gs": "x:y"}, {"nope": 1}, {"config": "/no/such/file"}])
-def test_a_bad_setting_is_an_import_error_of_one_line(mpstate: Any, given: dict[str, Any]) -> None:
+@pytest.mark.parametrize("keywords", [{"gs": "x:y"}, {"nope": 1}, {"config": "/no/such/file"}])
+def test_a_bad_setting_is_an_import_error_of_one_line(mpstate: Any, keywords: dict[str, Any]) -> None:
     with pytest.raises(ImportError) as raised:
-        gradys.init(mpstate, **given)
+        gradys.init(mpstate, **keywords)
     assert "\n" not in str(raised.value)
     assert mpstate.command_map == {}
 

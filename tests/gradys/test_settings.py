@@ -76,9 +76,9 @@ def test_only_an_ini_file_has_commands(tmp_path: Path, monkeypatch: Any) -> None
     with pytest.raises(SettingError, match="hum: only an INI file may have exec:"):
         settings.set("quantities", COMMAND)
     assert settings.snapshot() == before
-    for given in ({"quantities": COMMAND}, {"quantities": COMMAND, "origins": {"quantities": str(ini)}}):
+    for values in ({"quantities": COMMAND}, {"quantities": COMMAND, "origins": {"quantities": str(ini)}}):
         with pytest.raises(SettingError, match="INI file"):
-            GradysModuleSettings(given)
+            GradysModuleSettings(values)
     monkeypatch.setenv("GRADYS_QUANTITIES", COMMAND)
     with pytest.raises(SettingError, match=r"GRADYS_QUANTITIES: .*INI file"):
         GradysModuleSettings({})

@@ -11,6 +11,7 @@ from typing import Any
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.vehicle.messages import FORCE_DISARM, POSITION_IGNORED, VELOCITY_IGNORED
+from tests.support.drone_parameters import PARAMETERS
 
 mavlink = mavutil.mavlink
 
@@ -24,20 +25,6 @@ EKF_GOOD = mavlink.EKF_ATTITUDE | mavlink.EKF_POS_HORIZ_ABS | mavlink.EKF_POS_VE
 SPEEDS = {"horizontal": 10.0, "up": 2.5, "down": 1.5}
 BOOT_TIME = 1.0  # s from a reboot to the first word
 MISSION_SPEED = 2.0  # m/s northwards, in AUTO
-PARAMETERS = {
-    "WPNAV_SPEED": 1000.0,
-    "WPNAV_SPEED_UP": 250.0,
-    "WPNAV_SPEED_DN": 150.0,
-    "WPNAV_ACCEL": 250.0,
-    "LAND_SPEED": 50.0,
-    "LAND_SPEED_HIGH": 0.0,
-    "LAND_ALT_LOW": 1000.0,
-    "RTL_ALT": 1500.0,
-    "RTL_SPEED": 0.0,
-    "RTL_LOIT_TIME": 5000.0,
-    "GUID_TIMEOUT": 3.0,
-    "SIM_SPEEDUP": 1.0,
-}
 
 
 class Drone:

@@ -7,20 +7,15 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import math
 import os
-import random
 import tempfile
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, Protocol
+from typing import Any
 
 os.environ["MAVLINK20"] = "1"  # before pymavlink is imported anywhere
 
-import cv2
-import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.errors import Aborted
@@ -28,166 +23,15 @@ from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.mavlink.link import Address, require_finite
 from mavproxy_uavapi.sim.options import Home, Options, Wind
 from mavproxy_uavapi.sim.simulator import STEP, Simulator
-from mavproxy_vision.apriltag.detection import FrameResult, TagDetection
-from mavproxy_vision.apriltag.detector import Detector, DetectorOptions, locate
-from mavproxy_vision.apriltag.tag_layout import FAMILIES
-from mavproxy_vision.camera.renderer import PlacedTag, Renderer
-from mavproxy_vision.camera.source import Frame
-from mavproxy_vision.geometry.frames import Attitude, Vector, vector
 from mavproxy_vision.landing.flight_jobs import FlightJobs
 from mavproxy_vision.settings import VisionModuleSettings
-from mavproxy_vision.tracking.capture_worker import Health, Watch
 from mavproxy_vision.tracking.stream_rates import TRUTH
-from mavproxy_vision.tracking.tracker import Tracker, make_source
+from mavproxy_vision.tracking.tracker import Tracker
+from tests.support.eye import Eye
 from tests.support.virtual_time import TimeTravellingLoop
 
-DETECTOR_TIME = 0.015  # s from a frame's arrival to its outcome
 STREAMS_EVERY = 15.0  # s: as often does MAVProxy ask for all streams at its rate
 STREAM_RATE = 4  # Hz
-CORNER_NOISE = 0.05  # px
-REACH = 1.3  # times the range up to which a tag is dependable: beyond it none is found
-
-
-class Rig(Protocol):
-    """What an eye belongs to: the loop of the virtual clock, the module's own side, and what chance begins with."""
-
-    loop: Any
-    tracker: Tracker
-    seed: int
-
-
-class Projector:
-    """What a good camera and a good detector would find, by geometry alone: a tenth of their time.
-
-    Args:
-        renderer: whose camera, mount and tags these are.
-        seed: of the corners' noise.
-    """
-
-    def __init__(self, renderer: Renderer, seed: int) -> None:
-        self.renderer = renderer
-        self._random = np.random.default_rng(seed)
-
-    def detect(self, position: Vector, attitude: Attitude, options: DetectorOptions) -> tuple[TagDetection, ...]:
-        """The tags that are looked for, wholly in view and near enough, from there (NED m from home)."""
-        if self.renderer.look.occlusion:
-            return ()
-        sizes = options.sizes or {}
-        expected = [tag for tag in self.renderer.tags if options.any_id or not sizes or tag.id in sizes]
-        found = [self._sight(tag, position, attitude, sizes.get(tag.id, 0.0)) for tag in expected]
-        return tuple(detection for detection in found if detection is not None)
-
-    def _sight(self, tag: PlacedTag, position: Vector, attitude: Attitude, size: float) -> TagDetection | None:
-        model, mount = self.renderer.model, self.renderer.mount
-        heading = math.radians(tag.heading)
-        up, right = (
-            vector(math.cos(heading), math.sin(heading), 0.0),
-            vector(-math.sin(heading), math.cos(heading), 0.0),
-        )
-        centre, half = vector(tag.north, tag.east, 0.0), tag.size / 2
-        corners = [centre + half * (y * up + x * right) for x, y in ((-1, 1), (1, 1), (1, -1), (-1, -1))]
-        seen = (np.array(corners) - position - mount.lens(attitude)) @ mount.in_ned(attitude)
-        distance = float(np.linalg.norm(seen.mean(axis=0)))
-        if (seen[:, 2] <= 0.0).any() or distance > REACH * model.detection_range(tag.size, FAMILIES[tag.family][0]):
-            return None
-        pixels = seen[:, :2] / seen[:, 2:] * (model.fx, model.fy) + (model.cx, model.cy)
-        pixels += self._random.normal(0.0, CORNER_NOISE, (4, 2))
-        if (pixels < 1).any() or (pixels > (model.width - 2, model.height - 2)).any():
-            return None
-        if not size:
-            return TagDetection(tag.family, tag.id, 0, pixels)
-        place, turned, error = locate(model, pixels, size)
-        return TagDetection(tag.family, tag.id, 0, pixels, size, place, turned, error)
-
-
-class Eye:
-    """Stands in for the worker: frames come, and are looked at, on the virtual clock.
-
-    Attributes:
-        frozen: give the same frame again and again.
-        dead: give none.
-        blind: called with the truth (position, attitude); true hides the tags.
-
-    Args:
-        rig: to whom it belongs.
-        rendered: whether frames are drawn and tags detected in them; else both are left to geometry.
-    """
-
-    def __init__(self, rig: Rig, *, rendered: bool = False) -> None:
-        self.rig = rig
-        self._rendered = rendered
-        self.watch = Watch(True, rig.loop.time())
-        self.frozen = self.dead = False
-        self.blind: Callable[[Any], bool] = lambda _pose: False
-        self._last: Frame | None = None
-        self._random = random.Random(rig.seed + 7)
-        self._number = 0
-        self.source: Any = None
-        self.detector: Any = None
-        self._projector: Any = None
-        self._projected: tuple[TagDetection, ...] = ()  # in the newest frame
-        self.task: Any = None
-
-    def start(self) -> None:
-        self.rig.tracker.worker = self  # type: ignore[assignment]
-        settings = self.rig.tracker.settings
-        cv2.setNumThreads(settings.threads)
-        self.source = make_source(settings, self.rig.tracker._where, self.rig.loop.time)
-        self.source._random = random.Random(self.rig.seed + 11)
-        self.detector = Detector(settings.model, self.rig.tracker.options(settings))
-        self._projector = Projector(self.source.renderer, self.rig.seed)
-        self.task = self.rig.loop.create_task(self._run())
-
-    def stop(self) -> None:
-        if self.task is not None:
-            self.task.cancel()
-
-    @property
-    def health(self) -> Health:
-        return Health(self.watch.verdict(self.rig.loop.time()), self._number)
-
-    async def _run(self) -> None:
-        loop = self.rig.loop
-        while True:
-            light = loop.time()
-            loop.call_later(self.source.latency(), self._arrive, light)
-            await asyncio.sleep(1.0 / self.source.timing.rate)
-
-    def _arrive(self, light: float) -> None:
-        now = self.rig.loop.time()
-        if self.dead or self._random.random() < self.source.timing.dropout:
-            return
-        frame = self._frame(light, now)
-        if frame is None or not self.watch.is_new(frame):
-            return
-        self._last = frame
-        self._number += 1
-        detections = self.detector.detect(frame.image) if self._rendered else self._projected
-        size = (frame.image.shape[1], frame.image.shape[0])
-        done = now + DETECTOR_TIME
-        seen = FrameResult(self._number, frame.captured_at, frame.received_at, done, size, detections)
-        self.rig.loop.call_later(DETECTOR_TIME, self.rig.tracker.take, seen, frame.image)
-
-    def _frame(self, light: float, now: float) -> Frame | None:
-        if self.frozen and self._last is not None:
-            return replace(self._last, received_at=now, captured_at=now)
-        renderer, pose = self.source.renderer, self.rig.tracker._where(light)
-        tags, renderer.tags = renderer.tags, () if pose is not None and self.blind(pose) else renderer.tags
-        try:
-            return self.source.frame(light, now) if self._rendered else self._project(light, now)
-        finally:
-            renderer.tags = tags
-
-    def _project(self, light: float, now: float) -> Frame | None:
-        """A frame with nothing drawn in it but its number, and what would be found in it."""
-        pose = self.rig.tracker._where(light)
-        if pose is None:
-            return None
-        self._projected = self._projector.detect(*pose, self.detector.options)
-        model = self.source.renderer.model
-        image = np.zeros((model.height, model.width), np.uint8)
-        image[0, :16:4] = np.frombuffer(np.uint32(self._number).tobytes(), np.uint8)  # no two frames are the same
-        return Frame(image, now - self.source.timing.assumed_latency, now)
 
 
 class WireLink:

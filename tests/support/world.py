@@ -117,7 +117,7 @@ class World:
         from mavproxy_vision.settings import VisionModuleSettings  # noqa: PLC0415
         from mavproxy_vision.tracking.stream_rates import TRUTH  # noqa: PLC0415
         from mavproxy_vision.tracking.tracker import Tracker  # noqa: PLC0415
-        from tests.support.lockstep import Eye  # noqa: PLC0415
+        from tests.support.eye import Eye  # noqa: PLC0415
 
         self.tracker = Tracker(self.host, VisionModuleSettings({"source": "sim", **settings}).snapshot())
         self.flights = FlightJobs(self.tracker, lambda: self.directory)

@@ -9,7 +9,7 @@ from mavproxy_vision.apriltag.detector import Detector, DetectorOptions
 from mavproxy_vision.camera.renderer import Look, PlacedTag, Renderer
 from mavproxy_vision.geometry.camera_model import CameraModel
 from mavproxy_vision.geometry.frames import Attitude, Mount, vector
-from tests.support.lockstep import Projector
+from tests.support.eye import Projector
 
 MODEL = CameraModel.from_field_of_view(640, 480, 56.145)
 OPTIONS = DetectorOptions(("36h11",), {0: 0.3})

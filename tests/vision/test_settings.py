@@ -137,7 +137,7 @@ def test_a_setting_has_a_name_and_a_choice_its_words():
 
 
 def test_bad_settings_at_loading_are_refused_too():
-    for given in (
+    for values in (
         {"fps": "nan"},
         {"leash": float("nan")},
         {"tags": "0:0.3.0"},
@@ -145,7 +145,7 @@ def test_bad_settings_at_loading_are_refused_too():
         {"source": None},
     ):
         with pytest.raises(SettingError):
-            VisionModuleSettings(given)
+            VisionModuleSettings(values)
 
 
 @pytest.mark.parametrize(

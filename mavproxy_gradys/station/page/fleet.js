@@ -19,7 +19,7 @@ const source = new EventSource("watch");
 source.onmessage = event => {
   const news = JSON.parse(event.data);
   now = news.now; heard = performance.now();
-  for (const vehicle of news.vehicles) fleet.set(vehicle.device, vehicle);
+  for (const changes of news.vehicles) fleet.set(changes.device, {...fleet.get(changes.device), ...changes});
   for (const [name, vehicle] of fleet) if (now - vehicle.received > FORGOTTEN) fleet.delete(name);
   alarms = new Map();
   for (const [name, kind] of news.alarms) alarms.set(name, [...(alarms.get(name) || []), kind]);

@@ -6,9 +6,7 @@ import pytest
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import (
-    Busy,
     Invalid,
-    LinkLost,
     ModeChanged,
     NotArmed,
     NotFound,
@@ -20,160 +18,9 @@ from mavproxy_uavapi.core.errors import (
 from mavproxy_uavapi.core.vehicle.messages import NedTarget
 
 mavlink = mavutil.mavlink
-ARM = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
 MODE = mavlink.MAV_CMD_DO_SET_MODE
 SPEED = mavlink.MAV_CMD_DO_CHANGE_SPEED
-PREARM = mavlink.MAV_CMD_RUN_PREARM_CHECKS
 DENIED, FAILED = mavlink.MAV_RESULT_DENIED, mavlink.MAV_RESULT_FAILED
-
-
-def numbers(drone: Any) -> list[int]:
-    return [message.command for message in drone.orders()]
-
-
-# -- arm --------------------------------------------------------------------------------------------------
-
-
-def test_arm_switches_to_guided_then_arms(drone: Any, copter: Any, pilotage: Any) -> None:
-    pilotage.do(copter.arm)
-    assert numbers(drone) == [MODE, ARM]
-    assert (drone.mode, drone.armed) == ("GUIDED", True)
-    assert copter.state.armed is True
-
-
-def test_arm_in_guided_only_arms(loop: Any, drone: Any, copter: Any, pilotage: Any) -> None:
-    drone.pilot("GUIDED")
-    loop.settle()
-    pilotage.do(copter.arm)
-    assert numbers(drone) == [ARM]
-
-
-def test_arm_waits_until_the_vehicle_is_ready(loop: Any, drone: Any, copter: Any, pilotage: Any) -> None:
-    drone.ready = False
-    loop.pass_time(1.0)
-    job = pilotage.start(copter.arm)
-    loop.pass_time(10.0)
-    assert drone.orders() == []
-    drone.ready = True
-    pilotage.result(job)
-    assert numbers(drone) == [MODE, ARM]
-
-
-def test_arm_of_a_vehicle_that_does_not_get_ready_is_rejected_with_its_reasons(
-    loop: Any, drone: Any, copter: Any, pilotage: Any
-) -> None:
-    drone.ready = False
-    drone.says[PREARM] = ["PreArm: compass not healthy"]
-    loop.pass_time(1.0)
-    started = loop.time()
-    job = pilotage.start(copter.arm, timeout=10.0)
-    loop.call_later(8.3, drone.say, "PreArm: GPS: no fix")
-    loop.call_later(8.5, drone.say, "PreArm: battery low")
-    with pytest.raises(
-        Rejected, match=r"not ready to arm after 8 s: PreArm: compass not healthy; PreArm: GPS: n"
-    ) as e:
-        pilotage.result(job)
-    assert e.value.statustext == ["PreArm: compass not healthy", "PreArm: GPS: no fix", "PreArm: battery low"]
-    assert loop.time() - started < 13.0
-    assert numbers(drone) == [PREARM]
-
-
-def test_arm_reports_the_autopilots_texts_when_it_refuses(drone: Any, copter: Any, pilotage: Any) -> None:
-    drone.answers[ARM] = [FAILED]
-    drone.says[ARM] = ["Arm: throttle too high"]
-    with pytest.raises(Rejected) as caught:
-        pilotage.do(copter.arm)
-    assert (caught.value.ack, caught.value.statustext) == ("MAV_RESULT_FAILED", ["Arm: throttle too high"])
-
-
-def test_arm_without_guided_is_rejected_and_does_not_arm(drone: Any, copter: Any, pilotage: Any) -> None:
-    drone.answers[MODE] = [FAILED]
-    with pytest.raises(Rejected, match="refused DO_SET_MODE"):
-        pilotage.do(copter.arm)
-    assert numbers(drone) == [MODE]
-
-
-def test_arm_of_an_armed_vehicle_in_guided_sends_nothing(flying: Any, copter: Any, pilotage: Any) -> None:
-    pilotage.do(copter.arm)
-    assert flying.orders() == []
-
-
-def test_arm_of_a_vehicle_that_its_pilot_flies_sends_nothing(
-    loop: Any, drone: Any, copter: Any, pilotage: Any
-) -> None:
-    drone.fly("LOITER")
-    loop.settle()
-    with pytest.raises(ModeChanged, match="flying in LOITER"):
-        pilotage.do(copter.arm)
-    loop.pass_time(10.0)
-    assert drone.orders() == []
-
-
-def test_arm_without_an_ack_is_done_when_a_heartbeat_shows_it(drone: Any, copter: Any, pilotage: Any) -> None:
-    drone.answers[ARM] = [mavlink.MAV_RESULT_ACCEPTED]  # says yes, does not do it
-    with pytest.raises(TimedOut, match="did not show that it is armed"):
-        pilotage.do(copter.arm)
-
-
-def test_pilot_mode_change_ends_the_wait_for_readiness_and_sends_nothing(
-    loop: Any, drone: Any, copter: Any, pilotage: Any
-) -> None:
-    drone.ready = False
-    loop.pass_time(1.0)
-    job = pilotage.start(copter.arm)
-    loop.pass_time(3.0)
-    drone.pilot("LOITER")
-    started = loop.time()
-    with pytest.raises(ModeChanged):
-        pilotage.result(job)
-    assert loop.time() - started < 0.1
-    drone.ready = True
-    loop.pass_time(20.0)
-    assert drone.orders() == []
-
-
-def test_pilot_who_leaves_guided_is_not_armed_under_his_hands(
-    loop: Any, drone: Any, copter: Any, pilotage: Any
-) -> None:
-    drone.answers[ARM] = [None]
-    job = pilotage.start(copter.arm)
-    loop.pass_time(0.5)
-    assert numbers(drone) == [MODE, ARM]
-    drone.pilot("STABILIZE")
-    with pytest.raises(ModeChanged):
-        pilotage.result(job)
-    loop.pass_time(10.0)
-    assert numbers(drone) == [MODE, ARM]
-
-
-# -- disarm -----------------------------------------------------------------------------------------------
-
-
-def test_disarm_on_the_ground(loop: Any, drone: Any, copter: Any, pilotage: Any) -> None:
-    drone.armed = True
-    loop.pass_time(0.5)
-    pilotage.do(copter.disarm)
-    assert [(message.command, message.param1, message.param2) for message in drone.orders()] == [(ARM, 0, 0)]
-    assert copter.state.armed is False
-
-
-def test_disarm_of_a_disarmed_vehicle_is_done_at_once(loop: Any, drone: Any, copter: Any, pilotage: Any) -> None:
-    started = loop.time()
-    pilotage.do(copter.disarm)
-    assert (drone.orders(), loop.time()) == ([], started)
-
-
-def test_disarm_in_the_air_is_refused_and_sends_nothing(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
-    with pytest.raises(Busy, match="flying; land it first"):
-        pilotage.do(copter.disarm)
-    loop.pass_time(5.0)
-    assert flying.orders() == []
-
-
-def test_forced_disarm_in_the_air_carries_the_magic_number(flying: Any, copter: Any, pilotage: Any) -> None:
-    pilotage.do(copter.disarm, force=True)
-    assert [(message.param1, message.param2) for message in flying.orders()] == [(0, 21196)]
-
 
 # -- modes and speeds -------------------------------------------------------------------------------------
 
@@ -422,15 +269,6 @@ def test_guard_distinguishes_pilot_disarming_and_reboot(copter: Any) -> None:
     state.armed = state.mode = None
     with pytest.raises(NotArmed, match="rebooted"):
         copter.held_by("STABILIZE")
-
-
-def test_link_loss_ends_arming(loop: Any, drone: Any, copter: Any, pilotage: Any) -> None:
-    drone.answers[ARM] = [None]
-    job = pilotage.start(copter.arm)
-    loop.pass_time(0.2)
-    drone.power_off()
-    with pytest.raises(LinkLost):
-        pilotage.result(job)
 
 
 def test_mode_that_was_shown_and_left_at_once_is_somebody_elses_switch(

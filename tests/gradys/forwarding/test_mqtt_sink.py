@@ -8,10 +8,13 @@ from typing import Any
 
 import aiomqtt
 import pytest
+from paho.mqtt.client import topic_matches_sub
 
 from mavproxy_gradys.errors import NotDelivered
+from mavproxy_gradys.forwarding import mqtt_sink
 from mavproxy_gradys.forwarding.mqtt_sink import MqttSink, status_topic, topic_of
 from mavproxy_gradys.forwarding.readings import Reading, Stored
+from mavproxy_gradys.nearby import listener
 
 ALT = Reading("uav-7", 7, "alt", "m", 1.0, 0.0)
 
@@ -29,6 +32,11 @@ def test_topics(template: str, topic: str, status: str) -> None:
     assert status_topic(template, ALT) == status
 
 
+def test_default_topic_is_the_one_that_a_listener_for_nearby_vehicles_subscribes_to() -> None:
+    topic = topic_of(mqtt_sink.DEFAULT_TOPIC, Reading("north-7", 7, "position", "", [1, 2, 3], 0.0))
+    assert topic_matches_sub(listener.DEFAULT_TOPIC, topic)
+
+
 class Broker:
     """In the place of aiomqtt's clients: makes them, and answers as slowly as a test wants.
 
@@ -37,7 +45,7 @@ class Broker:
         refuses: topic that it refuses.
         made: how many clients there were.
         open: connections that nobody has closed.
-        said: (topic, retained) of what was published.
+        output: (topic, retained) of what was published.
     """
 
     def __init__(self) -> None:
@@ -107,6 +115,25 @@ def test_only_a_vehicle_of_our_own_name_stays_with_the_broker(loop: Any, broker:
         ("fleet/north-7/position", True),
         ("fleet/uav-7/position", False),
     ]
+
+
+def test_vehicles_of_two_machines_with_one_system_id_share_no_topic(loop: Any, broker: Broker) -> None:
+    topics = []
+    for name in ("north", "south"):
+        broker.output.clear()
+        sink = MqttSink("mqtt://127.0.0.1", 3.0, "", device=name)
+        sent(loop, sink, Reading(f"{name}-7", 7, "position", "", [1, 2, 3], 0.0))
+        topics.append(sorted(broker.output))
+    assert topics == [
+        [("fleet/north-7/position", True), ("fleet/north-7/status", True)],
+        [("fleet/south-7/position", True), ("fleet/south-7/status", True)],
+    ]
+
+
+def test_readings_of_all_devices_of_a_vehicle_take_one_connection(loop: Any, broker: Broker) -> None:
+    sink = MqttSink("mqtt://127.0.0.1", 3.0, "")
+    sent(loop, sink, ALT, *(Reading(f"buoy-{n}", 7, "depth", "m", 2.0, 0.0) for n in range(5)))
+    assert (broker.made, broker.output[0]) == (1, ("fleet/uav-7/status", True))
 
 
 def test_a_connection_that_comes_too_late_is_closed_and_meanwhile_none_is_made(

@@ -35,9 +35,9 @@ def pipeline(
 def start(loop: Any, pipeline: ReadingPipeline, settings: Any) -> Callable[..., None]:
     """Starts it: `start(sink="http://a/r")`."""
 
-    def begin(**given: Any) -> None:
+    def begin(**values: Any) -> None:
         async def begun() -> None:
-            pipeline.start(settings(**given))
+            pipeline.start(settings(**values))
 
         loop.run(begun())
         loop.settle()

@@ -126,9 +126,12 @@ def test_a_receiver_that_acknowledges_nothing_is_not_tried_again_at_once(
     assert spool_thread.count == 1 and "acknowledges nothing" in sender.last_error
 
 
-def refusing(poster: Any, refuses: Any, **given: Any) -> None:
+def refusing(poster: Any, refuses: Any, **attributes: Any) -> None:
     """Have it refuse the batches for which that holds, of their values."""
-    answers, refusal = poster.answer, NotDelivered("it answers 400", reached=True, **{"for_content": True, **given})
+    answers, refusal = (
+        poster.answer,
+        NotDelivered("it answers 400", reached=True, **{"for_content": True, **attributes}),
+    )
     poster.answer = lambda body: refusal if refuses(values(body)) else answers(body)
 
 

@@ -17,8 +17,8 @@ POSTED = [
 SAMPLED = [2**64 - 1, "text", [1, 2.5, -3]]
 
 
-def reading(value: Any, **given: Any) -> Reading:
-    named = {"device": "uav-1", "system": 1, "quantity": "alt", "representation": "m", "time": 5.0, **given}
+def reading(value: Any, **members: Any) -> Reading:
+    named = {"device": "uav-1", "system": 1, "quantity": "alt", "representation": "m", "time": 5.0, **members}
     return Reading(value=value, **named)
 
 
@@ -42,8 +42,8 @@ def test_what_would_not_come_back_is_not_taken(value: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    "given",
+    "members",
     [{"device": "a/b"}, {"quantity": "x" * 65}, {"representation": "\udcff"}, {"time": math.inf}, {"quantity": ""}],
 )
-def test_names_times_and_units_are_looked_at_too(given: dict[str, Any]) -> None:
-    assert not is_storable(reading(1.0, **given))
+def test_names_times_and_units_are_looked_at_too(members: dict[str, Any]) -> None:
+    assert not is_storable(reading(1.0, **members))

@@ -52,7 +52,7 @@ def test_several_stations_are_listed_once_each() -> None:
 
 
 @pytest.mark.parametrize(
-    "given,own,api,field",
+    "setting,own,api,field",
     [
         ("", "192.0.2.2", ("0.0.0.0", 8000), "192.0.2.2:8000/"),
         ("", "2001:db8::2", ("::", 8000), "[2001:db8::2]:8000/"),
@@ -64,8 +64,8 @@ def test_several_stations_are_listed_once_each() -> None:
         ("uav.local", "", None, "uav.local/"),
     ],
 )
-def test_ip_has_no_scheme_and_ends_in_a_slash(given: str, own: str, api: Any, field: str) -> None:
-    assert ip_field(given, own, api) == field
+def test_ip_has_no_scheme_and_ends_in_a_slash(setting: str, own: str, api: Any, field: str) -> None:
+    assert ip_field(setting, own, api) == field
 
 
 def test_ip_that_no_station_could_call_is_refused() -> None:

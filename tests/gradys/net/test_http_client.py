@@ -43,13 +43,13 @@ class Peer:
         return (await answer) if asyncio.iscoroutine(answer) else answer
 
 
-def requested(loop: Any, peer: Peer, times: int = 1, **given: Any) -> list[Any]:
+def requested(loop: Any, peer: Peer, times: int = 1, **options: Any) -> list[Any]:
     """What the client makes of the peer's answers."""
     loop.patience = 0.2
 
     async def run() -> list[Any]:
         await peer.start()
-        client = Client(3.0, **given)
+        client = Client(3.0, **options)
         try:
             return [await client.post(peer.url, b"a=1", FORM) for _ in range(times)]
         finally:

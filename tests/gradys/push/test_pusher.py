@@ -16,9 +16,9 @@ from mavproxy_gradys.push.statistics import StationTally
 def push(loop: Any, host: Any, telemetry: Any, settings: Any) -> Callable[..., Pusher]:
     """Begins to push to a station: `push(poster, ip="192.0.2.2")`."""
 
-    def begin(poster: Any, address: str = "127.0.0.1:9", **given: Any) -> Pusher:
+    def begin(poster: Any, address: str = "127.0.0.1:9", **values: Any) -> Pusher:
         where = station(address)
-        snapshot = settings(**{"ip": "192.0.2.2", **given})
+        snapshot = settings(**{"ip": "192.0.2.2", **values})
         pusher = Pusher(where, host, snapshot, StationTally(where.url, lambda: 0.0), poster)
 
         async def a_little_later() -> None:  # so that no turn falls on the end of a test's second

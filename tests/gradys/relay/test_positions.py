@@ -10,7 +10,7 @@ import pytest
 from mavproxy_gradys.relay.positions import Positions
 
 
-def put(positions: Positions, **given: Any) -> None:
+def put(positions: Positions, **members: Any) -> None:
     reading = {
         "device": "uav-7",
         "id": "7",
@@ -19,7 +19,7 @@ def put(positions: Positions, **given: Any) -> None:
         "value": [-15.8, -47.9, 20.0],
         "time": 9,
     }
-    positions.put(json.dumps({**reading, **given}).encode(), 100.0)
+    positions.put(json.dumps({**reading, **members}).encode(), 100.0)
 
 
 def forms(positions: Positions) -> list[dict[str, str]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
 import json
@@ -26,7 +27,7 @@ from mavproxy_gradys.station.updates import Updates, parse
 FORM = {"id": "10", "lat": "-15.84", "lng": "-47.9", "alt": "20.1", "device": "uav", "type": "102", "seq": "0"}
 
 
-def reading(seq: Any, **given: Any) -> dict[str, Any]:
+def reading(seq: Any, **members: Any) -> dict[str, Any]:
     return {
         "device": "uav-1",
         "id": "1",
@@ -35,7 +36,7 @@ def reading(seq: Any, **given: Any) -> dict[str, Any]:
         "representation": "m",
         "value": 1.5,
         "time": 5,
-        **given,
+        **members,
     }
 
 
@@ -63,13 +64,13 @@ class Asker:
     def __init__(self, loop: Any, client: TestClient[Any, Any], watch: FleetWatch) -> None:
         self._loop, self._client, self.watch = loop, client, watch
 
-    def __call__(self, method: str, path: str, **given: Any) -> tuple[int, str]:
-        answer = self.whole(method, path, **given)
+    def __call__(self, method: str, path: str, **options: Any) -> tuple[int, str]:
+        answer = self.whole(method, path, **options)
         return answer.status, answer.body.decode()
 
-    def whole(self, method: str, path: str, **given: Any) -> Any:
+    def whole(self, method: str, path: str, **options: Any) -> Any:
         async def requested() -> Any:
-            async with self._client.request(method, path, **given) as answer:
+            async with self._client.request(method, path, **options) as answer:
                 return SimpleNamespace(status=answer.status, headers=answer.headers, body=await answer.read())
 
         return self._loop.run(requested())
@@ -81,6 +82,18 @@ class Asker:
 
     def look(self) -> None:
         self._loop.run(self.watch.update())
+
+    @contextlib.contextmanager
+    def stream(self, path: str) -> Iterator[Callable[[], Any]]:
+        """A function that waits for the next event of a stream."""
+        response = self._loop.run(self._client.get(path))
+
+        async def event() -> Any:
+            line, _ = await response.content.readline(), await response.content.readline()
+            return json.loads(line.removeprefix(b"data: "))
+
+        yield lambda: self._loop.run(event())
+        response.close()
 
 
 @pytest.fixture
@@ -170,6 +183,23 @@ def test_the_fleet_is_of_readings_and_of_updates(ask: Any, clock: Any) -> None:
     metrics = ask("GET", "/metrics")[1]
     assert 'station_alarms{kind="silent"} 2.0' in metrics and "station_readings_stored_total 2.0" in metrics
     assert 'station_delay_seconds_bucket{le="+Inf"} 2.0' in metrics
+
+
+def test_stream_has_all_of_a_vehicle_and_then_what_has_changed(ask: Any, clock: Any) -> None:
+    post(ask, reading(1, quantity="position", value=[1, 2, 3], time=5), reading(1, device="uav-2", time=5))
+    ask.look()
+    with ask.stream("/watch") as event:
+        both = event()["vehicles"]
+        assert [(one["device"], one["alt"], one["quantities"]) for one in both] == [
+            ("uav-1", 3, {"position": "m"}),
+            ("uav-2", None, {"alt": "m"}),
+        ]
+        clock.now += 1
+        post(ask, reading(2, quantity="position", value=[1, 2.5, 3], time=6))
+        ask.look()
+        assert event()["vehicles"] == [{"device": "uav-1", "lng": 2.5, "time": 6, "received": clock.now}]
+        ask.look()
+        assert event()["vehicles"] == []
 
 
 def test_health_is_the_databases(ask: Any, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -19,9 +19,9 @@ DAY = 86400
 TODAY = 1_699_920_000  # 2023-11-14 00:00 UTC; the clock is 22:13 later
 
 
-def row(seq: int, time: float, device: str = "uav-1", **given: Any) -> ReadingRow:
+def row(seq: int, time: float, device: str = "uav-1", **members: Any) -> ReadingRow:
     reading = {"device": device, "id": "1", "seq": seq, "quantity": "alt", "representation": "m", "value": 1.5}
-    return reading_row({**reading, "time": time, **given})
+    return reading_row({**reading, "time": time, **members})
 
 
 @pytest.fixture

@@ -18,9 +18,9 @@ from mavproxy_gradys.station.sqlite_store import SqliteStore
 from mavproxy_gradys.station.store import HistoryQuery, ReadingQuery, Store
 
 
-def row(seq: int, **given: Any) -> ReadingRow:
+def row(seq: int, **members: Any) -> ReadingRow:
     reading = {"device": "uav-1", "id": "1", "seq": seq, "quantity": "alt", "representation": "m", "value": 1.5}
-    return reading_row({**reading, "time": 1_699_999_000 + seq, **given})
+    return reading_row({**reading, "time": 1_699_999_000 + seq, **members})
 
 
 async def every(store: Store, **requested: Any) -> list[tuple[Any, ...]]:
@@ -28,8 +28,8 @@ async def every(store: Store, **requested: Any) -> list[tuple[Any, ...]]:
 
 
 async def history(store: Store, start: float, end: float, buckets: int, **requested: Any) -> list[Any]:
-    given = {"device": "uav-1", "quantity": "alt", "element": None, **requested}
-    return await store.history(HistoryQuery(start=start, end=end, buckets=buckets, **given))
+    query = {"device": "uav-1", "quantity": "alt", "element": None, **requested}
+    return await store.history(HistoryQuery(start=start, end=end, buckets=buckets, **query))
 
 
 def test_readings_are_kept_once_each(store: Store, run: Any) -> None:

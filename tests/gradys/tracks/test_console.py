@@ -20,8 +20,10 @@ def test_a_number_that_cannot_be_flown_by_is_refused(option: str) -> None:
 
 
 def test_numbers_within_their_limits_are_taken() -> None:
-    given = argument_parser().parse_args(["fly", "a.track", "--ground", "-3.5", "--reach", "200", "--transit", "20"])
-    assert (given.ground, given.reach, given.transit) == (-3.5, 200.0, 20.0)
+    arguments = argument_parser().parse_args(
+        ["fly", "a.track", "--ground", "-3.5", "--reach", "200", "--transit", "20"]
+    )
+    assert (arguments.ground, arguments.reach, arguments.transit) == (-3.5, 200.0, 20.0)
 
 
 def test_all_flights_are_shown() -> None:

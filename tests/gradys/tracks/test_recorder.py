@@ -21,8 +21,8 @@ def sending(loop: Any, telemetry: Any, seconds: float) -> None:
         loop.pass_time(0.25)
 
 
-def recorder(loop: Any, host: Any, file: Path, style: str = "text", **given: Any) -> Recorder:
-    made = Recorder(host, 10, file, style=style, period=5.0, **given)
+def recorder(loop: Any, host: Any, file: Path, style: str = "text", **options: Any) -> Recorder:
+    made = Recorder(host, 10, file, style=style, period=5.0, **options)
     loop.run(made.start())
     return made
 

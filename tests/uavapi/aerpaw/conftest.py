@@ -28,6 +28,8 @@ class FakeApi:
         refusals: by path, the status and body that a verb gets instead.
         takes: by path, s that a verb takes; for ever with None.
         why_not: reasons why it cannot be armed.
+        delays: by path, s until a request of that path reaches the verb, as on a slow machine.
+        begun: paths of verbs in the order in which they took the vehicle.
         gone: paths of verbs whose client hung up.
     """
 
@@ -36,11 +38,14 @@ class FakeApi:
         self.requested: list[tuple[str, str, dict[str, Any]]] = []
         self.refusals: dict[str, tuple[int, dict[str, Any]]] = {}
         self.takes: dict[str, float | None] = {}
+        self.delays: dict[str, float] = {}
+        self.begun: list[str] = []
         self.gone: list[str] = []
         self.why_not: list[str] = []
         self.sending = True
         self.url = ""
         self._jobs: dict[str, str] = {}
+        self._commander: dict[str, Any] | None = None
         self._loop = asyncio.new_event_loop()
         self._up = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -72,6 +77,7 @@ class FakeApi:
         app.router.add_get("/telemetry/status", self._status)
         app.router.add_get("/telemetry/home_info", self._home)
         app.router.add_get("/telemetry/stream", self._stream)
+        app.router.add_get("/authority", self._authority)
         app.router.add_get("/jobs/{id}", self._job)
         app.router.add_delete("/jobs/{id}", self._job)
         app.router.add_route("*", "/{path:.*}", self._verb)
@@ -124,6 +130,7 @@ class FakeApi:
         path = request.path
         values = {**request.query, **(await request.json() if request.can_read_body else {})}
         self.requested.append((request.method, path, values))
+        await asyncio.sleep(self.delays.get(path, 0.0))
         if path in self.refusals:
             status, body = self.refusals[path]
             return web.json_response(body, status=status)
@@ -132,6 +139,8 @@ class FakeApi:
             self._jobs[number] = path
             self._loop.call_later(self.takes.get(path, 0.0) or 0.0, self._obey, path, values, number)
             return web.json_response({"id": "7", "job": number}, status=202)
+        self.begun.append(path)
+        self._commander = {"job": str(len(self.begun)), "verb": path, "request": values}
         try:
             takes = self.takes.get(path, 0.0)
             await asyncio.sleep(3600 if takes is None else takes)
@@ -157,7 +166,12 @@ class FakeApi:
     async def _job(self, request: web.Request) -> web.Response:
         number = request.match_info["id"]
         self.requested += [("DELETE", request.path, {})] if request.method == "DELETE" else []
-        return web.json_response({"state": "running" if number in self._jobs else "succeeded", "error": None})
+        job = {"state": "running" if number in self._jobs else "succeeded", "error": None}
+        commands = self._commander is not None and self._commander["job"] == number
+        return web.json_response({**(self._commander or {}), **job} if commands else job)
+
+    async def _authority(self, _: web.Request) -> web.Response:
+        return web.json_response({"id": "7", "vehicles": [{"vehicle": 7, "commanded_by": self._commander}]})
 
 
 @pytest.fixture

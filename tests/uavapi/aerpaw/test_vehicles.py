@@ -109,7 +109,8 @@ def test_goto_points_to_where_it_goes(api: Any, flying: Drone) -> None:
     asyncio.run(flying.goto_coordinates(flying.position + VectorNED(30, 0)))
     requested = api.last(GO_TO)
     assert requested["look_at_target"] is True and "heading" not in requested
-    assert (requested["tolerance"], requested["timeout"], requested["on_disconnect"]) == (2.0, 300.0, "hold")
+    assert (requested["tolerance"], requested["on_disconnect"]) == (2.0, "hold")
+    assert requested["timeout"] == pytest.approx(300, abs=1e-3)
 
 
 @pytest.mark.parametrize(("heading", "expected"), [(-1, 359), (90, 90), (720, 0)])
@@ -190,12 +191,8 @@ def test_velocity_is_left_to_the_api_and_not_requested_twice(api: Any, flying: D
 
     asyncio.run(flight())
     requested = api.last(TRAVEL)
-    assert (requested["vx"], requested["vy"], requested["duration"], requested["on_disconnect"]) == (
-        1,
-        2.5,
-        3600.0,
-        "hold",
-    )
+    assert (requested["vx"], requested["vy"], requested["on_disconnect"]) == (1, 2.5, "hold")
+    assert requested["duration"] == pytest.approx(3600, abs=1e-3)
     flying.close()
     for _ in range(100):
         if len(api.gone) == 2:
@@ -215,6 +212,47 @@ def test_velocity_with_a_duration_returns_at_once(api: Any, flying: Drone) -> No
     asyncio.run(flight())
     requested = api.last("/movement/travel_at_body")
     assert (requested["front"], requested["right"]) == (3, 0) and requested["duration"] == pytest.approx(5, abs=1e-3)
+
+
+@pytest.mark.parametrize("duration", [None, 5])
+def test_late_velocity_does_not_supersede_the_next_movement(api: Any, flying: Drone, duration: float | None) -> None:
+    async def flight() -> None:
+        api.takes[TRAVEL], api.delays[TRAVEL] = None, 0.4
+        for _ in range(2):
+            await flying.set_velocity(VectorNED(1, 0, 0), duration=duration)
+            await flying.goto_coordinates(flying.position + VectorNED(30, 0))
+
+    asyncio.run(flight())
+    assert api.begun == [TRAVEL, GO_TO, TRAVEL, GO_TO]
+
+
+def test_late_goto_to_where_the_vehicle_is_does_not_supersede_the_next_movement(api: Any, flying: Drone) -> None:
+    async def flight() -> None:
+        api.takes.update({GO_TO: None, TRAVEL: None})
+        api.delays[GO_TO] = 0.4
+        for _ in range(2):
+            await flying.goto_coordinates(flying.position)
+            await flying.set_velocity(VectorNED(1, 0, 0))
+
+    asyncio.run(flight())
+    assert api.begun == [GO_TO, TRAVEL, GO_TO, TRAVEL]
+
+
+def test_late_rovers_goto_does_not_supersede_the_next_movement(api: Any, rover: Any) -> None:
+    async def flight() -> None:
+        api.takes.update({GO_TO: None, TRAVEL: None})
+        api.delays[GO_TO] = 0.4
+        await rover.goto_coordinates(rover.position)
+        await rover.set_velocity(VectorNED(1, 0, 0))
+
+    asyncio.run(flight())
+    assert api.begun == [GO_TO, TRAVEL]
+
+
+def test_late_refusal_of_a_velocity_raises(api: Any, flying: Drone) -> None:
+    api.refusals[TRAVEL], api.delays[TRAVEL] = MODE_CHANGED, 0.4
+    with pytest.raises(VelocityError, match="left GUIDED"):
+        asyncio.run(flying.set_velocity(VectorNED(1, 0, 0)))
 
 
 def test_velocity_that_is_refused_raises(api: Any, flying: Drone) -> None:

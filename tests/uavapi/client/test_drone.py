@@ -90,6 +90,15 @@ def test_velocity_with_a_duration_ends(ours: Drone, flying: Any, loop: Any) -> N
     assert [setpoint.vx for setpoint in flying.setpoints()][-2:] == [1, 0]  # it points north
 
 
+def test_command_is_that_of_the_newest_movement(ours: Drone, loop: Any) -> None:
+    assert loop.run(ours.command()) is None
+    travelling = loop.create_task(ours.travel(Ned(2, 0, 0), 60.25))
+    loop.pass_time(1.0)
+    command = loop.run(ours.command())
+    assert command is not None and (command.verb, command.request["duration"]) == ("/movement/travel_at_ned", 60.25)
+    travelling.cancel()
+
+
 def test_landing_ends_disarmed(ours: Drone, loop: Any) -> None:
     loop.run(ours.land())
     assert ours.armed is False

@@ -65,12 +65,12 @@ def test_an_error_does_not_show_a_password():
     assert str(error.value) == "cannot open 'rtsp://pilot:***@127.0.0.1:1/none'"
 
 
-def camera(monkeypatch, spec, settings=None, clock=time.monotonic, **given):
+def camera(monkeypatch, spec, settings=None, clock=time.monotonic, **methods):
     """A capture of OpenCV's that does as told, and what it was asked for."""
     requested = {}
-    given = {"get": lambda _: 0.0, "release": lambda: None, **given}
+    methods = {"get": lambda _: 0.0, "release": lambda: None, **methods}
     device = SimpleNamespace(
-        isOpened=lambda: True, set=lambda name, value: requested.update({name: value}) is None, **given
+        isOpened=lambda: True, set=lambda name, value: requested.update({name: value}) is None, **methods
     )
     monkeypatch.setattr(cv2, "VideoCapture", lambda *_: device)
     source = make_source(VisionModuleSettings({"source": spec, **(settings or {})}).snapshot(), lambda _: None, clock)
