@@ -78,6 +78,7 @@ def lands(drone: Any) -> None:
 def test_without_the_option_auto_refuses_to_arm(rig, drone):
     rig.ok(rig.call("POST", "/mission/waypoints", data=MISSION, headers={"Content-Type": "text/plain"}))
     rig.ok(rig.call("PUT", "/parameters/AUTO_OPTIONS", json={"value": 0}))
+    rig.eventually(lambda: rig.status()["ready_to_arm"], 120, "getting ready to arm")
     switch(drone, "AUTO", drone.set_mode_auto)
     drone.arducopter_arm()
     rig.mavproxy.says("AUTO mode not armable")
@@ -94,7 +95,7 @@ def test_auto_then_arm_then_take_off_by_the_mission(rig, drone, tmp_path):
     rig.mavproxy.type("rc 3 1300")
     file = tmp_path / "gps_data"
     collect(drone, file, lambda: not drone.motors_armed())
-    rig.mavproxy.type("rc 3 0")
+    rig.mavproxy.type("rc 3 1000")  # down: with another throttle ArduCopter does not arm again
     track = parse(file.read_text())
     assert max(reading.alt for reading in track) / 1e3 - GROUND == pytest.approx(15, abs=8)
     assert len(waypoints(track)) >= 3
