@@ -41,7 +41,7 @@ class QuadGuided(Guided):
         return True
 
     def go_to(self, target: Ned, *, counter_clockwise: bool = False, radius: float = 0.0) -> None:
-        self._place = None
+        self._place, self._climbing = None, False
         super().go_to(target, counter_clockwise=counter_clockwise, radius=radius)
 
     def step(self, dt: float) -> Demand:
