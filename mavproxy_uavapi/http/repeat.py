@@ -59,11 +59,11 @@ class Repeat:
 
     def answer(self) -> bytes | None:
         """The answer with its headers; None if the request must go the usual way, which can also refuse it."""
-        if not self._counts():
+        call = self._call
+        if not self._counts() or seconds_to_wait(call.request, call.caller):
             return None
         body = self._body()
-        call = self._call
-        if body is None or seconds_to_wait(call.request, call.caller):
+        if body is None:
             return None
         call.service.heard_from(call.caller, self._holder)
         return b"%sContent-Length: %d\r\n\r\n%s" % (self._head or self._make_head(), len(body), body)
