@@ -30,7 +30,7 @@ class FleetRequest(Request):
     nothing is sent to any.
     """
 
-    model_config = ConfigDict(extra="allow", allow_inf_nan=False, defer_build=True)
+    model_config = ConfigDict(extra="allow", allow_inf_nan=False)
     verb: ClassVar[type[Request]] = Empty  # what the verb itself takes
     vehicles: Annotated[list[System] | Literal["all"], Field(description="system ids, or all")] = "all"
     each: Annotated[dict[str, dict[str, Any]], Field(description="by system id: other values for one vehicle")] = {}

@@ -64,7 +64,7 @@ Argument = Annotated[str, Field(max_length=4096, pattern=r"^[^\x00]*$")]  # no c
 class Request(BaseModel):
     """Base of all request models."""
 
-    model_config = ConfigDict(extra="ignore", allow_inf_nan=False, defer_build=True)
+    model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
 
 
 class Empty(Request):
