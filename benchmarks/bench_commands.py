@@ -29,6 +29,8 @@ from commands_vehicle import MODES, PATIENCE, SYSTEM, Key, Vehicle
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rig import Client, harness, machine, percentile, put_first, table
 
+from tests.support.ports import free_port
+
 MEDIAN_GOAL, WORST_GOAL = 1.0, 10.0  # ms, the latter at the 99th percentile
 STREAMERS = 4
 STREAM_PERIOD = 0.05  # s
@@ -302,8 +304,8 @@ def verdict(times: dict[tuple[str, str, str], list[float]]) -> tuple[bool, str]:
 def mavproxy(vehicle: Vehicle) -> Iterator[Any]:
     """A MAVProxy with our module, that flies the peer."""
     with tempfile.TemporaryDirectory(prefix="uavapi-bench-") as directory:
-        made = harness.Rig(Path(directory), harness.free_port())
-        listening = harness.free_port()
+        made = harness.Rig(Path(directory), free_port())
+        listening = free_port()
         command = [*harness.MAVPROXY, f"--master=udp:127.0.0.1:{listening}", "--cmd=set param_ftp 0"]
         vehicle.find(listening)
         try:
@@ -326,7 +328,7 @@ def main() -> int:
     print(f"commands: {machine()}")
     context = multiprocessing.get_context("spawn")
     streaming, ended = context.Event(), context.Event()
-    vehicle, bare = Vehicle(), harness.free_port()
+    vehicle, bare = Vehicle(), free_port()
     others = [context.Process(target=_run_bare, args=(bare, vehicle.port), daemon=True)]
     try:
         with mavproxy(vehicle) as made:

@@ -38,6 +38,7 @@ from rig import harness, machine, table
 from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.forwarding.sink_address import sink_address
 from mavproxy_gradys.forwarding.spool import Spool
+from tests.support.ports import free_port
 
 MOSQUITTO = shutil.which("mosquitto", path="/usr/sbin:/usr/bin:/usr/local/sbin")
 SHORTEST, LONGEST = 0.2, 2.0  # s from MAVProxy's start, or the cut before, to the next
@@ -116,9 +117,9 @@ class Bench:
     def __init__(self, directory: Path) -> None:
         self.directory = directory
         self.database = directory / "station.db"
-        self.rig = harness.Rig(directory, harness.free_port())
+        self.rig = harness.Rig(directory, free_port())
         self._instance = harness.start_embedded(self.rig, "--sysid=10", speedup=1)
-        self.port = harness.free_port()
+        self.port = free_port()
         self.sink = f"http://127.0.0.1:{self.port}/readings"
 
     def start_receiver(self) -> None:
@@ -128,7 +129,7 @@ class Bench:
 
     def start_broker(self) -> int:
         """Start a Mosquitto; its port."""
-        port = harness.free_port()
+        port = free_port()
         config = self.directory / "mosquitto.conf"
         queues = "max_queued_messages 0\nmax_inflight_messages 0"
         config.write_text(f"listener {port} 127.0.0.1\nallow_anonymous true\n{queues}\n", encoding="ascii")

@@ -22,6 +22,8 @@ from typing import Any
 
 from rig import harness
 
+from tests.support.ports import free_port
+
 MOSQUITTO = shutil.which("mosquitto", path="/usr/sbin:/usr/bin:/usr/local/sbin")
 TICKS = os.sysconf("SC_CLK_TCK")
 
@@ -109,9 +111,9 @@ def main() -> int:
 
 def run(tools: Any, directory: Path, vehicles: int, seconds: float) -> int:
     """Measure for so many seconds."""
-    rig = tools.Rig(directory, tools.free_port())
+    rig = tools.Rig(directory, free_port())
     try:
-        broker_port, link = tools.free_port(), tools.free_port()
+        broker_port, link = free_port(), free_port()
         config = directory / "mosquitto.conf"
         config.write_text(f"listener {broker_port} 127.0.0.1\nallow_anonymous true\n", encoding="ascii")
         broker = rig.start("mosquitto", [str(MOSQUITTO), "-c", str(config)])

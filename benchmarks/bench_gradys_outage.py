@@ -17,6 +17,8 @@ from typing import Any
 import requests
 from rig import harness
 
+from tests.support.ports import free_port
+
 RATE = 10  # posted readings per second
 
 
@@ -46,7 +48,7 @@ def run(tools: Any, directory: Path, seconds: float) -> int:
     """One outage of so many seconds."""
     rig = tools.embedded(directory, "--sysid=10", speedup=1)
     try:
-        port = tools.free_port()
+        port = free_port()
         command = [sys.executable, "-m", "mavproxy_gradys.station", f"--port={port}", f"--database={directory}/s.db"]
         url = f"http://127.0.0.1:{port}/readings"
         settings = {"sink": url, "spool": f"{directory}/spool.db", "quantities": "position@1"}

@@ -22,6 +22,8 @@ from typing import Any
 
 import rig
 
+from tests.support.ports import free_port
+
 SPEEDUP = 8
 PROGRAMS = {  # program: its speed-up
     "takeoff_land/takeoff_land.py": SPEEDUP,
@@ -42,7 +44,7 @@ class Launched(rig.harness.Rig):  # type: ignore[misc]
     """A vehicle and its MAVProxy, as `mavproxy-uavapi --simulated` starts them."""
 
     def __init__(self, directory: Path, speedup: int, ardupilot: str | None) -> None:
-        super().__init__(directory, rig.harness.free_port())
+        super().__init__(directory, free_port())
         command = [str(rig.harness.SCRIPTS / "mavproxy-uavapi"), "--simulated", "--headless", f"--port={self.port}"]
         command += [f"--speedup={speedup}", f"--log_path={directory}", f"--location={rig.harness.HOME}"]
         if ardupilot is not None:

@@ -19,6 +19,8 @@ from pathlib import Path
 from bench_reads import BARE, OURS, Case, Reads, read, reads_table
 from rig import Bare, Clients, fly, harness, machine, put_first, rig
 
+from tests.support.ports import free_port
+
 ORIGINAL = "uav_api 0.3.1"
 REQUIREMENT = "uav-api==0.3.1"
 CASES = [Case(server, clients) for clients in (1, 16) for server in (BARE, OURS, ORIGINAL)]
@@ -60,7 +62,7 @@ def main() -> int:
     parser.add_argument("--first", action="store_true", help="run before the machine's other work (root)")
     options = parser.parse_args()
     print(f"peers: {machine()}")
-    link, port = harness.free_port(), harness.free_port()
+    link, port = free_port(), free_port()
     with tempfile.TemporaryDirectory(prefix="uavapi-peer-") as folder:
         command = [str(install(options.venv or Path(folder) / "venv")), "start", f"--uav_connection=127.0.0.1:{link}"]
         command += ["--connection_type=udpin", f"--port={port}", "--sysid=1", f"--root_dir={folder}"]

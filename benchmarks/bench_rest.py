@@ -16,6 +16,8 @@ from pathlib import Path
 
 from rig import cpu_seconds, harness, machine, percentile, put_first, table
 
+from tests.support.ports import free_port
+
 ALONE = "MAVProxy alone"
 CASES: dict[str, tuple[str, ...]] = {
     ALONE: (),
@@ -68,7 +70,7 @@ def load(rig: harness.Rig, modules: tuple[str, ...]) -> float:
 def measure(modules: tuple[str, ...], rest: Rest, seconds: float, first: bool) -> None:
     """One round of one case."""
     with tempfile.TemporaryDirectory(prefix="uavapi-rest-") as directory:
-        rig = harness.Rig(Path(directory), harness.free_port())
+        rig = harness.Rig(Path(directory), free_port())
         try:
             instance = harness.start_embedded(rig, speedup=1)
             rig.mavproxy = rig.start("mavproxy", harness.mavproxy_command(instance))

@@ -21,6 +21,7 @@ from rig import ROOT, cpu_seconds, harness, machine, percentile, table
 
 from tests.support.chromium import Page, chromium
 from tests.support.fleet_vehicles import flight
+from tests.support.ports import free_port
 
 FRAMES = """
 new Promise(done => {
@@ -72,7 +73,7 @@ async def tell(url: str, vehicles: int, over: asyncio.Event) -> None:
 
 async def measure(directory: Path, options: argparse.Namespace) -> list[list[str]]:
     """Rows of the table."""
-    port = harness.free_port()
+    port = free_port()
     url = f"http://127.0.0.1:{port}"
     command = [sys.executable, "-m", "mavproxy_gradys.station", f"--port={port}", f"--database={directory}/s.db"]
     station = harness.Process(command, directory / "station.log", directory, {"PYTHONPATH": str(ROOT)})

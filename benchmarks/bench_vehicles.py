@@ -23,6 +23,8 @@ from bench_commands import Connection
 from rig import cpu_seconds, harness, machine, percentile, put_first, table
 from vehicle_generator import Copters
 
+from tests.support.ports import free_port
+
 PLAIN, OURS = 0, 1
 NAMES = ("without our modules", "uavapi and gradys")
 MODES = ("BRAKE", "GUIDED")  # by turns, so that each try changes the mode
@@ -142,7 +144,7 @@ def bench(count: int, options: argparse.Namespace) -> Iterator[Bench]:
 
 def start(directory: Path, links: list[int], out_port: int, with_modules: bool) -> Any:
     """A MAVProxy that listens for the vehicles at these ports."""
-    rig = harness.Rig(directory, harness.free_port())
+    rig = harness.Rig(directory, free_port())
     command = [
         *harness.MAVPROXY,
         f"--out=udp:127.0.0.1:{out_port}",

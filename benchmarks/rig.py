@@ -34,6 +34,7 @@ SIGNED = 1  # incompatibility flag: 13 bytes of signature follow
 sys.path.insert(0, str(ROOT))  # for `tests.support`, whose processes these are
 
 from tests.support import processes as harness  # noqa: E402
+from tests.support.ports import free_port  # noqa: E402
 
 # The harness gives each worker of pytest-xdist ports of its own: ours must not be those of a test run.
 os.environ.setdefault("PYTEST_XDIST_WORKER", f"gw{10 + os.getpid() % 15}")
@@ -49,7 +50,7 @@ def rig(*, outs: tuple[str, ...] = (), streamrate: int = 4, **settings: Any) -> 
         settings: of our module.
     """
     with tempfile.TemporaryDirectory(prefix="uavapi-bench-") as directory:
-        made = harness.Rig(Path(directory), harness.free_port())
+        made = harness.Rig(Path(directory), free_port())
         tap = None
         try:
             instance = harness.start_embedded(made, speedup=1)
@@ -361,7 +362,7 @@ class Bare:
     """An aiohttp server with nothing behind it, in a process of its own: what HTTP in Python costs here."""
 
     def __init__(self) -> None:
-        self.port = harness.free_port()
+        self.port = free_port()
         self._process = multiprocessing.get_context("spawn").Process(target=_run_bare, args=(self.port,), daemon=True)
         self._process.start()
         harness.eventually(self._is_up, what="the bare server's start")

@@ -27,6 +27,8 @@ from typing import Any
 import aiohttp
 from rig import harness, machine, table
 
+from tests.support.ports import free_port
+
 SPEEDUP = 10
 CLIENTS = 12
 WARM_UP = 120.0  # s of chaos before memory counts
@@ -408,7 +410,7 @@ class Soak:
 
 def start(directory: Path) -> Any:
     """The vehicle, and a MAVProxy whose module finds its port in the environment, however it is loaded."""
-    rig = harness.Rig(directory, harness.free_port())
+    rig = harness.Rig(directory, free_port())
     try:
         instance = harness.start_embedded(rig, speedup=SPEEDUP)
         command = harness.mavproxy_command(instance, "--cmd=module load uavapi")

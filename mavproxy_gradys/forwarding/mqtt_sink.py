@@ -14,7 +14,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-import socket
 import uuid
 from collections import defaultdict
 from collections.abc import Awaitable, Sequence
@@ -29,7 +28,7 @@ from mavproxy_gradys.forwarding.confirmations import Confirmations
 from mavproxy_gradys.forwarding.quantities import POSITION, STATUS
 from mavproxy_gradys.forwarding.readings import CONFIRMED_TOPIC, UAV, Reading, Stored, device_of
 from mavproxy_gradys.net.addresses import split_url
-from mavproxy_gradys.net.mqtt_client import make_client
+from mavproxy_gradys.net.mqtt_client import disconnect, make_client
 from mavproxy_gradys.net.resolver import Resolver
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.timeout import wait_with_timeout
@@ -262,16 +261,6 @@ async def leave(client: aiomqtt.Client, connecting: asyncio.Future[aiomqtt.Clien
     """Close a connection once the attempt to open it has ended; the attempt cannot be aborted."""
     await asyncio.gather(connecting, return_exceptions=True)
     await disconnect(client)
-
-
-async def disconnect(client: aiomqtt.Client) -> None:
-    """Disconnect in order; if the broker does not answer, close the connection anyway."""
-    with contextlib.suppress(aiomqtt.MqttError, asyncio.TimeoutError):
-        await wait_with_timeout(CLOSE_TIMEOUT, client.__aexit__(None, None, None))
-    open_socket = client._client.socket()  # aiomqtt leaves it open if the broker was too slow
-    if isinstance(open_socket, socket.socket):
-        with contextlib.suppress(OSError):
-            open_socket.shutdown(socket.SHUT_RDWR)
 
 
 def topic_of(template: str, reading: Reading) -> str:

@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
-import asyncio
 import logging
-import random
 from urllib.parse import unquote
 
-import aiomqtt
-
-from mavproxy_gradys.errors import NotDelivered
-from mavproxy_gradys.forwarding.mqtt_sink import disconnect
 from mavproxy_gradys.forwarding.readings import UAV, device_of
 from mavproxy_gradys.nearby.advice import Advice, Track
 from mavproxy_gradys.net.addresses import split_url
-from mavproxy_gradys.net.mqtt_client import make_client
+from mavproxy_gradys.net.mqtt_subscription import Subscription
 from mavproxy_gradys.net.outage_log import Outage
-from mavproxy_gradys.net.schedule import Backoff
 from mavproxy_uavapi.core.host import Host
 
 DEFAULT_TOPIC = "fleet/+/position"
-LONGEST_PAUSE = 20.0  # s between attempts to connect
 log = logging.getLogger("gradys.nearby")
 
 
@@ -38,36 +30,16 @@ class Listener:
     def __init__(self, host: Host, url: str, timeout: float, ca_file: str, device: str = UAV) -> None:
         self._host = host
         self._device = device
-        self._parts, self._port = split_url(url, ("mqtt", "mqtts"))
-        self._topic = unquote(self._parts.path.lstrip("/")) or DEFAULT_TOPIC
-        self._timeout = timeout
-        self._ca_file = ca_file
         self._advice = Advice()
-        name = f"the broker {self._parts.hostname}:{self._port}"
-        self._outage = Outage(log, f"no positions of others from {name}", f"positions of others from {name} again")
+        parts, port = split_url(url, ("mqtt", "mqtts"))
+        name = f"the broker {parts.hostname}:{port}"
+        outage = Outage(log, f"no positions of others from {name}", f"positions of others from {name} again")
+        topic = unquote(parts.path.lstrip("/")) or DEFAULT_TOPIC
+        self._subscription = Subscription((parts, port), topic, outage, timeout, ca_file)
 
     async def run(self) -> None:
         """Listen, until cancelled."""
-        backoff = Backoff(random.random, LONGEST_PAUSE)
-        while True:
-            try:
-                client = make_client(self._parts, self._port, self._timeout, self._ca_file)
-                await self._listen(client, backoff)
-            except (aiomqtt.MqttError, NotDelivered) as error:
-                self._outage.update(str(error) or "no answer")
-            await asyncio.sleep(backoff.failed(self._host.clock()))
-
-    async def _listen(self, client: aiomqtt.Client, backoff: Backoff) -> None:
-        try:
-            await client.__aenter__()
-            await client.subscribe(self._topic, qos=0)
-            backoff.succeeded()
-            self._outage.update("")
-            async for message in client.messages:
-                if not message.retain:  # nobody knows how old a retained position is
-                    self._take(message.payload)
-        finally:
-            await disconnect(client)
+        await self._subscription.run(lambda _topic, payload: self._take(payload))
 
     def _take(self, payload: object) -> None:
         if isinstance(payload, bytes | str) and self._advice.take(payload, self._host.clock()):

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
+import socket
 import ssl
 from typing import Any
 from urllib.parse import SplitResult, unquote
@@ -9,8 +12,10 @@ from urllib.parse import SplitResult, unquote
 import aiomqtt
 
 from mavproxy_gradys.net.http_client import tls_context
+from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 KEEP_ALIVE = 15  # s; the broker closes a silent connection after 1.5 times this
+DISCONNECT_TIMEOUT = 1.0  # s
 
 
 def make_client(parts: SplitResult, port: int, timeout: float, ca_file: str, **more: Any) -> aiomqtt.Client:
@@ -36,6 +41,16 @@ def make_client(parts: SplitResult, port: int, timeout: float, ca_file: str, **m
         tls_context=_tls(ca_file) if parts.scheme == "mqtts" else None,
         **more,
     )
+
+
+async def disconnect(client: aiomqtt.Client) -> None:
+    """Disconnect in order; if the broker does not answer, close the connection anyway."""
+    with contextlib.suppress(aiomqtt.MqttError, asyncio.TimeoutError):
+        await wait_with_timeout(DISCONNECT_TIMEOUT, client.__aexit__(None, None, None))
+    open_socket = client._client.socket()  # aiomqtt leaves it open if the broker was too slow
+    if isinstance(open_socket, socket.socket):
+        with contextlib.suppress(OSError):
+            open_socket.shutdown(socket.SHUT_RDWR)
 
 
 def _tls(ca_file: str) -> ssl.SSLContext:

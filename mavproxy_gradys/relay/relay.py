@@ -4,26 +4,21 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import random
 import time
 from collections.abc import Callable, Sequence
 from urllib.parse import SplitResult
 
-import aiomqtt
-
 from mavproxy_gradys.errors import NotDelivered
-from mavproxy_gradys.forwarding.mqtt_sink import disconnect
 from mavproxy_gradys.forwarding.quantities import STATUS
 from mavproxy_gradys.net.addresses import StationAddress
 from mavproxy_gradys.net.http_client import FORM, Poster
-from mavproxy_gradys.net.mqtt_client import make_client
+from mavproxy_gradys.net.mqtt_subscription import Subscription
 from mavproxy_gradys.net.outage_log import Outage
-from mavproxy_gradys.net.schedule import Backoff, Ticker
+from mavproxy_gradys.net.schedule import Ticker
 from mavproxy_gradys.push.position_update import encode
 from mavproxy_gradys.relay.positions import Positions
 from mavproxy_gradys.station.refusal_log import RefusalLog
 
-LONGEST_PAUSE = 20.0  # s between attempts to connect
 AT_ONCE = 8  # updates in flight to a station
 log = logging.getLogger("relay")
 
@@ -84,34 +79,15 @@ class Relay:
         ca_file: str = "",
         wall: Callable[[], float] = time.time,
     ) -> None:
-        self._broker, self._topic = broker, topic
-        self._timeout, self._ca_file = timeout, ca_file
         self._wall = wall
         self._positions = Positions()
-        self._outage = Outage(log, "no readings from the broker", "readings from the broker again")
+        outage = Outage(log, "no readings from the broker", "readings from the broker again")
+        self._subscription = Subscription(broker, topic, outage, timeout, ca_file)
         self._refusals = RefusalLog(log, time.monotonic)
 
     async def listen(self) -> None:
         """Take readings, until cancelled."""
-        backoff = Backoff(random.random, LONGEST_PAUSE)
-        while True:
-            try:
-                await self._listen(make_client(*self._broker, self._timeout, self._ca_file), backoff)
-            except (aiomqtt.MqttError, NotDelivered) as error:
-                self._outage.update(str(error) or "no answer")
-            await asyncio.sleep(backoff.failed(time.monotonic()))
-
-    async def _listen(self, client: aiomqtt.Client, backoff: Backoff) -> None:
-        try:
-            await client.__aenter__()
-            await client.subscribe(self._topic, qos=0)
-            backoff.succeeded()
-            self._outage.update("")
-            async for message in client.messages:
-                if not message.retain:  # nobody knows how old a retained position is
-                    self.take(str(message.topic), message.payload)
-        finally:
-            await disconnect(client)
+        await self._subscription.run(self.take)
 
     def take(self, topic: str, payload: object) -> None:
         """Take one message; a vehicle's status is not a reading."""

@@ -13,6 +13,8 @@ from pathlib import Path
 import pytest
 import requests
 
+from tests.support.ports import free_port
+
 RIG_SPEEDUP = 2  # nobody flies far here, and each message costs processor time
 TOKEN = "a-long-and-secret-word"
 
@@ -21,7 +23,7 @@ TOKEN = "a-long-and-secret-word"
 def guarded(harness, tmp_path_factory):
     """A rig whose API wants a token, listening everywhere."""
     directory = tmp_path_factory.mktemp("guarded")
-    rig = harness.Rig(directory, harness.free_port())
+    rig = harness.Rig(directory, free_port())
     try:
         instance = harness.start_embedded(rig, speedup=RIG_SPEEDUP)
         command = harness.mavproxy_command(instance, harness.load(rig.port, host="0.0.0.0"))
@@ -235,7 +237,7 @@ def descriptors_of(rig) -> int:
 @pytest.mark.long
 def test_idle_strangers_leave_mavproxy_the_descriptors_to_connect_again(harness, tmp_path):
     """With a limit of 160 descriptors there is no room for as many connections as may be open."""
-    rig = harness.Rig(tmp_path, harness.free_port())
+    rig = harness.Rig(tmp_path, free_port())
     owner = {"Authorization": f"Bearer {TOKEN}"}
     strangers = []
     try:

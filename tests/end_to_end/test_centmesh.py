@@ -11,6 +11,7 @@ import pytest
 from pymavlink import mavutil
 
 from mavproxy_gradys.tracks.formats import parse, waypoints
+from tests.support.ports import free_port
 
 mavlink = mavutil.mavlink
 GROUND = 584.0  # m AMSL, the tutorial's and this rig's
@@ -27,7 +28,7 @@ PATIENCE = 60.0  # s
 @pytest.fixture
 def drone(rig, harness) -> Iterator[Any]:
     """A program's connection, as the tutorial makes it."""
-    port = harness.free_port()
+    port = free_port()
     rig.mavproxy.ask(f"output add 127.0.0.1:{port}", "Adding output")
     connection = mavutil.mavlink_connection(f"udp:127.0.0.1:{port}")
     assert connection.wait_heartbeat(timeout=PATIENCE)

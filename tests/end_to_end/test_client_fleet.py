@@ -11,7 +11,8 @@ import pytest
 
 from mavproxy_uavapi.client import Fleet, Ned, connect, connect_fleet
 from mavproxy_uavapi.core.errors import NoVehicle
-from tests.support.processes import HOME, MAVPROXY, Rig, free_instance, free_port, load
+from tests.support.ports import free_instance, free_port
+from tests.support.processes import HOME, MAVPROXY, Rig, load
 
 SPEEDUP = 3  # the client has to keep up with it
 

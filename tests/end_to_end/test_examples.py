@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.ports import free_port
+
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
@@ -68,6 +70,6 @@ def test_example_stops_at_the_first_refusal_with_the_servers_words(embedded_rig)
 
 
 def test_example_without_an_api_says_so(harness):
-    done = run("takeoff_land.py", "--url", f"127.0.0.1:{harness.free_port()}")
+    done = run("takeoff_land.py", "--url", f"127.0.0.1:{free_port()}")
     assert done.returncode == 1
     assert "nothing answers" in done.stderr

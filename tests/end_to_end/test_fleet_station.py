@@ -20,6 +20,7 @@ from tests.support.chromium import chromium
 from tests.support.fleet import Broker, Fleet, Worker
 from tests.support.fleet_faults import FaultyFleet
 from tests.support.network_namespace import NetworkNamespace
+from tests.support.ports import free_port
 from tests.support.processes import eventually
 
 pytest.importorskip("asyncpg")
@@ -197,7 +198,7 @@ async def page_of(url: str, directory: Path) -> str:
 
 @pytest.mark.needs("chromium")
 def test_what_devices_are_called_is_text_on_the_page(harness: Any, tmp_path: Path) -> None:
-    port = harness.free_port()
+    port = free_port()
     command = [sys.executable, "-m", "mavproxy_gradys.station", f"--port={port}", "--database=s.db"]
     station = harness.Process(command, tmp_path / "station.log", tmp_path)
     try:
@@ -217,7 +218,7 @@ def test_what_devices_are_called_is_text_on_the_page(harness: Any, tmp_path: Pat
 
 @pytest.mark.needs("chromium")
 def test_page_keeps_what_has_not_changed(harness: Any, tmp_path: Path) -> None:
-    port = harness.free_port()
+    port = free_port()
     url = f"http://127.0.0.1:{port}"
     command = [sys.executable, "-m", "mavproxy_gradys.station", f"--port={port}", "--database=s.db"]
     station = harness.Process(command, tmp_path / "station.log", tmp_path)

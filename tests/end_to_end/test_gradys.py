@@ -16,6 +16,7 @@ import pytest
 import requests
 
 from tests.support.ground_station import Recorder
+from tests.support.ports import free_port
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +30,7 @@ def rig(harness, tmp_path_factory) -> Iterator:
 
 @pytest.fixture
 def recorder(harness) -> Iterator[Recorder]:
-    made = Recorder(harness.free_port())
+    made = Recorder(free_port())
     yield made
     made.stop()
 
@@ -77,7 +78,7 @@ def test_dropped_by_the_station_is_counted_separately_at_the_prompt_and_over_htt
 
 
 def test_redirects_are_refused(rig, recorder, harness):
-    elsewhere = Recorder(harness.free_port())
+    elsewhere = Recorder(free_port())
     recorder.status = 307
     recorder.headers = {"Location": f"http://127.0.0.1:{elsewhere.server_port}/update-info/"}
     tell(rig, recorder)
@@ -110,7 +111,7 @@ def certificate(tmp_path_factory) -> Path:
 
 @pytest.mark.needs("openssl")
 def test_tls_needs_a_certificate_that_is_trusted(rig, harness, certificate):
-    station = Recorder(harness.free_port(), certificate)
+    station = Recorder(free_port(), certificate)
     try:
         tell(rig, station, "https://")
         harness.eventually(lambda: "not trusted" in (report(rig)["last_error"] or ""), 10, "the refusal")
@@ -125,7 +126,7 @@ def test_tls_needs_a_certificate_that_is_trusted(rig, harness, certificate):
 
 def test_ipv6(rig, harness):
     try:
-        station = Recorder(harness.free_port(), host="::1")
+        station = Recorder(free_port(), host="::1")
     except OSError:
         pytest.skip("this machine has no IPv6 loopback")
     try:
@@ -138,7 +139,7 @@ def test_ipv6(rig, harness):
 
 def test_several_stations_each_with_its_own_state_and_a_dead_one_delays_nobody(rig, recorder, harness):
     hanging = socket.create_server(("127.0.0.1", 0))  # accepts, and never answers
-    refusing = f"127.0.0.1:{harness.free_port()}"
+    refusing = f"127.0.0.1:{free_port()}"
     names = [f"127.0.0.1:{hanging.getsockname()[1]}", refusing, "no-such-host.invalid:80"]
     rig.mavproxy.ask(f"gradys set gs {','.join(names)},127.0.0.1:{recorder.server_port}", "gradys: pushing to")
     with hanging:
@@ -162,7 +163,7 @@ def _answer_time(rig: Any) -> float:
 
 
 def test_no_fix_no_push_and_stale_no_push(harness, recorder, tmp_path):
-    rig = harness.Rig(tmp_path, harness.free_port())
+    rig = harness.Rig(tmp_path, free_port())
     try:
         instance = harness.start_embedded(rig, "--sysid=7", speedup=1)
         gradys = json.dumps({"gs": f"127.0.0.1:{recorder.server_port}", "max_age": 2}, separators=(",", ":"))
@@ -183,7 +184,7 @@ def test_no_fix_no_push_and_stale_no_push(harness, recorder, tmp_path):
 
 
 def test_routes_are_served_whichever_module_was_loaded_first_and_go_with_it(harness, tmp_path):
-    rig = harness.Rig(tmp_path, harness.free_port())
+    rig = harness.Rig(tmp_path, free_port())
     try:
         instance = harness.start_embedded(rig, speedup=1)
         rig.mavproxy = rig.start("mavproxy", harness.mavproxy_command(instance))
@@ -231,7 +232,7 @@ def test_a_mistake_at_the_prompt_is_one_clear_line(rig, line, answer):
 
 def test_the_original_stations_program_and_ours_agree(rig, harness, tmp_path):
     """Our station answers 101 until somebody watches, 103 then."""
-    port = harness.free_port()
+    port = free_port()
     command = [sys.executable, "-m", "mavproxy_gradys.station", f"--port={port}", f"--database={tmp_path}/s.db"]
     station = rig.start("station", command)
     station.says("listening on")

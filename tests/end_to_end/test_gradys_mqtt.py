@@ -14,6 +14,8 @@ from typing import Any
 
 import pytest
 
+from tests.support.ports import free_port
+
 MOSQUITTO = shutil.which("mosquitto", path="/usr/sbin:/usr/bin:/usr/local/sbin:/usr/local/bin:/opt/homebrew/sbin")
 
 pytestmark = pytest.mark.needs("mosquitto")
@@ -25,7 +27,7 @@ class Broker:
 
     def __init__(self, rig: Any, harness: Any, directory: Path, *lines: str) -> None:
         self._rig, self._harness, self._directory = rig, harness, directory
-        self.port = harness.free_port()
+        self.port = free_port()
         passwords = directory / "passwords"
         maker = (
             shutil.which("mosquitto_passwd", path="/usr/bin:/usr/local/bin:/opt/homebrew/bin") or "mosquitto_passwd"

@@ -21,6 +21,8 @@ from typing import Any
 import pytest
 import requests
 
+from tests.support.ports import free_port
+
 KILLS = int(os.environ.get("GRADYS_KILLS", "3"))
 
 
@@ -29,7 +31,7 @@ class Receiver:
 
     def __init__(self, rig: Any, harness: Any, directory: Path) -> None:
         self._rig, self._harness = rig, harness
-        self.port = harness.free_port()
+        self.port = free_port()
         self.url = f"http://127.0.0.1:{self.port}"
         self._database = directory / "station.db"
         self._process: Any = None
@@ -194,7 +196,7 @@ def test_a_captive_portal_takes_nothing(rig, harness, receiver, portal, tmp_path
 @pytest.mark.long
 def test_kill_9_loses_nothing_that_was_acknowledged(harness, tmp_path):
     """MAVProxy is killed at random moments while readings are posted; what was answered with 200 arrives."""
-    rig = harness.Rig(tmp_path, harness.free_port())
+    rig = harness.Rig(tmp_path, free_port())
     chance = random.Random(1)
     promised: list[int] = []
     try:
@@ -250,7 +252,7 @@ def test_a_full_disk_is_reported_and_nothing_else_suffers(harness, rig, tmp_path
     if mounted.returncode:
         pytest.skip("only root can mount a small disk")
     try:
-        sink = f"http://127.0.0.1:{harness.free_port()}/readings"
+        sink = f"http://127.0.0.1:{free_port()}/readings"
         settings = {"sink": sink, "spool": f"{disk}/spool.db", "quantities": "position@0.1"}
         rig.mavproxy.ask("module load gradys:" + json.dumps(settings, separators=(",", ":")), "Loaded module gradys")
         harness.eventually(lambda: serves(rig), 5, "the route")

@@ -10,6 +10,8 @@ from typing import Any
 import pytest
 import requests
 
+from tests.support.ports import free_port
+
 INI = """\
 [gradys]
 sink = {url}/readings
@@ -31,7 +33,7 @@ def rig(harness, tmp_path_factory) -> Iterator:
 @pytest.fixture(scope="module")
 def station(rig, harness) -> str:
     """A receiver's URL."""
-    port = harness.free_port()
+    port = free_port()
     database = rig.directory / "station.db"
     command = [sys.executable, "-m", "mavproxy_gradys.station", f"--port={port}", f"--database={database}"]
     rig.start("station", command).says("listening on")

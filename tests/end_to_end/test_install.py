@@ -14,6 +14,8 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 
+from tests.support.ports import free_port
+
 ROOT = Path(__file__).parents[2]
 OURS = re.compile(r"mavproxy_uavapi|\.pth$")
 LIST = (
@@ -94,7 +96,7 @@ def test_install_and_uninstall_leave_mavproxy_healthy(python, harness, tmp_path,
 def loads(python: Path, harness, directory: Path, answer: str) -> bool:
     """Whether a MAVProxy of that Python starts, and answers `module load uavapi` so."""
     directory.mkdir()
-    rig = harness.Rig(directory, harness.free_port())
+    rig = harness.Rig(directory, free_port())
     try:
         instance = harness.start_embedded(rig, speedup=2)
         command = harness.mavproxy_command(instance)
@@ -109,7 +111,7 @@ def test_mavproxy_and_all_three_modules_start_with_the_lean_set_alone(lean_pytho
     seen = "import importlib.util as u; print([n for n in ('pytest','vtk','matplotlib') if u.find_spec(n)])"
     assert subprocess.run([lean_python, "-c", seen], check=True, capture_output=True, text=True).stdout == "[]\n"
     subprocess.run([lean_python, "-c", "import requests, mavproxy_uavapi.client"], check=True)  # as scripts do
-    rig = harness.Rig(tmp_path, harness.free_port())
+    rig = harness.Rig(tmp_path, free_port())
     try:
         instance = harness.start_embedded(rig, speedup=2)
         loads = [harness.load(rig.port), '--cmd=module load vision:{"source":"sim"}', "--cmd=module load gradys"]

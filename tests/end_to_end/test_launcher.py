@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 import requests
 
+from tests.support.ports import free_port
+
 HOME = (-35.2, 149.1)
 
 
@@ -25,7 +27,7 @@ def station():
 
 @pytest.fixture(params=["embedded", pytest.param("ardupilot", marks=pytest.mark.sitl)])
 def launched(request, harness, station, tmp_path):
-    port = harness.free_port()
+    port = free_port()
     command = [str(harness.SCRIPTS / "mavproxy-uavapi"), "--simulated", "true", "--speedup", "10"]
     command += ["--port", str(port), "--sysid", "42", "--log_path", str(tmp_path)]
     command += [

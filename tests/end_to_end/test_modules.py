@@ -13,13 +13,15 @@ from pathlib import Path
 import pytest
 import requests
 
+from tests.support.ports import free_port
+
 ROUNDS = 50
 
 
 @pytest.fixture(scope="module")
 def mavproxy(harness, tmp_path_factory) -> Iterator:
     """A MAVProxy on the embedded vehicle, with none of our modules loaded."""
-    made = harness.Rig(tmp_path_factory.mktemp("bare"), harness.free_port())
+    made = harness.Rig(tmp_path_factory.mktemp("bare"), free_port())
     try:
         instance = harness.start_embedded(made, speedup=2)
         env = {"PYTHONPATH": str(made.directory)}
@@ -118,7 +120,7 @@ def test_a_port_in_use_is_one_clear_line_and_mavproxy_lives_on(mavproxy, harness
         output = prompt.ask(load_line(mavproxy), "takes another port")
         assert "Address already in use" in output
         assert "Traceback" not in output
-    other = harness.free_port()
+    other = free_port()
     prompt.ask(f"uavapi set port {other}", f"listening on http://127.0.0.1:{other}")
     prompt.ask("module unload uavapi", "Unloaded module uavapi")
 
@@ -141,7 +143,7 @@ def test_a_bad_setting_is_one_clear_line_and_mavproxy_lives_on(mavproxy, line, a
 def test_a_missing_dependency_is_one_clear_line_and_mavproxy_lives_on(harness, tmp_path):
     missing = "raise ModuleNotFoundError(\"No module named 'aiohttp'\", name='aiohttp')\n"
     (tmp_path / "aiohttp.py").write_text(missing, encoding="utf-8")
-    rig = harness.Rig(tmp_path, harness.free_port())
+    rig = harness.Rig(tmp_path, free_port())
     try:
         instance = harness.start_embedded(rig, speedup=2)
         rig.mavproxy = rig.start("mavproxy", harness.mavproxy_command(instance), {"PYTHONPATH": str(tmp_path)})
@@ -154,7 +156,7 @@ def test_a_missing_dependency_is_one_clear_line_and_mavproxy_lives_on(harness, t
 
 
 def test_loaded_from_the_command_line_before_there_is_a_link(harness, tmp_path):
-    rig = harness.Rig(tmp_path, harness.free_port())
+    rig = harness.Rig(tmp_path, free_port())
     ini = tmp_path / "uavapi.ini"
     ini.write_text(f"[api]\nport = {rig.port}\nuav_connection = 127.0.0.1:17171\n", encoding="utf-8")
     try:
@@ -212,7 +214,7 @@ def test_tab_completes_the_commands_and_settings(mavproxy, harness, tmp_path):
 
     try:
         harness.eventually(lambda: "Received" in screen(), 30, "the parameters' arrival")
-        type_and_see("listening on", f'module load uavapi:{{"port":{harness.free_port()}}}', "Enter")
+        type_and_see("listening on", f'module load uavapi:{{"port":{free_port()}}}', "Enter")
         type_and_see("start   status", "uavapi st", "Tab", "Tab")
         type_and_see("calls in flight", "atus", "Enter")
         type_and_see("uavapi set link_timeout", "uavapi set link", "Tab")

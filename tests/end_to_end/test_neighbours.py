@@ -12,7 +12,8 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from tests.support.processes import Rig, eventually, free_port
+from tests.support.ports import free_port
+from tests.support.processes import Rig, eventually
 from tests.support.several_vehicles import listed, several_vehicles
 
 BAD, GOOD, FLOODING = 1, 2, 9  # system ids

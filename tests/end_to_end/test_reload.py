@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 import requests
 
+from tests.support.ports import free_instance, free_port
+
 SPEEDUP = 4  # a take-off and a landing are all that is flown
 LAT, LON, GROUND = -353632610, 1491652300, 584  # 1e-7 degrees, m AMSL
 
@@ -18,10 +20,10 @@ LAT, LON, GROUND = -353632610, 1491652300, 584  # 1e-7 degrees, m AMSL
 @pytest.fixture(scope="module")
 def rig(harness, tmp_path_factory) -> Iterator:
     """A MAVProxy with vehicles 1, its current one, and 2, and none of our modules; it has their parameters."""
-    made = harness.Rig(tmp_path_factory.mktemp("reload"), harness.free_port())
+    made = harness.Rig(tmp_path_factory.mktemp("reload"), free_port())
     try:
         first = harness.start_embedded(made, speedup=SPEEDUP)
-        second = harness.free_instance()
+        second = free_instance()
         simulator = [sys.executable, "-m", "mavproxy_uavapi.sim", f"--home={harness.HOME}"]
         more = made.start("second", [*simulator, f"--instance={second}", "--sysid=2", f"--speedup={SPEEDUP}"])
         more.says("listening on tcp")
@@ -55,7 +57,7 @@ def flat(output: str) -> str:
 
 
 def test_uavapi_keeps_its_keywords_and_what_was_set_at_the_prompt(rig, prompt, harness):
-    other = harness.free_port()
+    other = free_port()
     prompt.ask(f'module load uavapi:{{"port":{rig.port},"sysid":2}}', f"listening on {rig.url}")
     prompt.ask(f"uavapi set port {other}", f"listening on http://127.0.0.1:{other}")
     for line in ("module reload uavapi", "module unload uavapi\nmodule load uavapi"):

@@ -11,6 +11,7 @@ import pytest
 
 from mavproxy_uavapi.launcher import command_lines
 from mavproxy_uavapi.launcher.options import parse
+from tests.support.ports import free_port
 
 pytestmark = pytest.mark.needs("tmux")
 
@@ -64,7 +65,7 @@ class Terminal:
 def rig(harness, tmp_path_factory):
     """A MAVProxy with a prompt, on the embedded vehicle; `settings` come in by file, environment and keyword."""
     directory = tmp_path_factory.mktemp("settings")
-    rig = harness.Rig(directory, harness.free_port())
+    rig = harness.Rig(directory, free_port())
     config = directory / "uav.ini"
     config.write_text(INI.format(folder=directory), encoding="utf-8")
     terminal = rig.terminal = Terminal(f"uavapi-test-{rig.port}")
@@ -225,7 +226,7 @@ token = s3cret
 
 def test_one_file_that_the_environment_names_configures_all_three_modules(harness, tmp_path):
     pytest.importorskip("cv2")
-    rig = harness.Rig(tmp_path, harness.free_port())
+    rig = harness.Rig(tmp_path, free_port())
     file = tmp_path / "uav.ini"
     file.write_text(ALL_THREE.format(port=rig.port, folder=tmp_path), encoding="utf-8")
     try:
@@ -278,7 +279,7 @@ def by_the_launchers_option(*_):
 @pytest.mark.parametrize("way", [by_file, by_environment, by_the_launchers_option])
 def test_a_pipeline_with_spaces_and_quotes_is_configured_without_a_person(harness, tmp_path, way):
     pytest.importorskip("cv2")
-    rig = harness.Rig(tmp_path, harness.free_port())
+    rig = harness.Rig(tmp_path, free_port())
     try:
         arguments, given = way(tmp_path, rig)
         command = harness.mavproxy_command(harness.start_embedded(rig, speedup=2), *arguments)

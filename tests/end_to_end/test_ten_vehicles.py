@@ -14,7 +14,8 @@ import requests
 
 from mavproxy_uavapi.core.vehicle.geodesy import offset
 from tests.support.ground_station import Recorder
-from tests.support.processes import SCRIPTS, Rig, eventually, free_port
+from tests.support.ports import free_port
+from tests.support.processes import SCRIPTS, Rig, eventually
 from tests.support.several_vehicles import listed
 from tests.support.truth import Truth
 

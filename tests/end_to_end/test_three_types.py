@@ -10,7 +10,8 @@ from typing import Any
 
 import pytest
 
-from tests.support.processes import HOME, MAVPROXY, SPEEDUP, Rig, free_instance, free_port, headless, load
+from tests.support.ports import free_instance, free_port
+from tests.support.processes import HOME, MAVPROXY, SPEEDUP, Rig, headless, load
 
 TYPES = {"copter": "ArduCopter", "plane": "ArduPlane", "rover": "Rover"}  # by system id, from 1
 TOGETHER = SPEEDUP / 3  # three vehicles send MAVProxy what one does at SPEEDUP; more, and acks come seconds late

@@ -15,6 +15,8 @@ import pytest
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from tests.support.ports import free_instance, free_port
+
 GUIDED, LOITER, LAND, BRAKE = 4, 5, 9, 17
 ACCEPTED, FAILED, DENIED = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_FAILED, mavlink.MAV_RESULT_DENIED
 PAUSE = mavlink.MAV_CMD_DO_PAUSE_CONTINUE
@@ -142,13 +144,13 @@ def station(
 ) -> Iterator[Station]:
     """A ground station and its vehicle, which the tests share."""
     directory: Path = tmp_path_factory.mktemp(request.param)
-    rig = harness.Rig(directory, harness.free_port())
+    rig = harness.Rig(directory, free_port())
     with contextlib.ExitStack() as stack:
         stack.callback(rig.stop)
         if request.param == "embedded":
             instance = harness.start_embedded(rig)
         else:
-            instance = harness.free_instance()
+            instance = free_instance()
             command = harness.sim_vehicle(directory, instance, "--no-mavproxy")
             rig.start("sim_vehicle", command, harness.headless())
         yield stack.enter_context(contextlib.closing(_connected(5760 + 10 * instance)))

@@ -19,6 +19,8 @@ import numpy as np
 import pytest
 import requests
 
+from tests.support.ports import free_port
+
 cv2 = pytest.importorskip("cv2")
 
 SPEEDUP = 1.5
@@ -219,7 +221,7 @@ def test_unloaded_in_flight_the_vehicle_holds(seeing: Any, harness: Any) -> None
 
 @pytest.mark.long
 def test_without_uavapi_the_prompt_is_all_it_takes(harness: Any, tmp_path: Path) -> None:
-    rig = harness.Rig(tmp_path, harness.free_port())
+    rig = harness.Rig(tmp_path, free_port())
     try:
         instance = harness.start_embedded(rig, speedup=2)
         given = {"source": "sim", "fps": 12, "width": 480, "height": 360, "sim_tags": "0:0.30@4,-3"}

@@ -14,7 +14,8 @@ from typing import Any
 
 import aiohttp
 
-from tests.support.processes import Process, free_port
+from tests.support.ports import free_port
+from tests.support.processes import Process
 
 PATIENCE = 60.0  # s
 # Chromium asks its makers' hosts for updates, hundreds of times where there is no internet; no test needs them.

@@ -13,8 +13,9 @@ from typing import Any
 
 import requests
 
+from tests.support.ports import free_port
 from tests.support.postgres import PostgresCluster
-from tests.support.processes import Process, eventually, free_port
+from tests.support.processes import Process, eventually
 
 MOSQUITTO = shutil.which("mosquitto", path=os.environ["PATH"] + ":/usr/sbin")
 CONFIG = Path(__file__).parents[2] / "packaging" / "mosquitto.conf"

@@ -16,7 +16,8 @@ from typing import NamedTuple
 
 from tests.support.fleet import Fleet
 from tests.support.network_namespace import NetworkNamespace
-from tests.support.processes import Process, eventually, free_port
+from tests.support.ports import free_port
+from tests.support.processes import Process, eventually
 
 ROOT = Path(__file__).parents[2]
 AUDIT = """

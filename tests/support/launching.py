@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shlex
-import socket
 import textwrap
 
 from mavproxy_uavapi.launcher import locations
@@ -15,11 +14,6 @@ def ini(tmp_path, text):
     file = tmp_path / "uav.ini"
     file.write_text(textwrap.dedent(text), encoding="utf-8")
     return f"--config={file}"
-
-
-def free_port():
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        return server.getsockname()[1]
 
 
 def as_mavproxy_reads(load):

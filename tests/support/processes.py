@@ -22,6 +22,7 @@ from typing import Any, NamedTuple
 import requests
 
 from tests.support.calls import PendingCall, ThreadedCall
+from tests.support.ports import free_instance, free_port
 from tests.support.relay import Relay
 
 SCRIPTS = Path(sysconfig.get_path("scripts"))
@@ -42,31 +43,6 @@ def eventually(look: Callable[[], Any], timeout: float = PATIENCE, what: str = "
         if time.monotonic() > deadline:
             raise AssertionError(f"{what} did not happen within {timeout:g} s")
         time.sleep(0.05)
-
-
-def free_port() -> int:
-    """A TCP port of the loopback that nobody has just now."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
-def free_instance(count: int = 1) -> int:
-    """The first of `count` SITL instances whose ports nobody has just now; from 30, to leave the low ones to people.
-
-    Tests that run side by side (pytest-xdist) look in ranges of their own, so that they do not race.
-    """
-    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
-    for instance in range(30 + 100 * worker, 130 + 100 * worker):
-        bases = [5760 + 10 * (instance + more) for more in range(count)]
-        with contextlib.ExitStack() as probes:
-            try:
-                for port in [base + offset for base in bases for offset in (0, 2, 3)]:
-                    probes.enter_context(socket.socket()).bind(("127.0.0.1", port))
-            except OSError:
-                continue
-            return instance
-    raise AssertionError("no free SITL instance")
 
 
 class Process:

@@ -7,7 +7,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from tests.support.processes import MAVPROXY, Rig, eventually, free_port, load, start_embedded
+from tests.support.ports import free_port
+from tests.support.processes import MAVPROXY, Rig, eventually, load, start_embedded
 
 
 @contextlib.contextmanager

@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from tests.support.processes import HOME, Rig, free_instance, free_port, load, mavproxy_command
+from tests.support.ports import free_instance, free_port
+from tests.support.processes import HOME, Rig, load, mavproxy_command
 
 BINARIES = {"plane": "arduplane", "quadplane": "arduplane", "rover": "ardurover"}
 DEFAULTS = {

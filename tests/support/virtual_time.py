@@ -7,6 +7,7 @@ import selectors
 import threading
 from typing import Any
 
+FULL_SOCKET = 0.25  # real s that a full socket gets besides: TCP may open its window as late as that
 NOTHING_HAPPENS = 5.0  # real s after which a loop that waits for nothing but other threads is called stuck
 
 
@@ -65,7 +66,12 @@ class _JumpingSelector(selectors.DefaultSelector):
             if not ready:
                 raise RuntimeError("nothing will ever happen: no timer, no socket")
             return ready
-        ready = super().select(min(timeout, self._loop.patience))
+        ready = super().select(min(timeout, self._patience()))
         if not ready:
             self._loop.now += max(timeout, 0.0)
         return ready
+
+    def _patience(self) -> float:
+        patience = self._loop.patience
+        is_full = patience and any(key.events & selectors.EVENT_WRITE for key in self.get_map().values())
+        return max(patience, FULL_SOCKET) if is_full else patience

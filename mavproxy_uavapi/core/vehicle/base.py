@@ -27,13 +27,14 @@ from mavproxy_uavapi.core.vehicle.message_waiter import MessageWaiter
 from mavproxy_uavapi.core.vehicle.mission_files import MissionItem
 from mavproxy_uavapi.core.vehicle.mission_protocol import Waypoints
 from mavproxy_uavapi.core.vehicle.mission_way import Stop
+from mavproxy_uavapi.core.vehicle.mode_switch import ModeRequests, ModeSwitch
 from mavproxy_uavapi.core.vehicle.parameters import Parameters
 from mavproxy_uavapi.core.vehicle.speeds import Speeds
 
 T = TypeVar("T")
 mavlink = mavutil.mavlink
 
-HEARTBEAT_TIMEOUT = 5.0  # s until a message must show what was acknowledged
+REPORT_TIMEOUT = 5.0  # s until a requested message must come
 HOLDING_MODES = ("LOITER", "HOLD", "POSHOLD", "ALT_HOLD", "STOP", "RTL")  # what comes first in a vehicle's mode map
 FRESH = 3.0  # s; no verb uses an older position
 
@@ -72,7 +73,7 @@ class BaseVehicle:
         self.waypoints = Waypoints(state, self.link, self.waiting, self._allow_upload)
         self.parameters = Parameters(state, self.link, self.waiting)
         self.logs = DataflashLogs(state, self.link, self.waiting)
-        self._requested_modes: dict[int, float] = {}  # requested modes, the newest last, and when (s)
+        self._mode_requests = ModeRequests(state, clock)
         self._requests: dict[str, asyncio.Task[Any]] = {}  # REQUEST_MESSAGE in flight, by message name
 
     # -- state --------------------------------------------------------------------------------------------
@@ -95,20 +96,8 @@ class BaseVehicle:
     @property
     def next_mode(self) -> str:
         """The name of the last requested mode, until a heartbeat shows the outcome; else `mode`."""
-        coming = self._on_its_way()
+        coming = self._mode_requests.on_their_way()
         return mode_name(self.state.vehicle_type, coming[-1]) if coming else self.mode
-
-    def _on_its_way(self) -> list[int]:
-        """The recently requested modes that no heartbeat has shown since, the newest last."""
-        now = self.clock()
-        requests = [(mode, at) for mode, at in self._requested_modes.items() if now - at <= HEARTBEAT_TIMEOUT]
-        for changed_at, mode in self.state.mode_changes:
-            answered = [at for requested, at in requests if requested == mode and at <= changed_at]
-            if answered:
-                requests = [(requested, at) for requested, at in requests if at > answered[-1]]
-            else:  # a switch by the pilot or a failsafe: our earlier requests are void
-                requests = [(requested, at) for requested, at in requests if at >= changed_at]
-        return [mode for mode, _ in requests]
 
     @property
     def is_ready_to_arm(self) -> bool:
@@ -247,12 +236,6 @@ class BaseVehicle:
         self.guard.require_mission(items, from_here=False)
 
     @property
-    def is_mode_of_ours(self) -> bool:
-        """Whether it came into its mode by our command."""
-        asked_at = None if self.state.mode is None else self._requested_modes.get(self.state.mode)
-        return asked_at is not None and asked_at <= self.state.mode_since <= asked_at + HEARTBEAT_TIMEOUT
-
-    @property
     def has_foreign_target(self) -> bool:
         """Whether the autopilot reports a target that another ground station gave it."""
         return False
@@ -283,7 +266,7 @@ class BaseVehicle:
             self.mode == "GUIDED" or flies_mission(self.mode) or (self.mode == "TAKEOFF" and self.kind == "plane")
         ):
             return False
-        commanded = self.guard.ordered_at >= self.state.mode_since or self.is_mode_of_ours
+        commanded = self.guard.ordered_at >= self.state.mode_since or self._mode_requests.chose_the_mode
         return commanded and not self.has_foreign_target
 
     def commanding(self, job: Job, *needs: Callable[[], None]) -> Callable[[], None]:
@@ -320,42 +303,25 @@ class BaseVehicle:
         """
         number = mode_number(self.state.vehicle_type, mode)
         goals = {number, *(mode_number(self.state.vehicle_type, name) for name in onward)}
-        before, on_its_way = self.state.mode, self._on_its_way()
-        # With another switch on its way, a heartbeat in this mode may be older than both; and the mode that a vehicle
-        # is in already does not show what else a command does.
-        does_more = command is not None or bool(onward)
-        is_ambiguous = not goals.isdisjoint((before, *on_its_way)) and (
-            does_more or any(other != number for other in on_its_way)
-        )
-        counts_from = math.inf if is_ambiguous else -math.inf  # s; older heartbeats show nothing
-        has_shown = False
-
-        def shown() -> bool:
-            nonlocal has_shown
-            elsewhere = self.state.mode not in (before, None, *goals, *on_its_way)
-            left_again = has_shown and self.state.mode not in (None, *goals)
-            if elsewhere or left_again:
-                raise ModeChanged(f"the pilot or a failsafe switched the vehicle to {self.mode} meanwhile")
-            has_shown = has_shown or (self.state.mode in goals and self.state.heartbeat_at > counts_from)
-            return has_shown and self.state.mode in goals
+        on_their_way = self._mode_requests.on_their_way()
+        switch = ModeSwitch(self.state, goals, on_their_way, does_more=command is not None or bool(onward))
 
         def switched_by_nobody_else() -> None:
-            shown()
+            switch.shown()
 
         def noted() -> None:
-            self._requested_modes.pop(number, None)
-            self._requested_modes[number] = self.clock()
+            self._mode_requests.note(number)
             job.modes |= {mode_name(self.state.vehicle_type, goal) for goal in goals}
 
         check = self.commanding(job, switched_by_nobody_else, *needs, noted)
+        order = command or messages.set_mode(number)
         try:
-            switch = command or messages.set_mode(number)
-            if is_ambiguous:
-                await self.commands.send(replace(switch, proven_by_ack=True), check, shown=shown)
-                counts_from = self.clock()
-            await self.commands.send_until_shown(switch, check, shown, f"show mode {mode.upper()}")
+            if switch.is_ambiguous:
+                await self.commands.send(replace(order, proven_by_ack=True), check, shown=switch.shown)
+                switch.count_from(self.clock())
+            await self.commands.send_until_shown(order, check, switch.shown, f"show mode {mode.upper()}")
         except Rejected:
-            self._requested_modes.pop(number, None)
+            self._mode_requests.forget(number)
             raise
         self.authority.shown(job)
 
@@ -392,4 +358,4 @@ class BaseVehicle:
 
         with self.waiting.expecting({name}, from_autopilot) as expected:
             await self.commands.send(messages.request_message(messages.MESSAGE_IDS[name]))
-            return await expected.within(HEARTBEAT_TIMEOUT, f"report {name}")
+            return await expected.within(REPORT_TIMEOUT, f"report {name}")

@@ -38,7 +38,7 @@ def test_no_broker_or_no_certificates_are_said_once_and_tried_again(
             raise EnoughError
         return 0.0
 
-    monkeypatch.setattr("mavproxy_gradys.nearby.listener.Backoff.failed", failed)
+    monkeypatch.setattr("mavproxy_gradys.net.mqtt_subscription.Backoff.failed", failed)
     host: Any = SimpleNamespace(clock=time.monotonic)
     ca_file = str(tmp_path / "gone.pem") if scheme == "mqtts" else ""
     listener = Listener(host, f"{scheme}://127.0.0.1:{closed_port()}", 1.0, ca_file)

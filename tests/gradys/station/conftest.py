@@ -11,8 +11,8 @@ import pytest
 
 from mavproxy_gradys.station.sqlite_store import SqliteStore
 from mavproxy_gradys.station.store import Store
+from tests.support.ports import free_port
 from tests.support.postgres import PostgresCluster
-from tests.support.processes import free_port
 
 
 class Clock:

@@ -11,8 +11,8 @@ import pytest
 
 from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.station.reading_row import ReadingRow, reading_row
+from tests.support.ports import free_port
 from tests.support.postgres import PostgresCluster
-from tests.support.processes import free_port
 
 pytestmark = pytest.mark.needs("pg_lsclusters", "postgresql")
 DAY = 86400

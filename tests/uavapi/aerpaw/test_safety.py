@@ -14,7 +14,7 @@ from mavproxy_uavapi.aerpaw.safety import SafetyCheckerClient
 from mavproxy_uavapi.aerpaw.safety_rules import SafetyRules
 from mavproxy_uavapi.aerpaw.safety_server import SafetyCheckerServer, main_cli, read_rules
 from mavproxy_uavapi.aerpaw.safety_wire import deserialize_msg, serialize_msg, serialize_request
-from tests.support.processes import free_port
+from tests.support.ports import free_port
 
 LIMITS = {"vehicle_type": "copter", "max_speed": 10, "min_speed": 1, "max_alt": 50, "min_alt": 5}
 

@@ -19,21 +19,20 @@ from mavproxy_uavapi.http.requests import Servo
 from mavproxy_uavapi.http.responses import Handler
 from mavproxy_uavapi.http.route import FLY, Route
 from mavproxy_uavapi.settings import ApiModuleSettings
+from tests.support.ports import free_port
 
 MAX_BODY = 1024 * 1024  # bytes
 
 
 @pytest.fixture
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+def listening_on() -> int:
+    return free_port()
 
 
 @pytest.fixture
-def server(loop: Any, service: Any, free_port: int) -> Any:
+def server(loop: Any, service: Any, listening_on: int) -> Any:
     loop.patience = 0.002
-    service.settings = ApiModuleSettings({"port": free_port}).snapshot()
+    service.settings = ApiModuleSettings({"port": listening_on}).snapshot()
     server = ApiServer(service)
     yield server
     loop.run(server.stop())
@@ -131,19 +130,19 @@ def test_path_of_another_module_is_served_while_that_is_loaded(flying: Any, api:
 # -- the server -------------------------------------------------------------------------------------------
 
 
-def test_server_listens_and_stops(loop: Any, server: Any, free_port: int, drone: Any) -> None:
+def test_server_listens_and_stops(loop: Any, server: Any, listening_on: int, drone: Any) -> None:
     loop.run(server.start())
-    assert loop.run(status_of(free_port)) == 200
+    assert loop.run(status_of(listening_on)) == 200
     loop.run(server.stop())
     with pytest.raises(OSError, match="refused|Cannot connect"):
-        loop.run(status_of(free_port))
+        loop.run(status_of(listening_on))
 
 
 def test_port_that_is_taken_is_an_os_error_and_leaks_nothing(
-    loop: Any, server: Any, free_port: int, descriptors: Any
+    loop: Any, server: Any, listening_on: int, descriptors: Any
 ) -> None:
     with socket.socket() as taken:
-        taken.bind(("127.0.0.1", free_port))
+        taken.bind(("127.0.0.1", listening_on))
         taken.listen()
         before = descriptors()
         with pytest.raises(OSError, match="in use"):
@@ -152,22 +151,22 @@ def test_port_that_is_taken_is_an_os_error_and_leaks_nothing(
         assert descriptors() == before
 
 
-def test_port_can_be_bound_again_at_once(loop: Any, service: Any, free_port: int, drone: Any) -> None:
+def test_port_can_be_bound_again_at_once(loop: Any, service: Any, listening_on: int, drone: Any) -> None:
     loop.patience = 0.002
-    service.settings = ApiModuleSettings({"port": free_port}).snapshot()
+    service.settings = ApiModuleSettings({"port": listening_on}).snapshot()
     for _ in range(3):
         server = ApiServer(service)
         loop.run(server.start())
-        assert loop.run(status_of(free_port)) == 200
+        assert loop.run(status_of(listening_on)) == 200
         loop.run(server.stop())
 
 
 def test_stop_answers_the_clients_whose_verbs_it_ends(
-    loop: Any, server: Any, service: Any, free_port: int, flying: Any
+    loop: Any, server: Any, service: Any, listening_on: int, flying: Any
 ) -> None:
     async def stop_meanwhile() -> tuple[int, Any]:
         async with ClientSession() as session:
-            request = loop.create_task(session.get(f"http://127.0.0.1:{free_port}/command/land"))
+            request = loop.create_task(session.get(f"http://127.0.0.1:{listening_on}/command/land"))
             await asyncio.sleep(2.0)
             assert service.host.jobs.running()
             await server.stop()
@@ -180,10 +179,10 @@ def test_stop_answers_the_clients_whose_verbs_it_ends(
     assert "stopping" in body["detail"]
 
 
-def test_stop_does_not_wait_long_for_an_open_stream(loop: Any, server: Any, free_port: int, flying: Any) -> None:
+def test_stop_does_not_wait_long_for_an_open_stream(loop: Any, server: Any, listening_on: int, flying: Any) -> None:
     async def stop_meanwhile() -> float:
         async with ClientSession() as session:
-            socket = await session.ws_connect(f"http://127.0.0.1:{free_port}/telemetry/stream")
+            socket = await session.ws_connect(f"http://127.0.0.1:{listening_on}/telemetry/stream")
             await socket.receive()
             started = loop.time()
             await server.stop()
@@ -194,10 +193,10 @@ def test_stop_does_not_wait_long_for_an_open_stream(loop: Any, server: Any, free
 
 
 def test_descriptors_are_those_of_the_port_and_of_every_connection(
-    loop: Any, server: Any, free_port: int, drone: Any
+    loop: Any, server: Any, listening_on: int, drone: Any
 ) -> None:
     async def count() -> list[int]:
-        async with ClientSession() as session, session.get(f"http://127.0.0.1:{free_port}/telemetry/gps"):
+        async with ClientSession() as session, session.get(f"http://127.0.0.1:{listening_on}/telemetry/gps"):
             return server.filenos()
 
     assert server.filenos() == []
@@ -208,7 +207,7 @@ def test_descriptors_are_those_of_the_port_and_of_every_connection(
     assert server._sockets[0].fileno() in found
 
 
-def test_each_vehicle_has_a_port_of_its_own(loop: Any, service: Any, make_drone: Any, free_port: int) -> None:
+def test_each_vehicle_has_a_port_of_its_own(loop: Any, service: Any, make_drone: Any, listening_on: int) -> None:
     async def ids(ports: list[int]) -> list[str]:
         async with ClientSession() as session:
             answers = [await session.get(f"http://127.0.0.1:{port}/telemetry/gps") for port in ports]
@@ -220,26 +219,26 @@ def test_each_vehicle_has_a_port_of_its_own(loop: Any, service: Any, make_drone:
     make_drone(1)
     make_drone(2)
     loop.patience = 0.002
-    service.settings = ApiModuleSettings({"port": free_port, "ports": f"{other_port}:2"}).snapshot()
+    service.settings = ApiModuleSettings({"port": listening_on, "ports": f"{other_port}:2"}).snapshot()
     server = ApiServer(service)
     loop.run(server.start())
-    assert loop.run(ids([free_port, other_port])) == ["1", "2"]
+    assert loop.run(ids([listening_on, other_port])) == ["1", "2"]
     assert len(server.filenos()) == 2
     loop.run(server.stop())
 
 
-def test_a_port_that_is_taken_closes_those_before_it(loop: Any, service: Any, free_port: int, drone: Any) -> None:
+def test_a_port_that_is_taken_closes_those_before_it(loop: Any, service: Any, listening_on: int, drone: Any) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         ports = f"{taken.getsockname()[1]}:2"
-        service.settings = ApiModuleSettings({"port": free_port, "ports": ports}).snapshot()
+        service.settings = ApiModuleSettings({"port": listening_on, "ports": ports}).snapshot()
         server = ApiServer(service)
         with pytest.raises(OSError, match="in use"):
             loop.run(server.start())
         loop.run(server.stop())
     with socket.socket() as free:
-        free.bind(("127.0.0.1", free_port))
+        free.bind(("127.0.0.1", listening_on))
 
 
 def test_listening_socket_of_a_foreign_address_is_an_os_error() -> None:

@@ -13,7 +13,8 @@ from mavproxy_uavapi.launcher import main, options
 from mavproxy_uavapi.launcher.errors import OptionError
 from mavproxy_uavapi.launcher.options import RunOptions, parse
 from mavproxy_vision import opencv_install
-from tests.support.launching import free_port, ini
+from tests.support.launching import ini
+from tests.support.ports import free_port
 
 
 def test_the_table_and_the_options_name_the_same_things():

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from mavproxy_uavapi.launcher import cli
-from tests.support.launching import free_port
+from tests.support.ports import free_port
 
 ROOT = Path(cli.__file__).resolve().parents[2]
 FAKE_MAVPROXY = """

@@ -1,0 +1,47 @@
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from tests.support.module_loader import Loader
+from tests.support.ports import free_port
+
+
+@pytest.fixture
+def loader(mpstate: Any, main_loop: Any) -> Iterator[Loader]:
+    loader = Loader(mpstate, main_loop)
+    yield loader
+    for module in list(main_loop.modules):
+        loader.unload(module)
+
+
+@pytest.fixture
+def port() -> int:
+    return free_port()
+
+
+@pytest.fixture
+def module(loader: Loader, port: int, output: Any) -> Any:
+    """The module, listening."""
+    module = loader.load(port=port)
+    assert output("listening") == f"uavapi: listening on http://127.0.0.1:{port}\n"
+    return module
+
+
+@pytest.fixture
+def output(main_loop: Any, capsys: Any) -> Callable[[str], str]:
+    """Turn the main loop until those words were printed; everything that was printed since the last time."""
+
+    def output(words: str) -> str:
+        printed: list[str] = []
+
+        def found() -> bool:
+            printed.append(capsys.readouterr().out)
+            return words in "".join(printed)
+
+        main_loop.until(found)
+        return "".join(printed)
+
+    return output

@@ -1,0 +1,161 @@
+from __future__ import annotations
+
+import asyncio
+import socket
+import threading
+import time
+from typing import Any
+
+from tests.support.module_loader import Loader, listens
+from tests.support.ports import free_port
+
+
+def test_taken_port_is_one_line_and_another_port_helps(
+    loader: Loader, main_loop: Any, port: int, capsys: Any, output: Any
+) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", port))
+        taken.listen()
+        module = loader.load(port=port)
+        assert output("\n") == (
+            f"uavapi: cannot listen on http://127.0.0.1:{port}: Address already in use; "
+            "`uavapi set port N` takes another port\n"
+        )
+        main_loop.turn()
+        assert capsys.readouterr().out == ""
+        other = free_port()
+        module.command(["set", "port", str(other)])
+        output("listening")
+        assert listens(other)
+
+
+def test_set_port_restarts_there(module: Any, port: int, output: Any) -> None:
+    other = free_port()
+    module.command(["set", "port", str(other)])
+    assert output("listening") == f"uavapi: listening on http://127.0.0.1:{other}\n"
+    assert listens(other)
+    assert not listens(port)
+
+
+def test_set_to_the_same_value_restarts_nothing(module: Any, port: int, capsys: Any) -> None:
+    before = module.api.filenos()
+    module.command(["set", "port", str(port)])
+    assert capsys.readouterr().out == ""
+    assert module.api.filenos() == before
+
+
+def test_stop_and_start(module: Any, port: int, output: Any) -> None:
+    module.command(["stop"])
+    assert output("stopped") == "uavapi: stopped\n"
+    assert not listens(port)
+    module.command(["start"])
+    assert output("listening") == f"uavapi: listening on http://127.0.0.1:{port}\n"
+    assert listens(port)
+
+
+def test_starts_and_stops_are_done_in_the_order_in_which_they_were_typed(module: Any, port: int, output: Any) -> None:
+    other = free_port()
+    for line in ("stop", "start", f"set port {other}", "stop", f"set port {port}", "start"):
+        module.command(line.split())
+    addresses = [f"uavapi: listening on http://127.0.0.1:{number}\n" for number in (port, other, port)]
+    stopped = "uavapi: stopped\n"
+    assert (
+        output(addresses[1] + stopped + addresses[2])
+        == stopped + addresses[0] + addresses[1] + stopped + addresses[2]
+    )
+    assert listens(port)
+    assert not listens(other)
+
+
+def test_set_does_not_open_what_was_stopped(module: Any, output: Any) -> None:
+    module.command(["stop"])
+    other = free_port()
+    module.command(["set", "port", str(other)])
+    output("stopped")
+    assert not listens(other)
+    module.command(["start"])
+    output("listening")
+    assert listens(other)
+
+
+def test_commands_of_a_startup_script_come_before_the_main_loop(
+    loader: Loader, port: int, output: Any, capsys: Any
+) -> None:
+    module = loader.load(port=port)
+    started = time.monotonic()
+    other = free_port()
+    for line in ("status", "vehicles", "start", f"set port {other}"):
+        module.command(line.split())
+    assert time.monotonic() - started < 1.0
+    assert f"not listening; it would be http://127.0.0.1:{port}" in capsys.readouterr().out
+    output("listening")
+    assert listens(other)
+
+
+def test_startup_script_may_keep_it_from_listening(loader: Loader, main_loop: Any, port: int, output: Any) -> None:
+    module = loader.load(port=port)
+    module.command(["stop"])
+    for _ in range(20):
+        main_loop.turn(0.01)
+    assert not listens(port)
+    module.command(["start"])
+    output("listening")
+    assert listens(port)
+
+
+def test_start_that_takes_long_holds_nothing_up_and_says_so_and_what_came_of_it(
+    loader: Loader, main_loop: Any, port: int, output: Any, monkeypatch: Any
+) -> None:
+    begun, released = threading.Event(), threading.Event()
+
+    def slow(*_: Any) -> None:
+        begun.set()
+        released.wait(10)
+
+    monkeypatch.setattr("mavproxy_uavapi.core.background.SLOW", 0.05)
+    module = loader.load(port=port)
+    module.logs.open = slow
+    started = time.monotonic()
+    main_loop.turn()
+    assert time.monotonic() - started < 0.5
+    assert begun.wait(5)
+    still = f"uavapi: still trying to listen on http://127.0.0.1:{port}; a line follows when it is done\n"
+    assert output("still") == still
+    released.set()
+    assert output("listening") == f"uavapi: listening on http://127.0.0.1:{port}\n"
+
+
+def test_start_that_fails_for_an_unforeseen_reason_is_reported(
+    loader: Loader, port: int, output: Any, monkeypatch: Any
+) -> None:
+    module = loader.load(port=port)
+    defects: list[Any] = []
+    module.host.bridge.loop.set_exception_handler(lambda _, context: defects.append(context["exception"]))
+    module.api.start = lambda _: 1 / 0
+    assert output("\n") == "uavapi: a defect ended this: ZeroDivisionError('division by zero')\n"
+    assert [type(defect) for defect in defects] == [ZeroDivisionError]
+    del module.api.start
+    module.command(["start"])
+    output("listening")
+    assert listens(port)
+
+
+def test_start_that_hangs_does_not_hold_up_the_unload(
+    loader: Loader, main_loop: Any, port: int, monkeypatch: Any
+) -> None:
+    module = loader.load(port=port)
+    hanging = threading.Event()
+
+    async def hang() -> None:
+        hanging.set()
+        await asyncio.Event().wait()
+
+    monkeypatch.setattr("mavproxy_uavapi.http.app.ApiServer.start", lambda _: hang())
+    started = time.monotonic()
+    main_loop.turn()
+    assert time.monotonic() - started < 0.5
+    assert hanging.wait(5)
+    started = time.monotonic()
+    loader.unload(module)
+    assert time.monotonic() - started < 2.0
+    assert not listens(port)

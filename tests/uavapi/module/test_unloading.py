@@ -1,0 +1,58 @@
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+from tests.support.module_loader import Loader, ask, listens
+
+
+def test_unload_leaves_nothing_behind_twenty_times(
+    loader: Loader, main_loop: Any, mpstate: Any, port: int, descriptors: Any, msg: Any
+) -> None:
+    threads, before = threading.active_count(), descriptors()
+    for number in range(20):
+        module = loader.load(port=port)
+        if number % 5:  # and sometimes it is unloaded before it began
+            main_loop.until(lambda module=module: module.api.listening)
+            module.mavlink_packet(msg("heartbeat"))
+            main_loop.until(lambda module=module: module.host.fleet.vehicles)
+            assert ask(port, "/telemetry/status")[0] == 200
+        loader.unload(module)
+        assert (mpstate.command_map, mpstate.completions, mpstate.select_extra) == ({}, {}, {})
+        assert list(mpstate.completion_functions) == ["(OTHER)"]
+        assert not hasattr(mpstate, "uavapi_host")
+    assert not listens(port)
+    assert threading.active_count() == threads
+    assert descriptors() == before
+
+
+def test_unload_ends_a_call_in_flight_and_answers_it(
+    loader: Loader, module: Any, main_loop: Any, port: int, msg: Any
+) -> None:
+    answers: list[Any] = []
+    module.mavlink_packet(msg("heartbeat"))
+    main_loop.until(lambda: 1 in module.host.fleet.vehicles)
+    client = threading.Thread(target=lambda: answers.append(ask(port, "/command/arm")))
+    client.start()
+    main_loop.until(module.host.jobs.running)
+    loader.unload(module)
+    client.join(5.0)
+    assert answers[0][0] == 409
+    assert answers[0][1]["code"] == "aborted"
+
+
+def test_unload_takes_its_descriptors_back_from_a_host_that_goes_on(
+    loader: Loader, main_loop: Any, mpstate: Any, port: int
+) -> None:
+    import vision
+
+    other = vision.init(mpstate)
+    main_loop.modules.append(other)
+    before = len(other.host.bridge._open_sockets)
+    for _ in range(3):
+        module = loader.load(port=port)
+        main_loop.until(lambda: listens(port))
+        loader.unload(module)
+        assert not listens(port)
+    assert len(other.host.bridge._open_sockets) == before
+    assert other.host.bridge.running
