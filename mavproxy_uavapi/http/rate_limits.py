@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 
 from aiohttp import web
@@ -13,6 +14,7 @@ from mavproxy_uavapi.http.caller import CALLER, Caller
 from mavproxy_uavapi.http.responses import Handler
 from mavproxy_uavapi.http.router import MATCH
 
+REFUSAL_DELAY = 0.1  # s; a flood of refusals at once would delay what MAVProxy forwards
 COMMANDS = ("/command/", "/movement/")  # paths that also command by GET
 
 
@@ -51,11 +53,12 @@ def seconds_to_wait(request: web.BaseRequest, caller: Caller) -> float:
 
 
 async def limit_rate(request: web.BaseRequest, handler: Handler) -> web.StreamResponse:
-    """Refuse a caller that asks more often than it may."""
+    """Refuse a caller that asks more often than it may, and let it wait for the refusal."""
     caller: Caller | None = request.get(CALLER)  # None for a reader of the documentation, counted by the door check
     if caller is not None and not stops(request):
         wait = seconds_to_wait(request, caller)
         if wait:
             rate = rate_of(caller, request[SERVICE])
+            await asyncio.sleep(REFUSAL_DELAY)
             raise TooManyRequests(f"more than {rate:g} requests a second", math.ceil(wait))
     return await handler(request)

@@ -57,6 +57,7 @@ class _JumpingSelector(selectors.DefaultSelector):
     def __init__(self, loop: TimeTravellingLoop) -> None:
         super().__init__()
         self._loop = loop
+        self._stuck: set[int] = set()  # full sockets that nobody reads at the other end
 
     def select(self, timeout: float | None = None) -> Any:
         if timeout == 0 and len(self.get_map()) <= 1:
@@ -66,12 +67,15 @@ class _JumpingSelector(selectors.DefaultSelector):
             if not ready:
                 raise RuntimeError("nothing will ever happen: no timer, no socket")
             return ready
-        ready = super().select(min(timeout, self._patience()))
-        if not ready:
+        full = self._full() if self._loop.patience else set()
+        patience = FULL_SOCKET if full - self._stuck else 0.0
+        ready = super().select(min(timeout, max(self._loop.patience, patience)))
+        if ready:
+            self._stuck -= {key.fd for key, _ in ready}
+        else:
+            self._stuck = full
             self._loop.now += max(timeout, 0.0)
         return ready
 
-    def _patience(self) -> float:
-        patience = self._loop.patience
-        is_full = patience and any(key.events & selectors.EVENT_WRITE for key in self.get_map().values())
-        return max(patience, FULL_SOCKET) if is_full else patience
+    def _full(self) -> set[int]:
+        return {key.fd for key in self.get_map().values() if key.events & selectors.EVENT_WRITE}

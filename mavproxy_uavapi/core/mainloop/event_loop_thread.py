@@ -8,8 +8,6 @@ import threading
 from collections.abc import Callable, Coroutine
 from typing import Any, TypeVar
 
-from mavproxy_uavapi.core.mainloop.yielding_selector import YieldingSelector
-
 T = TypeVar("T")
 
 
@@ -22,7 +20,7 @@ class EventLoopThread:
     """
 
     def __init__(self, name: str, loop: asyncio.AbstractEventLoop | None = None) -> None:
-        self.loop = loop or asyncio.SelectorEventLoop(YieldingSelector())
+        self.loop = loop or asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
 
     def start(self) -> None:

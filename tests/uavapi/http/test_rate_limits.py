@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.http.bucket import BURST, CLIENTS_KEPT, Bucket
+from mavproxy_uavapi.http.rate_limits import REFUSAL_DELAY
 from mavproxy_uavapi.settings import ApiModuleSettings
 from tests.support.api_port import OWNER, Port
 
@@ -30,6 +31,14 @@ def test_loopback_has_no_limit_until_one_is_set(flying: Any, api: Any, service: 
     service.settings = ApiModuleSettings({"max_rate": 10}, environ={}).snapshot()
     statuses = [api.get("/jobs").status for _ in range(40)]
     assert statuses[:20] == [200] * 20 and 429 in statuses
+
+
+def test_caller_over_its_rate_is_answered_late(flying: Any, api: Any, loop: Any, service: Any) -> None:
+    service.settings = ApiModuleSettings({"max_rate": 10}, environ={}).snapshot()
+    statuses, began = [api.get("/jobs").status for _ in range(20)], loop.time()
+    assert set(statuses) == {200}
+    statuses = [api.get("/jobs").status for _ in range(20)]
+    assert loop.time() - began == pytest.approx(REFUSAL_DELAY * statuses.count(429)) != 0
 
 
 STOPS = [
