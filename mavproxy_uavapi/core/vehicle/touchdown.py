@@ -6,6 +6,7 @@ from mavproxy_uavapi.core.vehicle.time_limits import FlightLimits
 
 ROLLING = 5.0  # m/s over the ground; a vehicle that is faster when it is disarmed flies: a plane would glide on
 STANDING = 1.0  # m/s; a vehicle that sinks faster after disarming has not landed
+FREE_FALL = 0.5  # s after the disarming, in which a vehicle that falls gets much faster than that
 POSITION_TIMEOUT = 2.0  # s in which a position must come after the disarming, if positions come at all
 
 
@@ -30,14 +31,14 @@ class Touchdown:
             self.fell = self.fell or self._level > ROLLING
 
     def is_over(self, now: float, age: float | None) -> bool | None:
-        """Whether a disarmed vehicle stands still, from a position that arrived after the disarming.
+        """Whether a disarmed vehicle stands still, from a position that arrived a while after the disarming.
 
         Args:
             now: s.
             age: of the newest position, s; if none arrives any more, the disarming alone counts.
         """
         assert self._disarmed_at is not None
-        updated_since = age is not None and now - age > self._disarmed_at
+        updated_since = age is not None and now - age > self._disarmed_at + FREE_FALL
         if updated_since:
             return True if abs(self._sinking) <= STANDING else None
         return True if now - self._disarmed_at >= POSITION_TIMEOUT else None
