@@ -23,9 +23,11 @@ def run(*arguments: str) -> subprocess.CompletedProcess[str]:
     [
         ["takeoff_land.py", "--altitude", "6"],
         ["ned_square.py", "--side", "8", "--altitude", "5"],
-        ["ned_square_polling.py", "--side", "8", "--altitude", "5"],
+        pytest.param(["ned_square_polling.py", "--side", "8", "--altitude", "5"], marks=pytest.mark.long),
         ["polygon_ned.py", "--sides", "3", "4", "5", "--radius", "3", "--height", "4"],
-        ["polygon_drive.py", "--sides", "3", "4", "5", "--radius", "3", "--height", "4"],
+        pytest.param(
+            ["polygon_drive.py", "--sides", "3", "4", "5", "--radius", "3", "--height", "4"], marks=pytest.mark.long
+        ),
         ["delivery.py", "--pickup", "10,0", "--delivery", "0,10"],
     ],
     ids=lambda arguments: arguments[0],

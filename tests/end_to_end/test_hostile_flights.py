@@ -197,7 +197,7 @@ def pilot_arms(rig):
 
 
 @both
-@pytest.mark.parametrize("verb", ["land", "rtl"])
+@pytest.mark.parametrize("verb", ["land", pytest.param("rtl", marks=pytest.mark.long)])
 def test_going_down_is_not_kept_from_the_vehicle_by_streams(rig, harness, verb):
     rig.in_the_air(50)
     rig.ok(rig.get("/command/set_sim_speedup", sim_factor=1))  # it sinks a little in each try

@@ -46,6 +46,7 @@ def no_more_than(before: dict[str, int], pid: int) -> bool:
     return all(count <= before[what] for what, count in resources(pid).items())
 
 
+@pytest.mark.long
 def test_fifty_rounds_of_load_and_unload_leave_nothing_behind(mavproxy, harness):
     prompt = mavproxy.mavproxy
 

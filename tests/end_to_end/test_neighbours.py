@@ -84,6 +84,7 @@ def is_heard(both: Vehicles, system: int) -> bool:
     return bool(listed(both.rig)[system]["link"]["alive"])
 
 
+@pytest.mark.long
 def test_silent_vehicle_loses_its_own_flight_only(both: Vehicles) -> None:
     both.take_off(BAD)
     flights = {system: both.fly(system) for system in (BAD, GOOD)}
@@ -97,6 +98,7 @@ def test_silent_vehicle_loses_its_own_flight_only(both: Vehicles) -> None:
     eventually(lambda: is_heard(both, BAD), what="the silent one's return")
 
 
+@pytest.mark.long
 def test_flooding_vehicle_keeps_no_command_from_another(both: Vehicles) -> None:
     with flood(both.flood_port):
         eventually(lambda: FLOODING in listed(both.rig), what="the flood's being heard")

@@ -130,8 +130,8 @@ def test_restarted_api_finds_its_scripts_again(rig, harness):
     ("action", "output", "end"),
     [
         ("nothing", "on_script_exit is nothing", (True, "GUIDED")),
-        ("hold", "hold is done", (True, "GUIDED")),
-        ("land", "land is done", (False, "LAND")),
+        pytest.param("hold", "hold is done", (True, "GUIDED"), marks=pytest.mark.long),
+        pytest.param("land", "land is done", (False, "LAND"), marks=pytest.mark.long),
         ("rtl", "rtl is done", (False, "RTL")),
     ],
 )

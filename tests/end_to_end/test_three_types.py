@@ -52,6 +52,7 @@ def listed(rig: Rig) -> dict[int, Any]:
     return {vehicle["id"]: vehicle for vehicle in rig.ok(rig.get("/vehicles"))["vehicles"]}
 
 
+@pytest.mark.long
 def test_three_types_in_one_mavproxy(rig: Rig) -> None:
     rig.eventually(lambda: len(listed(rig)) == len(TYPES), 60, "three vehicles")
     assert [listed(rig)[system]["type"] for system in (1, 2, 3)] == list(TYPES)

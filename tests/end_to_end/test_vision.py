@@ -140,6 +140,7 @@ def test_bad_requests_are_refused_before_anything_flies(looking: Any) -> None:
     assert looking.post("/vision/land").status_code == 409  # on the ground
 
 
+@pytest.mark.long
 def test_a_search_ends_at_the_tag_and_one_for_no_tag_can_be_stopped(looking: Any, harness: Any) -> None:
     looking.in_the_air(6)
     x, y, z = looking.ned()  # the simulated tag is 8 m north and 5 m west of where it was armed

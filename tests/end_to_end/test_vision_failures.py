@@ -136,6 +136,7 @@ def reason(body: dict[str, Any]) -> str:
     return str(body["detail"])
 
 
+@pytest.mark.long
 def test_control_it_lands_on_the_tag(scene: Scene) -> None:
     tag = scene.tag()
     body = scene.land(scene.camera(tag))
