@@ -65,7 +65,9 @@ const late = () => new Promise(done => setTimeout(() => done("no answer"), 20000
   const results = {};
   for (const [name, act] of Object.entries(tries))
     results[name] = await Promise.race([act().catch(error => `$${error}`), late()]);
-  await fetch("$report", {method: "POST", mode: "no-cors", body: JSON.stringify(results)});
+  const report = (url) => fetch(url, {method: "POST", mode: "no-cors", body: JSON.stringify(results)});
+  await report("$report");
+  setInterval(() => report("$report?again"), 100);
 })();
 </script>""")
 
@@ -111,7 +113,9 @@ addEventListener("load", async () => {
   const results = {};
   for (const [name, act] of Object.entries(tries))
     results[name] = `$${await Promise.resolve().then(act).catch(error => error)}`;
-  await fetch("$report", {method: "POST", mode: "no-cors", body: JSON.stringify(results)});
+  const report = (url) => fetch(url, {method: "POST", mode: "no-cors", body: JSON.stringify(results)});
+  await report("$report");
+  setInterval(() => report("$report?again"), 100);
 });
 </script><body></body>""")
 
@@ -244,15 +248,20 @@ class Browser:
         process = self._harness.Process(command, self._directory / "chromium.log", self._directory)
         try:
             report_ = site.reported.wait(PATIENCE)
+            if report_:  # Chromium writes its traffic late, and in order
+                self._harness.eventually(lambda: "/report?again" in self._log(), what="all of the traffic")
         finally:
             process.stop()
         assert report_, f"the page told nothing: {process.output()[-2000:]}"
+
+    def _log(self) -> str:
+        return self.traffic.read_text(encoding="utf-8", errors="replace")
 
     def statuses(self) -> dict[str, int]:
         """The API's answer to each try, by its name, as the browser received it."""
         names: dict[int, str] = {}
         statuses: dict[str, int] = {}
-        for line in self.traffic.read_text(encoding="utf-8", errors="replace").splitlines():
+        for line in self._log().splitlines():
             source = re.search(r'"source":\{"id":(\d+)', line)
             if source is None:
                 continue

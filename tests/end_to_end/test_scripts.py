@@ -12,7 +12,7 @@ import requests
 
 pytestmark = pytest.mark.needs("tmux")
 
-GRACE = 2.0
+GRACE = 4.0
 FLIES = """
 import json, os, sys, time, urllib.request
 
