@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import concurrent.futures
+import sys
 import threading
+import traceback
 from collections.abc import Callable, Coroutine
 from typing import Any, TypeVar
 
 T = TypeVar("T")
+DEEPEST = 5  # calls that the error for a loop that does not answer names
 
 
 class EventLoopThread:
@@ -71,7 +74,13 @@ class EventLoopThread:
             return future.result(timeout)
         except concurrent.futures.TimeoutError as error:
             future.cancel()
-            raise TimeoutError(f"no answer from the loop within {timeout:g} s") from error
+            raise TimeoutError(f"no answer from the loop within {timeout:g} s; it is in {self._where()}") from error
+
+    def _where(self) -> str:
+        """What the thread does now: its innermost calls, the last one first."""
+        frame = sys._current_frames().get(self._thread.ident or 0)
+        calls = traceback.extract_stack(frame)[: -DEEPEST - 1 : -1] if frame else []
+        return ", called by ".join(f"{call.name} ({call.filename}:{call.lineno})" for call in calls) or "no thread"
 
     def stop(self, timeout: float = 4.0) -> bool:
         """Cancel all tasks and end the thread; whether it ended within `timeout` seconds."""

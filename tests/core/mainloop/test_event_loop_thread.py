@@ -49,6 +49,17 @@ def test_run_gives_up_in_time_and_cancels(thread: EventLoopThread) -> None:
     assert cancelled.wait(1.0)
 
 
+def test_error_says_where_the_thread_hangs(thread: EventLoopThread) -> None:
+    released = threading.Event()
+
+    async def hang() -> None:
+        released.wait(10.0)
+
+    with pytest.raises(TimeoutError, match=r"it is in wait \(.*, called by hang \("):
+        thread.run(hang(), 0.2)
+    released.set()
+
+
 def test_stop_cancels_what_runs_and_ends_the_thread() -> None:
     thread = EventLoopThread("test-loop")
     thread.start()
