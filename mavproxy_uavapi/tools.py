@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mavproxy_uavapi.core.errors import TimedOut, ToolFailed
+from mavproxy_uavapi.core.forks import apart_from_forks
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 
@@ -39,14 +40,15 @@ async def run_tool(command: Sequence[str], timeout: float, cwd: Path | None = No
     """
     name = command[0]
     try:
-        process = await asyncio.create_subprocess_exec(
-            *command,
-            cwd=cwd,
-            stdin=asyncio.subprocess.DEVNULL,
-            stdout=asyncio.subprocess.PIPE,
-            stderr=asyncio.subprocess.PIPE,
-            start_new_session=True,
-        )
+        with apart_from_forks():
+            process = await asyncio.create_subprocess_exec(
+                *command,
+                cwd=cwd,
+                stdin=asyncio.subprocess.DEVNULL,
+                stdout=asyncio.subprocess.PIPE,
+                stderr=asyncio.subprocess.PIPE,
+                start_new_session=True,
+            )
     except FileNotFoundError as error:
         raise ToolFailed(f"{name} is not installed on this machine") from error
     except OSError as error:

@@ -15,6 +15,7 @@ from typing import IO, Any
 
 import numpy as np
 
+from mavproxy_uavapi.core.forks import apart_from_forks
 from mavproxy_vision.camera.controls import (
     LIBCAMERA,
     NO_CONTROLS,
@@ -87,13 +88,14 @@ class Pipeline:
         try:
             command = launch_command(self._controlled(), self._size)
             self._stderr = tempfile.TemporaryFile()  # noqa: SIM115 — `close` closes it
-            self._process = subprocess.Popen(
-                command,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=self._stderr,
-                start_new_session=True,  # the pilot's Ctrl-C must reach MAVProxy only, which then ends the program
-            )
+            with apart_from_forks():
+                self._process = subprocess.Popen(
+                    command,
+                    stdin=subprocess.DEVNULL,
+                    stdout=subprocess.PIPE,
+                    stderr=self._stderr,
+                    start_new_session=True,  # the pilot's Ctrl-C reaches MAVProxy only, which then ends the program
+                )
         except OSError as error:
             self.close()
             if error.filename in (LAUNCH, INSPECT) and isinstance(error, FileNotFoundError):
@@ -172,13 +174,17 @@ def known_properties(element: str) -> set[str]:
         NoCamera: the program does not answer.
         OSError: it is not installed.
     """
-    try:
-        done = subprocess.run(
-            [INSPECT, element], stdin=subprocess.DEVNULL, capture_output=True, check=False, timeout=INSPECT_TIMEOUT
+    with apart_from_forks():
+        process = subprocess.Popen(
+            [INSPECT, element], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
         )
-    except subprocess.TimeoutExpired as error:
-        raise NoCamera(f"{INSPECT} {element} does not answer within {INSPECT_TIMEOUT:g} s") from error
-    return set(re.findall(r"^  ([a-z][a-z-]*) *: ", done.stdout.decode(errors="replace"), re.MULTILINE))
+    with process:
+        try:
+            output, _ = process.communicate(timeout=INSPECT_TIMEOUT)
+        except subprocess.TimeoutExpired as error:
+            process.kill()
+            raise NoCamera(f"{INSPECT} {element} does not answer within {INSPECT_TIMEOUT:g} s") from error
+    return set(re.findall(r"^  ([a-z][a-z-]*) *: ", output.decode(errors="replace"), re.MULTILINE))
 
 
 def launch_command(spec: str, size: tuple[int, int]) -> list[str]:

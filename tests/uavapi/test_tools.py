@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -37,3 +39,36 @@ def test_a_child_that_holds_the_output_ends_with_the_time(tmp_path: Path, last: 
         pytest.fail("the child lives on")
 
     asyncio.run(run())
+
+
+FORKS = """
+import asyncio, os, threading, time
+from mavproxy_uavapi.tools import run_tool
+
+longest = 0.0
+async def tools():
+    global longest
+    until = time.monotonic() + 1.5
+    while time.monotonic() < until:
+        began = time.monotonic()
+        await asyncio.gather(*(run_tool(["true"], 60.0) for _ in range(3)))
+        longest = max(longest, time.monotonic() - began)
+
+thread = threading.Thread(target=asyncio.run, args=(tools(),))
+thread.start()
+while thread.is_alive():
+    if os.fork() == 0:
+        os.close(1)
+        time.sleep(20.0)
+        os._exit(0)
+    time.sleep(0.005)
+os.killpg(0, 9) if longest > 10.0 else print("longest", longest)
+os._exit(0)
+"""
+
+
+def test_program_that_starts_while_mavproxy_forks_does_not_wait_for_the_forked_child() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", FORKS], start_new_session=True, stdout=subprocess.PIPE, timeout=60, check=False
+    )
+    assert b"longest" in done.stdout
