@@ -14,6 +14,7 @@ from typing import Any
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import UavApiError
+from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle.messages import MESSAGE_IDS, Command, set_interval
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
@@ -64,12 +65,7 @@ class Rates:
         needed, now = self.needed, self._clock()
         ratio = max(vehicle.state.time_ratio.ratio, 0.1)
         for name, rate in needed.items():
-            age = vehicle.state.age(name, now)
-            received = vehicle.state.messages.get(name)
-            slow = (
-                received is None or max(age or 0.0, received.interval or 0.0) > SLOW / rate / ratio + LOOK_EVERY / 2
-            )
-            if not slow:
+            if not is_slow(vehicle.state, name, SLOW / rate / ratio + LOOK_EVERY / 2):
                 self._pause[name] = RETRY
             elif now - self._requested_at.get((vehicle, name), -LONGEST_RETRY) >= self._pause.get(name, RETRY):
                 if (vehicle, name) in self._requested_at:  # a slow link, or a vehicle that cannot send so fast
@@ -84,6 +80,19 @@ class Rates:
     async def _send(self, vehicle: Vehicle, command: Command) -> None:
         # We wait for no ack: the arriving messages are the proof.
         await vehicle.link.send(command.to(vehicle.address, 0), vehicle.state.system)
+
+
+def is_slow(state: VehicleState, name: str, longest: float) -> bool:
+    """Whether a message does not come every `longest` s.
+
+    Its age counts up to the vehicle's newest message: when all of them are late, MAVProxy or the link was busy, and a
+    request would not help. MAVProxy's console prints the ack of each request.
+    """
+    received = state.messages.get(name)
+    if received is None:
+        return True
+    newest = max(other.at for other in state.messages.values())
+    return max(newest - received.at, received.interval or 0.0) > longest
 
 
 def default_interval(message_id: int) -> Command:
