@@ -74,6 +74,20 @@ def test_it_flies_and_lands_and_the_api_sends_nothing(program: Program) -> None:
     assert "commands" not in world.loop.run(authority(world.host, []))
 
 
+@pytest.mark.parametrize(("late", "code"), [(5.0, None), (9.0, "superseded")])
+def test_target_that_reaches_the_vehicle_late_is_still_ours(program: Program, late: float, code: str | None) -> None:
+    """A busy MAVProxy, or a slow link: meanwhile the autopilot reports our target before it."""
+    world = program.world
+    assert world.ask("POST", "/movement/go_to_ned_wait", {"x": 20.0, "y": 0.0, "z": -ALT}).status == 200
+    wire = world.begin("POST", "/movement/go_to_ned_wait", {"x": 20.0, "y": 15.0, "z": -ALT})
+    world.loop.settle()
+    [target] = world._arriving
+    world._arriving.clear()
+    world.loop.pass_time(late)
+    world._arriving.append(target)
+    assert world.answer(wire).body.get("code") == code
+
+
 def test_its_goto_ends_a_movement_of_the_api_which_leaves_it_alone(program: Program) -> None:
     world = program.world
     waiting = world.begin("POST", "/movement/go_to_ned_wait", FAR)

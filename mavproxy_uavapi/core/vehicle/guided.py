@@ -22,7 +22,8 @@ GUIDED = "GUIDED"
 TOLERANCE = 1.0  # m, horizontally and vertically
 ARRIVAL_SPEED = 0.5  # m/s; slower than this the vehicle does not overshoot its tolerance any more
 FLOOR = 0.0  # m above home: the lowest target, less TOLERANCE for the noise of the estimate
-TARGET_SHOWN = 2.0  # s after a setpoint in which telemetry may still report the one before
+TARGET_SHOWN = 2.0  # s after a setpoint, until which telemetry does not count
+LATEST = 8.0  # s after a setpoint, until which a slow link or a busy MAVProxy may still report the target before it
 LIFT_OFF_TIMEOUT = 5.0  # s in which an unacknowledged takeoff must show
 SAME_PLACE = 2.0  # m on each axis: reported targets within this are the same
 NEAR_EXPECTED = 10.0  # m on each axis: our target in the local frame, whose origin the autopilot does not tell
@@ -45,6 +46,7 @@ class GuidedVehicle(Vehicle):
         self._sent_at = 0.0
         self._shown: GlobalTarget | None = None  # our target as the autopilot reports it
         self._expected: GlobalTarget | None = None  # where it will report our target in the local frame, about
+        self._before: GlobalTarget | None = None  # the target that it reported last before ours
 
     def require_guided_flight(self) -> None:
         """Raise NotArmed, ModeChanged or Busy unless it flies in GUIDED."""
@@ -143,7 +145,7 @@ class GuidedVehicle(Vehicle):
 
     def require_own_target(self) -> None:
         """Raise Superseded if the autopilot reports another target than ours."""
-        flown = setpoint_in_force.shown(self.state, self._sent_at + TARGET_SHOWN)
+        flown = self._flown()
         if flown is None:
             return
         if isinstance(flown, GlobalTarget) and self._is_ours(flown):
@@ -153,7 +155,7 @@ class GuidedVehicle(Vehicle):
     @property
     def has_foreign_target(self) -> bool:
         """Whether the autopilot reports another target or velocity than the newest of ours."""
-        flown = setpoint_in_force.shown(self.state, self._sent_at + TARGET_SHOWN)
+        flown = self._flown()
         if flown is None:
             return False
         if isinstance(flown, VelocityTarget):
@@ -164,6 +166,14 @@ class GuidedVehicle(Vehicle):
         if self._sent is None or isinstance(self._sent, VelocityTarget):
             return True
         return not self._is_ours(flown)
+
+    def _flown(self) -> GlobalTarget | VelocityTarget | None:
+        """The setpoint that the autopilot reports since ours must show; None without one."""
+        flown = setpoint_in_force.shown(self.state, self._sent_at + TARGET_SHOWN)
+        before, is_early = self._before, self.clock() < self._sent_at + LATEST
+        if is_early and before and isinstance(flown, GlobalTarget) and _apart(before, flown) <= SAME_PLACE:
+            return None
+        return flown
 
     def _is_ours(self, flown: GlobalTarget) -> bool:
         """Whether a reported target is our newest one; the first report that is near ours counts as ours."""
@@ -216,6 +226,8 @@ class GuidedVehicle(Vehicle):
 
     def sent(self, target: Target) -> None:
         """Remember the setpoint that went out last."""
+        before = setpoint_in_force.shown(self.state, self.state.mode_since)
+        self._before = before if isinstance(before, GlobalTarget) else None
         self._sent, self._sent_at = target, self.clock()
         self._shown = target if isinstance(target, GlobalTarget) else None
         self._expected = self._place_of(target) if isinstance(target, NedTarget) else None
