@@ -88,6 +88,21 @@ def test_target_that_reaches_the_vehicle_late_is_still_ours(program: Program, la
     assert world.answer(wire).body.get("code") == code
 
 
+def test_target_is_ours_though_the_vehicles_two_positions_are_of_different_times(program: Program) -> None:
+    """One in the local frame and one on the globe tell where the autopilot will report a target."""
+    world = program.world
+    assert world.ask("POST", "/movement/go_to_ned", FAR).status == 200
+    world.loop.pass_time(8.0)
+    bridge = world.host.bridge
+    hear = bridge._receive
+    bridge._receive = lambda message: message.get_type() == "LOCAL_POSITION_NED" or hear(message)
+    world.loop.pass_time(2.7)
+    wire = world.begin("POST", "/movement/go_to_ned_wait", {"x": -150.0, "y": 0.0, "z": -ALT})
+    world.loop.settle()
+    bridge._receive = hear
+    assert world.answer(wire).outcome == "200"
+
+
 def test_its_goto_ends_a_movement_of_the_api_which_leaves_it_alone(program: Program) -> None:
     world = program.world
     waiting = world.begin("POST", "/movement/go_to_ned_wait", FAR)

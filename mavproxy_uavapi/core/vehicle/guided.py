@@ -26,6 +26,7 @@ TARGET_SHOWN = 2.0  # s after a setpoint, until which telemetry does not count
 LATEST = 8.0  # s after a setpoint, until which a slow link or a busy MAVProxy may still report the target before it
 LIFT_OFF_TIMEOUT = 5.0  # s in which an unacknowledged takeoff must show
 SAME_PLACE = 2.0  # m on each axis: reported targets within this are the same
+SAME_MOMENT = 3.0  # s between two messages, in which a vehicle does not change its velocity much
 NEAR_EXPECTED = 10.0  # m on each axis: our target in the local frame, whose origin the autopilot does not tell
 TAKING_OFF = messages.mavlink.MAV_LANDED_STATE_TAKEOFF
 
@@ -233,13 +234,22 @@ class GuidedVehicle(Vehicle):
         self._expected = self._place_of(target) if isinstance(target, NedTarget) else None
 
     def _place_of(self, target: NedTarget) -> GlobalTarget | None:
-        """About where a target in the local frame is, by the vehicle's own place in both; None without these."""
+        """About where a target in the local frame is, by the vehicle's own place in both; None without these.
+
+        The vehicle has moved between the two messages.
+        """
         local, place = self.state.messages.get("LOCAL_POSITION_NED"), self.state.messages.get("GLOBAL_POSITION_INT")
         if local is None or place is None:
             return None
         here, there = local.message, place.message
-        lat, lon = moved(there.lat / 1e7, there.lon / 1e7, target.x - here.x, target.y - here.y)
-        return GlobalTarget(lat, lon, there.relative_alt / 1000.0 + here.z - target.z)
+        later = (there.time_boot_ms - here.time_boot_ms) / 1000.0  # s
+        if abs(later) > SAME_MOMENT:
+            return None
+        north = target.x - here.x - later * here.vx
+        east = target.y - here.y - later * here.vy
+        down = target.z - here.z - later * here.vz
+        lat, lon = moved(there.lat / 1e7, there.lon / 1e7, north, east)
+        return GlobalTarget(lat, lon, there.relative_alt / 1000.0 - down)
 
     async def take_up(self, job: Job, target: Target, yaw: Yaw) -> None:
         """Begin a movement. ArduCopter goes back to its own speeds when the kind of setpoint changes."""
