@@ -47,7 +47,7 @@ class GuidedVehicle(Vehicle):
         self._sent_at = 0.0
         self._shown: GlobalTarget | None = None  # our target as the autopilot reports it
         self._expected: GlobalTarget | None = None  # where it will report our target in the local frame, about
-        self._before: GlobalTarget | None = None  # the target that it reported last before ours
+        self._before: GlobalTarget | VelocityTarget | None = None  # what it reported last before our setpoint
 
     def require_guided_flight(self) -> None:
         """Raise NotArmed, ModeChanged or Busy unless it flies in GUIDED."""
@@ -171,10 +171,8 @@ class GuidedVehicle(Vehicle):
     def _flown(self) -> GlobalTarget | VelocityTarget | None:
         """The setpoint that the autopilot reports since ours must show; None without one."""
         flown = setpoint_in_force.shown(self.state, self._sent_at + TARGET_SHOWN)
-        before, is_early = self._before, self.clock() < self._sent_at + LATEST
-        if is_early and before and isinstance(flown, GlobalTarget) and _apart(before, flown) <= SAME_PLACE:
-            return None
-        return flown
+        is_early = self.clock() < self._sent_at + LATEST
+        return None if is_early and _are_alike(self._before, flown) else flown
 
     def _is_ours(self, flown: GlobalTarget) -> bool:
         """Whether a reported target is our newest one; the first report that is near ours counts as ours."""
@@ -227,8 +225,7 @@ class GuidedVehicle(Vehicle):
 
     def sent(self, target: Target) -> None:
         """Remember the setpoint that went out last."""
-        before = setpoint_in_force.shown(self.state, self.state.mode_since)
-        self._before = before if isinstance(before, GlobalTarget) else None
+        self._before = setpoint_in_force.shown(self.state, self.state.mode_since)
         self._sent, self._sent_at = target, self.clock()
         self._shown = target if isinstance(target, GlobalTarget) else None
         self._expected = self._place_of(target) if isinstance(target, NedTarget) else None
@@ -268,6 +265,15 @@ class GuidedVehicle(Vehicle):
         ours = self._sent if self._sent_at >= self.state.mode_since else None
         before = setpoint_in_force.shown(self.state, max(self._sent_at, self.state.mode_since)) or ours
         return before is not None and isinstance(before, VelocityTarget) == isinstance(target, VelocityTarget)
+
+
+def _are_alike(one: GlobalTarget | VelocityTarget | None, other: GlobalTarget | VelocityTarget | None) -> bool:
+    """Whether two reports are of the same setpoint."""
+    if isinstance(one, GlobalTarget) and isinstance(other, GlobalTarget):
+        return _apart(one, other) <= SAME_PLACE
+    if isinstance(one, VelocityTarget) and isinstance(other, VelocityTarget):
+        return math.dist((one.vx, one.vy, one.vz), (other.vx, other.vy, other.vz)) <= ARRIVAL_SPEED
+    return False
 
 
 def _apart(one: GlobalTarget, other: GlobalTarget) -> float:
