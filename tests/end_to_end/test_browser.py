@@ -239,29 +239,31 @@ class Browser:
     def __init__(self, harness: Any, directory: Path, inside: tuple[str, ...] = (), evil: str = "127.0.0.1") -> None:
         self._inside, self._rules = inside, f"--host-resolver-rules=MAP {EVIL} {evil}"
         self._harness, self._directory = harness, directory
+        self._traffic = ""
 
     def visit(self, url: str, site: Site) -> None:
         """Open a page and wait until it has told `site` what came of its tries."""
-        self.traffic = self._directory / "traffic.json"
-        started = chromium.command(self._directory / "profile", self._rules, f"--log-net-log={self.traffic}", url)
+        traffic = self._directory / "traffic.json"
+        started = chromium.command(self._directory / "profile", self._rules, f"--log-net-log={traffic}", url)
         command = [*self._inside, *started]
         process = self._harness.Process(command, self._directory / "chromium.log", self._directory)
         try:
             report_ = site.reported.wait(PATIENCE)
-            if report_:  # Chromium writes its traffic late, and in order
-                self._harness.eventually(lambda: "/report?again" in self._log(), what="all of the traffic")
+            if report_:  # Chromium writes its traffic late, and in order; at its end it may begin the file anew
+                self._harness.eventually(lambda: self._has_all(traffic), what="all of the traffic")
         finally:
             process.stop()
         assert report_, f"the page told nothing: {process.output()[-2000:]}"
 
-    def _log(self) -> str:
-        return self.traffic.read_text(encoding="utf-8", errors="replace")
+    def _has_all(self, traffic: Path) -> bool:
+        self._traffic = traffic.read_text(encoding="utf-8", errors="replace")
+        return "/report?again" in self._traffic
 
     def statuses(self) -> dict[str, int]:
         """The API's answer to each try, by its name, as the browser received it."""
         names: dict[int, str] = {}
         statuses: dict[str, int] = {}
-        for line in self._log().splitlines():
+        for line in self._traffic.splitlines():
             source = re.search(r'"source":\{"id":(\d+)', line)
             if source is None:
                 continue
