@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from mavproxy_uavapi.core.acquire import acquire
 from mavproxy_uavapi.core.errors import BadRequest, ToolFailed
 from mavproxy_uavapi.tools import run_tool
 
@@ -93,7 +94,7 @@ async def take(tool: str, shot: Shot) -> bytes:
         ToolFailed: it is not installed, failed, or made no picture; with its stderr.
         TimedOut: it took longer than TIME_LIMIT.
     """
-    folder = Path(await asyncio.to_thread(tempfile.mkdtemp, prefix="uavapi-photo-"))
+    folder = Path(await acquire(asyncio.to_thread(tempfile.mkdtemp, prefix="uavapi-photo-")))
     try:
         file = folder / "photo.jpg"
         outcome = await run_tool(TOOLS[tool](shot, str(file)), TIME_LIMIT, cwd=folder)

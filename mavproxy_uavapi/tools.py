@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from mavproxy_uavapi.core.acquire import acquire
 from mavproxy_uavapi.core.errors import TimedOut, ToolFailed
 from mavproxy_uavapi.core.forks import apart_from_forks
 from mavproxy_uavapi.core.timeout import wait_with_timeout
@@ -41,13 +42,15 @@ async def run_tool(command: Sequence[str], timeout: float, cwd: Path | None = No
     name = command[0]
     try:
         with apart_from_forks():
-            process = await asyncio.create_subprocess_exec(
-                *command,
-                cwd=cwd,
-                stdin=asyncio.subprocess.DEVNULL,
-                stdout=asyncio.subprocess.PIPE,
-                stderr=asyncio.subprocess.PIPE,
-                start_new_session=True,
+            process = await acquire(
+                asyncio.create_subprocess_exec(
+                    *command,
+                    cwd=cwd,
+                    stdin=asyncio.subprocess.DEVNULL,
+                    stdout=asyncio.subprocess.PIPE,
+                    stderr=asyncio.subprocess.PIPE,
+                    start_new_session=True,
+                )
             )
     except FileNotFoundError as error:
         raise ToolFailed(f"{name} is not installed on this machine") from error

@@ -12,6 +12,7 @@ from typing import Annotated, Any, BinaryIO, TypeVar
 from aiohttp import web
 from pydantic import Field
 
+from mavproxy_uavapi.core.acquire import acquire
 from mavproxy_uavapi.core.errors import Busy, NotFound, Stale, ToolFailed
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.log_pieces import HIGHEST_ID, LogEntry
@@ -144,13 +145,13 @@ async def _on_disk(store: LogStore, action: Callable[[], T]) -> T:
         ToolFailed: the disk refuses.
     """
     try:
-        return await asyncio.to_thread(action)
+        return await acquire(asyncio.to_thread(action))
     except OSError as error:
         raise ToolFailed(f"cannot save a log in {store.folder}: {error.strerror}") from error
 
 
 async def _send(call: Call, path: Path) -> web.StreamResponse:
-    file, size = await asyncio.to_thread(_opened, path)
+    file, size = await acquire(asyncio.to_thread(_opened, path))
     try:
         response = StreamingResponse("application/octet-stream")
         response.headers["Content-Disposition"] = f'attachment; filename="{path.name}"'

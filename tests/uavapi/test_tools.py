@@ -6,6 +6,7 @@ import asyncio
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -37,6 +38,26 @@ def test_a_child_that_holds_the_output_ends_with_the_time(tmp_path: Path, last: 
             await asyncio.sleep(0.01)
         os.kill(int(note.read_text()), 9)
         pytest.fail("the child lives on")
+
+    asyncio.run(run())
+
+
+def test_a_program_whose_caller_goes_at_its_start_ends_with_its_children(tmp_path: Path) -> None:
+    note = tmp_path / "child"
+
+    async def run() -> None:
+        task = asyncio.create_task(run_tool(["sh", "-c", f"sleep 60 & echo $! > {note}; wait"], 60.0))
+        await asyncio.sleep(0)
+        await asyncio.sleep(0)
+        until = time.monotonic() + 20.0
+        while not (note.exists() and note.read_text()) and time.monotonic() < until:
+            time.sleep(0.01)  # noqa: ASYNC251  the loop learns of the start only after the cancellation
+        task.cancel()
+        began = time.monotonic()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+        assert time.monotonic() - began < 20.0
+        assert is_gone(int(note.read_text()))
 
     asyncio.run(run())
 
