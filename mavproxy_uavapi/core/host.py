@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 import time
 from collections.abc import Awaitable, Callable, Mapping
 from functools import partial
@@ -29,6 +30,7 @@ from mavproxy_uavapi.core.vehicle.jobs import Job, JobBook
 from mavproxy_uavapi.core.vehicle.leases import Leases, operator_of
 from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
 
+LOOK_EVERY = 0.2  # s between two looks at what MAVProxy knows and which of its links are up
 ATTRIBUTE = "uavapi_host"  # attribute of MAVProxy's state, so that a reloaded module finds it
 
 
@@ -94,6 +96,7 @@ class Host:
         self.closing_messages: list[Callable[[], list[tuple[Any, int]]]] = [self.endings.closing_messages]
         self._mpstate = mpstate
         self._announced_target = 0
+        self._next_look = -math.inf
         self._link_keeper = LinkKeeper(clock)
         self._parameters = ParameterWatch()
         self._fences = FenceWatch()
@@ -106,19 +109,28 @@ class Host:
             self.bridge.feed(message)
 
     def idle(self, member: Any) -> None:
-        """MAVProxy's idle task: start at the first call, then send what is queued."""
+        """MAVProxy's idle task: start at the first call, then send what is queued.
+
+        MAVProxy calls it a hundred times a second and more. At rest these calls are most of what we cost.
+        """
         if self.members[:1] != [member]:
             return
-        if not self.bridge.running:
-            self.bridge.start()
+        now = self.clock()
+        if now >= self._next_look:
+            self._look()
+            self._next_look = now + LOOK_EVERY
         target = self._mpstate.settings.target_system
         if target != self._announced_target:
             self._announced_target = target
             self.bridge.call_soon(setattr, self.registry, "current", target)
+        self.bridge.turn()
+
+    def _look(self) -> None:
+        if not self.bridge.running:
+            self.bridge.start()
         self._link_keeper.turn(self._mpstate.mav_master)
         self._share_parameters()
         self._share_fences()
-        self.bridge.turn()
 
     def end(self) -> None:
         """Send the closing messages, and end the asyncio thread.
@@ -146,7 +158,7 @@ class Host:
         """
         if self._mpstate.continue_mode:
             return
-        changes = self._parameters.changes(self._mpstate.mav_param_by_sysid, self.clock())
+        changes = self._parameters.changes(self._mpstate.mav_param_by_sysid)
         if changes:
             self.bridge.feed_call(lambda: self.fleet.learn(changes))
 
@@ -155,7 +167,7 @@ class Host:
         if not self.envelopes.expects_fences:
             self._fences.forget()
             return
-        changes = self._fences.changes(self._mpstate.public_modules, self.clock())
+        changes = self._fences.changes(self._mpstate.public_modules)
         if changes:
             self.bridge.feed_call(lambda: self._take_fences(changes))
 

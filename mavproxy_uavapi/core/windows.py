@@ -57,8 +57,10 @@ class Windows:
     def turn(self) -> None:
         """Show what has changed; called in every idle task."""
         now = self._clock()
-        if now >= self._due and (self._console is not None or self._current_map is not None):
-            self._due = now + PERIOD
+        if now < self._due:
+            return
+        self._due = now + PERIOD
+        if self._console is not None or self._current_map is not None:
             self._bridge.call_soon(self._look)
 
     def clear(self) -> None:

@@ -120,7 +120,7 @@ class LinkKeeper:
         self._links: dict[Any, TcpLink] = {}
 
     def turn(self, masters: Sequence[Any]) -> None:
-        """Take care of the present links; called before each `select()`."""
+        """Take care of the present links; called several times a second."""
         for master in masters:
             if type(master) is mavutil.mavtcp and master not in self._links:
                 self._links[master] = TcpLink(master, self._clock)

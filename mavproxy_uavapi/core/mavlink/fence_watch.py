@@ -4,28 +4,21 @@ from __future__ import annotations
 
 from typing import Any
 
-PERIOD = 1.0  # s between looks
-
 
 class FenceWatch:
     """Finds which fences have changed since the last look."""
 
     def __init__(self) -> None:
         self._seen: dict[int, list[Any]] = {}
-        self._next = 0.0
 
-    def changes(self, modules: Any, now: float) -> dict[int, list[Any]]:
-        """By system id, the items of each fence that is new or different, at most every PERIOD s of `now`.
+    def changes(self, modules: Any) -> dict[int, list[Any]]:
+        """By system id, the items of each fence that is new or different.
 
         A fence that is still on its way from the vehicle is none yet.
 
         Args:
             modules: MAVProxy's public modules, by name.
-            now: s.
         """
-        if now < self._next:
-            return {}
-        self._next = now + PERIOD
         module = modules.get("fence")
         loaders = {} if module is None else dict(module.wploader_by_sysid)
         changed = {}

@@ -35,6 +35,7 @@ WANTED = {
     "POSITION_TARGET_GLOBAL_INT": 2,
 }
 IN_GUIDED = {"POSITION_TARGET_LOCAL_NED", "POSITION_TARGET_GLOBAL_INT"}  # in other modes they say nothing
+IN_NO_STREAM = IN_GUIDED | {"EXTENDED_SYS_STATE"}  # nobody but us asks for them
 
 
 class StreamRequester:
@@ -48,6 +49,7 @@ class StreamRequester:
     def __init__(self, registry: VehicleRegistry, system: int) -> None:
         self._registry = registry
         self._system = system
+        self._watched_since: dict[tuple[int, int], float] = {}  # by system id and number of reboots
         self._asked_at: defaultdict[tuple[int, int, str], list[float]] = defaultdict(list)
 
     async def run(self) -> None:
@@ -71,11 +73,14 @@ class StreamRequester:
     def missing(self, vehicle: Vehicle) -> list[str]:
         """The wanted messages that do not arrive and whose next request is due."""
         now = vehicle.clock()
+        since = self._watched_since.setdefault((vehicle.state.system, vehicle.state.reboots), now)
         missing = []
         guided = vehicle.state.armed and vehicle.mode == "GUIDED"
         for name in [name for name in WANTED if guided or name not in IN_GUIDED]:
             age = vehicle.state.age(name, now)
-            if age is not None and age < MISSING_AFTER:
+            if age is None:
+                age = MISSING_AFTER if name in IN_NO_STREAM else now - since
+            if age < MISSING_AFTER:
                 continue
             asked_at = self._asked_at[(vehicle.state.system, vehicle.state.reboots, name)]
             pause = LOOK_EVERY if len(asked_at) < FIRST_ASKINGS else ASK_AGAIN

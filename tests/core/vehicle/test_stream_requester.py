@@ -41,6 +41,16 @@ def test_messages_that_arrive_are_not_requested(drone: Any, watch: Any) -> None:
     assert requested(drone) == []
 
 
+def test_streams_have_time_to_arrive_and_what_is_in_none_is_requested_at_once(
+    loop: Any, host: Any, watch: Any, make_drone: Any
+) -> None:
+    drone = make_drone()
+    drone.mute.add("EXTENDED_SYS_STATE")
+    host.fleet.vehicles[1].messages.clear()  # as when the module is loaded while the vehicle flies
+    watch(60.0)
+    assert {number for number, _ in requested(drone)} == {MESSAGE_IDS["EXTENDED_SYS_STATE"]}
+
+
 def test_messages_that_do_not_arrive_are_requested_at_their_rate(drone: Any, watch: Any) -> None:
     drone.mute.add("EXTENDED_SYS_STATE")
     watch(0.5)
