@@ -119,11 +119,15 @@ class Host:
         if now >= self._next_look:
             self._look()
             self._next_look = now + LOOK_EVERY
+        self.share_target()
+        self.bridge.turn()
+
+    def share_target(self) -> None:
+        """Hand over which vehicle MAVProxy's own commands go to."""
         target = self._mpstate.settings.target_system
         if target != self._announced_target:
             self._announced_target = target
             self.bridge.call_soon(setattr, self.registry, "current", target)
-        self.bridge.turn()
 
     def _look(self) -> None:
         if not self.bridge.running:

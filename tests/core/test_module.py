@@ -84,6 +84,17 @@ def test_command_without_a_word_is_status(demo: Demo) -> None:
     assert demo.done == [("status", []), ["1", "2"]]
 
 
+def test_command_finds_the_vehicle_that_the_command_before_it_chose(demo: Demo, main_loop: Any, mpstate: Any) -> None:
+    main_loop.turn()
+    mpstate.settings.target_system = 3
+    demo.command(["go"])
+
+    async def current() -> int:
+        return demo.host.registry.current
+
+    assert demo.host.bridge.run(current()) == 3
+
+
 def test_unknown_word_is_answered_with_the_nearest(demo: Demo, capsys: Any) -> None:
     demo.command(["statsu"])
     demo.command(["xyz"])

@@ -1,4 +1,4 @@
-"""Two vehicles, each at the root of a port of its own, and two programs that know one vehicle only."""
+"""Two vehicles: the prompt's commands go to the chosen one; two programs that know one vehicle only fly one each."""
 
 from __future__ import annotations
 
@@ -22,10 +22,11 @@ TAKEOFF, LOCAL = 22, 1  # MAV_CMD_NAV_TAKEOFF, MAV_FRAME_LOCAL_NED
 NEAR = 0.1  # m
 
 
-@pytest.fixture
-def rig_and_vehicles(tmp_path: Path) -> Iterator[tuple[Rig, dict[int, Rig]]]:
+@pytest.fixture(scope="module")
+def rig_and_vehicles(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Rig, dict[int, Rig]]]:
     homes = ["-35.363261,149.165230,584,353", "-35.362261,149.165230,584,90"]  # 111 m apart
-    with several_vehicles(tmp_path, list(SIDES), speedup=10, homes=homes, arguments=["--streamrate=2"]) as made:
+    directory = tmp_path_factory.mktemp("ports")
+    with several_vehicles(directory, list(SIDES), speedup=10, homes=homes, arguments=["--streamrate=2"]) as made:
         yield made
 
 
@@ -56,6 +57,15 @@ def targets(vehicle: Rig) -> list[tuple[float, ...]]:
 def heights(vehicle: Rig) -> list[float]:
     """The heights of its takeoffs."""
     return [one["fields"]["param7"] for one in received(vehicle) if one["fields"].get("command") == TAKEOFF]
+
+
+def test_command_after_another_in_one_line_is_for_the_vehicle_that_was_chosen_there(
+    rig_and_vehicles: tuple[Rig, dict[int, Rig]],
+) -> None:
+    rig, _ = rig_and_vehicles
+    for system in (2, 1, 2):
+        assert f"vehicle {system}: copter" in rig.mavproxy.ask(f"vehicle {system};uavapi status", "in flight")
+    rig.mavproxy.ask("vehicle 1;uavapi status", "in flight")
 
 
 def test_each_program_flies_the_vehicle_of_its_port(rig_and_vehicles: tuple[Rig, dict[int, Rig]]) -> None:
