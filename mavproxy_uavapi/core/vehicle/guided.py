@@ -5,16 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from mavproxy_uavapi.core.errors import Busy, Invalid, Stale, Superseded, TimedOut
+from mavproxy_uavapi.core.errors import Busy, Invalid, Stale, TimedOut
 from mavproxy_uavapi.core.mavlink.link import Link
 from mavproxy_uavapi.core.mavlink.pending_waits import PendingWaits
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
-from mavproxy_uavapi.core.vehicle import messages, setpoint_in_force, time_limits
+from mavproxy_uavapi.core.vehicle import messages, time_limits
 from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_uavapi.core.vehicle.envelope_check import Spaces
 from mavproxy_uavapi.core.vehicle.geodesy import moved, offset
 from mavproxy_uavapi.core.vehicle.jobs import Job
-from mavproxy_uavapi.core.vehicle.messages import NO_YAW, GlobalTarget, NedTarget, Target, VelocityTarget, Yaw
+from mavproxy_uavapi.core.vehicle.messages import NO_YAW, GlobalTarget, NedTarget, Target, Yaw
+from mavproxy_uavapi.core.vehicle.own_target import OwnTarget
 from mavproxy_uavapi.core.vehicle.start_gate import pass_gate
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
@@ -22,12 +23,7 @@ GUIDED = "GUIDED"
 TOLERANCE = 1.0  # m, horizontally and vertically
 ARRIVAL_SPEED = 0.5  # m/s; slower than this the vehicle does not overshoot its tolerance any more
 FLOOR = 0.0  # m above home: the lowest target, less TOLERANCE for the noise of the estimate
-TARGET_SHOWN = 2.0  # s after a setpoint, until which telemetry does not count
-LATEST = 8.0  # s after a setpoint, until which a slow link or a busy MAVProxy may still report the target before it
 LIFT_OFF_TIMEOUT = 5.0  # s in which an unacknowledged takeoff must show
-SAME_PLACE = 2.0  # m on each axis: reported targets within this are the same
-SAME_MOMENT = 3.0  # s between two messages, in which a vehicle does not change its velocity much
-NEAR_EXPECTED = 10.0  # m on each axis: our target in the local frame, whose origin the autopilot does not tell
 TAKING_OFF = messages.mavlink.MAV_LANDED_STATE_TAKEOFF
 
 
@@ -43,11 +39,7 @@ class GuidedVehicle(Vehicle):
         spaces: Spaces = tuple,
     ) -> None:
         super().__init__(state, link, pending, clock, spaces)
-        self._sent: Target | None = None  # our newest setpoint
-        self._sent_at = 0.0
-        self._shown: GlobalTarget | None = None  # our target as the autopilot reports it
-        self._expected: GlobalTarget | None = None  # where it will report our target in the local frame, about
-        self._before: GlobalTarget | VelocityTarget | None = None  # what it reported last before our setpoint
+        self.own_target = OwnTarget(state, clock)
 
     def require_guided_flight(self) -> None:
         """Raise NotArmed, ModeChanged or Busy unless it flies in GUIDED."""
@@ -140,52 +132,20 @@ class GuidedVehicle(Vehicle):
             return None  # a gap in the telemetry; the deadline still holds
         horizontal = math.hypot(north, east)
         self.report_leg(job, math.hypot(horizontal, up))
-        self.require_own_target()
+        self.own_target.require()
         near = horizontal <= tolerance and abs(up) <= tolerance
         return True if near and self.speed_by(target) <= ARRIVAL_SPEED else None
-
-    def require_own_target(self) -> None:
-        """Raise Superseded if the autopilot reports another target than ours."""
-        flown = self._flown()
-        if flown is None:
-            return
-        if isinstance(flown, GlobalTarget) and self._is_ours(flown):
-            return
-        raise Superseded("another ground station gave the vehicle another target")
 
     @property
     def has_foreign_target(self) -> bool:
         """Whether the autopilot reports another target or velocity than the newest of ours."""
-        flown = self._flown()
-        if flown is None:
-            return False
-        if isinstance(flown, VelocityTarget):
-            speed = math.hypot(flown.vx, flown.vy, flown.vz)
-            ours = self._sent
-            own = math.hypot(ours.vx, ours.vy, ours.vz) if isinstance(ours, VelocityTarget) else 0.0
-            return speed > ARRIVAL_SPEED and abs(speed - own) > ARRIVAL_SPEED
-        if self._sent is None or isinstance(self._sent, VelocityTarget):
-            return True
-        return not self._is_ours(flown)
-
-    def _flown(self) -> GlobalTarget | VelocityTarget | None:
-        """The setpoint that the autopilot reports since ours must show; None without one."""
-        flown = setpoint_in_force.shown(self.state, self._sent_at + TARGET_SHOWN)
-        is_early = self.clock() < self._sent_at + LATEST
-        return None if is_early and _are_alike(self._before, flown) else flown
-
-    def _is_ours(self, flown: GlobalTarget) -> bool:
-        """Whether a reported target is our newest one; the first report that is near ours counts as ours."""
-        if self._shown is None:
-            if self._expected is not None and _apart(self._expected, flown) > NEAR_EXPECTED:
-                return False
-            self._shown = flown
-        return _apart(self._shown, flown) <= SAME_PLACE
+        return self.own_target.is_foreign
 
     @property
     def target_place(self) -> tuple[float, float] | None:
         """Latitude and longitude (degrees) of our target in GUIDED; None without one, or without a position."""
-        target, is_guided = self._sent, self.mode == GUIDED and self._sent_at >= self.state.mode_since
+        target = self.own_target.newest
+        is_guided = self.mode == GUIDED and self.own_target.sent_at >= self.state.mode_since
         if not self.state.armed or not is_guided or self.has_foreign_target:
             return None
         if isinstance(target, GlobalTarget):
@@ -221,36 +181,11 @@ class GuidedVehicle(Vehicle):
         await pass_gate()
         self.commanding(job, self.flying)()
         await self.link.send(target.to(self.address, yaw), self.state.system)
-        self.sent(target)
-
-    def sent(self, target: Target) -> None:
-        """Remember the setpoint that went out last."""
-        self._before = setpoint_in_force.shown(self.state, self.state.mode_since)
-        self._sent, self._sent_at = target, self.clock()
-        self._shown = target if isinstance(target, GlobalTarget) else None
-        self._expected = self._place_of(target) if isinstance(target, NedTarget) else None
-
-    def _place_of(self, target: NedTarget) -> GlobalTarget | None:
-        """About where a target in the local frame is, by the vehicle's own place in both; None without these.
-
-        The vehicle has moved between the two messages.
-        """
-        local, place = self.state.messages.get("LOCAL_POSITION_NED"), self.state.messages.get("GLOBAL_POSITION_INT")
-        if local is None or place is None:
-            return None
-        here, there = local.message, place.message
-        later = (there.time_boot_ms - here.time_boot_ms) / 1000.0  # s
-        if abs(later) > SAME_MOMENT:
-            return None
-        north = target.x - here.x - later * here.vx
-        east = target.y - here.y - later * here.vy
-        down = target.z - here.z - later * here.vz
-        lat, lon = moved(there.lat / 1e7, there.lon / 1e7, north, east)
-        return GlobalTarget(lat, lon, there.relative_alt / 1000.0 - down)
+        self.own_target.sent(target)
 
     async def take_up(self, job: Job, target: Target, yaw: Yaw) -> None:
         """Begin a movement. ArduCopter goes back to its own speeds when the kind of setpoint changes."""
-        other_kind = not self._flies_kind_of(target)
+        other_kind = not self.own_target.is_of_kind_in_force(target)
         await self.send_setpoint(job, target, yaw)
         await self.send_speeds(job, new_kind=other_kind)
 
@@ -259,23 +194,3 @@ class GuidedVehicle(Vehicle):
         for kind, speed in self.speeds.to_send(new_kind).items():
             await self.commands.send(messages.change_speed(kind, speed), self.commanding(job, self.flying))
             self.speeds.take(kind, speed)
-
-    def _flies_kind_of(self, target: Target) -> bool:
-        """Whether the setpoint in force is known to be of the same kind: a place, or a velocity."""
-        ours = self._sent if self._sent_at >= self.state.mode_since else None
-        before = setpoint_in_force.shown(self.state, max(self._sent_at, self.state.mode_since)) or ours
-        return before is not None and isinstance(before, VelocityTarget) == isinstance(target, VelocityTarget)
-
-
-def _are_alike(one: GlobalTarget | VelocityTarget | None, other: GlobalTarget | VelocityTarget | None) -> bool:
-    """Whether two reports are of the same setpoint."""
-    if isinstance(one, GlobalTarget) and isinstance(other, GlobalTarget):
-        return _apart(one, other) <= SAME_PLACE
-    if isinstance(one, VelocityTarget) and isinstance(other, VelocityTarget):
-        return math.dist((one.vx, one.vy, one.vz), (other.vx, other.vy, other.vz)) <= ARRIVAL_SPEED
-    return False
-
-
-def _apart(one: GlobalTarget, other: GlobalTarget) -> float:
-    """Metres between two places, on the axis where they are farther apart."""
-    return max(*map(abs, offset(one.lat, one.lon, other.lat, other.lon)))

@@ -24,9 +24,10 @@ from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission
 from mavproxy_uavapi.core.vehicle import arming, landing_pattern, messages, mission_flight, time_limits
 from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_uavapi.core.vehicle.geodesy import moved
-from mavproxy_uavapi.core.vehicle.guided import GUIDED, TARGET_SHOWN, TOLERANCE, GuidedVehicle
+from mavproxy_uavapi.core.vehicle.guided import GUIDED, TOLERANCE, GuidedVehicle
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.messages import GlobalTarget, NedTarget
+from mavproxy_uavapi.core.vehicle.own_target import TARGET_SHOWN
 from mavproxy_uavapi.core.vehicle.time_limits import FlightLimits
 from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
 
@@ -379,7 +380,7 @@ class Plane(GuidedVehicle):
             except Stale:
                 return None  # a gap in the telemetry
             self.report_leg(job, math.hypot(north, east))
-            self.require_own_target()
+            self.own_target.require()
             near = math.hypot(north, east) <= max(tolerance, CIRCLING * radius)
             return True if near and abs(up) <= max(tolerance, HEIGHT_TOLERANCE) else None
 
@@ -396,5 +397,5 @@ class Plane(GuidedVehicle):
 
     async def _reposition(self, job: Job, place: GlobalTarget) -> None:
         await self.commands.send(messages.reposition(place), self.commanding(job, self.flying))
-        self.sent(place)
+        self.own_target.sent(place)
         await self.send_speeds(job, new_kind=False)
