@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import pwd
 import shutil
@@ -10,6 +11,8 @@ import subprocess
 import tempfile
 import time
 from pathlib import Path
+
+import psutil
 
 NOBODY = "nobody"  # PostgreSQL refuses to run as root
 PATIENCE = 30.0  # s
@@ -96,8 +99,13 @@ class PostgresCluster:
     def kill(self) -> None:
         """`kill -9` it with all its children."""
         assert self._process is not None
-        os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.send_signal(signal.SIGSTOP)  # it starts no more of them
+        children = psutil.Process(self._process.pid).children(recursive=True)  # each in a session of its own
+        for process in (self._process, *children):
+            with contextlib.suppress(psutil.NoSuchProcess):
+                process.kill()
         self._process.wait()
+        psutil.wait_procs(children, PATIENCE)  # as long as one lives, none starts again
 
     def stop(self) -> None:
         """End it."""
