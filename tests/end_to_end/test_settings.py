@@ -95,7 +95,7 @@ def configuration(rig, harness):
     """What `uavapi config` prints: value and origin by setting."""
     before = len(rig.terminal.lines)
     rig.terminal.enter("uavapi config")
-    lines = shown(rig, harness, "token ", before)
+    lines = shown(rig, harness, "tokens ", before)  # the last row
     row = re.compile(r"(?:.*> )?(\w+) +(.*?)? +(default|environment|module load|uavapi set|/.*)")
     found = [row.fullmatch(line) for line in lines]
     return {match[1]: (match[2], match[3]) for match in found if match}

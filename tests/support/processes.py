@@ -29,7 +29,7 @@ SCRIPTS = Path(sysconfig.get_path("scripts"))
 MAVPROXY = [sys.executable, str(SCRIPTS / "mavproxy.py")]
 HOME = "-35.363261,149.165230,584,353"
 SPEEDUP = 10
-STREAM_RATE = 2  # Hz of the vehicle's clock, which is 20 of ours: MAVProxy spends its time on messages
+STREAM_RATE = 1  # Hz of the vehicle's clock, which is 10 of ours: MAVProxy spends its time on messages
 PATIENCE = 60.0  # s for a process to show what it should
 
 
