@@ -91,11 +91,21 @@ async def see_the_api_gone(pilot: Pilot) -> None:
     await pilot.sees("#hold-result", "HOLD ALL WAS NOT DELIVERED")
 
 
+async def open_the_page(pilot: Pilot, dropped: str) -> None:
+    """While the browser drops one of its files, as when the network changes; later it comes."""
+    await pilot.page.ask("Network.enable")
+    await pilot.page.ask("Network.setBlockedURLs", urls=[f"*/{dropped}"])
+    await pilot.page.visit(pilot.rig.url + "/")
+    await pilot.sees("#trouble", "Parts of this page did not arrive")
+    await pilot.page.ask("Network.setBlockedURLs", urls=[])
+    await pilot.sees_live()
+
+
 async def flight(rig: Any, directory: Path) -> list[str]:
     async with chromium(directory) as page:
         pilot = Pilot(page, rig)
-        await page.visit(rig.url + "/")
-        await pilot.sees_live()
+        await open_the_page(pilot, "layout.css")
+        await open_the_page(pilot, "dom.js")
         await take_off(pilot)
         rig.control.fault("pilot_sticks", throttle=1500)
         await go_to_a_click(pilot, 150, -90)

@@ -65,7 +65,9 @@ def test_page_loads_only_what_it_has() -> None:
     for name in FILES:
         if name.endswith(".js"):
             loaded |= set(
-                re.findall(r'(?:from|import) "\./([^"]+)"', (page.FOLDER / name).read_text(encoding="utf-8"))
+                re.findall(
+                    r'(?:from |import |import\()"\./([^"]+)"', (page.FOLDER / name).read_text(encoding="utf-8")
+                )
             )
     assert loaded | {page.INDEX} == set(FILES)
 

@@ -1,0 +1,17 @@
+// Loads the page's parts. When the network changes meanwhile, a browser drops some of them; then all are loaded anew.
+
+const PAUSE = 1000; // ms
+
+function requireStyles() {
+  for (const link of document.querySelectorAll("link[rel=stylesheet]")) {
+    if (!link.sheet?.cssRules.length) throw new Error(`${link.href} is empty`); // a dropped one may raise an error itself
+  }
+}
+
+function tryAgain(reason) {
+  console.warn(reason);
+  document.getElementById("trouble").textContent = "Parts of this page did not arrive, it is loaded again: nothing here is live yet.";
+  setTimeout(() => location.reload(), PAUSE);
+}
+
+import("./app.js").then(requireStyles).catch(tryAgain);
