@@ -39,7 +39,7 @@ def test_file_is_in_force_until_a_better_one_can_be_read(flying: Any) -> None:
     flying.mavproxy.type(f"uavapi set envelope {file}")
     eventually(lambda: heights(flying) == [40])
     assert refused(flying, **OUT)["outside"]["source"] == "field.geojson"
-    flying.ok(flying.post("/movement/go_to_ned_wait", x=0, y=40, z=-10))
+    flying.ok(flying.post("/movement/go_to_ned_wait", x=0, y=20, z=-10))
     mark = flying.mavproxy.mark()
     file.write_text("{")
     flying.mavproxy.says("the one before stays in force", mark)
@@ -64,4 +64,4 @@ def test_fence_that_mavproxy_has_loaded_is_the_envelope(flying: Any) -> None:
     flying.mavproxy.type(f"fence load {fence}")
     eventually(lambda: [one["vehicle"] for one in flying.ok(flying.get("/envelope"))["envelopes"]] == [1])
     assert refused(flying, **OUT)["outside"]["what"].startswith("fence polygon")
-    flying.ok(flying.post("/movement/go_to_ned_wait", x=0, y=-40, z=-10))
+    flying.ok(flying.post("/movement/go_to_ned_wait", x=0, y=-20, z=-10))
