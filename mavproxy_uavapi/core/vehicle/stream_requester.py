@@ -35,7 +35,7 @@ WANTED = {
     "POSITION_TARGET_GLOBAL_INT": 2,
 }
 IN_GUIDED = {"POSITION_TARGET_LOCAL_NED", "POSITION_TARGET_GLOBAL_INT"}  # in other modes they say nothing
-IN_NO_STREAM = IN_GUIDED | {"EXTENDED_SYS_STATE"}  # nobody but us asks for them
+AT_ONCE = IN_GUIDED | {"EXTENDED_SYS_STATE"}  # requested without waiting for MAVProxy's streams to bring them
 
 
 class StreamRequester:
@@ -79,7 +79,7 @@ class StreamRequester:
         for name in [name for name in WANTED if guided or name not in IN_GUIDED]:
             age = vehicle.state.age(name, now)
             if age is None:
-                age = MISSING_AFTER if name in IN_NO_STREAM else now - since
+                age = MISSING_AFTER if name in AT_ONCE else now - since
             if age < MISSING_AFTER:
                 continue
             asked_at = self._asked_at[(vehicle.state.system, vehicle.state.reboots, name)]
