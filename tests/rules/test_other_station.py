@@ -95,6 +95,26 @@ def test_target_that_reaches_the_vehicle_late_is_still_ours(
     assert world.answer(wire).body.get("code") == code
 
 
+def test_targets_that_reach_the_vehicle_late_one_after_the_other_are_all_ours(program: Program) -> None:
+    """When the newest is sent, the one before it has not been reported yet."""
+    world = program.world
+    assert world.ask("POST", "/movement/go_to_ned_wait", {"x": 20.0, "y": 0.0, "z": -ALT}).status == 200
+
+    def go_to(path: str, east: float) -> tuple[Any, list[Any]]:
+        wire = world.begin("POST", f"/movement/{path}", {"x": 20.0, "y": east, "z": -ALT})
+        world.loop.settle()
+        targets, world._arriving = world._arriving, []
+        return wire, targets
+
+    _, second = go_to("go_to_ned", 15.0)
+    world.loop.pass_time(0.5)
+    newest, third = go_to("go_to_ned_wait", 30.0)
+    for late in (second, third):
+        world.loop.pass_time(2.5)
+        world._arriving.extend(late)
+    assert world.answer(newest).outcome == "200"
+
+
 def test_target_is_ours_though_the_vehicles_two_positions_are_of_different_times(program: Program) -> None:
     """One in the local frame and one on the globe tell where the autopilot will report a target."""
     world = program.world

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable
 
 from mavproxy_uavapi.core.errors import Superseded
@@ -12,11 +13,13 @@ from mavproxy_uavapi.core.vehicle.geodesy import moved, offset
 from mavproxy_uavapi.core.vehicle.messages import GlobalTarget, NedTarget, Target, VelocityTarget
 
 TARGET_SHOWN = 2.0  # s after a setpoint, until which telemetry does not count
-LATEST = 8.0  # s after a setpoint, until which a slow link or a busy MAVProxy may still report the target before it
+LATEST = 8.0  # s after a setpoint, until which a slow link or a busy MAVProxy may still report those before it
 SAME_PLACE = 2.0  # m on each axis: reported targets within this are the same
 SAME_SPEED = 0.5  # m/s: reported velocities within this are the same
 SAME_MOMENT = 3.0  # s between two messages, in which a vehicle does not change its velocity much
 NEAR_EXPECTED = 10.0  # m on each axis: our target in the local frame, whose origin the autopilot does not tell
+
+Reported = GlobalTarget | VelocityTarget
 
 
 class OwnTarget:
@@ -37,14 +40,25 @@ class OwnTarget:
         self._state, self._clock = state, clock
         self._shown: GlobalTarget | None = None  # our target as the autopilot reports it
         self._expected: GlobalTarget | None = None  # where it will report our target in the local frame, about
-        self._before: GlobalTarget | VelocityTarget | None = None  # what it reported last before our setpoint
+        self._earlier: deque[tuple[float, Reported]] = deque()  # what it flew before, and when that was replaced (s)
 
     def sent(self, target: Target) -> None:
         """Remember the setpoint that went out last."""
-        self._before = setpoint_in_force.shown(self._state, self._state.mode_since)
+        self._replace(setpoint_in_force.shown(self._state, self._state.mode_since))
+        self._replace(self.newest if isinstance(self.newest, VelocityTarget) else self._shown or self._expected)
         self.newest, self.sent_at = target, self._clock()
         self._shown = target if isinstance(target, GlobalTarget) else None
         self._expected = place_of(target, self._state) if isinstance(target, NedTarget) else None
+
+    def _replace(self, target: Reported | None) -> None:
+        """Remember what may still be reported though a newer setpoint is on its way."""
+        now = self._clock()
+        while self._earlier and now >= self._earlier[0][0] + LATEST:
+            self._earlier.popleft()
+        if self._earlier and _are_alike(self._earlier[-1][1], target):
+            self._earlier.pop()  # many clients repeat their setpoint
+        if target is not None:
+            self._earlier.append((now, target))
 
     def require(self) -> None:
         """Raise Superseded if the autopilot reports another target than ours, or a velocity."""
@@ -75,11 +89,12 @@ class OwnTarget:
         before = setpoint_in_force.shown(self._state, max(self.sent_at, since)) or ours
         return before is not None and isinstance(before, VelocityTarget) == isinstance(target, VelocityTarget)
 
-    def _reported(self) -> GlobalTarget | VelocityTarget | None:
+    def _reported(self) -> Reported | None:
         """The setpoint that the autopilot reports since ours must show; None without one."""
         reported = setpoint_in_force.shown(self._state, self.sent_at + TARGET_SHOWN)
-        is_early = self._clock() < self.sent_at + LATEST
-        return None if is_early and _are_alike(self._before, reported) else reported
+        now = self._clock()
+        is_late = any(now < at + LATEST and _are_alike(earlier, reported) for at, earlier in self._earlier)
+        return None if is_late else reported
 
     def _is_ours(self, reported: GlobalTarget) -> bool:
         """Whether a reported target is our newest one; the first report that is near ours counts as ours."""
@@ -109,7 +124,7 @@ def place_of(target: NedTarget, state: VehicleState) -> GlobalTarget | None:
     return GlobalTarget(lat, lon, there.relative_alt / 1000.0 - down)
 
 
-def _are_alike(one: GlobalTarget | VelocityTarget | None, other: GlobalTarget | VelocityTarget | None) -> bool:
+def _are_alike(one: Reported, other: Reported | None) -> bool:
     """Whether two reports are of the same setpoint."""
     if isinstance(one, GlobalTarget) and isinstance(other, GlobalTarget):
         return _apart(one, other) <= SAME_PLACE
