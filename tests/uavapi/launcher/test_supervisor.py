@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import pty
 import signal
@@ -9,6 +10,7 @@ import subprocess
 import sys
 import termios
 import time
+import warnings
 from pathlib import Path
 
 import pytest
@@ -86,6 +88,15 @@ def is_alive(pid):
     return state != "Z"
 
 
+def state_of(pid):
+    """What a process does, and where in the kernel each of its threads waits."""
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+        return state, [(thread / "wchan").read_text() for thread in Path(f"/proc/{pid}/task").iterdir()]
+    except (FileNotFoundError, ProcessLookupError):
+        return "gone"
+
+
 def eventually(condition, timeout_s=60.0):
     """Wait for real processes; the time is a limit, not a pause."""
     deadline = time.monotonic() + timeout_s
@@ -131,6 +142,17 @@ class Launched:
     def ours(self):
         return [pid for name, pid in self.pids.items() if name != "other" and is_alive(pid)]
 
+    def status(self):
+        """Its exit status, once it has ended. What holds up an end of more than 5 s is a warning."""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            return self.process.wait(5)
+        held_up = [f"{name} {state_of(pid)}" for name, pid in {"launcher": self.process.pid, **self.pids}.items()]
+        status = self.process.wait(60)
+        with warnings.catch_warnings():
+            warnings.simplefilter("always")
+            warnings.warn(f"the run takes long to end: {held_up}", stacklevel=2)
+        return status
+
     def wait_up(self):
         up = eventually(lambda: "API of vehicle" in self.out or self.process.poll() is not None)
         assert up and self.process.poll() is None, self.out
@@ -164,7 +186,7 @@ def test_signal_ends_all_of_its_processes_and_no_other(launched, tmp_path, signu
     assert set(run.pids) == {"mavproxy", "stray", "other", "vehicle", "child"}
     assert f"curl http://127.0.0.1:{run.port}/command/arm" in run.out
     run.process.send_signal(signum)
-    assert run.process.wait(10) == 0
+    assert run.status() == 0
     assert run.ours() == []
     assert is_alive(run.pids["other"]), "what MAVProxy started in another session is not ours to end"
     [run_dir] = (tmp_path / "state" / "mavproxy-uavapi" / "uav10").iterdir()
@@ -186,7 +208,7 @@ def test_mavproxy_that_does_not_listen_is_killed(launched):
     run = launched(mode="deaf")
     run.wait_up()
     run.process.terminate()
-    assert run.process.wait(10) == 0
+    assert run.status() == 0
     assert run.ours() == []
 
 
@@ -194,20 +216,20 @@ def test_clean_end_of_mavproxy_is_status_0(launched):
     run = launched("--simulated")
     run.wait_up()
     os.kill(run.pids["mavproxy"], signal.SIGTERM)
-    assert run.process.wait(10) == 0
+    assert run.status() == 0
     assert run.ours() == []
 
 
 def test_crash_of_mavproxy_is_one_line_with_its_log(launched):
     run = launched("--simulated", mode="crash")
-    assert run.process.wait(10) == 1
+    assert run.status() == 1
     assert "MAVProxy ended with status 1: cannot open the link (log: " in run.out
     assert run.ours() == []
 
 
 def test_api_that_cannot_load_ends_the_wait_in_mavproxys_words(launched):
     run = launched("--simulated", mode="no module")
-    assert run.process.wait(10) == 1
+    assert run.status() == 1
     assert "mavproxy-uavapi: Failed to load module: uavapi: no setting 'x'. (log: " in run.out
     assert run.ours() == []
 
@@ -216,13 +238,13 @@ def test_mavproxy_killed_from_outside_is_reported_as_a_shell_would(launched):
     run = launched()
     run.wait_up()
     os.kill(run.pids["mavproxy"], signal.SIGKILL)
-    assert run.process.wait(10) == 128 + signal.SIGKILL
+    assert run.status() == 128 + signal.SIGKILL
     assert run.ours() == []
 
 
 def test_vehicle_that_does_not_start_is_one_line_with_its_log(launched):
     run = launched("--simulated", mode="no vehicle")
-    assert run.process.wait(10) == 1
+    assert run.status() == 1
     assert "the vehicle did not start: sim: the port is taken (log: " in run.out
     assert run.ours() == []
 
@@ -231,7 +253,7 @@ def test_vehicle_that_dies_ends_the_run(launched):
     run = launched("--simulated")
     run.wait_up()
     os.kill(run.pids["vehicle"], signal.SIGKILL)
-    assert run.process.wait(10) == 1
+    assert run.status() == 1
     assert "the simulated vehicle ended" in run.out
     assert run.ours() == []
 
@@ -245,7 +267,7 @@ def test_at_a_terminal_mavproxy_has_the_prompt_and_ends_the_run(launched, typed)
         assert os.getpgid(run.pids["mavproxy"]) == run.process.pid, "the terminal's foreground group"
         assert os.getsid(run.pids["vehicle"]) != run.process.pid, "out of reach of the terminal's Ctrl-C"
         os.write(keyboard, typed)
-        assert run.process.wait(10) == 0
+        assert run.status() == 0
         assert run.ours() == []
     finally:
         os.close(keyboard)
@@ -259,7 +281,7 @@ def test_at_a_terminal_a_signal_to_the_launcher_ends_the_run_too(launched):
         run.wait_up()
         before = termios.tcgetattr(terminal)
         run.process.terminate()
-        assert run.process.wait(10) == 0
+        assert run.status() == 0
         assert run.ours() == []
         assert termios.tcgetattr(terminal) == before
     finally:
