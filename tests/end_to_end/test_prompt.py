@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 from tests.end_to_end.test_waypoints import JSON, WPL, commands
+from tests.support.processes import SPEEDUP
 
 
 def test_mode_that_the_pilot_types_ends_the_movement(rig):
@@ -43,7 +44,9 @@ def test_raw_message_is_the_vehicles_command_once_it_is_allowed(rig):
 def test_mavproxys_own_wp_module_still_works_beside_ours(rig, tmp_path):
     file = tmp_path / "own.txt"
     file.write_text(WPL)
+    rig.ok(rig.get("/command/set_sim_speedup", sim_factor=1))  # it gives an upload up after 8 s of its clock
     rig.mavproxy.ask(f"wp load {file}", "Sent all 6 waypoints")
+    rig.ok(rig.get("/command/set_sim_speedup", sim_factor=SPEEDUP))
     assert commands(rig)[0] == "NAV_TAKEOFF"
     rig.ok(rig.post("/mission/waypoints", **JSON))
     rig.mavproxy.ask("wp list", "Saved 5 waypoints")
