@@ -42,13 +42,14 @@ class Truth:
         """The newest pose."""
         return self._poses[-1] if self._poses else None
 
-    def add(self, pose: Pose, armed: bool | None, height: float) -> None:
+    def add(self, pose: Pose, armed: bool | None, height: float | None) -> None:
         """Add a pose.
 
         Args:
             pose: the true pose.
             armed: whether the vehicle is armed; None while unknown.
-            height: m above home by its own estimate; used if the first pose is in the air.
+            height: m above home by its own estimate; None while unknown. Who first hears of an armed vehicle derives
+                home from it.
         """
         if self._poses and pose.at <= self._poses[-1].at:
             return
@@ -56,7 +57,9 @@ class Truth:
         if len(self._poses) > 2 * KEPT:
             self._poses = self._poses[-KEPT:]  # a new list: the camera's thread may be reading the old one
         if self._home is None:
-            self._home = pose.lat, pose.lon, pose.alt - (height if armed else 0.0)
+            above = height if armed else 0.0
+            if armed is not None and above is not None:
+                self._home = pose.lat, pose.lon, pose.alt - above
         elif armed and self._armed is False:
             self._home = pose.lat, pose.lon, pose.alt
         if armed is not None:

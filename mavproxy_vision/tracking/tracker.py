@@ -238,8 +238,8 @@ class Tracker:
         attitude = Attitude(message.roll, message.pitch, message.yaw)
         at = self._unstamped.sent(now, self.clock)
         pose = Pose(at, lat, lon, message.alt, (message.vn, message.ve, message.vd), attitude)
-        height = (state.field("GLOBAL_POSITION_INT", "relative_alt") or 0) / 1000.0
-        self.truth.add(pose, state.armed, height)
+        height = state.field("GLOBAL_POSITION_INT", "relative_alt")
+        self.truth.add(pose, state.armed, None if height is None else height / 1000.0)
 
     def _where(self, time: float) -> Any:
         """Position and attitude for the simulated camera at host time `time`. The worker's thread."""
