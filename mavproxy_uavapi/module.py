@@ -80,7 +80,10 @@ class UavApiModule(SharedModule[ApiSettings]):
         self.logs = Logs(lambda text: self.host.bridge.post(lambda: print_above_prompt(text, self.mpstate.rl.prompt)))
         self._background = BackgroundCommands(self.host, NAME)
         self._changing = asyncio.Lock()  # starts, stops and settings, in the typed order
-        self.api = Api(self.host, RemoteSettings(self.host.bridge, settings, self.change_setting, self._settled))
+        self.api = Api(
+            self.host,
+            RemoteSettings(self.host.bridge, settings, self.change_setting, self._settled, self.host.members),
+        )
         self.host.bridge.close_in_children(self.api.filenos)
         self.remembered.keep(self.module_settings.shown)
 

@@ -1,9 +1,12 @@
-"""The settings as callers of the API see and change them: as `uavapi set` does it, in MAVProxy's main loop."""
+"""The settings as callers of the API see and change them: as `uavapi set` does it, in MAVProxy's main loop.
+
+They see those of all our loaded modules, and change those of `uavapi`.
+"""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from typing import Any
 
 from mavproxy_uavapi.core.errors import NotFound, SettingError, TimedOut
@@ -23,6 +26,7 @@ class RemoteSettings:
         settings: those of the loaded module.
         change: sets one of them as the prompt does; the main loop only.
         settled: waits until what was changed before is in force.
+        members: our loaded modules.
     """
 
     def __init__(
@@ -31,20 +35,26 @@ class RemoteSettings:
         settings: ApiModuleSettings,
         change: Callable[[str, Any], None],
         settled: Callable[[], Awaitable[None]],
+        members: Sequence[Any],
     ) -> None:
         self._bridge = bridge
         self._settings = settings
         self._change = change
         self._settled = settled
+        self._members = members
 
-    async def reports(self) -> list[dict[str, Any]]:
-        """All settings, as `ModuleSettings.reports` has them.
+    async def reports(self) -> dict[str, list[dict[str, Any]]]:
+        """All settings by module, as `ModuleSettings.reports` has them.
 
         Raises:
             TimedOut: MAVProxy's main loop is blocked.
         """
+
+        def of_all() -> dict[str, list[dict[str, Any]]]:
+            return {member.module_settings.module: member.module_settings.reports() for member in self._members}
+
         try:
-            return await wait_with_timeout(LONGEST, self._bridge.on_main(self._settings.reports))
+            return await wait_with_timeout(LONGEST, self._bridge.on_main(of_all))
         except asyncio.TimeoutError as error:
             raise TimedOut(f"MAVProxy's main loop did not answer within {LONGEST:g} s") from error
 

@@ -173,9 +173,10 @@ class ModuleSettings(ABC, Generic[Snapshot]):
 
     def _report(self, row: Any) -> dict[str, Any]:
         secret, word = row.name in self.secrets, row.label.partition(" ")[0]
+        value, shown = self._values[row.name], self.shown(row.name)
         return {
             "name": row.name,
-            "value": self.shown(row.name) if secret else self._values[row.name],
+            "value": value if shown == escaped(str(value)) else shown,
             "meaning": row.label,
             "unit": word if word in UNITS else "",
             "accepts": _accepted(row),

@@ -39,7 +39,7 @@ TAGS = {
     "parameters": "The autopilot's parameters; each new value is read back.",
     "logs": "The dataflash logs that a vehicle holds, and their download to this machine.",
     "envelope": "Where vehicles may fly. Nothing that leads out of it is sent, whoever asks for it.",
-    "settings": "The settings of this module. Access, limits of callers, and files are set at the prompt only.",
+    "settings": "The settings of our modules. Most of `uavapi` are set here, all of them at the prompt.",
     "message": "Any MAVLink message, for what has no verb. Off unless the setting `allow_raw` is true.",
     "authority": "Which operator holds a vehicle. Taking it and giving it back sends nothing.",
     "vehicles": "All known vehicles. The prefix `/vehicles/{sysid}` of any path means that vehicle; without it the "

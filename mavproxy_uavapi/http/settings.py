@@ -1,4 +1,4 @@
-"""/settings: the settings of the module `uavapi`; what decides over callers is set at MAVProxy's prompt only."""
+"""/settings: those of our modules. Only those of `uavapi` can be set here, but for what decides over callers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,9 @@ from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import Empty, Request
 from mavproxy_uavapi.http.responses import Answer
 from mavproxy_uavapi.remote_settings import RemoteSettings
-from mavproxy_uavapi.settings import SETTABLE
+from mavproxy_uavapi.settings import SETTABLE, ApiModuleSettings
+
+Reports = list[dict[str, Any]]
 
 
 class NewSetting(Request):
@@ -27,9 +29,11 @@ class NewSetting(Request):
 async def show(call: Call) -> Answer:
     """The settings: value, meaning, unit, what each accepts, default, and where its value comes from.
 
-    A secret is shown as `(set)`. `settable` says whether this caller may change it.
+    `modules` has those of the other modules. A secret is shown as `(set)`. `settable` says whether this caller may
+    change it.
     """
-    return {"settings": await _reports(call)}
+    own, others = await _reports(call)
+    return {"settings": own, "modules": others}
 
 
 async def put(call: Call) -> Answer:
@@ -44,7 +48,8 @@ async def put(call: Call) -> Answer:
     remote.require_settable(name)
     call.remembered = call.params(NewSetting)
     await remote.set(name, value, call.client)
-    report = next(one for one in await _reports(call) if one["name"] == name)
+    own, _ = await _reports(call)
+    report = next(one for one in own if one["name"] == name)
     return {"result": f"{name} is {report['value']}", **report}
 
 
@@ -55,6 +60,9 @@ def _remote(call: Call) -> RemoteSettings:
     return remote
 
 
-async def _reports(call: Call) -> list[dict[str, Any]]:
+async def _reports(call: Call) -> tuple[Reports, dict[str, Reports]]:
+    """Those of `uavapi`, and those of the other modules by name."""
+    reports = await _remote(call).reports()
     may_set = is_owner(call)
-    return [{**one, "settable": may_set and one["name"] in SETTABLE} for one in await _remote(call).reports()]
+    own = [{**one, "settable": may_set and one["name"] in SETTABLE} for one in reports.pop(ApiModuleSettings.module)]
+    return own, {name: [{**one, "settable": False} for one in rows] for name, rows in reports.items()}

@@ -1,4 +1,4 @@
-// The settings of uavapi: all are shown; those that this caller may set by HTTP have an input.
+// The settings of our modules: all are shown; those that this caller may set by HTTP have an input.
 
 import {CommandPanel} from "./command_panel.js";
 import {element, setAttribute} from "./dom.js";
@@ -6,17 +6,23 @@ import "./hold_button.js";
 
 export class SettingList extends CommandPanel {
   build() {
-    this.rows = element("dl", {class: "settings"});
-    this.append(element("h3", {}, "The API"), this.answer, this.rows);
+    this.lists = element("div");
+    this.append(this.answer, this.lists);
     this.closest("[data-tab]").addEventListener("opened", () => this.look());
     this.context.api.addEventListener("token-changed", () => { if (this.checkVisibility()) this.look(); });
   }
 
   async look() {
     const listed = await this.attempt(() => this.context.api.get("/settings"));
-    if (!listed) return void this.rows.replaceChildren(); // another caller's rights are not shown as one's own
+    if (!listed) return void this.lists.replaceChildren(); // another caller's rights are not shown as one's own
     this.say("", "");
-    this.rows.replaceChildren(...inOrder(listed.settings).flatMap(one => this.row(one)));
+    const lists = Object.entries({uavapi: inOrder(listed.settings), ...listed.modules});
+    this.lists.replaceChildren(...lists.flatMap(([name, settings]) => this.list(name, settings)));
+  }
+
+  list(name, settings) {
+    const rows = element("dl", {class: "settings"}, ...settings.flatMap(one => this.row(one)));
+    return [element("h3", {}, `The module ${name}`), rows];
   }
 
   row(setting) {

@@ -70,7 +70,7 @@ class Truth:
         poses = self._poses
         if not poses or self._home is None:
             return None
-        index = bisect.bisect_right([pose.at for pose in poses], time)
+        index = bisect.bisect_right(poses, time, key=lambda pose: pose.at)
         if index == 0:
             return None
         before = poses[index - 1]

@@ -103,6 +103,8 @@ async def set_a_setting(pilot: Pilot) -> None:
         one["value"] == 4 for one in pilot.rig.ok(pilot.rig.get("/settings"))["settings"] if one["name"] == "max_age"
     )
     assert await pilot.page.evaluate("!document.querySelector('setting-list [aria-label^=port]')")
+    await pilot.sees("setting-list", "The module gradys")
+    await pilot.sees("setting-list", "ground stations, HOST:PORT by comma")
 
 
 async def look(rig: Any, directory: Path) -> list[str]:

@@ -81,11 +81,20 @@ class Page:
         )
 
     async def middle(self, element: str) -> tuple[float, float]:
-        """Where the middle of an element is, which the script `element` gives; it is scrolled to."""
+        """Where the middle of an element is, which the script `element` gives; it is scrolled to.
+
+        It must stand still: what a page learns later moves its buttons, and the click would meet another one.
+        """
         script = (
             f"{{const e = {element}; e.scrollIntoView({{block: 'nearest'}}); const r = e.getBoundingClientRect(); "
+            "JSON.stringify([r.x + r.width / 2, r.y + r.height / 2])}"
         )
-        x, y = json.loads(await self.evaluate(script + "JSON.stringify([r.x + r.width / 2, r.y + r.height / 2])}"))
+        deadline, before, place = time.monotonic() + PATIENCE, None, await self.evaluate(script)
+        while place != before:
+            assert time.monotonic() < deadline, f"{element} does not stand still"
+            await asyncio.sleep(0.1)
+            before, place = place, await self.evaluate(script)
+        x, y = json.loads(place)
         return x, y
 
     async def press(self, x: float, y: float) -> None:

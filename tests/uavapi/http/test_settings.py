@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -11,6 +12,7 @@ import pytest
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.remote_settings import LONGEST, RemoteSettings
 from mavproxy_uavapi.settings import ACCESS, LISTENING, SETTABLE, ApiModuleSettings
+from mavproxy_vision.settings import VisionModuleSettings
 from tests.support import tokens
 
 # By setting, what a caller with the token would gain by it: access, a program or a file of his choice, more than his
@@ -27,6 +29,9 @@ THE_PROMPTS = {
 }
 
 
+VISION = VisionModuleSettings({"source": "rtsp://eye:hidden@10.0.0.8/video"}, environ={})
+
+
 @pytest.fixture
 def settings(api: Any, drone: Any, host: Any) -> ApiModuleSettings:
     """The settings of a module whose API this is; the drone's messages turn the main loop."""
@@ -36,7 +41,13 @@ def settings(api: Any, drone: Any, host: Any) -> ApiModuleSettings:
         api.service.settings = replace(settings.snapshot(), tokens=api.service.settings.tokens)
 
     api.service.settings = replace(settings.snapshot(), token="")
-    api.service.remote_settings = RemoteSettings(host.bridge, settings, settings.set, settled)
+    api.service.remote_settings = RemoteSettings(
+        host.bridge,
+        settings,
+        settings.set,
+        settled,
+        [SimpleNamespace(module_settings=one) for one in (settings, VISION)],
+    )
     return settings
 
 
@@ -71,6 +82,19 @@ def test_each_setting_is_listed_with_what_it_takes_and_secrets_are_not_shown(
     assert found["on_conflict"]["choices"] == ["refuse", "wait"]
     assert (found["token"]["value"], found["token"]["settable"]) == ("(set)", False)
     assert "s3cret" not in str(found)
+
+
+def test_those_of_other_modules_are_listed_without_passwords_and_set_at_the_prompt_only(
+    api: Any, settings: ApiModuleSettings
+) -> None:
+    answer = api.get("/settings").body
+    assert list(answer["modules"]) == ["vision"]
+    found = {one["name"]: one for one in answer["modules"]["vision"]}
+    assert list(found) == VISION.names()
+    assert not any(one["settable"] for one in found.values())
+    assert (found["source"]["value"], found["fps"]["value"]) == ("rtsp://eye:***@10.0.0.8/video", 20.0)
+    assert put(api, "fps", 5).status == 404
+    assert VISION.snapshot().fps == 20.0
 
 
 def test_new_value_is_in_force_in_the_trail_and_on_the_prompt(
