@@ -44,7 +44,7 @@ class FakeApi:
         self.why_not: list[str] = []
         self.sending = True
         self.url = ""
-        self._jobs: dict[str, str] = {}
+        self._jobs: dict[str, dict[str, Any]] = {}
         self._commander: dict[str, Any] | None = None
         self._loop = asyncio.new_event_loop()
         self._up = threading.Event()
@@ -134,24 +134,25 @@ class FakeApi:
         if path in self.refusals:
             status, body = self.refusals[path]
             return web.json_response(body, status=status)
+        number = str(len(self._jobs) + 1)
+        job = {"job": number, "verb": path, "request": values, "state": "running", "error": None}
+        self._jobs[number] = job
         if values.get("wait") == "false":
-            number = str(len(self.requested))
-            self._jobs[number] = path
-            self._loop.call_later(self.takes.get(path, 0.0) or 0.0, self._obey, path, values, number)
+            self._loop.call_later(self.takes.get(path, 0.0) or 0.0, self._obey, job)
             return web.json_response({"id": "7", "job": number}, status=202)
         self.begun.append(path)
-        self._commander = {"job": str(len(self.begun)), "verb": path, "request": values}
+        self._commander = job
         try:
             takes = self.takes.get(path, 0.0)
             await asyncio.sleep(3600 if takes is None else takes)
         except asyncio.CancelledError:
             self.gone.append(path)
             raise
-        self._obey(path, values)
+        self._obey(job)
         return web.json_response({"id": "7", "result": "done"})
 
-    def _obey(self, path: str, values: dict[str, Any], job: str = "") -> None:
-        self._jobs.pop(job, None)
+    def _obey(self, job: dict[str, Any]) -> None:
+        job["state"], path, values = "succeeded", job["verb"], job["request"]
         if path == "/command/arm":
             self.armed, self.mode = True, GUIDED
         elif path == "/command/set_mode":
@@ -164,11 +165,8 @@ class FakeApi:
             self.yaw = float(values["heading"])
 
     async def _job(self, request: web.Request) -> web.Response:
-        number = request.match_info["id"]
         self.requested += [("DELETE", request.path, {})] if request.method == "DELETE" else []
-        job = {"state": "running" if number in self._jobs else "succeeded", "error": None}
-        commands = self._commander is not None and self._commander["job"] == number
-        return web.json_response({**(self._commander or {}), **job} if commands else job)
+        return web.json_response(self._jobs[request.match_info["id"]])
 
     async def _authority(self, _: web.Request) -> web.Response:
         return web.json_response({"id": "7", "vehicles": [{"vehicle": 7, "commanded_by": self._commander}]})
