@@ -16,21 +16,10 @@ from typing import Any
 
 from bench_commands import Connection
 from bench_rest import memory
-from rig import (
-    Bare,
-    Clients,
-    Forwarding,
-    Tap,
-    cpu_seconds,
-    fly,
-    harness,
-    machine,
-    message_id,
-    percentile,
-    put_first,
-    rig,
-    table,
-)
+from figures import cpu_seconds, machine, percentile, put_first, table
+from http_clients import Bare, Clients
+from rig import fly, harness, rig
+from tap import Forwarding, Tap, message_id
 
 BARE, THREAD, APART = "bare aiohttp handler", "uavapi, a thread", "prototype, a process"
 MODULES = {THREAD: "uavapi", APART: "http_apart"}

@@ -26,8 +26,10 @@ from pathlib import Path
 from typing import Any
 
 from commands_vehicle import MODES, PATIENCE, SYSTEM, Key, Vehicle
+from figures import machine, percentile, put_first, table
+from http_clients import Client
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
-from rig import Client, harness, machine, percentile, put_first, table
+from rig import harness
 
 from tests.support.ports import free_port
 

@@ -17,7 +17,8 @@ import time
 from pathlib import Path
 
 import psutil
-from rig import ROOT, harness, machine, table
+from figures import machine, table
+from rig import ROOT, harness
 
 from tests.support.fleet import MOSQUITTO, Fleet
 from tests.support.postgres import program

@@ -20,7 +20,9 @@ from typing import Any
 
 from bench_commands import Connection
 from bench_vehicles import free_ports, start
-from rig import Bare, Clients, harness, machine, percentile, put_first, table
+from figures import machine, percentile, put_first, table
+from http_clients import Bare, Clients
+from rig import harness
 from vehicle_generator import Copters
 
 MODES = ("brake", "guided")  # by turns, so that each try changes the mode

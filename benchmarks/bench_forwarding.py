@@ -13,7 +13,10 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from rig import Bare, Clients, Forwarding, cpu_seconds, fly, jitter, machine, percentile, put_first, rig, table
+from figures import cpu_seconds, jitter, machine, percentile, put_first, table
+from http_clients import Bare, Clients
+from rig import fly, rig
+from tap import Forwarding
 
 BUDGET = 10.0  # ms at the 99th percentile
 NONE, IDLE, LOAD, ELSEWHERE = "without uavapi", "uavapi idle", "uavapi under load", "load elsewhere"

@@ -33,7 +33,8 @@ from pathlib import Path
 from typing import Any
 
 import requests
-from rig import harness, machine, table
+from figures import machine, table
+from rig import harness
 
 from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.forwarding.sink_address import sink_address

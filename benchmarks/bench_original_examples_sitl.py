@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import rig
+from figures import machine, table
 
 from tests.support.ports import free_port
 
@@ -149,8 +150,8 @@ def main() -> int:
         rows.append(
             [Path(name).stem, f"{speedup}", f"{len(outcomes)}", f"{len(reasons)}", "; ".join(dict.fromkeys(reasons))]
         )
-    print(rig.machine())
-    print(rig.table(["program", "speed-up", "runs", "failed", "why"], rows))
+    print(machine())
+    print(table(["program", "speed-up", "runs", "failed", "why"], rows))
     return 1 if failed else 0
 
 

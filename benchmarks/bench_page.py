@@ -25,7 +25,8 @@ from pathlib import Path
 from typing import Any
 
 from bench_station_page import FRAMES
-from rig import harness, machine, percentile, table
+from figures import machine, percentile, table
+from rig import harness
 
 from tests.support.chromium import Page, chromium
 from tests.support.several_vehicles import several_vehicles

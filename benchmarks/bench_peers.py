@@ -17,7 +17,9 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from bench_reads import BARE, OURS, Case, Reads, read, reads_table
-from rig import Bare, Clients, fly, harness, machine, put_first, rig
+from figures import machine, put_first
+from http_clients import Bare, Clients
+from rig import fly, harness, rig
 
 from tests.support.ports import free_port
 

@@ -14,7 +14,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from rig import Bare, Client, Clients, Tap, fly, machine, message_id, percentile, put_first, rig, table
+from figures import machine, percentile, put_first, table
+from http_clients import Bare, Client, Clients
+from rig import fly, rig
+from tap import Tap, message_id
 
 BARE, OURS = "bare aiohttp handler", "uavapi"
 WAITING = 200

@@ -14,7 +14,8 @@ import urllib.error
 import urllib.request
 from pathlib import Path
 
-from rig import cpu_seconds, harness, machine, percentile, put_first, table
+from figures import cpu_seconds, machine, percentile, put_first, table
+from rig import harness
 
 from tests.support.ports import free_port
 

@@ -17,7 +17,8 @@ import time
 from pathlib import Path
 
 import aiohttp
-from rig import ROOT, cpu_seconds, harness, machine, percentile, table
+from figures import cpu_seconds, machine, percentile, table
+from rig import ROOT, harness
 
 from tests.support.chromium import Page, chromium
 from tests.support.fleet_vehicles import flight

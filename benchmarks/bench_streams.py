@@ -15,7 +15,9 @@ import time
 from pathlib import Path
 from typing import Any
 
-from rig import Client, cpu_seconds, machine, percentile, rig, table
+from figures import cpu_seconds, machine, percentile, table
+from http_clients import Client
+from rig import rig
 
 ALL = "/telemetry/stream"
 NAMES = ("ATTITUDE", "HEARTBEAT", "GLOBAL_POSITION_INT", "VFR_HUD", "SYS_STATUS")

@@ -20,7 +20,8 @@ from typing import Any
 
 import psutil
 from bench_commands import Connection
-from rig import cpu_seconds, harness, machine, percentile, put_first, table
+from figures import cpu_seconds, machine, percentile, put_first, table
+from rig import harness
 from vehicle_generator import Copters
 
 from tests.support.ports import free_port

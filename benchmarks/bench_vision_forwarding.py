@@ -19,7 +19,9 @@ from pathlib import Path
 from typing import Any
 
 import cv2
-from rig import Forwarding, cpu_seconds, fly, jitter, machine, percentile, put_first, rig, table
+from figures import cpu_seconds, jitter, machine, percentile, put_first, table
+from rig import fly, rig
+from tap import Forwarding
 
 from mavproxy_vision.apriltag.detector import Detector, DetectorOptions
 from mavproxy_vision.camera.renderer import Look, PlacedTag, Renderer

@@ -14,7 +14,8 @@ import json
 import sys
 from typing import Any
 
-from rig import fly, harness, machine, put_first, rig, table
+from figures import machine, put_first, table
+from rig import fly, harness, rig
 
 BUDGET = 60.0  # ms at the 99th percentile
 HEIGHT = 6.0  # m

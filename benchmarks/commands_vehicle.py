@@ -14,7 +14,7 @@ from typing import Any
 
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
-from rig import SO_TIMESTAMPNS
+from tap import SO_TIMESTAMPNS
 
 from mavproxy_uavapi.core.vehicle import time_limits
 

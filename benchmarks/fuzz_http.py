@@ -23,8 +23,10 @@ from collections import Counter
 from typing import Any
 
 import requests
-from rig import Client, harness, machine, percentile, put_first, rig, table
-from soak import Notes, look_for_bad_words
+from figures import machine, percentile, put_first, table
+from http_clients import Client
+from rig import harness, rig
+from soak_notes import Notes, look_for_bad_words
 
 FUZZERS = 12
 STALLED = 1.0  # s that a reader may wait

@@ -19,7 +19,7 @@ import threading
 from pathlib import Path
 
 from bench_page import heap
-from rig import machine, table
+from figures import machine, table
 
 from mavproxy_uavapi.http.page import FOLDER
 from tests.support.chromium import Page, chromium

@@ -15,7 +15,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from rig import machine, table
+from figures import machine, table
 
 from tests.support.fleet_faults import Audit, FaultyFleet
 from tests.support.network_namespace import NetworkNamespace

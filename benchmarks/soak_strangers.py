@@ -24,8 +24,11 @@ from collections import Counter
 from collections.abc import Awaitable, Callable
 from typing import Any
 
-from rig import Client, fly, machine, message_id, percentile, put_first, rig, table
-from soak import RSS_ALLOWED, Notes, Usage, look_for_bad_words
+from figures import machine, percentile, put_first, table
+from http_clients import Client
+from rig import fly, rig
+from soak_notes import RSS_ALLOWED, Notes, Usage, look_for_bad_words
+from tap import message_id
 
 TOKEN = "a-long-and-secret-word"
 STOP_WITHIN = 0.050  # s, at the 99th percentile

@@ -17,7 +17,7 @@ from collections.abc import Callable
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
-from rig import SO_TIMESTAMPNS, Forwarding
+from tap import SO_TIMESTAMPNS, Forwarding
 
 BURST, BURSTS_PER_SECOND = 10, 5  # messages in a datagram
 GUIDED = 4
