@@ -143,7 +143,7 @@ class Bench:
         settings = {"sink": sink, "spool": str(spool), "quantities": "position@0.1"}
         load = "--cmd=module load gradys:" + json.dumps(settings, separators=(",", ":"))
         process = self.rig.start(
-            "mavproxy", harness.mavproxy_command(self._instance, harness.load(self.rig.port), load)
+            "mavproxy", harness.mavproxy_command(self._instance, harness.load(self.rig.port), load, logs=True)
         )
         harness.eventually(lambda: self.report() is not None, 60, "the API")
         return process

@@ -46,7 +46,7 @@ def main() -> int:
 
 def run(tools: Any, directory: Path, seconds: float) -> int:
     """One outage of so many seconds."""
-    rig = tools.embedded(directory, "--sysid=10", speedup=1)
+    rig = tools.embedded(directory, "--sysid=10", speedup=1, logs=True)
     try:
         port = free_port()
         command = [sys.executable, "-m", "mavproxy_gradys.station", f"--port={port}", f"--database={directory}/s.db"]

@@ -171,7 +171,7 @@ def main() -> int:
     systems = range(1, options.vehicles + 1)
     with (
         tempfile.TemporaryDirectory(prefix="uavapi-bench-") as folder,
-        several_vehicles(Path(folder), systems, speedup=1) as (rig, _),
+        several_vehicles(Path(folder), systems, speedup=1, arguments=["--streamrate=4"]) as (rig, _),
     ):
         harness.eventually(lambda: all(one["ready_to_arm"] for one in rig.ok(rig.get("/vehicles"))["vehicles"]))
         with flying(rig, options.vehicles):

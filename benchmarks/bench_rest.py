@@ -26,6 +26,7 @@ CASES: dict[str, tuple[str, ...]] = {
     "uavapi, gradys": ("uavapi", "gradys"),
     "uavapi, gradys, vision": ("uavapi", "gradys", "vision"),
 }
+DEFAULT_RATE = "--streamrate=4"
 SETTLED_AFTER = 4.0  # s: the parameters have been loaded
 
 
@@ -74,7 +75,7 @@ def measure(modules: tuple[str, ...], rest: Rest, seconds: float, first: bool) -
         rig = harness.Rig(Path(directory), free_port())
         try:
             instance = harness.start_embedded(rig, speedup=1)
-            rig.mavproxy = rig.start("mavproxy", harness.mavproxy_command(instance))
+            rig.mavproxy = rig.start("mavproxy", harness.mavproxy_command(instance, DEFAULT_RATE, logs=True))
             rig.mavproxy.says("Received")
             if first:
                 put_first(*(process.pid for process in rig.processes))

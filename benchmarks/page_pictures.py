@@ -78,7 +78,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--folder", type=Path, default=Path("docs/pictures"), help="(%(default)s)")
     options = parser.parse_args()
-    modules = ["--load-module=vision", "--load-module=gradys"]
+    modules = ["--load-module=vision", "--load-module=gradys", "--streamrate=4"]
     with (
         tempfile.TemporaryDirectory(prefix="uavapi-pictures-") as name,
         several_vehicles(Path(name), SYSTEMS, speedup=1, arguments=modules, homes=list(map(home, SYSTEMS))) as (

@@ -158,7 +158,7 @@ def start(directory: Path) -> Any:
     rig = harness.Rig(directory, free_port())
     try:
         instance = harness.start_embedded(rig, speedup=SPEEDUP)
-        command = harness.mavproxy_command(instance, "--cmd=module load uavapi")
+        command = harness.mavproxy_command(instance, "--cmd=module load uavapi", logs=True)
         environment = {"UAVAPI_PORT": str(rig.port), "UAVAPI_MAX_RATE": "5000"}
         rig.mavproxy = rig.start("mavproxy", command, environment)
         rig.wait_until_up()

@@ -18,6 +18,8 @@ from .simulator import STEP, Simulator
 BACKLOG_LIMIT = 1 << 20
 """Bytes that may wait for a slow TCP peer; a peer with more is disconnected."""
 LONGEST_WAIT = 0.05
+SHORTEST_TURN = 0.005
+"""Wall seconds from one look at the sockets to the next, if nothing arrives: at a high speed-up several steps."""
 LONGEST_BURST = 0.05
 """Wall seconds of simulation at a stretch before the sockets get their turn."""
 BEHIND_LIMIT = 0.1
@@ -116,7 +118,8 @@ class Server:
             owed = self._simulate(owed, now + LONGEST_BURST)
             self._flush()
             behind = owed >= STEP
-            wait = 0.0 if behind else min((STEP - owed) / self.simulator.speedup, LONGEST_WAIT)
+            due = max(STEP, SHORTEST_TURN * self.simulator.speedup)
+            wait = 0.0 if behind else min((due - owed) / self.simulator.speedup, LONGEST_WAIT)
             self._serve(wait)
 
     def _simulate(self, owed: float, deadline: float) -> float:

@@ -16,18 +16,22 @@ from tests.support.processes import Lan, Rig, ardupilot, ardupilot_with_faults, 
 
 @pytest.fixture(scope="module", params=["embedded", pytest.param("ardupilot", marks=pytest.mark.sitl)])
 def rig(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
-    """A rig that the tests of a file share; each leaves it fit to fly."""
-    directory = tmp_path_factory.mktemp(request.param)
-    made = embedded(directory) if request.param == "embedded" else ardupilot(directory)
+    """A rig that the tests of a file share; each leaves it fit to fly. With RIG_LOGS in the file MAVProxy logs."""
+    directory, logs = tmp_path_factory.mktemp(request.param), getattr(request.module, "RIG_LOGS", False)
+    made = embedded(directory, logs=logs) if request.param == "embedded" else ardupilot(directory)
     yield made
     made.stop()
 
 
 @pytest.fixture(scope="module")
 def embedded_rig(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
-    """A rig with the embedded vehicle, for tests that need its back door; at the speed-up RIG_SPEEDUP of its file."""
+    """A rig with the embedded vehicle, for tests that need its back door.
+
+    Its file may set RIG_SPEEDUP, and RIG_LOGS as for `rig`.
+    """
     speedup = getattr(request.module, "RIG_SPEEDUP", processes.SPEEDUP)
-    made = embedded(tmp_path_factory.mktemp("embedded"), speedup=speedup)
+    logs = getattr(request.module, "RIG_LOGS", False)
+    made = embedded(tmp_path_factory.mktemp("embedded"), speedup=speedup, logs=logs)
     yield made
     made.stop()
 

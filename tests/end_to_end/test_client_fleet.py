@@ -12,7 +12,7 @@ import pytest
 from mavproxy_uavapi.client import Fleet, Ned, connect, connect_fleet
 from mavproxy_uavapi.core.errors import NoVehicle
 from tests.support.ports import free_instance, free_port
-from tests.support.processes import HOME, MAVPROXY, Rig, load
+from tests.support.processes import HOME, Rig, load, mavproxy_command
 
 SPEEDUP = 3  # the client has to keep up with it
 
@@ -22,14 +22,13 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
     """Two copters, 1 and 2, behind one MAVProxy."""
     rig = Rig(tmp_path_factory.mktemp("fleet"), free_port())
     try:
-        first, masters = free_instance(2), []
+        first = free_instance(2)
         for system in (1, 2):
             instance = first + system - 1
             command = [sys.executable, "-m", "mavproxy_uavapi.sim", f"--instance={instance}", f"--home={HOME}"]
             vehicle = rig.start(f"copter{system}", [*command, f"--sysid={system}", f"--speedup={SPEEDUP}"])
             vehicle.says("listening on tcp")
-            masters.append(f"--master=tcp:127.0.0.1:{5760 + 10 * instance}")
-        rig.mavproxy = rig.start("mavproxy", [*MAVPROXY, *masters, "--retries=20", load(rig.port)])
+        rig.mavproxy = rig.start("mavproxy", mavproxy_command([first, first + 1], load(rig.port)))
         rig.wait_until_up(120)
         rig.eventually(lambda: len(rig.ok(rig.get("/vehicles"))["vehicles"]) == 2, 60, "two vehicles")
         yield rig

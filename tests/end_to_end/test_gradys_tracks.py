@@ -8,7 +8,6 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -19,14 +18,13 @@ from mavproxy_gradys.tracks.formats import parse, waypoints
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "centmesh"
 CORNERS = ((25, 0, -8), (25, 25, -14))  # m, NED
+RIG_LOGS = True  # they tell where the vehicle was
 
 
-@pytest.fixture(scope="module", params=["embedded", pytest.param("ardupilot", marks=pytest.mark.sitl)])
-def rig(request, harness, tmp_path_factory) -> Iterator:
-    made = getattr(harness, request.param)(tmp_path_factory.mktemp("tracks"))
-    made.mavproxy.ask(f'module load gradys:{{"spool":"{made.directory}/spool.db"}}', "Loaded module gradys")
-    yield made
-    made.stop()
+@pytest.fixture(scope="module")
+def rig(rig: Any) -> Any:
+    rig.mavproxy.ask(f'module load gradys:{{"spool":"{rig.directory}/spool.db"}}', "Loaded module gradys")
+    return rig
 
 
 @pytest.fixture(scope="module")

@@ -31,7 +31,7 @@ asyncio.run(main())
 def rig(harness: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
     directory = tmp_path_factory.mktemp("operators")
     folders = {"scripts_path": str(directory / "scripts"), "script_logs": str(directory / "logs")}
-    rig = harness.embedded(directory, **folders)
+    rig = harness.embedded(directory, logs=True, **folders)
     rig.mavproxy.ask(f"uavapi set tokens {directory / 'tokens'}", "listening on")
     yield rig
     rig.stop()

@@ -7,6 +7,8 @@ import json
 from tests.end_to_end.test_waypoints import JSON, WPL, commands
 from tests.support.processes import SPEEDUP
 
+RIG_LOGS = True
+
 
 def test_mode_that_the_pilot_types_ends_the_movement(rig):
     rig.in_the_air(10)

@@ -72,7 +72,7 @@ def rig(harness, tmp_path_factory):
     try:
         instance = harness.start_embedded(rig, speedup=4)
         load = harness.load(rig.port, config=str(config), link_timeout=8, script_grace=8)
-        command = [*harness.mavproxy_command(instance, load), f"--logfile={directory / 'mav.tlog'}"]
+        command = [*harness.mavproxy_command(instance, load, logs=True), f"--logfile={directory / 'mav.tlog'}"]
         terminal.start(command, {"UAVAPI_MAX_AGE": "7", "UAVAPI_LINK_TIMEOUT": "7", "UAVAPI_SCRIPT_GRACE": "7"})
         rig.wait_until_up()
         yield rig

@@ -13,6 +13,7 @@ import requests
 
 from mavproxy_uavapi.http.streaming import MOST_OPEN
 
+RIG_LOGS = True
 RIG_SPEEDUP = 2  # nobody flies far here, and each message costs processor time
 
 

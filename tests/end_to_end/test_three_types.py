@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from tests.support.ports import free_instance, free_port
-from tests.support.processes import HOME, MAVPROXY, SPEEDUP, Rig, headless, load
+from tests.support.processes import HOME, SPEEDUP, Rig, headless, load, mavproxy_command
 
 TYPES = {"copter": "ArduCopter", "plane": "ArduPlane", "rover": "Rover"}  # by system id, from 1
 TOGETHER = SPEEDUP / 3  # three vehicles send MAVProxy what one does at SPEEDUP; more, and acks come seconds late
@@ -37,11 +37,11 @@ def rig(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Rig]:
     """Three vehicles of three types behind one MAVProxy."""
     rig = Rig(tmp_path, free_port())
     try:
-        first, masters = free_instance(len(TYPES)), []
+        first = free_instance(len(TYPES))
+        instances = range(first, first + len(TYPES))
         for number, kind in enumerate(TYPES):
-            start(rig, request.param, first + number, number + 1, kind)
-            masters.append(f"--master=tcp:127.0.0.1:{5760 + 10 * (first + number)}")
-        rig.mavproxy = rig.start("mavproxy", [*MAVPROXY, *masters, "--retries=20", load(rig.port)])
+            start(rig, request.param, instances[number], number + 1, kind)
+        rig.mavproxy = rig.start("mavproxy", mavproxy_command(instances, load(rig.port)))
         rig.wait_until_up(120)
         yield rig
     finally:

@@ -15,7 +15,7 @@ import subprocess
 import sys
 import sysconfig
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -257,10 +257,18 @@ class Rig:
             process.stop()
 
 
-def mavproxy_command(instance: int, *arguments: str) -> list[str]:
-    """MAVProxy on a simulated vehicle, with a prompt on its stdin."""
-    master = f"--master=tcp:127.0.0.1:{5760 + 10 * instance}"
-    return [*MAVPROXY, master, "--retries=20", f"--streamrate={STREAM_RATE}", *arguments]
+def mavproxy_command(instance: int | Sequence[int], *arguments: str, logs: bool = False) -> list[str]:
+    """MAVProxy on one or more simulated vehicles, with a prompt on its stdin.
+
+    Args:
+        instance: of the vehicle, or of each.
+        arguments: further ones.
+        logs: whether MAVProxy logs telemetry, and the API its trail; that takes half of MAVProxy's processor time.
+    """
+    instances = [instance] if isinstance(instance, int) else instance
+    masters = [f"--master=tcp:127.0.0.1:{5760 + 10 * number}" for number in instances]
+    state = [] if logs else ["--no-state"]
+    return [*MAVPROXY, *masters, "--retries=20", f"--streamrate={STREAM_RATE}", *state, *arguments]
 
 
 def load(port: int, **settings: Any) -> str:
@@ -279,12 +287,12 @@ def start_embedded(rig: Rig, *arguments: str, speedup: float = SPEEDUP) -> int:
     return instance
 
 
-def embedded(directory: Path, *arguments: str, speedup: float = SPEEDUP, **settings: Any) -> Rig:
-    """A rig with the embedded vehicle."""
+def embedded(directory: Path, *arguments: str, speedup: float = SPEEDUP, logs: bool = False, **settings: Any) -> Rig:
+    """A rig with the embedded vehicle; `logs` is of `mavproxy_command`."""
     rig = Rig(directory, free_port())
     try:
         instance = start_embedded(rig, *arguments, speedup=speedup)
-        rig.mavproxy = rig.start("mavproxy", mavproxy_command(instance, load(rig.port, **settings)))
+        rig.mavproxy = rig.start("mavproxy", mavproxy_command(instance, load(rig.port, **settings), logs=logs))
         rig.wait_until_up()
         rig.be_patient()
     except BaseException:

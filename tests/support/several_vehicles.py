@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.support.ports import free_port
-from tests.support.processes import MAVPROXY, Rig, eventually, load, start_embedded
+from tests.support.processes import Rig, eventually, load, mavproxy_command, start_embedded
 
 
 @contextlib.contextmanager
@@ -33,15 +33,15 @@ def several_vehicles(
     """
     rig, vehicles = Rig(directory, free_port()), {}
     try:
-        masters = []
+        instances = []
         for number, system in enumerate(systems):
             folder = directory / f"vehicle-{system}"
             folder.mkdir()
             vehicles[system] = Rig(folder, 0)
             home = [f"--home={homes[number]}"] if homes else []
-            instance = start_embedded(vehicles[system], f"--sysid={system}", *home, speedup=speedup)
-            masters.append(f"--master=tcp:127.0.0.1:{5760 + 10 * instance}")
-        rig.mavproxy = rig.start("mavproxy", [*MAVPROXY, *masters, *arguments, load(rig.port, **settings)])
+            instances.append(start_embedded(vehicles[system], f"--sysid={system}", *home, speedup=speedup))
+        command = mavproxy_command(instances, *arguments, load(rig.port, **settings))
+        rig.mavproxy = rig.start("mavproxy", command)
         rig.wait_until_up()
         eventually(lambda: set(systems) <= set(listed(rig)), what="all vehicles in the list")
         yield rig, vehicles
