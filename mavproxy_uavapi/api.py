@@ -52,7 +52,7 @@ class Api:
             raise
         self._server = server
         self.host.api_address = settings.host, settings.port
-        self._tasks.start(StreamRequester(self.host.registry, settings.sysid).run(), "the watch over the telemetry")
+        self._tasks.start(StreamRequester(self.host.registry).run(), "the watch over the telemetry")
         self._tasks.start(self._envelope.watch(), "the watch over the envelope's file")
         self._tasks.start(server.service.tokens.watch(), "the watch over the tokens' file")
         self._tasks.start(memory.give_back(), "the return of freed memory")

@@ -6,6 +6,7 @@ Operations::
     {"op": "clear"}                      end all faults
     {"op": "state"}                      the truth about the vehicle
     {"op": "received", "since": N}       what ground links have sent, after index N
+    {"op": "parameter", "name": NAME, "value": X}   set a parameter; ground stations are not told
 
 Faults: `silence` (seconds, sending, receiving), `lose_acks` (command, count), `delay_acks` (command, count,
 seconds), `foreign_ack` (command, count, result, system, component), `refuse` (command, count, result, text),
@@ -52,6 +53,7 @@ class Control:
             "clear": self._clear,
             "state": self._state,
             "received": self._received,
+            "parameter": self._parameter,
         }
         self._faults: dict[str, Callable[[Mapping[str, Any]], None]] = {
             "silence": self._silence,
@@ -180,6 +182,11 @@ class Control:
             "servos": vehicle.servos.driven(_IDLE),
             "mission": {"items": len(vehicle.mission.items), "current": vehicle.mission.current},
         }
+
+    def _parameter(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        if self._simulator.parameters.set(str(request["name"]), float(request["value"])) is None:
+            raise FaultError(f"the vehicle has no parameter {request['name']}")
+        return {}
 
     def _received(self, request: Mapping[str, Any]) -> dict[str, Any]:
         since, heartbeats = int(request.get("since", 0)), bool(request.get("heartbeats", False))

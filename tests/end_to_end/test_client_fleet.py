@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import sys
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
 
@@ -11,8 +10,8 @@ import pytest
 
 from mavproxy_uavapi.client import Fleet, Ned, connect, connect_fleet
 from mavproxy_uavapi.core.errors import NoVehicle
-from tests.support.ports import free_instance, free_port
-from tests.support.processes import HOME, Rig, load, mavproxy_command
+from tests.support.processes import Rig
+from tests.support.several_vehicles import several_vehicles
 
 SPEEDUP = 3  # the client has to keep up with it
 
@@ -20,20 +19,8 @@ SPEEDUP = 3  # the client has to keep up with it
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
     """Two copters, 1 and 2, behind one MAVProxy."""
-    rig = Rig(tmp_path_factory.mktemp("fleet"), free_port())
-    try:
-        first = free_instance(2)
-        for system in (1, 2):
-            instance = first + system - 1
-            command = [sys.executable, "-m", "mavproxy_uavapi.sim", f"--instance={instance}", f"--home={HOME}"]
-            vehicle = rig.start(f"copter{system}", [*command, f"--sysid={system}", f"--speedup={SPEEDUP}"])
-            vehicle.says("listening on tcp")
-        rig.mavproxy = rig.start("mavproxy", mavproxy_command([first, first + 1], load(rig.port)))
-        rig.wait_until_up(120)
-        rig.eventually(lambda: len(rig.ok(rig.get("/vehicles"))["vehicles"]) == 2, 60, "two vehicles")
+    with several_vehicles(tmp_path_factory.mktemp("fleet"), (1, 2), speedup=SPEEDUP) as (rig, _):
         yield rig
-    finally:
-        rig.stop()
 
 
 @asynccontextmanager

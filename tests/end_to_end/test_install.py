@@ -115,7 +115,9 @@ def test_mavproxy_and_all_three_modules_start_with_the_lean_set_alone(lean_pytho
     try:
         instance = harness.start_embedded(rig, speedup=2)
         loads = [harness.load(rig.port), '--cmd=module load vision:{"source":"sim"}', "--cmd=module load gradys"]
-        rig.mavproxy = rig.start("mavproxy", [str(lean_python), *harness.mavproxy_command(instance, *loads)[1:]])
+        rig.mavproxy = rig.start(
+            "mavproxy", [str(lean_python), *harness.mavproxy_command(instance, *loads, logs=True)[1:]]
+        )
         rig.wait_until_up()
         assert rig.get("/docs").status_code == 200
         harness.eventually(lambda: rig.ok(rig.get("/vision/status"))["info"]["camera"] == "ok", what="a picture")

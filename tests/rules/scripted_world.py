@@ -159,7 +159,7 @@ class ScriptedWorld:
         self._runner = web.ServerRunner(self.loop.run(make_server(self.service)))
         self.loop.run(self._runner.setup())
         self.drone.power_on()
-        self._watch = self.loop.create_task(StreamRequester(self.host.registry, 0).run())
+        self._watch = self.loop.create_task(StreamRequester(self.host.registry).run())
         self.loop.pass_time(0.6)
 
     # -- the link -------------------------------------------------------------------------------------------

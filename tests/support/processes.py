@@ -30,6 +30,10 @@ MAVPROXY = [sys.executable, str(SCRIPTS / "mavproxy.py")]
 HOME = "-35.363261,149.165230,584,353"
 SPEEDUP = 10
 STREAM_RATE = 1  # Hz of the vehicle's clock, which is 10 of ours: MAVProxy spends its time on messages
+FEW_MODULES = "log,signing,wp,rally,fence,ftp,param,arm,mode,rc,misc,cmdlong,output"
+# A copter whose landings and returns are quick. It stays armed on the ground for longer than ArduPilot's 10 s, which
+# are 1 s here.
+PARAMETERS = {"LAND_SPEED": 100, "RTL_ALT": 0, "RTL_LOIT_TIME": 500, "DISARM_DELAY": 120}
 PATIENCE = 60.0  # s for a process to show what it should
 
 
@@ -217,7 +221,7 @@ class Rig:
         eventually(up, timeout, "the API's knowing its vehicle")
 
     def be_patient(self) -> None:
-        """Have it stay armed on the ground for longer than ArduPilot's 10 s, which are 1 s here."""
+        """Have ArduPilot's copter stay armed on the ground for longer than 10 s, which are 1 s here."""
         self.mavproxy.says("Received", timeout=60)  # the parameters, without which MAVProxy sets none
         self.mavproxy.type("param set DISARM_DELAY 120")
 
@@ -263,12 +267,13 @@ def mavproxy_command(instance: int | Sequence[int], *arguments: str, logs: bool 
     Args:
         instance: of the vehicle, or of each.
         arguments: further ones.
-        logs: whether MAVProxy logs telemetry, and the API its trail; that takes half of MAVProxy's processor time.
+        logs: whether MAVProxy logs telemetry, the API its trail, and all standard modules are loaded, as its users
+            have it; that takes more than half of MAVProxy's processor time.
     """
     instances = [instance] if isinstance(instance, int) else instance
     masters = [f"--master=tcp:127.0.0.1:{5760 + 10 * number}" for number in instances]
-    state = [] if logs else ["--no-state"]
-    return [*MAVPROXY, *masters, "--retries=20", f"--streamrate={STREAM_RATE}", *state, *arguments]
+    lean = [] if logs else ["--no-state", f"--default-modules={FEW_MODULES}"]
+    return [*MAVPROXY, *masters, "--retries=20", f"--streamrate={STREAM_RATE}", *lean, *arguments]
 
 
 def load(port: int, **settings: Any) -> str:
@@ -284,6 +289,9 @@ def start_embedded(rig: Rig, *arguments: str, speedup: float = SPEEDUP) -> int:
     vehicle.says("listening on tcp")
     vehicle.says("control on tcp")
     rig.control = Control(control)
+    if not any(argument.startswith("--vehicle") for argument in arguments):
+        for name, value in PARAMETERS.items():
+            rig.control.ask("parameter", name=name, value=value)
     return instance
 
 
@@ -294,7 +302,6 @@ def embedded(directory: Path, *arguments: str, speedup: float = SPEEDUP, logs: b
         instance = start_embedded(rig, *arguments, speedup=speedup)
         rig.mavproxy = rig.start("mavproxy", mavproxy_command(instance, load(rig.port, **settings), logs=logs))
         rig.wait_until_up()
-        rig.be_patient()
     except BaseException:
         rig.stop()
         raise

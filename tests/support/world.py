@@ -196,7 +196,7 @@ class World:
         for cable in self._cables:
             cable.messages()
         self.loop.run(self._runner.setup())
-        watch = StreamRequester(self.host.registry, 0)
+        watch = StreamRequester(self.host.registry)
         self._tasks = [self.loop.create_task(self._run()), self.loop.create_task(watch.run())]
         for look in self._look:
             self.loop.call_soon(look)

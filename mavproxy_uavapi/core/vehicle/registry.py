@@ -54,7 +54,7 @@ class VehicleRegistry:
         self._clock = clock
         self._envelopes = Envelopes() if envelopes is None else envelopes
         self._vehicles: dict[int, Vehicle] = {}
-        self.traffic = Traffic(lambda: [self.find(system) for system in self._fleet.vehicles])
+        self.traffic = Traffic(self.all)
 
     def resolve(self, system: int = 0) -> int:
         """That system id; for 0 MAVProxy's current one, or else the first that was heard, or 0."""
@@ -80,6 +80,10 @@ class VehicleRegistry:
             )
             vehicle.guard.traffic = self.traffic
         return vehicle
+
+    def all(self) -> list[Vehicle]:
+        """The vehicles that were heard so far, the first one first."""
+        return [self.find(system) for system in self._fleet.vehicles]
 
     def commandable(self, system: int = 0) -> Vehicle:
         """As `find`, and its link is alive.

@@ -1,8 +1,8 @@
 """Requests the messages that a vehicle should send but that do not arrive.
 
-MAVProxy asks every vehicle for all streams at its `streamrate`, which stays as it is. What still does not arrive
-(EXTENDED_SYS_STATE is in no stream; a stream rate may be 0) is requested with SET_MESSAGE_INTERVAL, and again when it
-stops.
+MAVProxy asks every vehicle for all streams at its `streamrate`, which stays as it is; a vehicle that it hears later
+than the first is asked up to 15 s later. What does not arrive (EXTENDED_SYS_STATE is in no stream; a stream rate may
+be 0) is requested with SET_MESSAGE_INTERVAL, and again when it stops.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import contextlib
 from collections import defaultdict
 
 from mavproxy_uavapi.core.errors import UavApiError
+from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.vehicle.messages import MESSAGE_IDS, set_interval
 from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
@@ -39,24 +40,34 @@ AT_ONCE = IN_GUIDED | {"EXTENDED_SYS_STATE"}  # requested without waiting for MA
 
 
 class StreamRequester:
-    """Watches what arrives from the vehicle that the API flies.
+    """Watches what arrives from each vehicle that MAVProxy hears.
 
     Args:
         registry: the vehicles.
-        system: the system id to watch; 0 is MAVProxy's current one.
     """
 
-    def __init__(self, registry: VehicleRegistry, system: int) -> None:
+    def __init__(self, registry: VehicleRegistry) -> None:
         self._registry = registry
-        self._system = system
         self._watched_since: dict[tuple[int, int], float] = {}  # by system id and number of reboots
         self._asked_at: defaultdict[tuple[int, int, str], list[float]] = defaultdict(list)
 
     async def run(self) -> None:
-        """Look every few seconds, until cancelled."""
+        """Watch, until cancelled."""
+        watched: set[int] = set()
+        tasks = HeldTasks()  # one for each vehicle: one that does not acknowledge delays no other
+        try:
+            while True:
+                for system in {vehicle.state.system for vehicle in self._registry.all()} - watched:
+                    watched.add(system)
+                    tasks.start(self._watch(system), f"the watch over the telemetry of vehicle {system}")
+                await asyncio.sleep(LOOK_EVERY)
+        finally:
+            await tasks.end()
+
+    async def _watch(self, system: int) -> None:
         while True:
-            with contextlib.suppress(UavApiError):  # no vehicle, or its link is lost: nothing can be requested
-                await self.look(self._registry.commandable(self._system))
+            with contextlib.suppress(UavApiError):  # its link is lost, or it refuses: nothing can be requested
+                await self.look(self._registry.commandable(system))
             await asyncio.sleep(LOOK_EVERY)
 
     async def look(self, vehicle: Vehicle) -> None:

@@ -25,7 +25,7 @@ def watch(loop: Any, registry: Any) -> Any:
 
     def watch(seconds: float) -> None:
         if not tasks:
-            tasks.append(loop.create_task(StreamRequester(registry, 0).run()))
+            tasks.append(loop.create_task(StreamRequester(registry).run()))
         loop.pass_time(seconds)
         assert not tasks[0].done()
 
@@ -99,6 +99,17 @@ def test_nothing_is_requested_while_the_link_is_lost_and_all_again_when_it_is_ba
     drone.power_on()
     watch(2 * LOOK_EVERY)
     assert MESSAGE_IDS["VFR_HUD"] in {number for number, _ in requested(drone)[before:]}
+
+
+def test_each_vehicle_is_watched_and_one_that_is_silent_to_commands_delays_no_other(
+    loop: Any, watch: Any, make_drone: Any
+) -> None:
+    deaf, other = make_drone(1), make_drone(2)
+    for drone in (deaf, other):
+        drone.mute |= {"VFR_HUD", "ATTITUDE"}
+    deaf.on_send = lambda *_: None
+    watch(6.0)
+    assert {number for number, _ in requested(other)} == {MESSAGE_IDS["VFR_HUD"], MESSAGE_IDS["ATTITUDE"]}
 
 
 def test_watch_waits_for_the_first_vehicle(loop: Any, host: Any, watch: Any, make_drone: Any) -> None:

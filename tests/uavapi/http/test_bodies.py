@@ -106,8 +106,16 @@ def test_stranger_cannot_make_the_server_swallow_an_endless_body(drone: Any, por
     assert port.run(act) < 20_000_000
 
 
-@pytest.mark.parametrize("path", [route.path for route in ROUTES if "POST" in route.methods])
-@pytest.mark.parametrize("kind", ["application/json", "multipart/form-data; boundary=b", "text/plain"])
+JSON = "application/json"
+SLOW_BODIES = [(route.path, JSON) for route in ROUTES if "POST" in route.methods]
+SLOW_BODIES += [
+    (path, kind)
+    for path in ("/movement/drive", "/mission/upload-script", "/mission/waypoints")  # as JSON, a form, any bytes
+    for kind in ("multipart/form-data; boundary=b", "text/plain")
+]
+
+
+@pytest.mark.parametrize(("path", "kind"), SLOW_BODIES)
 def test_body_that_comes_byte_by_byte_is_waited_for_so_long_and_no_longer(
     flying: Any, port: Port, loop: Any, path: str, kind: str
 ) -> None:

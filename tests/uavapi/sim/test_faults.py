@@ -271,9 +271,16 @@ def test_what_was_received_is_reported_by_index(control):
         '{"op": "fault", "name": "drop", "message": "NOPE"}',
         '{"op": "fault", "name": "other_station", "position": [1, 2, 3]}',
         '{"op": "fault", "name": "other_station"}',
+        '{"op": "parameter", "name": "NOPE", "value": 1}',
+        '{"op": "parameter", "name": "LAND_SPEED"}',
     ],
 )
 def test_nonsense_is_answered_with_an_error(control, line):
     answer = json.loads(control._control.handle_line(line))
     assert answer["ok"] is False
     assert answer["error"]
+
+
+def test_a_parameter_is_set(control):
+    assert control.ask(op="parameter", name="LAND_SPEED", value=100)["ok"]
+    assert control.ground.simulator.parameters["LAND_SPEED"] == 100

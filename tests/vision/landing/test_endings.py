@@ -108,7 +108,7 @@ def test_what_follows_a_flight_is_what_the_table_says(lockstep, name, end):
     began = height(rig)
     rig.pass_time(0.3)
     mark = len(rig.wire.sent)
-    rig.pass_time(12.0)
+    rig.pass_time(12.0 if end == "silence" else 5.0)
     if mode not in ("LAND", "RTL"):  # else it has landed, or not yet
         assert rig.simulator.copter.armed == (end != "disarm")
     if mode:
