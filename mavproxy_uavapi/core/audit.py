@@ -9,7 +9,7 @@ import threading
 from collections import Counter, deque
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
@@ -114,7 +114,7 @@ class Audit:
         entry = entry.cut()
         self.entries.append(entry)
         log.info("%s", entry)
-        self._write(asdict(entry))
+        self._write(dict(vars(entry)))
 
     def refused(self, client: str, code: str) -> None:
         """Count a request that was refused before it became a command; the trail has an entry for it within a minute.

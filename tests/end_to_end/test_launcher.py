@@ -28,7 +28,7 @@ def station():
 @pytest.fixture(params=["embedded", pytest.param("ardupilot", marks=pytest.mark.sitl)])
 def launched(request, harness, station, tmp_path):
     port = free_port()
-    command = [str(harness.SCRIPTS / "mavproxy-uavapi"), "--simulated", "true", "--speedup", "10"]
+    command = [str(harness.SCRIPTS / "mavproxy-uavapi"), "--simulated", "true", "--speedup", "3"]
     command += ["--port", str(port), "--sysid", "42", "--log_path", str(tmp_path)]
     command += [
         "--location",
