@@ -20,29 +20,28 @@ from mavproxy_uavapi.core.values import is_unset
 
 Network = ipaddress.IPv4Network | ipaddress.IPv6Network
 
-# Keys of the original service's or the launcher's INI file that are not settings of the module, with the reason; each
-# is reported in a line.
-LAUNCHERS = "`mavproxy-uavapi --config` starts simulated vehicles"
-_OF_API = {
+# The sections of the original service and the launcher. A key may stand in any of them, as there.
+SECTIONS = ("api", "mode", "udp", "simulated", "logs")
+# Keys in them that are not settings of the module, with the reason; each is reported in a line.
+_LAUNCHERS = (
+    "simulated",
+    "count",
+    "vehicles",
+    "spacing",
+    "ardupilot_path",
+    "location",
+    "speedup",
+    "battery",
+    "headless",
+)
+NOT_OURS: dict[str, str] = {
     "uav_connection": "MAVProxy has the link (--master)",
     "connection_type": "MAVProxy has the link (--master)",
     "gradys_gs": "the module gradys reads it from here (`module load gradys`, with this file as its config)",
     "vehicle": "the vehicle's heartbeat gives its type",
     "udp": "there is no HTTP/3",
-}
-NOT_OURS: dict[str, dict[str, str]] = {
-    "api": _OF_API,
-    "mode": {**_OF_API, "simulated": LAUNCHERS},
-    "udp": _OF_API,
-    "simulated": {
-        "simulated": LAUNCHERS,
-        "ardupilot_path": LAUNCHERS,
-        "location": LAUNCHERS,
-        "speedup": LAUNCHERS,
-        "headless": LAUNCHERS,
-        "gs_connection": "MAVProxy forwards to ground stations (--out)",
-    },
-    "logs": {},
+    "gs_connection": "MAVProxy forwards to ground stations (--out)",
+    **dict.fromkeys(_LAUNCHERS, "`mavproxy-uavapi --config` starts simulated vehicles"),
 }
 # Settings for which an API must listen again: its address, its vehicle, and the access.
 ACCESS = ("token", "tokens", "allow_from", "allow_scripts_from", "allow_open", "cors_origins")
@@ -329,12 +328,12 @@ class ApiModuleSettings(ModuleSettings[ApiSettings]):
         Raises:
             SettingError: a key is unknown.
         """
-        for section, not_ours in NOT_OURS.items():
-            names = [] if section == "simulated" else self.names()
+        names = self.names()
+        for section in SECTIONS:
             for key, text in ini.section(section).items():
                 if key in names:
                     yield key, text
-                elif key not in not_ours:
-                    raise ini.no_key(section, key, [*names, *not_ours])
+                elif key not in NOT_OURS:
+                    raise ini.no_key(section, key, [*names, *NOT_OURS])
                 elif not is_unset(text):
-                    self.notes.append(f"{ini.file}: {key} is ignored here, {not_ours[key]}")
+                    self.notes.append(f"{ini.file}: {key} is ignored here, {NOT_OURS[key]}")

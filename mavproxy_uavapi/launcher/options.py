@@ -21,7 +21,7 @@ from mavproxy_uavapi.core.settings import CONFIG_VARIABLE, ENVIRONMENT
 from mavproxy_uavapi.core.values import boolean, is_unset
 from mavproxy_uavapi.launcher import values
 from mavproxy_uavapi.launcher.errors import OptionError
-from mavproxy_uavapi.settings import ApiModuleSettings
+from mavproxy_uavapi.settings import SECTIONS, ApiModuleSettings
 from mavproxy_vision import opencv_install
 
 
@@ -133,7 +133,6 @@ TABLE = (
     Row("script_logs", "logs", path, "directory for the output of uploaded scripts"),
 )
 VARIABLES = {f"UAVAPI_{row.name.upper()}": row for row in TABLE}
-SECTIONS = ("api", "mode", "udp", "simulated", "logs")  # of the INI file; the other sections belong to modules
 
 
 class _Parser(argparse.ArgumentParser):
@@ -268,7 +267,7 @@ def _modules_configs(ini: IniFile, environ: Mapping[str, str]) -> dict[str, str]
 
 def _read_section(ini: IniFile, section: str) -> dict[str, Any]:
     rows = {row.name: row for row in TABLE}
-    further = [] if section == "simulated" else [name for name in ApiModuleSettings.names() if name not in rows]
+    further = [name for name in ApiModuleSettings.names() if name not in rows]
     section_values = {}
     for key, text in ini.section(section).items():
         if key in further or (key == "udp" and not _read_udp(ini.file, text)):

@@ -6,7 +6,8 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.core.errors import SettingError
-from mavproxy_uavapi.settings import ApiModuleSettings
+from mavproxy_uavapi.launcher import options
+from mavproxy_uavapi.settings import SECTIONS, ApiModuleSettings
 
 
 @pytest.fixture
@@ -68,7 +69,7 @@ def test_ini_file_of_the_original_service_loads(ini: Any) -> None:
     ("text", "words"),
     [
         ("[api]\nprot = 1\n", "no key 'prot' in \\[api\\]"),
-        ("[simulated]\nport = 1\n", "no key 'port' in \\[simulated\\]; there are simulated, ardupilot_path"),
+        ("[simulated]\nspedup = 1\n", "no key 'spedup' in \\[simulated\\]; did you mean speedup\\?"),
         ("[apy]\nport = 1\n", "no section \\[apy\\]; did you mean api\\?"),
         ("[api]\nport = high\n", "it takes a whole number"),
         ("[api]\nhost = 0.0.0.0\n", "everybody on that network"),
@@ -79,6 +80,18 @@ def test_file_that_means_nothing_is_refused_in_one_line(ini: Any, text: str, wor
     with pytest.raises(SettingError, match=words) as caught:
         ApiModuleSettings({"config": ini(text)})
     assert "\n" not in str(caught.value)
+
+
+VALUES = {"connection_type": "tcp", "vehicle": "rover", "vehicles": "copter:2", "log_console": "API", "debug": "API"}
+VALUES |= {"host": "127.0.0.1", "gradys_gs": "127.0.0.1:5000", "location": "AbraDF", "uav_connection": "127.0.0.1:1"}
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+@pytest.mark.parametrize("row", options.TABLE, ids=lambda row: row.name)
+def test_key_of_the_launcher_is_read_by_both_in_any_section(ini: Any, row: Any, section: str) -> None:
+    file = ini(f"[{section}]\n{row.name} = {VALUES.get(row.name, '1')}\n")
+    assert row.name in options.read_ini(Path(file), {})
+    ApiModuleSettings({"config": file}, environ={})
 
 
 def test_each_key_that_is_ignored_is_reported_in_one_line(ini: Any) -> None:
