@@ -70,7 +70,7 @@ class Readings(Request):
         return value if not isinstance(value, dict) or "readings" in value else {"readings": [value]}
 
 
-class Since(Request):
+class RecentRequest(Request):
     """`since`: s since 1970; only later readings are answered."""
 
     since: Annotated[float, Field(ge=0, le=1e11, description="s since 1970; only later readings")] = 0.0
@@ -87,7 +87,7 @@ class GradysHandlers:
         return [
             Route("/gradys/status", self.status, Empty, WATCH),
             Route("/gradys/readings", self.readings, Readings, FLY, POST),
-            Route("/gradys/recent", self.recent, Since, WATCH),
+            Route("/gradys/recent", self.recent, RecentRequest, WATCH),
             Route("/gradys/flush", self.flush, Empty, FLY, EITHER),
             Route(VERB, self.fly_track, TrackRequest, FLY, POST, job=True),
         ]
@@ -116,7 +116,7 @@ class GradysHandlers:
 
     async def recent(self, call: Call) -> dict[str, Any]:
         """The newest numbers by device and quantity; their points are [s since 1970, value]."""
-        series = self._gradys.pipeline.recent.report(call.params(Since).since)
+        series = self._gradys.pipeline.recent.report(call.params(RecentRequest).since)
         return {"device": "uav", "id": self._id(call), "result": "Success", "series": series}
 
     async def fly_track(self, call: Call) -> Answer:

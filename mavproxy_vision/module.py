@@ -73,8 +73,8 @@ class VisionModule(SharedModule[VisionSettings]):
         self.flights = FlightJobs(self.tracker, self._directory)
         self._tag_view = TagView(self.tracker)
         self._background = BackgroundCommands(self.host, NAME)
-        self._pages = VisionHandlers(self.tracker, self.flights)
-        self._routes = {route.path: route for route in self._pages.routes()}
+        self._handlers = VisionHandlers(self.tracker, self.flights)
+        self._routes = {route.path: route for route in self._handlers.routes()}
         self.remembered.keep(self.module_settings.shown)
 
     # -- life ------------------------------------------------------------------------------------------------
@@ -82,7 +82,7 @@ class VisionModule(SharedModule[VisionSettings]):
     def begin(self) -> None:
         """Listen, and open the camera if one is set."""
         self.host.extensions.update(self._routes)
-        self.host.newest_frame = self._pages.newest_frame
+        self.host.newest_frame = self._handlers.newest_frame
         self.host.bridge.call_soon(self.tracker.listen)
         if self.module_settings.snapshot().source:
             self._start()
@@ -102,11 +102,11 @@ class VisionModule(SharedModule[VisionSettings]):
             self.host.extensions.pop(path, None)
         self.host.newest_frame = None
         try:
-            self._abandon()
+            self._abort_all()
         finally:
             super().unload()
 
-    def _abandon(self) -> None:
+    def _abort_all(self) -> None:
         """End what is in flight."""
 
         async def abandoned() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mavproxy_uavapi.core.errors import UavApiError
-from mavproxy_uavapi.core.vehicle.geodesy import moved
+from mavproxy_uavapi.core.geodesy import moved
 from mavproxy_uavapi.core.windows import Place, View
 from mavproxy_vision.tracking.tag_watch import place_of
 from mavproxy_vision.tracking.tracker import Tracker

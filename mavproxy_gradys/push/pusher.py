@@ -17,6 +17,7 @@ from mavproxy_gradys.push import position_update
 from mavproxy_gradys.push.statistics import StationTally, VehicleTally
 from mavproxy_gradys.settings import GradysSettings
 from mavproxy_uavapi.core.errors import Unavailable
+from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.timeout import wait_with_timeout
@@ -45,7 +46,8 @@ class Pusher:
         self._host = host
         self._settings = settings
         self._poster = poster
-        self._in_flight: dict[int, asyncio.Task[None]] = {}
+        self._tasks = HeldTasks()
+        self._in_flight: set[int] = set()  # system ids
         self._names = Resolver()
         self._outage = Outage(log, f"{station.url} does not answer", f"{station.url} answers again")
         self._refusals: dict[int, Outage] = {}
@@ -61,9 +63,7 @@ class Pusher:
                 await asyncio.sleep(ticker.wait(loop.time()))
                 self.turn()
         finally:
-            for task in list(self._in_flight.values()):
-                task.cancel()
-            await asyncio.gather(*self._in_flight.values(), return_exceptions=True)
+            await self._tasks.end()
             await self.close()
 
     async def close(self) -> None:
@@ -88,9 +88,9 @@ class Pusher:
                 self._begin(state, vehicle)
 
     def _begin(self, state: VehicleState, vehicle: VehicleTally) -> None:
-        task = asyncio.get_running_loop().create_task(self._push(state, vehicle))
-        self._in_flight[state.system] = task
-        task.add_done_callback(lambda _: self._in_flight.pop(state.system, None))
+        self._in_flight.add(state.system)
+        task = self._tasks.start(self._push(state, vehicle), f"the update of vehicle {state.system}")
+        task.add_done_callback(lambda _: self._in_flight.discard(state.system))
 
     def _position(self, state: VehicleState, vehicle: VehicleTally) -> Position | None:
         """The vehicle's position; None if it is unknown or too old, and then the tally has the reason."""

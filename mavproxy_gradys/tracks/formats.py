@@ -20,7 +20,7 @@ from typing import Any
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import Invalid
-from mavproxy_uavapi.core.vehicle.geodesy import offset
+from mavproxy_uavapi.core.geodesy import offset
 
 TEXT, TUPLE, GPX = "text", "tuple", "gpx"
 FORMATS = (TEXT, TUPLE, GPX)

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import overload
 
-from mavproxy_uavapi.core.vehicle.geodesy import METRES_PER_DEGREE, offset
+from mavproxy_uavapi.core.geodesy import METRES_PER_DEGREE, offset
 
 
 @dataclass(frozen=True)

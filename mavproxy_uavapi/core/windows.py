@@ -9,8 +9,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from mavproxy_uavapi.core.geodesy import offset
 from mavproxy_uavapi.core.mainloop.bridge import Bridge
-from mavproxy_uavapi.core.vehicle.geodesy import offset
 
 PERIOD = 1.0  # s
 ROW = 4  # of the console's status lines; MAVProxy uses those from 0 to 3

@@ -16,6 +16,7 @@ from aiohttp import web
 from mavproxy_uavapi.core.errors import BadRequest, Forbidden, Invalid, NotSupported, TooManyRequests
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.timeout import wait_with_timeout
+from mavproxy_uavapi.core.values import boolean
 from mavproxy_uavapi.core.vehicle.copter import Copter
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
@@ -36,8 +37,6 @@ log = logging.getLogger("uavapi.http.server")
 R = TypeVar("R", bound=Request)
 T = TypeVar("T")
 
-WAITS = {"true", "1", "yes"}  # values of the query's `wait`
-HURRIES = {"false", "0", "no"}
 LONGEST_LEASE = 3600.0  # s
 CLIENT_NAME = re.compile(r"[\w.:-]{1,64}", re.ASCII)  # the query's `client`
 ON_DISCONNECT = {"continue": "nothing", "hold": "hold"}  # the query's `on_disconnect`: the policy's value
@@ -288,10 +287,11 @@ class Call:
     def is_async(self) -> bool:
         """Whether the client wants the job's number instead of its outcome."""
         prefers = self.request.headers.get("Prefer", "").replace(" ", "").lower().split(",")
-        wait = self.request.query.get("wait", "true").lower()
-        if wait not in WAITS | HURRIES:
-            raise Invalid(f"{wait!r} is neither true nor false", "query", "wait")
-        return wait in HURRIES or "respond-async" in prefers
+        wait = self.request.query.get("wait", "true")
+        try:
+            return not boolean(wait) or "respond-async" in prefers
+        except ValueError as error:
+            raise Invalid(f"{wait!r} is neither true nor false", "query", "wait") from error
 
     @property
     def on_disconnect(self) -> str | None:

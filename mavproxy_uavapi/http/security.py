@@ -87,8 +87,7 @@ def check_page(headers: Mapping[str, str], trusted: tuple[str, ...] = ()) -> Non
         raise Forbidden(f"a page of {page} may not command the vehicle")
     if is_browser(headers):
         raise Forbidden(
-            "a browser that does not say for which page cannot command the vehicle; call by a program, from /docs, "
-            "with the token, or by https"
+            "the browser does not name the page that sends this command; use a program, /docs, the token, or https"
         )
 
 

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mavproxy_uavapi.core.errors import BadRequest, NoVehicle, ToolFailed
+from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.roles import Role
 from mavproxy_uavapi.scripts import aerpaw, clients, names, on_exit, runner, runs, tmux
@@ -41,7 +42,8 @@ class Scripts:
         self._host = host
         self.renew(settings)
         self._watched: dict[str, Run] = {}
-        self._watches: dict[str, asyncio.Task[None]] = {}
+        self._tasks = HeldTasks()
+        self._watches: dict[str, asyncio.Task[None]] = {}  # by session
         self._launching = asyncio.Lock()
         self._trusted: dict[str, Run] = {}  # by session: those that have begun, from before their first call
 
@@ -78,10 +80,7 @@ class Scripts:
 
     async def stop(self) -> None:
         """Stop watching. The scripts go on."""
-        watches = list(self._watches.values())
-        for watch in watches:
-            watch.cancel()
-        await asyncio.gather(*watches, return_exceptions=True)
+        await self._tasks.end()
 
     # -- verbs --------------------------------------------------------------------------------------------
 
@@ -243,7 +242,7 @@ class Scripts:
 
     def _watch(self, run: Run) -> None:
         self._watched[run.session] = self._trusted_run(run)
-        self._watches[run.session] = asyncio.create_task(self._until_ended(run))
+        self._watches[run.session] = self._tasks.start(self._until_ended(run), f"the watch over {run.script}")
 
     async def _until_ended(self, run: Run) -> None:
         try:
@@ -257,13 +256,7 @@ class Scripts:
             self._watches.pop(run.session, None)
         log.info("%s ended with status %s", run.script, run.exit_status)
         if run.died:
-            self._keep(asyncio.create_task(self._after_death(run)))
-
-    def _keep(self, task: asyncio.Task[None]) -> None:
-        """Keep a reference to a task until it is done; asyncio itself keeps a weak one."""
-        name = f"after {id(task)}"
-        self._watches[name] = task
-        task.add_done_callback(lambda _: self._watches.pop(name, None))
+            self._tasks.start(self._after_death(run), f"what follows the death of {run.script}")
 
     async def _after_death(self, run: Run) -> None:
         others = [other.script for other in self._watched.values() if other.sysid in (0, run.sysid)]

@@ -41,7 +41,7 @@ class DetectorOptions:
     """Options of the detector.
 
     Attributes:
-        families: names from `tags.FAMILIES`.
+        families: names from `tag_layout.FAMILIES`.
         sizes: side of the black square (m) by id.
         any_id: look for all ids, not only those in `sizes`; slower, and 16h5 gives false detections then.
         far: also look at the enlarged frame: a fifth more range for a third more time.

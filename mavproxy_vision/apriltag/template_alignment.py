@@ -1,10 +1,10 @@
 """Corners from the whole pattern of a tag that is so small that its border blurs into its payload. Pure.
 
-Lines through edge points (`corners`) need a border that is wider than the camera's blur. For a tag with less than
-four pixels per cell they lie inside the true edge: 36h11 of 0.166 m seemed 0.12 m too far at 7 m. Here the picture of
-the tag, blurred like a camera's, is fitted to the frame: the inverse compositional algorithm of Baker and Matthews,
-"Lucas-Kanade 20 Years On" (IJCV 2004), with a homography. The brightness of black, of white and of the ground around
-it is fitted too, and so is the blur.
+Lines through edge points (`corner_refinement`) need a border that is wider than the camera's blur. For a tag with
+less than four pixels per cell they lie inside the true edge: 36h11 of 0.166 m seemed 0.12 m too far at 7 m. Here the
+picture of the tag, blurred like a camera's, is fitted to the frame: the inverse compositional algorithm of Baker and
+Matthews, "Lucas-Kanade 20 Years On" (IJCV 2004), with a homography. The brightness of black, of white and of the
+ground around it is fitted too, and so is the blur.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mavproxy_uavapi.core.vehicle.geodesy import offset
+from mavproxy_uavapi.core.geodesy import offset
 
 SIDE = 900  # px
 EDGE = 80  # px

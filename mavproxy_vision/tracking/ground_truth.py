@@ -10,7 +10,7 @@ import bisect
 import math
 from dataclasses import dataclass
 
-from mavproxy_uavapi.core.vehicle.geodesy import offset
+from mavproxy_uavapi.core.geodesy import offset
 from mavproxy_vision.geometry.frames import Attitude, Vector, vector, wrap
 
 KEPT = 400  # poses

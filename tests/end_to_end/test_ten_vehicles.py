@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 import requests
 
-from mavproxy_uavapi.core.vehicle.geodesy import offset
+from mavproxy_uavapi.core.geodesy import offset
 from tests.support.ground_station import Recorder
 from tests.support.ports import free_port
 from tests.support.processes import SCRIPTS, Rig, eventually

@@ -13,12 +13,12 @@ import pytest
 ROOT = Path(__file__).parents[2]
 UAVAPI, VISION, GRADYS = "mavproxy_uavapi", "mavproxy_vision", "mavproxy_gradys"
 CORE, SIMULATOR, EXTENSION = f"{UAVAPI}.core", f"{UAVAPI}.sim", f"{UAVAPI}.http.extension"
-CLIENT, AERPAW = f"{UAVAPI}.client", f"{UAVAPI}.aerpaw"
+CLIENT, AERPAW, LAUNCHER = f"{UAVAPI}.client", f"{UAVAPI}.aerpaw", f"{UAVAPI}.launcher."
 # What a program at the other end of HTTP shares with the server: no state, no thread, no link.
-PURE = [f"{CORE}.{name}" for name in ("errors", "timeout", "mavlink.flight_modes", "vehicle.geodesy", "envelope.kml")]
+PURE = [f"{CORE}.{name}" for name in ("errors", "timeout", "mavlink.flight_modes", "geodesy", "envelope.kml")]
 # The rooms of each package, from the one that stands on no other to the one on top.
 FLOORS = {
-    CORE: ("mainloop", "mavlink", "vehicle"),
+    CORE: ("envelope", "mainloop", "mavlink", "vehicle"),
     VISION: ("geometry", "apriltag", "camera", "tracking", "landing"),
 }
 
@@ -78,6 +78,10 @@ def test_no_import_makes_a_circle() -> None:
 
 def test_core_imports_nothing_but_core() -> None:
     assert crossings(CORE) == []
+
+
+def test_uavapi_imports_the_other_modules_in_its_launcher_only() -> None:
+    assert [line for line in crossings(UAVAPI) if not line.startswith(LAUNCHER)] == []
 
 
 @pytest.mark.parametrize("package", [VISION, GRADYS])

@@ -8,7 +8,7 @@ from collections import defaultdict
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from mavproxy_uavapi.core.vehicle.geodesy import offset
+from mavproxy_uavapi.core.geodesy import offset
 
 SIMSTATE = int(mavlink.MAVLINK_MSG_ID_SIMSTATE)
 LONGEST = 2048

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.core.vehicle.geodesy import moved
+from mavproxy_uavapi.core.geodesy import moved
 from mavproxy_vision.window_view import TagView
 from tests.support.landing import SMALL, TAG
 

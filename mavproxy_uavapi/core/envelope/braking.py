@@ -1,7 +1,7 @@
 """How far a vehicle goes before it stands. Pure.
 
-The law is ArduCopter's: a limit for the deceleration, another for how fast it builds up (jerk). What follows from it
-is longer than the shortest way by the share in hand that a controller keeps (SHARE).
+The law is ArduCopter's: a limit for the deceleration, another for how fast it builds up (jerk). A controller uses
+only SHARE of the limit, so braking takes longer than physics requires.
 """
 
 from __future__ import annotations
@@ -100,8 +100,8 @@ def _values(parameters: Mapping[str, float]) -> list[float]:
 def overshoot(braking: Braking, speed: float, acceleration: float, seconds: float, corridor: float) -> float:
     """Metres by which a stopped vehicle may pass a border over the ground: the bound of the model.
 
-    The model looks at the speed that was told. For `seconds` after it the vehicle may gather more, outwards; and
-    beside a way that was allowed nothing is stopped within `corridor` m.
+    The model looks at the last reported speed. For `seconds` after it the vehicle may gather more, outwards. No
+    vehicle is stopped within `corridor` m of an allowed way.
 
     Args:
         braking: how it stops.

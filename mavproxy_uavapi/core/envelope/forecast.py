@@ -111,12 +111,13 @@ def _leg(a: Spot, b: Spot, pace: Pace) -> tuple[float, float]:
 def meeting(ours: Forecast, theirs: Forecast, distance: float) -> Meeting | None:
     """Where two come nearer than `distance` m first; None where they do not.
 
-    Two that are nearer already may do anything but come nearer still.
+    If the two are nearer than `distance` already, only a further approach counts.
     """
     if not len(ours.points) or not len(theirs.points):
         return None
     gaps = np.linalg.norm(ours.points[:, None, :] - theirs.points[None, :, :], axis=2)
-    between = math.hypot(distance, (ours.apart + theirs.apart) / 2)  # so far may two points be, and the ways nearer
+    # Points this far apart may lie on ways that are nearer.
+    between = math.hypot(distance, (ours.apart + theirs.apart) / 2)
     limit = min(between, float(gaps[0, 0]) - 1e-6)
     together = (ours.early[:, None] <= theirs.late[None, :]) & (theirs.early[None, :] <= ours.late[:, None])
     near = (gaps < limit) & together

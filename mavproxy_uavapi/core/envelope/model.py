@@ -75,7 +75,7 @@ class Limits:
             if value is not None and not (_is_number(value) and value > 0):
                 raise Invalid(f"{value!r} is no positive number", "limits", name)
         if (values.get("reserve") or 0) > 100:
-            raise Invalid(f"{values['reserve']} % is more than all", "limits", "reserve")
+            raise Invalid(f"{values['reserve']} %; at most 100 % is possible", "limits", "reserve")
         return cls(**{name: None if value is None else float(value) for name, value in values.items()})
 
     def report(self) -> dict[str, float]:

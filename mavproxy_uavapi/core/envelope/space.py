@@ -20,11 +20,11 @@ from shapely.geometry import LineString, Point, Polygon
 
 from mavproxy_uavapi.core.envelope.model import LARGEST, Area, Envelope, Place
 from mavproxy_uavapi.core.errors import Invalid
-from mavproxy_uavapi.core.vehicle.geodesy import METRES_PER_DEGREE
+from mavproxy_uavapi.core.geodesy import METRES_PER_DEGREE
 
 QUARTER = 64  # corners of a quarter of a circle
 SAFE_RADIUS = 1.0 / math.cos(math.pi / (4 * QUARTER))  # times the radius: a polygon around the circle, not in it
-TOUCH = 0.02  # m: a way that lies outside for less than that does not; 1e-7 degrees, what MAVLink tells, are 0.01
+TOUCH = 0.02  # m: a shorter part outside does not count; MAVLink's 1e-7 degrees are 0.01 m
 Span = tuple[float, float]  # of a way, by its parameter: point number plus the share of the leg after it
 
 

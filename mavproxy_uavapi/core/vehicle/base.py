@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import ModeChanged, NotArmed, Rejected, Stale, Superseded
+from mavproxy_uavapi.core.geodesy import offset
 from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission, kind_of, mode_name, mode_names, mode_number
 from mavproxy_uavapi.core.mavlink.link import Address, Link, is_finite
 from mavproxy_uavapi.core.mavlink.pending_waits import PendingWaits
@@ -20,7 +21,6 @@ from mavproxy_uavapi.core.vehicle.authority import CommandAuthority
 from mavproxy_uavapi.core.vehicle.command_sender import CommandSender
 from mavproxy_uavapi.core.vehicle.dataflash import DataflashLogs
 from mavproxy_uavapi.core.vehicle.envelope_check import Spaces
-from mavproxy_uavapi.core.vehicle.geodesy import offset
 from mavproxy_uavapi.core.vehicle.guard import STOPPING, EnvelopeGuard, GuardedLink
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.message_waiter import MessageWaiter

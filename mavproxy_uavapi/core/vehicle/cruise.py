@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from mavproxy_uavapi.core.geodesy import offset
 from mavproxy_uavapi.core.vehicle import time_limits
-from mavproxy_uavapi.core.vehicle.geodesy import offset
 from mavproxy_uavapi.core.vehicle.mission_way import Stop
 from mavproxy_uavapi.core.vehicle.speeds import Speeds
 

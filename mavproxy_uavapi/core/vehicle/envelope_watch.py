@@ -1,7 +1,7 @@
-"""In flight: a vehicle under our command that will leave its envelope in the time that it needs to stop is stopped.
+"""Stops a vehicle under our command before it leaves its envelope, or comes too near to another vehicle.
 
-So is one that will come too near to another; of two of ours that with the lower rank, or else the later command. One
-under the pilot's hand is never touched, nor one that lands, returns or holds.
+Of two vehicles under our command it stops the one with the lower rank; if the ranks are equal, the one with the later
+command. It never touches a vehicle that its pilot flies, nor one that lands, returns or holds.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from mavproxy_uavapi.core.envelope.forecast import Meeting
 from mavproxy_uavapi.core.envelope.space import TOUCH, Breach, Space, Spot, outside_by
 from mavproxy_uavapi.core.envelope.store import Envelopes
 from mavproxy_uavapi.core.errors import OutsideEnvelope, Stale, TooNear, UavApiError
+from mavproxy_uavapi.core.geodesy import moved
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle import time_limits
 from mavproxy_uavapi.core.vehicle.authority import Rank
-from mavproxy_uavapi.core.vehicle.geodesy import moved
 from mavproxy_uavapi.core.vehicle.jobs import Ending, Job, JobBook
 from mavproxy_uavapi.core.vehicle.mission_way import Stop
 from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry

@@ -14,11 +14,11 @@ from typing import Any, NamedTuple
 from mavproxy_uavapi.core.envelope import braking
 from mavproxy_uavapi.core.envelope.space import LocalFrame, Space, Spot, to_leg
 from mavproxy_uavapi.core.errors import OutsideEnvelope, Stale
+from mavproxy_uavapi.core.geodesy import moved, offset, rotate
 from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission, mode_name
 from mavproxy_uavapi.core.mavlink.link import Address, Link
 from mavproxy_uavapi.core.vehicle import orders
 from mavproxy_uavapi.core.vehicle.envelope_check import Checked, EnvelopeCheck, Spaces
-from mavproxy_uavapi.core.vehicle.geodesy import moved, offset, rotate
 from mavproxy_uavapi.core.vehicle.messages import NedTarget
 from mavproxy_uavapi.core.vehicle.mission_files import MissionItem
 from mavproxy_uavapi.core.vehicle.mission_way import Stop
@@ -124,7 +124,7 @@ class EnvelopeGuard:
         self.take_up(Ordered(way, not isinstance(order, orders.Fly), self._vehicle.clock()))
         return before
 
-    def _way_by(self, order: orders.Order) -> list[Stop]:
+    def _way_by(self, order: orders.VehicleOrder) -> list[Stop]:
         """The way that an order leads along, as far as it is known. Raises Stale."""
         if self.in_force and isinstance(order, orders.GoTo | orders.Climb):
             return self._way_of(order)
@@ -176,7 +176,7 @@ class EnvelopeGuard:
             sentence = f"the target is {distance / 1000:.0f} km away; {REACH / 1000:g} km are the most"
             raise OutsideEnvelope(sentence, {"what": "the reach of any vehicle", "by": round(distance - REACH)})
 
-    def _require_order(self, order: orders.Order) -> None:
+    def _require_order(self, order: orders.VehicleOrder) -> None:
         if isinstance(order, orders.GoTo | orders.Climb):
             self._require_place(order)
         elif isinstance(order, orders.Fly):
@@ -190,12 +190,12 @@ class EnvelopeGuard:
                 self._require_checked_mission()
         elif isinstance(order, orders.SetParameter):
             if order.name.startswith(PROTECTED):
-                raise OutsideEnvelope(f"{order.name} decides where the vehicle flies by itself: not with an envelope")
+                raise OutsideEnvelope(f"{order.name} decides where the autopilot flies; an envelope is in force")
         elif isinstance(order, orders.ChangeMission):
             return  # no vehicle flies it before it was looked at
         elif isinstance(order, orders.MoveHome):
             if self._vehicle.state.armed is not False and self.check.spaces:
-                raise OutsideEnvelope("heights and distances of the envelope count from home: it stays in flight")
+                raise OutsideEnvelope("home cannot be moved in flight: the envelope is measured from it")
         else:
             raise OutsideEnvelope(f"nobody can say whether {order.name} keeps the vehicle in the envelope")
 
@@ -220,10 +220,10 @@ class EnvelopeGuard:
     def _require_checked_mission(self) -> None:
         checked = self._checked_mission
         if checked is None or checked[0] != self.check.spaces or self._vehicle.clock() - checked[1] > CHECKED_FOR:
-            raise OutsideEnvelope("the vehicle's mission was not held against the envelope; POST /mission/start does")
+            raise OutsideEnvelope("the vehicle's mission was not checked against the envelope; start it by the API")
         self._require_apart(checked[2])
 
-    def _starts_mission(self, order: orders.Order) -> bool:
+    def _starts_mission(self, order: orders.VehicleOrder) -> bool:
         if isinstance(order, orders.SwitchMode):
             return flies_mission(mode_name(self._vehicle.state.vehicle_type, order.number))
         return isinstance(order, orders.FlyMission)

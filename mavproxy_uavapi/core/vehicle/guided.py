@@ -6,13 +6,13 @@ import math
 from collections.abc import Callable
 
 from mavproxy_uavapi.core.errors import Busy, Invalid, Stale, TimedOut
+from mavproxy_uavapi.core.geodesy import moved, offset
 from mavproxy_uavapi.core.mavlink.link import Link
 from mavproxy_uavapi.core.mavlink.pending_waits import PendingWaits
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle import messages, time_limits
 from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_uavapi.core.vehicle.envelope_check import Spaces
-from mavproxy_uavapi.core.vehicle.geodesy import moved, offset
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.messages import NO_YAW, GlobalTarget, NedTarget, Target, Yaw
 from mavproxy_uavapi.core.vehicle.own_target import OwnTarget

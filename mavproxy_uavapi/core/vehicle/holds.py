@@ -1,7 +1,7 @@
 """Which operator holds a vehicle: others of the same or a lower role do not command it meanwhile, but may stop it.
 
-A hold lasts as long as its lease, which each call of its operator renews. When the lease runs out, the hold is over,
-and the vehicle is seen to if the operator still commands it. The prompt's has no lease.
+A hold lasts as long as its lease, which each call of its operator renews. When the lease runs out, the hold ends; if
+the operator still commands the vehicle, it does what `on_lease_end` says. The prompt's hold has no lease.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 
 from pymavlink import mavutil
 
-from mavproxy_uavapi.core.vehicle.geodesy import moved, offset
+from mavproxy_uavapi.core.geodesy import moved, offset
 from mavproxy_uavapi.core.vehicle.messages import GlobalTarget
 from mavproxy_uavapi.core.vehicle.mission_files import MissionItem
 

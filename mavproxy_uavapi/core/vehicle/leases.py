@@ -1,4 +1,4 @@
-"""Leases: a client that commands says for how long it is alive without a word; then its vehicle is seen to.
+"""Leases: a client promises to call again within so many seconds; else its vehicle does what `on_lease_end` says.
 
 MAVProxy's own heartbeats keep the autopilot's ground station failsafe quiet, so nobody else notices a remote program
 that died, or whose network did.

@@ -52,7 +52,7 @@ async def fly(vehicle: Vehicle, job: Job, until_complete: bool = False, timeout:
     _require_startable(vehicle)
     items = await vehicle.mission_to_fly()
     if not items:
-        raise Busy("the vehicle has no mission; POST one to /mission/waypoints")
+        raise Busy("the vehicle has no mission; upload one first")
     _require_startable(vehicle)  # the pilot may have switched it meanwhile
     vehicle.authority.take(job, Rank.ARM, lambda: vehicle.guard.require_mission(items, from_here=True))
     await begin(vehicle, job, lambda: _require_startable(vehicle))

@@ -14,7 +14,7 @@ from typing import NamedTuple
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import OutsideEnvelope
-from mavproxy_uavapi.core.vehicle.geodesy import moved
+from mavproxy_uavapi.core.geodesy import moved
 from mavproxy_uavapi.core.vehicle.mission_files import DEGREES, MissionItem
 
 mavlink = mavutil.mavlink

@@ -93,7 +93,8 @@ class Unknown:
     name: str
 
 
-Order = GoTo | Fly | Climb | ChangeSpeed | SwitchMode | FlyMission | ChangeMission | MoveHome | SetParameter | Unknown
+Movement = GoTo | Fly | Climb
+VehicleOrder = Movement | ChangeSpeed | SwitchMode | FlyMission | ChangeMission | MoveHome | SetParameter | Unknown
 SPEED_KINDS = {number: kind for kind, number in SPEED_TYPES.items()}
 ALL_IGNORED = POSITION_IGNORED | VELOCITY_IGNORED | ACCELERATION_IGNORED
 PLACE_ONLY, VELOCITY_ONLY = ALL_IGNORED & ~POSITION_IGNORED, ALL_IGNORED & ~VELOCITY_IGNORED
@@ -128,7 +129,7 @@ HARMLESS_MESSAGES = {
 }
 
 
-def order_of(message: Any) -> Order | None:
+def order_of(message: Any) -> VehicleOrder | None:
     """What a message of ours has the vehicle do; None for what moves it nowhere."""
     name = message.get_type()
     if name in READERS:
@@ -136,7 +137,7 @@ def order_of(message: Any) -> Order | None:
     return None if name in HARMLESS_MESSAGES else Unknown(name)
 
 
-def _local(message: Any) -> Order:
+def _local(message: Any) -> VehicleOrder:
     used = message.type_mask & ALL_IGNORED
     if used == PLACE_ONLY and message.coordinate_frame == mavlink.MAV_FRAME_LOCAL_NED:
         return GoTo(NedTarget(message.x, message.y, message.z))
@@ -145,25 +146,25 @@ def _local(message: Any) -> Order:
     return Unknown("that kind of setpoint")
 
 
-def _global(message: Any) -> Order:
+def _global(message: Any) -> VehicleOrder:
     if message.type_mask & ALL_IGNORED != PLACE_ONLY or message.coordinate_frame not in ABOVE_HOME:
         return Unknown("that kind of setpoint")
     return GoTo(GlobalTarget(message.lat_int / 1e7, message.lon_int / 1e7, message.alt))
 
 
-def _command(message: Any) -> Order | None:
+def _command(message: Any) -> VehicleOrder | None:
     if message.command in HARMLESS_COMMANDS:
         return None
     read = COMMANDS.get(message.command)
     return Unknown(f"command {message.command}") if read is None else read(message)
 
 
-def _speed(message: Any) -> Order:
+def _speed(message: Any) -> VehicleOrder:
     kind = SPEED_KINDS.get(int(message.param1))
     return Unknown("that kind of speed") if kind is None or message.param2 <= 0 else ChangeSpeed(kind, message.param2)
 
 
-def _reposition(message: Any) -> Order:
+def _reposition(message: Any) -> VehicleOrder:
     has_speed, has_radius = (
         message.param1 > 0,
         commanded_radius(message),
@@ -183,11 +184,11 @@ def commanded_radius(message: Any) -> float | None:
     return float(message.param3) if message.param3 > OWN_RADIUS else 0.0
 
 
-def _climb(message: Any) -> Order:
+def _climb(message: Any) -> VehicleOrder:
     return Climb(message.param7) if message.get_type() == "COMMAND_LONG" else Unknown("that kind of takeoff")
 
 
-def _item(message: Any) -> Order:
+def _item(message: Any) -> VehicleOrder:
     """An item of a mission, or with `current` 2 a place to go to now."""
     is_target = message.mission_type == mavlink.MAV_MISSION_TYPE_MISSION and message.current == GUIDED_TARGET
     if not is_target or message.command != mavlink.MAV_CMD_NAV_WAYPOINT or message.frame not in ABOVE_HOME:
@@ -196,17 +197,17 @@ def _item(message: Any) -> Order:
     return GoTo(GlobalTarget(message.x / per_degree, message.y / per_degree, message.z))
 
 
-def _mission(message: Any) -> Order:
+def _mission(message: Any) -> VehicleOrder:
     if message.mission_type != mavlink.MAV_MISSION_TYPE_MISSION or getattr(message, "current", 0):
         return Unknown("that kind of mission item")  # a fence, a rally point, an altitude for now
     return ChangeMission()
 
 
-def _parameter(message: Any) -> Order:
+def _parameter(message: Any) -> VehicleOrder:
     return SetParameter(message.param_id)
 
 
-COMMANDS: dict[int, Callable[[Any], Order]] = {
+COMMANDS: dict[int, Callable[[Any], VehicleOrder]] = {
     mavlink.MAV_CMD_NAV_TAKEOFF: _climb,
     mavlink.MAV_CMD_DO_CHANGE_SPEED: _speed,
     mavlink.MAV_CMD_DO_REPOSITION: _reposition,
@@ -215,7 +216,7 @@ COMMANDS: dict[int, Callable[[Any], Order]] = {
     mavlink.MAV_CMD_MISSION_START: lambda message: FlyMission(now=True),
     mavlink.MAV_CMD_DO_SET_MISSION_CURRENT: lambda message: FlyMission(now=False),
 }
-READERS: dict[str, Callable[[Any], Order | None]] = {
+READERS: dict[str, Callable[[Any], VehicleOrder | None]] = {
     "SET_POSITION_TARGET_LOCAL_NED": _local,
     "SET_POSITION_TARGET_GLOBAL_INT": _global,
     "COMMAND_LONG": _command,

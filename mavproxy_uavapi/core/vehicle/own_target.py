@@ -7,9 +7,9 @@ from collections import deque
 from collections.abc import Callable
 
 from mavproxy_uavapi.core.errors import Superseded
+from mavproxy_uavapi.core.geodesy import moved, offset
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle import setpoint_in_force
-from mavproxy_uavapi.core.vehicle.geodesy import moved, offset
 from mavproxy_uavapi.core.vehicle.messages import GlobalTarget, NedTarget, Target, VelocityTarget
 
 TARGET_SHOWN = 2.0  # s after a setpoint, until which telemetry does not count

@@ -20,10 +20,10 @@ from mavproxy_uavapi.core.errors import (
     TimedOut,
     TooNear,
 )
+from mavproxy_uavapi.core.geodesy import moved
 from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission
 from mavproxy_uavapi.core.vehicle import arming, landing_pattern, messages, mission_flight, time_limits
 from mavproxy_uavapi.core.vehicle.authority import Rank
-from mavproxy_uavapi.core.vehicle.geodesy import moved
 from mavproxy_uavapi.core.vehicle.guided import GUIDED, TOLERANCE, GuidedVehicle
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.messages import GlobalTarget, NedTarget

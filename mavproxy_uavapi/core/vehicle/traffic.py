@@ -15,9 +15,9 @@ from mavproxy_uavapi.core.envelope import braking
 from mavproxy_uavapi.core.envelope.forecast import Forecast, Meeting, Pace, Slack, along, meeting
 from mavproxy_uavapi.core.envelope.space import LocalFrame
 from mavproxy_uavapi.core.errors import Stale, Superseded, TooNear
+from mavproxy_uavapi.core.geodesy import moved, offset
 from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission
 from mavproxy_uavapi.core.vehicle import cruise
-from mavproxy_uavapi.core.vehicle.geodesy import moved, offset
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.mission_way import Stop
 

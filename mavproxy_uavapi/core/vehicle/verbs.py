@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from mavproxy_uavapi.core.errors import NotSupported
+from mavproxy_uavapi.core.geodesy import rotate
 from mavproxy_uavapi.core.vehicle.base import BaseVehicle
-from mavproxy_uavapi.core.vehicle.geodesy import rotate
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.messages import GlobalTarget, NedTarget, VelocityTarget
 

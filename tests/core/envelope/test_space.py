@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from mavproxy_uavapi.core.envelope.model import Area, Envelope, Limits
 from mavproxy_uavapi.core.envelope.space import TOUCH, LocalFrame, Space, Spot, outside_by, to_leg
 from mavproxy_uavapi.core.errors import Invalid
-from mavproxy_uavapi.core.vehicle.geodesy import METRES_PER_DEGREE, offset
+from mavproxy_uavapi.core.geodesy import METRES_PER_DEGREE, offset
 
 HOME = (-35.363261, 149.165230)
 FRAME = LocalFrame(HOME)

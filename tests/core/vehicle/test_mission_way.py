@@ -8,7 +8,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.errors import OutsideEnvelope
-from mavproxy_uavapi.core.vehicle.geodesy import offset
+from mavproxy_uavapi.core.geodesy import offset
 from mavproxy_uavapi.core.vehicle.mission_files import MissionItem
 from mavproxy_uavapi.core.vehicle.mission_way import Setting, Stop, ways
 

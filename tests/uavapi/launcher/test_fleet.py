@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from mavproxy_uavapi.core.vehicle.geodesy import offset
+from mavproxy_uavapi.core.geodesy import offset
 from mavproxy_uavapi.launcher import locations
 from mavproxy_uavapi.launcher.fleet import fleet, kinds
 from mavproxy_uavapi.launcher.options import RunOptions, parse

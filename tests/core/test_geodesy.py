@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from mavproxy_uavapi.core.vehicle.geodesy import METRES_PER_DEGREE, offset, rotate
+from mavproxy_uavapi.core.geodesy import METRES_PER_DEGREE, offset, rotate
 
 
 def test_a_degree_of_latitude_is_as_long_as_ardupilot_reckons() -> None:
