@@ -131,8 +131,8 @@ class Gradys:
 async def hear(host: Host, settings: GradysSettings) -> None:
     """Listen to the positions of other MAVProxys' vehicles, until cancelled."""
     try:
-        from mavproxy_gradys.nearby.listener import Listener  # noqa: PLC0415  an extra
+        from mavproxy_gradys.nearby.listener import PositionListener  # noqa: PLC0415  an extra
     except ModuleNotFoundError as missing:
         host.warn(f"`gradys set hear` needs {missing.name}: pip install 'mavproxy-uavapi[mqtt]'")
         return
-    await Listener(host, settings.hear, settings.timeout, settings.ca_file, settings.device).run()
+    await PositionListener(host, settings.hear, settings.timeout, settings.ca_file, settings.device).run()

@@ -21,7 +21,7 @@ VALUE = "value"  # the cause if the content is not a value
 STALE_PERIODS = 2.0  # a writer that is as slow as the reader is not stale
 
 
-class Source(Protocol):
+class SensorSource(Protocol):
     """Where a sensor's value comes from."""
 
     async def read(self) -> Measured | None:
@@ -35,7 +35,7 @@ class Source(Protocol):
         """Release what it holds."""
 
 
-def source_of(quantity: Quantity, max_age: float, wall: Callable[[], float]) -> Source:
+def source_of(quantity: Quantity, max_age: float, wall: Callable[[], float]) -> SensorSource:
     """The source of a sensor.
 
     Args:
@@ -62,7 +62,9 @@ class SensorSampler:
         device: the beginning of the device names.
     """
 
-    def __init__(self, quantity: Quantity, source: Source, clock: Callable[[], float], device: str = UAV) -> None:
+    def __init__(
+        self, quantity: Quantity, source: SensorSource, clock: Callable[[], float], device: str = UAV
+    ) -> None:
         self.quantity, self.source = quantity, source
         self._device = device
         self.taken = 0

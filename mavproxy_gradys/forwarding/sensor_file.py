@@ -25,7 +25,7 @@ class Measured(NamedTuple):
     time: float
 
 
-class Version(NamedTuple):
+class FileVersion(NamedTuple):
     """A file's content, and what tells whether it was written again.
 
     Attributes:
@@ -51,7 +51,7 @@ class SensorFile:
     def __init__(self, file: str, longest: float, wall: Callable[[], float] = time.time) -> None:
         self._file, self._longest, self._wall = file, longest, wall
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="gradys-sensor")
-        self._reading: asyncio.Future[Version | NoReading] | None = None
+        self._reading: asyncio.Future[FileVersion | NoReading] | None = None
         self._taken: tuple[int, int] | None = None
 
     async def read(self) -> Measured | None:
@@ -70,7 +70,7 @@ class SensorFile:
         self._taken = version.identity
         return Measured(version.content, written)
 
-    async def _version(self) -> Version:
+    async def _version(self) -> FileVersion:
         """Read it; a read that does not end is not begun again."""
         if self._reading is None:
             self._reading = asyncio.get_running_loop().run_in_executor(self._thread, newest, self._file)
@@ -88,7 +88,7 @@ class SensorFile:
         self._thread.shutdown(wait=False, cancel_futures=True)
 
 
-def newest(file: str) -> Version | NoReading:
+def newest(file: str) -> FileVersion | NoReading:
     """Read a file, or the reason why that fails. It blocks as long as the disk or the driver does."""
     try:
         descriptor = os.open(file, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)  # a pipe without a writer is no wait
@@ -104,4 +104,4 @@ def newest(file: str) -> Version | NoReading:
     finally:
         os.close(descriptor)
     written = None if os.path.realpath(file).startswith(KERNEL) else status.st_mtime
-    return Version(content, (status.st_mtime_ns, status.st_ino), written)
+    return FileVersion(content, (status.st_mtime_ns, status.st_ino), written)

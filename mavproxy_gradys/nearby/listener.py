@@ -8,7 +8,7 @@ from urllib.parse import unquote
 from mavproxy_gradys.forwarding.readings import UAV, device_of
 from mavproxy_gradys.nearby.advice import Advice, Track
 from mavproxy_gradys.net.addresses import split_url
-from mavproxy_gradys.net.mqtt_subscription import Subscription
+from mavproxy_gradys.net.mqtt_subscription import MqttSubscription
 from mavproxy_gradys.net.outage_log import Outage
 from mavproxy_uavapi.core.host import Host
 
@@ -16,7 +16,7 @@ DEFAULT_TOPIC = "fleet/+/position"
 log = logging.getLogger("gradys.nearby")
 
 
-class Listener:
+class PositionListener:
     """Subscribes to the positions of others.
 
     Args:
@@ -35,7 +35,7 @@ class Listener:
         name = f"the broker {parts.hostname}:{port}"
         outage = Outage(log, f"no positions of others from {name}", f"positions of others from {name} again")
         topic = unquote(parts.path.lstrip("/")) or DEFAULT_TOPIC
-        self._subscription = Subscription((parts, port), topic, outage, timeout, ca_file)
+        self._subscription = MqttSubscription((parts, port), topic, outage, timeout, ca_file)
 
     async def run(self) -> None:
         """Listen, until cancelled."""

@@ -18,7 +18,7 @@ LONGEST_PAUSE = 20.0  # s between attempts to connect
 Take = Callable[[str, object], None]
 
 
-class Subscription:
+class MqttSubscription:
     """Passes messages on; their quality of service is 0.
 
     Args:

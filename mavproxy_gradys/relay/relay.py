@@ -12,7 +12,7 @@ from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.forwarding.quantities import STATUS
 from mavproxy_gradys.net.addresses import StationAddress
 from mavproxy_gradys.net.http_client import FORM, Poster
-from mavproxy_gradys.net.mqtt_subscription import Subscription
+from mavproxy_gradys.net.mqtt_subscription import MqttSubscription
 from mavproxy_gradys.net.outage_log import Outage
 from mavproxy_gradys.net.schedule import Ticker
 from mavproxy_gradys.push.position_update import encode
@@ -82,7 +82,7 @@ class Relay:
         self._wall = wall
         self._positions = Positions()
         outage = Outage(log, "no readings from the broker", "readings from the broker again")
-        self._subscription = Subscription(broker, topic, outage, timeout, ca_file)
+        self._subscription = MqttSubscription(broker, topic, outage, timeout, ca_file)
         self._refusals = RefusalLog(log, time.monotonic)
 
     async def listen(self) -> None:

@@ -31,7 +31,7 @@ from mavproxy_gradys.station.access import add_headers, require_token, same_orig
 from mavproxy_gradys.station.exports import ParquetMissing, csv_readings, csv_text, parquet_readings
 from mavproxy_gradys.station.fleet import FleetVehicle, changes
 from mavproxy_gradys.station.fleet_watch import FleetWatch
-from mavproxy_gradys.station.health import Health
+from mavproxy_gradys.station.health import StationHealth
 from mavproxy_gradys.station.history import history_view
 from mavproxy_gradys.station.intake import Intake
 from mavproxy_gradys.station.queries import MOST_EXPORTED, MOST_ROWS, history_query, reading_query
@@ -61,7 +61,7 @@ class Station:
         self,
         intake: Intake,
         watch: FleetWatch,
-        health: Health,
+        health: StationHealth,
         *,
         watched: bool = False,
         token: str = "",

@@ -8,13 +8,13 @@ from mavproxy_gradys.station.fleet_watch import FleetWatch
 from mavproxy_gradys.station.inbox import Inbox
 
 
-class Connection(Protocol):
+class BrokerConnection(Protocol):
     """A connection; `problem` is the reason while it is down, otherwise empty."""
 
     problem: str
 
 
-class Health:
+class StationHealth:
     """The state of broker and database, at most a second old.
 
     Args:
@@ -22,7 +22,7 @@ class Health:
         inbox, broker: of a worker that consumes messages; otherwise None.
     """
 
-    def __init__(self, watch: FleetWatch, inbox: Inbox | None = None, broker: Connection | None = None) -> None:
+    def __init__(self, watch: FleetWatch, inbox: Inbox | None = None, broker: BrokerConnection | None = None) -> None:
         self._watch = watch
         self._inbox = inbox
         self._broker = broker

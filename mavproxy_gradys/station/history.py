@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from statistics import median
 from typing import Any
 
-from mavproxy_gradys.station.store import Bucket
+from mavproxy_gradys.station.store import HistoryBucket
 
 GAP = 3.5  # times the usual interval between readings
 SHORTEST_GAP = 2.0  # s
 LATE = 10.0  # s from measurement to storage
 
 
-def spacing(buckets: Sequence[Bucket], width: float) -> float:
+def spacing(buckets: Sequence[HistoryBucket], width: float) -> float:
     """The usual interval between readings (s); the width of a part if each part has one reading.
 
     Args:
@@ -27,7 +27,7 @@ def spacing(buckets: Sequence[Bucket], width: float) -> float:
     return median(between) if between else width
 
 
-def gaps(buckets: Sequence[Bucket], width: float) -> list[tuple[float, float]]:
+def gaps(buckets: Sequence[HistoryBucket], width: float) -> list[tuple[float, float]]:
     """The start and end of each gap (s since 1970)."""
     shortest = max(GAP * spacing(buckets, width), SHORTEST_GAP)
     return [
@@ -37,7 +37,7 @@ def gaps(buckets: Sequence[Bucket], width: float) -> list[tuple[float, float]]:
     ]
 
 
-def history_view(buckets: Sequence[Bucket], width: float) -> dict[str, Any]:
+def history_view(buckets: Sequence[HistoryBucket], width: float) -> dict[str, Any]:
     """The JSON object for the page."""
     return {
         "parts": [list(bucket) for bucket in buckets],

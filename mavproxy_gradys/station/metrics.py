@@ -11,7 +11,7 @@ from prometheus_client.registry import Collector
 
 from mavproxy_gradys.station.fleet import LOW_BATTERY, SILENT
 from mavproxy_gradys.station.fleet_watch import FleetWatch
-from mavproxy_gradys.station.health import Health
+from mavproxy_gradys.station.health import StationHealth
 from mavproxy_gradys.station.statistics import Histogram, Statistics
 
 
@@ -24,7 +24,7 @@ class StationCollector(Collector):
         health: the state of broker and database.
     """
 
-    def __init__(self, statistics: Statistics, watch: FleetWatch, health: Health) -> None:
+    def __init__(self, statistics: Statistics, watch: FleetWatch, health: StationHealth) -> None:
         self._statistics = statistics
         self._watch = watch
         self._health = health

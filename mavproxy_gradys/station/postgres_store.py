@@ -15,7 +15,7 @@ from mavproxy_gradys.station.partitions import Partitions, day_of
 from mavproxy_gradys.station.postgres_connection import PostgresConnection
 from mavproxy_gradys.station.postgres_schema import STAGING
 from mavproxy_gradys.station.reading_row import COLUMNS, ReadingRow
-from mavproxy_gradys.station.store import CHUNK, Bucket, FleetNow, HistoryQuery, ReadingQuery, StoreCounts
+from mavproxy_gradys.station.store import CHUNK, FleetNow, HistoryBucket, HistoryQuery, ReadingQuery, StoreCounts
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 
 EXPORTS = 4  # running at once
@@ -159,7 +159,7 @@ class PostgresStore:
             finally:
                 export.terminate()
 
-    async def history(self, query: HistoryQuery) -> list[Bucket]:
+    async def history(self, query: HistoryQuery) -> list[HistoryBucket]:
         """See `Store.history`."""
         number = "number" if query.element is None else ELEMENT.format(query.element)
         operands = query.device, query.quantity, utc(query.start), utc(query.end), query.width
@@ -167,7 +167,7 @@ class PostgresStore:
         async with self._exports:
             connection = PostgresConnection(self._url, self._worker)
             try:
-                return [Bucket(*row) for row in await connection.do(lambda one: one.fetch(select, *operands))]
+                return [HistoryBucket(*row) for row in await connection.do(lambda one: one.fetch(select, *operands))]
             finally:
                 connection.terminate()
 

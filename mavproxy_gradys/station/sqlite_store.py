@@ -14,7 +14,7 @@ from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.forwarding.transaction import Transaction
 from mavproxy_gradys.station.newest import Newest, NewestReadings, newest_of
 from mavproxy_gradys.station.reading_row import COLUMNS, ReadingRow
-from mavproxy_gradys.station.store import CHUNK, Bucket, FleetNow, HistoryQuery, ReadingQuery, StoreCounts
+from mavproxy_gradys.station.store import CHUNK, FleetNow, HistoryBucket, HistoryQuery, ReadingQuery, StoreCounts
 
 T = TypeVar("T")
 SCHEMA = """
@@ -112,7 +112,7 @@ class SqliteStore:
         while rows := await self._do(lambda: cursor.fetchmany(CHUNK)):
             yield rows
 
-    async def history(self, query: HistoryQuery) -> list[Bucket]:
+    async def history(self, query: HistoryQuery) -> list[HistoryBucket]:
         """See `Store.history`."""
         parameters = {
             "device": query.device,
@@ -123,7 +123,7 @@ class SqliteStore:
             "width": query.width,
         }
         rows = await self._do(lambda: self._db.execute(HISTORY, parameters).fetchall())
-        return [Bucket(*row) for row in rows]
+        return [HistoryBucket(*row) for row in rows]
 
     async def close(self) -> None:
         """See `Store.close`."""

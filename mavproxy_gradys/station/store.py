@@ -72,7 +72,7 @@ class HistoryQuery:
         return (self.end - self.start) / self.buckets
 
 
-class Bucket(NamedTuple):
+class HistoryBucket(NamedTuple):
     """The readings of one part of a history.
 
     Attributes:
@@ -139,7 +139,7 @@ class Store(Protocol):
     def readings(self, query: ReadingQuery) -> AsyncGenerator[Sequence[tuple[Any, ...]], None]:
         """Readings as rows of COLUMNS, in chunks; times are s since 1970, the value is JSON."""
 
-    async def history(self, query: HistoryQuery) -> list[Bucket]:
+    async def history(self, query: HistoryQuery) -> list[HistoryBucket]:
         """The parts of a history with readings, in order of time."""
 
     async def close(self) -> None:

@@ -15,7 +15,7 @@ from mavproxy_gradys.station.app import Station
 from mavproxy_gradys.station.consumer import Consumer
 from mavproxy_gradys.station.fleet import AlarmLimits
 from mavproxy_gradys.station.fleet_watch import FleetWatch
-from mavproxy_gradys.station.health import Health
+from mavproxy_gradys.station.health import StationHealth
 from mavproxy_gradys.station.inbox import Inbox
 from mavproxy_gradys.station.intake import Intake
 from mavproxy_gradys.station.options import is_postgres, worker_name
@@ -65,7 +65,7 @@ async def worker(options: argparse.Namespace) -> AsyncIterator[web.Application]:
     try:
         intake = Intake(store, Statistics())
         watch = FleetWatch(store, AlarmLimits(options.silent, options.battery))
-        health = start_consumer(options, intake, watch, tasks) if options.broker else Health(watch)
+        health = start_consumer(options, intake, watch, tasks) if options.broker else StationHealth(watch)
         tasks.start(watch.run(), "the reading of the fleet's state")
         yield Station(intake, watch, health, watched=options.watched, token=options.token).app()
     finally:
@@ -73,7 +73,7 @@ async def worker(options: argparse.Namespace) -> AsyncIterator[web.Application]:
         await store.close()
 
 
-def start_consumer(options: argparse.Namespace, intake: Intake, watch: FleetWatch, tasks: HeldTasks) -> Health:
+def start_consumer(options: argparse.Namespace, intake: Intake, watch: FleetWatch, tasks: HeldTasks) -> StationHealth:
     """Begin to consume messages.
 
     Raises:
@@ -101,7 +101,7 @@ def start_consumer(options: argparse.Namespace, intake: Intake, watch: FleetWatc
     consumer = Consumer(inbox, intake, broker, size=options.batch, seconds=options.batch_seconds)
     tasks.start(broker.run(), "the connection to the broker")
     tasks.start(consumer.run(), "the storing of messages")
-    return Health(watch, inbox, broker)
+    return StationHealth(watch, inbox, broker)
 
 
 async def serve(options: argparse.Namespace, stop: asyncio.Event) -> None:

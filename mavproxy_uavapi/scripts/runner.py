@@ -43,7 +43,7 @@ class Terminal:
             os.write(self._fd, data)
 
 
-class Log:
+class RunLog:
     """One output stream of the script: written to its file and to the terminal."""
 
     def __init__(self, path: str, terminal: Terminal) -> None:
@@ -73,8 +73,8 @@ class Runner:
         self._path = record
         self._record: dict[str, Any] = json.loads(record.read_text(encoding="utf-8"))
         self._terminal = Terminal()
-        self._out = Log(self._record["out_log"], self._terminal)
-        self._err = Log(self._record["err_log"], self._terminal)
+        self._out = RunLog(self._record["out_log"], self._terminal)
+        self._err = RunLog(self._record["err_log"], self._terminal)
         self._child: subprocess.Popen[bytes] | None = None
         self._stop_wanted = False
         self._kill_at: float | None = None

@@ -26,7 +26,7 @@ JOIN = 2.0  # s that both threads have to end; a thread whose driver hangs is ab
 
 
 @dataclass(frozen=True)
-class Health:
+class CameraHealth:
     """The state of the camera.
 
     Attributes:
@@ -133,16 +133,16 @@ class Worker:
             self._changed.notify_all()
 
     @property
-    def health(self) -> Health:
+    def health(self) -> CameraHealth:
         """The state of the camera. Any thread."""
         reconnects = max(self._openings - 1, 0)
         error = self._defect or self._error
         verdict = self.verdict()
         rate = self._rate if verdict == "ok" else 0.0
-        return Health(verdict, self._frames, self._repeated, self._skipped, reconnects, rate, error)
+        return CameraHealth(verdict, self._frames, self._repeated, self._skipped, reconnects, rate, error)
 
     def verdict(self) -> str:
-        """The present state of the camera, a value of `Health.state`."""
+        """The present state of the camera, a value of `CameraHealth.state`."""
         if self._stop.is_set():
             return "closed"
         if not self._open:

@@ -29,7 +29,7 @@ from mavproxy_vision.camera.source import Folder, Image, Posted, Source
 from mavproxy_vision.errors import NoCamera
 from mavproxy_vision.geometry.frames import Attitude, vector
 from mavproxy_vision.settings import VisionSettings
-from mavproxy_vision.tracking.capture_worker import Health, Worker
+from mavproxy_vision.tracking.capture_worker import CameraHealth, Worker
 from mavproxy_vision.tracking.ground_truth import Pose, Truth
 from mavproxy_vision.tracking.measurement import TargetMeasurer, TargetSpec
 from mavproxy_vision.tracking.pose_history import History, UnstampedClock, VehicleClock
@@ -260,9 +260,9 @@ class Tracker:
         return self.host.registry.commandable(self._carrier or self.settings.vehicle)
 
     @property
-    def health(self) -> Health:
+    def health(self) -> CameraHealth:
         """The state of the camera."""
-        return self.worker.health if self.worker is not None else Health("closed")
+        return self.worker.health if self.worker is not None else CameraHealth("closed")
 
     def require_camera(self) -> None:
         """Raise NoCamera unless frames arrive."""

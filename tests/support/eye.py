@@ -21,7 +21,7 @@ from mavproxy_vision.apriltag.tag_layout import FAMILIES
 from mavproxy_vision.camera.renderer import PlacedTag, Renderer
 from mavproxy_vision.camera.source import Frame
 from mavproxy_vision.geometry.frames import Attitude, Vector, vector
-from mavproxy_vision.tracking.capture_worker import Health, Watch
+from mavproxy_vision.tracking.capture_worker import CameraHealth, Watch
 from mavproxy_vision.tracking.tracker import Tracker, make_source
 
 DETECTOR_TIME = 0.015  # s from a frame's arrival to its outcome
@@ -124,8 +124,8 @@ class Eye:
             self.task.cancel()
 
     @property
-    def health(self) -> Health:
-        return Health(self.watch.verdict(self.rig.loop.time()), self._number)
+    def health(self) -> CameraHealth:
+        return CameraHealth(self.watch.verdict(self.rig.loop.time()), self._number)
 
     async def _run(self) -> None:
         loop = self.rig.loop

@@ -35,7 +35,7 @@ from mavproxy_vision.http import (
     StreamRequest,
     VisionHandlers,
 )
-from mavproxy_vision.tracking.capture_worker import Health
+from mavproxy_vision.tracking.capture_worker import CameraHealth
 from mavproxy_vision.tracking.tracker import FRESH
 
 IMAGE = np.full((48, 64), 50, np.uint8)
@@ -70,7 +70,7 @@ def handlers(age, source):
         worker=SimpleNamespace(source=source, detector=SimpleNamespace(model=CameraModel())),
         host=SimpleNamespace(clock=lambda: NOW, target=1),
         system=1,
-        health=Health("frozen"),
+        health=CameraHealth("frozen"),
         settings=SimpleNamespace(source="http"),
         require_camera=lambda: None,
     )

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from mavproxy_gradys.nearby.listener import Listener
+from mavproxy_gradys.nearby.listener import PositionListener
 
 ATTEMPTS = 3
 
@@ -41,7 +41,7 @@ def test_no_broker_or_no_certificates_are_said_once_and_tried_again(
     monkeypatch.setattr("mavproxy_gradys.net.mqtt_subscription.Backoff.failed", failed)
     host: Any = SimpleNamespace(clock=time.monotonic)
     ca_file = str(tmp_path / "gone.pem") if scheme == "mqtts" else ""
-    listener = Listener(host, f"{scheme}://127.0.0.1:{closed_port()}", 1.0, ca_file)
+    listener = PositionListener(host, f"{scheme}://127.0.0.1:{closed_port()}", 1.0, ca_file)
     with pytest.raises(EnoughError):
         asyncio.run(listener.run())
     said = [record.getMessage() for record in caplog.records if "no positions of others" in record.getMessage()]

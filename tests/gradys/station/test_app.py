@@ -18,7 +18,7 @@ from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.station.app import FILES, PAGE, Station
 from mavproxy_gradys.station.fleet import AlarmLimits
 from mavproxy_gradys.station.fleet_watch import FleetWatch
-from mavproxy_gradys.station.health import Health
+from mavproxy_gradys.station.health import StationHealth
 from mavproxy_gradys.station.intake import Intake
 from mavproxy_gradys.station.sqlite_store import SqliteStore
 from mavproxy_gradys.station.statistics import Statistics
@@ -104,7 +104,7 @@ def ask(
     monkeypatch.setattr("mavproxy_gradys.station.sqlite_store.ThreadPoolExecutor", at_once)
     store = SqliteStore(tmp_path / "station.db", clock)
     watch = FleetWatch(store, AlarmLimits(10, 20))
-    station = Station(Intake(store, Statistics(), clock), watch, Health(watch), watched=True, clock=clock)
+    station = Station(Intake(store, Statistics(), clock), watch, StationHealth(watch), watched=True, clock=clock)
 
     async def start() -> TestClient[Any, Any]:
         client = TestClient(TestServer(station.app()))

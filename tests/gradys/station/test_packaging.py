@@ -8,7 +8,7 @@ from pathlib import Path
 
 from mavproxy_gradys.station.fleet import AlarmLimits
 from mavproxy_gradys.station.fleet_watch import FleetWatch
-from mavproxy_gradys.station.health import Health
+from mavproxy_gradys.station.health import StationHealth
 from mavproxy_gradys.station.inbox import Inbox
 from mavproxy_gradys.station.metrics import StationCollector, exposition
 from mavproxy_gradys.station.options import parser
@@ -24,7 +24,7 @@ class Broker:
 
 def test_the_dashboard_asks_for_metrics_that_there_are() -> None:
     watch = FleetWatch(SqliteStore(":memory:"), AlarmLimits(10, 20))
-    health = Health(watch, Inbox(1, lambda: 0.0), Broker())
+    health = StationHealth(watch, Inbox(1, lambda: 0.0), Broker())
     text = exposition(StationCollector(Statistics(), watch, health)).decode()
     there = set(re.findall(r"^(station_\w+)", text, re.MULTILINE))
     panels = json.loads((PACKAGING / "grafana-station.json").read_text(encoding="utf-8"))["panels"]

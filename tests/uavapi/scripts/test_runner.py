@@ -134,7 +134,7 @@ def test_runner_that_was_killed_leaves_a_run_that_nobody_takes_for_running(
 
 def test_full_log_ends_with_a_note_and_the_script_goes_on(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(runner, "LOG_LIMIT", 10)
-    log = runner.Log(str(tmp_path / "log"), runner.Terminal())
+    log = runner.RunLog(str(tmp_path / "log"), runner.Terminal())
     for _ in range(5):
         log.write(b"123456")
     log.file.close()
@@ -142,7 +142,7 @@ def test_full_log_ends_with_a_note_and_the_script_goes_on(tmp_path: Any, monkeyp
 
 
 def test_full_disk_does_not_end_the_script(tmp_path: Any) -> None:
-    log = runner.Log("/dev/full", runner.Terminal())
+    log = runner.RunLog("/dev/full", runner.Terminal())
     log.write(b"x")
     log.write(b"x")
     log.file.close()
