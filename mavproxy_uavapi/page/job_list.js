@@ -41,7 +41,7 @@ export class JobList extends Panel {
 
   async abort(number) {
     try {
-      await this.context.api.call("DELETE", `/jobs/${number}`, {timeout: 60000});
+      await this.context.api.urgent(`/jobs/${number}`, undefined, "DELETE");
     } catch (error) {
       setText(this.rows.get(number).state, error.message);
     }

@@ -18,10 +18,84 @@ from tests.support.chromium import Page, chromium
 
 pytestmark = pytest.mark.needs("chromium")
 
+# Calls of the API that are not answered until their signal ends them; `sent` has their paths, `answer` answers one.
+HELD_CALLS = """
+  const sent = [], open = {};
+  const settle = async () => { for (let n = 0; n < 20; n += 1) await new Promise(resolve => setTimeout(resolve)); };
+  window.fetch = (path, {signal}) => new Promise((resolve, reject) => {
+    sent.push(path);
+    open[path] = () => resolve(new Response('{}'));
+    signal.addEventListener('abort', () => reject(signal.reason));
+  });
+  const said = {}, ask = (name, call) => call.then(() => { said[name] = 'done'; }, e => { said[name] = e.message; });
+  const a = new m.Api();
+  ask('log', a.blob('/log', 600000)); ask('list', a.get('/list'));
+"""
+
 HOUR = 36_000  # events of a view at 10 Hz
 
 # module -> scripts that must give true; `m` is the module
 CHECKS = {
+    # both slots are held by slow reads
+    "api": [
+        # a stop goes out at once, and no command that waits goes out after it
+        f"""(async () => {{{HELD_CALLS}
+           ask('go', a.command('/go_to')); ask('start', a.call('POST', '/start')); ask('read', a.get('/read'));
+           ask('hold', a.urgent('/fleet/brake'));
+           const first = same(sent, ['/log', '/list', '/fleet/brake']);
+           open['/fleet/brake'](); open['/list']();
+           await settle();
+           const why = 'not sent: a stop came first';
+           return first && same(sent.slice(3), ['/read']) && said.go === why && said.start === why
+             && said.hold === 'done';
+           }})()""",
+        # a command that has waited too long is not sent, even if no timer told so meanwhile
+        f"""(async () => {{{HELD_CALLS}
+           const clock = performance.now.bind(performance);
+           ask('go', a.command('/go_to'));
+           performance.now = () => clock() + 1500;
+           try {{ open['/list'](); await settle(); }} finally {{ delete performance.now; }}
+           return same(sent, ['/log', '/list']) && said.go === 'not sent: the page was busy'; }})()""",
+        # a command goes before the reads that wait
+        f"""(async () => {{{HELD_CALLS}
+           ask('read', a.get('/read')); ask('go', a.command('/go_to'));
+           open['/list']();
+           await settle();
+           return same(sent, ['/log', '/list', '/go_to?wait=false']); }})()""",
+        # one connection is for stops: a second stop without an answer takes those of the slots, and nothing else does
+        f"""(async () => {{{HELD_CALLS}
+           ask('one', a.stop('/one')); await settle();
+           const kept = said.log === undefined;
+           ask('hold', a.urgent('/fleet/brake')); ask('read', a.get('/read')); ask('more', a.get('/more'));
+           await settle();
+           return kept && said.log === said.list && said.log.startsWith('given up')
+             && same(sent.slice(2), ['/one?wait=false', '/fleet/brake', '/read']); }})()""",
+        # a command that is under way without an answer is given up: the browser may not have sent it yet
+        """(async () => {
+           const signals = {}, said = [];
+           window.fetch = (path, {signal}) => new Promise((_, no) => { signals[path] = signal;
+             signal.addEventListener('abort', () => no(signal.reason)); });
+           const a = new m.Api();
+           a.command('/go_to').catch(e => said.push(e.message)); a.urgent('/fleet/brake');
+           await new Promise(resolve => setTimeout(resolve));
+           return said[0].startsWith('given up') && !signals['/fleet/brake'].aborted; })()""",
+    ],
+    # what stops takes no turn
+    "actions": [
+        """(async () => {
+           const {Fleet} = await import('/page/fleet.js'), fleet = new Fleet(), calls = [];
+           fleet.of(3); fleet.choose(3);
+           const kept = name => path => { calls.push([name, path]); return new Promise(() => {}); };
+           const panel = document.createElement('flight-actions');
+           panel.start({fleet, preferences: {alt: 10}, api: {stop: kept('stop'), command: kept('command')}});
+           for (const one of [panel.brake, panel.stop]) one.click();
+           for (const one of [panel.land, panel.rtl, panel.disarm, panel.takeoff]) {
+             one.dispatchEvent(new Event('confirmed'));
+           }
+           return same(calls, [['stop', 'command/brake'], ['stop', 'movement/stop'], ['stop', 'command/land'],
+             ['stop', 'command/rtl'], ['stop', 'command/disarm'], ['command', 'command/takeoff']]
+             .map(([way, path]) => [way, `/vehicles/3/${path}`])); })()""",
+    ],
     "areas": [
         "m.areasOf(null).length === 0",
         """{const [a] = m.areasOf({features: [{properties: {kind: 'exclusion', radius: 25},
