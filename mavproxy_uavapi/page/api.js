@@ -29,7 +29,9 @@ export class Api extends EventTarget {
     this.slots = new CallSlots();
   }
 
-  get hasToken() { return sessionStorage.getItem(TOKEN) !== null; }
+  get token() { return sessionStorage.getItem(TOKEN); } // null for none
+
+  get hasToken() { return this.token !== null; }
 
   setToken(token) {
     if (token) sessionStorage.setItem(TOKEN, token);
@@ -37,9 +39,13 @@ export class Api extends EventTarget {
     this.dispatchEvent(new Event("token-changed"));
   }
 
-  headers(more = {}) {
-    const token = sessionStorage.getItem(TOKEN);
-    return token === null ? more : {...more, Authorization: `Bearer ${token}`};
+  headers(more = {}) { return this.hasToken ? {...more, Authorization: `Bearer ${this.token}`} : more; }
+
+  /** The response of `fetch`; a 401 asks for a token, unless another one was given since. */
+  async asked(path, options) {
+    const {token} = this, response = await fetch(path, options);
+    if (response.status === 401 && token === this.token) this.dispatchEvent(new Event("token"));
+    return response;
   }
 
   get(path) { return this.call("GET", path); }
@@ -72,8 +78,7 @@ export class Api extends EventTarget {
 
   /** A response whose body goes on; `signal` ends it. */
   async open(path, signal) {
-    const response = await fetch(path, {headers: this.headers({Accept: "text/event-stream"}), signal, cache: "no-store"});
-    if (response.status === 401) this.dispatchEvent(new Event("token"));
+    const response = await this.asked(path, {headers: this.headers({Accept: "text/event-stream"}), signal, cache: "no-store"});
     if (!response.ok) throw new ApiError(response.status, await bodyOf(response));
     return response;
   }
@@ -90,9 +95,7 @@ export class Api extends EventTarget {
     const sent = json === undefined ? body : JSON.stringify(json);
     try {
       const ends = AbortSignal.any([AbortSignal.timeout(timeout), ...(signal ? [signal] : [])]);
-      const response = await fetch(path, {method, headers, body: sent, signal: ends, keepalive, cache: "no-store"});
-      if (response.status === 401) this.dispatchEvent(new Event("token"));
-      return response;
+      return await this.asked(path, {method, headers, body: sent, signal: ends, keepalive, cache: "no-store"});
     } catch (error) {
       if (signal?.aborted) throw signal.reason;
       const late = error.name === "TimeoutError";

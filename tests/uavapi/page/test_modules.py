@@ -32,6 +32,24 @@ HELD_CALLS = """
   ask('log', a.blob('/log', 600000)); ask('list', a.get('/list'));
 """
 
+# The page's strips as index.html has them, and what panels are given; `at` is the time of a vehicle's report.
+STRIPS = """
+  const {Fleet} = await import('/page/fleet.js'), fleet = new Fleet();
+  const told = (mode, at, armed = true) => fleet.of(1).take('vehicle',
+    {type: 'copter', mode, armed, link: {alive: true, heartbeat_age_s: 0}}, at);
+  const strip = id => {
+    const made = document.createElement('div');
+    document.body.append(Object.assign(made, {id}));
+    return made;
+  };
+  const trouble = strip('trouble'), result = strip('hold-result');
+  const drop = () => { for (const one of [trouble, result]) one.remove(); };
+  let why = '';
+  const stream = {heardAt: 0, trouble: () => why};
+  const spoken = one => [...one.querySelectorAll(':not([aria-hidden])')].filter(e => !e.children.length)
+    .map(e => e.textContent).join('|');
+"""
+
 HOUR = 36_000  # events of a view at 10 Hz
 
 # module -> scripts that must give true; `m` is the module
@@ -79,6 +97,103 @@ CHECKS = {
            a.command('/go_to').catch(e => said.push(e.message)); a.urgent('/fleet/brake');
            await new Promise(resolve => setTimeout(resolve));
            return said[0].startsWith('given up') && !signals['/fleet/brake'].aborted; })()""",
+        # a 401 to a call with a token from before asks for none
+        """(async () => {
+           const answers = [], a = new m.Api();
+           let asked = 0;
+           a.addEventListener('token', () => { asked += 1; });
+           const refuse = () => new Response('{}', {status: 401});
+           window.fetch = () => new Promise(resolve => answers.push(() => resolve(refuse())));
+           const old = [a.get('/a'), a.open('/b')].map(call => call.catch(() => {}));
+           a.setToken('new');
+           for (const answer of answers.splice(0)) answer();
+           await Promise.all(old);
+           const early = asked, late = a.get('/c').catch(() => {});
+           answers[0]();
+           await late;
+           a.setToken('');
+           return same([early, asked], [0, 1]); })()""",
+    ],
+    "hold_order": [
+        # an answer of the API counts until the vehicle tells of another mode; then nothing is said of now
+        f"""(async () => {{{STRIPS} drop();
+           told('GUIDED', 900);
+           const o = new m.HoldOrder(fleet, 1000);
+           o.answered({{1: {{status: 200}}}}, 1500);
+           const kinds = [o.standing(1500).kind];
+           told('GUIDED', 1600); kinds.push(o.standing(1700).kind); // on its way before the answer
+           told('BRAKE', 2000); kinds.push(o.standing(2100).kind, / held/.test(o.standing(2100).head));
+           told('GUIDED', 3000); kinds.push(o.standing(3100));
+           return same(kinds, ['good', 'good', 'good', true, null]); }})()""",
+        # no answer is bad after 3 s, and good when it comes
+        f"""(async () => {{{STRIPS} drop();
+           told('GUIDED', 900);
+           const o = new m.HoldOrder(fleet, 1000), early = o.standing(3900).kind, late = o.standing(4100);
+           o.answered({{1: {{status: 200}}}}, 9000);
+           return same([early, late.kind, late.missing], ['', 'bad', ['vehicle 1: no answer']])
+             && o.standing(9000).kind === 'good' && /NO ANSWER/.test(late.head); }})()""",
+        # what another vehicle lacks stays said
+        f"""(async () => {{{STRIPS} drop();
+           told('BRAKE', 2000);
+           const o = new m.HoldOrder(fleet, 1000);
+           o.answered({{1: {{status: 200}}, 2: {{status: 503, detail: 'no heartbeat'}}}}, 1500);
+           told('GUIDED', 3000);
+           const missing = ['vehicle 1: flies again (GUIDED)', 'vehicle 2: no heartbeat'];
+           return same(o.standing(3100).missing, missing); }})()""",
+    ],
+    "hold_all": [
+        # a screen reader hears no running age; the button to close stays the same one
+        f"""(async () => {{{STRIPS}
+           told('GUIDED', 0);
+           const panel = document.createElement('hold-all');
+           panel.start({{fleet, painter: {{touch() {{}}}}, api: {{urgent: () => new Promise(() => {{}})}}}});
+           panel.button.click();
+           const at = panel.order.at, close = result.querySelector('button');
+           panel.render(at + 100);
+           const first = spoken(result), age = result.querySelector('.age').textContent;
+           panel.render(at + 900);
+           const kept = spoken(result) === first && result.querySelector('.age').textContent !== age
+             && result.querySelector('button') === close && !result.hidden;
+           close.click(); panel.render(at + 1000); drop();
+           return kept && result.hidden; }})()""",
+    ],
+    "connection": [
+        f"""(async () => {{{STRIPS}
+           told('GUIDED', 0);
+           const panel = document.createElement('connection-state'), said = [];
+           panel.start({{fleet, stream}});
+           const look = at => {{ panel.render(at); said.push([trouble.hidden, spoken(trouble)]); }};
+           look(100); look(9000); look(9900); why = 'gone'; look(10000); look(11000); drop();
+           return same(said, [[true, ''], [false, 'LINK LOST: vehicle 1'], [false, 'LINK LOST: vehicle 1'],
+             [false, 'NO LIVE DATA: gone'], [false, 'NO LIVE DATA: gone']])
+             && trouble.querySelector('.age').textContent === 'what is shown is 11 s old'; }})()""",
+    ],
+    "job_list": [
+        # how far it is to go is grey and says its age when it is not live; how a job ended is not
+        f"""(async () => {{{STRIPS} drop();
+           told('GUIDED', 0);
+           const tell = info => fleet.take({{system: 1, event: 'job', info: {{verb: 'go', ...info}}}}, 0);
+           tell({{job: '1', state: 'succeeded', result: 'there', seconds: 1}});
+           tell({{job: '2', state: 'running', progress: {{distance_to_go: 5}}}});
+           const panel = document.createElement('job-list');
+           panel.start({{fleet, stream}});
+           const told_of = row => [row.className, row.querySelector('.age').textContent];
+           const rows = () => [...panel.querySelectorAll('li')].map(told_of);
+           panel.render(100); const live = rows();
+           panel.render(9000); const lost = rows();
+           told('GUIDED', 9000); why = 'gone'; panel.render(9000);
+           const ended = ['succeeded', ''], grey = [['running old', '9.0 s old'], ended];
+           return same(live, [['running', ''], ended]) && same(lost, grey) && same(rows(), grey); }})()""",
+    ],
+    "token_dialog": [
+        # it leaves HOLD ALL to be clicked
+        """{const panel = document.createElement('token-dialog');
+           panel.start({api: Object.assign(new EventTarget(), {hasToken: false})});
+           document.body.append(panel);
+           panel.ask();
+           const dialog = panel.querySelector('dialog'), found = dialog.open && !dialog.matches(':modal');
+           panel.remove();
+           found}""",
     ],
     # what stops takes no turn
     "actions": [
@@ -147,6 +262,27 @@ CHECKS = {
            const body = new Blob([parts]).stream(), heard = [];
            await m.readEvents(new Response(body), event => heard.push(event.n));
            return heard.length === 300 && heard[299] === 299})()""",
+        # with another token nothing more is heard of the stream from before
+        """(async () => {
+           const api = new EventTarget(), heard = [], bodies = [];
+           const settle = () => new Promise(resolve => setTimeout(resolve, 5));
+           let body;
+           api.open = async (_, signal) => {
+             const response = new Response(new ReadableStream({start(control) { body = control; }}));
+             signal.addEventListener('abort', () => bodies.push('ended'));
+             return response;
+           };
+           const stream = new m.TelemetryStream(api, {}, event => heard.push(event.n));
+           const tell = n => body.enqueue(new TextEncoder().encode(`data: {"n": ${n}, "time": 0}\n\n`));
+           stream.once();
+           await settle(); tell(1);
+           while (!heard.length) await settle();
+           const live = stream.trouble(stream.heardAt) === '';
+           api.dispatchEvent(new Event('token-changed'));
+           const at_once = stream.trouble(stream.heardAt);
+           tell(2); await settle(); await settle();
+           return live && at_once === 'another token was given' && same(heard, [1]) && same(bodies, ['ended'])
+             && stream.trouble(stream.heardAt) !== ''; })()""",
     ],
     "setting_list": [
         """same(m.inOrder([{name: 'a', settable: false}, {name: 'b', settable: true}, {name: 'c', settable: true}])
