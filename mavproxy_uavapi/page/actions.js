@@ -8,13 +8,13 @@ export class FlightActions extends CommandPanel {
   build() {
     this.alt = heightInput(this.context.preferences.alt, "height of the take-off in m");
     this.arm = this.held("Arm", () => this.send("/command/arm"));
-    this.disarm = this.held("Disarm", () => this.send("/command/disarm"));
+    this.disarm = this.held("Disarm", () => this.halt("/command/disarm"));
     this.takeoff = this.held("Take off", () => this.send("/command/takeoff", {alt: heightOf(this.alt)}));
-    this.land = this.held("Land", () => this.send("/command/land"));
-    this.rtl = this.held("Return", () => this.send("/command/rtl"));
+    this.land = this.held("Land", () => this.halt("/command/land"));
+    this.rtl = this.held("Return", () => this.halt("/command/rtl"));
     this.guided = this.held("Guided", () => this.send("/command/guided"));
-    this.brake = this.clicked("Brake", () => this.send("/command/brake"));
-    this.stop = this.clicked("Stop", () => this.send("/movement/stop"));
+    this.brake = this.clicked("Brake", () => this.halt("/command/brake"));
+    this.stop = this.clicked("Stop", () => this.halt("/movement/stop"));
     this.resume = this.held("Resume", () => this.send("/movement/resume"));
     this.append(
       element("div", {class: "buttons"}, this.arm, this.takeoff, labelled("to", this.alt, "m")),
@@ -27,11 +27,17 @@ export class FlightActions extends CommandPanel {
 
   clicked(label, act) { return element("button", {type: "button", class: "stop", on: {click: act}}, label); }
 
-  async send(path, body = {}) {
+  send(path, body = {}) { return this.tell(path, () => this.context.api.command(this.path(path), body)); }
+
+  /** A verb that ends what the vehicle does: it waits for nothing. */
+  halt(path) { return this.tell(path, () => this.context.api.stop(this.path(path))); }
+
+  /** Say what becomes of a verb. */
+  async tell(path, call) {
     const verb = path.split("/").pop().replaceAll("_", " "), {id} = this.vehicle;
     this.say(`vehicle ${id}: ${verb} …`, "wait");
     try {
-      this.await((await this.context.api.command(this.path(path), body)).job, verb);
+      this.await((await call()).job, verb);
     } catch (error) {
       this.say(`vehicle ${id}: ${verb}: ${error.message}`, "bad");
     }

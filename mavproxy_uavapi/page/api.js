@@ -1,8 +1,9 @@
-// Calls of the HTTP API. A browser opens six connections to a host: of ours two are for calls and at most three for
-// streams and pictures, so that one is always free for HOLD ALL.
+// Calls of the HTTP API: reads and commands in their turn, stops at once.
 
-const CALLS_AT_ONCE = 2;
+import {CallSlots} from "./call_slots.js";
+
 const TIMEOUT = 10000; // ms
+const STOP_TIMEOUT = 60000; // ms: a stop that is asked to wait answers when all stand still
 const TOKEN = "uavapi-token"; // in sessionStorage: it ends with the tab
 
 /** Why a call failed: `status` 0 means that there was no answer. */
@@ -25,11 +26,12 @@ function sentence(body) {
 export class Api extends EventTarget {
   constructor() {
     super();
-    this.running = 0;
-    this.waiting = [];
+    this.slots = new CallSlots();
   }
 
-  get hasToken() { return sessionStorage.getItem(TOKEN) !== null; }
+  get token() { return sessionStorage.getItem(TOKEN); } // null for none
+
+  get hasToken() { return this.token !== null; }
 
   setToken(token) {
     if (token) sessionStorage.setItem(TOKEN, token);
@@ -37,37 +39,46 @@ export class Api extends EventTarget {
     this.dispatchEvent(new Event("token-changed"));
   }
 
-  headers(more = {}) {
-    const token = sessionStorage.getItem(TOKEN);
-    return token === null ? more : {...more, Authorization: `Bearer ${token}`};
+  headers(more = {}) { return this.hasToken ? {...more, Authorization: `Bearer ${this.token}`} : more; }
+
+  /** The response of `fetch`; a 401 asks for a token, unless another one was given since. */
+  async asked(path, options) {
+    const {token} = this, response = await fetch(path, options);
+    if (response.status === 401 && token === this.token) this.dispatchEvent(new Event("token"));
+    return response;
   }
 
   get(path) { return this.call("GET", path); }
 
-  /** A command; it does not wait for its end, which the stream tells as an event of its job. */
+  /** A command, if its turn comes soon; it does not wait for its end, which the stream tells as an event of its job. */
   command(path, body = {}) { return this.call("POST", `${path}?wait=false`, {json: body}); }
 
-  /** A call's JSON; `json` or `body` is sent. Raises ApiError. */
-  async call(method, path, options = {}) {
-    return this.inTurn(() => this.json(method, path, options));
+  /** A call's JSON; `json` or `body` is sent. Raises ApiError, or an Error if it was not sent. */
+  call(method, path, options = {}) {
+    const work = signal => this.json(method, path, {...options, signal});
+    return method === "GET" ? this.slots.read(work) : this.slots.command(work);
   }
 
-  /** A call's body as a Blob, with its status. */
-  async blob(path, timeout = TIMEOUT) {
-    return this.inTurn(async () => {
-      const response = await this.fetch("GET", path, {timeout});
+  /** A call's body as a Blob. */
+  blob(path, timeout = TIMEOUT) {
+    return this.slots.read(async signal => {
+      const response = await this.fetch("GET", path, {timeout, signal});
       if (!response.ok) throw new ApiError(response.status, await bodyOf(response));
       return response.blob();
     });
   }
 
-  /** The same at once, whatever else is under way: for what stops vehicles. */
-  async urgent(path, json = {}) { return this.json("POST", path, {json, timeout: 60000, keepalive: true}); }
+  /** A call that stops something: it goes out at once, whatever else is under way; its answer may take long. */
+  urgent(path, json = {}, method = "POST") {
+    return this.slots.stop(() => this.json(method, path, {json, timeout: STOP_TIMEOUT, keepalive: true}));
+  }
+
+  /** The same of a vehicle's verb; the stream tells its end, as that of a command. */
+  stop(path) { return this.urgent(`${path}?wait=false`); }
 
   /** A response whose body goes on; `signal` ends it. */
   async open(path, signal) {
-    const response = await fetch(path, {headers: this.headers({Accept: "text/event-stream"}), signal, cache: "no-store"});
-    if (response.status === 401) this.dispatchEvent(new Event("token"));
+    const response = await this.asked(path, {headers: this.headers({Accept: "text/event-stream"}), signal, cache: "no-store"});
     if (!response.ok) throw new ApiError(response.status, await bodyOf(response));
     return response;
   }
@@ -79,29 +90,16 @@ export class Api extends EventTarget {
     return {status: response.status, ...body};
   }
 
-  async fetch(method, path, {json, body, timeout = TIMEOUT, keepalive = false}) {
+  async fetch(method, path, {json, body, signal, timeout = TIMEOUT, keepalive = false}) {
     const headers = this.headers(json === undefined ? {} : {"Content-Type": "application/json"});
     const sent = json === undefined ? body : JSON.stringify(json);
     try {
-      const signal = AbortSignal.timeout(timeout);
-      const response = await fetch(path, {method, headers, body: sent, signal, keepalive, cache: "no-store"});
-      if (response.status === 401) this.dispatchEvent(new Event("token"));
-      return response;
+      const ends = AbortSignal.any([AbortSignal.timeout(timeout), ...(signal ? [signal] : [])]);
+      return await this.asked(path, {method, headers, body: sent, signal: ends, keepalive, cache: "no-store"});
     } catch (error) {
+      if (signal?.aborted) throw signal.reason;
       const late = error.name === "TimeoutError";
       throw new ApiError(0, {detail: late ? `the API did not answer within ${timeout / 1000} s` : "the API cannot be reached"});
-    }
-  }
-
-  async inTurn(work) {
-    if (this.running >= CALLS_AT_ONCE) await new Promise(resolve => this.waiting.push(resolve));
-    this.running += 1;
-    try {
-      return await work();
-    } finally {
-      this.running -= 1;
-      const next = this.waiting.shift();
-      if (next) next();
     }
   }
 }

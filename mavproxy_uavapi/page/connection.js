@@ -2,28 +2,41 @@
 
 import {Panel} from "./panel.js";
 import {ageText} from "./freshness.js";
-import {setAttribute, setText} from "./dom.js";
+import {element, setAttribute, setText} from "./dom.js";
 
 export class ConnectionState extends Panel {
   build() {
     this.setAttribute("role", "status");
-    this.banner = document.getElementById("trouble");
+    this.banner = document.getElementById("trouble"); // a screen reader says what changes in it, but not the running age
+    this.text = element("span");
+    this.age = element("span", {class: "age", "aria-hidden": "true"});
+    this.banner.replaceChildren(this.text, this.age);
   }
 
   render(at) {
     const {stream, fleet} = this.context;
     const trouble = stream.trouble(at);
     const lost = trouble ? [] : fleet.all.filter(vehicle => vehicle.get("vehicle") && !vehicle.isAlive(at));
-    const heard = Number.isFinite(stream.heardAt) ? `; what is shown is ${ageText(at - stream.heardAt)} old` : "";
-    let text = "";
-    if (trouble) text = `NO LIVE DATA: ${trouble}${heard}`;
-    else if (lost.length) text = `LINK LOST: ${lost.map(vehicle => `vehicle ${vehicle.id}, silent for ${silence(vehicle, at)}`).join("; ")}`;
-    setText(this.banner, text);
-    this.banner.hidden = !text;
+    this.tell(...(trouble ? [`NO LIVE DATA: ${trouble}`, shownAge(stream, at)] : lost.length ? linkLost(lost, at) : ["", ""]));
     document.body.classList.toggle("no-data", Boolean(trouble));
     setText(this, trouble ? "not live" : lost.length ? "link lost" : fleet.vehicles.size ? "live" : "no vehicle yet");
     setAttribute(this, "class", trouble || lost.length ? "bad" : fleet.vehicles.size ? "good" : "wait");
   }
+
+  tell(text, age) {
+    setText(this.text, text);
+    setText(this.age, age);
+    this.banner.hidden = !text;
+  }
+}
+
+function shownAge(stream, at) {
+  return Number.isFinite(stream.heardAt) ? `what is shown is ${ageText(at - stream.heardAt)} old` : "";
+}
+
+function linkLost(lost, at) {
+  return [`LINK LOST: ${lost.map(vehicle => `vehicle ${vehicle.id}`).join(", ")}`,
+    `silent for ${lost.map(vehicle => silence(vehicle, at)).join(", ")}`];
 }
 
 function silence(vehicle, at) {

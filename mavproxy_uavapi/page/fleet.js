@@ -93,7 +93,7 @@ export class Fleet extends EventTarget {
   take(event, at) {
     if (event.view !== undefined) this.of(event.system).take(event.view, event.info, at);
     else if (event.event === "statustext") this.heardText(event, at);
-    else if (event.event === "job") this.heardJob(event);
+    else if (event.event === "job") this.heardJob(event, at);
     else if (event.event === "tag") this.of(event.system).sawTag(event.info);
     if (event.event !== undefined) this.dispatchEvent(new CustomEvent("event", {detail: event}));
     if (event.view === "vehicle" && event.info.current && !this.chosenId) this.choose(event.system);
@@ -117,8 +117,8 @@ export class Fleet extends EventTarget {
     if (texts.length > TEXTS) texts.shift();
   }
 
-  heardJob(event) {
-    const job = {...event.info, system: event.system};
+  heardJob(event, at) {
+    const job = {...event.info, system: event.system, at};
     this.jobs.delete(job.job);
     this.jobs.set(job.job, job);
     for (const [number, old] of this.jobs) {

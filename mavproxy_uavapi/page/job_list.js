@@ -1,6 +1,7 @@
 // The verbs in flight and the last ones that ended; a running one can be aborted.
 
 import {Panel} from "./panel.js";
+import {ageText} from "./freshness.js";
 import {element, setAttribute, setText} from "./dom.js";
 import {sentenceOf} from "./command_panel.js";
 
@@ -14,34 +15,41 @@ export class JobList extends Panel {
     this.append(this.empty, this.list);
   }
 
-  render() {
+  render(at) {
     const jobs = [...this.context.fleet.jobs.values()].slice(-SHOWN);
     this.empty.hidden = jobs.length > 0;
     for (const [number, row] of this.rows) if (!jobs.some(job => job.job === number)) { row.remove(); this.rows.delete(number); }
-    for (const job of jobs) this.show(job);
+    for (const job of jobs) this.show(job, at);
   }
 
-  show(job) {
+  show(job, at) {
     let row = this.rows.get(job.job);
     if (!row) {
       row = element("li");
       row.what = element("b");
       row.state = element("span", {class: "state"});
       row.abort = element("button", {type: "button", class: "stop small", on: {click: () => this.abort(job.job)}}, "Abort");
-      row.append(element("div", {class: "row"}, row.what, row.abort), row.state);
+      row.age = element("span", {class: "age"});
+      row.append(element("div", {class: "row"}, row.what, row.abort), row.state, " ", row.age);
       this.rows.set(job.job, row);
       this.list.prepend(row);
     }
     setText(row.what, `${job.job} · vehicle ${job.system} · ${job.verb.split("/").pop().replaceAll("_", " ")}`);
     setText(row.state, stateOf(job));
-    setAttribute(row, "class", job.state);
-    row.abort.hidden = job.state !== "running";
+    const runs = job.state === "running", old = runs && !this.isLive(job, at); // how one ended does not age
+    setText(row.age, old ? `${ageText(at - job.at)} old` : "");
+    setAttribute(row, "class", old ? `${job.state} old` : job.state);
+    row.abort.hidden = !runs;
     setAttribute(row.abort, "aria-label", `abort job ${job.job}`);
+  }
+
+  isLive(job, at) {
+    return !this.context.stream.trouble(at) && Boolean(this.context.fleet.vehicles.get(job.system)?.isAlive(at));
   }
 
   async abort(number) {
     try {
-      await this.context.api.call("DELETE", `/jobs/${number}`, {timeout: 60000});
+      await this.context.api.urgent(`/jobs/${number}`, undefined, "DELETE");
     } catch (error) {
       setText(this.rows.get(number).state, error.message);
     }

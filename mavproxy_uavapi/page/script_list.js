@@ -34,8 +34,8 @@ export class ScriptList extends CommandPanel {
     this.shown = key;
     const rows = names.map(name => {
       const act = busy.has(name)
-        ? element("button", {type: "button", class: "stop small", on: {click: () => this.send("/mission/stop-script", name, 60000)}}, "Stop")
-        : element("hold-button", {label: "Run", on: {confirmed: () => this.send("/mission/execute-script", name)}});
+        ? element("button", {type: "button", class: "stop small", on: {click: () => this.stop(name)}}, "Stop")
+        : element("hold-button", {label: "Run", on: {confirmed: () => this.run(name)}});
       const log = element("button", {type: "button", class: "small", on: {click: () => this.follow(name)}}, "Log");
       return element("li", {class: busy.has(name) ? "running" : ""}, element("b", {}, name), element("span", {class: "state"}, busy.has(name) ? "runs" : ""), act, log);
     });
@@ -50,10 +50,12 @@ export class ScriptList extends CommandPanel {
     await this.tell(() => this.context.api.call("POST", "/mission/upload-script", {body: form}), `${file.name} is uploaded`);
   }
 
-  async send(path, name, timeout) {
-    await this.tell(() => this.context.api.call("POST", path, {json: {script_name: name}, timeout}), `${name}: ${path.includes("stop") ? "stopped" : "started"}`);
-    if (path.includes("execute")) this.follow(name);
+  async run(name) {
+    await this.tell(() => this.context.api.call("POST", "/mission/execute-script", {json: {script_name: name}}), `${name}: started`);
+    this.follow(name);
   }
+
+  stop(name) { return this.tell(() => this.context.api.urgent("/mission/stop-script", {script_name: name}), `${name}: stopped`); }
 
   async tell(work, done) {
     try {

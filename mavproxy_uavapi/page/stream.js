@@ -31,13 +31,22 @@ export class TelemetryStream {
     this.take = take;
     this.heardAt = -Infinity;
     this.why = "not connected yet";
-    api.addEventListener("token-changed", () => this.hurry());
+    this.connection = new AbortController();
+    api.addEventListener("token-changed", () => this.renew());
   }
 
   /** Why there is no live data; empty while there is. */
   trouble(at) {
     if (this.why) return this.why;
     return at - this.heardAt > SILENT ? "the API has fallen silent" : "";
+  }
+
+  /** Nothing more is heard with the token from before. */
+  renew() {
+    const changed = new ApiError(0, {detail: "another token was given"});
+    this.why = changed.message;
+    this.connection.abort(changed);
+    this.hurry();
   }
 
   async run() {
@@ -54,17 +63,18 @@ export class TelemetryStream {
   hurry() {} // ends the pause; set while there is one
 
   async once() {
-    const stop = new AbortController();
+    const stop = this.connection = new AbortController();
     const opened = now();
     const watch = setInterval(() => { if (now() - Math.max(this.heardAt, opened) > DEAD) stop.abort(); }, 500);
     try {
       const response = await this.api.open(this.path, stop.signal);
       this.clock = new StreamClock();
       this.opened();
-      await readEvents(response, event => this.heard(event));
+      await readEvents(response, event => { if (!stop.signal.aborted) this.heard(event); });
       this.why = "the API has ended the connection";
     } catch (error) {
-      this.why = error instanceof ApiError ? error.message : "the API cannot be reached";
+      const cause = stop.signal.reason ?? error;
+      this.why = cause instanceof ApiError ? cause.message : "the API cannot be reached";
     } finally {
       clearInterval(watch);
       stop.abort();

@@ -21,7 +21,7 @@ export class TokenDialog extends Panel {
     if (this.dialog.open) return;
     this.note.textContent = this.context.api.hasToken ? "The token was not accepted." : "";
     this.input.value = "";
-    this.dialog.showModal();
+    this.dialog.show(); // not modal: HOLD ALL can be pressed
   }
 
   taken(event) {

@@ -14,6 +14,11 @@ from tests.support.page_pilot import BUTTON, Pilot
 RIG_SPEEDUP = 5  # so that the page counts no number as old on a busy machine
 pytestmark = pytest.mark.needs("chromium")
 
+# Both strips and HOLD ALL are wholly in the viewport, and what one sees there is they.
+ALARMS_IN_SIGHT = """['#trouble', '#hold-result', 'hold-all button'].every(name => {
+  const one = document.querySelector(name), {left, top, right, bottom} = one.getBoundingClientRect();
+  const seen = document.elementFromPoint((left + right) / 2, (top + bottom) / 2);
+  return left >= 0 && top >= 0 && right <= innerWidth && bottom <= innerHeight && one.contains(seen); })"""
 CANVAS = "document.querySelector('top-view canvas')"
 
 
@@ -74,6 +79,9 @@ async def give_the_token(pilot: Pilot) -> None:
     await pilot.page.visit(pilot.rig.url + "/")
     await pilot.page.until("document.querySelector('dialog').open")
     await pilot.sees("#trouble", "this API wants its token")
+    await pilot.click("HOLD ALL")  # the dialog is not in its way
+    await pilot.sees("#hold-result", "HOLD ALL WAS NOT DELIVERED")
+    await pilot.page.evaluate("document.querySelector('dialog input').focus()")
     await pilot.page.ask("Input.insertText", text="sesame")
     await pilot.click("Use it")
     await pilot.sees_live()
@@ -89,6 +97,11 @@ async def see_the_api_gone(pilot: Pilot) -> None:
     await pilot.page.until("document.querySelector('flight-status').classList.contains('old')")
     await pilot.click("HOLD ALL")
     await pilot.sees("#hold-result", "HOLD ALL WAS NOT DELIVERED")
+    await pilot.page.until(ALARMS_IN_SIGHT)
+    await pilot.page.resize(390, 844)
+    await pilot.page.evaluate("scrollTo(0, document.documentElement.scrollHeight)")
+    await pilot.page.until("scrollY > 100")
+    assert await pilot.page.evaluate(ALARMS_IN_SIGHT)
 
 
 async def open_the_page(pilot: Pilot, dropped: str) -> None:
@@ -118,7 +131,7 @@ async def flight(rig: Any, directory: Path) -> list[str]:
         await pilot.sees("flight-status", "GUIDED")
         await go_to_a_click(pilot, -200, 100)
         await pilot.hold_all_by_key()
-        await pilot.sees("#hold-result", "every vehicle holds")
+        await pilot.sees("#hold-result", "every vehicle held")
         await pilot.sees("flight-status", "BRAKE")
         await pilot.sees("flight-actions", "was superseded")
         await see_the_link_lost(pilot)

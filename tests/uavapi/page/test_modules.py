@@ -18,10 +18,199 @@ from tests.support.chromium import Page, chromium
 
 pytestmark = pytest.mark.needs("chromium")
 
+# Calls of the API that are not answered until their signal ends them; `sent` has their paths, `answer` answers one.
+HELD_CALLS = """
+  const sent = [], open = {};
+  const settle = async () => { for (let n = 0; n < 20; n += 1) await new Promise(resolve => setTimeout(resolve)); };
+  window.fetch = (path, {signal}) => new Promise((resolve, reject) => {
+    sent.push(path);
+    open[path] = () => resolve(new Response('{}'));
+    signal.addEventListener('abort', () => reject(signal.reason));
+  });
+  const said = {}, ask = (name, call) => call.then(() => { said[name] = 'done'; }, e => { said[name] = e.message; });
+  const a = new m.Api();
+  ask('log', a.blob('/log', 600000)); ask('list', a.get('/list'));
+"""
+
+# The page's strips as index.html has them, and what panels are given; `at` is the time of a vehicle's report.
+STRIPS = """
+  const {Fleet} = await import('/page/fleet.js'), fleet = new Fleet();
+  const told = (mode, at, armed = true) => fleet.of(1).take('vehicle',
+    {type: 'copter', mode, armed, link: {alive: true, heartbeat_age_s: 0}}, at);
+  const strip = id => {
+    const made = document.createElement('div');
+    document.body.append(Object.assign(made, {id}));
+    return made;
+  };
+  const trouble = strip('trouble'), result = strip('hold-result');
+  const drop = () => { for (const one of [trouble, result]) one.remove(); };
+  let why = '';
+  const stream = {heardAt: 0, trouble: () => why};
+  const spoken = one => [...one.querySelectorAll(':not([aria-hidden])')].filter(e => !e.children.length)
+    .map(e => e.textContent).join('|');
+"""
+
 HOUR = 36_000  # events of a view at 10 Hz
 
 # module -> scripts that must give true; `m` is the module
 CHECKS = {
+    # both slots are held by slow reads
+    "api": [
+        # a stop goes out at once, and no command that waits goes out after it
+        f"""(async () => {{{HELD_CALLS}
+           ask('go', a.command('/go_to')); ask('start', a.call('POST', '/start')); ask('read', a.get('/read'));
+           ask('hold', a.urgent('/fleet/brake'));
+           const first = same(sent, ['/log', '/list', '/fleet/brake']);
+           open['/fleet/brake'](); open['/list']();
+           await settle();
+           const why = 'not sent: a stop came first';
+           return first && same(sent.slice(3), ['/read']) && said.go === why && said.start === why
+             && said.hold === 'done';
+           }})()""",
+        # a command that has waited too long is not sent, even if no timer told so meanwhile
+        f"""(async () => {{{HELD_CALLS}
+           const clock = performance.now.bind(performance);
+           ask('go', a.command('/go_to'));
+           performance.now = () => clock() + 1500;
+           try {{ open['/list'](); await settle(); }} finally {{ delete performance.now; }}
+           return same(sent, ['/log', '/list']) && said.go === 'not sent: the page was busy'; }})()""",
+        # a command goes before the reads that wait
+        f"""(async () => {{{HELD_CALLS}
+           ask('read', a.get('/read')); ask('go', a.command('/go_to'));
+           open['/list']();
+           await settle();
+           return same(sent, ['/log', '/list', '/go_to?wait=false']); }})()""",
+        # one connection is for stops: a second stop without an answer takes those of the slots, and nothing else does
+        f"""(async () => {{{HELD_CALLS}
+           ask('one', a.stop('/one')); await settle();
+           const kept = said.log === undefined;
+           ask('hold', a.urgent('/fleet/brake')); ask('read', a.get('/read')); ask('more', a.get('/more'));
+           await settle();
+           return kept && said.log === said.list && said.log.startsWith('given up')
+             && same(sent.slice(2), ['/one?wait=false', '/fleet/brake', '/read']); }})()""",
+        # a command that is under way without an answer is given up: the browser may not have sent it yet
+        """(async () => {
+           const signals = {}, said = [];
+           window.fetch = (path, {signal}) => new Promise((_, no) => { signals[path] = signal;
+             signal.addEventListener('abort', () => no(signal.reason)); });
+           const a = new m.Api();
+           a.command('/go_to').catch(e => said.push(e.message)); a.urgent('/fleet/brake');
+           await new Promise(resolve => setTimeout(resolve));
+           return said[0].startsWith('given up') && !signals['/fleet/brake'].aborted; })()""",
+        # a 401 to a call with a token from before asks for none
+        """(async () => {
+           const answers = [], a = new m.Api();
+           let asked = 0;
+           a.addEventListener('token', () => { asked += 1; });
+           const refuse = () => new Response('{}', {status: 401});
+           window.fetch = () => new Promise(resolve => answers.push(() => resolve(refuse())));
+           const old = [a.get('/a'), a.open('/b')].map(call => call.catch(() => {}));
+           a.setToken('new');
+           for (const answer of answers.splice(0)) answer();
+           await Promise.all(old);
+           const early = asked, late = a.get('/c').catch(() => {});
+           answers[0]();
+           await late;
+           a.setToken('');
+           return same([early, asked], [0, 1]); })()""",
+    ],
+    "hold_order": [
+        # an answer of the API counts until the vehicle tells of another mode; then nothing is said of now
+        f"""(async () => {{{STRIPS} drop();
+           told('GUIDED', 900);
+           const o = new m.HoldOrder(fleet, 1000);
+           o.answered({{1: {{status: 200}}}}, 1500);
+           const kinds = [o.standing(1500).kind];
+           told('GUIDED', 1600); kinds.push(o.standing(1700).kind); // on its way before the answer
+           told('BRAKE', 2000); kinds.push(o.standing(2100).kind, / held/.test(o.standing(2100).head));
+           told('GUIDED', 3000); kinds.push(o.standing(3100));
+           return same(kinds, ['good', 'good', 'good', true, null]); }})()""",
+        # no answer is bad after 3 s, and good when it comes
+        f"""(async () => {{{STRIPS} drop();
+           told('GUIDED', 900);
+           const o = new m.HoldOrder(fleet, 1000), early = o.standing(3900).kind, late = o.standing(4100);
+           o.answered({{1: {{status: 200}}}}, 9000);
+           return same([early, late.kind, late.missing], ['', 'bad', ['vehicle 1: no answer']])
+             && o.standing(9000).kind === 'good' && /NO ANSWER/.test(late.head); }})()""",
+        # what another vehicle lacks stays said
+        f"""(async () => {{{STRIPS} drop();
+           told('BRAKE', 2000);
+           const o = new m.HoldOrder(fleet, 1000);
+           o.answered({{1: {{status: 200}}, 2: {{status: 503, detail: 'no heartbeat'}}}}, 1500);
+           told('GUIDED', 3000);
+           const missing = ['vehicle 1: flies again (GUIDED)', 'vehicle 2: no heartbeat'];
+           return same(o.standing(3100).missing, missing); }})()""",
+    ],
+    "hold_all": [
+        # a screen reader hears no running age; the button to close stays the same one
+        f"""(async () => {{{STRIPS}
+           told('GUIDED', 0);
+           const panel = document.createElement('hold-all');
+           panel.start({{fleet, painter: {{touch() {{}}}}, api: {{urgent: () => new Promise(() => {{}})}}}});
+           panel.button.click();
+           const at = panel.order.at, close = result.querySelector('button');
+           panel.render(at + 100);
+           const first = spoken(result), age = result.querySelector('.age').textContent;
+           panel.render(at + 900);
+           const kept = spoken(result) === first && result.querySelector('.age').textContent !== age
+             && result.querySelector('button') === close && !result.hidden;
+           close.click(); panel.render(at + 1000); drop();
+           return kept && result.hidden; }})()""",
+    ],
+    "connection": [
+        f"""(async () => {{{STRIPS}
+           told('GUIDED', 0);
+           const panel = document.createElement('connection-state'), said = [];
+           panel.start({{fleet, stream}});
+           const look = at => {{ panel.render(at); said.push([trouble.hidden, spoken(trouble)]); }};
+           look(100); look(9000); look(9900); why = 'gone'; look(10000); look(11000); drop();
+           return same(said, [[true, ''], [false, 'LINK LOST: vehicle 1'], [false, 'LINK LOST: vehicle 1'],
+             [false, 'NO LIVE DATA: gone'], [false, 'NO LIVE DATA: gone']])
+             && trouble.querySelector('.age').textContent === 'what is shown is 11 s old'; }})()""",
+    ],
+    "job_list": [
+        # how far it is to go is grey and says its age when it is not live; how a job ended is not
+        f"""(async () => {{{STRIPS} drop();
+           told('GUIDED', 0);
+           const tell = info => fleet.take({{system: 1, event: 'job', info: {{verb: 'go', ...info}}}}, 0);
+           tell({{job: '1', state: 'succeeded', result: 'there', seconds: 1}});
+           tell({{job: '2', state: 'running', progress: {{distance_to_go: 5}}}});
+           const panel = document.createElement('job-list');
+           panel.start({{fleet, stream}});
+           const told_of = row => [row.className, row.querySelector('.age').textContent];
+           const rows = () => [...panel.querySelectorAll('li')].map(told_of);
+           panel.render(100); const live = rows();
+           panel.render(9000); const lost = rows();
+           told('GUIDED', 9000); why = 'gone'; panel.render(9000);
+           const ended = ['succeeded', ''], grey = [['running old', '9.0 s old'], ended];
+           return same(live, [['running', ''], ended]) && same(lost, grey) && same(rows(), grey); }})()""",
+    ],
+    "token_dialog": [
+        # it leaves HOLD ALL to be clicked
+        """{const panel = document.createElement('token-dialog');
+           panel.start({api: Object.assign(new EventTarget(), {hasToken: false})});
+           document.body.append(panel);
+           panel.ask();
+           const dialog = panel.querySelector('dialog'), found = dialog.open && !dialog.matches(':modal');
+           panel.remove();
+           found}""",
+    ],
+    # what stops takes no turn
+    "actions": [
+        """(async () => {
+           const {Fleet} = await import('/page/fleet.js'), fleet = new Fleet(), calls = [];
+           fleet.of(3); fleet.choose(3);
+           const kept = name => path => { calls.push([name, path]); return new Promise(() => {}); };
+           const panel = document.createElement('flight-actions');
+           panel.start({fleet, preferences: {alt: 10}, api: {stop: kept('stop'), command: kept('command')}});
+           for (const one of [panel.brake, panel.stop]) one.click();
+           for (const one of [panel.land, panel.rtl, panel.disarm, panel.takeoff]) {
+             one.dispatchEvent(new Event('confirmed'));
+           }
+           return same(calls, [['stop', 'command/brake'], ['stop', 'movement/stop'], ['stop', 'command/land'],
+             ['stop', 'command/rtl'], ['stop', 'command/disarm'], ['command', 'command/takeoff']]
+             .map(([way, path]) => [way, `/vehicles/3/${path}`])); })()""",
+    ],
     "areas": [
         "m.areasOf(null).length === 0",
         """{const [a] = m.areasOf({features: [{properties: {kind: 'exclusion', radius: 25},
@@ -73,6 +262,27 @@ CHECKS = {
            const body = new Blob([parts]).stream(), heard = [];
            await m.readEvents(new Response(body), event => heard.push(event.n));
            return heard.length === 300 && heard[299] === 299})()""",
+        # with another token nothing more is heard of the stream from before
+        """(async () => {
+           const api = new EventTarget(), heard = [], bodies = [];
+           const settle = () => new Promise(resolve => setTimeout(resolve, 5));
+           let body;
+           api.open = async (_, signal) => {
+             const response = new Response(new ReadableStream({start(control) { body = control; }}));
+             signal.addEventListener('abort', () => bodies.push('ended'));
+             return response;
+           };
+           const stream = new m.TelemetryStream(api, {}, event => heard.push(event.n));
+           const tell = n => body.enqueue(new TextEncoder().encode(`data: {"n": ${n}, "time": 0}\n\n`));
+           stream.once();
+           await settle(); tell(1);
+           while (!heard.length) await settle();
+           const live = stream.trouble(stream.heardAt) === '';
+           api.dispatchEvent(new Event('token-changed'));
+           const at_once = stream.trouble(stream.heardAt);
+           tell(2); await settle(); await settle();
+           return live && at_once === 'another token was given' && same(heard, [1]) && same(bodies, ['ended'])
+             && stream.trouble(stream.heardAt) !== ''; })()""",
     ],
     "setting_list": [
         """same(m.inOrder([{name: 'a', settable: false}, {name: 'b', settable: true}, {name: 'c', settable: true}])

@@ -1,0 +1,58 @@
+// One HOLD ALL: what the API answered, and what each vehicle has told since.
+
+import {now} from "./freshness.js";
+
+const HOLDS = {copter: ["BRAKE"], plane: ["LOITER", "QLOITER"], rover: ["HOLD"]}; // the modes that /fleet/brake asks for
+const SOON = 3000; // ms in which the API answers if all is well
+const SETTLED = 1000; // ms after the answer; what a vehicle told before that may be older than its stop
+
+export class HoldOrder {
+  constructor(fleet, at = now()) {
+    this.fleet = fleet;
+    this.at = at;
+    this.clock = new Date().toLocaleTimeString([], {hour12: false});
+    this.error = "";
+    this.answers = null;
+    this.answeredAt = Infinity;
+    this.allHeld = false; // once
+  }
+
+  answered(answers, at = now()) {
+    this.answers = answers;
+    this.answeredAt = at;
+  }
+
+  /** How it stands: {kind, head, missing}; null when all have held and one flies again, because it tells nothing of now. */
+  standing(at) {
+    const outcomes = this.outcomes(at);
+    const missing = outcomes.filter(one => !one.stopped).map(one => `vehicle ${one.id}: ${one.why}`);
+    const {clock, error} = this, name = `HOLD ALL of ${clock}`;
+    if (this.allHeld && outcomes.some(one => one.fliesAgain)) return null;
+    if (error) return {kind: "bad", head: `HOLD ALL WAS NOT DELIVERED (${clock}): ${error}. Press again.`, missing: []};
+    if (outcomes.length && !missing.length) {
+      this.allHeld = true;
+      return {kind: "good", head: `${name}: every vehicle held.`, missing};
+    }
+    const count = outcomes.length ? `${outcomes.length - missing.length} of ${outcomes.length} hold.` : "no vehicle is known.";
+    if (this.answers) return {kind: "bad", head: `${name}: ${count}`, missing};
+    if (at - this.at < SOON) return {kind: "", head: `${name}: ${count}`, missing};
+    return {kind: "bad", head: `HOLD ALL HAS NO ANSWER (${clock}), it may not be delivered: ${count} Press again.`, missing};
+  }
+
+  outcomes(at) {
+    const ids = new Set([...this.fleet.vehicles.keys(), ...Object.keys(this.answers ?? {}).map(Number)]);
+    return [...ids].sort((a, b) => a - b).map(id => ({id, ...this.outcomeOf(id, at)}));
+  }
+
+  /** Whether a vehicle has stopped, and if not why. */
+  outcomeOf(id, at) {
+    const vehicle = this.fleet.vehicles.get(id), report = vehicle?.views.vehicle, told = report?.value;
+    const answer = this.answers?.[id], modes = HOLDS[told?.type];
+    const holds = told && (told.armed === false || modes?.includes(told.mode));
+    if (holds && report.at > this.at && vehicle.isAlive(at)) return {stopped: true};
+    if (!answer) return {stopped: false, why: "no answer"};
+    if (answer.status !== 200) return {stopped: false, why: answer.detail};
+    const fliesAgain = Boolean(modes && told.mode && told.armed) && !holds && report.at > this.answeredAt + SETTLED;
+    return {stopped: !fliesAgain, fliesAgain, why: `flies again (${told?.mode})`};
+  }
+}
