@@ -107,6 +107,7 @@ async def see_the_api_gone(pilot: Pilot) -> None:
 async def open_the_page(pilot: Pilot, dropped: str) -> None:
     """While the browser drops one of its files, as when the network changes; later it comes."""
     await pilot.page.ask("Network.enable")
+    await pilot.page.ask("Network.setCacheDisabled", cacheDisabled=True)  # what is in the cache cannot be dropped
     await pilot.page.ask("Network.setBlockedURLs", urls=[f"*/{dropped}"])
     await pilot.page.visit(pilot.rig.url + "/")
     await pilot.sees("#trouble", "Parts of this page did not arrive")
