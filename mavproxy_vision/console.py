@@ -1,12 +1,10 @@
-"""The texts at the prompt, and the body of /vision/status. Pure."""
+"""The texts at the prompt. Pure."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Any
-
 from mavproxy_vision.landing.flight_jobs import FlightJobs
-from mavproxy_vision.tracking.tracker import Tracker, in_view
+from mavproxy_vision.status import in_view, status
+from mavproxy_vision.tracking.tracker import Tracker
 
 HELP = """\
 vision status                      the camera, the tags in view, what is in flight
@@ -22,42 +20,6 @@ vision calibrate FOLDER BOARD [FILE]        charuco:7x5:0.03:0.022 or chessboard
 vision snapshot FILE               write the newest frame, with its tags drawn in
 vision tag FILE.pdf [--family F] [--id N] [--size M]   a tag to scale, for printing
 vision help                        this"""
-
-
-def status(tracker: Tracker, flights: FlightJobs) -> dict[str, Any]:
-    """The camera and the flight as a JSON object."""
-    health, settings = tracker.health, tracker.settings
-    result = tracker.fresh_result
-    body: dict[str, Any] = {
-        "source": settings.shown_source or None,
-        "camera": health.state,
-        "error": health.error or None,
-        "rate": round(health.rate, 1),
-        "frames": health.frames,
-        "repeated": health.repeated,
-        "skipped": health.skipped,
-        "reconnects": health.reconnects,
-        "controls": tracker.controls,
-        "families": list(settings.families),
-        "tags": [vars(tag) for tag in settings.tag_list],
-        "in_view": [detection["id"] for detection in in_view(result)],
-        "frame_age_s": None if result is None else round(tracker.host.clock() - result.captured_at, 3),
-        "detector_ms": None if result is None else round(1000 * (result.done_at - result.received_at), 1),
-    }
-    if tracker.latencies:
-        body["setpoint_ms"] = {
-            "median": percentile(tracker.latencies, 0.5),
-            "p99": percentile(tracker.latencies, 0.99),
-        }
-    if flights.report is not None:
-        body["flight"] = {"running": flights.running, "phase": flights.phase, **flights.report.as_dict()}
-    return body
-
-
-def percentile(seconds: Iterable[float], share: float) -> float:
-    """A percentile of times, in ms."""
-    ordered = sorted(seconds)
-    return round(1000 * ordered[min(int(share * len(ordered)), len(ordered) - 1)], 1)
 
 
 def report(tracker: Tracker, flights: FlightJobs) -> str:

@@ -36,12 +36,13 @@ from mavproxy_vision.apriltag.detection import FrameResult
 from mavproxy_vision.apriltag.overlay import annotated, jpeg
 from mavproxy_vision.camera.one_at_a_time import OneAtATime
 from mavproxy_vision.camera.source import Image, Posted, decode
-from mavproxy_vision.console import caption, status
+from mavproxy_vision.console import caption
 from mavproxy_vision.errors import BadImage, NoCamera
 from mavproxy_vision.landing.flight_jobs import FlightJobs, FlightTask
 from mavproxy_vision.landing.mission import MissionPlan
 from mavproxy_vision.settings import METHODS
-from mavproxy_vision.tracking.tracker import FRESH, Tracker, in_view
+from mavproxy_vision.status import in_view, status
+from mavproxy_vision.tracking.tracker import FRESH, Tracker
 
 BOUNDARY = "frame"
 FRAME_TIMEOUT = 5.0  # s without a frame until a stream ends

@@ -5,10 +5,8 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
-import os
 from collections import deque
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Iterator
 from typing import Any
 
 import cv2
@@ -23,9 +21,8 @@ from mavproxy_vision.apriltag.tag_layout import Tag
 from mavproxy_vision.camera.controls import NO_SUCH
 from mavproxy_vision.camera.gstreamer import Pipeline
 from mavproxy_vision.camera.opencv_capture import Capture
-from mavproxy_vision.camera.renderer import Renderer
-from mavproxy_vision.camera.simulated import SimulatedCamera, parse_placed
-from mavproxy_vision.camera.source import Folder, Image, Posted, Source
+from mavproxy_vision.camera.simulated import parse_placed
+from mavproxy_vision.camera.source import Image
 from mavproxy_vision.errors import NoCamera
 from mavproxy_vision.geometry.frames import Attitude, vector
 from mavproxy_vision.settings import VisionSettings
@@ -33,6 +30,7 @@ from mavproxy_vision.tracking.capture_worker import CameraHealth, Worker
 from mavproxy_vision.tracking.ground_truth import Pose, Truth
 from mavproxy_vision.tracking.measurement import TargetMeasurer, TargetSpec
 from mavproxy_vision.tracking.pose_history import History, UnstampedClock, VehicleClock
+from mavproxy_vision.tracking.source_factory import make_source
 from mavproxy_vision.tracking.stream_rates import TRUTH, Rates
 from mavproxy_vision.tracking.tag_watch import TagWatch
 from mavproxy_vision.tracking.target_filter import Target
@@ -326,48 +324,3 @@ HEARD: dict[str, tuple[str, ...]] = {  # the fields that must be finite, by mess
     "GLOBAL_POSITION_INT": (),
     "SIM_STATE": ("roll", "pitch", "yaw", "alt", "vn", "ve", "vd"),
 }
-
-
-def make_source(settings: VisionSettings, where: Any, clock: Callable[[], float]) -> Source:
-    """The source that the settings name.
-
-    Raises:
-        SettingError: one of the source's settings is invalid.
-    """
-    spec, latency = settings.source, settings.latency / 1000
-    if spec == "sim":
-        tags = parse_placed(settings.sim_tags, settings.families[0])
-        renderer = Renderer(settings.model, settings.camera_mount, tags, settings.look)
-        return SimulatedCamera(renderer, where, settings.timing, clock)
-    if spec == "http":
-        return Posted(latency, clock)
-    path = os.path.expanduser(spec)
-    if os.path.isdir(path):  # Path.is_dir raises on a long pipeline
-        return Folder(Path(path), latency, settings.fps, clock)
-    size = (settings.model.width, settings.model.height)
-    is_file = os.path.isfile(path)
-    if "!" in spec and not is_file:
-        return Pipeline(spec, latency, size, clock, controls=settings.controls)
-    camera = path if is_file else spec
-    return Capture(camera, latency, size, settings.fps, clock, controls=settings.controls)
-
-
-def in_view(result: FrameResult | None) -> list[dict[str, Any]]:
-    """The tags of a result, for an answer body."""
-    return [] if result is None else [_tag_report(result, detection) for detection in result.detections]
-
-
-def _tag_report(result: FrameResult, detection: Any) -> dict[str, Any]:
-    has_position = detection.position is not None
-    return {
-        "id": detection.id,
-        "family": detection.family,
-        "hamming": detection.hamming,
-        "corners": [[round(float(value), 2) for value in corner] for corner in detection.corners],
-        "size": detection.size or None,
-        "position": [round(float(value), 3) for value in detection.position] if has_position else None,
-        "distance": round(detection.distance, 3) if has_position else None,
-        "rotation": [[round(float(v), 4) for v in row] for row in detection.rotation] if has_position else None,
-        "reprojection_error": round(detection.error, 3) if has_position else None,
-        "latency_s": round(result.latency, 3),
-    }

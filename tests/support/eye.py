@@ -22,7 +22,8 @@ from mavproxy_vision.camera.renderer import PlacedTag, Renderer
 from mavproxy_vision.camera.source import Frame
 from mavproxy_vision.geometry.frames import Attitude, Vector, vector
 from mavproxy_vision.tracking.capture_worker import CameraHealth, Watch
-from mavproxy_vision.tracking.tracker import Tracker, make_source
+from mavproxy_vision.tracking.source_factory import make_source
+from mavproxy_vision.tracking.tracker import Tracker
 
 DETECTOR_TIME = 0.015  # s from a frame's arrival to its outcome
 CORNER_NOISE = 0.05  # px

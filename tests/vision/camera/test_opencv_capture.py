@@ -12,7 +12,7 @@ from mavproxy_vision.camera.opencv_capture import COMPARED, Capture, StreamClock
 from mavproxy_vision.errors import NoCamera
 from mavproxy_vision.geometry.camera_model import CameraModel
 from mavproxy_vision.settings import VisionModuleSettings
-from mavproxy_vision.tracking.tracker import make_source
+from mavproxy_vision.tracking.source_factory import make_source
 from tests.support.pictures import picture
 
 
