@@ -20,7 +20,8 @@ const rig = async (...tags) => {
   const call = (method, path, options) => new Promise((answer, refuse) =>
     asked.push({method, path, answer: async body => { answer(body); await settle(); await settle(); },
                 refuse: async why => { refuse(new Error(why)); await settle(); await settle(); }}));
-  const api = Object.assign(new EventTarget(), {call, get: path => call('GET', path)});
+  const api = Object.assign(new EventTarget(), {
+    call, get: path => call('GET', path), command: path => call('POST', path)});
   const context = {fleet, api, stream: {trouble: () => ''}, preferences: {alt: 10}, painter: {touch() {}}};
   const tell = (system, view, info, at) => fleet.take({system, view, info}, at);
   const alive = at => { for (const id of [1, 2]) tell(id, 'vehicle', {link: {alive: true}, armed: true,
@@ -120,6 +121,19 @@ CHECKS = {
            tell(1, 'mission', {total: 5}, 3); await answer(5);
            return same([during, gone, byJob, same3, reads().length, mission.items.length],
              [2, null, [2, 3], 2, 3, 5]); })()""",
+        # a file that was chosen for one vehicle is not sent to the other
+        """(async () => {
+           await import('/page/top_view.js');
+           const {fleet, asked, panels: [, plan]} = await rig('top-view', 'mission-plan');
+           let read;
+           const file = {text: () => new Promise(resolve => { read = resolve; })};
+           Object.defineProperty(plan.file, 'files', {get: () => [file]});
+           plan.sendFile(); fleet.choose(2); read('QGC WPL 110');
+           await settle();
+           const refused = asked.filter(one => one.method === 'POST').length;
+           plan.sendFile(); read('QGC WPL 110');
+           await settle();
+           return same([refused, asked.at(-1).path], [0, '/vehicles/2/mission/waypoints?wait=false']); })()""",
         # progress that comes no longer is grey and says its age
         """(async () => {
            await import('/page/top_view.js');
@@ -206,6 +220,19 @@ CHECKS = {
            alive(9000); go.render(9000);
            const stale = [go.where.textContent.endsWith('0.0 m away 9.0 s ago'), go.where.classList.contains('old')];
            return same([...fresh, ...stale], [true, false, true, true]); })()""",
+        # what was begun for one vehicle is not told as the other's, and closes nothing of the other
+        """(async () => {
+           await import('/page/top_view.js');
+           const {fleet, asked, tell, panels: [, go]} = await rig('top-view', 'go-to'), told = [];
+           const actions = Object.assign(document.createElement('flight-actions'), {await: job => told.push(job)});
+           document.body.append(actions);
+           for (const id of [1, 2]) tell(id, 'gps', at(-35, 149), 0);
+           go.choose({lat: -35, lon: 149}); go.send();
+           const sent = asked.at(-1);
+           fleet.choose(2);
+           go.choose({lat: -35, lon: 149});
+           await sent.answer({job: 1});
+           return same([sent.path, told, go.hidden], ['/vehicles/1/movement/go_to_gps_wait', [], false]); })()""",
     ],
     "time_plot": [
         """(async () => {
