@@ -37,7 +37,7 @@ BROWSERS_WANT = ("text/html", "application/xhtml", "image/", "text/css", "javasc
 DOCUMENTATION = ("/docs", "/openapi.json")
 PROXIES_SAY = ("Forwarded", "X-Forwarded-For", "X-Real-IP", "Via")
 STRANGERS_RATE = 10.0  # requests/s of one address that fail the door check
-READERS_RATE = 50.0  # files/s of the page that one address may read without the token
+READERS_RATE = 60.0  # files/s of the page that one address may read without the token
 REFUSED_LATE = 1.0  # s by which the answer is delayed if its address was refused too often
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from mavproxy_uavapi.core.errors import Stale
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.vehicle import mission_flight
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
@@ -26,11 +25,8 @@ OF_A_MESSAGE: Mapping[str, tuple[str, Callable[[Any], dict[str, Any]]]] = {
 
 
 def mission(_host: Host, vehicle: Vehicle) -> dict[str, Any] | None:
-    """How far the mission has come, as `/mission/progress` has it; None while the vehicle has not told."""
-    try:
-        return mission_flight.progress(vehicle)
-    except Stale:
-        return None
+    """How far the mission has come, as `/mission/progress` has it; None while the vehicle does not tell."""
+    return mission_flight.recent_progress(vehicle)
 
 
 # name -> a summary of several messages, made twice a second and at each change of mode, arming or commander

@@ -40,6 +40,10 @@ for (const panel of panels) panel.start(context);
 const part = name => document.querySelector(name);
 const [view, mission, goTo] = ["top-view", "mission-plan", "go-to"].map(part);
 view.addEventListener("place", ({detail}) => { if (!mission.takes(detail)) goTo.choose(detail); });
+view.addEventListener("nudge", ({detail}) => { // while one draws, a key moves and Enter places
+  view.cursor = mission.isTaking ? detail : null;
+  if (!mission.isTaking) goTo.choose(detail);
+});
 // What was begun for one vehicle does not end as a command to another.
 fleet.addEventListener("chosen", () => { for (const button of document.querySelectorAll("hold-button")) button.end(); });
 fleet.addEventListener("news", () => painter.news());

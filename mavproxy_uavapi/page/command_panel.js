@@ -7,6 +7,7 @@ export class CommandPanel extends Panel {
   start(context) {
     this.answer = element("p", {class: "answer", role: "status"}); // `build` gives it its place
     context.fleet.addEventListener("job", event => this.heard(event.detail));
+    context.fleet.addEventListener("chosen", () => { this.awaited = ""; }); // what was asked of one is not told of another
     super.start(context);
   }
 
@@ -15,21 +16,26 @@ export class CommandPanel extends Panel {
     setAttribute(this.answer, "class", `answer ${kind}`);
   }
 
+  /** Say something of a vehicle; if another one is chosen by now, with its number. */
+  sayOf(vehicle, text, kind) { this.say(vehicle && vehicle !== this.vehicle ? `vehicle ${vehicle.id}: ${text}` : text, kind); }
+
   /** What `work` gives; if it fails that is said, and it gives null. */
   async attempt(work) {
+    const {vehicle} = this;
     try {
       return await work();
     } catch (error) {
-      this.say(error.message, "bad");
+      this.sayOf(vehicle, error.message, "bad");
       return null;
     }
   }
 
   /** Begin a job by `call`, and say what becomes of it; whether it was begun. */
   async begin(call) {
+    const {vehicle} = this;
     this.say("sending …", "wait");
     const begun = await this.attempt(call);
-    if (begun) this.await(begun.job);
+    if (begun && vehicle === this.vehicle) this.await(begun.job);
     return begun !== null;
   }
 

@@ -1,6 +1,7 @@
 // What the page knows of each vehicle: its newest views, where it was, and what it said.
 
 import {Fresh} from "./freshness.js";
+import {HeldMission, mayChangeMission} from "./held_mission.js";
 
 const TRAIL = 1000, TRAIL_STEP = 0.5; // places of a trail, and m between two of them
 const HISTORY = 1200; // points of each curve
@@ -15,7 +16,7 @@ export class Vehicle {
     this.trail = []; // [lat, lon]
     this.history = {alt: [], speed: []}; // [ms, value]
     this.texts = []; // {at, severity, text}
-    this.mission = []; // the items that it holds, once they were read
+    this.mission = new HeldMission();
     this.fence = null; // {radius, alt}
     this.areas = {envelope: [], own: []}; // of envelopes, and of its own fence once that was read
     this.tags = []; // {id, lat, lon}
@@ -23,6 +24,12 @@ export class Vehicle {
 
   /** The newest value of a view; null before the first. */
   get(view) { return this.views[view].value; }
+
+  /** Where it is; null if it has not told that. ArduPilot tells 0 N 0 E before it knows. */
+  get position() {
+    const position = this.get("gps")?.position;
+    return isPlace(position) ? position : null;
+  }
 
   take(view, value, at) {
     this.views[view].set(value, at);
@@ -32,6 +39,7 @@ export class Vehicle {
 
   moved({position}, at) {
     remember(this.history.alt, at, position.relative_alt);
+    if (!isPlace(position)) return;
     const last = this.trail[this.trail.length - 1];
     if (last) {
       const north = (position.lat - last[0]) * METRES_PER_DEGREE;
@@ -44,7 +52,7 @@ export class Vehicle {
 
   /** A tag in sight: its place, by what the vehicle tells of its own. */
   sawTag({id, seen, ned}) {
-    const here = this.get("gps")?.position, own = this.get("ned")?.position;
+    const here = this.position, own = this.get("ned")?.position;
     if (!seen || !ned || !here || !own) return;
     const lat = here.lat + (ned[0] - own.x) / METRES_PER_DEGREE;
     const lon = here.lon + (ned[1] - own.y) / METRES_PER_DEGREE / Math.cos(here.lat * Math.PI / 180);
@@ -62,13 +70,18 @@ export class Vehicle {
   get flies() { return this.armed === true && this.get("vehicle").landed_state !== "on_ground"; }
 }
 
+const isPlace = position => Boolean(position && (position.lat || position.lon));
+
 function remember(curve, at, value) {
   if (value === null || value === undefined) return;
   curve.push([at, value]);
   if (curve.length > HISTORY) curve.splice(0, HISTORY / 10);
 }
 
-/** All vehicles and jobs. Dispatches `news` at whatever is new, and `chosen`, `vehicle`, `event` and `job`. */
+/**
+ * All vehicles and jobs. Dispatches `news` at whatever is new, and `chosen`, `vehicle`, `event` and `job`; and `mission` with
+ * a vehicle whose mission may be another one than was read.
+ */
 export class Fleet extends EventTarget {
   constructor() {
     super();
@@ -91,7 +104,7 @@ export class Fleet extends EventTarget {
 
   /** Take an event of the stream that happened at `at` (ms). */
   take(event, at) {
-    if (event.view !== undefined) this.of(event.system).take(event.view, event.info, at);
+    if (event.view !== undefined) this.heardView(event, at);
     else if (event.event === "statustext") this.heardText(event, at);
     else if (event.event === "job") this.heardJob(event, at);
     else if (event.event === "tag") this.of(event.system).sawTag(event.info);
@@ -108,6 +121,14 @@ export class Fleet extends EventTarget {
     }
     return vehicle;
   }
+
+  heardView({system, view, info}, at) {
+    const vehicle = this.of(system);
+    vehicle.take(view, info, at);
+    if (view === "mission" && vehicle.mission.told(info.total)) this.missionChanged(vehicle);
+  }
+
+  missionChanged(vehicle) { this.dispatchEvent(new CustomEvent("mission", {detail: vehicle})); }
 
   heardText(event, at) {
     const texts = this.of(event.system).texts;
@@ -126,5 +147,9 @@ export class Fleet extends EventTarget {
       if (old.state !== "running") this.jobs.delete(number);
     }
     this.dispatchEvent(new CustomEvent("job", {detail: job}));
+    if (!mayChangeMission(job)) return;
+    const vehicle = this.of(job.system);
+    vehicle.mission.forget();
+    this.missionChanged(vehicle);
   }
 }

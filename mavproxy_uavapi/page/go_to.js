@@ -2,6 +2,7 @@
 
 import {CommandPanel} from "./command_panel.js";
 import {element, heightInput, heightOf, labelled, number, setAttribute, setText} from "./dom.js";
+import {ageText} from "./freshness.js";
 import "./hold_button.js";
 
 export class GoTo extends CommandPanel {
@@ -35,10 +36,10 @@ export class GoTo extends CommandPanel {
   }
 
   async send() {
-    const {lat, lon} = this.place, body = {lat, long: lon, alt: heightOf(this.alt), look_at_target: this.look.checked};
+    const {vehicle} = this, {lat, lon} = this.place, body = {lat, long: lon, alt: heightOf(this.alt), look_at_target: this.look.checked};
     this.say("sending …", "wait");
     const begun = await this.attempt(() => this.context.api.command(this.path("/movement/go_to_gps_wait"), body));
-    if (!begun) return;
+    if (!begun || vehicle !== this.vehicle) return;
     document.querySelector("flight-actions").await(begun.job, "on its way");
     this.cancel(); // the target is drawn from what the autopilot tells
   }
@@ -46,7 +47,10 @@ export class GoTo extends CommandPanel {
   render(at) {
     if (this.hidden || !this.place || !this.vehicle || !this.view.projection) return;
     const [north, east] = this.view.metresOf(this.place), here = this.view.placeOf(this.vehicle);
-    const far = here ? `${number(Math.hypot(north - here[0], east - here[1]))} m away` : "distance unknown";
+    const {gps} = this.vehicle.views, old = Boolean(here) && this.isOld(gps, at);
+    const away = here ? `${number(Math.hypot(north - here[0], east - here[1]))} m away` : "distance unknown";
+    const far = old ? `${away} ${ageText(gps.age(at))} ago` : away;
+    this.where.classList.toggle("old", old);
     setText(this.where, `Vehicle ${this.vehicle.id} to ${number(north)} m N, ${number(east)} m E of home: ${far}`);
     const live = this.vehicle.isAlive(at) && !this.context.stream.trouble(at);
     const high = heightOf(this.alt) !== null;

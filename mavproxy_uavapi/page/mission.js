@@ -1,8 +1,9 @@
 // The mission that the autopilot itself flies: drawn on the top view or read from a file, uploaded, started, watched.
 
 import {CommandPanel} from "./command_panel.js";
-import {areasOf} from "./areas.js";
+import {areasOf, markOld} from "./areas.js";
 import {element, heightInput, heightOf, labelled, setAttribute, setText} from "./dom.js";
+import {ageText} from "./freshness.js";
 import "./hold_button.js";
 
 const ENDS = {nothing: null, land: "NAV_LAND", rtl: "NAV_RETURN_TO_LAUNCH"};
@@ -21,26 +22,33 @@ export class MissionPlan extends CommandPanel {
     this.rows = element("ol", {class: "waypoints"});
     this.upload = element("hold-button", {label: "Upload draft", on: {confirmed: () => this.sendDraft()}});
     this.starter = element("hold-button", {label: "Start mission", on: {confirmed: () => this.send("/mission/start", {json: {}})}});
-    this.progress = element("p", {class: "where"}, "The vehicle holds no items."); // nothing below it moves later
-    this.append(this.progress, element("div", {class: "buttons"}, this.drawing, labelled("height", this.alt, "m"), labelled("then", this.end)),
+    this.held = element("span");
+    this.progress = element("span");
+    const where = element("p", {class: "where"}, this.held, this.progress);
+    this.append(where, element("div", {class: "buttons"}, this.drawing, labelled("height", this.alt, "m"), labelled("then", this.end)),
       this.rows, element("div", {class: "buttons"}, this.upload, this.starter), element("div", {class: "buttons"}, read, clear),
       labelled("upload a file", this.file), this.answer);
-    this.context.fleet.addEventListener("chosen", () => { this.draw(false); this.replace([]); this.say("", ""); });
-    this.addEventListener("opened", () => { if (this.vehicle && !this.vehicle.mission.length) this.read(); });
+    this.context.fleet.addEventListener("chosen", () => { this.draw(false); this.replace([]); this.say("", ""); this.update(); });
+    this.context.fleet.addEventListener("mission", ({detail}) => { if (detail === this.vehicle) this.update(); });
+    this.addEventListener("opened", () => this.update());
   }
 
   // -- the draft
 
   get isDrawing() { return this.drawing.getAttribute("aria-pressed") === "true"; }
 
+  /** Whether a click on the top view, or Enter, is a waypoint. */
+  get isTaking() { return this.isDrawing && !this.hidden; }
+
   draw(on) {
+    this.view.cursor = null;
     setAttribute(this.drawing, "aria-pressed", String(on));
     setText(this.drawing, on ? "Drawing: click the view" : "Draw");
   }
 
-  /** Take a click on the top view, if one is drawing. */
+  /** Take a place on the top view, if one is drawing. */
   takes({lat, lon}) {
-    if (!this.isDrawing || this.hidden) return false;
+    if (!this.isTaking) return false;
     const alt = heightOf(this.alt);
     if (alt === null) this.say("how high?", "bad");
     else this.replace([...this.draft, {lat, long: lon, alt}]);
@@ -89,8 +97,10 @@ export class MissionPlan extends CommandPanel {
 
   async sendFile() {
     const [file] = this.file.files;
+    if (!file) return;
+    const {vehicle} = this, body = await file.text();
     this.file.value = "";
-    if (file) await this.send("/mission/waypoints", {body: await file.text()});
+    if (vehicle === this.vehicle) await this.send("/mission/waypoints", {body}); // it was meant for that one
   }
 
   send(path, content) {
@@ -102,35 +112,49 @@ export class MissionPlan extends CommandPanel {
     if (job.verb !== "/mission/waypoints") return;
     this.draw(false);
     this.replace([]);
-    this.read();
+  }
+
+  /** Read what the chosen vehicle holds if it is not known, and somebody looks at it or did. */
+  update() {
+    const mission = this.vehicle?.mission;
+    if (mission && !mission.items && (mission.isWanted || !this.hidden)) this.read();
   }
 
   /** Read the mission and the fence that the vehicle holds. */
   async read() {
-    const {vehicle} = this;
-    if (!vehicle) return;
-    const {api} = this.context;
-    const mission = await this.attempt(() => api.get(`/vehicles/${vehicle.id}/mission/waypoints`));
-    if (mission) vehicle.mission = mission.items;
+    const {vehicle} = this, {api} = this.context;
+    if (!vehicle || vehicle.mission.isBeingRead) return;
+    await vehicle.mission.read(async () => (await api.get(this.path("/mission/waypoints", vehicle))).items);
     this.view.touch();
     try {
-      vehicle.areas.own = areasOf((await api.get(`/vehicles/${vehicle.id}/mission/fence`)).fence);
+      vehicle.areas.own = areasOf((await api.get(this.path("/mission/fence", vehicle))).fence);
     } catch {
-      vehicle.areas.own = []; // it keeps none, or tells none: nothing is drawn that is not known
+      markOld(vehicle.areas.own);
     }
     this.view.touch();
   }
 
   render(at) {
     const {vehicle} = this, live = vehicle?.isAlive(at) && !this.context.stream.trouble(at);
-    const progress = vehicle?.get("mission"), count = vehicle?.mission.length ?? 0;
-    const stage = !progress ? "" : `, item ${progress.current} of ${progress.total ?? "?"}, ${progress.state.replace("_", " ")}`;
-    const far = progress?.distance_m === null || progress?.distance_m === undefined ? "" : `, ${progress.distance_m} m to go`;
-    setText(this.progress, `The vehicle holds ${count || "no"} items${count ? stage + far : ""}.`);
+    const count = vehicle?.mission.items?.length ?? 0;
+    setText(this.held, vehicle ? `${vehicle.mission.words}.` : "No vehicle is chosen.");
+    this.showProgress(vehicle?.views.mission, at);
     setAttribute(this.upload, "disabled", !(live && this.draft.length));
     setAttribute(this.starter, "disabled", !(live && vehicle.armed && count));
-    setAttribute(this.starter, "title", live && vehicle.armed ? "hold for a second" : "arm it first");
+    setAttribute(this.starter, "title", !count ? "no mission is known" : live && vehicle.armed ? "hold for a second" : "arm it first");
   }
+
+  /** How far it has come; grey and with its age once that is old. */
+  showProgress(fresh, at) {
+    const progress = fresh?.value, old = Boolean(progress) && this.isOld(fresh, at);
+    const isNone = !progress || progress.state === "no_mission" || this.vehicle.mission.items?.length === 0;
+    this.progress.classList.toggle("old", old);
+    setText(this.progress, isNone ? "" : progressWords(progress) + (old ? `, ${ageText(fresh.age(at))} old` : ""));
+  }
+}
+
+function progressWords({current, total, state, distance_m: far}) {
+  return ` Item ${current} of ${total ?? "?"}, ${state.replace("_", " ")}${far === null || far === undefined ? "" : `, ${far} m to go`}`;
 }
 
 customElements.define("mission-plan", MissionPlan);

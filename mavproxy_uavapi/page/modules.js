@@ -1,6 +1,6 @@
 // What is asked besides the stream, seldom: which modules are loaded, and where the chosen vehicle may fly.
 
-import {areasOfAll} from "./areas.js";
+import {areasOfAll, markOld} from "./areas.js";
 
 const EVERY = 20000; // ms
 const CIRCLE = 2; // FENCE_TYPE's bit of the circle around home
@@ -33,10 +33,10 @@ async function offer(api, path, tabs, panel) {
 async function readEnvelopes(api, vehicle, painter) {
   try {
     vehicle.areas.envelope = areasOfAll((await api.get(`/vehicles/${vehicle.id}/envelope`)).envelopes);
-    painter.touch();
   } catch {
-    vehicle.areas.envelope = [];
+    markOld(vehicle.areas.envelope); // one lost answer takes no border away
   }
+  painter.touch();
 }
 
 /** The circular fence, from what MAVProxy knows of the parameters; the vehicle is not asked. */
@@ -45,8 +45,8 @@ async function readFence(api, vehicle, painter) {
     const {parameters} = await api.get(`/vehicles/${vehicle.id}/parameters?match=FENCE_*`);
     const on = parameters.FENCE_ENABLE === 1 && (parameters.FENCE_TYPE & CIRCLE) !== 0;
     vehicle.fence = on && parameters.FENCE_RADIUS > 0 ? {radius: parameters.FENCE_RADIUS} : null;
-    painter.touch();
   } catch {
-    vehicle.fence = null; // no fence is drawn that is not known
+    markOld(vehicle.fence ? [vehicle.fence] : []);
   }
+  painter.touch();
 }

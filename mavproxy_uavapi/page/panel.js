@@ -12,6 +12,11 @@ export class Panel extends HTMLElement {
 
   get vehicle() { return this.context.fleet.chosen; }
 
-  /** The path of the chosen vehicle's API. */
-  path(rest) { return `/vehicles/${this.vehicle.id}${rest}`; }
+  /** The path of a vehicle's API, else of the chosen one. */
+  path(rest, vehicle = this.vehicle) { return `/vehicles/${vehicle.id}${rest}`; }
+
+  /** Whether a value of a vehicle (a Fresh) is old, or nothing live comes. */
+  isOld(fresh, at, vehicle = this.vehicle) {
+    return fresh.isOld(at) || !vehicle.isAlive(at) || Boolean(this.context.stream.trouble(at));
+  }
 }

@@ -13,35 +13,46 @@ export class ParameterList extends CommandPanel {
     this.note = element("p", {class: "empty"});
     this.append(labelled("names, with * and ?", this.filter), this.note, this.rows, this.answer);
     this.addEventListener("opened", () => this.look());
-    this.context.fleet.addEventListener("chosen", () => { if (!this.hidden) this.look(); });
+    this.context.fleet.addEventListener("chosen", () => this.forget());
+  }
+
+  /** Another vehicle was chosen: nothing of the one before stays. */
+  forget() {
+    this.rows.replaceChildren();
+    setText(this.note, "");
+    this.say("", "");
+    if (!this.hidden) this.look();
   }
 
   async look() {
-    if (!this.vehicle) return;
+    const {vehicle} = this;
+    if (!vehicle) return;
     try {
       const {parameters} = await this.context.api.get(this.path(`/parameters?match=${encodeURIComponent(this.filter.value || "*")}`));
+      if (vehicle !== this.vehicle) return;
       const names = Object.keys(parameters);
       setText(this.note, names.length > SHOWN ? `${names.length} match; the first ${SHOWN}:` : names.length ? "" : "None that MAVProxy knows.");
-      this.rows.replaceChildren(...names.slice(0, SHOWN).flatMap(name => this.row(name, parameters[name])));
+      this.rows.replaceChildren(...names.slice(0, SHOWN).flatMap(name => this.row(vehicle, name, parameters[name])));
     } catch (error) {
-      this.say(error.message, "bad");
+      this.sayOf(vehicle, error.message, "bad");
     }
   }
 
-  row(name, value) {
+  row(vehicle, name, value) {
     const input = element("input", {type: "text", inputMode: "decimal", value: text(value), "aria-label": name});
-    const set = element("hold-button", {label: "Set", disabled: "", on: {confirmed: () => this.set(name, input)}});
+    const set = element("hold-button", {label: "Set", disabled: "", on: {confirmed: () => this.set(vehicle, name, input)}});
     input.addEventListener("input", () => setAttribute(set, "disabled", input.value.trim() === "" || !Number.isFinite(Number(input.value))));
     return [element("dt", {}, name), element("dd", {}, input, set)];
   }
 
-  async set(name, input) {
-    this.say(`${name} …`, "wait");
+  /** Set it on the vehicle of its row. */
+  async set(vehicle, name, input) {
+    this.sayOf(vehicle, `${name} …`, "wait");
     const options = {json: {value: Number(input.value)}, timeout: 20000};
-    const body = await this.attempt(() => this.context.api.call("PUT", this.path(`/parameters/${name}`), options));
+    const body = await this.attempt(() => this.context.api.call("PUT", this.path(`/parameters/${name}`, vehicle), options));
     if (!body) return;
     input.value = text(body.value);
-    this.say(body.result, "good");
+    this.sayOf(vehicle, body.result, "good");
   }
 }
 

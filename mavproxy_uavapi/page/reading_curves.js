@@ -3,14 +3,14 @@
 import {Panel} from "./panel.js";
 import {SPAN, drawCurve} from "./curve.js";
 import {element, number, setAttribute, setText} from "./dom.js";
-import {now} from "./freshness.js";
+import {Fresh, ageText, now} from "./freshness.js";
 
 const MOST = 24; // curves
 const GAP = 30000; // ms: a quantity may be measured seldom
 
 export class ReadingCurves extends Panel {
   build() {
-    this.curves = new Map(); // device and quantity -> {points, figure, canvas, value}
+    this.curves = new Map(); // device and quantity -> {points, newest, canvas, value, age}
     this.newest = 0; // s since 1970
   }
 
@@ -22,7 +22,9 @@ export class ReadingCurves extends Panel {
     for (const one of series) {
       const curve = this.curveOf(one);
       for (const [time, value] of one.points) {
-        curve?.points.push([this.context.stream.clock?.happened(time * 1000, arrived) ?? arrived, value]);
+        const at = this.context.stream.clock?.happened(time * 1000, arrived) ?? arrived;
+        curve?.points.push([at, value]);
+        curve?.newest.set(value, at);
         this.newest = Math.max(this.newest, time);
       }
     }
@@ -33,22 +35,24 @@ export class ReadingCurves extends Panel {
     const key = `${device} ${quantity}`;
     if (!this.curves.has(key)) {
       if (this.curves.size >= MOST) return null;
-      const canvas = element("canvas", {role: "img"}), value = element("span", {class: "value"});
-      const title = element("figcaption", {}, `${device} · ${quantity} `, value, ` ${representation}`);
+      const canvas = element("canvas", {role: "img"}), value = element("span", {class: "value"}), age = element("span", {class: "age"});
+      const title = element("figcaption", {}, `${device} · ${quantity} `, value, ` ${representation} `, age);
       const figure = element("figure", {class: "reading"}, title, canvas);
       this.append(figure);
-      this.curves.set(key, {points: [], canvas, value});
+      this.curves.set(key, {points: [], newest: new Fresh(), canvas, value, age});
     }
     return this.curves.get(key);
   }
 
   render(at) {
-    for (const [key, {points, canvas, value}] of this.curves) {
+    for (const [key, {points, newest, canvas, value, age}] of this.curves) {
       while (points.length && at - points[0][0] > SPAN) points.shift();
-      const newest = points[points.length - 1];
-      setText(value, newest ? number(newest[1], 2) : "nothing for two minutes");
+      const old = newest.isOld(at);
+      setText(value, points.length ? number(newest.value, 2) : "nothing for two minutes");
+      setText(age, points.length && old ? `${ageText(newest.age(at))} old` : "");
+      canvas.parentElement.classList.toggle("old", old);
       drawCurve(canvas, points, at, {gap: GAP});
-      setAttribute(canvas, "aria-label", `${key}: ${value.textContent}`);
+      setAttribute(canvas, "aria-label", `${key}: ${value.textContent}${age.textContent && `, ${age.textContent}`}`);
     }
   }
 }

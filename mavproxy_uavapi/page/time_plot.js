@@ -3,6 +3,9 @@
 import {Panel} from "./panel.js";
 import {SPAN, drawCurve} from "./curve.js";
 import {element, number, setAttribute} from "./dom.js";
+import {ageText} from "./freshness.js";
+
+const VIEWS = {alt: "gps", speed: "general"}; // curve -> the view that it shows
 
 export class TimePlot extends Panel {
   build() {
@@ -15,7 +18,12 @@ export class TimePlot extends Panel {
     const points = (this.vehicle?.history[this.curve] ?? []).filter(([when]) => at - when < SPAN);
     drawCurve(this.canvas, points, at, {zero: true});
     const newest = points[points.length - 1];
-    setAttribute(this.canvas, "aria-label", `${this.getAttribute("label")}: ${newest ? number(newest[1]) : "nothing yet"}`);
+    setAttribute(this.canvas, "aria-label", `${this.getAttribute("label")}: ${newest ? this.words(newest, at) : "nothing in two minutes"}`);
+  }
+
+  words([when, value], at) {
+    const old = this.isOld(this.vehicle.views[VIEWS[this.curve]], at);
+    return old ? `${number(value)}, ${ageText(at - when)} old` : number(value);
   }
 }
 

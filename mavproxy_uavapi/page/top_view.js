@@ -1,4 +1,4 @@
-// The top view: the fleet from above, in metres. A click, or the arrow keys and Enter, choose a place to go to.
+// The top view: the fleet from above, in metres. A click, or the arrow keys, choose a place to go to.
 
 import {Panel} from "./panel.js";
 import {Camera} from "./camera.js";
@@ -14,13 +14,17 @@ const NEAR = 14; // px; a target that the vehicle has reached is not drawn
 const CLICK = 6; // px that a pointer may move in a click
 const STEP = {ArrowUp: [1, 0], ArrowDown: [-1, 0], ArrowRight: [0, 1], ArrowLeft: [0, -1]};
 
-/** Dispatches `place` with {north, east, lat, lon} of a click. */
+/**
+ * Dispatches `place` with {north, east, lat, lon} of a click, or of the cursor at Enter; `nudge` with that of an arrow key;
+ * and `take` when Enter takes the place that was chosen.
+ */
 export class TopView extends Panel {
   build() {
     this.camera = new Camera();
     this.tiles = new TileLayer(this.context.api, this.context.painter);
     this.pointers = new Map();
     this.chosenPlace = null; // {lat, lon}, not yet sent
+    this.cursor = null; // {lat, lon} where the keys are, while a mission is drawn
     this.draft = []; // of a mission: {lat, long, number}
     this.selected = -1;
     this.canvas = element("canvas", {tabIndex: 0, role: "application"});
@@ -45,14 +49,15 @@ export class TopView extends Panel {
 
   /** The plane: around the home of the chosen vehicle, else where the first position was. */
   get projection() {
-    const home = this.vehicle?.get("home"), position = this.vehicle?.get("gps")?.position;
+    const {vehicle} = this, home = vehicle?.get("home");
+    const position = vehicle?.position ?? this.context.fleet.all.find(one => one.position)?.position;
     if (home && (this.plane?.lat !== home.lat || this.plane?.lon !== home.lon)) this.plane = new Projection(home.lat, home.lon);
     else if (!this.plane && position) this.plane = new Projection(position.lat, position.lon);
     return this.plane ?? null;
   }
 
   placeOf(vehicle) {
-    const position = vehicle?.get("gps")?.position;
+    const position = vehicle?.position;
     return position && this.projection ? this.projection.metres(position.lat, position.lon) : null;
   }
 
@@ -67,7 +72,13 @@ export class TopView extends Panel {
   }
 
   missionOf(vehicle) {
-    return vehicle.mission.filter(item => item.lat).map(item => ({place: this.projection.metres(item.lat, item.long), number: item.seq}));
+    return (vehicle.mission.items ?? []).filter(item => item.lat).map(item => ({place: this.projection.metres(item.lat, item.long), number: item.seq}));
+  }
+
+  /** The number of the item that is flown; 0 if that is not known now. */
+  currentItem(at) {
+    const {mission} = this.vehicle.views;
+    return mission.value && !this.isOld(mission, at) ? mission.value.current : 0;
   }
 
   areasOf(vehicle) { return [...vehicle.areas.envelope, ...vehicle.areas.own]; }
@@ -87,18 +98,19 @@ export class TopView extends Panel {
     if (camera.step(calmMotion.matches)) this.touch(); // and again in the next frame
     this.tiles.draw(pen, camera, this.projection);
     layers.drawGrid(pen, camera, theme);
-    this.drawGround(pen, theme);
+    this.drawGround(pen, at, theme);
     const taken = [];
     for (const vehicle of this.inOrder()) this.drawVehicle(pen, vehicle, at, theme, taken);
     if (this.chosenPlace) layers.drawChosen(pen, camera, this.placeOf(this.vehicle), this.metresOf(this.chosenPlace), theme);
+    if (this.cursor) layers.drawChosen(pen, camera, null, this.metresOf(this.cursor), theme);
     layers.drawScale(pen, camera, theme);
-    setAttribute(this.canvas, "aria-label", this.words());
+    setAttribute(this.canvas, "aria-label", this.words(at));
   }
 
   /** What the camera keeps in sight by itself. */
   places() {
     const places = [[0, 0], ...this.draftPlaces().map(item => item.place)];
-    if (this.chosenPlace) places.push(this.metresOf(this.chosenPlace));
+    for (const place of [this.chosenPlace, this.cursor]) if (place) places.push(this.metresOf(place));
     for (const vehicle of this.context.fleet.all) {
       const place = this.placeOf(vehicle);
       if (place) places.push(place);
@@ -111,7 +123,7 @@ export class TopView extends Panel {
     return places;
   }
 
-  drawGround(pen, theme) {
+  drawGround(pen, at, theme) {
     const {camera, vehicle} = this, home = vehicle?.get("home");
     if (home) {
       const place = this.projection.metres(home.lat, home.lon);
@@ -120,7 +132,7 @@ export class TopView extends Panel {
     }
     for (const area of vehicle ? this.areasOf(vehicle) : []) layers.drawArea(pen, camera, this.projection, area, theme);
     for (const tag of vehicle?.tags ?? []) layers.drawTag(pen, camera, {id: tag.id, place: this.projection.metres(tag.lat, tag.lon)}, theme);
-    if (vehicle) layers.drawMission(pen, camera, this.missionOf(vehicle), {current: vehicle.get("mission")?.current}, theme);
+    if (vehicle) layers.drawMission(pen, camera, this.missionOf(vehicle), {current: this.currentItem(at)}, theme);
     layers.drawMission(pen, camera, this.draftPlaces(), {draft: true, selected: this.selected}, theme);
   }
 
@@ -131,7 +143,7 @@ export class TopView extends Panel {
     const place = this.placeOf(vehicle);
     if (!place) return;
     const {gps} = vehicle.views, {camera} = this, chosen = vehicle === this.vehicle;
-    const old = gps.isOld(at) || !vehicle.isAlive(at) || Boolean(this.context.stream.trouble(at));
+    const old = this.isOld(gps, at, vehicle);
     layers.drawTrail(pen, camera, this.projection, vehicle.trail, vehicle.id, old);
     const target = old ? null : this.targetOf(vehicle);
     if (target && distance(target, place) * camera.scale > NEAR) layers.drawTarget(pen, camera, place, target, vehicle.id, theme);
@@ -140,12 +152,17 @@ export class TopView extends Panel {
     layers.drawVehicle(pen, camera, {place, heading: gps.value.heading, system: vehicle.id, label, old, chosen, taken}, theme);
   }
 
-  words() {
-    const place = this.placeOf(this.vehicle);
-    const where = place ? `vehicle ${this.vehicle.id} is ${number(place[0], 0)} m north, ${number(place[1], 0)} m east of home` : "no position";
+  words(at) {
+    const where = this.placeOf(this.vehicle) ? this.whereWords(at) : "no position";
     const areas = this.vehicle ? this.areasOf(this.vehicle).length : 0;
     const fenced = areas ? `; ${areas} ${areas === 1 ? "area" : "areas"} of fences and envelopes` : "";
-    return `top view: ${where}${fenced}; arrow keys choose a place, Enter takes it, plus and minus zoom`;
+    const cursor = this.cursor ? `; the cursor is ${eastOfHome(this.metresOf(this.cursor))}` : "";
+    return `top view: ${where}${fenced}${cursor}; arrow keys choose a place, Enter takes it, plus and minus zoom`;
+  }
+
+  whereWords(at) {
+    const {vehicle} = this, {gps} = vehicle.views, place = eastOfHome(this.placeOf(vehicle));
+    return this.isOld(gps, at) ? `vehicle ${vehicle.id} was ${place} ${ageText(gps.age(at))} ago` : `vehicle ${vehicle.id} is ${place}`;
   }
 
   // -- hands
@@ -188,22 +205,31 @@ export class TopView extends Panel {
     const step = STEP[event.key];
     if (event.key === "+" || event.key === "-") this.zoom(event.key === "+" ? 1.25 : 0.8);
     else if (step && this.projection) this.nudge(step, event.shiftKey ? 10 : 1);
-    else if (event.key === "Enter" && this.chosenPlace) this.dispatchEvent(new Event("take"));
+    else if (event.key === "Enter" && (this.cursor || this.chosenPlace)) this.enter(event);
     else return;
     event.preventDefault();
     this.touch();
   }
 
   nudge([north, east], metres) {
-    const from = (this.chosenPlace && this.metresOf(this.chosenPlace)) ?? this.placeOf(this.vehicle) ?? [0, 0];
-    this.pick([from[0] + metres * north, from[1] + metres * east]);
+    const before = this.cursor ?? this.chosenPlace;
+    const from = (before && this.metresOf(before)) ?? this.placeOf(this.vehicle) ?? [0, 0];
+    this.pick([from[0] + metres * north, from[1] + metres * east], "nudge");
   }
 
-  pick([north, east]) {
+  enter({repeat}) {
+    if (repeat) return; // a held key places one waypoint
+    if (this.cursor) this.pick(this.metresOf(this.cursor));
+    else this.dispatchEvent(new Event("take"));
+  }
+
+  pick([north, east], event = "place") {
     if (!this.projection) return;
     const [lat, lon] = this.projection.degrees(north, east);
-    this.dispatchEvent(new CustomEvent("place", {detail: {north, east, lat, lon}}));
+    this.dispatchEvent(new CustomEvent(event, {detail: {north, east, lat, lon}}));
   }
 }
+
+const eastOfHome = ([north, east]) => `${number(north, 0)} m north, ${number(east, 0)} m east of home`;
 
 customElements.define("top-view", TopView);

@@ -44,17 +44,17 @@ export function drawScale(pen, camera, theme) {
 export function drawFence(pen, camera, home, fence, theme) {
   const [x, y] = camera.pixels(home), radius = fence.radius * camera.scale;
   pen.setLineDash([10, 6]);
-  pen.strokeStyle = theme.bad;
+  pen.strokeStyle = fence.isOld ? theme.dim : theme.bad;
   pen.lineWidth = 1.5;
   pen.beginPath();
   pen.arc(x, y, radius, 0, 7);
   pen.stroke();
   pen.setLineDash([]);
   pen.font = FONT;
-  haloed(pen, `fence ${fence.radius} m`, x + 4, y - radius - 5, theme.bad, theme.map);
+  haloed(pen, `fence ${fence.radius} m${fence.isOld ? ", old" : ""}`, x + 4, y - radius - 5, pen.strokeStyle, theme.map);
 }
 
-/** An area of an envelope or a fence; where one must not be is filled. */
+/** An area of an envelope or a fence; where one must not be is filled. An old one is grey. */
 export function drawArea(pen, camera, projection, area, theme) {
   const pixels = ([lat, lon]) => camera.pixels(projection.metres(lat, lon));
   pen.beginPath();
@@ -63,7 +63,7 @@ export function drawArea(pen, camera, projection, area, theme) {
     ring.forEach((corner, n) => (n ? pen.lineTo(...pixels(corner)) : pen.moveTo(...pixels(corner))));
     pen.closePath();
   }
-  pen.fillStyle = pen.strokeStyle = theme.bad;
+  pen.fillStyle = pen.strokeStyle = area.isOld ? theme.dim : theme.bad;
   pen.globalAlpha = 0.14;
   if (!area.inclusion) pen.fill("evenodd");
   pen.globalAlpha = 1;

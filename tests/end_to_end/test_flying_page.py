@@ -55,9 +55,13 @@ async def fly_a_drawn_mission(pilot: Pilot) -> None:
     await pilot.sees("mission-plan", "Drawing")
     for right, down in ((-120, -90), (120, -90)):
         await pilot.page.click(CANVAS, right, down)
+    for key, code in (("ArrowUp", 38), ("ArrowUp", 38), ("Enter", 13)):  # only Enter places
+        await pilot.page.key("keyDown", key, code)
+        await pilot.page.key("keyUp", key, code)
+    await pilot.page.until("document.querySelectorAll('.waypoints li').length === 3")
     await pilot.hold("Upload draft")
-    await pilot.sees("mission-plan", "Mission of 4 items uploaded")
-    await pilot.sees("mission-plan", "holds 4 items")
+    await pilot.sees("mission-plan", "Mission of 5 items uploaded")
+    await pilot.sees("mission-plan", "holds 5 items")
     await pilot.hold("Start mission")
     await pilot.sees("flight-status", "AUTO")
 

@@ -142,9 +142,11 @@ class VehicleState:
         After a reboot the streams may be off; a report from before it does not show the present state.
         """
         received = self.messages.get(name)
-        if received is None or self.heartbeat_at - received.at > RECENT:
-            return None
-        return getattr(received.message, attribute)
+        return getattr(received.message, attribute) if received is not None and self.is_recent(received) else None
+
+    def is_recent(self, received: Received) -> bool:
+        """Whether a message is not much older than the newest heartbeat."""
+        return self.heartbeat_at - received.at <= RECENT
 
     def age(self, name: str, now: float) -> float | None:
         """Seconds since a message of that name arrived; None when none did."""

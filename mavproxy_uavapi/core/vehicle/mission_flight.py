@@ -155,7 +155,7 @@ def progress(vehicle: Vehicle) -> dict[str, Any]:
         current, last_reached: item numbers, from 1; 0 and None before any.
         total: items besides home; None where the autopilot does not report it.
         state: of STATES.
-        distance_m: horizontally to the current item, in AUTO; None elsewhere.
+        distance_m: horizontally to the current item, in AUTO; None elsewhere, and where it is old.
 
     Raises:
         Stale: the autopilot has not reported it yet.
@@ -173,5 +173,11 @@ def progress(vehicle: Vehicle) -> dict[str, Any]:
         "last_reached": reached.message.seq if reached is not None and since_the_start else None,
         "state": STATES.get(current.mission_state, "unknown"),
         "mode": vehicle.mode,
-        "distance_m": vehicle.state.field("NAV_CONTROLLER_OUTPUT", "wp_dist") if in_auto else None,
+        "distance_m": vehicle.state.recent_field("NAV_CONTROLLER_OUTPUT", "wp_dist") if in_auto else None,
     }
+
+
+def recent_progress(vehicle: Vehicle) -> dict[str, Any] | None:
+    """As `progress`; None while MISSION_CURRENT does not come, so that an old one is not told as new."""
+    received = vehicle.state.newest("MISSION_CURRENT")
+    return progress(vehicle) if received is not None and vehicle.state.is_recent(received) else None

@@ -72,5 +72,5 @@ def why_not(vehicle: Vehicle, link_alive: bool, now: float) -> list[str]:
 
 
 def _battery(vehicle: Vehicle) -> int | None:
-    remaining: int | None = vehicle.state.field("SYS_STATUS", "battery_remaining")
+    remaining: int | None = vehicle.state.recent_field("SYS_STATUS", "battery_remaining")
     return None if remaining == -1 else remaining

@@ -177,3 +177,17 @@ def test_progress_is_reported_and_a_mission_before_this_one_is_not(loop: Any, fl
     flying.pilot("AUTO")
     loop.settle()
     assert (mission_flight.progress(copter)["last_reached"], mission_flight.progress(copter)["distance_m"]) == (1, 14)
+
+
+def test_an_old_report_is_not_told_as_a_new_one(loop: Any, flying: Any, copter: Any) -> None:
+    assert mission_flight.recent_progress(copter) is None
+    flying.send("mission_current", seq=2, total=3, mission_state=mavlink.MISSION_STATE_ACTIVE)
+    flying.send("nav_controller_output", wp_dist=14)
+    flying.pilot("AUTO")
+    loop.settle()
+    recent = mission_flight.recent_progress(copter)
+    assert recent is not None and recent["distance_m"] == 14
+    flying.mute |= {"MISSION_CURRENT", "NAV_CONTROLLER_OUTPUT"}
+    loop.pass_time(10.0)
+    assert mission_flight.recent_progress(copter) is None
+    assert mission_flight.progress(copter)["distance_m"] is None

@@ -100,3 +100,9 @@ def test_unknown_charge_is_none(loop: Any, drone: Any, copter: Any) -> None:
     drone.send("sys_status", battery_remaining=-1)
     loop.settle()
     assert status(copter, True, loop.time())["battery_remaining"] is None
+
+
+def test_old_charge_is_none(loop: Any, drone: Any, copter: Any) -> None:
+    drone.mute.add("SYS_STATUS")
+    loop.pass_time(10.0)
+    assert status(copter, True, loop.time())["battery_remaining"] is None

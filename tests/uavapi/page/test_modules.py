@@ -3,18 +3,12 @@
 from __future__ import annotations
 
 import asyncio
-import functools
-import http.server
-import json
-import threading
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.http.page import FOLDER
-from tests.support.chromium import Page, chromium
+from tests.support.chromium import chromium
+from tests.support.page_checks import failures
 
 pytestmark = pytest.mark.needs("chromium")
 
@@ -250,6 +244,12 @@ CHECKS = {
         """{const v = new m.Vehicle(1);
            for (let n = 0; n < 100; n += 1) v.moved({position: {lat: -35, lon: 149, relative_alt: 0}}, n);
            v.trail.length === 1}""",
+        # ArduPilot tells 0 N 0 E before it knows where it is; the height is one all the same
+        """{const v = new m.Vehicle(1);
+           v.take('gps', {position: {lat: 0, lon: 0, relative_alt: 3}}, 0);
+           const before = [v.position, v.trail.length, v.history.alt.length];
+           v.take('gps', {position: {lat: 0, lon: 9, relative_alt: 3}}, 1);
+           same([...before, v.position.lon, v.trail.length], [null, 0, 1, 9, 1])}""",
         # jobs that still run are kept, the oldest that ended is forgotten
         """{const f = new m.Fleet();
            const state = n => (n < 2 ? 'running' : 'succeeded');
@@ -338,45 +338,9 @@ CHECKS = {
 }
 
 
-class Handler(http.server.SimpleHTTPRequestHandler):
-    """The page's folder as the API has it."""
-
-    def translate_path(self, path: str) -> str:
-        """The file of an address."""
-        return super().translate_path(path.removeprefix("/page"))
-
-    def log_message(self, *_: Any) -> None:
-        """Say nothing."""
-
-
-@pytest.fixture
-def address() -> Iterator[str]:
-    """A server of the page's files, without the API."""
-    handler = functools.partial(Handler, directory=str(FOLDER))
-    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
-        thread = threading.Thread(target=server.serve_forever)
-        thread.start()
-        yield f"http://127.0.0.1:{server.server_address[1]}"
-        server.shutdown()
-        thread.join()
-
-
-async def failures(page: Page, address: str) -> list[str]:
-    """The checks that did not give true."""
-    await page.visit(f"{address}/page/theme.css")
-    found = []
-    for module, checks in CHECKS.items():
-        for check in checks:
-            script = f"import('/page/{module}.js').then(m => eval({json.dumps(check)}))"
-            same = "const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);"
-            if await page.evaluate(f"(() => {{ {same} return {script}; }})()") is not True:
-                found.append(f"{module}: {check}")
-    return found
-
-
 def test_modules_compute_what_they_say(address: str, tmp_path: Path) -> None:
     async def look() -> list[str]:
         async with chromium(tmp_path) as page:
-            return await failures(page, address)
+            return await failures(page, address, CHECKS)
 
     assert asyncio.run(look()) == []
