@@ -34,10 +34,11 @@ export class FlightActions extends CommandPanel {
 
   /** Say what becomes of a verb. */
   async tell(path, call) {
-    const verb = path.split("/").pop().replaceAll("_", " "), {id} = this.vehicle;
+    const verb = path.split("/").pop().replaceAll("_", " "), {vehicle} = this, {id} = vehicle;
     this.say(`vehicle ${id}: ${verb} …`, "wait");
     try {
-      this.await((await call()).job, verb);
+      const {job} = await call();
+      if (vehicle === this.vehicle) this.await(job, verb); // else Jobs tells its end
     } catch (error) {
       this.say(`vehicle ${id}: ${verb}: ${error.message}`, "bad");
     }
