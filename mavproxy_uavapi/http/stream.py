@@ -29,7 +29,7 @@ HEARD_EVERY = 0.1  # s between two of its messages; more of them wait on its sid
 
 async def stream(call: Call) -> web.StreamResponse:
     """Messages, views and events as they arrive, filtered by name, system and rate."""
-    with call.service.streams.one_more(), call.service.broadcast.heard_by(_subscription(call)) as subscription:
+    with call.one_more_stream(), call.service.broadcast.heard_by(_subscription(call)) as subscription:
         if call.request.headers.get("Upgrade", "").lower() == "websocket":
             return await _websocket(call.request, subscription)
         return await _events(call.request, subscription)

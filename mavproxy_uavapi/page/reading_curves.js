@@ -22,7 +22,7 @@ export class ReadingCurves extends Panel {
     for (const one of series) {
       const curve = this.curveOf(one);
       for (const [time, value] of one.points) {
-        curve?.points.push([this.context.stream.clock?.happened(time * 1000, arrived) ?? arrived, value]);
+        curve?.points.push([this.context.stream.clock?.happenedByWall(time * 1000, arrived) ?? arrived, value]);
         this.newest = Math.max(this.newest, time);
       }
     }
