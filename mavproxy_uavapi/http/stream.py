@@ -18,7 +18,7 @@ from mavproxy_uavapi.http.streaming import (
     EventStream,
     NotRead,
     abort_later,
-    limit_kernel,
+    limit_buffers,
     while_read,
 )
 from mavproxy_uavapi.http.subscription import Names, Subscription, Wishes
@@ -56,7 +56,7 @@ def _require_some(parameter: str, asked: Names, known: tuple[str, ...]) -> None:
 async def _websocket(request: web.BaseRequest, subscription: Subscription) -> web.StreamResponse:
     # With compression each message would have to be encoded for each client.
     socket = web.WebSocketResponse(compress=False, max_msg_size=MOST_SAID)
-    limit_kernel(request.transport)
+    limit_buffers(request.transport)
     await socket.prepare(request)
     sender = asyncio.create_task(_send_all(socket, request, subscription))
     try:

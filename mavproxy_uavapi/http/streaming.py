@@ -110,7 +110,7 @@ class StreamingResponse(web.StreamResponse):
     async def prepare(self, request: web.BaseRequest) -> AbstractStreamWriter | None:
         """Send the headers."""
         self._transport = request.transport
-        limit_kernel(self._transport)
+        limit_buffers(self._transport)
         add_cors_headers(request, self)
         return await super().prepare(request)
 
@@ -137,11 +137,12 @@ class EventStream(StreamingResponse):
         super().__init__("text/event-stream", END)
 
 
-def limit_kernel(transport: asyncio.Transport | None) -> None:
-    """Let the kernel buffer only a little of a stream, and notice when the client's machine has gone."""
+def limit_buffers(transport: asyncio.Transport | None) -> None:
+    """Let asyncio and the kernel buffer only a little of a stream, and notice when the client's machine has gone."""
     sock = None if transport is None else transport.get_extra_info("socket")
-    if sock is None:
+    if transport is None or sock is None:
         return
+    transport.set_write_buffer_limits(LOW_WATER)
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
     if hasattr(socket, "TCP_NOTSENT_LOWAT"):  # what waits with us instead can still be replaced by what is newer
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, LOW_WATER)

@@ -296,6 +296,20 @@ def test_client_that_reads_slowly_is_kept(flying: Any, api: Any, loop: Any, host
     assert host.listeners
 
 
+def test_slow_reader_with_a_rate_gets_little_that_is_old(
+    flying: Any, api: Any, loop: Any, host: Any, unread: Any, msg: Any
+) -> None:
+    client = unread("/telemetry/stream?names=STATUSTEXT&rate=100")
+    api.until(lambda: host.listeners)
+    for number in range(1000):  # for 20 s, of which it reads nothing
+        host.bridge.feed(msg("statustext", text=f"{number:050d}"))
+        host.bridge.turn()
+        loop.pass_time(0.02)
+    data = loop.run(until(loop, client, f"{999:050d}".encode()))
+    assert data.count(b"event: STATUSTEXT") < 300  # what fills the buffers on the way, and the newest
+    assert b'"dropped": 0' in data[-400:]
+
+
 def test_client_that_never_reads_holds_no_connection(
     flying: Any, api: Any, loop: Any, host: Any, unread: Any, msg: Any
 ) -> None:
