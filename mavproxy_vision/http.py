@@ -192,7 +192,7 @@ class VisionHandlers:
         pause = 1.0 / call.params(StreamRequest).rate
         response = StreamingResponse(f"multipart/x-mixed-replace; boundary={BOUNDARY}")
         gone = ConnectionError, NoCamera, asyncio.TimeoutError  # the client, or the camera
-        with call.service.streams.one_more(), contextlib.suppress(*gone):
+        with call.one_more_stream(), contextlib.suppress(*gone):
             await response.prepare(call.request)
             while True:
                 await wait_with_timeout(FRAME_TIMEOUT, self.tracker.changed.wait())

@@ -10,7 +10,7 @@ from typing import Any
 
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
-from mavproxy_uavapi.http.stream_event import Event, of_info, of_message
+from mavproxy_uavapi.http.stream_event import Event, When, of_info, of_message
 from mavproxy_uavapi.http.stream_news import NewsWatch
 from mavproxy_uavapi.http.stream_views import BY_MESSAGE, OF_A_MESSAGE, OF_A_VEHICLE
 from mavproxy_uavapi.http.subscription import Subscription
@@ -54,6 +54,10 @@ class TelemetryBroadcast:
                 self._host.listeners.remove(self._take)
                 self._host.observers.remove(self._tell)
 
+    def _when(self, at: float) -> When:
+        """What was at `at` of the monotonic clock, on both clocks."""
+        return When(time.time() - (self._host.clock() - at), at)
+
     def _offer(self, event: Event) -> None:
         now = self._host.clock()
         for subscription in self._subscriptions:
@@ -66,9 +70,9 @@ class TelemetryBroadcast:
             self._wishes[kind, name] = wanted
         return wanted
 
-    def _take(self, state: VehicleState, message: Any, _now: float) -> None:
+    def _take(self, state: VehicleState, message: Any, now: float) -> None:
         """A message has arrived."""
-        at, name = time.time(), message.get_type()
+        at, name = self._when(now), message.get_type()
         if self._wanted("name", name):
             self._offer(of_message(message, at))
         for view in BY_MESSAGE.get(name, ()):
@@ -79,7 +83,7 @@ class TelemetryBroadcast:
         if self._ticks is not None:
             changes = self._watch.of_vehicle(state)
             for change in [*changes, *(self._watch.of_jobs() if changes else ())]:
-                self._tell(*change)
+                self._announce(*change)
             if changes:
                 self._summarize(state.system)
 
@@ -91,41 +95,44 @@ class TelemetryBroadcast:
         self._ticks = asyncio.get_running_loop().call_later(TICK, self._tick)
         self._offer(self._alive())
         for change in self._watch.everything():
-            self._tell(*change)
+            self._announce(*change)
         for system in list(self._host.fleet.vehicles):
             self._summarize(system)
 
     def _alive(self) -> Event:
         systems = sorted(self._host.fleet.vehicles)
-        return of_info("event", "alive", 0, time.time(), {"vehicles": systems})
+        return of_info("event", "alive", 0, self._when(self._host.clock()), {"vehicles": systems})
 
     def _tell(self, name: str, system: int, ago: float, info: Mapping[str, Any]) -> None:
         """Pass an event on; it happened `ago` s ago."""
+        self._announce(name, system, self._host.clock() - ago, info)
+
+    def _announce(self, name: str, system: int, at: float, info: Mapping[str, Any]) -> None:
         if self._wanted("event", name):
-            self._offer(of_info("event", name, system, time.time() - ago, info))
+            self._offer(of_info("event", name, system, self._when(at), info))
 
     def _summarize(self, system: int) -> None:
         vehicle = self._host.registry.find(system)
         for name, make in OF_A_VEHICLE.items():
             info = make(self._host, vehicle) if self._wanted("view", name) else None
             if info is not None:
-                self._offer(of_info("view", name, system, time.time(), info))
+                self._offer(of_info("view", name, system, self._when(self._host.clock()), info))
 
     def _tell_first(self, subscription: Subscription) -> None:
         """Offer what was known before it came, with the time of its arrival."""
-        now, wall = self._host.clock(), time.time()
+        now = self._host.clock()
         subscription.offer(self._alive(), now)  # its time shows how old the others are
         if subscription.wishes.view:
             for system, state in self._host.fleet.vehicles.items():
                 for view, (name, _) in OF_A_MESSAGE.items():
                     newest = state.newest(name)
                     if newest is not None:
-                        subscription.offer(_view_of(view, system, newest.message, wall - (now - newest.at)), now)
+                        subscription.offer(_view_of(view, system, newest.message, self._when(newest.at)), now)
         if subscription.wishes.event:
-            for event, system, ago, info in self._watch.first():
-                subscription.offer(of_info("event", event, system, wall - ago, info), now)
+            for event, system, at, info in self._watch.first():
+                subscription.offer(of_info("event", event, system, self._when(at), info), now)
 
 
-def _view_of(view: str, system: int, message: Any, at: float) -> Event:
+def _view_of(view: str, system: int, message: Any, at: When) -> Event:
     make = OF_A_MESSAGE[view][1]
     return Event("view", view, system, at, lambda: {"info": make(message)})

@@ -8,6 +8,7 @@ import logging
 import math
 import re
 from collections.abc import Awaitable, Callable, Iterator
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from typing import Any, TypeVar, cast
 
@@ -21,13 +22,14 @@ from mavproxy_uavapi.core.vehicle.copter import Copter
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.http.broadcast import TelemetryBroadcast
+from mavproxy_uavapi.http.browser import is_browser
 from mavproxy_uavapi.http.bucket import Bucket
 from mavproxy_uavapi.http.caller import CALLER, Caller, client_of
 from mavproxy_uavapi.http.log_throttle import LogThrottle
 from mavproxy_uavapi.http.requests import Request, parse
 from mavproxy_uavapi.http.responses import Answer, envelope
 from mavproxy_uavapi.http.router import NOWHERE, Match
-from mavproxy_uavapi.http.streaming import MOST_OPEN, Slots
+from mavproxy_uavapi.http.streaming import MOST_OPEN, SharedSlots
 from mavproxy_uavapi.remote_settings import RemoteSettings
 from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.settings import ApiSettings
@@ -65,7 +67,7 @@ class Service:
     scripts: Scripts = field(init=False)
     tokens: Tokens = field(init=False)
     broadcast: TelemetryBroadcast = field(init=False)
-    streams: Slots = field(default_factory=lambda: Slots(MOST_OPEN, "streams are open"))
+    streams: SharedSlots = field(default_factory=lambda: SharedSlots(MOST_OPEN, "streams are open"))
     callers: Bucket = field(default_factory=Bucket)
     strangers: Bucket = field(default_factory=Bucket)
     throttle: LogThrottle = field(init=False)
@@ -109,6 +111,11 @@ class Call:
         self._route = match.route
         self._params = self.remembered = params
         self.job: Job | None = None
+
+    def one_more_stream(self) -> AbstractContextManager[None]:
+        """Take a place for a stream; a browser counts apart, so that no script of its machine takes the page's."""
+        browser = " browser" if is_browser(self.request.headers) else ""
+        return self.service.streams.one_more_of(self.caller.counted_as + browser)
 
     def params(self, model: type[R]) -> R:
         """The parameters, already validated by the route as `model`."""

@@ -85,6 +85,11 @@ class Caller:
         return group_of(self.address)
 
     @property
+    def counted_as(self) -> str:
+        """The name under which limits count it: its group and, apart from others there, its token."""
+        return f"{self.name}@{self.group}"
+
+    @property
     def is_local(self) -> bool:
         """Whether it is a program on this machine."""
         return not self.forwarded and self.address is not None and self.address.is_loopback

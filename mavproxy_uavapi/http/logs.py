@@ -81,7 +81,7 @@ async def read_log(call: Call) -> web.StreamResponse:
         raise NotFound(
             f"log {number} of vehicle {system} is not downloaded yet; POST /logs/{number}/download does that"
         )
-    with call.service.streams.one_more():
+    with call.one_more_stream():
         return await _send(call, file)
 
 

@@ -37,7 +37,7 @@ async def yield_to_main_loop(request: web.BaseRequest, handler: Handler) -> web.
 def _rate_key(caller: Caller, request: web.BaseRequest) -> str:
     """The key under which requests are counted: the caller and the vehicle. Unknown vehicles count as one."""
     system = request[MATCH].system
-    return f"{caller.name}@{caller.group} {system if system in request[SERVICE].host.fleet.vehicles else 0}"
+    return f"{caller.counted_as} {system if system in request[SERVICE].host.fleet.vehicles else 0}"
 
 
 def rate_of(caller: Caller, service: Service) -> float:

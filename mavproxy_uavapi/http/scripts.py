@@ -86,7 +86,7 @@ async def script_log(call: Call) -> web.StreamResponse:
     if run is None:
         raise NotFound(f"{script} never ran")
     if p.follow:
-        with call.service.streams.one_more():
+        with call.one_more_stream():
             return await _follow(call, run)
     text = await asyncio.to_thread(runs.tail, run.out_log if p.stream == "out" else run.err_log, LOG_SERVED)
     return web.Response(text=text, content_type="text/plain", charset="utf-8")

@@ -20,6 +20,7 @@ from urllib.parse import urlsplit
 from aiohttp import web
 
 from mavproxy_uavapi.core.errors import Forbidden, TooManyRequests, UavApiError, Unauthorized, without_frames
+from mavproxy_uavapi.http.browser import is_browser
 from mavproxy_uavapi.http.call import SERVICE, Service
 from mavproxy_uavapi.http.caller import CALLER, Caller, address_of, group_of
 from mavproxy_uavapi.http.connection import Connection
@@ -32,8 +33,6 @@ from mavproxy_uavapi.tokens import Token, digest_of
 
 log = logging.getLogger("uavapi.http.door")
 OURSELVES = {"same-origin", "none"}  # Sec-Fetch-Site of our own page and of a typed address
-# What a browser accepts for a page, picture, style, script or film; programs ask for JSON or for anything.
-BROWSERS_WANT = ("text/html", "application/xhtml", "image/", "text/css", "javascript", "video/", "audio/")
 DOCUMENTATION = ("/docs", "/openapi.json")
 PROXIES_SAY = ("Forwarded", "X-Forwarded-For", "X-Real-IP", "Via")
 STRANGERS_RATE = 10.0  # requests/s of one address that fail the door check
@@ -89,15 +88,6 @@ def check_page(headers: Mapping[str, str], trusted: tuple[str, ...] = ()) -> Non
         raise Forbidden(
             "the browser does not name the page that sends this command; use a program, /docs, the token, or https"
         )
-
-
-def is_browser(headers: Mapping[str, str]) -> bool:
-    """Whether a browser sent this, by its name or by the types that it accepts."""
-    name = headers.get("User-Agent", "")
-    accepted = headers.get("Accept", "").lower()
-    return (name.startswith("Mozilla/") and "PowerShell" not in name) or any(
-        kind in accepted for kind in BROWSERS_WANT
-    )
 
 
 def is_our_name(host: str) -> bool:

@@ -18,7 +18,7 @@ from mavproxy_uavapi.http.streaming import (
     EventStream,
     NotRead,
     abort_later,
-    limit_kernel,
+    limit_buffers,
     while_read,
 )
 from mavproxy_uavapi.http.subscription import Names, Subscription, Wishes
@@ -29,7 +29,7 @@ HEARD_EVERY = 0.1  # s between two of its messages; more of them wait on its sid
 
 async def stream(call: Call) -> web.StreamResponse:
     """Messages, views and events as they arrive, filtered by name, system and rate."""
-    with call.service.streams.one_more(), call.service.broadcast.heard_by(_subscription(call)) as subscription:
+    with call.one_more_stream(), call.service.broadcast.heard_by(_subscription(call)) as subscription:
         if call.request.headers.get("Upgrade", "").lower() == "websocket":
             return await _websocket(call.request, subscription)
         return await _events(call.request, subscription)
@@ -56,7 +56,7 @@ def _require_some(parameter: str, asked: Names, known: tuple[str, ...]) -> None:
 async def _websocket(request: web.BaseRequest, subscription: Subscription) -> web.StreamResponse:
     # With compression each message would have to be encoded for each client.
     socket = web.WebSocketResponse(compress=False, max_msg_size=MOST_SAID)
-    limit_kernel(request.transport)
+    limit_buffers(request.transport)
     await socket.prepare(request)
     sender = asyncio.create_task(_send_all(socket, request, subscription))
     try:

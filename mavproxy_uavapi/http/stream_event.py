@@ -4,10 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 from mavproxy_uavapi.http.responses import dumps
 from mavproxy_uavapi.http.telemetry_views import fields
+
+
+class When(NamedTuple):
+    """When something arrived.
+
+    Attributes:
+        time: s since 1970; steps when the server's clock is set.
+        clock: s of the server's monotonic clock: what tells how old it is, and, for a text, which one it is.
+    """
+
+    time: float
+    clock: float
 
 
 class Event:
@@ -17,7 +29,7 @@ class Event:
         kind: `name` for a message, `view`, or `event`: the member of the JSON that holds the name.
         name: what it is called.
         system: of which vehicle; 0 for none.
-        at: when it arrived, s since 1970.
+        at: when it arrived.
         members: makes the rest of the JSON, at the first reader.
         component: of a message.
     """
@@ -27,7 +39,7 @@ class Event:
         kind: str,
         name: str,
         system: int,
-        at: float,
+        at: When,
         members: Callable[[], Mapping[str, Any]],
         *,
         component: int = 0,
@@ -38,7 +50,8 @@ class Event:
 
     @cached_property
     def _members(self) -> str:
-        head = {"system": self.system, self.kind: self.name, "time": round(self._at, 3)}
+        time, clock = round(self._at.time, 3), round(self._at.clock, 3)
+        head = {"system": self.system, self.kind: self.name, "time": time, "clock": clock}
         return dumps({**head, **self._make()})[1:]
 
     def json(self, dropped: int) -> str:
@@ -52,8 +65,8 @@ class Event:
         return self._encoded[1]
 
 
-def of_message(message: Any, at: float) -> Event:
-    """A MAVLink message that arrived at `at` (s since 1970)."""
+def of_message(message: Any, at: When) -> Event:
+    """A MAVLink message that arrived at `at`."""
     component = message.get_srcComponent()
     return Event(
         "name",
@@ -65,6 +78,6 @@ def of_message(message: Any, at: float) -> Event:
     )
 
 
-def of_info(kind: str, name: str, system: int, at: float, info: Mapping[str, Any]) -> Event:
+def of_info(kind: str, name: str, system: int, at: When, info: Mapping[str, Any]) -> Event:
     """A view or an event whose payload is made already."""
     return Event(kind, name, system, at, lambda: {"info": info})

@@ -14,7 +14,7 @@ NAMES = ("alive", "mode", "armed", "link", "authority", "statustext", "job", "ta
 TEXTS_TOLD_FIRST = 20  # of the newest of a vehicle, to who begins to listen
 JOBS_TOLD_FIRST = 20
 
-News = tuple[str, int, float, dict[str, Any]]  # name, system, how long ago (s), what
+News = tuple[str, int, float, dict[str, Any]]  # name, system, when by the host's clock (s), what
 
 
 @dataclass
@@ -41,14 +41,16 @@ class NewsWatch:
         self._jobs: dict[str, tuple[Any, ...]] = {}
 
     def first(self) -> list[News]:
-        """What somebody who begins to listen must know: the last texts and jobs."""
+        """What somebody who begins to listen must know: the last texts and jobs, and all jobs that run."""
         now = self._host.clock()
         news: list[News] = []
         for system, state in self._host.fleet.vehicles.items():
             texts = list(state.statustexts)[-TEXTS_TOLD_FIRST:]
-            news += [("statustext", system, now - text.at, _of_text(text)) for text in texts]
-        for job in self._host.jobs.all()[-JOBS_TOLD_FIRST:]:
-            news.append(("job", job.vehicle.state.system, 0.0, report_of_job(job, now)))
+            news += [("statustext", system, text.at, _of_text(text)) for text in texts]
+        jobs = self._host.jobs.all()
+        old, newest = jobs[:-JOBS_TOLD_FIRST], jobs[-JOBS_TOLD_FIRST:]
+        for job in [job for job in old if job.running] + newest:
+            news.append(("job", job.vehicle.state.system, now, report_of_job(job, now)))
         return news
 
     def everything(self) -> list[News]:
@@ -72,16 +74,15 @@ class NewsWatch:
             return []
         news: list[News] = []
         if seen.mode != before.mode and seen.mode is not None:
-            news.append(("mode", state.system, 0.0, {"mode": vehicle.mode}))
+            news.append(("mode", state.system, now, {"mode": vehicle.mode}))
         if seen.armed != before.armed and seen.armed is not None:
-            news.append(("armed", state.system, 0.0, {"armed": seen.armed}))
+            news.append(("armed", state.system, now, {"armed": seen.armed}))
         if seen.alive != before.alive:
-            news.append(("link", state.system, 0.0, {"alive": seen.alive}))
+            news.append(("link", state.system, now, {"alive": seen.alive}))
         if seen.authority != before.authority:
-            news.append(("authority", state.system, 0.0, authority))
-        return news + [
-            ("statustext", state.system, now - text.at, _of_text(text)) for text in _since(state, before.text)
-        ]
+            news.append(("authority", state.system, now, authority))
+        texts = _since(state, before.text)
+        return news + [("statustext", state.system, text.at, _of_text(text)) for text in texts]
 
     def of_jobs(self) -> Iterator[News]:
         """The jobs that began, ended, or made progress."""
@@ -89,7 +90,7 @@ class NewsWatch:
         for job in self._host.jobs.all():
             jobs[job.id] = (job.outcome_name, dict(job.stage), dict(job.progress))
             if jobs[job.id] != self._jobs.get(job.id):
-                yield "job", job.vehicle.state.system, 0.0, report_of_job(job, now)
+                yield "job", job.vehicle.state.system, now, report_of_job(job, now)
         self._jobs = jobs
 
 

@@ -6,6 +6,7 @@ import asyncio
 import json
 import logging
 import socket
+from collections import Counter
 from collections.abc import Awaitable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -24,7 +25,7 @@ UNREAD = 30.0  # s without reading after which a client is dropped
 LINGER = 30.0  # s that it then has to read the reason
 WHY = f"nothing was read for {UNREAD:g} s"
 SEND_BUFFER = 128 * 1024  # bytes of a stream that the kernel buffers; a larger buffer delays the data
-LOW_WATER = 16 * 1024  # bytes in asyncio's own buffer up to which writers do not wait
+LOW_WATER = 16 * 1024  # bytes that wait in asyncio, or unsent in the kernel, up to which writers do not wait
 
 COMMENT = b": still here\n\n"
 END = f"event: end\ndata: {json.dumps({'code': 'not_read', 'detail': WHY})}\n\n".encode()
@@ -65,6 +66,34 @@ class Slots:
             self.count -= 1
 
 
+class SharedSlots(Slots):
+    """Slots of which a caller may take another one while more are free than it has.
+
+    So one caller gets half of them at most, the next one half of the rest, and there is one for a newcomer.
+    """
+
+    def __init__(self, most: int, phrase: str) -> None:
+        super().__init__(most, phrase)
+        self._taken: Counter[str] = Counter()
+
+    @contextmanager
+    def one_more_of(self, who: str) -> Iterator[None]:
+        """Take a slot of that caller for as long as the context lasts.
+
+        Raises:
+            TooManyRequests: it has as many as are free, or all are taken.
+        """
+        taken, free = self._taken[who], self._most - self.count
+        if taken >= free > 0:
+            raise TooManyRequests(f"{taken} {self._phrase} to this caller already; {free} are left for others")
+        with self.one_more():
+            self._taken[who] += 1
+            try:
+                yield
+            finally:
+                self._taken -= Counter([who])  # forgets it at 0
+
+
 class StreamingResponse(web.StreamResponse):
     """An answer that goes on until its client leaves or stops reading.
 
@@ -81,7 +110,7 @@ class StreamingResponse(web.StreamResponse):
     async def prepare(self, request: web.BaseRequest) -> AbstractStreamWriter | None:
         """Send the headers."""
         self._transport = request.transport
-        limit_kernel(self._transport)
+        limit_buffers(self._transport)
         add_cors_headers(request, self)
         return await super().prepare(request)
 
@@ -108,12 +137,15 @@ class EventStream(StreamingResponse):
         super().__init__("text/event-stream", END)
 
 
-def limit_kernel(transport: asyncio.Transport | None) -> None:
-    """Let the kernel buffer only a little of a stream, and notice when the client's machine has gone."""
+def limit_buffers(transport: asyncio.Transport | None) -> None:
+    """Let asyncio and the kernel buffer only a little of a stream, and notice when the client's machine has gone."""
     sock = None if transport is None else transport.get_extra_info("socket")
-    if sock is None:
+    if transport is None or sock is None:
         return
+    transport.set_write_buffer_limits(LOW_WATER)
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
+    if hasattr(socket, "TCP_NOTSENT_LOWAT"):  # what waits with us instead can still be replaced by what is newer
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, LOW_WATER)
     if hasattr(socket, "TCP_USER_TIMEOUT"):  # on Linux; longer than UNREAD, which can give the reason
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, int(2 * UNREAD * 1000))
 

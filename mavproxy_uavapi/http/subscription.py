@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections import deque
+import itertools
+from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
@@ -12,7 +13,7 @@ from typing import Any
 from mavproxy_uavapi.http.stream_event import Event
 from mavproxy_uavapi.http.stream_views import OF_A_VEHICLE
 
-QUEUED = 1000  # events; a client that reads slower than that loses the oldest
+QUEUED = 1000  # entries; a client that reads slower than that loses the oldest
 TOGETHER = 100  # events that a client gets at once
 
 
@@ -71,7 +72,8 @@ Later = Callable[[float, Callable[[], None]], asyncio.TimerHandle]
 class Subscription:
     """One client's wishes, and its events that are not yet read.
 
-    Of what comes more often than `rate` the newest is kept, and passed on when its time has come.
+    Of what comes more often than `rate` the newest is kept, and passed on when its time has come. It then takes the
+    place of an older one that is not yet read, so that who reads slowly gets few new values instead of many old ones.
 
     Args:
         wishes: what it wants.
@@ -89,7 +91,8 @@ class Subscription:
         self._next: dict[tuple[Any, ...], float] = {}  # when each may be passed on again
         self._held: dict[tuple[Any, ...], Event] = {}
         self._timers: dict[tuple[Any, ...], asyncio.TimerHandle] = {}
-        self._queue: deque[Event] = deque(maxlen=QUEUED)
+        self._queue: OrderedDict[Any, Event] = OrderedDict()  # what has a number is never replaced
+        self._numbers = itertools.count()
         self._news = asyncio.Event()
 
     def offer(self, event: Event, now: float) -> None:
@@ -97,7 +100,7 @@ class Subscription:
         if event not in self.wishes:
             return
         if not self._interval or event.kind == "event":  # an event comes but once
-            self._put(event)
+            self._put(next(self._numbers), event)
             return
         key = event.system, event.component, event.kind, event.name
         due = self._next.get(key, now)
@@ -117,12 +120,13 @@ class Subscription:
     def _pass_on(self, key: tuple[Any, ...], event: Event, now: float) -> None:
         self._held.pop(key, None)
         self._next[key] = now + self._interval
-        self._put(event)
+        self._put(key, event)
 
-    def _put(self, event: Event) -> None:
-        if len(self._queue) == QUEUED:
+    def _put(self, key: Any, event: Event) -> None:
+        self._queue[key] = event  # in the place of an older one
+        if len(self._queue) > QUEUED:
+            self._queue.popitem(last=False)
             self.dropped += 1
-        self._queue.append(event)
         self._news.set()
 
     async def next(self, quiet: float) -> list[Event]:
@@ -134,7 +138,7 @@ class Subscription:
                 await self._news.wait()
             finally:
                 timer.cancel()
-        return [self._queue.popleft() for _ in range(min(len(self._queue), TOGETHER))]
+        return [self._queue.popitem(last=False)[1] for _ in range(min(len(self._queue), TOGETHER))]
 
     def close(self) -> None:
         """Forget what is held."""

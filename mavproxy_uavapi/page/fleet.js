@@ -132,8 +132,8 @@ export class Fleet extends EventTarget {
 
   heardText(event, at) {
     const texts = this.of(event.system).texts;
-    const text = {at, wall: event.time, ...event.info};
-    if (texts.some(one => one.wall === text.wall && one.text === text.text)) return; // told again after a reconnection
+    const text = {at, clock: event.clock, ...event.info};
+    if (texts.some(one => one.clock === text.clock && one.text === text.text)) return; // told again after a reconnection
     texts.push(text);
     if (texts.length > TEXTS) texts.shift();
   }

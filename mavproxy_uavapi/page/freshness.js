@@ -1,6 +1,6 @@
 // How old a value is, by our own clock: an old number is never shown as a new one.
 
-const WINDOW = 30000; // ms in which the fastest delivery is looked for
+const DRIFT = 0.0002; // ms that two clocks may part in a ms
 const SOONEST_OLD = 1500, LATEST_OLD = 5000; // ms
 const INTERVALS_UNTIL_OLD = 3;
 
@@ -8,27 +8,31 @@ const INTERVALS_UNTIL_OLD = 3;
 export const now = () => performance.now();
 
 /**
- * When an event happened, on our clock. Its time is the server's, whose clock may differ; the fastest delivery of late
- * tells by how much. What was delivered slower than that was held up on its way, and is older than its arrival.
+ * When an event happened, on our clock. Its `clock` is the server's, which never steps; the fastest delivery of this stream
+ * tells how far ours is from that. What was delivered slower was held up on its way, and is older than its arrival. The
+ * fastest is forgotten only as slowly as two clocks part, so that a lasting delay is not taken for their difference.
  */
 export class StreamClock {
   constructor() {
-    this.fastest = [Infinity, Infinity]; // of this window and of the one before
-    this.began = 0;
+    this.fastest = Infinity;
+    this.learnt = 0;
+    this.epoch = 0; // when the server's clock was 0, by its wall clock
   }
 
-  /** Learn from an event that was sent when it happened; times in ms. */
-  learn(sent, arrived) {
-    if (arrived - this.began > WINDOW) {
-      this.fastest = [Infinity, this.fastest[0]];
-      this.began = arrived;
-    }
-    this.fastest[0] = Math.min(this.fastest[0], arrived - sent);
+  /** Learn from an event that was sent when it happened, at `sent` and at `wall` of the server's clocks; all in ms. */
+  learn(sent, arrived, wall) {
+    this.fastest = Math.min(this.fastest + DRIFT * (arrived - this.learnt), arrived - sent);
+    this.learnt = arrived;
+    this.epoch = wall - sent;
   }
 
   happened(sent, arrived) {
-    const fastest = Math.min(...this.fastest);
-    return Number.isFinite(fastest) ? Math.min(arrived, sent + fastest) : arrived;
+    return Math.min(arrived, sent + this.fastest);
+  }
+
+  /** The same of something of which only the wall time is known. */
+  happenedByWall(wall, arrived) {
+    return this.happened(wall - this.epoch, arrived);
   }
 }
 

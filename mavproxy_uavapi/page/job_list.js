@@ -16,7 +16,8 @@ export class JobList extends Panel {
   }
 
   render(at) {
-    const jobs = [...this.context.fleet.jobs.values()].slice(-SHOWN);
+    const all = [...this.context.fleet.jobs.values()];
+    const jobs = all.filter((job, n) => job.state === "running" || n >= all.length - SHOWN); // what runs can be aborted
     this.empty.hidden = jobs.length > 0;
     for (const [number, row] of this.rows) if (!jobs.some(job => job.job === number)) { row.remove(); this.rows.delete(number); }
     for (const job of jobs) this.show(job, at);

@@ -14,7 +14,7 @@ export class MessageList extends Panel {
     this.context.fleet.addEventListener("event", event => this.heard(event.detail));
   }
 
-  heard({event, system, time, info}) {
+  heard({event, system, time, clock, info}) {
     const text = event === "statustext" ? info.text
       : event === "mode" ? `mode ${info.mode}`
       : event === "armed" ? (info.armed ? "armed" : "disarmed")
@@ -23,10 +23,10 @@ export class MessageList extends Panel {
       : event === "delivered" ? `${info.count} readings delivered to ${info.sink}` : "";
     if (!text) return;
     const severity = event === "statustext" ? info.severity : event === "link" && !info.alive ? 2 : 6;
-    const key = `${system} ${time} ${text}`;
+    const key = `${system} ${clock} ${text}`;
     if ([...this.list.children].some(row => row.key === key)) return; // told again after a reconnection
-    const clock = new Date(time * 1000).toLocaleTimeString([], {hour12: false});
-    const row = element("li", {class: severity <= WORST ? "bad" : ""}, element("time", {}, clock),
+    const told = new Date(time * 1000).toLocaleTimeString([], {hour12: false});
+    const row = element("li", {class: severity <= WORST ? "bad" : ""}, element("time", {}, told),
       element("b", {}, system ? String(system) : ""), element("span", {title: SEVERITIES[severity]}, text));
     row.key = key;
     this.list.prepend(row);

@@ -22,7 +22,7 @@ export class ReadingCurves extends Panel {
     for (const one of series) {
       const curve = this.curveOf(one);
       for (const [time, value] of one.points) {
-        const at = this.context.stream.clock?.happened(time * 1000, arrived) ?? arrived;
+        const at = this.context.stream.clock?.happenedByWall(time * 1000, arrived) ?? arrived;
         curve?.points.push([at, value]);
         curve?.newest.set(value, at);
         this.newest = Math.max(this.newest, time);

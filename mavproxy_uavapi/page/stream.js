@@ -82,10 +82,10 @@ export class TelemetryStream {
   }
 
   heard(event) {
-    const arrived = now(), sent = event.time * 1000;
+    const arrived = now(), sent = event.clock * 1000;
     this.heardAt = arrived;
     this.why = "";
-    if (event.event === "alive") this.clock.learn(sent, arrived);
+    if (event.event === "alive") this.clock.learn(sent, arrived, event.time * 1000);
     this.take(event, this.clock.happened(sent, arrived));
   }
 }

@@ -18,7 +18,7 @@ from mavproxy_uavapi.http import call as calls
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.caller import CALLER, Caller
 from mavproxy_uavapi.http.requests import parse
-from mavproxy_uavapi.http.streaming import Slots
+from mavproxy_uavapi.http.streaming import SharedSlots
 from mavproxy_vision import http
 from mavproxy_vision.apriltag.detection import FrameResult
 from mavproxy_vision.apriltag.overlay import jpeg
@@ -252,10 +252,11 @@ def test_a_slow_drawing_is_joined_rather_than_overtaken(monkeypatch):
 def test_frame_streams_count_among_the_open_ones():
     over = handlers(0.0, Posted(0.0))
     over.tracker.changed = asyncio.Event()
-    service = SimpleNamespace(streams=Slots(1, "streams are open"))
+    service = SimpleNamespace(streams=SharedSlots(1, "streams are open"))
 
     async def run():
         request = make_mocked_request("GET", "/vision/stream.mjpg")
+        request[CALLER] = Caller(None)
         first = asyncio.create_task(over.stream(Call(service, request, StreamRequest())))
         await asyncio.sleep(0)
         with pytest.raises(TooManyRequests, match="1 streams are open already"):

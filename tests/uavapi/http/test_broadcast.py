@@ -1,11 +1,13 @@
 from __future__ import annotations
 
 import json
+import time
 from typing import Any
 
 import pytest
 
 from mavproxy_uavapi.http.broadcast import TICK, TelemetryBroadcast
+from mavproxy_uavapi.http.stream_news import JOBS_TOLD_FIRST
 from mavproxy_uavapi.http.subscription import Names, Subscription, Wishes
 
 
@@ -68,6 +70,42 @@ def test_what_was_known_before_comes_first_with_its_own_time(flying: Any, hear: 
     alive, gps = come()[:2]
     assert (alive["event"], gps["view"]) == ("alive", "gps")
     assert alive["time"] - gps["time"] > 2.0
+
+
+def test_text_that_is_told_again_has_the_same_clock(flying: Any, hear: Any, host: Any, msg: Any, loop: Any) -> None:
+    before = hear(event="statustext")
+    before()
+    loop.pass_time(0.1237)
+    host.bridge.feed(msg("statustext", text="hello", severity=4))
+    (first,) = [event for event in before(1.0) if event["info"]["text"] == "hello"]
+    again = [event for _ in range(20) for event in hear(event="statustext")(0.0371) if event["info"] == first["info"]]
+    assert {event["clock"] for event in again} == {first["clock"]}
+    assert len(again) == 20
+
+
+def test_clock_of_events_does_not_step_with_the_wall_clock(
+    flying: Any, hear: Any, loop: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    come = hear(view="gps", event="alive")
+    come(1.0)
+    true = time.time
+    for step in (3600.0, -3600.0):
+        monkeypatch.setattr(time, "time", lambda ahead=step: true() + ahead)
+        events = come(2.0)
+        assert {event["time"] // 3600 for event in events} <= {(true() + step + n) // 3600 for n in (-5, 5)}
+        assert all(0.0 <= loop.time() - event["clock"] <= 2.1 for event in events)
+
+
+def test_newcomer_hears_of_each_job_that_runs_and_of_the_newest(flying: Any, hear: Any, api: Any) -> None:
+    drive = api.begin("POST", "/movement/drive_wait", json={"x": 500, "y": 0, "z": 0})
+    api.until(api.service.host.jobs.running)
+    (old,) = api.service.host.jobs.running()
+    for _ in range(JOBS_TOLD_FIRST + 5):
+        assert api.post("/command/set_air_speed?new_v=5").status in (200, 429)
+    told = named(hear(event="job")(), "job")
+    assert [job["job"] for job in told if job["state"] == "running"] == [old.id]
+    assert len(told) == JOBS_TOLD_FIRST + 1
+    drive.cancel()
 
 
 def test_status_tells_a_lost_link_though_nothing_arrives(flying: Any, hear: Any, host: Any) -> None:

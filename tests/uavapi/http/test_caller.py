@@ -4,7 +4,9 @@ from ipaddress import ip_address, ip_network
 
 import pytest
 
+from mavproxy_uavapi.core.roles import Role
 from mavproxy_uavapi.http.caller import Caller, address_of, group_of
+from mavproxy_uavapi.tokens import Token
 
 
 @pytest.mark.parametrize(
@@ -35,6 +37,14 @@ def test_one_network_of_ipv6_is_one_caller() -> None:
 
 def test_this_machine_is_one_caller_whatever_address_of_the_loopback_it_takes() -> None:
     assert len({group_of(ip_address(own)) for own in ("127.0.0.1", "127.1.2.3", "::1")}) == 1
+
+
+def test_limits_count_each_token_and_each_address_apart() -> None:
+    anna = Token("anna", Role.FLY, frozenset(), b"")
+    callers = [
+        Caller(ip_address(address), token=token) for address in ("127.0.0.1", "192.0.2.7") for token in (None, anna)
+    ]
+    assert len({caller.counted_as for caller in callers}) == 4
 
 
 def test_what_a_proxy_passed_on_is_from_nowhere_that_is_known() -> None:

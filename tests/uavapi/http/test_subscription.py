@@ -5,10 +5,11 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.http.stream_event import Event, of_message
+from mavproxy_uavapi.http.stream_event import Event, When, of_message
 from mavproxy_uavapi.http.subscription import QUEUED, TOGETHER, Names, Subscription, Wishes
 
 ALL = Wishes(Names("*"))
+THEN = When(0.0, 0.0)
 
 
 def take(loop: Any, subscription: Subscription) -> list[Event]:
@@ -20,7 +21,7 @@ def numbers(events: list[Event]) -> list[int]:
 
 
 def attitude(msg: Any, number: int, **header: Any) -> Event:
-    return of_message(msg("attitude", time_boot_ms=number, **header), 0.0)
+    return of_message(msg("attitude", time_boot_ms=number, **header), THEN)
 
 
 def test_reader_that_falls_behind_loses_the_oldest_and_is_told_how_many(loop: Any, msg: Any) -> None:
@@ -34,10 +35,13 @@ def test_reader_that_falls_behind_loses_the_oldest_and_is_told_how_many(loop: An
 
 def test_rate_lets_the_first_through_and_counts_components_apart(loop: Any, msg: Any) -> None:
     subscription = Subscription(Wishes(Names("*"), rate=2.0))
+    told = []
     for tenth in range(11):
         for component in (1, 154):
             subscription.offer(attitude(msg, tenth, component=component), tenth / 10)
-    assert numbers(take(loop, subscription)) == [0, 0, 5, 5, 10, 10]
+        if tenth % 5 == 0:
+            told += numbers(take(loop, subscription))
+    assert told == [0, 0, 5, 5, 10, 10]
 
 
 def test_of_what_comes_too_often_the_newest_is_passed_on_when_its_time_has_come(loop: Any, msg: Any) -> None:
@@ -54,10 +58,26 @@ def test_of_what_comes_too_often_the_newest_is_passed_on_when_its_time_has_come(
     assert numbers(take(loop, subscription)) == [4]
 
 
+def test_slow_reader_with_a_rate_gets_the_newest_of_each_and_every_event(loop: Any, msg: Any) -> None:
+    subscription = Subscription(Wishes(Names("*"), event=Names("mode"), rate=2.0))
+    for second in range(3 * QUEUED):
+        for system in (1, 2):
+            subscription.offer(attitude(msg, second, system=system), float(second))
+        if second in (10, 20):
+            subscription.offer(Event("event", "mode", 1, THEN, lambda second=second: {"info": second}), float(second))
+    told = [json.loads(event.json(0)) for event in take(loop, subscription)]
+    assert [(one["system"], one["fields"]["time_boot_ms"]) for one in told[:2]] == [
+        (1, 3 * QUEUED - 1),
+        (2, 3 * QUEUED - 1),
+    ]
+    assert [one["info"] for one in told[2:]] == [10, 20]
+    assert subscription.dropped == 0
+
+
 def test_no_rate_holds_an_event_back(loop: Any) -> None:
     subscription = Subscription(Wishes(event=Names("mode"), rate=1.0), loop.call_later)
     for mode in ("GUIDED", "LOITER", "GUIDED"):
-        subscription.offer(Event("event", "mode", 1, 0.0, lambda mode=mode: {"info": mode}), 0.0)
+        subscription.offer(Event("event", "mode", 1, THEN, lambda mode=mode: {"info": mode}), 0.0)
     assert [json.loads(event.json(0))["info"] for event in take(loop, subscription)] == ["GUIDED", "LOITER", "GUIDED"]
 
 
@@ -73,16 +93,17 @@ def test_no_rate_holds_an_event_back(loop: Any) -> None:
     ],
 )
 def test_names_may_have_wildcards(msg: Any, wishes: Wishes, wanted: bool) -> None:
-    assert (of_message(msg("gps_raw_int", system=3), 0.0) in wishes) is wanted
+    assert (of_message(msg("gps_raw_int", system=3), THEN) in wishes) is wanted
 
 
 def test_event_of_no_vehicle_is_for_those_who_want_one(loop: Any) -> None:
-    assert Event("event", "alive", 0, 0.0, dict) in Wishes(event=Names("*"), systems=frozenset({4}))
+    assert Event("event", "alive", 0, THEN, dict) in Wishes(event=Names("*"), systems=frozenset({4}))
 
 
 def test_event_tells_each_client_what_that_has_lost(msg: Any) -> None:
-    event = of_message(msg("attitude", roll=float("nan"), system=3), 12.3456)
+    event = of_message(msg("attitude", roll=float("nan"), system=3), When(12.3456, 7.0))
     for dropped in (0, 7):
         told = json.loads(event.json(dropped))
         assert (told["dropped"], told["system"], told["name"], told["time"]) == (dropped, 3, "ATTITUDE", 12.346)
+        assert told["clock"] == 7.0
         assert told["fields"]["roll"] is None

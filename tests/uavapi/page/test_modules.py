@@ -46,6 +46,23 @@ STRIPS = """
 
 HOUR = 36_000  # events of a view at 10 Hz
 
+
+def _ages(delay: str, right: str, step: int = 0) -> str:
+    """A script: whether the age of each of an hour's events, two a second, is right at its arrival.
+
+    Args:
+        delay: how late event `n` comes, in ms; it is a function of JavaScript, as `right` is.
+        right: whether an age is right for event `n`.
+        step: ms by which the server's wall clock is set after a minute.
+    """
+    return f"""{{const c = new m.StreamClock(), delay = {delay}, right = {right};
+        Array.from({{length: 7200}}, (_, n) => n).every(n => {{
+          const sent = 9e6 + 500 * n, arrived = 500 * n + delay(n);
+          c.learn(sent, arrived, 7e9 + sent + (n < 120 ? 0 : {step}));
+          return right(arrived - c.happened(sent, arrived), n);
+        }})}}"""
+
+
 # module -> scripts that must give true; `m` is the module
 CHECKS = {
     # both slots are held by slow reads
@@ -163,6 +180,12 @@ CHECKS = {
              && trouble.querySelector('.age').textContent === 'what is shown is 11 s old'; }})()""",
     ],
     "job_list": [
+        # an old job that still runs keeps its row, and its button
+        """{const jobs = new Map(Array.from({length: 60}, (_, n) => [String(n), {job: String(n), system: 1,
+             verb: '/a', state: n === 3 ? 'running' : 'succeeded', result: '', seconds: 1, progress: {}}]));
+           const list = new m.JobList(), fleet = {jobs, vehicles: new Map()};
+           list.start({fleet, stream: {trouble: () => ''}}); list.render(0);
+           list.rows.size === 26 && !list.rows.get('3').abort.hidden}""",
         # how far it is to go is grey and says its age when it is not live; how a job ended is not
         f"""(async () => {{{STRIPS} drop();
            told('GUIDED', 0);
@@ -250,6 +273,10 @@ CHECKS = {
            const before = [v.position, v.trail.length, v.history.alt.length];
            v.take('gps', {position: {lat: 0, lon: 9, relative_alt: 3}}, 1);
            same([...before, v.position.lon, v.trail.length], [null, 0, 1, 9, 1])}""",
+        # a text that is told again after a reconnection, when the wall clock was set meanwhile, is the same
+        """{const f = new m.Fleet();
+           const text = (time, clock) => f.take({system: 1, event: 'statustext', time, clock, info: {text: 'a'}}, 0);
+           text(1, 7); text(3601, 7); text(3602, 8); f.of(1).texts.length === 2}""",
         # jobs that still run are kept, the oldest that ended is forgotten
         """{const f = new m.Fleet();
            const state = n => (n < 2 ? 'running' : 'succeeded');
@@ -292,8 +319,34 @@ CHECKS = {
         "m.ageText(Infinity) === 'never heard' && m.ageText(3210) === '3.2 s' && m.ageText(7.2e6) === '2 h'",
         "{const f = new m.Fresh(); f.set(1, 0); !f.isOld(2900) && f.isOld(3100)}",
         "{const f = new m.Fresh(); f.set(1, 1000); f.set(2, 900); f.value === 1}",  # older, and late
-        """{const c = new m.StreamClock(); c.learn(0, 50);
+        """{const c = new m.StreamClock(); c.learn(0, 50, 0);
            c.happened(1000, 9000) === 1050 && c.happened(1000, 1040) === 1040}""",
+        # a clock that has learnt nothing tells when an event came
+        "new m.StreamClock().happened(5, 70) === 70",
+        # a constant delay is taken for the difference of two clocks
+        _ages("n => 300", "age => age < 1"),
+        # a delay that lasts is shown for as long as it lasts, from 60 s on for an hour
+        _ages("n => (n < 120 ? 50 : 20000)", "(age, n) => (n < 120 ? age < 1 : age > 19000 && age < 20000)"),
+        # a lag that grows by 10 ms a second, for 20 minutes
+        _ages("n => 5 * Math.min(n, 2400)", "(age, n) => Math.abs(age - 5 * Math.min(n, 2400)) < 800"),
+        # a delay that ends is forgotten at once
+        _ages("n => (n < 120 ? 20000 : 50)", "age => age < 1"),
+        # the clocks part by 100 ppm, either way
+        _ages("n => 1000 + 0.05 * n", "age => age < 1"),
+        _ages("n => 1000 - 0.05 * n", "age => age < 1"),
+        # the server's wall clock is set by an hour: no age changes, and what has only that time is placed anew
+        *(
+            _ages("n => (n < 120 ? 50 : 20000)", "(age, n) => (n < 120 ? age < 1 : age > 19000 && age < 20000)", step)
+            for step in (3_600_000, -3_600_000)
+        ),
+        """[3.6e6, -3.6e6].every(step => {const c = new m.StreamClock(); c.learn(0, 50, 7e9);
+           c.learn(500, 550, 7e9 + 500 + step); return c.happenedByWall(7e9 + 400 + step, 900) === 450})""",
+    ],
+    "message_list": [
+        """{const fleet = new EventTarget(), list = new m.MessageList(); list.start({fleet});
+           const text = (time, clock) => list.heard(
+             {event: 'statustext', system: 1, time, clock, info: {severity: 4, text: 'a'}});
+           text(1, 7); text(3601, 7); text(3602, 8); list.list.children.length === 2}""",
     ],
     "projection": [
         """{const p = new m.Projection(-35, 149), [lat, lon] = p.degrees(100, -50), [n, e] = p.metres(lat, lon);
