@@ -49,6 +49,7 @@ def on_the_ground(rig: Any) -> bool:
     return (status["armed"], status["landed_state"]) == (False, "on_ground")
 
 
+@pytest.mark.long  # the script that is uploaded below is the same one
 def test_square_is_flown(rig: Any) -> None:
     status, out, err = end(begin(rig, EXAMPLES / "square.py", "--vehicle", "drone", "--side", "8"))
     assert status == 0, out + err
