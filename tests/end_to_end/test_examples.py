@@ -22,7 +22,7 @@ def run(*arguments: str) -> subprocess.CompletedProcess[str]:
     "arguments",
     [
         ["takeoff_land.py", "--altitude", "6"],
-        pytest.param(["ned_square.py", "--side", "8", "--altitude", "5"], marks=pytest.mark.long),  # test_ports has it
+        pytest.param(["ned_square.py", "--side", "8", "--altitude", "5"], marks=pytest.mark.long),  # see test_ports
         pytest.param(["ned_square_polling.py", "--side", "8", "--altitude", "5"], marks=pytest.mark.long),
         ["polygon_ned.py", "--sides", "3", "4", "5", "--radius", "3", "--height", "4"],
         pytest.param(
