@@ -139,10 +139,10 @@ def _token(words: Sequence[str]) -> Token:
     if len(words) != 3:
         raise SettingError("a line is NAME ROLE[:VEHICLES] HASH", "tokens")
     name, (role, vehicles) = name_of(words[0]), rights_of(words[1])
-    found = HASH.fullmatch(words[2])
-    if found is None:
+    digits = HASH.fullmatch(words[2])
+    if digits is None:
         raise SettingError(f"the third word of {name} is no hash: sha256: and 64 digits 0-9a-f", "tokens")
-    return Token(name, role, vehicles, bytes.fromhex(found[1]))
+    return Token(name, role, vehicles, bytes.fromhex(digits[1]))
 
 
 def read_text(path: Path) -> str:
@@ -249,11 +249,11 @@ class Tokens:
 
     def find(self, digest: bytes) -> Token | None:
         """The token with that hash. It takes as long whether there is one or not."""
-        found = None
+        match = None
         for token in self._tokens:
             if hmac.compare_digest(token.digest, digest):
-                found = token
-        return found
+                match = token
+        return match
 
     def named(self, name: str) -> Token | None:
         """The token of that owner."""

@@ -45,8 +45,8 @@ class WatchedFile:
         if self.path is None:
             return None
         try:
-            found = self.path.stat()
+            status = self.path.stat()
             link = self.path.lstat()
         except OSError:
             return None
-        return found.st_mtime_ns, found.st_ctime_ns, found.st_size, found.st_ino, found.st_mode, link.st_ino
+        return status.st_mtime_ns, status.st_ctime_ns, status.st_size, status.st_ino, status.st_mode, link.st_ino

@@ -75,13 +75,13 @@ class SensorFile:
         if self._reading is None:
             self._reading = asyncio.get_running_loop().run_in_executor(self._thread, newest, self._file)
         try:
-            found = await wait_with_timeout(LONGEST_READ, asyncio.shield(self._reading))
+            version = await wait_with_timeout(LONGEST_READ, asyncio.shield(self._reading))
         except asyncio.TimeoutError:
             raise NoReading("slow", f"{self._file} does not answer") from None
         self._reading = None
-        if isinstance(found, NoReading):
-            raise found
-        return found
+        if isinstance(version, NoReading):
+            raise version
+        return version
 
     async def close(self) -> None:
         """End the thread after its read; wait for nothing."""

@@ -27,8 +27,8 @@ async def tile(call: Call) -> web.StreamResponse:
     if not all(text.isascii() and text.isdigit() and len(text) < 9 for text in texts):
         raise NotFound("a tile is /tiles/ZOOM/X/Y, with whole numbers")
     zoom, x, y = map(int, texts)
-    found = await asyncio.to_thread(_store(call).read, zoom, x, y)
-    return static_files.answer(call.request, found.body, found.kind, HEADERS)
+    tile = await asyncio.to_thread(_store(call).read, zoom, x, y)
+    return static_files.answer(call.request, tile.body, tile.kind, HEADERS)
 
 
 def _store(call: Call) -> TileStore:

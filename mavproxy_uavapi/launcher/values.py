@@ -89,10 +89,12 @@ def host_port(text: str) -> str:
 def modules(text: str) -> tuple[str, ...]:
     """One MAVProxy module, `NAME` or `NAME:{"key":value}`, or several names with commas between."""
     names = (text,) if "{" in text else tuple(part for part in text.split(",") if part)
-    found = [_MODULE.fullmatch(name) for name in names]
-    if not found or None in found:
+    matches = [_MODULE.fullmatch(name) for name in names]
+    if not matches or None in matches:
         raise ValueError('expected NAME or NAME:{"key":value}')
-    return tuple(f"{match[1]}:{one_word(json.loads(match[2]))}" if match[2] else match[1] for match in found if match)
+    return tuple(
+        f"{match[1]}:{one_word(json.loads(match[2]))}" if match[2] else match[1] for match in matches if match
+    )
 
 
 def one_word(settings: Mapping[str, object]) -> str:

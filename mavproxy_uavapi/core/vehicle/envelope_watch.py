@@ -103,12 +103,12 @@ class EnvelopeWatch:
         if not self._may_stop(vehicle):
             return
         try:
-            found = leaving(vehicle)
-            near = None if found else self._registry.traffic.nearing(vehicle, _until_it_stands(vehicle) + MARGIN)
+            crossing = leaving(vehicle)
+            near = None if crossing else self._registry.traffic.nearing(vehicle, _until_it_stands(vehicle) + MARGIN)
         except Stale:
             return  # where it is, or where home is, nobody knows: what moves it is refused
-        if found is not None:
-            space, breach = found
+        if crossing is not None:
+            space, breach = crossing
             what = f"{breach.what} of {space.envelope.source}"
             details = {"what": breach.what, "source": space.envelope.source}
             self._stop(vehicle, f"break {what}", "envelope", lambda sentence: OutsideEnvelope(sentence, details))
@@ -119,7 +119,7 @@ class EnvelopeWatch:
         stop = self._stops.get(vehicle.state.system)
         return vehicle.flies_for_us and (stop is None or not stop.running)
 
-    def _stop_one(self, vehicle: Vehicle, other: Vehicle, found: Meeting) -> None:
+    def _stop_one(self, vehicle: Vehicle, other: Vehicle, meeting: Meeting) -> None:
         """Stop that of two vehicles which has the lower rank, or else the later command."""
         ours = [one for one in (vehicle, other) if self._may_stop(one) and _moves(one)]
         if not ours:
@@ -127,7 +127,7 @@ class EnvelopeWatch:
         held = min(ours, key=lambda one: (one.authority.rank, -one.guard.ordered_at))
         kept_from = other if held is vehicle else vehicle
         what = f"vehicle {kept_from.state.system}"
-        near = {"vehicle": kept_from.state.system, "in_s": round(found.seconds, 1)}
+        near = {"vehicle": kept_from.state.system, "in_s": round(meeting.seconds, 1)}
         self._stop(held, f"come too near to {what}", "other vehicle", lambda sentence: TooNear(sentence, near))
 
     def _stop(self, vehicle: Vehicle, deed: str, before: str, error_of: Callable[[str], UavApiError]) -> None:
@@ -210,8 +210,8 @@ def _gets_worse(way: list[Spot], rules: Any) -> bool:
 
 def _velocity(vehicle: Vehicle) -> tuple[float, float, float]:
     """m/s north, east, up."""
-    told = vehicle.fresh("GLOBAL_POSITION_INT")
-    return told.vx / 100.0, told.vy / 100.0, 0.0 if vehicle.kind == "rover" else -told.vz / 100.0
+    position = vehicle.fresh("GLOBAL_POSITION_INT")
+    return position.vx / 100.0, position.vy / 100.0, 0.0 if vehicle.kind == "rover" else -position.vz / 100.0
 
 
 def _until_it_brakes(vehicle: Vehicle) -> float:

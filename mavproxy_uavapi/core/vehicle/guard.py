@@ -263,9 +263,9 @@ class EnvelopeGuard:
 
     def _way_to_rest(self) -> list[Stop]:
         """The way that it needs to stand, from the velocity that it has."""
-        here, told = self.check.here(), self._vehicle.fresh("GLOBAL_POSITION_INT")
+        here, position = self.check.here(), self._vehicle.fresh("GLOBAL_POSITION_INT")
         stopping = braking.of_rover if self.check.drives else braking.of_guided
-        velocity = told.vx / 100.0, told.vy / 100.0, 0.0 if self.check.drives else -told.vz / 100.0
+        velocity = position.vx / 100.0, position.vy / 100.0, 0.0 if self.check.drives else -position.vz / 100.0
         north, east, up = stopping(self._vehicle.state.parameters).to_rest(velocity, braking.LATENCY)
         return [here, Stop(*moved(here.lat, here.lon, north, east), here.up + up)]
 

@@ -227,12 +227,12 @@ def _require_mission_alone(plan: Mapping[str, Any]) -> None:
         BadRequest: it names what the file has besides the mission.
     """
     fence, rally = plan.get("geoFence"), plan.get("rallyPoints")
-    found = [
+    lists_of = [
         (fence, "polygons", "fence polygon"),
         (fence, "circles", "fence circle"),
         (rally, "points", "rally point"),
     ]
-    lists = [(part.get(key), name) for part, key, name in found if isinstance(part, dict)]
+    lists = [(part.get(key), name) for part, key, name in lists_of if isinstance(part, dict)]
     counts = [(len(items), name) for items, name in lists if isinstance(items, list)]
     extra = ", ".join(f"{count} {name}{'s' if count > 1 else ''}" for count, name in counts if count)
     if extra:

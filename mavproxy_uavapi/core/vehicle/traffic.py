@@ -68,9 +68,9 @@ class Traffic:
             return
         ours = _swung(vehicle, _to_amsl(vehicle, way))
         for other in self._others(vehicle):
-            found = self._meeting(vehicle, ours, other, PLANNED, math.inf)
-            if found is not None:
-                raise self._too_near(vehicle, other, found, ours[0])
+            meeting = self._meeting(vehicle, ours, other, PLANNED, math.inf)
+            if meeting is not None:
+                raise self._too_near(vehicle, other, meeting, ours[0])
 
     def nearing(self, vehicle: Any, seconds: float) -> tuple[Any, Meeting] | None:
         """The vehicle that it is about to come too near to within that many s, and where; None for none."""
@@ -79,9 +79,9 @@ class Traffic:
         for other in self._others(vehicle):
             if self._apart_for(vehicle, other, seconds):
                 continue
-            found = self._meeting(vehicle, expected(vehicle, CERTAIN), other, WATCHED, seconds)
-            if found is not None:
-                return other, found
+            meeting = self._meeting(vehicle, expected(vehicle, CERTAIN), other, WATCHED, seconds)
+            if meeting is not None:
+                return other, meeting
         return None
 
     async def in_turn(self, job: Job, verb: Callable[[Job], Awaitable[None]]) -> None:
