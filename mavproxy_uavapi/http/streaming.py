@@ -19,7 +19,7 @@ from mavproxy_uavapi.http.cors import add_cors_headers
 
 log = logging.getLogger("uavapi.http")
 
-MOST_OPEN = 120  # streams at once, of all kinds
+MOST_OPEN = 240  # streams at once, of all kinds
 KEEP_ALIVE = 15.0  # s; silence after which a comment or ping is sent, to notice dead connections
 UNREAD = 30.0  # s without reading after which a client is dropped
 LINGER = 30.0  # s that it then has to read the reason
