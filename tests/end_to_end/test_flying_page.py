@@ -140,6 +140,7 @@ async def flight(rig: Any, directory: Path) -> list[str]:
         await pilot.sees("flight-status", "BRAKE")
         await pilot.sees("flight-actions", "was superseded")
         await see_the_link_lost(pilot)
+        await page.evaluate("document.documentElement.dataset.theme = 'dark'")
         await page.resize(390, 844)
         await page.until("document.documentElement.scrollWidth <= innerWidth")
         await pilot.finds_it_accessible()
