@@ -1,4 +1,4 @@
-"""The page at / in a real browser: who holds the vehicle, its logs, areas and tiles on the map, readings."""
+"""The page at / in a real browser: every tab and what it promises, areas and tiles on the map, who holds it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,11 @@ from tests.support.chromium import chromium
 from tests.support.page_pilot import Pilot
 from tests.support.pictures import grey_png
 
-pytestmark = pytest.mark.needs("chromium")
+pytestmark = [pytest.mark.needs("chromium"), pytest.mark.needs("tmux")]
+cv2 = pytest.importorskip("cv2")
+
+SPEEDUP = 1.5  # the rendered camera runs on the wall clock
+SCRIPT = "import time\nprint('the script is up', flush=True)\ntime.sleep(300)\n"
 
 FIELD = {
     "type": "Feature",
@@ -107,9 +111,60 @@ async def set_a_setting(pilot: Pilot) -> None:
     await pilot.sees("setting-list", "ground stations, HOST:PORT by comma")
 
 
+async def run_a_script(pilot: Pilot) -> None:
+    file = pilot.rig.directory / "waits.py"
+    file.write_text(SCRIPT)
+    await pilot.click("Scripts")
+    await pilot.sees("script-list", "No script was uploaded yet.")
+    await pilot.page.choose_file("document.querySelector('script-list input')", file)
+    await pilot.sees("script-list .answer", "waits.py is uploaded")
+    await pilot.hold("Run")
+    await pilot.sees("script-list .log", "the script is up")
+    await pilot.sees("script-list .running", "waits.py")
+    await pilot.finds_it_accessible()
+    await pilot.page.click("document.querySelector('script-list .stop')")
+    await pilot.sees("script-list .log", "ended, exit status")
+    await pilot.page.until("!document.querySelector('script-list .running')")
+    assert pilot.rig.ok(pilot.rig.get("/mission/running-scripts"))["scripts"] == []
+
+
+async def set_a_parameter(pilot: Pilot) -> None:
+    await pilot.click("Parameters")
+    await pilot.page.until("document.querySelectorAll('parameter-list dt').length > 0")
+    await pilot.page.evaluate(
+        """{const input = document.querySelector('parameter-list input');
+           input.value = 'LAND_SPEED'; input.dispatchEvent(new Event('change'))}"""
+    )
+    value = "document.querySelector('parameter-list [aria-label=LAND_SPEED]')"
+    await pilot.page.until(f"{value}.value === '100'")
+    await pilot.page.evaluate(f"{value}.value = '90'; {value}.dispatchEvent(new Event('input'))")
+    await pilot.hold("Set")
+    await pilot.sees("parameter-list .answer", "LAND_SPEED")
+    assert pilot.rig.ok(pilot.rig.get("/parameters", match="LAND_SPEED"))["parameters"] == {"LAND_SPEED": 90}
+    await pilot.finds_it_accessible()
+
+
+async def land_on_the_tag(pilot: Pilot) -> None:
+    pilot.rig.in_the_air(5)
+    pilot.rig.ok(pilot.rig.post("/movement/go_to_ned_wait", x=7, y=-4, z=-5))
+    await pilot.click("Vision")
+    await pilot.page.until("document.querySelector('vision-view img').naturalWidth === 480")
+    await pilot.finds_it_accessible()
+    await pilot.hold("Land on the tag")
+    await pilot.sees("vision-view .answer", "Landed on tag 0")
+    assert pilot.rig.control.ask("state")["position"][:2] == pytest.approx([8, -5], abs=0.4)
+
+
+def load_vision(rig: Any) -> None:
+    """With the simulated camera, which looks at a tag 8 m north and 5 m west of home."""
+    settings = {"directory": str(rig.directory), "source": "sim", "fps": 12, "width": 480, "height": 360}
+    rig.mavproxy.ask(f"module load vision:{json.dumps(settings, separators=(',', ':'))}", "Loaded module vision")
+
+
 async def look(rig: Any, directory: Path) -> list[str]:
     settings = json.dumps({"sink": "http://127.0.0.1:9/", "spool": f"{directory}/spool.db"}, separators=(",", ":"))
     rig.mavproxy.ask(f"module load gradys:{settings}", "Loaded module gradys")
+    load_vision(rig)
     envelope = {"type": "FeatureCollection", "features": [FIELD]}
     assert rig.call("PUT", "/envelope", json=envelope).status_code == 200
     async with chromium(directory) as page:
@@ -126,13 +181,18 @@ async def look(rig: Any, directory: Path) -> list[str]:
         await pilot.finds_it_accessible()
         await see_readings(pilot)
         await pilot.finds_it_accessible()
+        await run_a_script(pilot)
+        await set_a_parameter(pilot)
+        await land_on_the_tag(pilot)
         return page.complaints
 
 
 @pytest.fixture
 def rig(harness: Any, tmp_path: Path) -> Iterator[Any]:
     """A vehicle that has a log, because it was armed once."""
-    made = harness.embedded(tmp_path, speedup=2, vehicle_logs=str(tmp_path / "logs"), tiles=str(map_of(tmp_path)))
+    folders = {"vehicle_logs": "logs", "scripts_path": "scripts", "script_logs": "script-logs"}
+    settings = {name: str(tmp_path / folder) for name, folder in folders.items()}
+    made = harness.embedded(tmp_path, speedup=SPEEDUP, tiles=str(map_of(tmp_path)), **settings)
     try:
         harness.eventually(lambda: made.status()["ready_to_arm"], 60, what="getting ready to arm")
         made.ok(made.get("/command/arm"))

@@ -106,6 +106,19 @@ class Page:
         """Let the mouse's button go."""
         await self.ask("Input.dispatchMouseEvent", type="mouseReleased", x=x, y=y, button="left", clickCount=1)
 
+    async def touch(self, x: float, y: float) -> None:
+        """Put a finger there."""
+        await self.ask("Input.dispatchTouchEvent", type="touchStart", touchPoints=[{"x": x, "y": y}])
+
+    async def lift(self) -> None:
+        """Take the finger away."""
+        await self.ask("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+
+    async def choose_file(self, element: str, file: Path) -> None:
+        """Choose a file in the file input that the script `element` gives."""
+        found = await self.ask("Runtime.evaluate", expression=element)
+        await self.ask("DOM.setFileInputFiles", files=[str(file)], objectId=found["result"]["objectId"])
+
     async def click(self, element: str, right: float = 0, down: float = 0) -> None:
         """Click an element, so many pixels from its middle."""
         x, y = await self.middle(element)

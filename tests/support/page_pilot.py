@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+from collections.abc import AsyncIterator
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -33,12 +35,42 @@ class Pilot:
 
     async def hold_the(self, element: str) -> None:
         """Hold the button that the script `element` gives, until it acts."""
+        async with self._acting(element):
+            x, y = await self.page.middle(element)
+            await self.page.press(x, y)
+        await self.page.release(x, y)
+
+    async def hold_by_touch(self, label: str) -> None:
+        """Hold a finger on a button until it acts."""
+        element = BUTTON.format(tag="hold-button", label=label)
+        async with self._acting(element):
+            await self.page.touch(*await self.page.middle(element))
+        await self.page.lift()
+
+    async def hold_by_key(self, label: str, key: str, code: int) -> None:
+        """Put the focus on a button and hold a key until it acts."""
+        element = BUTTON.format(tag="hold-button", label=label)
+        async with self._acting(element):
+            await self.page.evaluate(f"{element}.button.focus()")
+            await self.page.key("keyDown", key, code)
+        await self.page.key("keyUp", key, code)
+
+    async def press_twice(self, label: str) -> None:
+        """Press a button as assistive technology does, which cannot hold it."""
+        element = BUTTON.format(tag="hold-button", label=label)
+        async with self._acting(element):
+            await self.page.evaluate(f"{element}.button.click()")
+            await self.page.until(f"{element}.button.ariaLabel.includes('press again to confirm')")
+            assert not await self.page.evaluate("acted")
+            await self.page.evaluate(f"{element}.button.click()")
+
+    @contextlib.asynccontextmanager
+    async def _acting(self, element: str) -> AsyncIterator[None]:
+        """Do something to a button that may be used, and wait until it has acted."""
         await self.page.until(f"!{element}.button.disabled")
         await self.page.evaluate(f"window.acted = false; {element}.addEventListener('confirmed', () => acted = true)")
-        x, y = await self.page.middle(element)
-        await self.page.press(x, y)
+        yield
         await self.page.until("acted")
-        await self.page.release(x, y)
 
     async def click(self, label: str) -> None:
         """Click a button."""
