@@ -19,14 +19,18 @@ export class CallSlots {
   /** The outcome of `work(signal)`, a read, in its turn. */
   read(work) { return this.inTurn(work, false); }
 
-  /** The same of a command: it goes before reads, and fails if it is not sent soon. */
-  command(work) { return this.inTurn(work, true); }
+  /** The same of a command: it goes before reads, one of which gives up its slot for it; it fails if it is not sent soon. */
+  command(work) {
+    const done = this.inTurn(work, true);
+    if (this.free <= 0) this.giveUp(this.running.filter(call => !call.command).slice(0, 1), "given up for a command");
+    return done;
+  }
 
   /** The outcome of `work()`, a stop, at once. No command from before it is sent after it. */
   async stop(work) {
     this.stops += 1;
     this.drop(call => call.command, "not sent: a stop came first");
-    this.giveUp(this.free < 0 ? this.running : this.running.filter(call => call.command));
+    this.giveUp(this.free < 0 ? this.running : this.running.filter(call => call.command), "given up for a stop; it may have been sent");
     try {
       return await work();
     } finally {
@@ -75,7 +79,7 @@ export class CallSlots {
   }
 
   /** End calls that have no answer: their connections are free, and what the browser still holds back is not sent. */
-  giveUp(calls) {
-    for (const call of calls) call.ends.abort(new Error("given up for a stop; it may have been sent"));
+  giveUp(calls, why) {
+    for (const call of calls) call.ends.abort(new Error(why));
   }
 }

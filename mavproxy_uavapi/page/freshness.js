@@ -1,6 +1,7 @@
 // How old a value is, by our own clock: an old number is never shown as a new one.
 
 const DRIFT = 0.0002; // ms that two clocks may part in a ms
+const SAME = 2000; // ms by which the epoch of one clock may change while no connection is open
 const SOONEST_OLD = 1500, LATEST_OLD = 5000; // ms
 const INTERVALS_UNTIL_OLD = 3;
 
@@ -10,17 +11,24 @@ export const now = () => performance.now();
 /**
  * When an event happened, on our clock. Its `clock` is the server's, which never steps; the fastest delivery of this stream
  * tells how far ours is from that. What was delivered slower was held up on its way, and is older than its arrival. The
- * fastest is forgotten only as slowly as two clocks part, so that a lasting delay is not taken for their difference.
+ * fastest is forgotten only as slowly as two clocks part, so that a lasting delay is not taken for their difference; nor
+ * is one that outlives its connection.
  */
 export class StreamClock {
   constructor() {
     this.fastest = Infinity;
     this.learnt = 0;
     this.epoch = 0; // when the server's clock was 0, by its wall clock
+    this.isNew = false; // of a connection that has told no times yet
   }
+
+  /** Another connection: if the epoch is another one, so is the server's clock. */
+  reopen() { this.isNew = true; }
 
   /** Learn from an event that was sent when it happened, at `sent` and at `wall` of the server's clocks; all in ms. */
   learn(sent, arrived, wall) {
+    if (this.isNew && Math.abs(wall - sent - this.epoch) > SAME) this.fastest = Infinity;
+    this.isNew = false;
     this.fastest = Math.min(this.fastest + DRIFT * (arrived - this.learnt), arrived - sent);
     this.learnt = arrived;
     this.epoch = wall - sent;

@@ -31,6 +31,7 @@ export class TelemetryStream {
     this.take = take;
     this.heardAt = -Infinity;
     this.why = "not connected yet";
+    this.clock = new StreamClock();
     this.connection = new AbortController();
     api.addEventListener("token-changed", () => this.renew());
   }
@@ -68,7 +69,7 @@ export class TelemetryStream {
     const watch = setInterval(() => { if (now() - Math.max(this.heardAt, opened) > DEAD) stop.abort(); }, 500);
     try {
       const response = await this.api.open(this.path, stop.signal);
-      this.clock = new StreamClock();
+      this.clock.reopen();
       this.opened();
       await readEvents(response, event => { if (!stop.signal.aborted) this.heard(event); });
       this.why = "the API has ended the connection";

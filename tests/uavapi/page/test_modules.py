@@ -12,7 +12,7 @@ from tests.support.page_checks import failures
 
 pytestmark = pytest.mark.needs("chromium")
 
-# Calls of the API that are not answered until their signal ends them; `sent` has their paths, `answer` answers one.
+# Calls of the API that are not answered until their signal ends them; `sent` has their paths, `open` answers one.
 HELD_CALLS = """
   const sent = [], open = {};
   const settle = async () => { for (let n = 0; n < 20; n += 1) await new Promise(resolve => setTimeout(resolve)); };
@@ -23,8 +23,9 @@ HELD_CALLS = """
   });
   const said = {}, ask = (name, call) => call.then(() => { said[name] = 'done'; }, e => { said[name] = e.message; });
   const a = new m.Api();
-  ask('log', a.blob('/log', 600000)); ask('list', a.get('/list'));
 """
+READS = HELD_CALLS + "ask('log', a.blob('/log', 600000)); ask('list', a.get('/list'));"
+COMMANDS = HELD_CALLS + "ask('log', a.call('POST', '/log')); ask('list', a.call('POST', '/list'));"
 
 # The page's strips as index.html has them, and what panels are given; `at` is the time of a vehicle's report.
 STRIPS = """
@@ -65,10 +66,10 @@ def _ages(delay: str, right: str, step: int = 0) -> str:
 
 # module -> scripts that must give true; `m` is the module
 CHECKS = {
-    # both slots are held by slow reads
+    # both slots are held by slow calls
     "api": [
         # a stop goes out at once, and no command that waits goes out after it
-        f"""(async () => {{{HELD_CALLS}
+        f"""(async () => {{{READS}
            ask('go', a.command('/go_to')); ask('start', a.call('POST', '/start')); ask('read', a.get('/read'));
            ask('hold', a.urgent('/fleet/brake'));
            const first = same(sent, ['/log', '/list', '/fleet/brake']);
@@ -79,20 +80,26 @@ CHECKS = {
              && said.hold === 'done';
            }})()""",
         # a command that has waited too long is not sent, even if no timer told so meanwhile
-        f"""(async () => {{{HELD_CALLS}
+        f"""(async () => {{{COMMANDS}
            const clock = performance.now.bind(performance);
            ask('go', a.command('/go_to'));
            performance.now = () => clock() + 1500;
            try {{ open['/list'](); await settle(); }} finally {{ delete performance.now; }}
            return same(sent, ['/log', '/list']) && said.go === 'not sent: the page was busy'; }})()""",
         # a command goes before the reads that wait
-        f"""(async () => {{{HELD_CALLS}
+        f"""(async () => {{{COMMANDS}
            ask('read', a.get('/read')); ask('go', a.command('/go_to'));
            open['/list']();
            await settle();
            return same(sent, ['/log', '/list', '/go_to?wait=false']); }})()""",
+        # of two slow reads the older one gives up its slot for a command; the next command takes the other's
+        f"""(async () => {{{READS}
+           ask('go', a.command('/go_to')); await settle();
+           const kept = said.list === undefined && said.log === 'given up for a command';
+           ask('set', a.call('PUT', '/set')); await settle();
+           return kept && said.list === said.log && same(sent.slice(2), ['/go_to?wait=false', '/set']); }})()""",
         # one connection is for stops: a second stop without an answer takes those of the slots, and nothing else does
-        f"""(async () => {{{HELD_CALLS}
+        f"""(async () => {{{READS}
            ask('one', a.stop('/one')); await settle();
            const kept = said.log === undefined;
            ask('hold', a.urgent('/fleet/brake')); ask('read', a.get('/read')); ask('more', a.get('/more'));
@@ -341,6 +348,10 @@ CHECKS = {
         ),
         """[3.6e6, -3.6e6].every(step => {const c = new m.StreamClock(); c.learn(0, 50, 7e9);
            c.learn(500, 550, 7e9 + 500 + step); return c.happenedByWall(7e9 + 400 + step, 900) === 450})""",
+        # a lag that outlives its connection stays; a server that was started anew, or is another one, has none yet
+        """{const ageAfter = begun => {const c = new m.StreamClock(); c.learn(0, 50, 7e9); c.reopen();
+             c.learn(500 - begun, 20500, 7e9 + 500); return 20500 - c.happened(500 - begun, 20500)};
+           ageAfter(0) > 19900 && ageAfter(0) < 20000 && ageAfter(9e6) === 0}""",
     ],
     "message_list": [
         """{const fleet = new EventTarget(), list = new m.MessageList(); list.start({fleet});
