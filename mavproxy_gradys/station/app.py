@@ -37,6 +37,7 @@ from mavproxy_gradys.station.intake import Intake
 from mavproxy_gradys.station.queries import MOST_EXPORTED, MOST_ROWS, history_query, reading_query
 from mavproxy_gradys.station.reading_row import COLUMNS, reading_row
 from mavproxy_gradys.station.updates import DEVICE_COLUMNS, Updates, newest_of_update, parse
+from mavproxy_uavapi.http.streaming import EventStream
 
 RECEIVED, DROPPED = 103, 101
 LARGEST_BODY = 16 * 1024 * 1024  # bytes
@@ -203,7 +204,7 @@ class Station:
 
     async def watch(self, request: web.Request) -> web.StreamResponse:
         """The fleet, once a second: first all vehicles, then what has changed of each, with its device."""
-        response = web.StreamResponse(headers={"Content-Type": "text/event-stream", "Cache-Control": "no-store"})
+        response = EventStream()
         await response.prepare(request)
         self._watchers += 1
         known: dict[str, FleetVehicle] = {}
@@ -214,7 +215,7 @@ class Station:
                 news = [changes(before, vehicle) for before, vehicle in pairs if before != vehicle]
                 await response.write(f"data: {json.dumps(self._event(news))}\n\n".encode())
                 await self._watch.next_update()
-        except ConnectionResetError:
+        except ConnectionError:  # the browser has gone, or reads nothing
             return response
         finally:
             self._watchers -= 1

@@ -11,14 +11,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from pymavlink import mavutil
-
 from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle.messages import MESSAGE_IDS, Command, set_interval
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
-
-mavlink = mavutil.mavlink
 
 FLIGHT = {"ATTITUDE": 25.0, "LOCAL_POSITION_NED": 25.0}  # Hz of the vehicle's clock
 TRUTH = {"SIM_STATE": 50.0}
@@ -75,7 +71,7 @@ class Rates:
         for other, name in [key for key in self._requested_at if key[0] is not vehicle or key[1] not in needed]:
             del self._requested_at[other, name]
             self._pause.pop(name, None)
-            await self._send(other, default_interval(MESSAGE_IDS[name]))
+            await self._send(other, set_interval(MESSAGE_IDS[name], 0))
 
     async def _send(self, vehicle: Vehicle, command: Command) -> None:
         # We wait for no ack: the arriving messages are the proof.
@@ -93,8 +89,3 @@ def is_slow(state: VehicleState, name: str, longest: float) -> bool:
         return True
     newest = max(other.at for other in state.messages.values())
     return max(newest - received.at, received.interval or 0.0) > longest
-
-
-def default_interval(message_id: int) -> Command:
-    """The command that requests a message at the rate of its stream."""
-    return Command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, (message_id, 0))

@@ -202,8 +202,8 @@ def request_message(message_id: int) -> Command:
 
 
 def set_interval(message_id: int, rate: float) -> Command:
-    """Ask for a message at `rate` Hz."""
-    return Command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, (message_id, 1e6 / rate))
+    """Ask for a message at `rate` Hz; 0 for the rate of its stream."""
+    return Command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, (message_id, 1e6 / rate if rate else 0))
 
 
 def read_parameter(address: Address, name: str) -> Any:
