@@ -7,7 +7,7 @@ from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.vehicle.endings import Policy
 from mavproxy_uavapi.core.vehicle.stream_requester import StreamRequester
-from mavproxy_uavapi.envelope_file import EnvelopeFile
+from mavproxy_uavapi.files.envelope_file import EnvelopeFile
 from mavproxy_uavapi.http.app import ApiServer
 from mavproxy_uavapi.http.call import Service
 from mavproxy_uavapi.remote_settings import RemoteSettings

@@ -12,14 +12,14 @@ try:
     from mavproxy_uavapi.api import Api
 except ModuleNotFoundError as missing:  # MAVProxy prints the text of an ImportError as one line
     raise ImportError(f"uavapi needs {missing.name}: pip install mavproxy-uavapi") from missing
-from mavproxy_uavapi import authority_console, fleet_console, token_console, window_view
-from mavproxy_uavapi.console import report, vehicles
 from mavproxy_uavapi.core.background import BackgroundCommands
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.logs import Logs, print_above_prompt
 from mavproxy_uavapi.core.module import SharedModule
 from mavproxy_uavapi.core.remembered_settings import RememberedSettings
 from mavproxy_uavapi.core.windows import View
+from mavproxy_uavapi.prompt import authority, fleet, token, windows
+from mavproxy_uavapi.prompt.report import report, vehicles
 from mavproxy_uavapi.remote_settings import RemoteSettings
 from mavproxy_uavapi.settings import ApiModuleSettings, ApiSettings
 
@@ -98,7 +98,7 @@ class UavApiModule(SharedModule[ApiSettings]):
 
     def view(self) -> View:
         """Who commands, and the commanded targets."""
-        return window_view.view(self.host)
+        return windows.view(self.host)
 
     async def end(self) -> None:
         """Stop listening, or trying to."""
@@ -168,16 +168,16 @@ class UavApiModule(SharedModule[ApiSettings]):
             fly(["--sysid", str(self.module_settings.snapshot().sysid), *args])
 
     def _fleet(self, args: list[str]) -> None:
-        self._background.send(lambda: fleet_console.command(self.host, args), f"at fleet {' '.join(args)}")
+        self._background.send(lambda: fleet.command(self.host, args), f"at fleet {' '.join(args)}")
 
     def _authority(self, args: list[str]) -> None:
-        self._background.send(lambda: authority_console.command(self.host, args), f"at authority {' '.join(args)}")
+        self._background.send(lambda: authority.command(self.host, args), f"at authority {' '.join(args)}")
 
     def _token(self, args: list[str]) -> None:
         file = self.module_settings.snapshot().tokens
 
         async def change() -> str:
-            text, has_changed = await asyncio.to_thread(token_console.command, file, args)
+            text, has_changed = await asyncio.to_thread(token.command, file, args)
             if has_changed:
                 self.api.take_tokens()
             return text

@@ -10,13 +10,13 @@ from typing import Any
 
 from MAVProxy.modules.lib.mp_settings import MPSetting
 
-from mavproxy_uavapi import envelope_file, tile_store, tokens
 from mavproxy_uavapi.core.addresses import is_loopback, local_url_of, url_of
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.ini_file import IniFile
 from mavproxy_uavapi.core.logs import components
 from mavproxy_uavapi.core.settings import DEFAULT, ModuleSettings
 from mavproxy_uavapi.core.values import is_unset
+from mavproxy_uavapi.files import envelope_file, tile_store, tokens
 
 Network = ipaddress.IPv4Network | ipaddress.IPv6Network
 

@@ -21,6 +21,7 @@ from mavproxy_uavapi.core.values import boolean
 from mavproxy_uavapi.core.vehicle.copter import Copter
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+from mavproxy_uavapi.files.tokens import Token, Tokens
 from mavproxy_uavapi.http.broadcast import TelemetryBroadcast
 from mavproxy_uavapi.http.browser import is_browser
 from mavproxy_uavapi.http.bucket import Bucket
@@ -33,7 +34,6 @@ from mavproxy_uavapi.http.streaming import MOST_OPEN, SharedSlots
 from mavproxy_uavapi.remote_settings import RemoteSettings
 from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.settings import ApiSettings
-from mavproxy_uavapi.tokens import Token, Tokens
 
 log = logging.getLogger("uavapi.http.server")
 R = TypeVar("R", bound=Request)

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from aiohttp import web
 
 from mavproxy_uavapi.core.roles import Operator, Role
+from mavproxy_uavapi.files.tokens import Token
 from mavproxy_uavapi.settings import Network
-from mavproxy_uavapi.tokens import Token
 
 IpAddress = ipaddress.IPv4Address | ipaddress.IPv6Address
 

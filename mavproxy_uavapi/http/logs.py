@@ -17,11 +17,11 @@ from mavproxy_uavapi.core.errors import Busy, NotFound, Stale, ToolFailed
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.log_pieces import HIGHEST_ID, LogEntry
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+from mavproxy_uavapi.files.log_store import LogFile, LogStore
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import Request
 from mavproxy_uavapi.http.responses import Answer
 from mavproxy_uavapi.http.streaming import StreamingResponse
-from mavproxy_uavapi.log_store import LogFile, LogStore
 
 T = TypeVar("T")
 PART = 64 * 1024  # bytes that are read and sent at a time

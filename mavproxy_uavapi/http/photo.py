@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from aiohttp import web
 
-from mavproxy_uavapi import camera_tools
-from mavproxy_uavapi.camera_tools import TOOLS, Shot
 from mavproxy_uavapi.core.errors import BadRequest
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import Photo
+from mavproxy_uavapi.programs import cameras
+from mavproxy_uavapi.programs.cameras import TOOLS, Shot
 
 VISION = "vision"
 
@@ -18,12 +18,12 @@ async def take_photo(call: Call) -> web.StreamResponse:
     p = call.params(Photo)
     if p.command != VISION and p.command not in TOOLS:
         raise BadRequest(f"camera tool {p.command!r} is not allowed, but {', '.join([*TOOLS, VISION])}")
-    width, height = camera_tools.size_of(p.resolution)
+    width, height = cameras.size_of(p.resolution)
     if p.command == VISION:
         picture = await _newest_frame(call)
     else:
         shot = Shot(width, height, p.capture_time, p.focus_distance, p.exposure)
-        picture = await camera_tools.take(p.command, shot)
+        picture = await cameras.take(p.command, shot)
     headers = {"Content-Disposition": 'attachment; filename="photo.jpg"', "Cache-Control": "no-store"}
     return web.Response(body=picture, content_type="image/jpeg", headers=headers)
 

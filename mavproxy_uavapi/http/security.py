@@ -20,6 +20,7 @@ from urllib.parse import urlsplit
 from aiohttp import web
 
 from mavproxy_uavapi.core.errors import Forbidden, TooManyRequests, UavApiError, Unauthorized, without_frames
+from mavproxy_uavapi.files.tokens import Token, digest_of
 from mavproxy_uavapi.http.browser import is_browser
 from mavproxy_uavapi.http.call import SERVICE, Service
 from mavproxy_uavapi.http.caller import CALLER, Caller, address_of, group_of
@@ -29,7 +30,6 @@ from mavproxy_uavapi.http.page import wants_page
 from mavproxy_uavapi.http.responses import Handler, failure
 from mavproxy_uavapi.http.router import MATCH
 from mavproxy_uavapi.settings import ApiSettings
-from mavproxy_uavapi.tokens import Token, digest_of
 
 log = logging.getLogger("uavapi.http.door")
 OURSELVES = {"same-origin", "none"}  # Sec-Fetch-Site of our own page and of a typed address

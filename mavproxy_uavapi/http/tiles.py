@@ -8,9 +8,9 @@ from typing import Any
 from aiohttp import web
 
 from mavproxy_uavapi.core.errors import NotFound
+from mavproxy_uavapi.files.tile_store import TileStore
 from mavproxy_uavapi.http import static_files
 from mavproxy_uavapi.http.call import Call
-from mavproxy_uavapi.tile_store import TileStore
 
 HEADERS = static_files.headers("sandbox")  # a picture, and nothing else
 

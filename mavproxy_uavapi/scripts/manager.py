@@ -17,11 +17,11 @@ from mavproxy_uavapi.core.errors import BadRequest, NoVehicle, ToolFailed
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.roles import Role
+from mavproxy_uavapi.files.tokens import SCRIPT, Token, digest_of, new_token
 from mavproxy_uavapi.scripts import aerpaw, clients, names, on_exit, runner, runs, tmux
 from mavproxy_uavapi.scripts.runs import Run
 from mavproxy_uavapi.scripts.store import ScriptStore
 from mavproxy_uavapi.settings import ApiSettings
-from mavproxy_uavapi.tokens import SCRIPT, Token, digest_of, new_token
 
 log = logging.getLogger("uavapi.script")
 

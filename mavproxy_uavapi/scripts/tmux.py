@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mavproxy_uavapi.core.errors import ToolFailed
-from mavproxy_uavapi.tools import Outcome, run_tool
+from mavproxy_uavapi.programs.program import Outcome, run_tool
 
 TIMEOUT = 10.0  # s for one call
 RECORD = "@uavapi_record"  # the session's option with the path of its run's record

@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi import authority_console
 from mavproxy_uavapi.core.errors import BadRequest, NoVehicle
 from mavproxy_uavapi.core.vehicle.copter import Copter
 from mavproxy_uavapi.core.vehicle.endings import Policy
 from mavproxy_uavapi.http.connection import Connection
+from mavproxy_uavapi.prompt import authority
 from tests.support import tokens
 from tests.support.wire import Wire
 
@@ -46,7 +46,7 @@ def held_by(world: Any) -> Any:
 
 
 def prompt(world: Any, *words: str) -> str:
-    return str(world.loop.run(authority_console.command(world.host, words)))
+    return str(world.loop.run(authority.command(world.host, words)))
 
 
 def speed(world: Any) -> float:

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from mavproxy_uavapi.authority_console import command as authority
+from mavproxy_uavapi.prompt.authority import command as authority
 from tests.support.world import MODES, PLACE, World
 
 ALT = 8.0  # m above home

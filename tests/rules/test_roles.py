@@ -13,6 +13,7 @@ import pytest
 from mavproxy_gradys.http import GradysHandlers
 from mavproxy_uavapi.core.errors import Forbidden
 from mavproxy_uavapi.core.roles import Role
+from mavproxy_uavapi.files.tokens import Token
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.caller import CALLER, Caller
 from mavproxy_uavapi.http.fleet import FleetRequest
@@ -20,7 +21,6 @@ from mavproxy_uavapi.http.openapi import document, example_of
 from mavproxy_uavapi.http.requests import Empty
 from mavproxy_uavapi.http.route import Route
 from mavproxy_uavapi.http.routes import PAGE, ROUTES
-from mavproxy_uavapi.tokens import Token
 from mavproxy_vision.http import VisionHandlers
 from tests.rules.fault_scenes import track
 from tests.support import tokens

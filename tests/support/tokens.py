@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from mavproxy_uavapi.tokens import digest_of
+from mavproxy_uavapi.files.tokens import digest_of
 
 ALL = {"tower": "watch", "anna": "fly", "bo": "fly", "second": "fly:2", "boss": "admin", "chief": "admin"}
 

@@ -5,8 +5,8 @@ from ipaddress import ip_address, ip_network
 import pytest
 
 from mavproxy_uavapi.core.roles import Role
+from mavproxy_uavapi.files.tokens import Token
 from mavproxy_uavapi.http.caller import Caller, address_of, group_of
-from mavproxy_uavapi.tokens import Token
 
 
 @pytest.mark.parametrize(

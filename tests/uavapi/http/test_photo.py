@@ -4,9 +4,9 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi import camera_tools
-from mavproxy_uavapi.camera_tools import Shot
 from mavproxy_uavapi.core.errors import TimedOut, ToolFailed
+from mavproxy_uavapi.programs import cameras
+from mavproxy_uavapi.programs.cameras import Shot
 
 
 @pytest.fixture
@@ -18,7 +18,7 @@ def taken(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
         requested.append((tool, shot))
         return b"\xff\xd8\xffpicture"
 
-    monkeypatch.setattr(camera_tools, "take", take)
+    monkeypatch.setattr(cameras, "take", take)
     return requested
 
 
@@ -68,7 +68,7 @@ def test_failures_are_reported(api: Any, monkeypatch: pytest.MonkeyPatch, error:
     async def take(_tool: str, _shot: Shot) -> bytes:
         raise error
 
-    monkeypatch.setattr(camera_tools, "take", take)
+    monkeypatch.setattr(cameras, "take", take)
     answer = api.get("/peripherical/take_photo?command=fswebcam")
     assert (answer.status, answer.body.get("stderr")) == (status, getattr(error, "stderr", None))
 

@@ -14,10 +14,10 @@ from aiohttp import ClientError, WSMsgType
 
 from mavproxy_uavapi.core.errors import Forbidden, Unauthorized
 from mavproxy_uavapi.core.roles import Role
+from mavproxy_uavapi.files.tokens import Token, digest_of
 from mavproxy_uavapi.http.security import check_caller
 from mavproxy_uavapi.scripts.runs import Run
 from mavproxy_uavapi.settings import ApiModuleSettings
-from mavproxy_uavapi.tokens import Token, digest_of
 from tests.support import tokens
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from mavproxy_uavapi.core.errors import TimedOut
-from mavproxy_uavapi.tools import run_tool
+from mavproxy_uavapi.programs.program import run_tool
 
 
 def is_gone(pid: int) -> bool:
@@ -64,7 +64,7 @@ def test_a_program_whose_caller_goes_at_its_start_ends_with_its_children(tmp_pat
 
 FORKS = """
 import asyncio, os, threading, time
-from mavproxy_uavapi.tools import run_tool
+from mavproxy_uavapi.programs.program import run_tool
 
 longest = 0.0
 async def tools():

@@ -8,7 +8,7 @@ import pytest
 
 from mavproxy_uavapi.core.roles import THE_PROMPT
 from mavproxy_uavapi.core.vehicle.messages import GlobalTarget, NedTarget, VelocityTarget
-from mavproxy_uavapi.window_view import view
+from mavproxy_uavapi.prompt.windows import view
 from tests.support.piloting import place
 
 

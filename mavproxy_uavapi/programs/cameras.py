@@ -12,7 +12,7 @@ from pathlib import Path
 
 from mavproxy_uavapi.core.acquire import acquire
 from mavproxy_uavapi.core.errors import BadRequest, ToolFailed
-from mavproxy_uavapi.tools import run_tool
+from mavproxy_uavapi.programs.program import run_tool
 
 TIME_LIMIT = 30.0  # s
 SKIPPED_FRAMES = 5  # of a USB camera, whose first ones are dark

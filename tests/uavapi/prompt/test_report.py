@@ -6,8 +6,8 @@ import pytest
 from pymavlink import mavutil
 
 from mavproxy_uavapi.api import Api
-from mavproxy_uavapi.console import report, vehicles
 from mavproxy_uavapi.core.vehicle.messages import NedTarget
+from mavproxy_uavapi.prompt.report import report, vehicles
 from mavproxy_uavapi.settings import ApiModuleSettings
 
 mavlink = mavutil.mavlink

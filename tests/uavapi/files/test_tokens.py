@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import os
-import stat
-import time
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from mavproxy_uavapi import token_console
-from mavproxy_uavapi.core.errors import BadRequest, SettingError
+from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.roles import Role
+from mavproxy_uavapi.files.tokens import MOST, Token, Tokens, check, digest_of, new_token, parse, read
+from mavproxy_uavapi.files.watched_file import LOOK_EVERY
 from mavproxy_uavapi.settings import ApiModuleSettings
-from mavproxy_uavapi.tokens import MOST, Token, Tokens, check, digest_of, new_token, parse, read
-from mavproxy_uavapi.watched_file import LOOK_EVERY
 from tests.support.at_once import AtOnce
 
 HASHES = [f"sha256:{digest_of(str(number).encode()).hex()}" for number in range(MOST + 2)]
@@ -164,17 +161,13 @@ def test_file_that_is_gone_at_the_start_lets_nobody_in(loop: Any, tmp_path: Path
     assert tokens.wanted and tokens.find(digest_of(b"0")) is None and "cannot be read" in said[0]
 
 
-def test_token_is_found_by_its_hash_in_microseconds(file: Path) -> None:
+def test_token_is_found_by_its_hash_among_the_most_there_may_be(file: Path) -> None:
     put(file, "\n".join(f"n{number} watch {HASHES[number]}" for number in range(MOST)))
     tokens = Tokens(print)
     tokens.use(str(file))
     found = tokens.find(digest_of(b"7"))
     assert found is not None and found.name == "n7"
     assert tokens.find(digest_of(b"x")) is None
-    began = time.perf_counter()
-    for _ in range(200):
-        tokens.find(digest_of(b"x"))
-    assert (time.perf_counter() - began) / 200 < 1e-3  # 20 us where nothing else runs
 
 
 def test_what_is_served_ends_when_its_token_goes_or_changes(file: Path) -> None:
@@ -205,55 +198,6 @@ def test_token_of_a_script_counts_as_long_as_its_starter_may_start_scripts(
     tokens = Tokens(print)
     tokens.use(str(file))
     assert tokens.counts(Token(f"{starter}/square", Role.ADMIN, frozenset(), b"")) is counts
-
-
-# -- the prompt ---------------------------------------------------------------------------------------------
-
-
-def test_prompt_makes_shows_and_removes_tokens(tmp_path: Path) -> None:
-    path = tmp_path / "tokens"
-    text, changed = token_console.command(str(path), ["add", "anna", "fly", "1", "2"])
-    secret = text.splitlines()[-1]
-    assert changed and len(secret) > 40 and "shown this once" in text
-    assert stat.S_IMODE(path.stat().st_mode) == 0o600 and secret not in path.read_text()
-    tokens = Tokens(print)
-    tokens.use(str(path))
-    found = tokens.find(digest_of(secret.encode()))
-    assert found is not None and str(found).startswith("anna fly:1,2 sha256:")
-    put(path, path.read_text().rstrip("\n") + "  # keep this\n# and this")
-    token_console.command(str(path), ["add", "bo", "admin"])
-    assert token_console.command(str(path), ["list"]) == (f"tokens of {path}\n  anna fly:1,2\n  bo admin", False)
-    token_console.command(str(path), ["remove", "bo"])
-    assert "# keep this" in path.read_text() and "# and this" in path.read_text() and "bo" not in path.read_text()
-    assert [entry.name for entry in tmp_path.iterdir()] == ["tokens"]
-    token_console.command(str(path), ["remove", "anna"])
-    assert "has no tokens" in token_console.command(str(path), ["list"])[0]
-
-
-@pytest.mark.parametrize(
-    "words",
-    ["add anna fly", "add a@b fly", "add bo king", "add bo watch 1", "add bo fly 0", "add bo fly:", "remove bo"],
-)
-def test_prompt_changes_nothing_for_words_of_no_use(file: Path, words: str) -> None:
-    before = file.read_text()
-    with pytest.raises(SettingError):
-        token_console.command(str(file), words.split())
-    assert file.read_text() == before
-
-
-@pytest.mark.parametrize("words", ["", "add", "add bo", "remove", "remove a b", "list all", "show"])
-def test_prompt_says_what_it_takes(file: Path, words: str) -> None:
-    with pytest.raises(BadRequest, match="token takes"):
-        token_console.command(str(file), words.split())
-
-
-def test_prompt_wants_the_setting_first_and_leaves_a_broken_file_alone(file: Path) -> None:
-    with pytest.raises(BadRequest, match="uavapi set tokens FILE"):
-        token_console.command("", ["list"])
-    put(file, "broken")
-    with pytest.raises(SettingError, match="line 1"):
-        token_console.command(str(file), ["add", "bo", "watch"])
-    assert file.read_text() == "broken"
 
 
 def test_tokens_are_long_and_never_the_same() -> None:

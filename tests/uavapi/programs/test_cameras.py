@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi import camera_tools
-from mavproxy_uavapi.camera_tools import TOOLS, Shot, size_of, take
 from mavproxy_uavapi.core.errors import BadRequest, TimedOut, ToolFailed
+from mavproxy_uavapi.programs import cameras
+from mavproxy_uavapi.programs.cameras import TOOLS, Shot, size_of, take
 
 SHOT = Shot(1280, 720, 150)
 WRITES = 'for last; do :; done\nprintf "\\377\\330\\377 picture" > "$last"\n'
@@ -106,7 +106,7 @@ def test_tool_that_is_not_installed_is_reported(temporary: Path, monkeypatch: py
 def test_tool_that_hangs_is_ended_with_its_children(
     temporary: Path, fake: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(camera_tools, "TIME_LIMIT", 0.5)
+    monkeypatch.setattr(cameras, "TIME_LIMIT", 0.5)
     fake("fswebcam", f"sleep 60 &\necho $! > {tmp_path}/pid\nwait\n")
     began = time.monotonic()
     with pytest.raises(TimedOut, match=r"0\.5 s"):

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mavproxy_uavapi.core.errors import BadRequest, SettingError
-from mavproxy_uavapi.tokens import MOST, Token, digest_of, name_of, new_token, parse, read_text, rights_of
+from mavproxy_uavapi.files.tokens import MOST, Token, digest_of, name_of, new_token, parse, read_text, rights_of
 
 USAGE = "token takes `add NAME watch|fly|admin [SYSID …]`, `list`, or `remove NAME`"
 HEAD = "# NAME ROLE[:VEHICLES] HASH; `uavapi token add NAME ROLE` adds a line\n"

@@ -11,10 +11,10 @@ import pytest
 
 from mavproxy_uavapi.core.envelope.store import API, OPERATOR, Envelopes, Key
 from mavproxy_uavapi.core.errors import SettingError
-from mavproxy_uavapi.envelope_file import EnvelopeFile
+from mavproxy_uavapi.files.envelope_file import EnvelopeFile
+from mavproxy_uavapi.files.watched_file import LOOK_EVERY
 from mavproxy_uavapi.http.examples import ENVELOPE
 from mavproxy_uavapi.settings import ApiModuleSettings
-from mavproxy_uavapi.watched_file import LOOK_EVERY
 from tests.support.at_once import AtOnce
 
 

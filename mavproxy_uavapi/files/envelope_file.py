@@ -11,7 +11,7 @@ from mavproxy_uavapi.core.envelope.space import Space
 from mavproxy_uavapi.core.envelope.store import ALL, OPERATOR, Envelopes, missing
 from mavproxy_uavapi.core.errors import SettingError, UavApiError
 from mavproxy_uavapi.core.values import is_unset
-from mavproxy_uavapi.watched_file import WatchedFile
+from mavproxy_uavapi.files.watched_file import WatchedFile
 
 log = logging.getLogger("uavapi.api")
 

@@ -25,7 +25,7 @@ from pathlib import Path
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.roles import Operator, Role
 from mavproxy_uavapi.core.values import is_unset
-from mavproxy_uavapi.watched_file import WatchedFile
+from mavproxy_uavapi.files.watched_file import WatchedFile
 
 log = logging.getLogger("uavapi.http.door")
 

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.core.errors import BadRequest
-from mavproxy_uavapi.fleet_console import command
+from mavproxy_uavapi.prompt.fleet import command
 
 
 def test_every_vehicle_has_a_line(make_drone: Any, host: Any, loop: Any) -> None:

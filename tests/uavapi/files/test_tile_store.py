@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from mavproxy_uavapi.core.errors import NotFound, SettingError
+from mavproxy_uavapi.files.tile_store import LARGEST, TileStore
 from mavproxy_uavapi.settings import ApiModuleSettings
-from mavproxy_uavapi.tile_store import LARGEST, TileStore
 
 PNG, JPEG = b"\x89PNG\r\n\x1a\nnorth", b"\xff\xd8\xff\xe0south"
 

@@ -1,0 +1,1 @@
+"""What the owner keeps on the disk: tokens, an envelope, logs, the tiles of a map."""

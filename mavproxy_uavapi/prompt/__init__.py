@@ -1,0 +1,1 @@
+"""What `uavapi` says and takes at MAVProxy's prompt, and shows in its windows."""
