@@ -28,7 +28,7 @@ from tests.support import tokens
 VISION = VisionHandlers(None, None).routes()  # type: ignore[arg-type]
 GRADYS = GradysHandlers(None).routes()  # type: ignore[arg-type]
 EVERY = [*ROUTES, *PAGE, *VISION, *GRADYS]
-ENDLESS = {"/telemetry/stream", "/vision/stream.mjpg"}  # tests/uavapi/http/test_roles.py
+ENDLESS = {"/telemetry/stream", "/vision/stream.mjpg"}  # tests/uavapi/http/test_named_tokens.py
 METHODS = ("GET", "HEAD", "OPTIONS", "POST", "PUT", "PATCH", "DELETE")
 NAMES = {"z": "0", "x": "0", "y": "0", "id": "1", "name": "ATTITUDE", "sysid": "1", "file": "x.css"}
 FAR = {"x": 5000, "y": 0, "z": -8}
