@@ -1,7 +1,7 @@
 """`vision` in a real MAVProxy on the embedded vehicle: the seed's mission, and what the prompt and HTTP tell of it.
 
 The rendered camera runs on the wall clock, with a latency that a speed-up would multiply: these flights run at
-twice the speed at most. What goes wrong in flight is tested in lock step, in tests/vision/test_failures.py.
+twice the speed at most. What goes wrong in flight is tested in lock step, in tests/vision/landing/test_failures.py.
 """
 
 from __future__ import annotations

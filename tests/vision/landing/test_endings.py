@@ -1,4 +1,7 @@
-"""Every flight, ended in every way."""
+"""How each flight of vision ends in each way: a table of flights by ends, each flown in lock step.
+
+An end is the work of `landing/`, and of the core's jobs and `endings.py`; none of them has the whole table.
+"""
 
 from __future__ import annotations
 
