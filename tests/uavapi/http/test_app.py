@@ -68,7 +68,7 @@ def test_wrong_method_is_405_with_those_that_are_allowed(
     assert answer.status == 405
     assert set(answer.headers["Allow"].split(",")) == set(allowed.split(","))
     assert isinstance(answer.body["detail"], str)
-    assert flying.got == []
+    assert flying.received == []
 
 
 @pytest.mark.parametrize("data", ["{", "x=1", "", "[1, 2]", '"text"', "null", b"\xff\xfe{}", '{"x": 1,}', "[" * 5000])

@@ -87,7 +87,7 @@ def test_every_path_is_403_for_a_page_of_another_site_and_nothing_is_sent(
 ) -> None:
     answer = loop.run(api.ask(method, path, headers=headers))
     assert (answer.status, answer.body["code"]) == (403, "forbidden")
-    assert flying.got == []
+    assert flying.received == []
 
 
 def test_page_of_another_site_may_not_open_a_websocket(flying: Any, api: Any, loop: Any) -> None:
@@ -155,7 +155,7 @@ def test_picture_of_a_foreign_page_commands_nothing_and_may_read_what_it_cannot_
 ) -> None:
     headers = {**CHROMIUM, "Accept": IMAGE}
     assert api.get(path, headers=headers).status == 403
-    assert flying.got == []
+    assert flying.received == []
     assert api.get("/telemetry/gps", headers=headers).status == 200
 
 
