@@ -142,7 +142,7 @@ def values(body: bytes) -> list[float]:
 def test_batches_that_are_too_large_get_smaller_and_stay_so(
     loop: Any, spool_thread: Any, sender: Any, poster: Any
 ) -> None:
-    refusing(poster, lambda found: len(found) > 60, too_large=True)
+    refusing(poster, lambda batch: len(batch) > 60, too_large=True)
     keep(loop, spool_thread, 1000)
     loop.pass_time(20)
     assert spool_thread.count == 0
