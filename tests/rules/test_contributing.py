@@ -55,13 +55,13 @@ class Code:
                     self.names |= self.files[path]
 
     def _read(self, node: ast.AST) -> set[str]:
-        found: set[str] = set()
+        names: set[str] = set()
         for child in ast.iter_child_nodes(node):
             inner = self._read(child)
             if isinstance(child, ast.ClassDef):
                 self.members.setdefault(child.name, set()).update(inner)
-            found |= inner | set(_bound(child))
-        return found
+            names |= inner | set(_bound(child))
+        return names
 
 
 def _bound(node: ast.AST) -> Iterator[str]:

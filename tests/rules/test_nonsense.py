@@ -192,10 +192,10 @@ def is_bad(value: Any, path: str, name: str, as_text: bool) -> bool:
     return not low <= value <= high or (name in WHOLE and value != int(value))
 
 
-def request(world: Any, method: str, path: str, by: str, given: dict[str, Any]) -> Any:
+def request(world: Any, method: str, path: str, by: str, values: dict[str, Any]) -> Any:
     if by == "json":
-        return world.ask(method, path + "?wait=false", json.dumps(given).encode())
-    texts = {name: value if isinstance(value, str) else json.dumps(value) for name, value in given.items()}
+        return world.ask(method, path + "?wait=false", json.dumps(values).encode())
+    texts = {name: value if isinstance(value, str) else json.dumps(value) for name, value in values.items()}
     if by == "form":
         content = urlencode({**texts, "wait": "false"}).encode()
         return world.ask(method, path + "?wait=false", content, "application/x-www-form-urlencoded")

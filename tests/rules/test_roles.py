@@ -129,9 +129,9 @@ def walk(world: Any, name: str, prefix: str = "") -> dict[str, int]:
             assert world.orders_of(world.sent[before:]) == [], f"{name}: {method} {route.path}"
             allowed = {one for other in routes if other.path == route.path for one in other.methods}
             if method in allowed:
-                found = next(other for other in routes if other.path == route.path and method in other.methods)
+                matching = next(other for other in routes if other.path == route.path and method in other.methods)
                 answers[f"{method} {route.path}"] = status
-                assert (status == 403) is (found.needs > tokens_role(name)), f"{method} {route.path}: {status}"
+                assert (status == 403) is (matching.needs > tokens_role(name)), f"{method} {route.path}: {status}"
             else:
                 assert status in (404, 405), f"{method} {route.path}: {status}"
     assert world.host.jobs.get("1").running
