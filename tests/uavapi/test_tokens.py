@@ -168,8 +168,8 @@ def test_token_is_found_by_its_hash_in_microseconds(file: Path) -> None:
     put(file, "\n".join(f"n{number} watch {HASHES[number]}" for number in range(MOST)))
     tokens = Tokens(print)
     tokens.use(str(file))
-    found = tokens.find(digest_of(b"7"))
-    assert found is not None and found.name == "n7"
+    token = tokens.find(digest_of(b"7"))
+    assert token is not None and token.name == "n7"
     assert tokens.find(digest_of(b"x")) is None
     began = time.perf_counter()
     for _ in range(200):
@@ -218,8 +218,8 @@ def test_prompt_makes_shows_and_removes_tokens(tmp_path: Path) -> None:
     assert stat.S_IMODE(path.stat().st_mode) == 0o600 and secret not in path.read_text()
     tokens = Tokens(print)
     tokens.use(str(path))
-    found = tokens.find(digest_of(secret.encode()))
-    assert found is not None and str(found).startswith("anna fly:1,2 sha256:")
+    token = tokens.find(digest_of(secret.encode()))
+    assert token is not None and str(token).startswith("anna fly:1,2 sha256:")
     put(path, path.read_text().rstrip("\n") + "  # keep this\n# and this")
     token_console.command(str(path), ["add", "bo", "admin"])
     assert token_console.command(str(path), ["list"]) == (f"tokens of {path}\n  anna fly:1,2\n  bo admin", False)

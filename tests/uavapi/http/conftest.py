@@ -161,8 +161,8 @@ def port(loop: Any, service: Any, tmp_path: Path) -> Iterator[Port]:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         free = int(probe.getsockname()[1])
-    given = {"port": free, "token": TOKEN, "scripts_path": str(tmp_path / "scripts")}
-    service.settings = ApiModuleSettings(given, environ={}).snapshot()
+    keywords = {"port": free, "token": TOKEN, "scripts_path": str(tmp_path / "scripts")}
+    service.settings = ApiModuleSettings(keywords, environ={}).snapshot()
     service.scripts = Scripts(service.host, service.settings)
     server = ApiServer(service)
     loop.run(server.start())

@@ -202,9 +202,9 @@ def test_descriptors_are_those_of_the_port_and_of_every_connection(
     assert server.filenos() == []
     loop.run(server.start())
     assert len(server.filenos()) == 1
-    found = loop.run(count())
-    assert len(set(found)) == 2
-    assert server._sockets[0].fileno() in found
+    descriptors = loop.run(count())
+    assert len(set(descriptors)) == 2
+    assert server._sockets[0].fileno() in descriptors
 
 
 def test_each_vehicle_has_a_port_of_its_own(loop: Any, service: Any, make_drone: Any, listening_on: int) -> None:

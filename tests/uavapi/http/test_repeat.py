@@ -278,5 +278,5 @@ def test_connection_answers_again_only_what_came_alone(
         connection.connection_lost(None)
         return transport.written, inner.received
 
-    written, got = loop.run(act())
-    assert (written, got) == (([b"again"], before) if repeated else ([], [*before, before[-1]]))
+    written, received = loop.run(act())
+    assert (written, received) == (([b"again"], before) if repeated else ([], [*before, before[-1]]))

@@ -27,9 +27,9 @@ def configured(api: Any, loop: Any, service: Any, tmp_path: Path) -> Any:
     """`configured(**settings)`: the service with those, and its scripts in a folder of the test's."""
     loop.patience = FILE_PATIENCE
 
-    def configure(**given: Any) -> Any:
+    def configure(**keywords: Any) -> Any:
         folders = {"scripts_path": str(tmp_path / "scripts"), "script_logs": str(tmp_path / "logs")}
-        service.settings = ApiModuleSettings({**folders, **given}, environ={}).snapshot()
+        service.settings = ApiModuleSettings({**folders, **keywords}, environ={}).snapshot()
         service.scripts = Scripts(service.host, service.settings)
         return service.scripts
 
