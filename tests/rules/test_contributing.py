@@ -101,9 +101,9 @@ def why_wrong(span: str) -> str | None:
         return None if target[1] in targets() else "no such target"
     if FILE.fullmatch(span):
         return None if (ROOT / span).exists() else "no such file"
-    if (found := NAME.fullmatch(span)) is None:
+    if (match := NAME.fullmatch(span)) is None:
         return None
-    name, _, member = found[1].partition(".")
+    name, _, member = match[1].partition(".")
     if member:
         known: Container[str] = code().members.get(name, ())
     else:

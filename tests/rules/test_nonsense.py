@@ -92,7 +92,7 @@ def numeric(route: Route) -> list[str]:
     """The names of its parameters that are numbers."""
     properties = route.model.model_json_schema().get("properties", {})
     kinds = {name: {kind.get("type") for kind in field.get("anyOf", [field])} for name, field in properties.items()}
-    return [name for name, found in kinds.items() if found & {"number", "integer"}]
+    return [name for name, types in kinds.items() if types & {"number", "integer"}]
 
 
 PARAMETERS = [

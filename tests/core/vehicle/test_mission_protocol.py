@@ -245,8 +245,8 @@ def test_one_transfer_at_a_time(loop: Any, copter: Any, store: Store) -> None:
     async def both() -> Any:
         return await asyncio.gather(copter.waypoints.upload(NEW), copter.waypoints.download())
 
-    _, found = loop.run(both())
-    assert found == (HOME, NEW)
+    _, downloaded = loop.run(both())
+    assert downloaded == (HOME, NEW)
     assert store.counts == 1
 
 

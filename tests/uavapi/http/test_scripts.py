@@ -261,7 +261,7 @@ def test_scripts_are_for_this_machine_and_for_the_token(
 
 
 @pytest.mark.parametrize(
-    ("given", "caller", "may"),
+    ("keywords", "caller", "may"),
     [
         ({"token": "t", "allow_from": "10.0.0.0/8"}, Caller(ip_address("10.0.0.5")), False),
         ({"token": "t", "allow_from": "10.0.0.0/8"}, Caller(ip_address("10.0.0.5"), has_token=True), True),
@@ -273,9 +273,9 @@ def test_scripts_are_for_this_machine_and_for_the_token(
     ids=["network", "token", "here", "by a proxy", "named for scripts", "named for flying only"],
 )
 def test_network_that_may_fly_may_not_run_scripts_unless_named_for_that(
-    configured: Any, service: Any, given: dict[str, Any], caller: Caller, may: bool
+    configured: Any, service: Any, keywords: dict[str, Any], caller: Caller, may: bool
 ) -> None:
-    configured(host="0.0.0.0", **given)
+    configured(host="0.0.0.0", **keywords)
     call = SimpleNamespace(service=service, request={CALLER: caller})
     if may:
         assert _scripts(call) is service.scripts  # type: ignore[arg-type]
