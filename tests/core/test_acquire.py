@@ -17,9 +17,9 @@ async def user(events: list[str], seconds: float = 1.0, error: Exception | None 
         events.append("begun")
         return "it"
 
-    thing = await acquire(begin())
+    resource = await acquire(begin())
     try:
-        events.append(f"has {thing}")
+        events.append(f"has {resource}")
         await asyncio.sleep(1.0)
         events.append("used")
     finally:

@@ -15,8 +15,8 @@ from mavproxy_uavapi.core.audit import FILE, KEPT, MOST_ADDRESSES, OTHERS, WAITI
 
 
 def entry(verb: str = "/command/arm", **changes: Any) -> Entry:
-    given: dict[str, Any] = {"client": "127.0.0.1", "request": {}, "detail": "Armed vehicle", **changes}
-    return Entry(time=utc_now(), verb=verb, system=1, outcome="ok", seconds=1.0, sent=(), **given)
+    members: dict[str, Any] = {"client": "127.0.0.1", "request": {}, "detail": "Armed vehicle", **changes}
+    return Entry(time=utc_now(), verb=verb, system=1, outcome="ok", seconds=1.0, sent=(), **members)
 
 
 @pytest.fixture
@@ -83,10 +83,10 @@ def test_stalled_disk_holds_nobody_up_and_what_it_lost_is_reported(
     audit._writer.submit(lambda: None).result()
     audit.add(entry("last"))
     audit.close()
-    found = lines(tmp_path)
-    assert [line.get("verb") for line in found[-2:]] == [None, "last"]
-    assert found[-2]["lost"] == 20
-    assert len(found) == WAITING + 2
+    written = lines(tmp_path)
+    assert [line.get("verb") for line in written[-2:]] == [None, "last"]
+    assert written[-2]["lost"] == 20
+    assert len(written) == WAITING + 2
 
 
 def test_trail_in_no_folder_keeps_its_memory_and_says_so_once(

@@ -17,8 +17,8 @@ def tree(cls: type[UavApiError] = UavApiError) -> list[type[UavApiError]]:
 
 
 def test_docstring_is_the_tree_itself() -> None:
-    found = re.findall(r"(\w+) +(\d{3}) (\w+)", errors.__doc__ or "")
-    drawn = {name: f"{status} {code}" for name, status, code in found}
+    rows = re.findall(r"(\w+) +(\d{3}) (\w+)", errors.__doc__ or "")
+    drawn = {name: f"{status} {code}" for name, status, code in rows}
     for cls in tree():
         if cls.__subclasses__() and cls.code in ("conflict", "unavailable"):
             continue
@@ -63,9 +63,9 @@ def test_detail_is_the_sentence() -> None:
 
 
 def test_invalid_lists_its_problems() -> None:
-    one = Invalid("too high", "query", "alt")
-    assert one.detail == [{"loc": ["query", "alt"], "msg": "too high", "type": "value_error"}]
-    assert str(one) == "query.alt: too high"
+    invalid = Invalid("too high", "query", "alt")
+    assert invalid.detail == [{"loc": ["query", "alt"], "msg": "too high", "type": "value_error"}]
+    assert str(invalid) == "query.alt: too high"
     problems = [{"loc": ["body", 0], "msg": "a", "type": "t"}, {"loc": ["body", "b"], "msg": "c", "type": "t"}]
     assert str(Invalid(problems)) == "body.0: a; body.b: c"
 

@@ -40,8 +40,8 @@ def write(file: RotatingFile, *lines: str) -> None:
 def test_files_are_bounded_in_size_and_number(rotating: Callable[..., RotatingFile], tmp_path: Path) -> None:
     file = rotating()
     write(file, *(f"{number:099d}" for number in range(100)))
-    found = sorted(path.name for path in tmp_path.iterdir())
-    assert found == ["log", "log.1", "log.2"]
+    files = sorted(path.name for path in tmp_path.iterdir())
+    assert files == ["log", "log.1", "log.2"]
     assert all(path.stat().st_size <= 1000 for path in tmp_path.iterdir())
     assert (tmp_path / "log").read_text().endswith(f"{99:099d}\n")
 

@@ -25,9 +25,9 @@ def test_setpoints_are_counted_rather_than_listed() -> None:
 
 
 def test_names_that_alternate_without_end_are_bounded() -> None:
-    found = reported(["LANDING_TARGET", "SET_POSITION_TARGET_LOCAL_NED"] * 10_000)
-    assert len(found) == MOST_RUNS + 1
-    assert found[-1] == f"and {20_000 - MOST_RUNS} more"
+    summary = reported(["LANDING_TARGET", "SET_POSITION_TARGET_LOCAL_NED"] * 10_000)
+    assert len(summary) == MOST_RUNS + 1
+    assert summary[-1] == f"and {20_000 - MOST_RUNS} more"
 
 
 def test_names_are_noted_within_a_context_only() -> None:

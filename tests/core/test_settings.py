@@ -53,9 +53,9 @@ class DemoSettings(ModuleSettings[dict[str, Any]]):
         yield from super().settings_in(ini)
 
 
-def demo(given: Mapping[str, Any] | None = None, **environ: str) -> DemoSettings:
+def demo(keywords: Mapping[str, Any] | None = None, **environ: str) -> DemoSettings:
     """Settings in an environment of their own."""
-    return DemoSettings(given, environ)
+    return DemoSettings(keywords, environ)
 
 
 @pytest.fixture

@@ -30,9 +30,9 @@ from mavproxy_uavapi.core.values import boolean, converted, is_unset, path_of
     ],
 )
 def test_values_are_taken_as_they_are_written(kind: type, value: Any, typed: Any) -> None:
-    made = converted(kind, value)
-    assert made == typed
-    assert type(made) is kind
+    taken = converted(kind, value)
+    assert taken == typed
+    assert type(taken) is kind
 
 
 @pytest.mark.parametrize(

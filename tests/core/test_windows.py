@@ -20,12 +20,12 @@ class Shown:
     """A module's windows, and the view that it makes."""
 
     def __init__(self, host: Any, mpstate: Any, loop: Any) -> None:
-        self.view, self.made = View(), 0
+        self.view, self.computed = View(), 0
         self.host, self.loop = host, loop
         self.windows = Windows("demo", mpstate, host.bridge, host.clock, self.make)
 
     def make(self) -> View:
-        self.made += 1
+        self.computed += 1
         return self.view
 
     def pass_time(self, seconds: float = PERIOD) -> None:
@@ -43,7 +43,7 @@ def shown(host: Any, mpstate: Any, loop: Any) -> Shown:
 
 def test_without_windows_nothing_is_computed(shown: Shown) -> None:
     shown.pass_time(5.0)
-    assert shown.made == 0
+    assert shown.computed == 0
 
 
 def test_a_line_stands_below_those_of_mavproxy_and_is_set_when_it_changes(shown: Shown, mpstate: Any) -> None:
@@ -51,7 +51,7 @@ def test_a_line_stands_below_those_of_mavproxy_and_is_set_when_it_changes(shown:
     shown.view = View("anna flies")
     shown.pass_time(5.0)
     assert (console.lines, console.count) == ({"demo": ("anna flies", ROW)}, 1)
-    assert shown.made == pytest.approx(5, abs=1)
+    assert shown.computed == pytest.approx(5, abs=1)
     shown.view = View("nobody flies")
     shown.pass_time()
     assert console.lines["demo"][0] == "nobody flies"

@@ -55,13 +55,13 @@ class Receiver:
 
     def readings(self, **query: Any) -> list[dict[str, Any]]:
         answer = requests.get(f"{self.url}/readings", params={"limit": 1_000_000, **query}, timeout=30).json()
-        found: list[dict[str, Any]] = answer["readings"]
-        return found
+        readings: list[dict[str, Any]] = answer["readings"]
+        return readings
 
 
 def gradys(receiver: Receiver, directory: Path, **settings: Any) -> str:
-    given = {"sink": f"{receiver.url}/readings", "spool": f"{directory}/spool.db", **settings}
-    return "module load gradys:" + json.dumps(given, separators=(",", ":"))
+    keywords = {"sink": f"{receiver.url}/readings", "spool": f"{directory}/spool.db", **settings}
+    return "module load gradys:" + json.dumps(keywords, separators=(",", ":"))
 
 
 @pytest.fixture(scope="module")
@@ -101,13 +101,13 @@ def test_sampled_and_posted_readings_arrive(loaded, receiver, harness):
     harness.eventually(lambda: report(loaded)["sinks"], 5, "the sink")
     (number,) = post(loaded, 21.5)
     harness.eventually(lambda: len(receiver.readings(quantity="alt")) >= 4, 15, "four samples")
-    found = receiver.readings()
-    samples = [r["seq"] for r in found if r["quantity"] == "alt"]
+    received = receiver.readings()
+    samples = [r["seq"] for r in received if r["quantity"] == "alt"]
     assert samples == sorted(set(samples))  # what is posted is stored at once, before samples that wait half a second
-    posted = next(r for r in found if r["seq"] == number)
+    posted = next(r for r in received if r["seq"] == number)
     assert (posted["quantity"], posted["value"], posted["representation"]) == ("temperature", 21.5, "degC")
     assert (posted["device"], posted["id"]) == ("uav-10", "10")
-    position = next(r for r in found if r["quantity"] == "position")["value"]
+    position = next(r for r in received if r["quantity"] == "position")["value"]
     assert position[0] == pytest.approx(-35.363, abs=0.01)
     csv = requests.get(f"{receiver.url}/readings.csv", timeout=5).text.splitlines()
     assert csv[0].startswith("device,seq,id,quantity") and len(csv) > 5
@@ -134,9 +134,9 @@ def test_an_outage_costs_nothing_and_order_is_kept(loaded, receiver, harness):
     receiver.start()
     loaded.mavproxy.ask("gradys flush", "tried now")
     harness.eventually(lambda: len(receiver.readings(quantity="temperature")) == 100, 30, "all hundred")
-    found = receiver.readings(quantity="temperature")
-    assert [r["seq"] for r in found] == posted
-    assert [r["value"] for r in found] == list(range(100))
+    received = receiver.readings(quantity="temperature")
+    assert [r["seq"] for r in received] == posted
+    assert [r["value"] for r in received] == list(range(100))
     everything = [r["seq"] for r in receiver.readings()]
     assert len(everything) == len(set(everything))
 
@@ -188,8 +188,8 @@ def test_a_captive_portal_takes_nothing(rig, harness, receiver, portal, tmp_path
         assert "names no numbers" in error or "redirects to /login" in error
         assert report(rig)["spooled"] == 10
         rig.mavproxy.ask(f"gradys set sink {receiver.url}/readings", "gradys: no ground station")
-        found = harness.eventually(lambda: len(receiver.readings()) == 10 and receiver.readings(), 30, "all ten")
-        assert [reading["seq"] for reading in found] == posted
+        received = harness.eventually(lambda: len(receiver.readings()) == 10 and receiver.readings(), 30, "all ten")
+        assert [reading["seq"] for reading in received] == posted
     finally:
         rig.mavproxy.ask("module unload gradys", "Unloaded module gradys")
 

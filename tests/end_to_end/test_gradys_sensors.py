@@ -41,8 +41,8 @@ def station(rig, harness) -> str:
 
 
 def newest(station: str, quantity: str) -> Any:
-    found = requests.get(f"{station}/readings", params={"quantity": quantity}, timeout=10).json()["readings"]
-    return found[-1] if found else None
+    readings = requests.get(f"{station}/readings", params={"quantity": quantity}, timeout=10).json()["readings"]
+    return readings[-1] if readings else None
 
 
 def runs(pid: int) -> bool:

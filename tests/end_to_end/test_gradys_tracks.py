@@ -48,8 +48,8 @@ def track(rig, harness, tmp_path_factory) -> Path:
 
 
 def flight(rig: Any) -> dict[str, Any]:
-    found = rig.ok(rig.get("/gradys/status"))["info"]["tracks"]["flights"]
-    return found[-1] if found else {"state": None}
+    flights = rig.ok(rig.get("/gradys/status"))["info"]["tracks"]["flights"]
+    return flights[-1] if flights else {"state": None}
 
 
 def flown_since(rig: Any, start: float) -> list[tuple[float, float, float]]:

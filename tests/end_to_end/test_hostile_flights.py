@@ -7,11 +7,27 @@ from __future__ import annotations
 
 import contextlib
 import math
-import threading
 import time
 
 import pytest
 import requests
+
+from tests.support.hostile_flights import (
+    DEADLY,
+    WPL,
+    Streams,
+    armed_on_the_ground,
+    height,
+    highest,
+    job_of,
+    mark,
+    mode,
+    reload,
+    run_deadly,
+    sent,
+    speed,
+    until_command,
+)
 
 pytestmark = pytest.mark.needs("tmux")
 
@@ -20,28 +36,6 @@ SLOW = 3  # speed-up, where the first second of a take-off is aimed at
 SCRIPT_GONE = 2.0  # s within which a dead script's job must end
 SENT_WITHIN = 0.25  # s from a request to the vehicle's socket, on a machine that does much else
 COMMANDS = {"takeoff": 22, "land": 176, "rtl": 176}
-STEERING = {"SET_POSITION_TARGET_LOCAL_NED", "SET_POSITION_TARGET_GLOBAL_INT", "COMMAND_LONG", "COMMAND_INT"}
-DEADLY = """
-import json, os, sys, threading, time, urllib.request
-
-path, body, lives, die = sys.argv[1], sys.argv[2], float(sys.argv[3]), int(sys.argv[4])
-
-def ask():
-    data = None if body == "-" else body.encode()
-    request = urllib.request.Request(os.environ["UAVAPI_URL"] + path, data, {"Content-Type": "application/json"})
-    urllib.request.urlopen(request, timeout=600)
-
-threading.Thread(target=ask, daemon=True).start()
-time.sleep(lives)
-os.kill(os.getpid(), die)
-"""
-WPL = """QGC WPL 110
-0\t1\t0\t16\t0\t0\t0\t0\t-35.363261\t149.165230\t584\t1
-1\t0\t3\t22\t0\t0\t0\t0\t0\t0\t10\t1
-2\t0\t3\t16\t0\t0\t0\t0\t-35.3600\t149.1653\t12\t1
-3\t0\t3\t16\t0\t0\t0\t0\t-35.3660\t149.1653\t12\t1
-"""
-
 
 ARDUPILOT = pytest.param("ardupilot", marks=pytest.mark.sitl)
 # tests/rules and tests/core have these moments in virtual time.
@@ -78,90 +72,6 @@ def rig(vehicle):
     vehicle.get("/command/disarm", force=True)
 
 
-class Background:
-    """A request that waits, in a thread of its own."""
-
-    def __init__(self, request):
-        self.answer = None
-        self._thread = threading.Thread(target=self._run, args=(request,))
-        self._thread.start()
-
-    def _run(self, request):
-        self.answer = request()
-
-    def join(self, timeout=60):
-        self._thread.join(timeout)
-        assert self.answer is not None, f"no answer within {timeout} s"
-        return self.answer
-
-
-class Streams:
-    """Clients that each ask for a velocity 20 times a second; a context."""
-
-    def __init__(self, rig, count=2, **velocity):
-        self._url = rig.url + "/movement/travel_at_ned"
-        self._velocities = [velocity or {"vx": 4 * (-1) ** n, "vy": 0, "vz": 0} for n in range(count)]
-        self._ended = threading.Event()
-        self.answers = []
-        self._threads = [threading.Thread(target=self._run, args=(one,)) for one in self._velocities]
-
-    def _run(self, velocity):
-        with requests.Session() as session:
-            while not self._ended.wait(0.05):
-                answer = session.post(self._url, json=velocity, timeout=30)
-                self.answers.append((answer.status_code, answer.json().get("code")))
-
-    def __enter__(self):
-        for thread in self._threads:
-            thread.start()
-        return self
-
-    def __exit__(self, *_):
-        self._ended.set()
-        for thread in self._threads:
-            thread.join(40)
-
-    def refusals(self, since=0):
-        return {code for status, code in self.answers[since:] if status != 200}
-
-
-def speed(rig):
-    velocity = rig.ok(rig.get("/telemetry/ned"))["info"]["velocity"]
-    return math.hypot(velocity["vx"], velocity["vy"], velocity["vz"])
-
-
-def height(rig):
-    return -rig.ned()[2]
-
-
-def mode(rig):
-    return rig.status()["mode"]
-
-
-def sent(rig, since):
-    """What the vehicle received from then on, but for what asks for telemetry."""
-    messages = rig.control.ask("received", since=since)["messages"]
-    asks = {511, 512}  # SET_MESSAGE_INTERVAL, REQUEST_MESSAGE
-    return [m for m in messages if m["name"] in STEERING and m["fields"].get("command") not in asks]
-
-
-def mark(rig):
-    return rig.control.ask("received", since=0)["last"]
-
-
-def delete(rig, location):
-    return requests.delete(rig.url + location, timeout=60)
-
-
-def job_of(rig, location):
-    return requests.get(rig.url + location, timeout=10).json()
-
-
-def armed_on_the_ground(rig):
-    rig.control.fault("pilot_sticks", throttle=1000)
-    rig.ok(rig.get("/command/arm"))
-
-
 # -- F1: a pilot who takes off while arm waits ------------------------------------------------------------
 
 
@@ -170,12 +80,12 @@ def test_arm_that_waits_does_not_take_the_vehicle_from_the_pilot_who_arms_it(rig
     rig.ok(rig.get("/command/set_mode", mode="STABILIZE"))
     rig.control.fault("ekf_bad")
     harness.eventually(lambda: not rig.status()["ekf_ok"], 30, "the loss of its position")
-    waiting = Background(lambda: rig.get("/command/arm"))
+    waiting = rig.begin("GET", "/command/arm")
     time.sleep(0.3)
     harness.eventually(lambda: pilot_arms(rig), 5, "the pilot's arming")
     time.sleep(0.5)
     rig.control.fault("pilot_sticks", throttle=1500)
-    answer = waiting.join(30)
+    answer = waiting.answer(30)
     assert (answer.status_code, answer.json().get("code")) == (409, "mode_changed")
     rig.control.ask("clear")
     harness.eventually(lambda: rig.status()["ekf_ok"], 30, "readiness")
@@ -294,24 +204,15 @@ def test_yaw_rate_after_a_takeoff_does_not_fly_to_the_target_before_it(rig):
 @pytest.mark.parametrize("after", [0.05, 0.4])
 def test_yaw_rate_in_a_takeoff_is_refused_and_the_climb_goes_on(rig, after):
     armed_on_the_ground(rig)
-    waiting = Background(lambda: rig.get("/command/takeoff", alt=20))
+    waiting = rig.begin("GET", "/command/takeoff?alt=20")
     time.sleep(after)
     answer = rig.get("/movement/set_yaw_rate", yaw_rate=30)
     assert (answer.status_code, answer.json().get("code")) == (409, "busy")
-    rig.ok(waiting.join())
+    rig.ok(waiting.answer(60))
     assert height(rig) > 18.5
 
 
 # -- F5: a hold in the first second of a take-off ---------------------------------------------------------
-
-
-def highest(rig, seconds=4.0):
-    """The greatest height (m) of so many seconds."""
-    end, most = time.monotonic() + seconds, 0.0
-    while time.monotonic() < end:
-        most = max(most, height(rig))
-        time.sleep(0.05)
-    return most
 
 
 def assert_stays_low(rig):
@@ -329,26 +230,21 @@ def test_takeoff_that_is_deleted_in_its_first_second_does_not_climb_on(rig, afte
     rig.ok(rig.get("/command/set_sim_speedup", sim_factor=SLOW))
     location = rig.get("/command/takeoff?alt=20&wait=false").headers["Location"]
     time.sleep(after)
-    assert delete(rig, location).status_code == 200
+    assert rig.delete(location).status_code == 200
     assert_stays_low(rig)
 
 
 @on_ardupilot
 def test_takeoff_whose_client_hangs_up_in_its_first_second_does_not_climb_on(rig):
     armed_on_the_ground(rig)
-    set_on_disconnect(rig, "hold")
+    rig.set("on_disconnect", "hold")
     try:
         rig.ok(rig.get("/command/set_sim_speedup", sim_factor=SLOW))
         with contextlib.suppress(requests.ReadTimeout):
             rig.get("/command/takeoff", alt=20, timeout=0.3)
         assert_stays_low(rig)
     finally:
-        set_on_disconnect(rig, "continue")
-
-
-def set_on_disconnect(rig, value):
-    rig.mavproxy.type(f"uavapi set on_disconnect {value}")
-    rig.mavproxy.ask("uavapi set on_disconnect", f" {value} ")
+        rig.set("on_disconnect", "continue")
 
 
 @on_ardupilot
@@ -357,11 +253,6 @@ def test_takeoff_whose_script_dies_in_its_first_second_does_not_climb_on(rig):
     rig.ok(rig.get("/command/set_sim_speedup", sim_factor=SLOW))
     run_deadly(rig, "/command/takeoff?alt=20&wait=false", "-", 0.3)
     assert_stays_low(rig)
-
-
-def run_deadly(rig, path, body, lives, die=9):
-    args = [path, body, str(lives), str(die)]
-    rig.ok(rig.post("/mission/execute-script", script_name="deadly", args=args))
 
 
 # -- F6: a dead script's job ------------------------------------------------------------------------------
@@ -401,7 +292,7 @@ def test_mission_that_is_deleted_is_left_by_brake(rig, harness):
     answer = rig.post("/mission/start?wait=false", until_complete=True)
     assert answer.status_code == 202
     harness.eventually(lambda: mode(rig) == "AUTO" and speed(rig) > 2, 20, "its mission")
-    assert delete(rig, answer.headers["Location"]).status_code == 200
+    assert rig.delete(answer.headers["Location"]).status_code == 200
     assert mode(rig) == "BRAKE"
     harness.eventually(lambda: speed(rig) < 0.5, 10, "standing still")
     rig.ok(rig.get("/command/guided"))
@@ -444,34 +335,11 @@ def test_first_command_goes_out_before_anything_is_requested(rig, harness, verb)
         rig.in_the_air(10)
     reload(rig)
     since, asked_at = mark(rig), time.time()
-    waiting = Background(lambda: rig.get(f"/command/{verb}"))
+    waiting = rig.begin("GET", f"/command/{verb}")
     expected = COMMANDS[verb]
     received = harness.eventually(lambda: until_command(rig, since, expected), 10, f"{verb} on the wire")
     took = received[-1]["wall"] - asked_at
     print(f"{verb} was on the wire after {1000 * took:.1f} ms")
     assert [m["fields"]["param_id"] for m in received if m["name"] == "PARAM_REQUEST_READ"] == []
     assert took < SENT_WITHIN
-    rig.ok(waiting.join())
-
-
-def until_command(rig, since, command):
-    """What came from then on, up to that command; None while it has not come."""
-    messages = rig.control.ask("received", since=since)["messages"]
-    for number, message in enumerate(messages, 1):
-        if message["name"] == "COMMAND_LONG" and message["fields"]["command"] == command:
-            return messages[:number]
-    return None
-
-
-def reload(rig):
-    """A fresh API, which has asked for nothing yet."""
-    rig.mavproxy.ask("module unload uavapi", "Unloaded module uavapi")
-    rig.mavproxy.ask(rig_load(rig), "uavapi: listening")
-    rig.wait_until_up()
-
-
-def rig_load(rig):
-    import json
-
-    settings = {"port": rig.port, **rig.settings}
-    return f"module load uavapi:{json.dumps(settings, separators=(',', ':'))}"
+    rig.ok(waiting.answer(60))

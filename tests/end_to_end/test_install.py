@@ -36,13 +36,13 @@ def lean_python(tmp_path: Path) -> Path:
     """A Python with our project and what requirements/lean.txt lists, and nothing else."""
     lines = (ROOT / "requirements" / "lean.txt").read_text(encoding="utf-8").splitlines()
     pinned = [Requirement(line.rstrip(" \\")) for line in lines if line[:1].isalnum()]
-    found = {
+    packages = {
         Path(str(package.locate_file(file.parts[0])))
         for package in (distribution(line.name) for line in pinned if line.marker is None or line.marker.evaluate())
         for file in package.files or []
         if file.parts[0] != ".."  # a script
     }
-    return python_with(tmp_path, found, ROOT)
+    return python_with(tmp_path, packages, ROOT)
 
 
 def python_with(directory: Path, packages: Iterable[Path], *folders: Path) -> Path:

@@ -46,15 +46,15 @@ def launched(request, harness, station, tmp_path):
 
 def of_this_run(directory: Path) -> list[str]:
     """The command lines of all processes that name this run's directory, or are tagged with it."""
-    found = []
+    lines = []
     for proc in Path("/proc").glob("[0-9]*"):
         try:
             text = (proc / "cmdline").read_bytes() + (proc / "environ").read_bytes()
         except OSError:
             continue
         if str(directory).encode() in text:
-            found.append((proc / "cmdline").read_bytes().replace(b"\0", b" ").decode())
-    return found
+            lines.append((proc / "cmdline").read_bytes().replace(b"\0", b" ").decode())
+    return lines
 
 
 def test_one_command_gives_a_vehicle_to_fly_and_ends_all_it_started(launched, station, harness):

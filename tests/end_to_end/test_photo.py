@@ -35,9 +35,9 @@ def test_photo_is_taken_with_the_right_arguments(rig):
     assert answer.headers["Content-Type"] == "image/jpeg"
     assert answer.headers["Content-Disposition"] == 'attachment; filename="photo.jpg"'
     assert answer.content == b"\xff\xd8\xff photo"
-    given = (rig.tools / "rpicam-still.log").read_text()
-    assert "-t 20 " in given and "--shutter 5000" in given
-    assert "--lens-position 0.5" in given
+    arguments = (rig.tools / "rpicam-still.log").read_text()
+    assert "-t 20 " in arguments and "--shutter 5000" in arguments
+    assert "--lens-position 0.5" in arguments
 
 
 def test_tool_that_is_missing_and_tools_that_there_are_not(rig):

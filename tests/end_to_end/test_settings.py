@@ -45,8 +45,8 @@ class Terminal:
         return subprocess.run(command, capture_output=True, text=True, check=True, timeout=10).stdout
 
     def start(self, command, environment):
-        given = [word for name, value in environment.items() for word in ("-e", f"{name}={value}")]
-        self.tmux("new-session", "-d", "-x", "180", "-y", "60", *given, shlex.join(command))
+        options = [word for name, value in environment.items() for word in ("-e", f"{name}={value}")]
+        self.tmux("new-session", "-d", "-x", "180", "-y", "60", *options, shlex.join(command))
 
     def type(self, text):
         self.tmux("send-keys", "-l", text)
@@ -97,8 +97,8 @@ def configuration(rig, harness):
     rig.terminal.enter("uavapi config")
     lines = shown(rig, harness, "tokens ", before)  # the last row
     row = re.compile(r"(?:.*> )?(\w+) +(.*?)? +(default|environment|module load|uavapi set|/.*)")
-    found = [row.fullmatch(line) for line in lines]
-    return {match[1]: (match[2], match[3]) for match in found if match}
+    matches = [row.fullmatch(line) for line in lines]
+    return {match[1]: (match[2], match[3]) for match in matches if match}
 
 
 def test_later_sources_win_and_config_reports_each(rig, harness):
@@ -233,8 +233,8 @@ def test_one_file_that_the_environment_names_configures_all_three_modules(harnes
         command = harness.mavproxy_command(
             harness.start_embedded(rig, speedup=2), "--load-module=uavapi,vision,gradys"
         )
-        given = {"UAVAPI_CONFIG": str(file), "VISION_SPEED": "3", "GRADYS_PERIOD": "4"}
-        rig.mavproxy = rig.start("mavproxy", command, given)
+        environment = {"UAVAPI_CONFIG": str(file), "VISION_SPEED": "3", "GRADYS_PERIOD": "4"}
+        rig.mavproxy = rig.start("mavproxy", command, environment)
         rig.wait_until_up()
         rig.mavproxy.says("gradys: pushing to http://127.0.0.1:9")
         rig.mavproxy.says("vision: looking for 36h11 through http")
@@ -281,9 +281,9 @@ def test_a_pipeline_with_spaces_and_quotes_is_configured_without_a_person(harnes
     pytest.importorskip("cv2")
     rig = harness.Rig(tmp_path, free_port())
     try:
-        arguments, given = way(tmp_path, rig)
+        arguments, environment = way(tmp_path, rig)
         command = harness.mavproxy_command(harness.start_embedded(rig, speedup=2), *arguments)
-        rig.mavproxy = rig.start("mavproxy", command, given)
+        rig.mavproxy = rig.start("mavproxy", command, environment)
         rig.mavproxy.says(f"vision: looking for 36h11 through {PIPELINE}")
         harness.eventually(lambda: "camera ok" in rig.mavproxy.ask("vision status", "in view"), what="a picture")
     finally:

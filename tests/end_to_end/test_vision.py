@@ -1,7 +1,7 @@
 """`vision` in a real MAVProxy on the embedded vehicle: the seed's mission, and what the prompt and HTTP tell of it.
 
 The rendered camera runs on the wall clock, with a latency that a speed-up would multiply: these flights run at
-twice the speed at most. What goes wrong in flight is tested in lock step, in tests/vision/test_failures.py.
+twice the speed at most. What goes wrong in flight is tested in lock step, in tests/vision/landing/test_failures.py.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ def looking(request: pytest.FixtureRequest, harness: Any, tmp_path_factory: pyte
     try:
         harness.eventually(lambda: made.status()["ready_to_arm"], 120, "getting ready to arm")
         made.ok(made.get("/command/set_sim_speedup", sim_factor=SPEEDUP))
-        given = json.dumps({"directory": str(directory)}, separators=(",", ":"))
-        made.mavproxy.ask(f"module load vision:{given}", "Loaded module vision")
+        keywords = json.dumps({"directory": str(directory)}, separators=(",", ":"))
+        made.mavproxy.ask(f"module load vision:{keywords}", "Loaded module vision")
         for name, value in (("fps", 12), ("width", 480), ("height", 360), ("source", "sim")):
             made.mavproxy.type(f"vision set {name} {value}")
         harness.eventually(lambda: camera(made) == "ok", 30, "frames' coming")
@@ -225,8 +225,8 @@ def test_without_uavapi_the_prompt_is_all_it_takes(harness: Any, tmp_path: Path)
     rig = harness.Rig(tmp_path, free_port())
     try:
         instance = harness.start_embedded(rig, speedup=2)
-        given = {"source": "sim", "fps": 12, "width": 480, "height": 360, "sim_tags": "0:0.30@4,-3"}
-        load = f"--cmd=module load vision:{json.dumps(given, separators=(',', ':'))}"
+        keywords = {"source": "sim", "fps": 12, "width": 480, "height": 360, "sim_tags": "0:0.30@4,-3"}
+        load = f"--cmd=module load vision:{json.dumps(keywords, separators=(',', ':'))}"
         rig.mavproxy = rig.start("mavproxy", harness.mavproxy_command(instance, load))
         rig.mavproxy.says("looking for 36h11 through sim")
         rig.mavproxy.says("Received", timeout=60)  # the parameters

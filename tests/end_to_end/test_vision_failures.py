@@ -30,9 +30,9 @@ def posted(request: Any, harness: Any, poster: Any, tmp_path_factory: pytest.Tem
     made = make(directory, speedup=SPEEDUP)
     try:
         harness.eventually(lambda: made.status()["ready_to_arm"], 120, "getting ready to arm")
-        given = {"source": "http", "gimbal": True, "width": 480, "height": 360, "attempts": 1, "leash": 3}
-        given["directory"] = str(directory)
-        made.mavproxy.ask(f"module load vision:{json.dumps(given, separators=(',', ':'))}", "looking for")
+        keywords = {"source": "http", "gimbal": True, "width": 480, "height": 360, "attempts": 1, "leash": 3}
+        keywords["directory"] = str(directory)
+        made.mavproxy.ask(f"module load vision:{json.dumps(keywords, separators=(',', ':'))}", "looking for")
         yield made
     finally:
         made.stop()

@@ -73,13 +73,13 @@ def empty(rig):
 @pytest.mark.parametrize("text", [WPL, json.dumps(PLAN), json.dumps(JSON)], ids=["wpl", "plan", "json"])
 def test_upload_is_read_back(rig, text):
     rig.ok(post(rig, text))
-    found = items(rig)
-    legs = [item for item in found if item["command"] == "NAV_WAYPOINT"]
-    assert found[0]["command"] == "NAV_TAKEOFF"
+    uploaded = items(rig)
+    legs = [item for item in uploaded if item["command"] == "NAV_WAYPOINT"]
+    assert uploaded[0]["command"] == "NAV_TAKEOFF"
     assert [(leg["lat"], leg["long"], leg["alt"]) for leg in legs] == [pytest.approx(place) for place in PLACES]
     again = rig.ok(rig.get("/mission/waypoints"))
     rig.ok(rig.post("/mission/waypoints", items=again["items"]))
-    assert items(rig) == found
+    assert items(rig) == uploaded
 
 
 def test_upload_by_form(rig):

@@ -1,5 +1,13 @@
+"""The handlers of gradys: readings that a caller posts, and POST /mission/fly-track, a job as every verb's."""
+
 from __future__ import annotations
 
+import asyncio
+import ipaddress
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -8,22 +16,30 @@ import pytest
 from mavproxy_gradys.http import LONGEST_LIST, LONGEST_TEXT, MOST_READINGS, GradysHandlers, Readings
 from mavproxy_gradys.service import Gradys
 from mavproxy_gradys.tracks.request import TrackRequest
-from mavproxy_uavapi.core.errors import Invalid
-from mavproxy_uavapi.http.call import Call
+from mavproxy_uavapi.core.errors import Invalid, TooManyRequests
+from mavproxy_uavapi.core.vehicle.endings import Policy
+from mavproxy_uavapi.http.auditing import audited
+from mavproxy_uavapi.http.call import Call, Service
 from mavproxy_uavapi.http.caller import CALLER, Caller
-from mavproxy_uavapi.http.requests import parse
+from mavproxy_uavapi.http.jobs import list_jobs
+from mavproxy_uavapi.http.requests import Empty, parse
+from mavproxy_uavapi.http.router import Match
+from mavproxy_uavapi.settings import ApiModuleSettings
+
+LINE = "(1, -158400810, -479266420, 584090, 0, 65535, 0, 0, 3, 10)\n"
+LONG = LINE + "# a comment\n" * 10_000
 
 
 def readings(body: Any) -> list[Any]:
-    found = parse(Readings, "body", body)
-    assert isinstance(found, Readings)
-    return found.readings
+    request = parse(Readings, "body", body)
+    assert isinstance(request, Readings)
+    return request.readings
 
 
 @pytest.mark.parametrize("value", [1, 0, 2**63 - 1, 2.5, True, False, "yes", "12", [1, 2.5], ""])
 def test_a_value_stays_what_it_was(value: Any) -> None:
-    (found,) = readings({"quantity": "a", "value": value})
-    assert found.value == value and type(found.value) is type(value)
+    (reading,) = readings({"quantity": "a", "value": value})
+    assert reading.value == value and type(reading.value) is type(value)
 
 
 @pytest.mark.parametrize(
@@ -67,15 +83,16 @@ def test_what_is_no_reading_is_refused(body: Any) -> None:
         readings(body)
 
 
+def post_reading(loop: Any, host: Any, gradys: Gradys, **body: Any) -> Any:
+    service: Any = SimpleNamespace(host=host, settings=SimpleNamespace(sysid=0))
+    call = Call(service, {CALLER: Caller(None)}, parse(Readings, "body", {"value": 1, **body}))  # type: ignore[arg-type]
+    return loop.run(GradysHandlers(gradys).readings(call))
+
+
 def test_nobody_poses_as_a_vehicle(loop: Any, host: Any, telemetry: Any, settings: Any, at_once: Any) -> None:
     gradys = Gradys(host)
     loop.run(gradys.start(settings(quantities="position@1,alt=VFR_HUD.alt")))
-    service: Any = SimpleNamespace(host=host, settings=SimpleNamespace(sysid=0))
-
-    def post(**body: Any) -> Any:
-        call = Call(service, {CALLER: Caller(None)}, parse(Readings, "body", {"value": 1, **body}))  # type: ignore[arg-type]
-        return loop.run(GradysHandlers(gradys).readings(call))
-
+    post = partial(post_reading, loop, host, gradys)
     for body in ({"quantity": "position"}, {"quantity": "alt", "device": "uav-1"}):
         with pytest.raises(Invalid, match="from the vehicle itself only"):
             post(**body)
@@ -92,12 +109,7 @@ def test_nobody_poses_as_a_vehicle_of_the_devices_name(
 ) -> None:
     gradys = Gradys(host)
     loop.run(gradys.start(settings(device="north", sink="http://a/r")))
-    service: Any = SimpleNamespace(host=host, settings=SimpleNamespace(sysid=0))
-
-    def post(**body: Any) -> Any:
-        call = Call(service, {CALLER: Caller(None)}, parse(Readings, "body", {"value": 1, **body}))  # type: ignore[arg-type]
-        return loop.run(GradysHandlers(gradys).readings(call))
-
+    post = partial(post_reading, loop, host, gradys)
     for device in (None, "north-1", "uav-1"):
         with pytest.raises(Invalid, match="from the vehicle itself only"):
             post(quantity="position", device=device)
@@ -115,3 +127,72 @@ def test_a_track_has_limits() -> None:
     ):
         with pytest.raises(Invalid):
             parse(TrackRequest, "body", body)
+
+
+# -- POST /mission/fly-track ------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def service(host: Any, telemetry: Any, monkeypatch: pytest.MonkeyPatch) -> Service:
+    """Before vehicle 10, which flies in GUIDED."""
+
+    async def at_once(call: Callable[..., Any], *args: Any) -> Any:
+        return call(*args)
+
+    monkeypatch.setattr(asyncio, "to_thread", at_once)
+    telemetry.send("heartbeat", armed=True, mode="GUIDED", system_status=4)
+    telemetry.send("extended_sys_state", landed_state=2)
+    return Service(host, ApiModuleSettings(environ={}).snapshot())
+
+
+class PassedRequest(dict[Any, Any]):
+    """A request that has passed the door, as far as these tests ask it."""
+
+
+def track_call(service: Service, text: str = LONG, **query: str) -> Call:
+    request: Any = PassedRequest({CALLER: Caller(ipaddress.ip_address("10.0.0.9"))})
+    request.path, request.remote = "/mission/fly-track", "10.0.0.9"
+    request.headers, request.query, request.transport = {}, query, None
+    return Call(service, request, TrackRequest(track=text), Match("/mission/fly-track"))
+
+
+def fly_track(service: Service, call: Call) -> Any:
+    return audited(call, GradysHandlers(Gradys(service.host)).fly_track)
+
+
+def sizes(service: Service, loop: Any) -> list[int]:
+    """Bytes of what the trail and the list of jobs tell."""
+    jobs = loop.run(list_jobs(Call(service, SimpleNamespace(path="/jobs"), Empty())))  # type: ignore[arg-type]
+    return [len(json.dumps(jobs)), *(len(json.dumps(entry.request)) for entry in service.host.audit.entries)]
+
+
+def test_neither_job_nor_trail_keeps_the_tracks_text(loop: Any, service: Service) -> None:
+    assert loop.run(fly_track(service, track_call(service, wait="false"))).status == 202
+    with pytest.raises(Invalid):
+        loop.run(fly_track(service, track_call(service, LONG + "nonsense")))
+    service.host.jobs.on_ended.clear()
+    service.host.jobs.abort_remote("enough")
+    loop.settle()
+    kept = sizes(service, loop)
+    assert len(kept) == 3 and max(kept) < 1000
+
+
+def test_the_same_track_joins_the_flight_and_another_does_not(loop: Any, service: Service) -> None:
+    answers = [loop.run(fly_track(service, track_call(service, text, wait="false"))) for text in (LONG, LONG, LINE)]
+    assert [answer.headers["Location"] for answer in answers] == ["/jobs/1", "/jobs/1", "/jobs/2"]
+
+
+def test_the_limit_of_jobs_holds_for_tracks_too(loop: Any, service: Service) -> None:
+    service.settings = replace(service.settings, max_jobs=0)
+    with pytest.raises(TooManyRequests):
+        loop.run(fly_track(service, track_call(service)))
+
+
+def test_hanging_up_holds_where_that_is_set(loop: Any, service: Service) -> None:
+    service.host.endings.on_disconnect = Policy.HOLD
+    waiting = loop.create_task(fly_track(service, track_call(service)))
+    loop.settle()
+    waiting.cancel()
+    loop.settle()
+    assert [job.verb for job in service.host.jobs.all()] == ["/mission/fly-track", "hold after /mission/fly-track"]
+    assert service.host.audit.entries[-1].outcome == "client_gone"

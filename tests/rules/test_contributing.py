@@ -55,13 +55,13 @@ class Code:
                     self.names |= self.files[path]
 
     def _read(self, node: ast.AST) -> set[str]:
-        found: set[str] = set()
+        names: set[str] = set()
         for child in ast.iter_child_nodes(node):
             inner = self._read(child)
             if isinstance(child, ast.ClassDef):
                 self.members.setdefault(child.name, set()).update(inner)
-            found |= inner | set(_bound(child))
-        return found
+            names |= inner | set(_bound(child))
+        return names
 
 
 def _bound(node: ast.AST) -> Iterator[str]:
@@ -101,9 +101,9 @@ def why_wrong(span: str) -> str | None:
         return None if target[1] in targets() else "no such target"
     if FILE.fullmatch(span):
         return None if (ROOT / span).exists() else "no such file"
-    if (found := NAME.fullmatch(span)) is None:
+    if (match := NAME.fullmatch(span)) is None:
         return None
-    name, _, member = found[1].partition(".")
+    name, _, member = match[1].partition(".")
     if member:
         known: Container[str] = code().members.get(name, ())
     else:

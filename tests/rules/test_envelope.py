@@ -73,13 +73,13 @@ def test_what_leads_out_is_refused_and_nothing_is_sent(make_world: Any, name: st
     put(world)
     method, path, body = OUTWARDS[name]
     kind = "text/plain" if isinstance(body, bytes) else "application/json"
-    told = refused(world, method, path, body, kind)
-    assert told["detail"]
+    answer = refused(world, method, path, body, kind)
+    assert answer["detail"]
     if name in ("go_to_ned", "by vehicle"):
-        assert told["outside"]["what"] == "field" and told["outside"]["by"] == pytest.approx(20.0, abs=0.5)
-        assert told["outside"]["at"]["alt"] == pytest.approx(10.0, abs=0.3)
+        assert answer["outside"]["what"] == "field" and answer["outside"]["by"] == pytest.approx(20.0, abs=0.5)
+        assert answer["outside"]["at"]["alt"] == pytest.approx(10.0, abs=0.3)
     if name == "through the mast":
-        assert told["outside"]["what"] == "mast"
+        assert answer["outside"]["what"] == "mast"
 
 
 def mission(world: Any, north: float) -> None:
@@ -202,8 +202,9 @@ def test_envelope_that_makes_no_sense_leaves_the_one_before_in_force(make_world:
 
 def test_plainly_wrong_target_is_refused_without_any_envelope(make_world: Any) -> None:
     world = make_world()
-    told = refused(world, "POST", "/movement/go_to_gps", {"lat": -place(0, 0)[0], "long": place(0, 0)[1], "alt": 10})
-    assert "km away" in told["detail"]
+    of_the_other_hemisphere = {"lat": -place(0, 0)[0], "long": place(0, 0)[1], "alt": 10}
+    answer = refused(world, "POST", "/movement/go_to_gps", of_the_other_hemisphere)
+    assert "km away" in answer["detail"]
 
 
 def test_distance_and_reserve_count(make_world: Any) -> None:

@@ -104,15 +104,12 @@ def strike(world: Any, verb: str, fault: str) -> tuple[float, Any]:
     return world.loop.time(), wire
 
 
-def begin(world: Any, verb: str, given: Any) -> Any:
+def begin(world: Any, verb: str, content: Any) -> Any:
     path = outcomes.VERBS[verb].path
     if verb in AT_THE_PROMPT:
-        return AT_THE_PROMPT[verb](world, given)
-    if verb.startswith("script: "):
-        return clients.Script(world, *(("POST", path, given) if isinstance(given, dict) else ("GET", path + given)))
-    if isinstance(given, dict):
-        return world.begin("POST", path, given)
-    return world.begin("GET", path + given)
+        return AT_THE_PROMPT[verb](world, content)
+    call = ("POST", path, content) if isinstance(content, dict) else ("GET", path + content)
+    return clients.Script(world, *call) if verb.startswith("script: ") else world.begin(*call)
 
 
 AT_THE_PROMPT = {"prompt: vision land": clients.vision_land, "prompt: uavapi fly": clients.fly_track}

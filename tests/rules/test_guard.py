@@ -78,8 +78,8 @@ def test_every_message_that_is_not_known_is_unknown() -> None:
 def test_every_message_that_a_verb_makes_is_known() -> None:
     known = {name.lower() for name in orders.HARMLESS_MESSAGES | orders.READERS.keys()}
     for file in VEHICLE.glob("*.py"):
-        made = set(re.findall(r"MAVLink_(\w+)_message\b", file.read_text(encoding="utf-8")))
-        assert made <= known, file.name
+        built = set(re.findall(r"MAVLink_(\w+)_message\b", file.read_text(encoding="utf-8")))
+        assert built <= known, file.name
 
 
 def test_setpoint_of_a_kind_that_no_verb_uses_is_refused(host: Any, copter: Any, flying: Any, loop: Any) -> None:

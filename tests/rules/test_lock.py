@@ -46,14 +46,14 @@ def environment(python: str, machine: str) -> dict[str, str]:
 
 def versions(name: str, where: dict[str, str] | None = None) -> dict[str, str]:
     """What a lock installs there, here without an environment."""
-    found: dict[str, str] = {}
+    pins: dict[str, str] = {}
     for line in locked(name):
         if line.marker is None or line.marker.evaluate(where):
             (pin,) = line.specifier
             key = canonicalize_name(line.name)
-            assert pin.operator == "==" and key not in found
-            found[key] = pin.version
-    return found
+            assert pin.operator == "==" and key not in pins
+            pins[key] = pin.version
+    return pins
 
 
 def unmet(requested: list[Requirement], there: dict[str, str], where: dict[str, str] | None = None) -> list[str]:

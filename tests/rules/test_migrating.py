@@ -57,13 +57,13 @@ def spans(page: str) -> list[str]:
 
 def why_wrong(span: str) -> str | None:
     """What a span names that does not exist; None where it names nothing, or all is there."""
-    if found := PATH.fullmatch(span) or OTHER_PATH.fullmatch(span):
-        methods = [found[1]] if found[1] else ["GET", "POST", "PUT", "DELETE"]
-        return None if any((method, found[2]) in METHODS for method in methods) else "no such path"
-    if found := CALL.fullmatch(span):
-        return why_wrong_call(found[1], found[2])
-    if found := re.match(r"gradys (\w+(?: (?:record|fly|stop))?)", span):
-        return None if f"gradys {found[1]}" in GRADYS_HELP else "no such command"
+    if match := PATH.fullmatch(span) or OTHER_PATH.fullmatch(span):
+        methods = [match[1]] if match[1] else ["GET", "POST", "PUT", "DELETE"]
+        return None if any((method, match[2]) in METHODS for method in methods) else "no such path"
+    if match := CALL.fullmatch(span):
+        return why_wrong_call(match[1], match[2])
+    if match := re.match(r"gradys (\w+(?: (?:record|fly|stop))?)", span):
+        return None if f"gradys {match[1]}" in GRADYS_HELP else "no such command"
     return None
 
 

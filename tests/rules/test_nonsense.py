@@ -92,7 +92,7 @@ def numeric(route: Route) -> list[str]:
     """The names of its parameters that are numbers."""
     properties = route.model.model_json_schema().get("properties", {})
     kinds = {name: {kind.get("type") for kind in field.get("anyOf", [field])} for name, field in properties.items()}
-    return [name for name, found in kinds.items() if found & {"number", "integer"}]
+    return [name for name, types in kinds.items() if types & {"number", "integer"}]
 
 
 PARAMETERS = [
@@ -192,10 +192,10 @@ def is_bad(value: Any, path: str, name: str, as_text: bool) -> bool:
     return not low <= value <= high or (name in WHOLE and value != int(value))
 
 
-def request(world: Any, method: str, path: str, by: str, given: dict[str, Any]) -> Any:
+def request(world: Any, method: str, path: str, by: str, values: dict[str, Any]) -> Any:
     if by == "json":
-        return world.ask(method, path + "?wait=false", json.dumps(given).encode())
-    texts = {name: value if isinstance(value, str) else json.dumps(value) for name, value in given.items()}
+        return world.ask(method, path + "?wait=false", json.dumps(values).encode())
+    texts = {name: value if isinstance(value, str) else json.dumps(value) for name, value in values.items()}
     if by == "form":
         content = urlencode({**texts, "wait": "false"}).encode()
         return world.ask(method, path + "?wait=false", content, "application/x-www-form-urlencoded")

@@ -28,7 +28,7 @@ from tests.support import tokens
 VISION = VisionHandlers(None, None).routes()  # type: ignore[arg-type]
 GRADYS = GradysHandlers(None).routes()  # type: ignore[arg-type]
 EVERY = [*ROUTES, *PAGE, *VISION, *GRADYS]
-ENDLESS = {"/telemetry/stream", "/vision/stream.mjpg"}  # tests/uavapi/http/test_roles.py
+ENDLESS = {"/telemetry/stream", "/vision/stream.mjpg"}  # tests/uavapi/http/test_named_tokens.py
 METHODS = ("GET", "HEAD", "OPTIONS", "POST", "PUT", "PATCH", "DELETE")
 NAMES = {"z": "0", "x": "0", "y": "0", "id": "1", "name": "ATTITUDE", "sysid": "1", "file": "x.css"}
 FAR = {"x": 5000, "y": 0, "z": -8}
@@ -129,9 +129,9 @@ def walk(world: Any, name: str, prefix: str = "") -> dict[str, int]:
             assert world.orders_of(world.sent[before:]) == [], f"{name}: {method} {route.path}"
             allowed = {one for other in routes if other.path == route.path for one in other.methods}
             if method in allowed:
-                found = next(other for other in routes if other.path == route.path and method in other.methods)
+                matching = next(other for other in routes if other.path == route.path and method in other.methods)
                 answers[f"{method} {route.path}"] = status
-                assert (status == 403) is (found.needs > tokens_role(name)), f"{method} {route.path}: {status}"
+                assert (status == 403) is (matching.needs > tokens_role(name)), f"{method} {route.path}: {status}"
             else:
                 assert status in (404, 405), f"{method} {route.path}: {status}"
     assert world.host.jobs.get("1").running

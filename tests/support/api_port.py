@@ -39,9 +39,9 @@ class Wire:
         body = json.loads(text) if text.startswith(("{", "[")) else text
         return SimpleNamespace(status=int(head.split()[1]), head=head, body=body)
 
-    async def ask(self, method: str, path: str, *headers: str, **given: Any) -> Any:
+    async def ask(self, method: str, path: str, *headers: str, **options: Any) -> Any:
         """A request and its answer."""
-        self.send(method, path, *headers, **given)
+        self.send(method, path, *headers, **options)
         return await self.answer()
 
     async def ended(self) -> bool:
@@ -64,10 +64,10 @@ class Port:
         self._wires.append(wire)
         return wire
 
-    async def ask(self, method: str, path: str, *headers: str, **given: Any) -> Any:
+    async def ask(self, method: str, path: str, *headers: str, **options: Any) -> Any:
         """A request on a connection of its own, and its answer."""
         wire = await self.connect()
-        answer = await wire.ask(method, path, *headers, **given)
+        answer = await wire.ask(method, path, *headers, **options)
         wire.writer.close()
         return answer
 

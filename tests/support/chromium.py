@@ -116,8 +116,8 @@ class Page:
 
     async def choose_file(self, element: str, file: Path) -> None:
         """Choose a file in the file input that the script `element` gives."""
-        found = await self.ask("Runtime.evaluate", expression=element)
-        await self.ask("DOM.setFileInputFiles", files=[str(file)], objectId=found["result"]["objectId"])
+        reference = await self.ask("Runtime.evaluate", expression=element)
+        await self.ask("DOM.setFileInputFiles", files=[str(file)], objectId=reference["result"]["objectId"])
 
     async def click(self, element: str, right: float = 0, down: float = 0) -> None:
         """Click an element, so many pixels from its middle."""

@@ -31,7 +31,7 @@ class Drone:
     """A scripted copter: obeys commands after LATENCY, flies straight at its target, tells where it is.
 
     Attributes:
-        got: the messages that reached it, oldest first.
+        received: the messages that reached it, oldest first.
         answers: results by MAV_CMD, given one after the other instead of obeying; the last one stays.
             None is silence, a tuple is several acks in one go.
         deaf: MAV_CMDs that it obeys without acknowledging, as if the ack had been lost.
@@ -45,7 +45,7 @@ class Drone:
     def __init__(self, loop: Any, receive: Callable[[Any], None], make: Callable[..., Any], system: int = 1) -> None:
         self._loop, self._receive, self._make = loop, receive, make
         self.system = system
-        self.got: list[Any] = []
+        self.received: list[Any] = []
         self.answers: defaultdict[int, list[Any]] = defaultdict(list)
         self.deaf: set[int] = set()
         self.says: dict[int, list[str]] = {}
@@ -108,19 +108,19 @@ class Drone:
 
     def commands(self, number: int | None = None) -> list[Any]:
         """COMMAND_LONGs that it got, of one MAV_CMD or all."""
-        found = [message for message in self.got if message.get_type() == "COMMAND_LONG"]
-        return [message for message in found if number in (None, message.command)]
+        commands = [message for message in self.received if message.get_type() == "COMMAND_LONG"]
+        return [message for message in commands if number in (None, message.command)]
 
     def setpoints(self) -> list[Any]:
         """SET_POSITION_TARGET_* that it got."""
-        return [message for message in self.got if message.get_type().startswith("SET_POSITION_TARGET")]
+        return [message for message in self.received if message.get_type().startswith("SET_POSITION_TARGET")]
 
     def orders(self) -> list[Any]:
         """All that it got but for questions: reads of parameters, requests and intervals of messages."""
         asking = {mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL}
         return [
             message
-            for message in self.got
+            for message in self.received
             if message.get_type() != "PARAM_REQUEST_READ" and getattr(message, "command", None) not in asking
         ]
 
@@ -270,7 +270,7 @@ class Drone:
         if system != self.system:
             return
         assert message.target_system == self.system
-        self.got.append(message)
+        self.received.append(message)
         self._arriving.append(message)
         self._loop.call_later(LATENCY, self._take_next)
 

@@ -56,8 +56,8 @@ class Projector:
             return ()
         sizes = options.sizes or {}
         expected = [tag for tag in self.renderer.tags if options.any_id or not sizes or tag.id in sizes]
-        found = [self._sight(tag, position, attitude, sizes.get(tag.id, 0.0)) for tag in expected]
-        return tuple(detection for detection in found if detection is not None)
+        sights = [self._sight(tag, position, attitude, sizes.get(tag.id, 0.0)) for tag in expected]
+        return tuple(detection for detection in sights if detection is not None)
 
     def _sight(self, tag: PlacedTag, position: Vector, attitude: Attitude, size: float) -> TagDetection | None:
         model, mount = self.renderer.model, self.renderer.mount

@@ -18,7 +18,7 @@ class LogVehicle:
         loss: share of the messages that are lost, each way.
         interval: s between some pieces and the next ones.
         mute: names of its messages that are all lost.
-        got: what reached it, as name and fields.
+        received: what reached it, as name and fields.
     """
 
     def __init__(self, loop: Any, drone: Any, link: Any) -> None:
@@ -28,7 +28,7 @@ class LogVehicle:
         self.loss = 0.0
         self.mute: set[str] = set()
         self.interval = 0.01
-        self.got: list[tuple[str, dict[str, Any]]] = []
+        self.received: list[tuple[str, dict[str, Any]]] = []
         self._chance = random.Random(1)
         self._sending: list[int] | None = None  # id, next byte, the one after the last
         before = link.on_send
@@ -42,7 +42,7 @@ class LogVehicle:
 
     def names(self) -> list[str]:
         """The names of what reached it."""
-        return [name for name, _ in self.got]
+        return [name for name, _ in self.received]
 
     def send_to_others(self, number: int) -> None:
         """Begin to send a log that another program has requested."""
@@ -56,7 +56,7 @@ class LogVehicle:
         name = message.get_type()
         if self._chance.random() < self.loss:
             return
-        self.got.append((name, message.to_dict()))
+        self.received.append((name, message.to_dict()))
         if name == "LOG_REQUEST_END":
             self._sending = None
         elif self._sending is not None or self._drone.armed:

@@ -35,15 +35,15 @@ def message_of(name: str, system: int = 1, component: int = 1, sequence: int = 0
     `armed` and `mode` spell a heartbeat's bits; texts may be given as str.
     """
     cls = getattr(mavlink, f"MAVLink_{name.lower()}_message")
-    given = {**DEFAULTS.get(name.lower(), {}), **fields}
-    if given.pop("armed", False):
-        given["base_mode"] |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED
-    if "mode" in given and name.lower() == "heartbeat":
-        given["custom_mode"] = mavutil.mode_mapping_byname(given["type"])[given.pop("mode")]
+    values = {**DEFAULTS.get(name.lower(), {}), **fields}
+    if values.pop("armed", False):
+        values["base_mode"] |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+    if "mode" in values and name.lower() == "heartbeat":
+        values["custom_mode"] = mavutil.mode_mapping_byname(values["type"])[values.pop("mode")]
     for field in cls.fieldnames:
-        given.setdefault(field, 0)
-        if isinstance(given[field], str):
-            given[field] = given[field].encode()
-    message = cls(**given)
+        values.setdefault(field, 0)
+        if isinstance(values[field], str):
+            values[field] = values[field].encode()
+    message = cls(**values)
     message._header = mavlink.MAVLink_header(cls.id, srcSystem=system, srcComponent=component, seq=sequence % 256)
     return message

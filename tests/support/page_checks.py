@@ -20,11 +20,11 @@ async def failures(page: Page, address: str, checks: Mapping[str, list[str]], be
         before: a script that runs before each of them; theirs is what it defines.
     """
     await page.visit(f"{address}/page/theme.css")
-    found = []
+    failed = []
     for module, scripts in checks.items():
         for check in scripts:
             script = f"import('/page/{module}.js').then(m => eval({json.dumps(check)})).catch(String)"
-            given = await page.evaluate(f"(() => {{ {SAME} {before} return {script}; }})()")
-            if given is not True:
-                found.append(f"{module}: {given} of {check}")
-    return found
+            outcome = await page.evaluate(f"(() => {{ {SAME} {before} return {script}; }})()")
+            if outcome is not True:
+                failed.append(f"{module}: {outcome} of {check}")
+    return failed

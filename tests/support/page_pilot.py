@@ -87,5 +87,5 @@ class Pilot:
         spec = find_spec("axe_core_python")
         assert spec is not None and spec.origin is not None
         await self.page.evaluate(Path(spec.origin).with_name("axe.min.js").read_text(encoding="utf-8") + ";0")
-        found = json.loads(await self.page.evaluate("axe.run().then(r => JSON.stringify(r.violations))"))
-        assert [one["id"] for one in found if one["impact"] in ("serious", "critical")] == []
+        violations = json.loads(await self.page.evaluate("axe.run().then(r => JSON.stringify(r.violations))"))
+        assert [violation["id"] for violation in violations if violation["impact"] in ("serious", "critical")] == []

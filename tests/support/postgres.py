@@ -20,8 +20,8 @@ PATIENCE = 30.0  # s
 
 def program(name: str) -> str:
     """A program of PostgreSQL's server, which Debian keeps out of the way; of the newest version."""
-    found = [str(path) for path in sorted(Path("/usr/lib/postgresql").glob(f"*/bin/{name}"))]
-    return shutil.which(name) or (found[-1] if found else name)
+    installed = [str(path) for path in sorted(Path("/usr/lib/postgresql").glob(f"*/bin/{name}"))]
+    return shutil.which(name) or (installed[-1] if installed else name)
 
 
 class PostgresCluster:
@@ -44,8 +44,8 @@ class PostgresCluster:
             os.chown(self.directory, owner.pw_uid, owner.pw_gid)
         self._data = self.directory / "data"
         self._process: subprocess.Popen[bytes] | None = None
-        made = ["--auth=trust", "--username=fleet", "--encoding=UTF8", "--locale=C", "--no-sync", "--no-instructions"]
-        self._run([program("initdb"), *made, f"--pgdata={self._data}"])
+        options = "--auth=trust --username=fleet --encoding=UTF8 --locale=C --no-sync --no-instructions"
+        self._run([program("initdb"), *options.split(), f"--pgdata={self._data}"])
         with (self._data / "postgresql.conf").open("a", encoding="ascii") as file:
             lines = (f"port = {port}", "listen_addresses = '127.0.0.1'", "unix_socket_directories = ''", *settings)
             file.write("".join(f"{line}\n" for line in lines))

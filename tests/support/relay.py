@@ -77,11 +77,11 @@ class Relay:
                 self._enable_gps(True)
                 return {"ok": True}
             assert op == "received", f"a wire knows nothing of {op}"
-            found = [entry for entry in self._received if entry[0] > arguments.get("since", 0)]
-            reported = [(wall, message) for _, wall, message in found if message.get_type() != "HEARTBEAT"]
+            newer = [entry for entry in self._received if entry[0] > arguments.get("since", 0)]
+            reported = [(wall, message) for _, wall, message in newer if message.get_type() != "HEARTBEAT"]
             return {
                 "ok": True,
-                "last": found[-1][0] if found else arguments.get("since", 0),
+                "last": newer[-1][0] if newer else arguments.get("since", 0),
                 "messages": [
                     {"name": message.get_type(), "wall": wall, "fields": message.to_dict()}
                     for wall, message in reported

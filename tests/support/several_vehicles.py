@@ -46,8 +46,8 @@ def several_vehicles(
         eventually(lambda: set(systems) <= set(listed(rig)), what="all vehicles in the list")
         yield rig, vehicles
     finally:
-        for made in (rig, *vehicles.values()):
-            made.stop()
+        for started in (rig, *vehicles.values()):
+            started.stop()
 
 
 def listed(rig: Rig) -> dict[int, dict[str, Any]]:

@@ -55,17 +55,17 @@ def test_stop_closes_the_port_and_ends_the_watch(loop: Any, api: Api, settings: 
     assert api.filenos() == []
     with pytest.raises(OSError, match="Cannot connect"):
         loop.run(status_of(settings))
-    drone.got.clear()
+    drone.received.clear()
     drone.mute.add("VFR_HUD")
     loop.pass_time(20.0)
-    assert drone.got == []
+    assert drone.received == []
 
 
 def test_api_watches_the_telemetry(loop: Any, api: Api, settings: Any, drone: Any) -> None:
     loop.run(api.start(settings))
     drone.mute.add("VFR_HUD")
     loop.pass_time(10.0)
-    assert drone.got
+    assert drone.received
 
 
 def test_taken_port_leaves_nothing_behind_and_can_be_tried_again(

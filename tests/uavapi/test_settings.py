@@ -146,7 +146,7 @@ def test_networks_that_may_run_scripts_are_networks() -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "url"),
+    ("keywords", "url"),
     [
         ({}, "http://127.0.0.1:8000"),
         ({"host": "0.0.0.0", "token": "t", "port": 81}, "http://127.0.0.1:81"),
@@ -155,5 +155,5 @@ def test_networks_that_may_run_scripts_are_networks() -> None:
         ({"certfile": "c", "keyfile": "k"}, "https://127.0.0.1:8000"),
     ],
 )
-def test_address_is_one_that_this_machine_can_reach(given: dict[str, Any], url: str) -> None:
-    assert ApiModuleSettings(given, environ={}).snapshot().local_url == url
+def test_address_is_one_that_this_machine_can_reach(keywords: dict[str, Any], url: str) -> None:
+    assert ApiModuleSettings(keywords, environ={}).snapshot().local_url == url

@@ -54,11 +54,11 @@ NOW = 100.0
     ],
 )
 def test_true_is_no_number(model, name):
-    rest = {"north": 1, "east": 1} if model is MissionRequest else {}
-    assert getattr(parse(model, "query", {**rest, name: "7"}), name) == 7
+    required = {"north": 1, "east": 1} if model is MissionRequest else {}
+    assert getattr(parse(model, "query", {**required, name: "7"}), name) == 7
     for value in (True, False, "1_0"):
         with pytest.raises(Invalid):
-            parse(model, "body", {**rest, name: value})
+            parse(model, "body", {**required, name: value})
 
 
 def handlers(age, source):
@@ -95,14 +95,14 @@ def test_an_old_frame_is_no_camera():
 
 def posted(over, body):
     """Post a body to /vision/frame: the answer, or the error that it would be made of."""
-    found = []
+    outcomes = []
 
     async def handle(request):
         request[CALLER] = Caller(None)
         try:
-            found.append(await over.post_frame(Call(None, request, FrameRequest())))
+            outcomes.append(await over.post_frame(Call(None, request, FrameRequest())))
         except BadRequest as error:
-            found.append(error)
+            outcomes.append(error)
         return web.Response()
 
     async def run():
@@ -110,7 +110,7 @@ def posted(over, body):
         app.router.add_post("/vision/frame", handle)
         async with TestClient(TestServer(app)) as client:
             await client.post("/vision/frame", data=body)
-        return found[0]
+        return outcomes[0]
 
     return asyncio.run(run())
 

@@ -47,11 +47,11 @@ def test_two_ways_meet_in_space_and_time(name: str, theirs: list[tuple[float, fl
 
 
 def test_a_meeting_says_where_and_when() -> None:
-    found = meeting(flight((0, 0, 10), (0, 100, 10)), flight((0, 60, 10)), DISTANCE)
-    assert found is not None
-    assert found.at.east == pytest.approx(51.5, abs=1.5)
-    assert found.seconds == pytest.approx(found.at.east / 5.0, abs=0.1)
-    assert found.gap < 1.0
+    encounter = meeting(flight((0, 0, 10), (0, 100, 10)), flight((0, 60, 10)), DISTANCE)
+    assert encounter is not None
+    assert encounter.at.east == pytest.approx(51.5, abs=1.5)
+    assert encounter.seconds == pytest.approx(encounter.at.east / 5.0, abs=0.1)
+    assert encounter.gap < 1.0
 
 
 def test_who_is_too_near_already_may_go_away_and_come_no_nearer() -> None:

@@ -41,9 +41,9 @@ def test_way_inside_breaks_nothing() -> None:
 
 
 def test_target_outside_is_named_with_where_and_by_how_much() -> None:
-    found = breach(Space(Envelope((square(100),))), (0, 0, 10), (130, 0, 10))
-    assert found.what == "field"
-    assert found.by == pytest.approx(30.0, abs=0.01)
+    violation = breach(Space(Envelope((square(100),))), (0, 0, 10), (130, 0, 10))
+    assert violation.what == "field"
+    assert violation.by == pytest.approx(30.0, abs=0.01)
 
 
 def test_way_over_a_ceiling_and_under_a_floor_breaks_it() -> None:
@@ -228,8 +228,8 @@ def test_way_is_judged_as_brute_force_judges_it(field, hole, at, floor, thick, a
             naive = max(naive, inner)
         assert outside_by(spot, rules) == pytest.approx(naive, abs=1e-6)
         deepest = max(deepest, naive)
-    found = space.breach(way, rules, may_return=False)
-    assert found is not None or deepest <= TOUCH + 1e-6
-    if found is not None:
-        assert found.by > TOUCH and outside_by(found.at, rules) == pytest.approx(found.by)
-        assert to_leg(found.at, *way) < 1e-6
+    violation = space.breach(way, rules, may_return=False)
+    assert violation is not None or deepest <= TOUCH + 1e-6
+    if violation is not None:
+        assert violation.by > TOUCH and outside_by(violation.at, rules) == pytest.approx(violation.by)
+        assert to_leg(violation.at, *way) < 1e-6

@@ -118,7 +118,7 @@ def test_command_goes_out_before_any_parameter_is_requested(
         loop.settle()
     began = loop.time()
     pilotage.start(getattr(copter, verb), **arguments.get(verb, {}))
-    first = armed.got[0]
+    first = armed.received[0]
     assert first.get_type().startswith(("COMMAND_LONG", "SET_POSITION_TARGET"))
     assert loop.time() == began
 
@@ -243,7 +243,7 @@ def test_movements_are_refused_while_the_vehicle_is_stopped(
     loop: Any, flying: Any, copter: Any, pilotage: Any, verb: str
 ) -> None:
     pilotage.do(copter.stop)
-    flying.got.clear()
+    flying.received.clear()
     arguments = {"go_to": FAR, "travel": VelocityTarget(1.0, 0.0, 0.0), "set_heading": 90.0, "set_yaw_rate": 10.0}
     with pytest.raises(Paused, match="`resume`"):
         pilotage.do(getattr(copter, verb), arguments[verb])
@@ -282,7 +282,7 @@ def test_refused_stop_stops_nothing(loop: Any, flying: Any, copter: Any, pilotag
 def test_guided_ends_a_stop_where_it_is(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
     job = pilotage.start(copter.go_to, FAR, wait=True)
     pilotage.do(copter.stop)
-    flying.got.clear()
+    flying.received.clear()
     pilotage.do(copter.set_mode, "GUIDED")
     with pytest.raises(Superseded):
         pilotage.result(job)
@@ -305,7 +305,7 @@ def test_pilots_mode_change_ends_our_stop(loop: Any, flying: Any, copter: Any, p
     loop.pass_time(1.0)
     flying.pilot("GUIDED")
     loop.pass_time(1.0)
-    flying.got.clear()
+    flying.received.clear()
     pilotage.do(copter.go_to, FAR)
     assert flying.commands(PAUSE) == []
 

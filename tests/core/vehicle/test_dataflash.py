@@ -91,7 +91,7 @@ def test_download_is_complete_whatever_is_lost(loop: Any, copter: Any, vehicle: 
     assert copter.logs.fetching is None
     if not loss:
         loop.pass_time(0.1)
-        requests = [fields for name, fields in vehicle.got if name == "LOG_REQUEST_DATA"]
+        requests = [fields for name, fields in vehicle.received if name == "LOG_REQUEST_DATA"]
         assert [(fields["ofs"], fields["count"]) for fields in requests] == [
             (0, CHUNK),
             (CHUNK, CHUNK),
@@ -165,11 +165,11 @@ def test_armed_vehicle_is_not_asked(loop: Any, copter: Any, vehicle: LogVehicle,
     entry = loop.run(copter.logs.find(1))
     drone.fly()
     loop.settle()
-    vehicle.got.clear()
+    vehicle.received.clear()
     for refused in (copter.logs.read_list(), copter.logs.fetch(entry, Saved().save, lambda *_: None)):
         with pytest.raises(Busy, match="is armed"):
             loop.run(refused)
-    assert vehicle.got == []
+    assert vehicle.received == []
     with pytest.raises(TimedOut):
         loop.run(copter.logs.read_list(while_armed=True))
     assert "LOG_REQUEST_LIST" in vehicle.names()
@@ -213,7 +213,7 @@ def test_download_of_another_program_is_not_disturbed(loop: Any, copter: Any, ve
     for refused in (copter.logs.read_list(), download(copter, Saved(), 1)):
         with pytest.raises(Busy, match="another program downloads log 2"):
             loop.run(refused)
-    assert vehicle.got == []
+    assert vehicle.received == []
     loop.pass_time(10.0)
     saved = Saved()
     loop.run(download(copter, saved, 1))

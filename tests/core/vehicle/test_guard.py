@@ -55,7 +55,7 @@ def make(host: Any, msg: Callable[..., Any], loop: Any) -> Callable[..., Any]:
         state.parameters.update(parameters)
         lat, lon = FRAME.degrees(Spot(*at))
         vx, vy, vz = (round(100 * speed) for speed in velocity)
-        told = {
+        telemetry = {
             "GLOBAL_POSITION_INT": {
                 "lat": round(lat * 1e7), "lon": round(lon * 1e7), "alt": 600_000, "relative_alt": round(1000 * at[2]),
                 "vx": vx, "vy": vy, "vz": vz,
@@ -63,7 +63,7 @@ def make(host: Any, msg: Callable[..., Any], loop: Any) -> Callable[..., Any]:
             "LOCAL_POSITION_NED": {"x": at[0], "y": at[1], "z": -at[2]},
             "HOME_POSITION": {"latitude": round(HOME[0] * 1e7), "longitude": round(HOME[1] * 1e7)},
         }  # fmt: skip
-        for name, fields in told.items():
+        for name, fields in telemetry.items():
             state.messages[name] = Received(msg(name.lower(), 1, 1, 0, **fields), loop.time())
         return CLASSES[kind](state, host.link, host.pending, loop.time, lambda: (space,))
 

@@ -25,9 +25,9 @@ def state() -> VehicleState:
 @pytest.fixture
 def radius() -> GuidedRadius:
     """That of a plane that was told at 10 s to circle with 300 m."""
-    given = GuidedRadius()
-    given.sent(reposition(300.0), 10.0)
-    return given
+    radius = GuidedRadius()
+    radius.sent(reposition(300.0), 10.0)
+    return radius
 
 
 def reposition(radius: float) -> Any:

@@ -39,7 +39,7 @@ def test_entry_beyond_the_list_is_none_of_it() -> None:
     listing = LogList()
     listing.take(entry(1))
     listing.take(entry(9))
-    assert [found.id for found in listing.entries] == [1]
+    assert [listed.id for listed in listing.entries] == [1]
 
 
 def test_gaps_are_requested_in_their_order_and_never_more_than_a_chunk() -> None:

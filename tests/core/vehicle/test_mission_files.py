@@ -156,7 +156,7 @@ def test_answer_in_floats_is_understood() -> None:
 
 
 @pytest.mark.parametrize(
-    ("found", "words"),
+    ("read_back", "words"),
     [
         ([TAKEOFF, LEG], None),
         ([TAKEOFF, replace(LEG, params=(9.0, 0.0, 0.0, 0.0))], None),
@@ -168,6 +168,6 @@ def test_answer_in_floats_is_understood() -> None:
         ([TAKEOFF, replace(LEG, frame=0)], "item 2"),
     ],
 )
-def test_read_back_is_compared_by_what_every_autopilot_keeps(found: list[MissionItem], words: str | None) -> None:
-    reported = difference([TAKEOFF, LEG], found)
+def test_read_back_is_compared_by_what_every_autopilot_keeps(read_back: list[MissionItem], words: str | None) -> None:
+    reported = difference([TAKEOFF, LEG], read_back)
     assert reported is None if words is None else reported is not None and words in reported

@@ -43,14 +43,14 @@ class Store:
         self.refuse: dict[int, int] = {}
         self.counts = 0
         self._expected: list[Any] | None = None
-        self.got: list[str] = []
+        self.received: list[str] = []
         self.spoil = False
 
     def take(self, message: Any) -> None:
         name = message.get_type()
         if not name.startswith("MISSION"):
             return
-        self.got.append(name)
+        self.received.append(name)
         if self.lost.get(name):
             self.lost[name] -= 1
             return
@@ -124,7 +124,7 @@ def store(loop: Any, drone: Any, link: Any) -> Store:
 
 def test_download_has_home_and_the_items(loop: Any, copter: Any, store: Store) -> None:
     assert loop.run(copter.waypoints.download()) == (HOME, OLD)
-    assert store.got[-1] == "MISSION_ACK"
+    assert store.received[-1] == "MISSION_ACK"
     store.items = []
     assert loop.run(copter.waypoints.download()) == (None, [])
 
@@ -245,8 +245,8 @@ def test_one_transfer_at_a_time(loop: Any, copter: Any, store: Store) -> None:
     async def both() -> Any:
         return await asyncio.gather(copter.waypoints.upload(NEW), copter.waypoints.download())
 
-    _, found = loop.run(both())
-    assert found == (HOME, NEW)
+    _, downloaded = loop.run(both())
+    assert downloaded == (HOME, NEW)
     assert store.counts == 1
 
 

@@ -186,14 +186,14 @@ def test_sim_speedup_of_a_real_vehicle_is_not_supported(loop: Any, drone: Any, c
     del drone.parameters["SIM_SPEEDUP"]
     with pytest.raises(NotSupported, match="not a simulation"):
         loop.run(copter.set_sim_speedup(5))
-    assert [message.get_type() for message in drone.got] == ["PARAM_REQUEST_READ"]
+    assert [message.get_type() for message in drone.received] == ["PARAM_REQUEST_READ"]
 
 
 def test_parameters_are_requested_once_and_missing_ones_left_out(loop: Any, drone: Any, copter: Any) -> None:
     assert loop.run(copter.parameters.read([("RTL_ALT",), ("NO_SUCH",)])) == {"RTL_ALT": 1500.0}
-    drone.got.clear()
+    drone.received.clear()
     assert loop.run(copter.parameters.read([("RTL_ALT",)])) == {"RTL_ALT": 1500.0}
-    assert drone.got == []
+    assert drone.received == []
 
 
 def test_one_of_a_quantitys_names_is_enough(loop: Any, drone: Any, copter: Any) -> None:

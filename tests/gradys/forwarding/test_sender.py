@@ -142,7 +142,7 @@ def values(body: bytes) -> list[float]:
 def test_batches_that_are_too_large_get_smaller_and_stay_so(
     loop: Any, spool_thread: Any, sender: Any, poster: Any
 ) -> None:
-    refusing(poster, lambda found: len(found) > 60, too_large=True)
+    refusing(poster, lambda batch: len(batch) > 60, too_large=True)
     keep(loop, spool_thread, 1000)
     loop.pass_time(20)
     assert spool_thread.count == 0
@@ -154,7 +154,7 @@ def test_one_that_is_refused_by_itself_holds_up_nobody_and_is_sent_last(
     loop: Any, spool_thread: Any, sender: Any, poster: Any
 ) -> None:
     answers = poster.answer
-    refusing(poster, lambda found: 150.0 in found)
+    refusing(poster, lambda batch: 150.0 in batch)
     keep(loop, spool_thread, 300)
     loop.pass_time(20)
     assert spool_thread.count == 1 and sender.report()["put_last"] >= 1
@@ -168,7 +168,7 @@ def test_one_that_is_refused_by_itself_holds_up_nobody_and_is_sent_last(
 
 def test_those_that_are_sent_last_take_turns(loop: Any, spool_thread: Any, sender: Any, poster: Any) -> None:
     refused = {3.0, 7.0}
-    refusing(poster, lambda found: refused & set(found))
+    refusing(poster, lambda batch: refused & set(batch))
     keep(loop, spool_thread, 10)
     loop.pass_time(60)
     assert spool_thread.count == 2

@@ -41,8 +41,8 @@ class Script:
     [("23.5\n", 23.5), (" 7 ", 7), ("-1e3", -1000.0), ("+4", 4), (".5", 0.5), (str(2**63 - 1), 2**63 - 1)],
 )
 def test_a_number(text: str, value: float) -> None:
-    found = value_of(SOIL, text.encode())
-    assert found == value and type(found) is type(value)
+    number = value_of(SOIL, text.encode())
+    assert number == value and type(number) is type(value)
 
 
 def test_a_scaled_number() -> None:

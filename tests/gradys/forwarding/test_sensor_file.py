@@ -81,15 +81,15 @@ def test_what_cannot_be_read_says_why(tmp_path: Path, kind: str) -> None:
         os.mkfifo(path)
     if kind == "locked":
         path = Path("/proc/self/mem")  # it opens, but its first bytes cannot be read
-    found = newest(str(path))
-    assert isinstance(found, NoReading)
-    assert str(path) in str(found)
+    problem = newest(str(path))
+    assert isinstance(problem, NoReading)
+    assert str(path) in str(problem)
 
 
 def test_a_long_file_is_not_read_to_its_end(tmp_path: Path) -> None:
     (tmp_path / "long").write_bytes(b"x" * 1_000_000)
-    found = newest(str(tmp_path / "long"))
-    assert not isinstance(found, NoReading) and len(found.content) < 20_000
+    beginning = newest(str(tmp_path / "long"))
+    assert not isinstance(beginning, NoReading) and len(beginning.content) < 20_000
 
 
 def test_a_file_that_does_not_answer_is_asked_once(loop: Any, monkeypatch: Any, write: Any) -> None:

@@ -40,6 +40,6 @@ def test_another_password_or_option_is_the_same_sink_and_anything_else_another_o
 
 
 def test_one_that_is_named_twice_is_one_and_the_later_word_counts() -> None:
-    found = sink_addresses("http://h/r, mqtt://u:old@b/t, http://h/r#ack=status, mqtt://u:new@b/t")
-    assert [sink.url for sink in found] == ["http://h/r", "mqtt://u:new@b/t"]
-    assert found[0].status_counts
+    sinks = sink_addresses("http://h/r, mqtt://u:old@b/t, http://h/r#ack=status, mqtt://u:new@b/t")
+    assert [sink.url for sink in sinks] == ["http://h/r", "mqtt://u:new@b/t"]
+    assert sinks[0].status_counts

@@ -207,9 +207,9 @@ def test_what_was_kept_survives_kill_9(tmp_path: Path) -> None:
         child.wait()
     spool = Spool(file, 1e9, 1e9)
     assert spool.set_aside is None
-    found = numbers(spool, limit=1_000_000)
-    assert set(reported) <= set(found)
-    assert len(found) % 10 == 0  # whole transactions
+    kept = numbers(spool, limit=1_000_000)
+    assert set(reported) <= set(kept)
+    assert len(kept) % 10 == 0  # whole transactions
     spool.close()
 
 

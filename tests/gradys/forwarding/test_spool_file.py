@@ -83,7 +83,7 @@ def test_the_database_of_another_program_is_left_alone(file: Path) -> None:
 
 
 def modes(folder: Path) -> dict[str, int]:
-    return {found.name: mode(found) for found in folder.iterdir()}
+    return {path.name: mode(path) for path in folder.iterdir()}
 
 
 def mode(file: Path) -> int:
@@ -112,14 +112,14 @@ def test_what_others_could_read_is_tightened(file: Path) -> None:
     aside, other = file.with_name("spool.db.corrupt-1"), file.with_name("other")
     aside.touch()  # of an older version: it may hold a password
     other.touch()
-    for found in file.parent.iterdir():
-        found.chmod(0o644)
+    for path in file.parent.iterdir():
+        path.chmod(0o644)
     assert "spool.db-wal" in modes(file.parent)
     with opened(file) as spool:
-        found = modes(file.parent)
-        assert found.pop("other") == 0o644
-        assert {"spool.db", "spool.db-wal", "spool.db.corrupt-1"} <= set(found)
-        assert set(found.values()) == {0o600}
+        after = modes(file.parent)
+        assert after.pop("other") == 0o644
+        assert {"spool.db", "spool.db-wal", "spool.db.corrupt-1"} <= set(after)
+        assert set(after.values()) == {0o600}
         assert spool.count == 11
 
 

@@ -24,10 +24,10 @@ def reading(value: Any, **members: Any) -> Reading:
 
 @pytest.mark.parametrize("value", [*POSTED, *SAMPLED], ids=lambda value: repr(value)[:20])
 def test_whatever_is_taken_comes_back_from_its_row(value: Any) -> None:
-    found = reading(value, representation="°C\0" * 20)
-    back = stored_of((7, *row_of(found)))
-    assert is_storable(found) and back is not None
-    assert (back.seq, back.reading) == (7, found)
+    original = reading(value, representation="°C\0" * 20)
+    back = stored_of((7, *row_of(original)))
+    assert is_storable(original) and back is not None
+    assert (back.seq, back.reading) == (7, original)
 
 
 def test_these_are_what_may_be_posted() -> None:

@@ -113,7 +113,7 @@ def test_an_older_file_keeps_its_readings_and_what_was_acknowledged(file: Path, 
 def test_no_password_is_left_of_an_older_file(file: Path, version: int) -> None:
     make_old(file, version)
     with opened(file):
-        left = b"".join(found.read_bytes() for found in file.parent.iterdir())
+        left = b"".join(path.read_bytes() for path in file.parent.iterdir())
     assert b"s3cret" not in left and b"s3cret" not in file.read_bytes()
 
 

@@ -16,7 +16,7 @@ def at(north: float, east: float, velocity: tuple[float, float] = (0.0, 0.0), no
     return Track(FRAME.degrees(Spot(north, east, 0.0)), velocity, now)
 
 
-def told(north: float, east: float, device: str = "uav-7") -> str:
+def position(north: float, east: float, device: str = "uav-7") -> str:
     return json.dumps({"device": device, "value": [*FRAME.degrees(Spot(north, east, 0.0)), 30.0]})
 
 
@@ -40,7 +40,7 @@ def test_a_pair_is_warned_of_once_until_it_is_apart_again() -> None:
     advice, ours = Advice(), {"uav-1": at(0, 0)}
     said: list[str] = []
     for now, east in enumerate([30.0, 7.0, 6.0, 9.0, 7.5, 30.0, 30.0, 30.0, 6.0]):
-        assert advice.take(told(0, east), float(now)) == "uav-7"
+        assert advice.take(position(0, east), float(now)) == "uav-7"
         said += advice.warnings({"uav-1": at(0, 0, now=now)}, {"uav-1"}, 8.0, float(now))
     assert len(said) == 2 and "uav-7 of another MAVProxy" in said[0] and "of uav-1" in said[0]
     assert advice.warnings(ours, {"uav-1"}, 0.0, 8.0) == []
@@ -49,16 +49,16 @@ def test_a_pair_is_warned_of_once_until_it_is_apart_again() -> None:
 def test_its_velocity_comes_from_two_positions() -> None:
     advice = Advice()
     for now, east in ((0.0, 60.0), (1.0, 50.0)):  # 10 m/s towards us: here in 5 s
-        advice.take(told(0, east), now)
+        advice.take(position(0, east), now)
     (sentence,) = advice.warnings({"uav-1": at(0, 0)}, {"uav-1"}, 8.0, 1.0)
     assert "within 0 m" in sentence
 
 
 def test_our_own_positions_and_old_ones_say_nothing() -> None:
     advice = Advice()
-    advice.take(told(0, 1, "uav-1"), 0.0)
-    advice.take(told(0, 1, "uav-2"), 0.0)
-    advice.take(told(0, 1), -OLD)
+    advice.take(position(0, 1, "uav-1"), 0.0)
+    advice.take(position(0, 1, "uav-2"), 0.0)
+    advice.take(position(0, 1), -OLD)
     assert advice.warnings({"uav-1": at(0, 0)}, {"uav-1", "uav-2"}, 8.0, 0.1) == []
 
 

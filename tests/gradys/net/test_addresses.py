@@ -20,9 +20,9 @@ from mavproxy_uavapi.core.errors import SettingError
     ],
 )
 def test_a_station_as_people_write_it(text: str, url: str, host: str, port: int) -> None:
-    found = station(text)
-    assert (found.url, found.host, found.port) == (url, host, port)
-    assert found.update_url == f"{url}/update-info/"
+    address = station(text)
+    assert (address.url, address.host, address.port) == (url, host, port)
+    assert address.update_url == f"{url}/update-info/"
 
 
 @pytest.mark.parametrize(

@@ -56,8 +56,8 @@ def requested(loop: Any, peer: Peer, times: int = 1, **options: Any) -> list[Any
             await client.close()
             await peer.runner.cleanup()
 
-    found: list[Any] = loop.run(run())
-    return found
+    answers: list[Any] = loop.run(run())
+    return answers
 
 
 @pytest.fixture

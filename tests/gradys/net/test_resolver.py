@@ -61,5 +61,5 @@ def test_what_is_no_host_is_an_error_of_the_system(loop: Any, host: str) -> None
 
 
 def test_as_aiohttp_asks(loop: Any) -> None:
-    (found,) = loop.run(Resolver(Server().ask).resolve("good", 80))
-    assert (found["hostname"], found["host"], found["port"], found["family"]) == ("good", "192.0.2.7", 80, 2)
+    (entry,) = loop.run(Resolver(Server().ask).resolve("good", 80))
+    assert (entry["hostname"], entry["host"], entry["port"], entry["family"]) == ("good", "192.0.2.7", 80, 2)

@@ -23,7 +23,7 @@ def put(positions: Positions, **members: Any) -> None:
 
 
 def forms(positions: Positions) -> list[dict[str, str]]:
-    return [positions.form(one) for one in positions.take_changed()]
+    return [positions.form(vehicle) for vehicle in positions.take_changed()]
 
 
 def test_a_form_has_the_fields_of_the_ground_station() -> None:

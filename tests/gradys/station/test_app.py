@@ -126,9 +126,9 @@ def test_readings_are_kept_once_each(ask: Any) -> None:
     post(ask, reading(1), reading(2))
     status, text = ask("POST", "/readings", data=json.dumps({"readings": [reading(2, value=9), reading(3)]}))
     assert (status, json.loads(text)) == (200, {"acknowledged": [2, 3]})  # a repeat is acknowledged again
-    found = ask.json("/readings")
-    assert [(one["seq"], one["value"]) for one in found["readings"]] == [(1, 1.5), (2, 1.5), (3, 1.5)]
-    assert (found["count"], found["repeats"]) == (3, 1)
+    listing = ask.json("/readings")
+    assert [(kept["seq"], kept["value"]) for kept in listing["readings"]] == [(1, 1.5), (2, 1.5), (3, 1.5)]
+    assert (listing["count"], listing["repeats"]) == (3, 1)
 
 
 def test_a_batch_with_something_else_in_it_is_not_kept(ask: Any) -> None:
@@ -189,8 +189,8 @@ def test_stream_has_all_of_a_vehicle_and_then_what_has_changed(ask: Any, clock: 
     post(ask, reading(1, quantity="position", value=[1, 2, 3], time=5), reading(1, device="uav-2", time=5))
     ask.look()
     with ask.stream("/watch") as event:
-        both = event()["vehicles"]
-        assert [(one["device"], one["alt"], one["quantities"]) for one in both] == [
+        vehicles = event()["vehicles"]
+        assert [(shown["device"], shown["alt"], shown["quantities"]) for shown in vehicles] == [
             ("uav-1", 3, {"position": "m"}),
             ("uav-2", None, {"alt": "m"}),
         ]

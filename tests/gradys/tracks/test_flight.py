@@ -51,18 +51,18 @@ def flown(loop: Any, copter: Any, *places: TrackWaypoint, **options: Any) -> lis
     job: Any = SimpleNamespace(stage={})
     loop.run(TrackFlight(copter, places, **options).fly(job))
     assert copter.did[-1] == "rtl"
-    did: list[Any] = copter.did[:-1]
-    return did
+    steps: list[Any] = copter.did[:-1]
+    return steps
 
 
 def test_a_track_that_begins_here_is_flown_from_its_first_height_on(loop: Any) -> None:
-    did = flown(loop, Copter(), place(2, 2), place(30, 8))
-    assert did == ["arm", ("takeoff", 2), (2, 2), (30, 8)]
+    steps = flown(loop, Copter(), place(2, 2), place(30, 8))
+    assert steps == ["arm", ("takeoff", 2), (2, 2), (30, 8)]
 
 
 def test_a_track_that_begins_elsewhere_is_reached_at_a_height_above_the_trees(loop: Any) -> None:
-    did = flown(loop, Copter(), place(3000, 2), place(3030, 50))
-    assert did == ["arm", ("takeoff", 10), (3000, 10), (3000, 2), (3030, 50)]
+    steps = flown(loop, Copter(), place(3000, 2), place(3030, 50))
+    assert steps == ["arm", ("takeoff", 10), (3000, 10), (3000, 2), (3030, 50)]
     assert flown(loop, Copter(), place(3000, 2), transit=40)[1:] == [("takeoff", 40), (3000, 40), (3000, 2)]
     assert flown(loop, Copter(), place(3000, 60))[1:] == [("takeoff", 60), (3000, 60), (3000, 60)]
 
@@ -73,8 +73,8 @@ def test_in_the_air_it_climbs_before_it_goes_there_and_never_descends(loop: Any)
 
 
 def test_no_takeoff_is_higher_than_the_verb_allows(loop: Any) -> None:
-    did = flown(loop, Copter(), place(3000, 900))
-    assert did == ["arm", ("takeoff", 500), (0, 900), (3000, 900), (3000, 900)]
+    steps = flown(loop, Copter(), place(3000, 900))
+    assert steps == ["arm", ("takeoff", 500), (0, 900), (3000, 900), (3000, 900)]
     assert flown(loop, Copter(), place(0, 900))[1:] == [("takeoff", 500), (0, 900)]
 
 

@@ -22,64 +22,64 @@ def sending(loop: Any, telemetry: Any, seconds: float) -> None:
 
 
 def recorder(loop: Any, host: Any, file: Path, style: str = "text", **options: Any) -> Recorder:
-    made = Recorder(host, 10, file, style=style, period=5.0, **options)
-    loop.run(made.start())
-    return made
+    recording = Recorder(host, 10, file, style=style, period=5.0, **options)
+    loop.run(recording.start())
+    return recording
 
 
 @pytest.mark.parametrize("style", ["text", "tuple"])
 def test_a_reading_every_period(loop: Any, host: Any, telemetry: Any, tmp_path: Path, style: str) -> None:
-    made = recorder(loop, host, tmp_path / "track", style)
+    recording = recorder(loop, host, tmp_path / "track", style)
     sending(loop, telemetry, 21)
-    loop.run(made.stop())
+    loop.run(recording.stop())
     readings = parse((tmp_path / "track").read_text())
-    assert made.written == len(readings)
+    assert recording.written == len(readings)
     assert [
         after.time_usec - before.time_usec for before, after in zip(readings[1:], readings[2:], strict=False)
     ] == [5_000_000] * 3
 
 
 def test_gpx_is_whole_at_every_moment(loop: Any, host: Any, telemetry: Any, tmp_path: Path) -> None:
-    made = recorder(loop, host, tmp_path / "a.gpx", "gpx")
+    recording = recorder(loop, host, tmp_path / "a.gpx", "gpx")
     for count in range(3):
         text = (tmp_path / "a.gpx").read_text()
         assert text.endswith("</gpx>\n") and text.count("<trkpt") >= count
         sending(loop, telemetry, 5)
-    loop.run(made.stop())
+    loop.run(recording.stop())
 
 
 def test_the_latest_is_written_on_every_message(loop: Any, host: Any, telemetry: Any, tmp_path: Path) -> None:
     latest = tmp_path / "latest"
-    made = recorder(loop, host, tmp_path / "track", latest=latest)
-    seen = set()
+    recording = recorder(loop, host, tmp_path / "track", latest=latest)
+    texts = set()
     for _ in range(8):
         sending(loop, telemetry, 0.25)
-        seen.add(latest.read_text())
-    assert len(seen) == 8
-    assert all(len(parse(text)) == 1 for text in seen)
-    loop.run(made.stop())
+        texts.add(latest.read_text())
+    assert len(texts) == 8
+    assert all(len(parse(text)) == 1 for text in texts)
+    loop.run(recording.stop())
     assert host.listeners == []
 
 
 def test_stopping_writes_what_was_heard_last(loop: Any, host: Any, telemetry: Any, tmp_path: Path) -> None:
     latest = tmp_path / "latest"
-    made = recorder(loop, host, tmp_path / "track", latest=latest)
+    recording = recorder(loop, host, tmp_path / "track", latest=latest)
     sending(loop, telemetry, 1)
     for number in (7, 8):
         telemetry.send("gps_raw_int", time_usec=number, lat=357713121, lon=-786743912, alt=584090, fix_type=3)
-    loop.run(made.stop())
+    loop.run(recording.stop())
     loop.settle()
     assert parse(latest.read_text())[0].time_usec == 8
 
 
 def test_nothing_old_is_recorded(loop: Any, host: Any, telemetry: Any, tmp_path: Path) -> None:
-    made = recorder(loop, host, tmp_path / "track")
+    recording = recorder(loop, host, tmp_path / "track")
     sending(loop, telemetry, 6)
-    written = made.written
+    written = recording.written
     loop.pass_time(30)
-    assert made.written <= written + 1
-    assert "sends no GPS_RAW_INT" in made.problem
-    loop.run(made.stop())
+    assert recording.written <= written + 1
+    assert "sends no GPS_RAW_INT" in recording.problem
+    loop.run(recording.stop())
 
 
 def test_a_file_that_cannot_be_written_is_reported_at_once(

@@ -108,8 +108,8 @@ def test_real_package_is_left_alone_or_lends_its_util(monkeypatch: Any, tmp_path
 
 
 def test_what_is_not_ours_is_the_scripts_in_its_order() -> None:
-    given = ["--file", "a.plan", "--script", "s.py", "--lat", "-35.5", "--vehicle", "drone", "-r", "5", "--ping"]
-    chosen, rest = options.parse(given)
+    arguments = ["--file", "a.plan", "--script", "s.py", "--lat", "-35.5", "--vehicle", "drone", "-r", "5", "--ping"]
+    chosen, rest = options.parse(arguments)
     assert (chosen.script, chosen.vehicle, chosen.on_exit) == ("s.py", "drone", "rtl")
     assert rest == ["--file", "a.plan", "--lat", "-35.5", "-r", "5", "--ping"]
 
@@ -124,16 +124,16 @@ def test_options_of_files_come_before_those_of_the_command_line(tmp_path: Path) 
 
 
 def test_options_of_the_original_are_understood() -> None:
-    given = "--script s --conn http://a --vehicle generic --mavsdk-port 50052 --no-aerpaw-environment --skip-rtl"
+    line = "--script s --conn http://a --vehicle generic --mavsdk-port 50052 --no-aerpaw-environment --skip-rtl"
     more = "--api-version v1 --no-status-bar --conn-timeout 5 --heartbeat-timeout 2 --zmq-identifier a"
-    chosen, rest = options.parse([*given.split(), *more.split(), "--zmq-proxy-server", "b"])
+    chosen, rest = options.parse([*line.split(), *more.split(), "--zmq-proxy-server", "b"])
     assert rest == [] and chosen.heartbeat_timeout == 2.0
 
 
-@pytest.mark.parametrize("given", [["--vehicle", "drone"], ["--script", "a", "--vehicle", "plane"]])
-def test_options_that_make_no_sense_end_with_a_sentence(given: list[str], capsys: Any) -> None:
+@pytest.mark.parametrize("arguments", [["--vehicle", "drone"], ["--script", "a", "--vehicle", "plane"]])
+def test_options_that_make_no_sense_end_with_a_sentence(arguments: list[str], capsys: Any) -> None:
     with pytest.raises(SystemExit):
-        options.parse(given)
+        options.parse(arguments)
     assert "--script" in capsys.readouterr().err
 
 

@@ -54,9 +54,9 @@ def test_log_that_the_apis_machine_has_is_not_requested_again(
 ) -> None:
     loop.run(standing.download_log(loop.run(standing.logs())[0], tmp_path / "one.bin"))
     log = loop.run(standing.logs())[0]
-    vehicle.got.clear()
+    vehicle.received.clear()
     loop.run(standing.download_log(log, tmp_path / "two.bin"))
-    assert vehicle.got == []
+    assert vehicle.received == []
     assert (tmp_path / "two.bin").read_bytes() == vehicle.logs[1]
 
 

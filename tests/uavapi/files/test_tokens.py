@@ -165,8 +165,8 @@ def test_token_is_found_by_its_hash_among_the_most_there_may_be(file: Path) -> N
     put(file, "\n".join(f"n{number} watch {HASHES[number]}" for number in range(MOST)))
     tokens = Tokens(print)
     tokens.use(str(file))
-    found = tokens.find(digest_of(b"7"))
-    assert found is not None and found.name == "n7"
+    token = tokens.find(digest_of(b"7"))
+    assert token is not None and token.name == "n7"
     assert tokens.find(digest_of(b"x")) is None
 
 

@@ -114,6 +114,26 @@ def raising(loop: Any, service: Service) -> Any:
 
 
 @pytest.fixture
+def unread(api: Any, loop: Any) -> Iterator[Callable[..., socket.socket]]:
+    """A client that asks for a stream and reads nothing: `unread(path, header=value)`."""
+    clients: list[socket.socket] = []
+
+    def connect(path: str = "/telemetry/stream", **headers: str) -> socket.socket:
+        client = socket.socket()
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        client.connect(("127.0.0.1", api.client.port))
+        lines = [f"GET {path} HTTP/1.1", "Host: 127.0.0.1", *(f"{k}: {v}" for k, v in headers.items())]
+        client.sendall("\r\n".join([*lines, "", ""]).encode())
+        client.setblocking(False)
+        clients.append(client)
+        return client
+
+    yield connect
+    for client in clients:
+        client.close()
+
+
+@pytest.fixture
 def idle_strangers(port: Port) -> Iterator[Callable[[int], list[socket.socket]]]:
     """Opens so many connections that say nothing; their own ends take none of the low descriptors."""
     limits = resource.getrlimit(resource.RLIMIT_NOFILE)
@@ -141,8 +161,8 @@ def port(loop: Any, service: Any, tmp_path: Path) -> Iterator[Port]:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         free = int(probe.getsockname()[1])
-    given = {"port": free, "token": TOKEN, "scripts_path": str(tmp_path / "scripts")}
-    service.settings = ApiModuleSettings(given, environ={}).snapshot()
+    keywords = {"port": free, "token": TOKEN, "scripts_path": str(tmp_path / "scripts")}
+    service.settings = ApiModuleSettings(keywords, environ={}).snapshot()
     service.scripts = Scripts(service.host, service.settings)
     server = ApiServer(service)
     loop.run(server.start())

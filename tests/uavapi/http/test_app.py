@@ -68,7 +68,7 @@ def test_wrong_method_is_405_with_those_that_are_allowed(
     assert answer.status == 405
     assert set(answer.headers["Allow"].split(",")) == set(allowed.split(","))
     assert isinstance(answer.body["detail"], str)
-    assert flying.got == []
+    assert flying.received == []
 
 
 @pytest.mark.parametrize("data", ["{", "x=1", "", "[1, 2]", '"text"', "null", b"\xff\xfe{}", '{"x": 1,}', "[" * 5000])
@@ -202,9 +202,9 @@ def test_descriptors_are_those_of_the_port_and_of_every_connection(
     assert server.filenos() == []
     loop.run(server.start())
     assert len(server.filenos()) == 1
-    found = loop.run(count())
-    assert len(set(found)) == 2
-    assert server._sockets[0].fileno() in found
+    descriptors = loop.run(count())
+    assert len(set(descriptors)) == 2
+    assert server._sockets[0].fileno() in descriptors
 
 
 def test_each_vehicle_has_a_port_of_its_own(loop: Any, service: Any, make_drone: Any, listening_on: int) -> None:

@@ -102,9 +102,9 @@ def test_newcomer_hears_of_each_job_that_runs_and_of_the_newest(flying: Any, hea
     (old,) = api.service.host.jobs.running()
     for _ in range(JOBS_TOLD_FIRST + 5):
         assert api.post("/command/set_air_speed?new_v=5").status in (200, 429)
-    told = named(hear(event="job")(), "job")
-    assert [job["job"] for job in told if job["state"] == "running"] == [old.id]
-    assert len(told) == JOBS_TOLD_FIRST + 1
+    jobs = named(hear(event="job")(), "job")
+    assert [job["job"] for job in jobs if job["state"] == "running"] == [old.id]
+    assert len(jobs) == JOBS_TOLD_FIRST + 1
     drive.cancel()
 
 

@@ -116,7 +116,7 @@ def test_value_that_is_out_of_range_is_422_and_nothing_is_sent(
     assert answer.body["code"] == "invalid"
     assert isinstance(answer.body["detail"], list)
     assert set(answer.body["detail"][0]) == {"loc", "msg", "type"}
-    assert drone.got == []
+    assert drone.received == []
 
 
 def test_unknown_parameters_are_ignored(api: Any, drone: Any) -> None:
@@ -178,7 +178,7 @@ def test_lost_link_is_503_link_lost(api: Any, loop: Any, drone: Any) -> None:
     loop.pass_time(6.0)
     answer = api.get("/command/arm")
     assert (answer.status, answer.body["code"]) == (503, "link_lost")
-    assert drone.got == []
+    assert drone.received == []
 
 
 @pytest.mark.parametrize("path", ["takeoff", "land", "rtl", "brake"])

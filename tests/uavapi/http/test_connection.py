@@ -59,8 +59,8 @@ def test_tls_handshake_that_stops_half_way_is_given_up_and_holds_up_nobody(
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         free = int(probe.getsockname()[1])
-    given = {"port": free, "certfile": cert, "keyfile": key}
-    service.settings = ApiModuleSettings(given, environ={}).snapshot()
+    keywords = {"port": free, "certfile": cert, "keyfile": key}
+    service.settings = ApiModuleSettings(keywords, environ={}).snapshot()
     server = ApiServer(service)
     port = Port(loop, server, free)
 

@@ -19,7 +19,7 @@ def three(make_drone: Any, loop: Any) -> list[Any]:
 
 
 def commands(drone: Any) -> list[int]:
-    return [message.command for message in drone.got if message.get_type() == "COMMAND_LONG"]
+    return [message.command for message in drone.received if message.get_type() == "COMMAND_LONG"]
 
 
 def test_one_verb_for_all_with_an_answer_of_each(three: Any, api: Any) -> None:
@@ -57,7 +57,7 @@ def test_what_one_cannot_do_is_in_its_answer_and_the_others_do_it(three: Any, ap
 def test_each_has_values_of_its_own(three: Any, api: Any) -> None:
     body = {"x": 0, "y": 0, "z": -20, "each": {"2": {"x": 40}, "3": {"x": 60, "z": -30}}}
     assert api.post("/fleet/go_to_ned", body).status == 200
-    targets = [next(m for m in drone.got if m.get_type() == "SET_POSITION_TARGET_LOCAL_NED") for drone in three]
+    targets = [next(m for m in drone.received if m.get_type() == "SET_POSITION_TARGET_LOCAL_NED") for drone in three]
     assert [(target.x, target.z) for target in targets] == [(0, -20), (40, -20), (60, -30)]
 
 

@@ -18,10 +18,10 @@ from tests.support.api_port import OWNER, Port
 MOST = 200
 
 
-def connection(group: str = "127.0.0.1", **given: Any) -> Any:
+def connection(group: str = "127.0.0.1", **changed: Any) -> Any:
     """A connection that has asked for nothing yet."""
     state = dict.fromkeys(("silent", "admitted", "refused", "answering", "closing"), False)
-    return SimpleNamespace(group=group, **{**state, "idle_since": 0.0, **given})
+    return SimpleNamespace(group=group, **{**state, "idle_since": 0.0, **changed})
 
 
 def busy(group: str = "127.0.0.1") -> Any:

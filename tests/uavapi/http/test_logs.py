@@ -100,7 +100,7 @@ def test_armed_vehicle_is_asked_on_purpose_only(api: Any, vehicle: LogVehicle, d
     drone.fly()
     for answer in (api.get("/logs"), api.post("/logs/1/download")):
         assert (answer.status, answer.body["code"]) == (409, "busy")
-    assert vehicle.got == []
+    assert vehicle.received == []
     assert api.get("/logs?while_armed=true").status == 504
     assert api.post("/logs/1/download?while_armed=true").status == 504
     assert api.post("/logs/1/download", {"while_armed": "maybe"}).status == 422

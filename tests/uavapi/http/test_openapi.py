@@ -29,8 +29,8 @@ def described(route: Route, method: str) -> Any:
 
 def leaves(base: type[UavApiError] = UavApiError) -> list[type[UavApiError]]:
     """The errors that are raised: those whose code is a word of the contract."""
-    found = [] if base in (UavApiError, errors.Conflict, errors.Unavailable) else [base]
-    return found + [error for child in base.__subclasses__() for error in leaves(child)]
+    own = [] if base in (UavApiError, errors.Conflict, errors.Unavailable) else [base]
+    return own + [error for child in base.__subclasses__() for error in leaves(child)]
 
 
 OURS = [error for error in leaves() if error.__module__ == "mavproxy_uavapi.core.errors"]

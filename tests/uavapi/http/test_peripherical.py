@@ -28,4 +28,4 @@ def test_servo_output(drone: Any, api: Any, slash: str) -> None:
 )
 def test_servo_out_of_range_is_422_and_nothing_is_sent(drone: Any, api: Any, body: dict[str, Any]) -> None:
     assert api.post("/peripherical/servo_output", body).status == 422
-    assert drone.got == []
+    assert drone.received == []

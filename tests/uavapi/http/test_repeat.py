@@ -226,10 +226,10 @@ class Inner(asyncio.Protocol):
     """aiohttp's protocol, of which only what it gets is seen."""
 
     def __init__(self) -> None:
-        self.got: list[bytes] = []
+        self.received: list[bytes] = []
 
     def data_received(self, data: bytes) -> None:
-        self.got.append(data)
+        self.received.append(data)
 
 
 class Transport(asyncio.Transport):
@@ -276,7 +276,7 @@ def test_connection_answers_again_only_what_came_alone(
         connection.ended()
         connection.data_received(before[-1])
         connection.connection_lost(None)
-        return transport.written, inner.got
+        return transport.written, inner.received
 
-    written, got = loop.run(act())
-    assert (written, got) == (([b"again"], before) if repeated else ([], [*before, before[-1]]))
+    written, received = loop.run(act())
+    assert (written, received) == (([b"again"], before) if repeated else ([], [*before, before[-1]]))

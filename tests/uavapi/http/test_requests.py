@@ -11,16 +11,16 @@ from mavproxy_uavapi.http.requests import parse
 
 
 @pytest.mark.parametrize(
-    ("given", "value"),
+    ("written", "value"),
     [("30", 30), (30, 30), ("30.5", 30.5), (30.5, 30.5), ("30.0", 30.0), ("3e1", 30.0), (30.0, 30.0)],
 )
-def test_numbers_stay_as_the_client_wrote_them(given: Any, value: float) -> None:
-    alt = parse(requests.Takeoff, "query", {"alt": given}).alt  # type: ignore[attr-defined]
+def test_numbers_stay_as_the_client_wrote_them(written: Any, value: float) -> None:
+    alt = parse(requests.Takeoff, "query", {"alt": written}).alt  # type: ignore[attr-defined]
     assert (alt, type(alt)) == (value, type(value))
 
 
 @pytest.mark.parametrize(
-    "given",
+    "written",
     [
         math.nan,
         math.inf,
@@ -39,9 +39,9 @@ def test_numbers_stay_as_the_client_wrote_them(given: Any, value: float) -> None
         "9" * 5000,
     ],
 )
-def test_what_is_no_finite_number_is_invalid(given: Any) -> None:
+def test_what_is_no_finite_number_is_invalid(written: Any) -> None:
     with pytest.raises(Invalid) as caught:
-        parse(requests.Takeoff, "body", {"alt": given})
+        parse(requests.Takeoff, "body", {"alt": written})
     assert caught.value.problems[0]["loc"][:2] == ["body", "alt"]
 
 

@@ -27,9 +27,9 @@ def configured(api: Any, loop: Any, service: Any, tmp_path: Path) -> Any:
     """`configured(**settings)`: the service with those, and its scripts in a folder of the test's."""
     loop.patience = FILE_PATIENCE
 
-    def configure(**given: Any) -> Any:
+    def configure(**keywords: Any) -> Any:
         folders = {"scripts_path": str(tmp_path / "scripts"), "script_logs": str(tmp_path / "logs")}
-        service.settings = ApiModuleSettings({**folders, **given}, environ={}).snapshot()
+        service.settings = ApiModuleSettings({**folders, **keywords}, environ={}).snapshot()
         service.scripts = Scripts(service.host, service.settings)
         return service.scripts
 
@@ -261,7 +261,7 @@ def test_scripts_are_for_this_machine_and_for_the_token(
 
 
 @pytest.mark.parametrize(
-    ("given", "caller", "may"),
+    ("keywords", "caller", "may"),
     [
         ({"token": "t", "allow_from": "10.0.0.0/8"}, Caller(ip_address("10.0.0.5")), False),
         ({"token": "t", "allow_from": "10.0.0.0/8"}, Caller(ip_address("10.0.0.5"), has_token=True), True),
@@ -273,9 +273,9 @@ def test_scripts_are_for_this_machine_and_for_the_token(
     ids=["network", "token", "here", "by a proxy", "named for scripts", "named for flying only"],
 )
 def test_network_that_may_fly_may_not_run_scripts_unless_named_for_that(
-    configured: Any, service: Any, given: dict[str, Any], caller: Caller, may: bool
+    configured: Any, service: Any, keywords: dict[str, Any], caller: Caller, may: bool
 ) -> None:
-    configured(host="0.0.0.0", **given)
+    configured(host="0.0.0.0", **keywords)
     call = SimpleNamespace(service=service, request={CALLER: caller})
     if may:
         assert _scripts(call) is service.scripts  # type: ignore[arg-type]

@@ -1,12 +1,16 @@
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
+from mavproxy_uavapi.tokens import Token
 
 from mavproxy_uavapi.core.errors import Forbidden, Unauthorized
+from mavproxy_uavapi.core.roles import Role
 from mavproxy_uavapi.http.security import check_caller, check_origin, check_page, has_token, is_our_name
 from mavproxy_uavapi.settings import ApiModuleSettings
+from tests.support import tokens
 from tests.support.api_port import Port
 
 HOST = {"Host": "127.0.0.1:8000"}
@@ -83,7 +87,7 @@ def test_every_path_is_403_for_a_page_of_another_site_and_nothing_is_sent(
 ) -> None:
     answer = loop.run(api.ask(method, path, headers=headers))
     assert (answer.status, answer.body["code"]) == (403, "forbidden")
-    assert flying.got == []
+    assert flying.received == []
 
 
 def test_page_of_another_site_may_not_open_a_websocket(flying: Any, api: Any, loop: Any) -> None:
@@ -151,7 +155,7 @@ def test_picture_of_a_foreign_page_commands_nothing_and_may_read_what_it_cannot_
 ) -> None:
     headers = {**CHROMIUM, "Accept": IMAGE}
     assert api.get(path, headers=headers).status == 403
-    assert flying.got == []
+    assert flying.received == []
     assert api.get("/telemetry/gps", headers=headers).status == 200
 
 
@@ -164,15 +168,15 @@ def test_token_or_a_referer_of_ours_lets_a_browser_command(flying: Any, api: Any
 # -- callers ------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("given", ["Bearer t", "bearer  t ", "BEARER t"])
-def test_token_is_known_however_its_scheme_is_written(given: str) -> None:
-    assert has_token(given, "t")
+@pytest.mark.parametrize("header", ["Bearer t", "bearer  t ", "BEARER t"])
+def test_token_is_known_however_its_scheme_is_written(header: str) -> None:
+    assert has_token(header, "t")
 
 
-@pytest.mark.parametrize("given", [None, "", "t", "Bearer", "Bearer T", "Bearer \udcff", "Basic t", "Bearer t t"])
-def test_what_is_no_token_is_none(given: str | None) -> None:
-    assert not has_token(given, "t")
-    assert not has_token(given, "")
+@pytest.mark.parametrize("header", [None, "", "t", "Bearer", "Bearer T", "Bearer \udcff", "Basic t", "Bearer t t"])
+def test_what_is_no_token_is_none(header: str | None) -> None:
+    assert not has_token(header, "t")
+    assert not has_token(header, "")
 
 
 def settings(**given: Any) -> Any:
@@ -194,6 +198,28 @@ def test_network_is_known_however_its_addresses_are_written() -> None:
         check_caller("::ffff:11.0.0.5", {}, settings(token="t", allow_from="10.0.0.0/8"))
     with pytest.raises(Forbidden):
         check_caller(None, {}, settings())
+
+
+def test_setting_token_is_an_admin_without_a_name_and_a_named_one_decides_in_any_network(tmp_path: Path) -> None:
+    file = tokens.write(tmp_path / "tokens", tokens.ALL)
+    both = settings(token="t", tokens=file, allow_from="10.0.0.0/8")
+    named = {b"tower-tower": Token("tower", Role.WATCH, frozenset(), b"")}
+    caller = check_caller("10.0.0.1", tokens.bearer("tower"), both, named.get)
+    assert (caller.role, caller.name, caller.flies(1)) == (Role.WATCH, "tower", False)
+    for headers, remote in (({"Authorization": "Bearer t"}, "11.0.0.1"), ({}, "10.0.0.1")):
+        caller = check_caller(remote, headers, both, named.get)
+        assert (caller.role, caller.name, caller.flies(9)) == (Role.ADMIN, "", True)
+        assert caller.operator.name == remote
+
+
+def test_where_there_is_a_file_nobody_calls_without_a_token(tmp_path: Path) -> None:
+    with_file = settings(tokens=str(tmp_path / "later"), allow_open=True)
+    for remote in ("127.0.0.1", "192.0.2.1"):
+        with pytest.raises(Unauthorized):
+            check_caller(remote, {}, with_file)
+    with pytest.raises(Forbidden):
+        check_caller("192.0.2.1", {}, settings())
+    assert check_caller("127.0.0.1", {}, settings()).role is Role.ADMIN
 
 
 @pytest.mark.parametrize(

@@ -56,7 +56,7 @@ def put(api: Any, name: str, value: Any, **more: Any) -> Any:
 
 
 def listed(api: Any, **more: Any) -> dict[str, Any]:
-    return {one["name"]: one for one in api.get("/settings", **more).body["settings"]}
+    return {setting["name"]: setting for setting in api.get("/settings", **more).body["settings"]}
 
 
 def as_admin() -> dict[str, Any]:
@@ -66,9 +66,9 @@ def as_admin() -> dict[str, Any]:
 def test_each_setting_is_listed_with_what_it_takes_and_secrets_are_not_shown(
     api: Any, settings: ApiModuleSettings
 ) -> None:
-    found = listed(api)
-    assert list(found) == settings.names()
-    assert found["max_age"] == {
+    listing = listed(api)
+    assert list(listing) == settings.names()
+    assert listing["max_age"] == {
         "name": "max_age",
         "value": 5.0,
         "meaning": "s after which telemetry is stale",
@@ -79,9 +79,9 @@ def test_each_setting_is_listed_with_what_it_takes_and_secrets_are_not_shown(
         "origin": "default",
         "settable": True,
     }
-    assert found["on_conflict"]["choices"] == ["refuse", "wait"]
-    assert (found["token"]["value"], found["token"]["settable"]) == ("(set)", False)
-    assert "s3cret" not in str(found)
+    assert listing["on_conflict"]["choices"] == ["refuse", "wait"]
+    assert (listing["token"]["value"], listing["token"]["settable"]) == ("(set)", False)
+    assert "s3cret" not in str(listing)
 
 
 def test_those_of_other_modules_are_listed_without_passwords_and_set_at_the_prompt_only(
@@ -89,10 +89,10 @@ def test_those_of_other_modules_are_listed_without_passwords_and_set_at_the_prom
 ) -> None:
     answer = api.get("/settings").body
     assert list(answer["modules"]) == ["vision"]
-    found = {one["name"]: one for one in answer["modules"]["vision"]}
-    assert list(found) == VISION.names()
-    assert not any(one["settable"] for one in found.values())
-    assert (found["source"]["value"], found["fps"]["value"]) == ("rtsp://eye:***@10.0.0.8/video", 20.0)
+    listing = {setting["name"]: setting for setting in answer["modules"]["vision"]}
+    assert list(listing) == VISION.names()
+    assert not any(setting["settable"] for setting in listing.values())
+    assert (listing["source"]["value"], listing["fps"]["value"]) == ("rtsp://eye:***@10.0.0.8/video", 20.0)
     assert put(api, "fps", 5).status == 404
     assert VISION.snapshot().fps == 20.0
 
@@ -168,7 +168,7 @@ def test_other_caller_of_this_machine_may_set_and_one_of_an_open_network_may_onl
     proxied = {"headers": {"X-Forwarded-For": "10.0.0.9"}}
     api.service.settings = replace(api.service.settings, allow_open=True)
     assert put(api, "max_age", 3, **proxied).status == 403
-    assert not any(one["settable"] for one in listed(api, **proxied).values())
+    assert not any(setting["settable"] for setting in listed(api, **proxied).values())
     assert settings.snapshot().max_age == 5
 
 
@@ -178,10 +178,10 @@ def test_roles(api: Any, settings: ApiModuleSettings, tmp_path: Path, name: str,
     api.service.settings = replace(api.service.settings, tokens=file)
     api.service.tokens.use(file)
     api.service.tokens.take()
-    found = api.get("/settings", headers=tokens.bearer(name))
-    assert found.status == (200 if name else 401)
+    answer = api.get("/settings", headers=tokens.bearer(name))
+    assert answer.status == (200 if name else 401)
     if name:
-        assert any(one["settable"] for one in found.body["settings"]) == (name == "boss")
+        assert any(setting["settable"] for setting in answer.body["settings"]) == (name == "boss")
     assert put(api, "max_age", 3, headers=tokens.bearer(name)).status == status
     assert settings.snapshot().max_age == (3 if status == 200 else 5)
 

@@ -1,92 +1,59 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
-import json
-import socket
-from collections.abc import Callable, Iterator
-from contextlib import suppress
 from typing import Any
 
 import pytest
 from aiohttp import WSCloseCode, WSMsgType
 
-from mavproxy_uavapi.core.errors import TooManyRequests
-from mavproxy_uavapi.http import stream_event
-from mavproxy_uavapi.http.streaming import KEEP_ALIVE, LINGER, MOST_OPEN, UNREAD, SharedSlots
+from mavproxy_uavapi.http.streaming import KEEP_ALIVE
 from mavproxy_uavapi.http.subscription import QUEUED
-from mavproxy_uavapi.http.telemetry_views import fields
+from tests.support.stream_clients import UPGRADE, bytes_until, server_sent_events, socket_events
 
-
-async def socket_events(api: Any, query: str, count: int) -> list[dict[str, Any]]:
-    """The first events of a WebSocket."""
-    async with api.client.ws_connect(f"/telemetry/stream{query}") as socket:
-        return [json.loads((await socket.receive()).data) for _ in range(count)]
-
-
-async def server_sent_events(api: Any, query: str, count: int) -> list[dict[str, Any]]:
-    """The first Server-Sent Events, comments left out."""
-    found: list[dict[str, Any]] = []
-    async with api.client.get(f"/telemetry/stream{query}") as response:
-        assert response.status == 200
-        assert response.headers["Content-Type"].startswith("text/event-stream")
-        name = ""
-        async for line in response.content:
-            field, _, value = line.decode().strip().partition(": ")
-            if field == "event":
-                name = value
-            elif field == "data":
-                found.append(json.loads(value))
-                assert found[-1]["name"] == name
-            if len(found) == count:
-                break
-    return found
-
-
-both = pytest.mark.parametrize("events", [socket_events, server_sent_events])
+both = pytest.mark.parametrize("read", [socket_events, server_sent_events])
 
 
 @both
 @pytest.mark.parametrize("slash", ["", "/"])
-def test_messages_come_as_they_arrive(flying: Any, api: Any, loop: Any, events: Any, slash: str) -> None:
-    found = loop.run(events(api, slash, 9))
-    assert {event["name"] for event in found} >= {"HEARTBEAT", "ATTITUDE", "GLOBAL_POSITION_INT"}
-    for event in found:
+def test_messages_come_as_they_arrive(flying: Any, api: Any, loop: Any, read: Any, slash: str) -> None:
+    events = loop.run(read(api, slash, 9))
+    assert {event["name"] for event in events} >= {"HEARTBEAT", "ATTITUDE", "GLOBAL_POSITION_INT"}
+    for event in events:
         assert (event["system"], event["component"], event["dropped"]) == (1, 1, 0)
         assert event["fields"]["mavpackettype"] == event["name"]
-    (position,) = [event["fields"] for event in found if event["name"] == "GLOBAL_POSITION_INT"]
+    (position,) = [event["fields"] for event in events if event["name"] == "GLOBAL_POSITION_INT"]
     assert (position["relative_alt"], position["hdg"]) == (20_000, None)
 
 
 @both
-def test_names_are_a_filter(flying: Any, api: Any, loop: Any, events: Any) -> None:
-    found = loop.run(events(api, "?names=attitude,%20VFR_HUD", 6))
-    assert {event["name"] for event in found} == {"ATTITUDE", "VFR_HUD"}
+def test_names_are_a_filter(flying: Any, api: Any, loop: Any, read: Any) -> None:
+    events = loop.run(read(api, "?names=attitude,%20VFR_HUD", 6))
+    assert {event["name"] for event in events} == {"ATTITUDE", "VFR_HUD"}
 
 
 @both
-def test_system_is_a_filter(flying: Any, make_drone: Any, api: Any, loop: Any, events: Any) -> None:
+def test_system_is_a_filter(flying: Any, make_drone: Any, api: Any, loop: Any, read: Any) -> None:
     make_drone(2)
-    found = loop.run(events(api, "?sysid=2", 12))
-    assert {event["system"] for event in found} == {2}
-    found = loop.run(events(api, "?names=ATTITUDE", 4))
-    assert {event["system"] for event in found} == {1, 2}
+    events = loop.run(read(api, "?sysid=2", 12))
+    assert {event["system"] for event in events} == {2}
+    events = loop.run(read(api, "?names=ATTITUDE", 4))
+    assert {event["system"] for event in events} == {1, 2}
 
 
 @both
-def test_several_vehicles_are_a_filter(flying: Any, make_drone: Any, api: Any, loop: Any, events: Any) -> None:
+def test_several_vehicles_are_a_filter(flying: Any, make_drone: Any, api: Any, loop: Any, read: Any) -> None:
     for system in (2, 3):
         make_drone(system)
-    found = loop.run(events(api, "?names=ATTITUDE&vehicles=1,%203", 12))
-    assert {event["system"] for event in found} == {1, 3}
-    found = loop.run(events(api, "?names=ATTITUDE&vehicles=3&sysid=2", 12))
-    assert {event["system"] for event in found} == {2, 3}
+    events = loop.run(read(api, "?names=ATTITUDE&vehicles=1,%203", 12))
+    assert {event["system"] for event in events} == {1, 3}
+    events = loop.run(read(api, "?names=ATTITUDE&vehicles=3&sysid=2", 12))
+    assert {event["system"] for event in events} == {2, 3}
 
 
 @both
-def test_rate_is_a_limit_for_each_name(flying: Any, api: Any, loop: Any, events: Any) -> None:
+def test_rate_is_a_limit_for_each_name(flying: Any, api: Any, loop: Any, read: Any) -> None:
     started = loop.time()
-    loop.run(events(api, "?names=ATTITUDE&rate=1", 4))
+    loop.run(read(api, "?names=ATTITUDE&rate=1", 4))
     assert loop.time() - started >= 3.0
 
 
@@ -110,8 +77,8 @@ def test_filter_that_makes_no_sense_is_422(api: Any, query: str) -> None:
 
 
 @both
-def test_client_that_leaves_is_forgotten(flying: Any, api: Any, loop: Any, host: Any, events: Any) -> None:
-    loop.run(events(api, "", 3))
+def test_client_that_leaves_is_forgotten(flying: Any, api: Any, loop: Any, host: Any, read: Any) -> None:
+    loop.run(read(api, "", 3))
     api.until(lambda: not host.listeners)
 
 
@@ -164,210 +131,9 @@ def test_client_is_not_expected_to_say_anything(flying: Any, api: Any, loop: Any
     assert loop.run(talk()) is WSMsgType.TEXT
 
 
-# -- clients that do not behave ---------------------------------------------------------------------------
-
-
-@pytest.fixture
-def unread(api: Any, loop: Any) -> Iterator[Callable[..., socket.socket]]:
-    """A client that asks for a stream and reads nothing: `unread(path, header=value)`."""
-    clients: list[socket.socket] = []
-
-    def connect(path: str = "/telemetry/stream", **headers: str) -> socket.socket:
-        client = socket.socket()
-        client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-        client.connect(("127.0.0.1", api.client.port))
-        lines = [f"GET {path} HTTP/1.1", "Host: 127.0.0.1", *(f"{k}: {v}" for k, v in headers.items())]
-        client.sendall("\r\n".join([*lines, "", ""]).encode())
-        client.setblocking(False)
-        clients.append(client)
-        return client
-
-    yield connect
-    for client in clients:
-        client.close()
-
-
-UPGRADE = {
-    "Upgrade": "websocket",
-    "Connection": "Upgrade",
-    "Sec-WebSocket-Version": "13",
-    "Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA==",
-    "Sec-WebSocket-Extensions": "permessage-deflate",
-}
-
-
-async def everything(loop: Any, client: socket.socket) -> bytes:
-    """What is sent to a client until its connection is closed."""
-    data = b""
-    while chunk := await loop.sock_recv(client, 1 << 16):
-        data += chunk
-    return data
-
-
-def pour(api: Any, loop: Any, msg: Any, count: int) -> None:
-    """Let so many long messages arrive, with a breath after each hundred."""
-    for number in range(count):
-        api.service.host.bridge.feed(msg("statustext", text=f"{number:050d}"))
-        if number % 100 == 99:
-            api.service.host.bridge.turn()
-            loop.settle()
-
-
-@pytest.fixture
-def encodings(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """The names of the messages that were encoded."""
-    found: list[str] = []
-
-    def counting(message: Any) -> dict[str, Any]:
-        found.append(message.get_type())
-        return fields(message)
-
-    monkeypatch.setattr(stream_event, "fields", counting)
-    return found
-
-
-def test_message_is_encoded_once_for_all_clients(
-    flying: Any, api: Any, loop: Any, unread: Any, msg: Any, encodings: list[str]
-) -> None:
-    clients = [unread("/telemetry/stream?names=STATUSTEXT") for _ in range(5)]
-    clients += [unread("/telemetry/stream?names=STATUSTEXT&rate=1000", **UPGRADE) for _ in range(5)]
-    api.until(lambda: api.service.streams.count == 10)
-    api.service.host.bridge.feed(msg("statustext", text="hello"))
-    api.service.host.bridge.turn()
-
-    async def greeted() -> bool:
-        return all([b"hello" in await until(loop, client, b"hello") for client in clients])
-
-    assert loop.run(greeted())
-    assert encodings == ["STATUSTEXT"]
-
-
-async def until(loop: Any, client: socket.socket, text: bytes) -> bytes:
-    """What is sent to a client until that comes."""
-    data = b""
-    while text not in data:
-        data += await loop.sock_recv(client, 1 << 16)
-    return data
-
-
-def test_what_nobody_reads_is_not_encoded(
-    flying: Any, api: Any, loop: Any, unread: Any, msg: Any, encodings: list[str]
-) -> None:
-    for _ in range(3):
-        unread("/telemetry/stream?names=STATUSTEXT")
-    api.until(lambda: api.service.streams.count == 3)
-    pour(api, loop, msg, 3000)  # fills what the sockets hold
-    encodings.clear()
-    pour(api, loop, msg, 500)
-    assert encodings == []
-
-
-@pytest.mark.parametrize(("headers", "says"), [({}, b"event: end"), (UPGRADE, b"\x03\xf0nothing was read")])
-def test_client_that_reads_nothing_is_dropped_and_gets_the_reason(
-    flying: Any, api: Any, loop: Any, host: Any, unread: Any, msg: Any, headers: dict[str, str], says: bytes
-) -> None:
-    client = unread("/telemetry/stream?names=STATUSTEXT", **headers)
-    api.until(lambda: host.listeners)
-    began = loop.time()
-    pour(api, loop, msg, 3000)
-    loop.pass_time(UNREAD - 2.0)
-    assert host.listeners
-    api.until(lambda: not host.listeners)
-    assert loop.time() - began == pytest.approx(UNREAD, abs=2.0)
-    data = loop.run(everything(loop, client))
-    assert says in data
-    assert b"nothing was read for 30 s" in data[-200:]
-
-
-def test_client_that_reads_slowly_is_kept(flying: Any, api: Any, loop: Any, host: Any, unread: Any, msg: Any) -> None:
-    client = unread("/telemetry/stream?names=STATUSTEXT")
-    api.until(lambda: host.listeners)
-
-    async def read_slowly() -> None:
-        for _ in range(10):
-            await asyncio.sleep(UNREAD / 2)
-            for _ in range(30):
-                with suppress(BlockingIOError):
-                    client.recv(4096)
-                await asyncio.sleep(0.001)
-
-    pour(api, loop, msg, 3000)
-    loop.run(read_slowly())
-    assert host.listeners
-
-
-def test_slow_reader_with_a_rate_gets_little_that_is_old(
-    flying: Any, api: Any, loop: Any, host: Any, unread: Any, msg: Any
-) -> None:
-    client = unread("/telemetry/stream?names=STATUSTEXT&rate=100")
-    api.until(lambda: host.listeners)
-    for number in range(1000):  # for 20 s, of which it reads nothing
-        host.bridge.feed(msg("statustext", text=f"{number:050d}"))
-        host.bridge.turn()
-        loop.pass_time(0.02)
-    data = loop.run(until(loop, client, f"{999:050d}".encode()))
-    assert data.count(b"event: STATUSTEXT") < 300  # what fills the buffers on the way, and the newest
-    assert b'"dropped": 0' in data[-400:]
-
-
-def test_client_that_never_reads_holds_no_connection(
-    flying: Any, api: Any, loop: Any, host: Any, unread: Any, msg: Any
-) -> None:
-    client = unread("/telemetry/stream?names=STATUSTEXT")
-    api.until(lambda: host.listeners)
-    pour(api, loop, msg, 3000)
-    loop.pass_time(UNREAD + LINGER + 5.0)
-    assert b"event: end" not in loop.run(everything(loop, client))
-
-
-def test_streams_beyond_a_callers_share_are_429_and_a_place_is_free_again(
-    flying: Any, api: Any, loop: Any, unread: Any
-) -> None:
-    share = MOST_OPEN // 2
-    clients = [unread("/telemetry/stream?names=HEARTBEAT") for _ in range(share)]
-    api.until(lambda: api.service.streams.count == share)
-    refused = api.get("/telemetry/stream")
-    assert (refused.status, refused.body["code"]) == (429, "too_many_requests")
-    assert refused.body["detail"] == f"{share} streams are open to this caller already; {share} are left for others"
-    clients[0].close()
-    api.until(lambda: api.service.streams.count < share)
-    assert loop.run(server_sent_events(api, "", 1))
-
-
-def test_script_that_leaves_its_streams_open_keeps_no_page_of_its_machine_from_one(
-    flying: Any, api: Any, unread: Any
-) -> None:
-    for _ in range(MOST_OPEN // 2 + 5):
-        unread("/telemetry/stream?names=HEARTBEAT")
-    api.until(lambda: api.service.streams.count == MOST_OPEN // 2)
-    unread("/telemetry/stream?names=HEARTBEAT", **{"User-Agent": "Mozilla/5.0"})
-    api.until(lambda: api.service.streams.count == MOST_OPEN // 2 + 1)
-
-
-def test_no_few_callers_take_all_places() -> None:
-    slots = SharedSlots(120, "streams are open")
-    with contextlib.ExitStack() as taken:
-        for who in ("first", "second", "third", "newcomer"):
-            with pytest.raises(TooManyRequests, match=r"to this caller already"):
-                while True:
-                    taken.enter_context(slots.one_more_of(who))
-        assert slots.count == 60 + 30 + 15 + 8
-    assert (slots.count, slots._taken) == (0, {})
-
-
-def test_places_that_are_all_taken_are_refused_to_anybody() -> None:
-    slots = SharedSlots(3, "streams are open")
-    with contextlib.ExitStack() as taken:
-        for who in ("first", "second", "third"):
-            taken.enter_context(slots.one_more_of(who))
-        for who in ("first", "newcomer"):
-            with pytest.raises(TooManyRequests, match=r"3 streams are open already"), slots.one_more_of(who):
-                pass
-
-
 def test_websocket_is_not_compressed(flying: Any, loop: Any, unread: Any) -> None:
     client = unread(**UPGRADE)
-    assert b"deflate" not in loop.run(until(loop, client, b"\r\n\r\n"))
+    assert b"deflate" not in loop.run(bytes_until(loop, client, b"\r\n\r\n"))
 
 
 def test_websocket_that_says_too_much_at_once_is_closed(flying: Any, api: Any, loop: Any, host: Any) -> None:

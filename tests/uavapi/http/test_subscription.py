@@ -29,19 +29,19 @@ def test_reader_that_falls_behind_loses_the_oldest_and_is_told_how_many(loop: An
     for number in range(QUEUED + 25):
         subscription.offer(attitude(msg, number), 1.0)
     assert subscription.dropped == 25
-    got = [number for _ in range(QUEUED // TOGETHER) for number in numbers(take(loop, subscription))]
-    assert got == list(range(25, QUEUED + 25))
+    kept = [number for _ in range(QUEUED // TOGETHER) for number in numbers(take(loop, subscription))]
+    assert kept == list(range(25, QUEUED + 25))
 
 
 def test_rate_lets_the_first_through_and_counts_components_apart(loop: Any, msg: Any) -> None:
     subscription = Subscription(Wishes(Names("*"), rate=2.0))
-    told = []
+    passed = []
     for tenth in range(11):
         for component in (1, 154):
             subscription.offer(attitude(msg, tenth, component=component), tenth / 10)
         if tenth % 5 == 0:
-            told += numbers(take(loop, subscription))
-    assert told == [0, 0, 5, 5, 10, 10]
+            passed += numbers(take(loop, subscription))
+    assert passed == [0, 0, 5, 5, 10, 10]
 
 
 def test_of_what_comes_too_often_the_newest_is_passed_on_when_its_time_has_come(loop: Any, msg: Any) -> None:
@@ -65,12 +65,12 @@ def test_slow_reader_with_a_rate_gets_the_newest_of_each_and_every_event(loop: A
             subscription.offer(attitude(msg, second, system=system), float(second))
         if second in (10, 20):
             subscription.offer(Event("event", "mode", 1, THEN, lambda second=second: {"info": second}), float(second))
-    told = [json.loads(event.json(0)) for event in take(loop, subscription)]
-    assert [(one["system"], one["fields"]["time_boot_ms"]) for one in told[:2]] == [
+    bodies = [json.loads(event.json(0)) for event in take(loop, subscription)]
+    assert [(body["system"], body["fields"]["time_boot_ms"]) for body in bodies[:2]] == [
         (1, 3 * QUEUED - 1),
         (2, 3 * QUEUED - 1),
     ]
-    assert [one["info"] for one in told[2:]] == [10, 20]
+    assert [body["info"] for body in bodies[2:]] == [10, 20]
     assert subscription.dropped == 0
 
 
@@ -103,7 +103,7 @@ def test_event_of_no_vehicle_is_for_those_who_want_one(loop: Any) -> None:
 def test_event_tells_each_client_what_that_has_lost(msg: Any) -> None:
     event = of_message(msg("attitude", roll=float("nan"), system=3), When(12.3456, 7.0))
     for dropped in (0, 7):
-        told = json.loads(event.json(dropped))
-        assert (told["dropped"], told["system"], told["name"], told["time"]) == (dropped, 3, "ATTITUDE", 12.346)
-        assert told["clock"] == 7.0
-        assert told["fields"]["roll"] is None
+        body = json.loads(event.json(dropped))
+        assert (body["dropped"], body["system"], body["name"], body["time"]) == (dropped, 3, "ATTITUDE", 12.346)
+        assert body["clock"] == 7.0
+        assert body["fields"]["roll"] is None

@@ -47,7 +47,7 @@ def test_path_of_a_vehicle_means_that_vehicle(two: Any, api: Any, loop: Any) -> 
     first, second = two
     assert api.get("/vehicles/1/command/arm/").status == 200
     assert (first.armed, second.mode) == (True, "GUIDED")
-    assert "COMMAND_LONG" not in {message.get_type() for message in second.got}
+    assert "COMMAND_LONG" not in {message.get_type() for message in second.received}
 
 
 def test_a_vehicle_that_was_not_heard_is_503(two: Any, api: Any) -> None:

@@ -19,8 +19,8 @@ def test_module_settings_survive_mavproxys_splitting():
 
 
 def test_mavproxy_command_for_a_real_vehicle():
-    given = RunOptions(port=8001, sysid=3, gradys_gs="10.0.2.5:8000", module=("vision",), mavproxy_args=("--map",))
-    line = command_lines.mavproxy_command(given, ["mavproxy.py"], Path("/run"), [], None)
+    options = RunOptions(port=8001, sysid=3, gradys_gs="10.0.2.5:8000", module=("vision",), mavproxy_args=("--map",))
+    line = command_lines.mavproxy_command(options, ["mavproxy.py"], Path("/run"), [], None)
     assert line[:4] == [
         *("mavproxy.py", "--master=udpin:127.0.0.1:17171", "--target-system=3", "--logfile=/run/mav.tlog")
     ]
@@ -35,25 +35,25 @@ def test_mavproxy_command_for_a_real_vehicle():
 
 
 @pytest.mark.parametrize(
-    ("given", "expected"),
+    ("options", "expected"),
     [
         (RunOptions(connection_type="udpout"), "udpout:127.0.0.1:17171"),
         (RunOptions(connection_type="tcp", uav_connection="10.0.0.1:5760"), "tcp:10.0.0.1:5760"),
         (RunOptions(connection_type="usb", uav_connection="/dev/ttyACM0,57600"), "/dev/ttyACM0,57600"),
     ],
 )
-def test_link_to_the_vehicle(given, expected):
-    assert command_lines.masters(given, []) == [expected]
+def test_link_to_the_vehicle(options, expected):
+    assert command_lines.masters(options, []) == [expected]
 
 
 def test_each_simulated_vehicle_has_a_link():
-    given = RunOptions(simulated=True, count=2)
-    assert command_lines.masters(given, simulated(2, 5)) == ["tcp:127.0.0.1:5780", "tcp:127.0.0.1:5810"]
+    options = RunOptions(simulated=True, count=2)
+    assert command_lines.masters(options, simulated(2, 5)) == ["tcp:127.0.0.1:5780", "tcp:127.0.0.1:5810"]
 
 
 def test_headless_mavproxy_is_a_daemon_and_forwards():
-    given = RunOptions(headless=True, simulated=True, gs_connection=("1.1.1.1:1",))
-    line = command_lines.mavproxy_command(given, [], Path("/run"), simulated(0), None)
+    options = RunOptions(headless=True, simulated=True, gs_connection=("1.1.1.1:1",))
+    line = command_lines.mavproxy_command(options, [], Path("/run"), simulated(0), None)
     assert "--daemon" in line
     assert "--out=1.1.1.1:1" in line
     assert not any(word.startswith("--sitl") for word in line)
@@ -66,9 +66,9 @@ def test_vehicle_commands():
         "--home=-15.8400810,-47.9266420,1042,30",
     ]
     assert "--battery=1500" in command_lines.embedded_command(RunOptions(battery=1500.0), *simulated(3))
-    given = RunOptions(ardupilot_path="/ap", speedup=5.0)
+    options = RunOptions(ardupilot_path="/ap", speedup=5.0)
     plane = simulated(1, kind="plane", sysid=7)[0]
-    sitl = command_lines.sim_vehicle_command(given, "python3", plane, Path("/run/vehicle"))
+    sitl = command_lines.sim_vehicle_command(options, "python3", plane, Path("/run/vehicle"))
     assert sitl[:2] == ["python3", "/ap/Tools/autotest/sim_vehicle.py"]
     assert {"--vehicle=ArduPlane", "--instance=1", "--sysid=7", "--speedup=5", "--no-mavproxy"} < set(sitl)
 
@@ -82,12 +82,12 @@ def test_settings_without_a_keyword_travel_by_file():
 
 def test_token_is_on_no_command_line_and_in_no_greeting(monkeypatch):
     monkeypatch.setenv("UAVAPI_TOKEN", "very-secret")
-    given = RunOptions(simulated=True, host="0.0.0.0", scripts_path="/s")
+    options = RunOptions(simulated=True, host="0.0.0.0", scripts_path="/s")
     lines = [
-        *command_lines.mavproxy_command(given, ["m"], Path("/run"), simulated(0), Path("/run/uavapi.ini")),
-        *command_lines.embedded_command(given, *simulated(0)),
-        command_lines.greeting(given, with_token=True),
-        command_lines.settings_file(given) or "",
+        *command_lines.mavproxy_command(options, ["m"], Path("/run"), simulated(0), Path("/run/uavapi.ini")),
+        *command_lines.embedded_command(options, *simulated(0)),
+        command_lines.greeting(options, with_token=True),
+        command_lines.settings_file(options) or "",
     ]
     assert "very-secret" not in " ".join(lines)
     assert environment.for_mavproxy(os.environ)["UAVAPI_TOKEN"] == "very-secret"
@@ -109,18 +109,18 @@ def test_greeting_has_three_lines_to_try_for_a_simulated_vehicle():
 def test_the_modules_own_keys_of_the_file_reach_the_module(tmp_path: Path) -> None:
     file = tmp_path / "uav.ini"
     file.write_text("[api]\nport = 8005\nmax_age = 2\nallow_from = 10.0.0.0/8\n", encoding="utf-8")
-    read = parse(["--config", str(file)], environ={})
-    text = command_lines.settings_file(read)
+    options = parse(["--config", str(file)], environ={})
+    text = command_lines.settings_file(options)
     assert text is not None and "max_age = 2" in text and "allow_from = 10.0.0.0/8" in text
 
 
 def test_module_knows_where_each_setting_came_from(tmp_path: Path) -> None:
     file = tmp_path / "uav.ini"
     file.write_text("[api]\nport = 8005\nsysid = 5\nscript_grace = 20\n", encoding="utf-8")
-    read = parse(["--config", str(file), "--sysid", "7"], environ={"UAVAPI_LOG_PATH": "/l/u.log"})
-    name, given = as_mavproxy_reads(command_lines.module_loads(read, Path("/run/uavapi.ini"))[0])
+    options = parse(["--config", str(file), "--sysid", "7"], environ={"UAVAPI_LOG_PATH": "/l/u.log"})
+    name, keywords = as_mavproxy_reads(command_lines.module_loads(options, Path("/run/uavapi.ini"))[0])
     assert name == "uavapi"
-    assert given["origins"] == {
+    assert keywords["origins"] == {
         "host": "default",
         "port": str(file),
         "sysid": "command line",
@@ -132,8 +132,8 @@ def test_module_knows_where_each_setting_came_from(tmp_path: Path) -> None:
 def test_section_of_the_module_gradys_is_its_own_to_read(tmp_path: Path) -> None:
     file = tmp_path / "uav.ini"
     file.write_text("[api]\ngradys_gs = 10.0.2.5:8000\n[gradys]\nperiod = 2\n", encoding="utf-8")
-    read = parse(["--config", str(file), "--module", "gradys,vision"], environ={})
-    loads = command_lines.module_loads(read, None)
+    options = parse(["--config", str(file), "--module", "gradys,vision"], environ={})
+    loads = command_lines.module_loads(options, None)
     keywords = {"config": str(file), "gs": "10.0.2.5:8000", "origins": {"gs": str(file)}}
     assert as_mavproxy_reads(loads[1]) == ("gradys", keywords)
     assert loads[2:] == ["module load vision"]
@@ -153,8 +153,8 @@ def test_one_file_configures_all_three_modules(tmp_path: Path) -> None:
 def test_keywords_of_a_module_go_with_its_section_and_load_it_once(tmp_path: Path) -> None:
     file = tmp_path / "uav.ini"
     file.write_text("[gradys]\nperiod = 2\n", encoding="utf-8")
-    read = parse(["--config", str(file), "--module", 'gradys:{"period":3}', "--module", 'map:{"a":1}'], environ={})
-    loads = command_lines.module_loads(read, None)
+    options = parse(["--config", str(file), "--module", 'gradys:{"period":3}', "--module", 'map:{"a":1}'], environ={})
+    loads = command_lines.module_loads(options, None)
     assert as_mavproxy_reads(loads[1]) == ("gradys", {"config": str(file), "period": 3})
     assert loads[2:] == ['module load map:{"a":1}']
     with pytest.raises(OptionError, match="--module"):

@@ -9,10 +9,10 @@ from mavproxy_uavapi.launcher.options import RunOptions, parse
 
 
 def test_fleet_has_types_system_ids_and_homes_in_a_row():
-    given = RunOptions(simulated=True, sysid=3, vehicles=(("copter", 2), ("rover", 1)), spacing=10.0)
+    options = RunOptions(simulated=True, sysid=3, vehicles=(("copter", 2), ("rover", 1)), spacing=10.0)
     home = locations.BUILT_IN["CMAC"]
-    vehicles = fleet(given, home, [0, 4, 7])
-    assert [(one.kind, one.sysid, one.instance) for one in vehicles] == [
+    vehicles = fleet(options, home, [0, 4, 7])
+    assert [(vehicle.kind, vehicle.sysid, vehicle.instance) for vehicle in vehicles] == [
         ("copter", 3, 0),
         ("copter", 4, 4),
         ("rover", 5, 7),

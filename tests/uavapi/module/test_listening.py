@@ -1,3 +1,5 @@
+"""When and where the module listens, what it prints of that, and `uavapi start` and `stop`: a part of `module.py`."""
+
 from __future__ import annotations
 
 import asyncio

@@ -1,3 +1,5 @@
+"""`module load uavapi`: what it brings into MAVProxy, and what it refuses: a part of `module.py`."""
+
 from __future__ import annotations
 
 import threading

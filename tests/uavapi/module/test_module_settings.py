@@ -1,3 +1,5 @@
+"""`uavapi set`, `status` and `vehicles` at the prompt, and settings that outlive a reload: a part of `module.py`."""
+
 from __future__ import annotations
 
 import re

@@ -1,3 +1,5 @@
+"""`module unload uavapi`: what it ends, answers and gives back: a part of `module.py`."""
+
 from __future__ import annotations
 
 import threading

@@ -29,7 +29,7 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def fake(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """`fake(tool, text)`: a program of that name on PATH; `.given()` are its arguments."""
+    """`fake(tool, text)`: a program of that name on PATH; what is returned gives its arguments when called."""
     folder = tmp_path / "bin"
     folder.mkdir()
     monkeypatch.setenv("PATH", f"{folder}:/usr/bin:/bin")
@@ -46,10 +46,10 @@ def fake(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
 
 @pytest.mark.parametrize("tool", ["rpicam-still", "libcamera-still"])
 def test_raspberry_cameras_get_microseconds_and_dioptres(temporary: Path, fake: Any, tool: str) -> None:
-    given = fake(tool)
+    arguments = fake(tool)
     picture = asyncio.run(take(tool, Shot(640, 480, 300, focus_distance=0.25, exposure=12.5)))
     assert picture == b"\xff\xd8\xff picture"
-    words = given()
+    words = arguments()
     pairs = dict(zip(words, words[1:], strict=False))
     assert (pairs["--width"], pairs["--height"], pairs["--shutter"]) == ("640", "480", "12500")
     assert pairs["-t"] == "300"
@@ -59,16 +59,16 @@ def test_raspberry_cameras_get_microseconds_and_dioptres(temporary: Path, fake: 
 
 
 def test_without_a_focus_distance_and_an_exposure_the_camera_chooses_them(temporary: Path, fake: Any) -> None:
-    given = fake("rpicam-still")
+    arguments = fake("rpicam-still")
     asyncio.run(take("rpicam-still", Shot(1280, 720, 0)))
-    assert not {"--lens-position", "--autofocus-mode", "--shutter"} & set(given())
-    assert given()[given().index("-t") + 1] == "1"  # 0 would be for ever
+    assert not {"--lens-position", "--autofocus-mode", "--shutter"} & set(arguments())
+    assert arguments()[arguments().index("-t") + 1] == "1"  # 0 would be for ever
 
 
 def test_usb_camera_gets_its_resolution(temporary: Path, fake: Any) -> None:
-    given = fake("fswebcam")
+    arguments = fake("fswebcam")
     asyncio.run(take("fswebcam", SHOT))
-    words = given()
+    words = arguments()
     assert words[words.index("-r") + 1] == "1280x720"
     assert words[words.index("-D") + 1] == "0.15"
     assert "--no-banner" in words

@@ -29,14 +29,14 @@ def make_run(tmp_path: Path) -> Callable[..., runs.Run]:
     def make(text: str = "exit 0", script: str = "a.sh", **changed: Any) -> runs.Run:
         path = tmp_path / script
         path.write_text(text, encoding="utf-8")
-        given: dict[str, Any] = {
+        defaults: dict[str, Any] = {
             "command": ["bash", str(path), *changed.pop("args", [])],
             "cwd": tmp_path,
             "port": 8000,
             "grace": 5.0,
             "environment": {"PATH": "/usr/bin:/bin", "GIVEN": "yes"},
         }
-        return runs.create(tmp_path / "logs", script, [], changed.pop("sysid", 1), **{**given, **changed})
+        return runs.create(tmp_path / "logs", script, [], changed.pop("sysid", 1), **{**defaults, **changed})
 
     return make
 

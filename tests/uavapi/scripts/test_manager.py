@@ -25,18 +25,18 @@ class NoRegistry:
         raise NoVehicle("none")
 
 
-def settings(folder: Path, **given: Any) -> Any:
+def settings(folder: Path, **keywords: Any) -> Any:
     defaults = {"scripts_path": str(folder / "scripts"), "script_logs": str(folder / "logs"), "sysid": 9}
-    return ApiModuleSettings({**defaults, **given}, environ={}).snapshot()
+    return ApiModuleSettings({**defaults, **keywords}, environ={}).snapshot()
 
 
-def scripts_in(folder: Path, **given: Any) -> Scripts:
-    return Scripts(SimpleNamespace(registry=NoRegistry()), settings(folder, **given))  # type: ignore[arg-type]
+def scripts_in(folder: Path, **keywords: Any) -> Scripts:
+    return Scripts(SimpleNamespace(registry=NoRegistry()), settings(folder, **keywords))  # type: ignore[arg-type]
 
 
-def flown(folder: Path, story: Callable[[Scripts], Awaitable[Any]], **given: Any) -> Any:
+def flown(folder: Path, story: Callable[[Scripts], Awaitable[Any]], **keywords: Any) -> Any:
     async def run() -> Any:
-        scripts = scripts_in(folder, **given)
+        scripts = scripts_in(folder, **keywords)
         try:
             return await asyncio.wait_for(story(scripts), 30)
         finally:

@@ -54,8 +54,8 @@ def pieces(ground: Any, number: int, start: int = 0, count: int = WHOLE, seconds
     return [m for m in ground.run(seconds) if m.get_type() == "LOG_DATA"]
 
 
-def bytes_of(found: list[Any]) -> bytes:
-    return b"".join(bytes(m.data[: m.count]) for m in found)
+def bytes_of(messages: list[Any]) -> bytes:
+    return b"".join(bytes(m.data[: m.count]) for m in messages)
 
 
 def test_vehicle_that_never_flew_has_no_log(ground: Any) -> None:
@@ -75,17 +75,17 @@ def test_each_flight_is_a_log(landed: Any) -> None:
 def test_log_is_one_that_pymavlink_reads(landed: Any, tmp_path: Path) -> None:
     file = tmp_path / "1.bin"
     file.write_bytes(landed.simulator.dataflash.logs[0].data)
-    found: dict[str, list[Any]] = {}
+    messages: dict[str, list[Any]] = {}
     log = DFReader.DFReader_binary(str(file))
     while (message := log.recv_msg()) is not None:
-        found.setdefault(message.get_type(), []).append(message)
-    assert set(found) == {"FMT", "MSG", "MODE", "ATT", "GPS"}
-    assert "Copter" in found["MSG"][0].Message
-    assert [m.Mode for m in found["MODE"]] == [4, 5]
-    assert max(m.Alt for m in found["GPS"]) == pytest.approx(594.0, abs=1.0)
-    assert found["GPS"][0].Lat == pytest.approx(-35.363261, abs=1e-6)
-    assert found["ATT"][0].Yaw == pytest.approx(-7.0, abs=0.1)
-    assert found["GPS"][0]._timestamp == pytest.approx(BOOTED_AT + 6.0, abs=1.0)
+        messages.setdefault(message.get_type(), []).append(message)
+    assert set(messages) == {"FMT", "MSG", "MODE", "ATT", "GPS"}
+    assert "Copter" in messages["MSG"][0].Message
+    assert [m.Mode for m in messages["MODE"]] == [4, 5]
+    assert max(m.Alt for m in messages["GPS"]) == pytest.approx(594.0, abs=1.0)
+    assert messages["GPS"][0].Lat == pytest.approx(-35.363261, abs=1e-6)
+    assert messages["ATT"][0].Yaw == pytest.approx(-7.0, abs=0.1)
+    assert messages["GPS"][0]._timestamp == pytest.approx(BOOTED_AT + 6.0, abs=1.0)
     log.close()
 
 

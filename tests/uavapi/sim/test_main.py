@@ -1,4 +1,4 @@
-"""The real process over real sockets."""
+"""`python -m mavproxy_uavapi.sim`: the real process over real sockets."""
 
 import contextlib
 import json

@@ -1,4 +1,4 @@
-"""Whatever a ground station sends, the vehicle neither dies nor flies to a place that is not a number."""
+"""Whatever a ground station sends, the copter neither dies nor flies to a place that is not a number."""
 
 import itertools
 import math

@@ -1,4 +1,4 @@
-"""Whatever a ground station sends, no type of vehicle dies or goes to a place that is not a number."""
+"""Whatever a ground station sends, no vehicle of another type dies or goes to a place that is not a number."""
 
 import itertools
 import math

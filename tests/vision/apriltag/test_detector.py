@@ -34,9 +34,9 @@ def test_each_family_is_found_where_it_lies(name):
 
 @pytest.mark.parametrize("height", [0.6, 1.5, 3.0, 5.0])
 def test_range_is_right(height):
-    detector = Detector(MODEL, DetectorOptions(("25h9",), {0: SIZE}))
-    found = [detector.detect(frame(height, tags=(PlacedTag("25h9", 0, SIZE, 0, 0),), seed=seed)) for seed in range(5)]
-    ranges = [seen.distance for detections in found for seen in detections]
+    detector, tags = Detector(MODEL, DetectorOptions(("25h9",), {0: SIZE})), (PlacedTag("25h9", 0, SIZE, 0, 0),)
+    images = [frame(height, tags=tags, seed=seed) for seed in range(5)]
+    ranges = [seen.distance for image in images for seen in detector.detect(image)]
     assert len(ranges) == 5
     assert np.mean(ranges) == pytest.approx(height, abs=0.05)
 
@@ -63,8 +63,8 @@ def test_only_selected_ids_are_detected_unless_all_are_selected():
 
 def test_several_families_at_once():
     image = frame(tags=(PlacedTag("36h11", 0, SIZE, 0, -0.3), PlacedTag("16h5", 0, SIZE, 0, 0.3)))
-    seen = Detector(MODEL, DetectorOptions(("36h11", "16h5"), {0: SIZE})).detect(image)
-    assert {(one.family, one.id) for one in seen} == {("36h11", 0), ("16h5", 0)}
+    detections = Detector(MODEL, DetectorOptions(("36h11", "16h5"), {0: SIZE})).detect(image)
+    assert {(tag.family, tag.id) for tag in detections} == {("36h11", 0), ("16h5", 0)}
 
 
 @pytest.mark.parametrize("name", ["36h11", "25h9", "16h5", "36h10"])
@@ -101,8 +101,8 @@ def test_the_far_setting_sees_farther():
 def test_each_tag_is_reported_once_however_often_it_is_detected(apart):
     tags = (PlacedTag("36h11", 0, SIZE, 0, 0), PlacedTag("36h11", 0, SIZE, 0, apart))
     for height in (1.5, 4.0):
-        seen = Detector(MODEL, DetectorOptions(sizes={0: SIZE}, far=True)).detect(frame(height, tags=tags))
-        assert sorted(one.position[0] for one in seen) == pytest.approx([0, apart], abs=0.02)
+        detections = Detector(MODEL, DetectorOptions(sizes={0: SIZE}, far=True)).detect(frame(height, tags=tags))
+        assert sorted(tag.position[0] for tag in detections) == pytest.approx([0, apart], abs=0.02)
 
 
 @pytest.mark.parametrize("exposure", [0.3, 0.15, 0.1])

@@ -19,14 +19,14 @@ from tests.support.pictures import png_header
 def test_calibration_from_rendered_chessboards(tmp_path, boards):
     true = CameraModel(640, 480, 610.0, 605.0, 325.0, 236.0, (-0.1, 0.02, 0.0, 0.0, 0.0))
     boards.draw(tmp_path, true)
-    made = calibrate(tmp_path, Board.parse("chessboard:10x7:0.03"))
-    assert made.views >= 5
-    assert made.error < 0.3
-    assert made.model.fx == pytest.approx(610, rel=0.01)
-    assert made.model.fy == pytest.approx(605, rel=0.01)
-    save(made.model, tmp_path / "camera.json")
-    assert load(tmp_path / "camera.json") == made.model
-    assert VisionModuleSettings({"calibration": str(tmp_path / "camera.json")}).snapshot().model == made.model
+    calibrated = calibrate(tmp_path, Board.parse("chessboard:10x7:0.03"))
+    assert calibrated.views >= 5
+    assert calibrated.error < 0.3
+    assert calibrated.model.fx == pytest.approx(610, rel=0.01)
+    assert calibrated.model.fy == pytest.approx(605, rel=0.01)
+    save(calibrated.model, tmp_path / "camera.json")
+    assert load(tmp_path / "camera.json") == calibrated.model
+    assert VisionModuleSettings({"calibration": str(tmp_path / "camera.json")}).snapshot().model == calibrated.model
 
 
 def calibration(**changed):

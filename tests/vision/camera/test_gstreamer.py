@@ -34,12 +34,12 @@ def test_a_pipeline_ends_in_grey_frames_of_our_size():
 
 def frames(source, count):
     """So many frames of a source, within ten seconds."""
-    found, until = [], time.monotonic() + 10
-    while len(found) < count and time.monotonic() < until:
+    frames, until = [], time.monotonic() + 10
+    while len(frames) < count and time.monotonic() < until:
         frame = source.read()
         if frame is not None:
-            found.append(frame)
-    return found
+            frames.append(frame)
+    return frames
 
 
 @needs_gstreamer

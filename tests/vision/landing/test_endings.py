@@ -1,4 +1,7 @@
-"""Every flight, ended in every way."""
+"""How each flight of vision ends in each way: a table of flights by ends, each flown in lock step.
+
+An end is the work of `landing/`, and of the core's jobs and `endings.py`; none of them has the whole table.
+"""
 
 from __future__ import annotations
 
@@ -119,8 +122,8 @@ def test_what_follows_a_flight_is_what_the_table_says(lockstep, name, end):
     if name == "landing_target":
         assert plnd(rig) == rig.before
     flown = [m for m in rig.wire.sent[mark:] if m.get_type() in ("SET_POSITION_TARGET_LOCAL_NED", "LANDING_TARGET")]
-    rest = [m for m in flown if m.get_type() == "LANDING_TARGET" or (m.vx, m.vy, m.vz) != (0, 0, 0)]
-    assert end == "another search" or not rest
+    moving = [m for m in flown if m.get_type() == "LANDING_TARGET" or (m.vx, m.vy, m.vz) != (0, 0, 0)]
+    assert end == "another search" or not moving
     switched = {m.param2 for m in sent(rig, "COMMAND_LONG", mark) if m.command == SWITCH_MODE}
     assert switched <= {MODES.get(mode)}
 

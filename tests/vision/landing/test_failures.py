@@ -1,4 +1,7 @@
-"""What goes wrong in flight, each with the action expected and a control that shows that the test can fail."""
+"""What goes wrong in a landing, each with the action expected and a control that shows that the test can fail.
+
+The whole of `landing/` flies here in lock step; tests/end_to_end/test_vision_failures.py flies the same in real time.
+"""
 
 from __future__ import annotations
 
@@ -10,21 +13,13 @@ import pytest
 from mavproxy_uavapi.core.errors import LinkLost, ModeChanged
 from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_vision.errors import LandingFailed
-
-TAG = "0:0.30@0.8,-0.6"  # m north and east of home, above which the vehicle takes off
-SMALL = {"width": 320, "height": 240, "fps": 12.0, "sim_noise": 3.0, "sim_jitter": 0.0}
+from tests.support.landing import FAR_TAG, LARGE, SWITCH_MODE, TAG, sent
 
 
 @pytest.fixture
-def flying(lockstep: Any) -> Any:
-    """A vehicle some metres above home: `flying(alt=6, sim_tags=…)`."""
-
-    def make(alt: float = 4.0, **settings: Any) -> Any:
-        rig = lockstep(**{"sim_tags": TAG, **SMALL, **settings})
-        rig.start(alt)
-        return rig
-
-    return make
+def flying(flying: Any) -> Any:
+    """As all tests of landings have it, but lower: `flying(alt=6, sim_tags=…)`."""
+    return lambda alt=4.0, **settings: flying(alt, **settings)
 
 
 def landed_off(rig: Any, north: float = 0.8, east: float = -0.6) -> float:
@@ -36,7 +31,7 @@ def landed_off(rig: Any, north: float = 0.8, east: float = -0.6) -> float:
 
 def setpoints(rig: Any, since: int = 0) -> list[Any]:
     """Velocity setpoints that the vehicle got since the message of that number."""
-    return [m for m in rig.wire.sent[since:] if m.get_type() == "SET_POSITION_TARGET_LOCAL_NED"]
+    return sent(rig, "SET_POSITION_TARGET_LOCAL_NED", since)
 
 
 def below(height: float) -> Any:
@@ -87,7 +82,7 @@ def test_two_tags_with_different_ids_are_no_matter(flying):
 
 @pytest.mark.parametrize("height", [6, 3])
 def test_a_tag_lost_high_up_is_held_for_then_climbed_for_then_searched(flying, height):
-    rig = flying(alt=height + 1.0, attempts=3, leash=4.0, tags="0:0.6", sim_tags="0:0.6@0.8,-0.6")
+    rig = flying(alt=height + 1.0, attempts=3, leash=4.0, **LARGE)
     rig.eye.blind = below(height)
     phases: list[str] = []
     tops: list[float] = []
@@ -159,14 +154,14 @@ def test_a_camera_turned_from_what_mount_says_is_noticed(flying, mount):
 
 @pytest.mark.parametrize("burst", [0.2, 0.4])
 def test_a_machine_that_hears_of_the_vehicle_in_bursts_does_not_suspect_the_mount(flying, burst):
-    rig = flying(alt=5.0, sim_tags="0:0.30@1.6,-1.2")
+    rig = flying(alt=5.0, sim_tags=FAR_TAG)
     rig.burst = burst
     assert rig.outcome(rig.land()).startswith("Landed on tag 0")
     assert landed_off(rig, 1.6, -1.2) < 0.2
 
 
 def test_a_turned_camera_is_noticed_on_a_busy_machine_too(flying):
-    rig = flying(alt=5.0, sim_tags="0:0.30@1.6,-1.2")
+    rig = flying(alt=5.0, sim_tags=FAR_TAG)
     rig.burst = 0.2
     rig.eye.source.renderer.mount = type(rig.eye.source.renderer.mount)(yaw=180.0)
     assert "mount" in str(rig.outcome(rig.land()))
@@ -195,33 +190,33 @@ NESTED = {"tags": "1:0.08 0:0.5@-0.35,0", "sim_tags": "1:0.08@0.8,-0.6 0:0.5@0.8
 
 def sights(rig: Any) -> list[tuple[float, int]]:
     """Collects height and id of what it descends by."""
-    found: list[tuple[float, int]] = []
+    seen: list[tuple[float, int]] = []
 
     def look() -> None:
         target = rig.tracker.target
         if target is not None and target.last is not None and rig.flights.phase == "descending":
-            found.append((-rig.truth.down, target.last.tag))
+            seen.append((-rig.truth.down, target.last.tag))
 
     rig.each_step.append(look)
-    return found
+    return seen
 
 
 def test_a_small_tag_beside_the_large_one_takes_over_low_down(flying):
     rig = flying(alt=5.0, **NESTED)
-    by = sights(rig)
+    seen = sights(rig)
     assert rig.outcome(rig.land()).startswith("Landed on tag 1")
     assert landed_off(rig) < 0.2
-    assert by[0][1] == 0  # from 5 m the small one cannot be read
-    assert by[-1][1] == 1
-    assert by[-1][0] < 0.6
+    assert seen[0][1] == 0  # from 5 m the small one cannot be read
+    assert seen[-1][1] == 1
+    assert seen[-1][0] < 0.6
 
 
 def test_control_without_the_small_tag_the_last_metre_is_blind(flying):
     rig = flying(alt=5.0, tags="0:0.5", sim_tags="0:0.5@0.8,-0.6")
-    by = sights(rig)
+    seen = sights(rig)
     assert rig.outcome(rig.land()).startswith("Landed on tag 0")
-    assert by[-1][1] == 0
-    assert by[-1][0] > 0.8
+    assert seen[-1][1] == 0
+    assert seen[-1][0] > 0.8
 
 
 def test_occlusion_is_waited_out(flying):
@@ -243,7 +238,7 @@ def test_occlusion_is_waited_out(flying):
 
 
 def test_link_silence_of_four_seconds_is_rested_out(flying):
-    rig = flying(alt=7.5, tags="0:0.6", sim_tags="0:0.6@0.8,-0.6")
+    rig = flying(alt=7.5, **LARGE)
     job = rig.land()
     rig.pass_time(2.0)
     rig.simulator.faults.silence(rig.simulator.copter.now, 4.0, sending=True, receiving=True)
@@ -264,9 +259,9 @@ def test_during_link_silence_it_is_commanded_to_rest(flying):
     rig.pass_time(1.5)
     mark = len(rig.wire.sent)
     rig.pass_time(1.0)
-    reported = setpoints(rig, mark)
-    assert reported
-    assert all(m.vx == m.vy == m.vz == 0 for m in reported)
+    commanded = setpoints(rig, mark)
+    assert commanded
+    assert all(m.vx == m.vy == m.vz == 0 for m in commanded)
 
 
 def test_a_lost_link_ends_the_landing_and_nothing_more_is_sent(flying):
@@ -294,7 +289,7 @@ def test_the_pilots_mode_ends_the_landing_and_nothing_more_is_sent(flying, mode)
     rig.pass_time(3.0)
     assert isinstance(error, ModeChanged)
     assert not setpoints(rig, mark)
-    assert not [m for m in rig.wire.sent[mark:] if m.get_type() == "COMMAND_LONG" and m.command == 176]
+    assert not [m for m in sent(rig, "COMMAND_LONG", mark) if m.command == SWITCH_MODE]
     assert rig.simulator.copter.mode.number == mode
 
 
@@ -369,7 +364,7 @@ def test_landing_target_lands_and_puts_the_parameters_back(flying):
     assert landed_off(rig) < 0.1
     assert during[0] == 1
     assert {name: parameters[name] for name in before} == before
-    assert [m for m in rig.wire.sent if m.get_type() == "LANDING_TARGET" and m.position_valid == 1]
+    assert [m for m in sent(rig, "LANDING_TARGET") if m.position_valid == 1]
 
 
 def test_a_precision_landing_that_was_off_at_boot_asks_for_a_reboot(flying):

@@ -52,11 +52,11 @@ class Point:
 
     @property
     def phases(self) -> list[Phase]:
-        found: list[Phase] = []
+        phases: list[Phase] = []
         for order in self.orders:
-            if not found or found[-1] is not order.phase:
-                found.append(order.phase)
-        return found
+            if not phases or phases[-1] is not order.phase:
+                phases.append(order.phase)
+        return phases
 
 
 def test_it_centres_and_touches_down():

@@ -61,21 +61,21 @@ def test_nothing_is_dated_by_what_comes_no_more():
 
 
 def test_what_happened_in_a_silence_is_not_known():
-    made = history()
-    made.add_attitude(3.0, Attitude(), (0, 0, 0))
-    made.add_motion(3.0, vector(3, 0, -5), vector(1, 0, 0))
-    assert made.attitude(2.0) is None
-    assert made.motion(2.0) is None
-    assert made.attitude(0.9) is not None
+    poses = history()
+    poses.add_attitude(3.0, Attitude(), (0, 0, 0))
+    poses.add_motion(3.0, vector(3, 0, -5), vector(1, 0, 0))
+    assert poses.attitude(2.0) is None
+    assert poses.motion(2.0) is None
+    assert poses.attitude(0.9) is not None
 
 
 def history() -> History:
-    made = History()
+    poses = History()
     for step in range(21):
         at = 0.05 * step
-        made.add_attitude(at, Attitude(0.1 * at, -0.1 * at, math.pi - 0.05 + 0.1 * at), (0.1, -0.1, 0.1))
-        made.add_motion(at, vector(at, 0, -5), vector(1, 0, 0))
-    return made
+        poses.add_attitude(at, Attitude(0.1 * at, -0.1 * at, math.pi - 0.05 + 0.1 * at), (0.1, -0.1, 0.1))
+        poses.add_motion(at, vector(at, 0, -5), vector(1, 0, 0))
+    return poses
 
 
 def test_between_two_messages_it_is_interpolated():
@@ -88,33 +88,33 @@ def test_heading_is_interpolated_across_south():
 
 
 def test_shortly_after_the_newest_it_is_carried_on_and_later_unknown():
-    made = history()
-    assert made.attitude(1.1).roll == pytest.approx(0.11)
-    assert made.motion(1.2).position[0] == pytest.approx(1.2)
-    assert made.attitude(1.5) is None
-    assert made.motion(1.5) is None
-    assert made.attitude(-1) is None
+    poses = history()
+    assert poses.attitude(1.1).roll == pytest.approx(0.11)
+    assert poses.motion(1.2).position[0] == pytest.approx(1.2)
+    assert poses.attitude(1.5) is None
+    assert poses.motion(1.5) is None
+    assert poses.attitude(-1) is None
 
 
 def test_the_way_travelled_does_not_jump_with_the_position():
-    made = history()
-    made.add_motion(1.05, vector(9, 9, -5), vector(1, 0, 0))  # the estimator changed its mind
-    assert made.motion(1.05).travelled[0] == pytest.approx(1.05)
-    assert made.motion(1.05).position[0] == pytest.approx(9)
+    poses = history()
+    poses.add_motion(1.05, vector(9, 9, -5), vector(1, 0, 0))  # the estimator changed its mind
+    assert poses.motion(1.05).travelled[0] == pytest.approx(1.05)
+    assert poses.motion(1.05).position[0] == pytest.approx(9)
 
 
 def test_a_reboot_restarts_the_history_and_a_message_out_of_order_is_left_out():
-    made = History()
-    made.add_motion(100, vector(0, 0, 0), vector(1, 0, 0))
-    made.add_motion(99.9, vector(5, 5, 5), vector(9, 9, 9))
-    assert made.motion(100).position[0] == 0
-    made.add_motion(1, vector(2, 0, 0), vector(0, 0, 0))
-    assert made.motion(1).position[0] == 2
+    poses = History()
+    poses.add_motion(100, vector(0, 0, 0), vector(1, 0, 0))
+    poses.add_motion(99.9, vector(5, 5, 5), vector(9, 9, 9))
+    assert poses.motion(100).position[0] == 0
+    poses.add_motion(1, vector(2, 0, 0), vector(0, 0, 0))
+    assert poses.motion(1).position[0] == 2
 
 
 def test_what_is_old_is_forgotten():
-    made = History()
+    poses = History()
     for step in range(4000):
-        made.add_motion(0.05 * step, vector(0, 0, 0), vector(1, 0, 0))
-    assert made.motion(10) is None
-    assert made.motion(195).travelled[0] == pytest.approx(195)
+        poses.add_motion(0.05 * step, vector(0, 0, 0), vector(1, 0, 0))
+    assert poses.motion(10) is None
+    assert poses.motion(195).travelled[0] == pytest.approx(195)

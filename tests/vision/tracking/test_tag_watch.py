@@ -20,11 +20,11 @@ CORNERS = np.array([[0.0, 0.0], [50.0, 0.0], [50.0, 50.0], [0.0, 50.0]])
 @pytest.fixture
 def history() -> History:
     """A vehicle that hovers level, 10 m above the EKF origin, 20 m north and 30 m east of it."""
-    made = History()
+    poses = History()
     for tenth in range(60):
-        made.add_attitude(tenth / 10, Attitude(0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-        made.add_motion(tenth / 10, vector(20.0, 30.0, -10.0), vector(0.0, 0.0, 0.0))
-    return made
+        poses.add_attitude(tenth / 10, Attitude(0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        poses.add_motion(tenth / 10, vector(20.0, 30.0, -10.0), vector(0.0, 0.0, 0.0))
+    return poses
 
 
 def frame(at: float, *ids: int, position: Any = (0.0, 0.0, 10.0)) -> FrameResult:
@@ -34,18 +34,18 @@ def frame(at: float, *ids: int, position: Any = (0.0, 0.0, 10.0)) -> FrameResult
 
 
 def test_a_tag_is_told_once_when_it_comes_and_once_when_it_has_gone(history: History) -> None:
-    told: list[dict[str, Any]] = []
-    watch = TagWatch(told.append)
+    events: list[dict[str, Any]] = []
+    watch = TagWatch(events.append)
     for at, ids in ((1.0, (7,)), (1.1, (7,)), (1.1 + LOST_AFTER / 2, ()), (1.2 + LOST_AFTER, (8,))):
         watch.look(frame(at, *ids), MOUNT, history, CLOCK)
-    assert [(one["id"], one["seen"]) for one in told] == [(7, True), (8, True), (7, False)]
-    assert told[0]["ned"] == pytest.approx([20.0, 30.0, 0.0], abs=0.2)
-    assert told[0]["distance"] == 10.0
+    assert [(event["id"], event["seen"]) for event in events] == [(7, True), (8, True), (7, False)]
+    assert events[0]["ned"] == pytest.approx([20.0, 30.0, 0.0], abs=0.2)
+    assert events[0]["distance"] == 10.0
 
 
 def test_a_tag_of_unknown_size_and_a_vehicle_of_unknown_place_have_none(history: History) -> None:
-    told: list[dict[str, Any]] = []
-    watch = TagWatch(told.append)
+    events: list[dict[str, Any]] = []
+    watch = TagWatch(events.append)
     watch.look(frame(1.0, 7, position=None), MOUNT, history, CLOCK)
     watch.look(frame(1.1, 8), MOUNT, History(), CLOCK)
-    assert [(one["ned"], one["distance"]) for one in told] == [(None, None), (None, 10.0)]
+    assert [(event["ned"], event["distance"]) for event in events] == [(None, None), (None, 10.0)]

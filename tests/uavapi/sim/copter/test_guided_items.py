@@ -1,4 +1,4 @@
-"""MISSION_ITEM with current 2 and 3: the old way to give GUIDED a target, as SITL takes it."""
+"""MISSION_ITEM with current 2 and 3: the old way to give the copter's GUIDED a target, as SITL takes it."""
 
 import math
 

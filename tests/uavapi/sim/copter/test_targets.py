@@ -1,4 +1,4 @@
-"""POSITION_TARGET_LOCAL_NED and POSITION_TARGET_GLOBAL_INT in each mode and submode, as SITL sends them."""
+"""POSITION_TARGET_LOCAL_NED and POSITION_TARGET_GLOBAL_INT in each mode of the copter, as SITL sends them."""
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -21,8 +21,7 @@ def requested(ground, name):
     ground.heard.clear()
     number = getattr(mavlink, f"MAVLINK_MSG_ID_{name}")
     assert ground.command(mavlink.MAV_CMD_REQUEST_MESSAGE, number) == mavlink.MAV_RESULT_ACCEPTED
-    found = ground.of(name)
-    return found[0] if found else None
+    return next(iter(ground.of(name)), None)
 
 
 def local_target(ground):

@@ -1,9 +1,12 @@
-"""What tests take for a camera and a detector finds what the real ones find."""
+"""`Projector`, which tests take for a camera and a detector, finds what the real ones find."""
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
+
+pytest.importorskip("cv2")
+
+import numpy as np
 
 from mavproxy_vision.apriltag.detector import Detector, DetectorOptions
 from mavproxy_vision.camera.renderer import Look, PlacedTag, Renderer

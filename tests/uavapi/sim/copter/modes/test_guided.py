@@ -1,3 +1,5 @@
+"""GUIDED of the copter: its setpoints, and the commands that it takes, as SITL flies them."""
+
 import math
 
 import pytest

@@ -1,4 +1,4 @@
-"""MAV_CMD_DO_PAUSE_CONTINUE in GUIDED and AUTO, as SITL answers it."""
+"""MAV_CMD_DO_PAUSE_CONTINUE through `commands.py`, GUIDED and AUTO of the copter, as SITL answers it."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The first second of a takeoff, in which the motors run up and the vehicle still stands."""
+"""The first second of the copter's takeoff, in which the motors run up and the vehicle still stands."""
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink

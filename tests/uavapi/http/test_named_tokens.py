@@ -1,4 +1,7 @@
-"""Named tokens at the door: streams, and what becomes of connections whose token is taken away."""
+"""Named tokens in the whole API: what becomes of streams, flights and scripts whose token is taken away.
+
+It takes all of them together. `test_security.py` tests the door alone, `tests/rules/test_roles.py` each route.
+"""
 
 from __future__ import annotations
 
@@ -12,12 +15,8 @@ from typing import Any
 import pytest
 from aiohttp import ClientError, WSMsgType
 
-from mavproxy_uavapi.core.errors import Forbidden, Unauthorized
-from mavproxy_uavapi.core.roles import Role
-from mavproxy_uavapi.files.tokens import Token, digest_of
-from mavproxy_uavapi.http.security import check_caller
+from mavproxy_uavapi.files.tokens import digest_of
 from mavproxy_uavapi.scripts.runs import Run
-from mavproxy_uavapi.settings import ApiModuleSettings
 from tests.support import tokens
 
 
@@ -57,17 +56,17 @@ async def by_events(api: Any, name: str, events: list[Any]) -> None:
 def test_watcher_streams_until_its_token_is_taken_away_or_changed(
     flying: Any, api: Any, loop: Any, roles: Any, stream: Any, change: dict[str, str]
 ) -> None:
-    events, others = list[Any](), list[Any]()
-    task = loop.create_task(stream(api, "tower", events))
-    other = loop.create_task(stream(api, "anna", others))
-    api.until(lambda: len(events) > 5 and len(others) > 5)
+    tower_events, anna_events = list[Any](), list[Any]()
+    tower = loop.create_task(stream(api, "tower", tower_events))
+    anna = loop.create_task(stream(api, "anna", anna_events))
+    api.until(lambda: len(tower_events) > 5 and len(anna_events) > 5)
     roles(anna="fly", **change)
-    api.until(task.done)
-    assert task.exception() is None or isinstance(task.exception(), ClientError)
-    count = len(others)
-    api.until(lambda: len(others) > count + 5)
-    assert not other.done() and flying.orders() == []
-    other.cancel()
+    api.until(tower.done)
+    assert tower.exception() is None or isinstance(tower.exception(), ClientError)
+    count = len(anna_events)
+    api.until(lambda: len(anna_events) > count + 5)
+    assert not anna.done() and flying.orders() == []
+    anna.cancel()
     loop.settle()
 
 
@@ -81,12 +80,12 @@ def test_flight_of_a_token_that_is_taken_away_ends_as_if_its_client_hung_up(
     flying: Any, api: Any, loop: Any, roles: Any
 ) -> None:
     body = {"x": 300, "y": 0, "z": -20}
-    going = api.begin("POST", "/movement/go_to_ned_wait", json=body, headers=tokens.bearer("anna"))
+    request = api.begin("POST", "/movement/go_to_ned_wait", json=body, headers=tokens.bearer("anna"))
     api.until(api.service.host.jobs.running)
     (job,) = api.service.host.jobs.running()
     roles(bo="fly")
-    api.until(going.done)
-    assert isinstance(going.exception(), ClientError)
+    api.until(request.done)
+    assert isinstance(request.exception(), ClientError)
     api.until(lambda: not job.running)
     assert "hung up" in str(job.error)
     assert api.get("/vehicles", headers=tokens.bearer("anna")).status == 401
@@ -119,43 +118,13 @@ def test_limit_counts_each_token_apart_and_a_watcher_has_no_way_round_it(
     api.service.settings = replace(api.service.settings, local_rate=10.0)
 
     async def land() -> list[int]:
-        asked = [api.ask("GET", "/command/land", headers=tokens.bearer("tower")) for _ in range(60)]
-        return [answer.status for answer in await asyncio.gather(*asked)]
+        requests = [api.ask("GET", "/command/land", headers=tokens.bearer("tower")) for _ in range(60)]
+        return [answer.status for answer in await asyncio.gather(*requests)]
 
     assert {403, 429} == set(loop.run(land()))
     assert api.get("/telemetry/gps", headers=tokens.bearer("anna")).status == 200
     assert api.get("/command/brake?wait=false", headers=tokens.bearer("anna")).status == 202
     assert len(flying.orders()) <= 1
-
-
-# -- the door itself ----------------------------------------------------------------------------------------
-
-
-def settings(**given: Any) -> Any:
-    return ApiModuleSettings(given, environ={}).snapshot()
-
-
-def test_setting_token_is_an_admin_without_a_name_and_a_named_one_decides_in_any_network(tmp_path: Path) -> None:
-    file = tokens.write(tmp_path / "tokens", tokens.ALL)
-    given = settings(token="t", tokens=file, allow_from="10.0.0.0/8")
-    tower = Token("tower", Role.WATCH, frozenset(), b"")
-    found = {b"tower-tower": tower}
-    caller = check_caller("10.0.0.1", tokens.bearer("tower"), given, found.get)
-    assert (caller.role, caller.name, caller.flies(1)) == (Role.WATCH, "tower", False)
-    for headers, remote in (({"Authorization": "Bearer t"}, "11.0.0.1"), ({}, "10.0.0.1")):
-        caller = check_caller(remote, headers, given, found.get)
-        assert (caller.role, caller.name, caller.flies(9)) == (Role.ADMIN, "", True)
-        assert caller.operator.name == remote
-
-
-def test_where_there_is_a_file_nobody_calls_without_a_token(tmp_path: Path) -> None:
-    given = settings(tokens=str(tmp_path / "later"), allow_open=True)
-    for remote in ("127.0.0.1", "192.0.2.1"):
-        with pytest.raises(Unauthorized):
-            check_caller(remote, {}, given)
-    with pytest.raises(Forbidden):
-        check_caller("192.0.2.1", {}, settings())
-    assert check_caller("127.0.0.1", {}, settings()).role is Role.ADMIN
 
 
 def test_script_has_a_token_of_its_own_as_long_as_it_runs(api: Any, drone: Any, roles: Any, tmp_path: Path) -> None:

@@ -6,10 +6,10 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.sim import Options
-from mavproxy_uavapi.sim.geodesy import Ned, from_ned
+from tests.support.simulated import ACCEPTED, DENIED, FAILED, away, height, place, vehicle
+from tests.support.simulated_plane import AUTO, GUIDED, RTL, reposition
 
-ACCEPTED, DENIED, UNSUPPORTED, FAILED = 0, 2, 3, 4
-MANUAL, AUTO, RTL, GUIDED, QSTABILIZE, QHOVER, QLOITER, QLAND, QRTL = 0, 10, 11, 15, 17, 18, 19, 20, 21
+QSTABILIZE, QHOVER, QLOITER, QLAND, QRTL = 17, 18, 19, 20, 21
 TO_FW, TO_MC, MC, FW = 1, 2, 3, 4
 ON_GROUND, IN_AIR, TAKING_OFF, LANDING = 1, 2, 3, 4
 TAKE_OFF = mavlink.MAV_CMD_NAV_TAKEOFF
@@ -36,34 +36,12 @@ def hovering(standing):
     return standing
 
 
-def vehicle(ground):
-    return ground.simulator.vehicle
-
-
-def height(ground):
-    return -vehicle(ground).body.down
-
-
-def away(ground, north, east):
-    return math.dist((north, east), vehicle(ground).body.position[:2])
-
-
 def states(ground):
     return vehicle(ground).vtol_state, vehicle(ground).landed_state
 
 
 def take_off(ground, climb):
     return ground.command(TAKE_OFF, 0, 0, 0, 0, 0, 0, climb)
-
-
-def place(ground, north, east):
-    location = from_ned(vehicle(ground).estimator.start, Ned(north, east, 0.0))
-    return round(location.latitude * 1e7), round(location.longitude * 1e7)
-
-
-def reposition(ground, north, east, z):
-    parameters = (-1, 1, 0, math.nan)
-    return ground.command_int(mavlink.MAV_CMD_DO_REPOSITION, 3, parameters, (*place(ground, north, east), z))
 
 
 def seconds_until(ground, condition, most=200.0):

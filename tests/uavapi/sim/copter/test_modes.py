@@ -1,3 +1,5 @@
+"""The copter's modes but GUIDED and AUTO, how one is left for another, and what noise and wind do to them."""
+
 import math
 
 import pytest

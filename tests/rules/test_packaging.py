@@ -1,4 +1,4 @@
-"""The files in packaging/ name what exists."""
+"""The files in packaging/ name what the station has: its metrics, its options, and what its broker must keep."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from mavproxy_gradys.station.options import parser
 from mavproxy_gradys.station.sqlite_store import SqliteStore
 from mavproxy_gradys.station.statistics import Statistics
 
-PACKAGING = Path(__file__).parents[3] / "packaging"
+PACKAGING = Path(__file__).parents[2] / "packaging"
 
 
 class Broker:

@@ -7,9 +7,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.sim import Options
 from mavproxy_uavapi.sim.control import Control
-from mavproxy_uavapi.sim.geodesy import Ned, from_ned
+from tests.support.simulated import ACCEPTED, DENIED, FAILED, UNSUPPORTED, at, away, body, place, upload, vehicle
 
-ACCEPTED, DENIED, UNSUPPORTED, FAILED = 0, 2, 3, 4
 MANUAL, HOLD, LOITER, AUTO, RTL, SMART_RTL, GUIDED = 0, 4, 5, 10, 11, 12, 15
 BODY = mavlink.MAV_FRAME_BODY_NED
 VELOCITY, VELOCITY_AND_RATE, ACCELERATION = 0x0DC7, 0x05C7, 0x0C3F
@@ -27,37 +26,12 @@ def rover(new_ground):
     return ground
 
 
-def place(ground, north, east):
-    location = from_ned(ground.simulator.vehicle.estimator.start, Ned(north, east, 0.0))
-    return round(location.latitude * 1e7), round(location.longitude * 1e7)
-
-
-def body(ground):
-    return ground.simulator.vehicle.body
-
-
-def distance(ground, north, east):
-    return math.dist((north, east), body(ground).position[:2])
-
-
-def upload(ground, items):
-    ground.send(mavlink.MAVLink_mission_count_message(1, 1, len(items), 0))
-    for _ in items:
-        seq = [m for m in ground.run(0.01) if m.get_type() == "MISSION_REQUEST"][0].seq
-        command, parameters, where = items[seq]
-        lat, lon = place(ground, *where)
-        ground.send(
-            mavlink.MAVLink_mission_item_int_message(1, 1, seq, 3, command, 0, 1, *parameters, lat, lon, 0.0, 0)
-        )
-    assert [m.type for m in ground.run(0.01) if m.get_type() == "MISSION_ACK"] == [0]
-
-
 def waypoint(north, east, wait=0):
-    return (16, (wait, 0, 0, 0), (north, east))
+    return at(north, east, 0.0, 16, wait)
 
 
-def do(command, *parameters):
-    return (command, (*parameters, *([0] * (4 - len(parameters)))), (0, 0))
+def do_at_start(command, *parameters):
+    return at(0.0, 0.0, 0.0, command, *parameters)
 
 
 def test_it_says_that_it_is_a_rover(rover):
@@ -120,7 +94,7 @@ def test_a_place_is_driven_to_and_reported(rover):
     assert not rover.of("MISSION_ITEM_REACHED")
     rover.run(6.0)
     assert [m.seq for m in rover.of("MISSION_ITEM_REACHED")] == [0]
-    assert distance(rover, 40.0, 0.0) < 0.5
+    assert away(rover, 40.0, 0.0) < 0.5
     assert body(rover).speed == 0.0
     assert body(rover).down == 0.0
 
@@ -152,7 +126,7 @@ def test_a_velocity_with_a_turn_rate_can_go_backwards(rover):
         rover.local((-1.0, 0.0, 0.0), VELOCITY_AND_RATE, BODY)
         rover.run(0.5)
     assert body(rover).speed == pytest.approx(-1.0, abs=0.05)
-    assert rover.simulator.vehicle.body.yaw == pytest.approx(math.radians(-7), abs=0.05)
+    assert vehicle(rover).body.yaw == pytest.approx(math.radians(-7), abs=0.05)
 
 
 def test_an_acceleration_is_ignored_with_a_text(rover):
@@ -168,13 +142,13 @@ def test_reposition(rover):
     rover.mode(HOLD)
     assert rover.command_int(reposition, 3, (-1, 0, 0, 0), there) == DENIED
     assert rover.command_int(reposition, 3, (3, 1, 0, 0), there) == FAILED
-    assert rover.simulator.vehicle.mode.name == "GUIDED"
+    assert vehicle(rover).mode.name == "GUIDED"
     assert rover.command_int(reposition, 3, (-1, 1, 0, 0), there) == ACCEPTED
     assert rover.command_int(reposition, 3, (3, 1, 0, 0), there) == ACCEPTED
     assert rover.command_int(reposition, 3, (-1, 1, 0, 0), (0, 0, 0.0)) == DENIED
     assert rover.command(reposition, -1, 1) == UNSUPPORTED
     rover.run(15.0)
-    assert distance(rover, 20.0, 0.0) < 0.5
+    assert away(rover, 20.0, 0.0) < 0.5
 
 
 def test_reverse(rover):
@@ -184,7 +158,7 @@ def test_reverse(rover):
     assert body(rover).speed < -1.0
     rover.mode(HOLD)
     rover.mode(GUIDED)
-    assert not rover.simulator.vehicle.navigator.reversed
+    assert not vehicle(rover).navigator.reversed
 
 
 def test_hold_rolls_out_and_loiter_brakes(rover):
@@ -217,20 +191,19 @@ def test_disarmed_on_the_way_it_rolls_and_armed_again_goes_on(rover):
 
 
 def test_home_moves_with_a_disarmed_rover_unless_the_ground_has_set_it(rover):
-    vehicle = rover.simulator.vehicle
     rover.local((20.0, 0.0, 0.0))
     rover.run(12.0)
-    assert vehicle.home_offset.north == 0.0
+    assert vehicle(rover).home_offset.north == 0.0
     rover.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0)
     rover.run(1.0)
-    assert vehicle.home_offset.north == pytest.approx(20.0, abs=0.5)
+    assert vehicle(rover).home_offset.north == pytest.approx(20.0, abs=0.5)
     rover.command(mavlink.MAV_CMD_DO_SET_HOME, 1)
     rover.arm()
     rover.local((0.0, 0.0, 0.0))
     rover.run(15.0)
     rover.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0)
     rover.run(1.0)
-    assert vehicle.home_offset.north == pytest.approx(20.0, abs=0.5)
+    assert vehicle(rover).home_offset.north == pytest.approx(20.0, abs=0.5)
 
 
 @pytest.mark.parametrize("mode", [RTL, SMART_RTL])
@@ -239,12 +212,12 @@ def test_it_comes_home(rover, mode):
     rover.run(14.0)
     rover.local((30.0, 20.0, 0.0))
     rover.run(12.0)
-    assert distance(rover, 30.0, 20.0) < 1.0
+    assert away(rover, 30.0, 20.0) < 1.0
     assert rover.mode(mode) == ACCEPTED
     rover.run(60.0)
-    assert distance(rover, 0.0, 0.0) < 1.5
+    assert away(rover, 0.0, 0.0) < 1.5
     assert "Reached destination" in rover.texts()
-    assert rover.simulator.vehicle.armed
+    assert vehicle(rover).armed
 
 
 def test_a_mission(rover):
@@ -253,22 +226,22 @@ def test_a_mission(rover):
         [
             waypoint(0, 0),
             waypoint(30, 0),
-            do(178, 1, 2.0),
+            do_at_start(178, 1, 2.0),
             waypoint(30, 30),
-            do(194, 1),
+            do_at_start(194, 1),
             waypoint(0, 30, 3),
-            do(194, 0),
-            do(93, 2, -1, -1, -1),
-            (19, (2, 0, 0, 0), (0, 0)),
-            do(20),
+            do_at_start(194, 0),
+            do_at_start(93, 2, -1, -1, -1),
+            do_at_start(19, 2),
+            do_at_start(20),
         ],
     )
     assert rover.command(mavlink.MAV_CMD_MISSION_START) == ACCEPTED
-    started = rover.simulator.vehicle.now
-    while "Mission Complete" not in rover.texts() and rover.simulator.vehicle.now < started + 150:
+    started = vehicle(rover).now
+    while "Mission Complete" not in rover.texts() and vehicle(rover).now < started + 150:
         rover.run(1.0)
     # SITL: 78 s.
-    assert rover.simulator.vehicle.now - started == pytest.approx(78, abs=8)
+    assert vehicle(rover).now - started == pytest.approx(78, abs=8)
     assert [m.seq for m in rover.of("MISSION_ITEM_REACHED")] == [2, 4, 6, 7, 8, 9]
     for text in (
         "Mission: 4 SetReverse",
@@ -279,24 +252,24 @@ def test_a_mission(rover):
         "Finished active loiter",
     ):
         assert text in rover.texts()
-    assert rover.simulator.vehicle.mode.name == "AUTO"
-    assert distance(rover, 0.0, 0.0) < 1.0
+    assert vehicle(rover).mode.name == "AUTO"
+    assert away(rover, 0.0, 0.0) < 1.0
 
 
 def test_what_a_rover_cannot_do_is_skipped_in_a_mission(rover):
-    upload(rover, [waypoint(0, 0), do(22), waypoint(10, 0)])
+    upload(rover, [waypoint(0, 0), do_at_start(22), waypoint(10, 0)])
     rover.command(mavlink.MAV_CMD_MISSION_START)
     rover.run(12.0)
     assert "Mission: 1 Takeoff" in rover.texts()
     assert [m.seq for m in rover.of("MISSION_ITEM_REACHED")] == [2]
-    assert distance(rover, 10.0, 0.0) < 1.0
+    assert away(rover, 10.0, 0.0) < 1.0
 
 
 def test_a_guided_item_is_driven_to(rover):
     lat, lon = place(rover, 10.0, 0.0)
     rover.send(mavlink.MAVLink_mission_item_int_message(1, 1, 0, 3, 16, 2, 1, 0, 0, 0, 0, lat, lon, 0.0, 0))
     rover.run(12.0)
-    assert distance(rover, 10.0, 0.0) < 0.5
+    assert away(rover, 10.0, 0.0) < 0.5
 
 
 @pytest.mark.parametrize(
@@ -314,7 +287,7 @@ def test_the_place_of_any_guided_item_counts(rover, command, frame, result):
     rover.send(item(1, 1, 0, frame, command, 2, 1, 0, 0, 0, 0, lat, lon, 0.0, 0))
     rover.run(0.02)
     assert rover.of("MISSION_ACK")[-1].type == result
-    assert (rover.simulator.vehicle.mode.target is not None) == (result == mavlink.MAV_MISSION_ACCEPTED)
+    assert (vehicle(rover).mode.target is not None) == (result == mavlink.MAV_MISSION_ACCEPTED)
 
 
 def test_the_pilot_drives_in_manual(rover):
@@ -336,7 +309,7 @@ def test_what_goes_wrong_goes_wrong_for_a_rover_too(rover):
     rover.run(5.0)
     control.handle_line('{"op": "fault", "name": "ekf_bad", "seconds": 5}')
     rover.run(2.0)
-    assert rover.simulator.vehicle.mode.name == "HOLD"
+    assert vehicle(rover).mode.name == "HOLD"
     assert rover.of("HEARTBEAT")[-1].system_status == mavlink.MAV_STATE_CRITICAL
     rover.run(5.0)
     assert "EKF failsafe cleared" in rover.texts()
@@ -344,11 +317,11 @@ def test_what_goes_wrong_goes_wrong_for_a_rover_too(rover):
     rover.simulator.parameters.set("BATT_FS_LOW_ACT", 1)
     control.handle_line('{"op": "fault", "name": "low_battery"}')
     rover.run(11.0)
-    assert rover.simulator.vehicle.mode.name == "RTL"
+    assert vehicle(rover).mode.name == "RTL"
     control.handle_line('{"op": "fault", "name": "pilot_mode", "mode": "manual"}')
-    assert rover.simulator.vehicle.mode.name == "MANUAL"
+    assert vehicle(rover).mode.name == "MANUAL"
     control.handle_line('{"op": "fault", "name": "pilot_disarm"}')
-    assert not rover.simulator.vehicle.armed
+    assert not vehicle(rover).armed
 
 
 def test_another_station_drives_it_in_guided_only(rover):
