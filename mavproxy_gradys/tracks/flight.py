@@ -63,6 +63,8 @@ class TrackFlight:
             self._enter("flying")
             await self._go_to(job, place.lat, place.lon, place.alt)
         self._enter("returning")
+        await self.copter.hear_again()  # a pilot may have taken it since the last heartbeat
+        self.copter.held_by("GUIDED")
         await self.copter.rtl(job)
         self._enter("done")
         return self.result

@@ -41,7 +41,7 @@ class Descent:
         order = await flight.fly(landing)
         if order.phase is Phase.FAILED:
             await flight.give_up(landing, order.reason)
-        flight.vehicle.held_by("GUIDED")
+        await flight.hear_again()
         flight.phase = Phase.LAND.value
         await flight.fly_by("LAND", flight.vehicle.land)
 
@@ -107,7 +107,7 @@ class PrecisionDescent(Descent):
         flight, vehicle, tracker = self.flight, self.flight.vehicle, self.flight.tracker
         limits = await vehicle.limits()
         touchdown = Touchdown(limits)
-        vehicle.held_by("GUIDED")
+        await flight.hear_again()
         flight.autopilot = "LAND"
         await vehicle.set_mode(flight.job, "LAND")
         late = tracker.now() + SLOWER * time_limits.landing_time(limits, vehicle.height)
@@ -117,6 +117,9 @@ class PrecisionDescent(Descent):
                 flight.autopilot = None  # it is almost down; it is not taken back
                 raise TimedOut(f"vehicle {vehicle.state.system} has not landed and disarmed; it is in LAND")
             if self._must_come_back(landing, now):
+                await vehicle.hear_again()  # its pilot may have it by now
+                if self._stands(touchdown) or not self._must_come_back(landing, tracker.now()):
+                    continue
                 await vehicle.set_mode(flight.job, "GUIDED")
                 flight.autopilot = None
                 motion = tracker.history.last_motion

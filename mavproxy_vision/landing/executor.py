@@ -287,6 +287,18 @@ class TagFlight:
         self._sent_at = self.tracker.host.clock()
         await self.vehicle.link.send(message, self.vehicle.state.system)
 
+    async def hear_again(self) -> None:
+        """Rest in GUIDED until the next heartbeat, which shows what its pilot has done since the last one.
+
+        Raises:
+            ModeChanged, NotArmed, Superseded, Paused, LinkLost: as `send` and `pause`.
+        """
+        asked_at = self.tracker.host.clock()
+        while self.vehicle.state.heartbeat_at <= asked_at:
+            await self.send(REST)
+            await self.pause()
+        self.vehicle.held_by("GUIDED")
+
     async def fly_by(self, mode: str, verb: Callable[[Job], Awaitable[None]]) -> None:
         """Let the autopilot fly in its own mode until it is done."""
         self.autopilot = mode
@@ -306,7 +318,7 @@ class TagFlight:
         if landing.refused and self.report.verb == "land":
             action = "hold"  # its position is safe
         self.report.action = action
-        await self.send(REST)
+        await self.hear_again()
         if self.plnd is not None:
             try:
                 await self.plnd.switch_off()  # it would also act in RTL

@@ -14,7 +14,7 @@ LARGE = {"tags": "0:0.6", "sim_tags": "0:0.6@0.8,-0.6"}
 SMALL = {"width": 320, "height": 240, "fps": 12.0, "sim_noise": 3.0, "sim_jitter": 0.0}
 SWITCH_MODE, TAKEOFF = 176, 22
 PLND = ("PLND_ENABLED", "PLND_STRICT", "PLND_RET_MAX", "PLND_ALT_MIN", "PLND_ALT_MAX")
-MODES = {"LAND": 9, "RTL": 6, "BRAKE": 17, "GUIDED": 4}
+MODES = {"LAND": 9, "RTL": 6, "BRAKE": 17, "GUIDED": 4, "LOITER": 5}
 
 
 def height(rig: Any) -> float:

@@ -68,6 +68,7 @@ class World:
         sent: what the host sent, oldest first; MAVProxy's own requests are not in it.
         simulator: the vehicle; the first of `simulators`.
         uplink_until, cut_until: s; until then nothing reaches the vehicle, or nothing goes either way.
+        hears: whether a message of the vehicle reaches the host.
         gradys: the module's own side.
         tracker, flights: the module's own side, with a simulated camera; only in a world that was made with one.
         screen: what was printed at the prompt since it was last asked for.
@@ -88,6 +89,7 @@ class World:
         self.control = Control(self.simulator)
         self.sent: list[Sent] = []
         self.uplink_until = self.cut_until = -math.inf
+        self.hears: Callable[[Any], bool] = lambda _message: True
         self.source = US
         self.simulators: list[Simulator] = []
         self._cables: list[Any] = []
@@ -220,7 +222,7 @@ class World:
                     simulator.step()
             data = b"".join(cable.drain() for cable in self._cables)
             if self.loop.time() >= self.cut_until and data:
-                for message in self._parser.parse_buffer(data) or []:
+                for message in filter(self.hears, self._parser.parse_buffer(data) or []):
                     self.host.bridge.feed(message)
             self.host.bridge.turn()
             await asyncio.sleep(TICK)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Callable
+from dataclasses import replace
 
 from mavproxy_uavapi.core.errors import ModeChanged, Rejected, TimedOut
 from mavproxy_uavapi.core.vehicle import messages
@@ -42,22 +44,37 @@ async def arm(vehicle: BaseVehicle, job: Job, timeout: float | None) -> None:
         still_guided()
         return bool(vehicle.state.armed)
 
+    def noted() -> None:
+        vehicle.arm_sent_at = vehicle.clock()
+
     if not vehicle.state.armed:
-        await vehicle.commands.send(messages.arm(), vehicle.commanding(job, still_guided), shown=shown)
+        try:
+            await vehicle.commands.send(messages.arm(), vehicle.commanding(job, still_guided, noted), shown=shown)
+        except Rejected:
+            vehicle.arm_sent_at = -math.inf
+            raise
     # Not sent again: a pilot may have disarmed it meanwhile.
     await vehicle.waiting.until(
         {"HEARTBEAT"}, lambda: vehicle.state.armed or None, SHOWN_WITHIN, "show that it is armed"
     )
+    vehicle.arm_sent_at = -math.inf
 
 
 async def disarm(vehicle: BaseVehicle, job: Job, force: bool) -> None:
-    """See `Vehicle.disarm`."""
-    await vehicle.commands.send_until_shown(
-        messages.disarm(force),
-        vehicle.commanding(job),
-        lambda: vehicle.state.armed is False,
-        "show that it is disarmed",
-    )
+    """See `Vehicle.disarm`. A heartbeat from before the order shows nothing.
+
+    An order of ours to arm may arrive after the next heartbeat, too; then only the acknowledgement counts.
+    """
+    order, check = messages.disarm(force), vehicle.commanding(job)
+    if vehicle.arm_is_on_its_way:
+        await vehicle.commands.send(replace(order, proven_by_ack=True), check)
+        vehicle.arm_sent_at = -math.inf
+    sent_at = vehicle.clock()
+
+    def shown() -> bool:
+        return vehicle.state.armed is False and vehicle.state.heartbeat_at > sent_at
+
+    await vehicle.commands.send_until_shown(order, check, shown, "show that it is disarmed")
 
 
 def _requires_guided(vehicle: BaseVehicle) -> Callable[[], None]:

@@ -35,6 +35,7 @@ T = TypeVar("T")
 mavlink = mavutil.mavlink
 
 REPORT_TIMEOUT = 5.0  # s until a requested message must come
+HEARD_WITHIN = 5.0  # s until a heartbeat must come, or show what an order has done
 HOLDING_MODES = ("LOITER", "HOLD", "POSHOLD", "ALT_HOLD", "STOP", "RTL")  # what comes first in a vehicle's mode map
 FRESH = 3.0  # s; no verb uses an older position
 
@@ -65,6 +66,7 @@ class BaseVehicle:
         self.state = state
         self.clock = clock
         self.speeds = Speeds(state)
+        self.arm_sent_at = -math.inf  # s; when the order to arm was sent last
         self.guard = EnvelopeGuard(self, spaces)
         self.link: Link = GuardedLink(link, self.guard)
         self.authority = CommandAuthority(state)
@@ -151,6 +153,23 @@ class BaseVehicle:
         if not is_finite(message):
             raise Stale(f"vehicle {self.state.system} does not report its position ({name}: not a number)")
         return message
+
+    @property
+    def arm_is_on_its_way(self) -> bool:
+        """Whether an order of ours to arm may yet arm it."""
+        return self.state.armed is False and self.clock() - self.arm_sent_at <= HEARD_WITHIN
+
+    async def hear_again(self) -> None:
+        """Wait for the next heartbeat: it shows what a pilot has done since the last one.
+
+        It comes before a mode switch that nobody requests at that moment, and before "disarmed" counts as an outcome.
+
+        Raises:
+            TimedOut, LinkLost: none comes.
+        """
+        asked_at = self.clock()
+        names, action = {"HEARTBEAT"}, "send a heartbeat"
+        await self.waiting.until(names, lambda: self.state.heartbeat_at > asked_at or None, HEARD_WITHIN, action)
 
     def require_armed(self) -> None:
         """Raise NotArmed unless the vehicle is armed."""
@@ -256,8 +275,14 @@ class BaseVehicle:
         return ModeChanged(f"the vehicle is {moving} in {self.mode}; `guided` takes it over")
 
     @property
+    def obeys_us(self) -> bool:
+        """Whether it is in a mode that we chose or have commanded in, and has no other's target."""
+        commanded = self.guard.ordered_at >= self.state.mode_since or self._mode_requests.chose_the_mode
+        return commanded and not self.has_foreign_target
+
+    @property
     def flies_for_us(self) -> bool:
-        """Whether it flies by a command of ours: in a mode that we chose or command in, towards no other's target."""
+        """Whether it flies by a command of ours."""
         if not self.state.armed or self.stands or self.authority.commander is None:
             return False
         if self.mode in STOPPING or self.mode in self.holding_modes:
@@ -266,8 +291,7 @@ class BaseVehicle:
             self.mode == "GUIDED" or flies_mission(self.mode) or (self.mode == "TAKEOFF" and self.kind == "plane")
         ):
             return False
-        commanded = self.guard.ordered_at >= self.state.mode_since or self._mode_requests.chose_the_mode
-        return commanded and not self.has_foreign_target
+        return self.obeys_us
 
     def commanding(self, job: Job, *needs: Callable[[], None]) -> Callable[[], None]:
         """The check before each message of `job`: it still commands, and no need raises."""

@@ -82,10 +82,10 @@ class Copter(TurningVehicle):
     async def land(self, job: Job, timeout: float | None = None) -> None:
         """Land where it is; done when it has disarmed.
 
-        Nothing is sent to a disarmed vehicle; an `arm` that waits ends.
+        A vehicle whose next heartbeat shows it disarmed has landed; an `arm` that waits ends.
         """
         self.authority.take(job, Rank.STOP)
-        if self.state.armed is False:
+        if await self.stays_disarmed(job):
             return
         await self.switch_to(job, "LAND")
         limits = await self.limits()
@@ -103,7 +103,7 @@ class Copter(TurningVehicle):
             ModeChanged: it was armed while we requested its home.
         """
         self.authority.take(job, Rank.STOP)
-        if await self.is_done_at_home():
+        if await self.is_done_at_home(job):
             return
         await self.switch_to(job, "RTL")
         limits = await self.limits()
@@ -115,6 +115,11 @@ class Copter(TurningVehicle):
         await self.land(job)
 
     # -- stopping -----------------------------------------------------------------------------------------
+
+    @property
+    def stops_in_its_mode(self) -> bool:
+        """Whether `hold` stops it by setpoints, which do nothing in a pilot's mode."""
+        return self.mode == self.next_mode == GUIDED
 
     async def set_mode(self, job: Job, mode: str) -> None:
         """Switch to any mode. GUIDED ends a `stop` too: the vehicle stays where it is, and takes movements again."""
@@ -133,8 +138,7 @@ class Copter(TurningVehicle):
         Raises:
             ModeChanged: it is in another mode.
         """
-        if self.authority.on_its_way and not self.state.armed:
-            self.authority.take(job, Rank.STOP)  # an arm that waits ends
+        await self.end_waiting_arm(job)
         self.require_armed()
         mode = self.mode
         if mode != GUIDED and not flies_mission(mode):
@@ -176,7 +180,7 @@ class Copter(TurningVehicle):
         A mode switch that is on its way counts: the vehicle may have left GUIDED when it hears us.
         """
         self.authority.take(job, Rank.STOP)
-        if not self.mode == self.next_mode == GUIDED:
+        if not self.stops_in_its_mode:
             await self.switch_to(job, self.holding_mode)
         elif self.state.landed and not self.authority.paused:
             await self._hold_down(job)

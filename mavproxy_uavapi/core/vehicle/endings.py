@@ -35,6 +35,7 @@ class Situation(Enum):
 
     UNKNOWN = "not known"  # no heartbeat, or none since it booted
     DISARMED = "disarmed"
+    ARMING = "disarmed, with an order to arm on its way"
     IDLE = "stands on the ground"  # in a landing's mode, its motors idle
     GUIDED = "GUIDED"  # on the ground too: a climb begins there
     PAUSED = "held still"  # by `stop`: `resume` would fly on to its target
@@ -46,10 +47,11 @@ class Situation(Enum):
 
 
 NOTHING = dict.fromkeys(Policy)
-HOLD, LAND, RTL = "hold", "land", "rtl"
+HOLD, LAND, RTL, DISARM = "hold", "land", "rtl", "disarm"
 WHAT_FOLLOWS: Mapping[Situation, Mapping[Policy, str | None]] = {
     Situation.UNKNOWN: NOTHING,
     Situation.DISARMED: NOTHING,
+    Situation.ARMING: {**dict.fromkeys(Policy, DISARM), Policy.NOTHING: None},
     Situation.IDLE: NOTHING,
     Situation.PILOTED: NOTHING,
     Situation.GUIDED: {**NOTHING, Policy.HOLD: HOLD, Policy.SAFE: HOLD, Policy.LAND: LAND, Policy.RTL: RTL},
@@ -61,6 +63,8 @@ WHAT_FOLLOWS: Mapping[Situation, Mapping[Policy, str | None]] = {
 }
 LANDINGS = {"LAND", "QLAND"}
 RETURNS = {"RTL", "SMART_RTL", "QRTL"}
+# Endings that somebody requests at that moment, or that come after a new heartbeat (leases): they wait for none.
+AT_ONCE = {Ending.ABORTED, Ending.UNLOADED, Ending.LEASE_OVER}
 # After these errors we do not have the vehicle: the pilot, a client that stopped it, or a failsafe has it.
 HAS_ANOTHER_MASTER = (ModeChanged, NotArmed, Paused, LinkLost)
 FIXED: Mapping[Ending, Policy] = {
@@ -82,7 +86,8 @@ def situation(vehicle: Vehicle, modes: Collection[str] = ()) -> Situation:
     """
     state, mode = vehicle.state, vehicle.next_mode
     if not state.armed:
-        return Situation.UNKNOWN if state.armed is None else Situation.DISARMED
+        disarmed = Situation.ARMING if vehicle.arm_is_on_its_way else Situation.DISARMED
+        return Situation.UNKNOWN if state.armed is None else disarmed
     if mode == "GUIDED":
         return Situation.PAUSED if vehicle.authority.paused else Situation.GUIDED
     if mode not in modes:
@@ -135,7 +140,9 @@ class FlightEndings:
     def _ended(self, job: Job) -> None:
         vehicle = job.vehicle
         if isinstance(vehicle, Vehicle) and job in (vehicle.authority.commander, vehicle.authority.interrupted):
-            closing = self.see_to(vehicle, self.policy(job), f"after {job.verb}", job.client, job.modes)
+            at_once = job.ending in AT_ONCE
+            policy, why = self.policy(job), f"after {job.verb}"
+            closing = self._close(vehicle, policy, why, job.client, job.modes, at_once=at_once)
             if closing is not None:
                 running = {number: follower for number, follower in self._closing.items() if follower.running}
                 self._closing = running | {job.id: closing}
@@ -155,7 +162,9 @@ class FlightEndings:
     def see_to(
         self, vehicle: Vehicle, policy: Policy, why: str, client: str, modes: Collection[str] = ()
     ) -> Job | None:
-        """Begin the job that policy and telemetry call for; None where nothing is sent.
+        """Begin what policy and telemetry call for, for a vehicle that no job flies; None where nothing is sent.
+
+        In GUIDED it may fly for another station: unless it obeys us, it is left alone.
 
         Args:
             vehicle: the vehicle to command.
@@ -164,6 +173,14 @@ class FlightEndings:
             client: the client in whose name the job runs.
             modes: modes that the ended job switched to.
         """
+        if vehicle.next_mode == "GUIDED" and not vehicle.obeys_us:
+            log.info("vehicle %d, %s: it flies for another station, so nothing is sent", vehicle.state.system, why)
+            return None
+        return self._close(vehicle, policy, why, client, modes, at_once=False)
+
+    def _close(
+        self, vehicle: Vehicle, policy: Policy, why: str, client: str, modes: Collection[str], *, at_once: bool
+    ) -> Job | None:
         action = self.what_follows(vehicle, policy, modes)
         shown = situation(vehicle, modes).value
         log.info("vehicle %d, %s: %s, so %s", vehicle.state.system, why, shown, action or "nothing is sent")
@@ -172,6 +189,10 @@ class FlightEndings:
         verb = _verb(vehicle, action)
 
         async def body(job: Job) -> str:
+            if not (at_once or (action == HOLD and vehicle.stops_in_its_mode)):
+                await vehicle.hear_again()  # a pilot may have taken it since the last heartbeat
+                if self.what_follows(vehicle, policy, modes) != action:
+                    raise ModeChanged(f"the vehicle is in {vehicle.mode} now: nothing is sent")
             await verb(job)
             return f"{action} is done"
 
@@ -182,4 +203,4 @@ class FlightEndings:
 
 def _verb(vehicle: Vehicle, action: str) -> Callable[[Job], Awaitable[None]]:
     returns = vehicle.rtl if vehicle.has("rtl") else vehicle.come_down
-    return {HOLD: vehicle.hold, LAND: vehicle.come_down, RTL: returns}[action]
+    return {HOLD: vehicle.hold, LAND: vehicle.come_down, RTL: returns, DISARM: vehicle.disarm}[action]

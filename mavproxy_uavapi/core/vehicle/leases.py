@@ -19,7 +19,7 @@ from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 log = logging.getLogger("uavapi.copter")
 
-LINK_PAUSE = 1.0  # s until it is looked at again whether a vehicle hears us whose lease ran out
+LINK_PAUSE = 0.2  # s until it is looked at again whether a vehicle whose lease ran out was heard since
 
 
 @dataclass
@@ -101,10 +101,11 @@ class Leases:
             timer.cancel()
 
     def _look(self, vehicle: Vehicle) -> None:
-        """See whether the lease has run out; if so, see to the vehicle, once it hears us."""
+        """See whether the lease has run out; if so, see to the vehicle after its next heartbeat."""
         lease = self._leases[vehicle]
         remaining = lease.ends_at - self._clock()
-        if remaining <= 0 and self._link_watch.is_alive(vehicle.state):
+        heard = vehicle.state.heartbeat_at > lease.ends_at and self._link_watch.is_alive(vehicle.state)
+        if remaining <= 0 and heard:
             self._forget(vehicle)
             self._end(vehicle, lease)
         else:

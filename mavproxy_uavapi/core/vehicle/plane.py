@@ -124,7 +124,7 @@ class Plane(GuidedVehicle):
         if self.state.armed is False:
             self.authority.take(job, Rank.ARM)
             if flies_mission(self.mode):
-                await self.switch_to(job, GUIDED, self._require_disarmed)
+                await self.switch_to(job, GUIDED, self.require_disarmed)
             await self._select_first_item(job)
         await super().arm(job, timeout)
 
@@ -132,7 +132,7 @@ class Plane(GuidedVehicle):
         modes = (self.state.mode, GUIDED, None)  # None: it has rebooted meanwhile
 
         def check_unclaimed() -> None:
-            self._require_disarmed()
+            self.require_disarmed()
             if self.state.mode not in modes:
                 raise ModeChanged(f"the pilot or another client switched the vehicle to {self.mode} meanwhile")
 
@@ -143,11 +143,6 @@ class Plane(GuidedVehicle):
             check()
             await self.link.send(messages.select_item(self.address, 1), self.state.system)
         check()
-
-    def _require_disarmed(self) -> None:
-        """Raise ModeChanged unless it is disarmed: the mission of a vehicle that another client armed must stay."""
-        if self.state.armed is not False:
-            raise ModeChanged(f"the pilot or another client has armed the vehicle, in {self.mode}")
 
     # -- up and down --------------------------------------------------------------------------------------
 
@@ -175,6 +170,8 @@ class Plane(GuidedVehicle):
 
             names = {"GLOBAL_POSITION_INT", "EXTENDED_SYS_STATE"}
             await self.flown(TAKEOFF, names, has_climbed, allowed, f"climb in {TAKEOFF}")
+            await self.hear_again()
+            self.held_by(TAKEOFF)
             await self.switch_to(job, GUIDED)
             here = self.fresh("GLOBAL_POSITION_INT")
             await self._reposition(job, GlobalTarget(here.lat / 1e7, here.lon / 1e7, alt))
@@ -197,7 +194,7 @@ class Plane(GuidedVehicle):
             Busy: the mission has no landing sequence; `land_at` makes one.
         """
         self.authority.take(job, Rank.STOP)  # a waiting arm ends
-        if self.state.armed is False:
+        if await self.stays_disarmed(job):
             return
         vertical = await self.is_vtol()
         if vertical:
@@ -257,7 +254,7 @@ class Plane(GuidedVehicle):
     async def rtl(self, job: Job, timeout: float | None = None) -> None:
         """Return to launch; done when it circles there, or has landed if its parameters say so."""
         self.authority.take(job, Rank.STOP)
-        if await self.is_done_at_home():
+        if await self.is_done_at_home(job):
             return
         lands = self.state.parameters.get("RTL_AUTOLAND") in LANDING_RETURNS
         returning = (RTL, AUTO) if lands else (RTL,)
@@ -287,8 +284,7 @@ class Plane(GuidedVehicle):
         Raises:
             NotArmed: there is nothing to stop.
         """
-        if self.authority.on_its_way and not self.state.armed:
-            self.authority.take(job, Rank.STOP)  # a waiting arm ends
+        await self.end_waiting_arm(job)
         self.require_armed()
         await self.hold(job)
         held = self.mode in {*self.holding_modes, self.holding_mode}

@@ -87,7 +87,7 @@ class Rover(TravellingVehicle):
     async def rtl(self, job: Job, timeout: float | None = None) -> None:
         """Return to launch; done when it has stopped there. A disarmed rover at home has nothing to do."""
         self.authority.take(job, Rank.STOP)
-        if await self.is_done_at_home():
+        if await self.is_done_at_home(job):
             return
         await self.switch_to(job, "RTL")
         await self.know_home()
@@ -108,8 +108,7 @@ class Rover(TravellingVehicle):
         Raises:
             NotArmed: there is nothing to stop.
         """
-        if self.authority.on_its_way and not self.state.armed:
-            self.authority.take(job, Rank.STOP)  # a waiting arm ends
+        await self.end_waiting_arm(job)
         self.require_armed()
         await self.hold(job)
         await self.flown(

@@ -45,16 +45,44 @@ class Vehicle(Verbs):
     async def disarm(self, job: Job, force: bool = False) -> None:
         """Disarm and wait until a heartbeat shows it. In flight it is refused, unless `force`: then it falls.
 
-        It ends an `arm` that waits. Nothing is sent then, unless the command to arm may be on its way.
+        It ends an `arm` that waits. It is sent to a disarmed vehicle, too: somebody may have armed it since its last
+        heartbeat.
         """
-        armed = self.state.armed is not False
-        if armed and not force and self.state.landed is False:
+        if self.state.armed is not False and not force and self.state.landed is False:
             raise Busy("the vehicle is flying; land it first (force=true stops its motors in the air)")
-        may_be_armed = armed or self.authority.on_its_way
         self.authority.take(job, Rank.FORCE if force else Rank.STOP)
-        if may_be_armed:
-            await arming.disarm(self, job, force)
+        await arming.disarm(self, job, force)
         self.authority.shown(job)
+
+    async def stays_disarmed(self, job: Job) -> bool:
+        """Whether it is disarmed, by a heartbeat that is newer than the call.
+
+        An order of ours to arm that may be on its way is undone first.
+
+        Raises:
+            ModeChanged: the heartbeat shows it armed.
+            TimedOut, LinkLost: no heartbeat comes.
+        """
+        if self.state.armed is not False:
+            return False
+        if self.arm_is_on_its_way:
+            await arming.disarm(self, job, force=False)
+        else:
+            await self.hear_again()
+        self.require_disarmed()
+        return True
+
+    def require_disarmed(self) -> None:
+        """Raise ModeChanged unless it is disarmed: a vehicle that another one armed is left to him."""
+        if self.state.armed is not False:
+            raise ModeChanged(f"the pilot or another client has armed the vehicle, in {self.mode}")
+
+    async def end_waiting_arm(self, job: Job) -> None:
+        """End an `arm` of ours that has not shown its effect, for a verb that stops the vehicle."""
+        if self.authority.on_its_way and not self.state.armed:
+            self.authority.take(job, Rank.STOP)
+            if self.arm_is_on_its_way:
+                await arming.disarm(self, job, force=False)
 
     async def set_mode(self, job: Job, mode: str) -> None:
         """Switch to any mode of the vehicle's type. A mode that stops it has the higher rank.
@@ -70,6 +98,11 @@ class Vehicle(Verbs):
         await self.switch_to(job, mode)
 
     # -- stopping -----------------------------------------------------------------------------------------
+
+    @property
+    def stops_in_its_mode(self) -> bool:
+        """Whether `hold` switches no mode."""
+        return False
 
     async def hold(self, job: Job) -> None:
         """Stop and stay, however it moves for us."""
@@ -87,21 +120,21 @@ class Vehicle(Verbs):
 
     # -- home ---------------------------------------------------------------------------------------------
 
-    async def is_done_at_home(self) -> bool:
+    async def is_done_at_home(self, job: Job) -> bool:
         """Whether it is disarmed, so that there is nothing to return: at home it is done.
 
         Raises:
             NotArmed: it is disarmed elsewhere.
             NotFound: it is disarmed, and has no home yet.
             ModeChanged: it was armed while we requested its home.
+            TimedOut, LinkLost: as `stays_disarmed`.
         """
-        if self.state.armed is not False:
+        if not await self.stays_disarmed(job):
             return False
         distance = self.distance_home()
         if distance is None:
             await self.home()
-            if self.state.armed is not False:
-                raise ModeChanged(f"the pilot or another client has armed the vehicle, in {self.mode}")
+            self.require_disarmed()
             self.fresh("GLOBAL_POSITION_INT")
             distance = self.distance_home() or 0.0
         if distance > HOME_RADIUS:

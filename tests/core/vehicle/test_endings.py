@@ -18,6 +18,7 @@ from mavproxy_uavapi.core.errors import (
     UavApiError,
 )
 from mavproxy_uavapi.core.vehicle.endings import WHAT_FOLLOWS, Policy, Situation, situation
+from mavproxy_uavapi.core.vehicle.guard import Ordered
 from mavproxy_uavapi.core.vehicle.jobs import Ending
 from mavproxy_uavapi.core.vehicle.messages import NedTarget
 
@@ -63,6 +64,7 @@ NONE = (None, None, None, None, None)
 EXPECTED = {
     Situation.UNKNOWN: NONE,
     Situation.DISARMED: NONE,
+    Situation.ARMING: (None, "disarm", "disarm", "disarm", "disarm"),
     Situation.IDLE: NONE,
     Situation.GUIDED: (None, "hold", "hold", "land", "rtl"),
     Situation.PAUSED: (None, "hold", "hold", "land", "rtl"),
@@ -105,6 +107,7 @@ def test_every_situation_and_policy(loop: Any, host: Any, drone: Any, copter: An
     now, show = SHOWN[how]
     show(drone)
     loop.settle()
+    copter.guard.take_up(Ordered(at=loop.time()))  # it is in its mode for us
     action = EXPECTED[now][list(Policy).index(policy)]
     before, requested = len(drone.orders()), loop.now
 
@@ -113,7 +116,7 @@ def test_every_situation_and_policy(loop: Any, host: Any, drone: Any, copter: An
 
     closing = loop.run(see_to())
     assert (closing is not None) == (action is not None)
-    loop.pass_time(3.0)
+    loop.pass_time(4.0)
     sent = drone.orders()[before:]
     if action is None:
         assert sent == []
@@ -126,6 +129,35 @@ def test_every_situation_and_policy(loop: Any, host: Any, drone: Any, copter: An
     else:
         assert drone.mode == "BRAKE"
     assert loop.now > requested
+
+
+@pytest.mark.parametrize("policy", Policy)
+def test_vehicle_that_another_station_flies_in_guided_is_left_alone(
+    loop: Any, host: Any, flying: Any, copter: Any, policy: Policy
+) -> None:
+    async def see_to() -> Any:
+        return host.endings.see_to(copter, policy, "in a test", "10.0.0.7")
+
+    assert loop.run(see_to()) is None
+    loop.pass_time(3.0)
+    assert flying.orders() == []
+
+
+@pytest.mark.parametrize(("policy", "mode"), [(Policy.HOLD, "AUTO"), (Policy.LAND, "GUIDED"), (Policy.RTL, "AUTO")])
+def test_vehicle_that_its_pilot_took_since_the_last_heartbeat_is_left_alone(
+    loop: Any, host: Any, drone: Any, copter: Any, policy: Policy, mode: str
+) -> None:
+    drone.fly(mode)
+    loop.settle()
+    copter.guard.take_up(Ordered(at=loop.time()))
+
+    async def see_to() -> Any:
+        return host.endings.see_to(copter, policy, "in a test", "10.0.0.7", ITS_OWN)
+
+    drone.mode = "LOITER"  # no heartbeat has told so yet
+    closing = loop.run(see_to())
+    loop.pass_time(3.0)
+    assert isinstance(closing.error, ModeChanged) and drone.orders() == [] and drone.mode == "LOITER"
 
 
 @pytest.mark.parametrize("policy", Policy)

@@ -39,6 +39,12 @@ class Copter:
         self.height = target.alt
         self.did.append((round(self.north), target.alt))
 
+    async def hear_again(self) -> None:
+        """It is heard at once."""
+
+    def held_by(self, mode: str) -> None:
+        assert mode == "GUIDED"
+
     async def rtl(self, _job: Any) -> None:
         self.did.append("rtl")
 

@@ -102,9 +102,10 @@ def test_long_values_are_cut(service: Any, api: Any) -> None:
     assert len(json.dumps(asdict(entry))) < 4000
 
 
-def test_what_is_done_after_a_scripts_death_leaves_a_trace(flying: Any, host: Any, loop: Any) -> None:
+def test_what_is_done_after_a_scripts_death_leaves_a_trace(flying: Any, api: Any, host: Any, loop: Any) -> None:
+    api.post("/movement/go_to_ned", json={"x": 30, "y": 0, "z": -20})
     loop.run(after_death(host, 1, run_of("a.py"), []))
-    (entry,) = host.audit.entries
+    entry = host.audit.entries[-1]
     assert (entry.client, entry.verb, entry.system) == ("script a.py", "hold after the death of a.py", 1)
     assert (entry.outcome, entry.detail) == ("ok", "hold is done")
     assert "SET_POSITION_TARGET_LOCAL_NED" in " ".join(entry.sent)
@@ -124,9 +125,10 @@ def test_job_of_a_task_that_a_finished_call_began_has_an_entry_of_its_own(
         return {"result": "runs"}
 
     host.extensions["/execute"] = Route("/execute", execute, Empty, FLY, POST)
+    api.post("/movement/go_to_ned", json={"x": 30, "y": 0, "z": -20})
     api.post("/execute")
     loop.pass_time(10.0)
-    of_call, of_death = service.host.audit.entries
+    _, of_call, of_death = service.host.audit.entries
     assert (of_call.verb, of_call.sent) == ("/execute", ())
     assert of_death.sent
 

@@ -15,7 +15,7 @@ from mavproxy_uavapi.core.vehicle.messages import NedTarget
 from mavproxy_vision.errors import LandingFailed
 from mavproxy_vision.geometry.frames import Attitude, vector
 from mavproxy_vision.landing.precision_landing import WANTED, landing_target
-from tests.support.landing import LARGE, PLND, holds, pilot, plnd, sent, silent, unheard, until
+from tests.support.landing import LARGE, MODES, PLND, SWITCH_MODE, holds, pilot, plnd, sent, silent, unheard, until
 
 
 @pytest.mark.parametrize(("forward", "right"), [(1.0, 0.5), (-1.0, 0.5), (0.3, -2.0)])
@@ -39,6 +39,38 @@ def test_stopped_in_land_by_landing_target_it_holds_and_plnd_is_as_before(flying
     rig.outcome(job)
     assert holds(rig, "BRAKE")
     assert plnd(rig) == before
+
+
+@pytest.mark.parametrize("switch_after", [0.3, 1.0])  # s of silence, of which 1.2 s would have it taken back
+def test_a_pilot_who_takes_it_while_the_telemetry_is_silent_keeps_it(flying, switch_after):
+    rig = flying(alt=6.0, plnd=True, **LARGE)
+    job = rig.land(method="landing_target")
+    until(rig, lambda: rig.copter.mode == "LAND")
+    rig.pass_time(1.5)
+    hear, rig.host._receive = rig.host._receive, lambda _message: None
+    rig.pass_time(switch_after)
+    pilot(rig, MODES["LOITER"])
+    began = len(rig.wire.sent)
+    rig.pass_time(3.0 - switch_after)
+    rig.host._receive = hear
+    rig.pass_time(3.0)
+    switches = [m for m in rig.wire.sent[began:] if m.get_type() == "COMMAND_LONG" and m.command == SWITCH_MODE]
+    assert switches == [] and rig.mode == "LOITER"
+    assert isinstance(rig.outcome(job), ModeChanged)
+
+
+def test_a_pilot_who_takes_it_as_the_tag_is_lost_keeps_it(flying):
+    rig = flying(alt=6.0, plnd=True, **LARGE)
+    job = rig.land(method="landing_target")
+    until(rig, lambda: rig.copter.mode == "LAND")
+    rig.pass_time(1.5)
+    rig.eye.blind = lambda _detection: True
+    hear = unheard(rig, "LOITER")
+    rig.pass_time(1.0)
+    pilot(rig, MODES["LOITER"])
+    rig.pass_time(1.5)
+    rig.host._receive = hear
+    assert isinstance(rig.outcome(job), ModeChanged) and rig.mode == "LOITER"
 
 
 def test_stopped_and_unloaded_in_one_breath_it_holds_and_plnd_is_as_before(flying):

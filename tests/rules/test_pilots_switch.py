@@ -1,0 +1,104 @@
+"""A pilot's switch that no heartbeat has told of yet: what a flight does by itself does not undo it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from mavproxy_uavapi.core.vehicle.endings import Policy
+from tests.support.wire import Wire
+from tests.support.world import World
+
+SET_MODE, ARM = mavlink.MAV_CMD_DO_SET_MODE, mavlink.MAV_CMD_COMPONENT_ARM_DISARM
+PLANE_LOITERS = 12  # its number of LOITER
+STOPS = ("/command/land", "/command/rtl", "/movement/stop", "/command/disarm")
+
+
+def commands(world: World, number: int, since: float) -> list[Any]:
+    """The host's commands of that number."""
+    sent = [message for message in world.orders(since) if message.get_type() == "COMMAND_LONG"]
+    return [message for message in sent if message.command == number]
+
+
+def is_heartbeat(message: Any) -> bool:
+    return bool(message.get_type() == "HEARTBEAT")
+
+
+def test_a_plane_that_its_pilot_takes_in_its_takeoff_is_not_switched_to_guided(make_world: Any) -> None:
+    world = make_world(World.armed, vehicle="plane")
+    takeoff = world.begin("GET", "/command/takeoff?alt=53")
+    while world.vehicle.mode.name != "TAKEOFF" or world.at[2] > -40:
+        world.loop.pass_time(0.02)
+    world.hears = lambda message: not is_heartbeat(message)  # the heartbeats are lost
+    world.in_mode("LOITER")
+    since = world.loop.time()
+    world.loop.pass_time(2.5)
+    assert commands(world, SET_MODE, since) == []
+    world.hears = lambda _message: True
+    assert world.answer(takeoff).outcome == "409 mode_changed"
+    assert commands(world, SET_MODE, since) == [] and world.vehicle.mode.name == "LOITER"
+
+
+@pytest.mark.parametrize(("pilot", "then"), [(None, "RTL"), ("LOITER", "LOITER")])
+def test_the_end_of_a_lease_waits_for_a_heartbeat(make_world: Any, pilot: str | None, then: str) -> None:
+    world = make_world()
+    world.host.endings.on_lease_end = Policy.RTL
+    assert world.ask("POST", "/movement/go_to_ned?lease=1", {"x": 300, "y": 0, "z": -8}).status == 200
+    world.hears = lambda message: not is_heartbeat(message)
+    if pilot:
+        world.in_mode(pilot)
+    since = world.loop.time()
+    world.loop.pass_time(3.0)
+    assert commands(world, SET_MODE, since) == []
+    world.hears = lambda _message: True
+    world.loop.pass_time(3.0)
+    assert world.vehicle.mode.name == then
+    assert bool(commands(world, SET_MODE, since)) == (pilot is None)
+
+
+@pytest.fixture
+def arming(make_world: Any) -> Callable[[], tuple[World, Wire]]:
+    """A vehicle to which our order to arm is on its way."""
+
+    def begin() -> tuple[World, Wire]:
+        world = make_world(World.boot)
+        world.in_mode("GUIDED")
+        world.loop.pass_time(3.0)
+        arm = world.begin("GET", "/command/arm?wait=false")
+        while not commands(world, ARM, 0):
+            world.loop.pass_time(0.001)
+        return world, arm
+
+    return begin
+
+
+@pytest.mark.parametrize("verb", STOPS)
+def test_a_stop_undoes_an_order_to_arm_that_is_on_its_way(arming: Any, verb: str) -> None:
+    world, _ = arming()
+    assert world.ask("GET", verb).outcome == ("409 not_armed" if verb == "/movement/stop" else "200")
+    world.loop.pass_time(3.0)
+    assert not world.vehicle.armed
+
+
+def test_a_deleted_arm_is_undone_if_it_was_sent(arming: Any) -> None:
+    world, arm = arming()
+    job = world.answer(arm).body["job"]
+    assert world.ask("DELETE", f"/jobs/{job}").body["then"] == "disarm is done"
+    world.loop.pass_time(3.0)
+    assert not world.vehicle.armed
+
+
+def test_a_pilot_who_armed_since_the_last_heartbeat_keeps_it_from_a_land_and_loses_it_by_a_disarm(
+    make_world: Any,
+) -> None:
+    world = make_world(World.boot)
+    world.loop.pass_time(3.0)
+    world.by_hand(ARM, 1)
+    assert world.ask("GET", "/command/land").outcome == "409 mode_changed"
+    world.by_hand(ARM, 0)
+    world.loop.pass_time(3.0)
+    world.by_hand(ARM, 1)
+    assert world.ask("GET", "/command/disarm").outcome == "200" and not world.vehicle.armed
