@@ -157,9 +157,9 @@ def endings_page() -> list[str]:
         lines.append(f"| {situation.value} | " + " | ".join(cells) + " |")
     lines += [
         "",
-        "A change of mode that nobody requests at that moment (the client hung up, its script died, a lease ran out, a",
-        "failure, a defect) waits for the next heartbeat: if that shows a pilot's mode, nothing is sent. A zero velocity",
-        "does not wait; it does nothing in a pilot's mode.",
+        "A change of mode that nobody requests at that moment (the client hung up, its script died, a lease ran out,",
+        "a failure, a defect) waits for the next heartbeat: if that shows a pilot's mode, nothing is sent. A zero",
+        "velocity does not wait; it does nothing in a pilot's mode.",
     ]
     return lines
 
