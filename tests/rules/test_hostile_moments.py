@@ -174,6 +174,48 @@ def test_stop_that_never_reaches_the_vehicle_does_not_say_that_it_stopped(world:
     assert reply.outcome != "200"
 
 
+@pytest.mark.parametrize("lost", [1, 2, 3])
+def test_guided_after_a_stop_whose_zero_velocity_is_lost_does_not_fly_on(world: Any, lost: int) -> None:
+    stopped_on_its_way(world)
+    world.fault("drop", message="SET_POSITION_TARGET_LOCAL_NED", count=lost)
+    before = world.at
+    assert world.ask("GET", "/command/guided").outcome == "200"
+    world.loop.pass_time(10.0)
+    assert math.dist(before, world.at) < 1.0
+
+
+def test_guided_after_a_stop_whose_zero_velocities_are_all_lost_leaves_it_stopped(world: Any) -> None:
+    stopped_on_its_way(world)
+    world.fault("drop", message="SET_POSITION_TARGET_LOCAL_NED")
+    before = world.at
+    assert world.ask("GET", "/command/guided").outcome == "504 timeout"
+    world.loop.pass_time(10.0)
+    assert math.dist(before, world.at) < 1.0
+    assert world.ask("POST", "/movement/go_to_ned", FAR).outcome == "409 paused"
+
+
+@pytest.mark.parametrize("after", [0.1, 0.5, 1.0, 2.0])
+def test_pilot_who_switches_while_guided_ends_a_stop_gets_nothing_more(world: Any, after: float) -> None:
+    stopped_on_its_way(world)
+    world.fault("drop", message="SET_POSITION_TARGET_LOCAL_NED")
+    ending = world.begin("GET", "/command/guided")
+    world.loop.pass_time(after)
+    world.fault("pilot_mode", mode="LOITER")
+    world.loop.pass_time(1.2)
+    since = world.loop.time()
+    world.loop.pass_time(10.0)
+    assert world.answer(ending).outcome == "409 mode_changed"
+    assert world.orders(since) == []
+    assert world.copter.mode.name == "LOITER"
+
+
+def stopped_on_its_way(world: Any) -> None:
+    """It goes far away, and `stop` holds it on the way."""
+    assert world.ask("POST", "/movement/go_to_ned", FAR).outcome == "200"
+    world.loop.pass_time(5.0)
+    assert world.ask("GET", "/movement/stop").outcome == "200"
+
+
 # -- landings ---------------------------------------------------------------------------------------------
 
 
