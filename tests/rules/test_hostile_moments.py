@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -320,6 +321,76 @@ def test_takeoff_that_is_deleted_with_its_first_hold_lost_holds_all_the_same(on_
     on_ground.ask("DELETE", requested.headers["location"])
     on_ground.loop.pass_time(10.0)
     assert -on_ground.at[2] < 4.0
+
+
+MOVEMENTS = {
+    "/movement/go_to_ned": {"x": 30, "y": 0, "z": -20},
+    "/movement/travel_at_ned": {"vx": 8, "vy": 0, "vz": 0, "duration": 6},
+    "/movement/travel_at_body": {"front": 8, "right": 0, "down": 0},
+    "/movement/set_heading": {"heading": 90},
+    "/movement/set_yaw_rate": {"yaw_rate": 30},
+}
+
+
+def hangs_up(world: Any) -> None:
+    """The client of a takeoff hangs up in its climb."""
+    climbing = world.begin("GET", "/command/takeoff?alt=20")
+    world.loop.pass_time(3.0)
+    climbing.hang_up()
+    world.loop.pass_time(0.2)
+
+
+def another_station_takes_off(world: Any) -> None:
+    world.pilot_command(TAKEOFF, 0, 0, 0, 0, 0, 0, 20)
+    world.loop.pass_time(3.2)
+
+
+def takes_too_long(world: Any) -> None:
+    """The timeout of a takeoff passes in its climb."""
+    assert world.ask("GET", "/command/takeoff?alt=20&timeout=3").outcome == "504 timeout"
+
+
+def guided_supersedes_it(world: Any) -> None:
+    """`guided` supersedes the job of a takeoff, which goes on."""
+    climbing = world.begin("GET", "/command/takeoff?alt=20")
+    world.loop.pass_time(3.2)
+    assert world.ask("GET", "/command/guided").outcome == "200"
+    assert world.answer(climbing).outcome == "409 superseded"
+
+
+@pytest.mark.parametrize("path", MOVEMENTS)
+@pytest.mark.parametrize("stage", [hangs_up, another_station_takes_off, takes_too_long, guided_supersedes_it])
+def test_movement_in_a_takeoff_that_no_job_flies_is_busy(
+    on_ground: Any, stage: Callable[[Any], None], path: str
+) -> None:
+    stage(on_ground)
+    since = on_ground.loop.time()
+    method = "GET" if "heading" in path or "yaw" in path else "POST"
+    query = "?" + "&".join(f"{name}={value}" for name, value in MOVEMENTS[path].items()) if method == "GET" else ""
+    reply = on_ground.ask(method, path + query, None if query else MOVEMENTS[path])
+    assert reply.outcome == "409 busy"
+    assert on_ground.orders(since) == []
+    on_ground.loop.pass_time(20.0)
+    assert -on_ground.at[2] == pytest.approx(20, abs=0.5)
+    assert on_ground.ask("POST", "/movement/go_to_ned_wait", {"x": 5, "y": 0, "z": -20}).outcome == "200"
+
+
+def test_no_movement_goes_out_between_the_ground_and_the_end_of_a_takeoff(on_ground: Any) -> None:
+    climbing = on_ground.begin("GET", "/command/takeoff?alt=20")
+    on_ground.loop.pass_time(0.5)
+    climbing.hang_up()
+    for _ in range(200):
+        on_ground.loop.pass_time(0.1)
+        if on_ground.ask("POST", "/movement/travel_at_ned", {"vx": 8, "vy": 0, "vz": 0}).outcome != "409 busy":
+            break
+    assert -on_ground.at[2] > 19.0
+
+
+def test_movement_while_a_takeoff_is_stopped_is_paused(on_ground: Any) -> None:
+    on_ground.begin("GET", "/command/takeoff?alt=20")
+    on_ground.loop.pass_time(4.0)
+    assert on_ground.ask("GET", "/movement/stop").outcome == "200"
+    assert on_ground.ask("POST", "/movement/go_to_ned", FAR).outcome == "409 paused"
 
 
 def test_job_that_a_delete_began_may_be_deleted_and_the_vehicle_stays(world: Any) -> None:

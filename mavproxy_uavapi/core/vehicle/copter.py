@@ -80,7 +80,7 @@ class Copter(TurningVehicle):
         allowed = self.allowed(time_limits.leg_time(limits, 0.0, alt), timeout)
         names = {"GLOBAL_POSITION_INT", "EXTENDED_SYS_STATE"}
         await self.flown(GUIDED, names, reached, allowed, f"reach {alt:g} m")
-        self.authority.shown(job)
+        self.takeoff_is_done(job)
 
     async def land(self, job: Job, timeout: float | None = None) -> None:
         """Land where it is; done when it has disarmed.
