@@ -291,6 +291,43 @@ def test_two_takeoffs_at_once_agree_on_one_height(on_ground: Any, after: float) 
     assert -on_ground.at[2] == pytest.approx(10 if outcomes[0] == "200" else 20, abs=1.0)
 
 
+@pytest.mark.parametrize("after", [0.1, 0.3, 1.0, 1.5, 1.6, 1.7, 1.8, 1.9, 2.0, 2.5])
+@pytest.mark.parametrize("acks", ["come", "are lost"])
+def test_second_takeoff_is_busy_as_soon_as_the_first_is_sent(on_ground: Any, after: float, acks: str) -> None:
+    if acks == "are lost":
+        on_ground.fault("lose_acks", command=TAKEOFF)
+    first = on_ground.begin("GET", "/command/takeoff?alt=10")
+    on_ground.loop.pass_time(after)
+    assert on_ground.ask("GET", "/command/takeoff?alt=20").outcome == "409 busy"
+    assert on_ground.answer(first).outcome == "200"
+    assert -on_ground.at[2] == pytest.approx(10, abs=1.0)
+
+
+def test_lease_of_a_takeoff_acts_though_another_client_has_asked_for_a_second_one(on_ground: Any) -> None:
+    first = on_ground.begin("GET", "/command/takeoff?alt=60&lease=5&client=first")
+    on_ground.loop.pass_time(1.8)
+    assert on_ground.ask("GET", "/command/takeoff?alt=65&client=second").outcome == "409 busy"
+    assert on_ground.answer(first).outcome == "409 aborted"
+    on_ground.loop.pass_time(10.0)
+    assert -on_ground.at[2] < 20.0
+    assert speed(on_ground) < 0.3
+
+
+def test_takeoff_that_is_stopped_on_the_ground_may_be_replaced_by_another_one(on_ground: Any) -> None:
+    first = on_ground.begin("GET", "/command/takeoff?alt=10")
+    on_ground.loop.pass_time(0.5)
+    assert on_ground.ask("GET", "/movement/stop").outcome == "200"
+    assert on_ground.ask("GET", "/command/takeoff?alt=5").outcome == "200"
+    assert on_ground.answer(first).outcome == "409 superseded"
+    assert -on_ground.at[2] == pytest.approx(5, abs=0.5)
+
+
+def test_takeoff_after_one_that_was_refused_takes_off(on_ground: Any) -> None:
+    on_ground.fault("refuse", command=TAKEOFF, result=4, text="no", count=1)
+    assert on_ground.ask("GET", "/command/takeoff?alt=10").outcome == "500 rejected"
+    assert on_ground.ask("GET", "/command/takeoff?alt=5").outcome == "200"
+
+
 @pytest.mark.parametrize("after", [0.0, 0.02, 0.06, 0.3, 0.8, 1.5, 2.0, 2.5])
 def test_takeoff_that_is_deleted_stays_below_two_metres(on_ground: Any, after: float) -> None:
     requested = on_ground.ask("GET", "/command/takeoff?alt=20&wait=false")

@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 from typing import Any
 
-from mavproxy_uavapi.core.errors import Busy, ModeChanged, Rejected, TimedOut
+from mavproxy_uavapi.core.errors import ModeChanged, Rejected, TimedOut
 from mavproxy_uavapi.core.mavlink.flight_modes import MISSION_MODES, flies_mission
 from mavproxy_uavapi.core.vehicle import messages, setpoint_in_force, time_limits
 from mavproxy_uavapi.core.vehicle.authority import Rank
@@ -51,8 +51,7 @@ class Copter(TurningVehicle):
         """
         self.require_armed()
         self.require_mode(GUIDED)
-        if self.state.landed is False:
-            raise Busy("the vehicle is flying already")
+        self.require_ground(job)
         was_paused = self.authority.paused
         self.authority.take(job, Rank.ARM, self.inside(messages.takeoff(alt)))
         await self.lift_off(job, alt)

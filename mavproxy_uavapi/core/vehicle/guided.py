@@ -41,6 +41,7 @@ class GuidedVehicle(Vehicle):
     ) -> None:
         super().__init__(state, link, pending, clock, spaces)
         self.own_target = OwnTarget(state, clock)
+        self._lifts_off_for: Job | None = None  # the job that has sent the last takeoff
         self._reported_after_its_end: float | None = None  # a takeoff: since when its mode has lasted (s)
 
     def require_guided_flight(self) -> None:
@@ -67,6 +68,17 @@ class GuidedVehicle(Vehicle):
         if self.is_taking_off and not is_done and not self.authority.paused:
             raise Busy("the vehicle is taking off")
 
+    def require_ground(self, job: Job) -> None:
+        """Raise Busy if it flies, or takes off for another job than this one.
+
+        Telemetry shows a takeoff only seconds after its command; the autopilot refuses a second one before that.
+        """
+        if self.state.landed is False:
+            raise Busy("the vehicle is flying already")
+        lifts_off = self._lifts_off_for is self.authority.commander and self.authority.on_its_way
+        if lifts_off and self._lifts_off_for is not job:
+            raise Busy("the vehicle is taking off already")
+
     def takeoff_is_done(self, job: Job) -> None:
         """Note that the takeoff of `job` has reached its altitude."""
         self._reported_after_its_end = self.state.mode_since if self.is_taking_off else None
@@ -83,8 +95,12 @@ class GuidedVehicle(Vehicle):
     async def lift_off(self, job: Job, alt: float) -> None:
         """Begin to climb to `alt` m above home in GUIDED; returns when that is acknowledged, or shows."""
         self._reported_after_its_end = None
+
+        def noted() -> None:
+            self._lifts_off_for = job
+
         try:
-            await self.commands.send(messages.takeoff(alt), self.commanding(job, self.flying))
+            await self.commands.send(messages.takeoff(alt), self.commanding(job, self.flying, noted))
         except TimedOut:  # the ack may be lost: telemetry shows whether the takeoff began
             ratio = max(self.state.time_ratio.ratio, 0.1)
             await self.flown(
