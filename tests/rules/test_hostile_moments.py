@@ -10,6 +10,9 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from mavproxy_uavapi.core.vehicle.messages import FORCE_DISARM
+from tests.support.world import PLACE
+
 ARM, TAKEOFF, PAUSE = mavlink.MAV_CMD_COMPONENT_ARM_DISARM, mavlink.MAV_CMD_NAV_TAKEOFF, 193
 MODE = mavlink.MAV_CMD_DO_SET_MODE
 GO = "/movement/go_to_ned_wait"
@@ -322,6 +325,13 @@ def test_takeoff_that_is_stopped_on_the_ground_may_be_replaced_by_another_one(on
     assert -on_ground.at[2] == pytest.approx(5, abs=0.5)
 
 
+@pytest.mark.parametrize("alt", [0.1, 0.3, 0.5])
+def test_takeoff_to_less_than_its_tolerance_is_not_done_on_the_ground(on_ground: Any, alt: float) -> None:
+    assert on_ground.ask("GET", f"/command/takeoff?alt={alt}").outcome == "200"
+    assert not on_ground.copter.on_ground
+    assert -on_ground.at[2] == pytest.approx(alt, abs=0.3)
+
+
 def test_takeoff_after_one_that_was_refused_takes_off(on_ground: Any) -> None:
     on_ground.fault("refuse", command=TAKEOFF, result=4, text="no", count=1)
     assert on_ground.ask("GET", "/command/takeoff?alt=10").outcome == "500 rejected"
@@ -443,6 +453,58 @@ def test_job_that_a_delete_began_may_be_deleted_and_the_vehicle_stays(world: Any
     assert speed(world) < 0.3
     assert [job["verb"] for job in world.ask("GET", "/jobs").body["jobs"] if job["state"] == "running"] == []
     assert world.answer(deleting).outcome == "200"
+
+
+# -- the end of a mission ---------------------------------------------------------------------------------
+
+
+def on_the_way(world: Any, *, lands: bool = False) -> Any:
+    """A request for a mission of a waypoint far away, and of a landing there; it waits for the end."""
+    items = [{"command": "NAV_WAYPOINT", "lat": PLACE[0] + 0.004, "long": PLACE[1], "alt": 30}]
+    if lands:
+        items = [{"command": "NAV_LAND", "lat": PLACE[0], "long": PLACE[1], "alt": 0}]
+    assert world.ask("POST", "/mission/waypoints", {"items": items}).outcome == "200"
+    waiting = world.begin("POST", "/mission/start", {"until_complete": True})
+    world.loop.pass_time(4.0)
+    assert not waiting.reply.done()
+    return waiting
+
+
+def kill(world: Any) -> None:
+    world.pilot_command(ARM, 0, FORCE_DISARM)
+
+
+def boots(world: Any) -> None:
+    world.reboot(1.5)
+
+
+@pytest.fixture
+def high(make_world: Any) -> Any:
+    return make_world(lambda world: world.flying(height=30.0))
+
+
+@pytest.mark.parametrize("end", [kill, boots])
+@pytest.mark.parametrize("lands", [False, True])
+def test_vehicle_that_loses_its_motors_in_the_last_item_of_its_mission_has_not_completed_it(
+    high: Any, end: Callable[[Any], None], lands: bool
+) -> None:
+    waiting = on_the_way(high, lands=lands)
+    end(high)
+    assert high.answer(waiting).outcome == "409 not_armed"
+
+
+def test_mission_that_lands_is_complete_when_it_stands_disarmed(high: Any) -> None:
+    waiting = on_the_way(high, lands=True)
+    assert high.answer(waiting).outcome == "200"
+    assert not high.copter.armed
+    assert high.at[2] == pytest.approx(0.0, abs=0.1)
+
+
+def test_mission_whose_last_item_is_a_waypoint_is_complete_there(high: Any) -> None:
+    waiting = on_the_way(high)
+    assert high.answer(waiting).outcome == "200"
+    assert high.copter.armed
+    assert high.at[0] > 430.0
 
 
 # -- others -----------------------------------------------------------------------------------------------

@@ -68,7 +68,8 @@ class Copter(TurningVehicle):
             self.report_leg(job, abs(alt - self.height))
             climb = self.state.field("GLOBAL_POSITION_INT", "vz") or 0
             slow = abs(climb) / 100.0 <= 2 * ARRIVAL_SPEED
-            if not (abs(alt - self.height) <= tolerance and slow):
+            near = abs(alt - self.height) <= tolerance and self.state.landed is False
+            if not (near and slow):
                 near_since = None
                 return None
             near_since = self.clock() if near_since is None else near_since
