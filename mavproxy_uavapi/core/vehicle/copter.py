@@ -6,19 +6,22 @@ import asyncio
 import contextlib
 from typing import Any
 
-from mavproxy_uavapi.core.errors import Busy, ModeChanged, Rejected, TimedOut
+from mavproxy_uavapi.core.errors import ModeChanged, Rejected, TimedOut
 from mavproxy_uavapi.core.mavlink.flight_modes import MISSION_MODES, flies_mission
-from mavproxy_uavapi.core.vehicle import messages, time_limits
+from mavproxy_uavapi.core.vehicle import messages, setpoint_in_force, time_limits
 from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_uavapi.core.vehicle.guided import ARRIVAL_SPEED, GUIDED
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.messages import NO_YAW, VelocityTarget
+from mavproxy_uavapi.core.vehicle.travelling import REST_PERIOD
 from mavproxy_uavapi.core.vehicle.turning import TurningVehicle
 
 TAKEOFF_SHARE = 0.05  # of the altitude, between TAKEOFF_TOLERANCE's two ends
 TAKEOFF_TOLERANCE = (0.3, 1.0)  # m
 TAKEOFF_END = 3.0  # s at its altitude after which a takeoff counts as done, even if the autopilot still reports it
 SLOWDOWN = 0.3  # s that a pause on the ground needs to slow the motors from full throttle
+REST = VelocityTarget(0, 0, 0)
+DROP_TIMEOUT = 5.0  # s until a stopped vehicle must report that it has dropped its old movement
 STOP_TIMEOUT = 20.0  # s from full speed to rest
 SPEED_MODES = {"GUIDED", "RTL", *MISSION_MODES}  # others refuse DO_CHANGE_SPEED
 
@@ -48,13 +51,12 @@ class Copter(TurningVehicle):
         """
         self.require_armed()
         self.require_mode(GUIDED)
-        if self.state.landed is False:
-            raise Busy("the vehicle is flying already")
+        self.require_ground(job)
         was_paused = self.authority.paused
         self.authority.take(job, Rank.ARM, self.inside(messages.takeoff(alt)))
         await self.lift_off(job, alt)
         if was_paused:  # a pause outlives a takeoff in the autopilot
-            await self._continue(job)
+            await self._continue(job, GUIDED)
         limits = await self.limits()
         low, high = TAKEOFF_TOLERANCE
         tolerance = min(max(TAKEOFF_SHARE * alt, low), high)
@@ -66,7 +68,8 @@ class Copter(TurningVehicle):
             self.report_leg(job, abs(alt - self.height))
             climb = self.state.field("GLOBAL_POSITION_INT", "vz") or 0
             slow = abs(climb) / 100.0 <= 2 * ARRIVAL_SPEED
-            if not (abs(alt - self.height) <= tolerance and slow):
+            near = abs(alt - self.height) <= tolerance and self.state.landed is False
+            if not (near and slow):
                 near_since = None
                 return None
             near_since = self.clock() if near_since is None else near_since
@@ -77,7 +80,7 @@ class Copter(TurningVehicle):
         allowed = self.allowed(time_limits.leg_time(limits, 0.0, alt), timeout)
         names = {"GLOBAL_POSITION_INT", "EXTENDED_SYS_STATE"}
         await self.flown(GUIDED, names, reached, allowed, f"reach {alt:g} m")
-        self.authority.shown(job)
+        self.takeoff_is_done(job)
 
     async def land(self, job: Job, timeout: float | None = None) -> None:
         """Land where it is; done when it has disarmed.
@@ -127,8 +130,25 @@ class Copter(TurningVehicle):
         await super().set_mode(job, mode)
         if was_paused and mode.upper() == GUIDED and self.authority.paused:
             if self.state.armed:
-                await self.send_setpoint(job, VelocityTarget(0, 0, 0))  # so that it does not resume the old movement
-            await self._continue(job)
+                await self._drop_movement(job)
+            await self._continue(job, GUIDED)
+
+    async def _drop_movement(self, job: Job) -> None:
+        """Give a stopped vehicle a zero velocity in place of its old setpoint, until it reports that.
+
+        Raises:
+            TimedOut: it does not; it stays stopped, because it would fly on to its old target.
+        """
+        deadline = self.clock() + DROP_TIMEOUT
+        while self.clock() <= deadline:
+            await self.send_setpoint(job, REST)
+            if await setpoint_in_force.ask(self.state, self.waiting, self.link) == REST:
+                return
+            await asyncio.sleep(REST_PERIOD)
+        raise TimedOut(
+            f"vehicle {self.state.system} does not report within {DROP_TIMEOUT:g} s that it has dropped its old "
+            "movement, so it stays stopped; `brake` ends that too"
+        )
 
     async def stop(self, job: Job) -> None:
         """Hold the vehicle still, in GUIDED or in its mission, until `resume`; done when telemetry shows it.
@@ -161,16 +181,17 @@ class Copter(TurningVehicle):
     async def resume(self, job: Job) -> None:
         """Continue the movement that `stop` interrupted."""
         self.require_armed()
-        if not flies_mission(self.mode):
+        mode = self.mode
+        if not flies_mission(mode):
             self.require_mode(GUIDED)
         self.authority.accompany(job, "resume", stopped_too=True)
         interrupted = self.authority.interrupted
-        if interrupted is not None and interrupted.steers and not interrupted.running and self.mode == GUIDED:
-            await self.send_setpoint(job, VelocityTarget(0, 0, 0))  # its setpoints have stopped
-        await self._continue(job)
+        if interrupted is not None and interrupted.steers and not interrupted.running and mode == GUIDED:
+            await self.send_setpoint(job, REST)  # its setpoints have stopped
+        await self._continue(job, mode)
 
-    async def _continue(self, job: Job) -> None:
-        mode = self.mode
+    async def _continue(self, job: Job, mode: str) -> None:
+        """End the pause of a vehicle that is in `mode`."""
         await self.commands.send(messages.pause(False), self.commanding(job, lambda: self.require_mode(mode)))
         self.authority.end_pause()
 
@@ -198,4 +219,4 @@ class Copter(TurningVehicle):
             await self.commands.send(messages.pause(True), self.commanding(job, self.flying))
             await asyncio.sleep(SLOWDOWN)
         await self.rest(job)
-        await self._continue(job)
+        await self._continue(job, GUIDED)

@@ -24,6 +24,7 @@ TOLERANCE = 1.0  # m, horizontally and vertically
 ARRIVAL_SPEED = 0.5  # m/s; slower than this the vehicle does not overshoot its tolerance any more
 FLOOR = 0.0  # m above home: the lowest target, less TOLERANCE for the noise of the estimate
 LIFT_OFF_TIMEOUT = 5.0  # s in which an unacknowledged takeoff must show
+ON_GROUND = messages.mavlink.MAV_LANDED_STATE_ON_GROUND
 TAKING_OFF = messages.mavlink.MAV_LANDED_STATE_TAKEOFF
 
 
@@ -40,23 +41,48 @@ class GuidedVehicle(Vehicle):
     ) -> None:
         super().__init__(state, link, pending, clock, spaces)
         self.own_target = OwnTarget(state, clock)
+        self._lifts_off_for: Job | None = None  # the job that has sent the last takeoff
+        self._reported_after_its_end: float | None = None  # a takeoff: since when its mode has lasted (s)
 
     def require_guided_flight(self) -> None:
-        """Raise NotArmed, ModeChanged or Busy unless it flies in GUIDED."""
+        """Raise NotArmed, ModeChanged or Busy unless it flies in GUIDED, after its takeoff."""
         self.require_armed()
         self.require_mode(GUIDED)
         if self.state.landed:
             raise Busy("the vehicle is on the ground; `takeoff` first")
+        self.require_no_takeoff()
 
     @property
     def is_taking_off(self) -> bool:
-        """Whether the autopilot reports a takeoff, ours or another one."""
-        return bool(self.state.recent_field("EXTENDED_SYS_STATE", "landed_state") == TAKING_OFF)
+        """Whether the autopilot reports a takeoff, ours or another one, or that it has left the ground just now."""
+        reported = self.state.recent_field("EXTENDED_SYS_STATE", "landed_state")
+        has_just_left = reported == ON_GROUND and self.state.landed is False  # as a newer heartbeat says
+        return bool(reported == TAKING_OFF or has_just_left)
 
     def require_no_takeoff(self) -> None:
-        """Raise Busy during a takeoff."""
-        if self.is_taking_off:
+        """Raise Busy during a takeoff, unless that is done and reported all the same.
+
+        The authority refuses what moves a takeoff that `stop` has paused.
+        """
+        is_done = self._reported_after_its_end == self.state.mode_since
+        if self.is_taking_off and not is_done and not self.authority.paused:
             raise Busy("the vehicle is taking off")
+
+    def require_ground(self, job: Job) -> None:
+        """Raise Busy if it flies, or takes off for another job than this one.
+
+        Telemetry shows a takeoff only seconds after its command; the autopilot refuses a second one before that.
+        """
+        if self.state.landed is False:
+            raise Busy("the vehicle is flying already")
+        lifts_off = self._lifts_off_for is self.authority.commander and self.authority.on_its_way
+        if lifts_off and self._lifts_off_for is not job:
+            raise Busy("the vehicle is taking off already")
+
+    def takeoff_is_done(self, job: Job) -> None:
+        """Note that the takeoff of `job` has reached its altitude."""
+        self._reported_after_its_end = self.state.mode_since if self.is_taking_off else None
+        self.authority.shown(job)
 
     def flying(self) -> None:
         """The check before each message of a movement: the vehicle is armed and in GUIDED."""
@@ -68,8 +94,13 @@ class GuidedVehicle(Vehicle):
 
     async def lift_off(self, job: Job, alt: float) -> None:
         """Begin to climb to `alt` m above home in GUIDED; returns when that is acknowledged, or shows."""
+        self._reported_after_its_end = None
+
+        def noted() -> None:
+            self._lifts_off_for = job
+
         try:
-            await self.commands.send(messages.takeoff(alt), self.commanding(job, self.flying))
+            await self.commands.send(messages.takeoff(alt), self.commanding(job, self.flying, noted))
         except TimedOut:  # the ack may be lost: telemetry shows whether the takeoff began
             ratio = max(self.state.time_ratio.ratio, 0.1)
             await self.flown(

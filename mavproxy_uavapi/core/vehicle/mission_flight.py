@@ -10,10 +10,11 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import Busy, ModeChanged, Stale
 from mavproxy_uavapi.core.mavlink.flight_modes import MISSION_MODES, flies_mission
-from mavproxy_uavapi.core.vehicle import messages
+from mavproxy_uavapi.core.vehicle import messages, time_limits
 from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.mission_files import MissionItem
+from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 mavlink = mavutil.mavlink
@@ -24,6 +25,7 @@ STARTING_MODES = (AUTO, "GUIDED")  # in any other mode the pilot has it; `guided
 START_TIMEOUT = 10.0  # s until the vehicle must show that the mission runs
 LONGEST = 4 * 3600.0  # s for a mission whose client gave no timeout: longer than any copter flies
 END_SHOWN = 5.0  # s from the end of a final item until telemetry must show what follows it, such as a disarming
+STANDS_WITHIN = 10.0  # s from its disarming until a vehicle that has landed must stand still
 AFTER_MISSION = {"plane": "RTL"}  # the mode to which an autopilot goes on at the end of its mission
 UNKNOWN_TOTAL = 65535
 STATES = {
@@ -42,7 +44,7 @@ async def fly(vehicle: Vehicle, job: Job, until_complete: bool = False, timeout:
     On the ground the mission's first item must be a takeoff; the autopilot says so.
 
     Raises:
-        NotArmed: arm it first.
+        NotArmed: arm it first; or it was disarmed before the end, or in flight.
         ModeChanged: it is in a pilot's mode, or left AUTO meanwhile.
         Busy: it has no mission.
         Superseded: a newer command took it meanwhile.
@@ -109,26 +111,32 @@ def _is_active(vehicle: Vehicle, since: float) -> bool:
 
 
 async def _flown_to_its_end(vehicle: Vehicle, job: Job, items: Sequence[MissionItem], timeout: float) -> None:
-    final = {seq for seq, item in enumerate(items, 1) if item.command in LANDINGS} | {len(items)}
-    in_final_at = -math.inf  # s; a vehicle that has landed and disarmed reports the first item again
+    landings = {seq for seq, item in enumerate(items, 1) if item.command in LANDINGS}
+    touchdown = Touchdown(time_limits.limits({}, {}))  # it looks from the disarming on: nothing landed sinks then
+    in_landing_at = in_final_at = -math.inf  # s; a vehicle that has landed and disarmed reports the first item again
 
-    def complete() -> bool | None:
-        nonlocal in_final_at
+    def ended() -> str | None:
+        nonlocal in_landing_at, in_final_at
         _report(vehicle, job)
         if _is_complete(vehicle):
-            return True
-        just_ended = vehicle.clock() - in_final_at <= END_SHOWN
-        if vehicle.state.armed is False and just_ended:
-            return True
-        if vehicle.mode == AFTER_MISSION.get(vehicle.kind) and just_ended:
+            return "complete"
+        now = vehicle.clock()
+        if vehicle.state.armed is False and now - in_landing_at <= END_SHOWN:
+            return "disarmed"
+        if vehicle.mode == AFTER_MISSION.get(vehicle.kind) and now - in_final_at <= END_SHOWN:
             return None  # what shows the end of the mission may come after the mode that follows it
         _held(vehicle)
-        if progress(vehicle)["current"] in final:
-            in_final_at = vehicle.clock()
+        current = progress(vehicle)["current"]
+        in_landing_at = now if current in landings else in_landing_at
+        in_final_at = now if current in landings | {len(items)} else in_final_at
         return None
 
+    def landed() -> bool | None:
+        return vehicle.has_landed(touchdown, AUTO, *MISSION_MODES)
+
     names = {"HEARTBEAT", "MISSION_CURRENT", "MISSION_ITEM_REACHED"}
-    await vehicle.waiting.until(names, complete, timeout, "complete its mission")
+    if await vehicle.waiting.until(names, ended, timeout, "complete its mission") == "disarmed":
+        await vehicle.waiting.until({"HEARTBEAT", "GLOBAL_POSITION_INT"}, landed, STANDS_WITHIN, "stand still")
 
 
 def _is_complete(vehicle: Vehicle) -> bool:

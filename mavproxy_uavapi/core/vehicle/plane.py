@@ -153,8 +153,7 @@ class Plane(GuidedVehicle):
         """
         self.require_armed()
         self.require_mode(GUIDED)
-        if self.state.landed is False:
-            raise Busy("the vehicle is flying already")
+        self.require_ground(job)
         self.authority.take(job, Rank.ARM, self.inside(messages.takeoff(alt)))
         allowed = self.allowed(CIRCLES + time_limits.leg_time(await self.limits(), 0.0, alt), timeout)
         if vtol:

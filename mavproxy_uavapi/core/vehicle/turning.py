@@ -26,6 +26,7 @@ class TurningVehicle(TravellingVehicle):
         """
         self.require_armed()
         self.require_mode(GUIDED)
+        self.require_no_takeoff()
         self.authority.accompany(job, YAW)
         await self.commands.send(messages.yaw_to(heading), self.commanding(job, self.flying))
 
@@ -46,7 +47,6 @@ class TurningVehicle(TravellingVehicle):
         not report one, the present position is sent.
         """
         self.require_guided_flight()
-        self.require_no_takeoff()
         self.authority.accompany(job, YAW)
         target = await setpoint_in_force.ask(self.state, self.waiting, self.link)
         self.require_no_takeoff()

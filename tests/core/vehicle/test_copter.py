@@ -123,6 +123,19 @@ def test_command_goes_out_before_any_parameter_is_requested(
     assert loop.time() == began
 
 
+def test_takeoff_that_the_autopilot_reports_for_ever_ends_and_movements_begin(
+    loop: Any, armed: Any, copter: Any, pilotage: Any
+) -> None:
+    job = pilotage.start(copter.takeoff, 10.0)
+    loop.pass_time(3.0)
+    armed.lifting, armed.landed = False, mavlink.MAV_LANDED_STATE_TAKEOFF
+    assert pilotage.result(job) == "done"
+    assert copter.is_taking_off
+    pilotage.do(copter.go_to, FAR)
+    armed.landed = mavlink.MAV_LANDED_STATE_TAKEOFF
+    pilotage.do(copter.travel, VelocityTarget(1.0, 0.0, 0.0))
+
+
 def test_takeoff_takes_as_long_as_its_height_needs(loop: Any, armed: Any, copter: Any, pilotage: Any) -> None:
     started = loop.time()
     pilotage.do(copter.takeoff, 300.0)

@@ -135,6 +135,33 @@ def test_disarming_before_it_is_a_failure(loop: Any, flying: Any, flight: Flight
         pilotage.result(job)
 
 
+def test_disarming_in_a_last_item_that_is_no_landing_is_a_failure(
+    loop: Any, flying: Any, flight: Flight, pilotage: Any
+) -> None:
+    flight.items = ITEMS[:2]
+    job = flight.start(until_complete=True)
+    loop.pass_time(1.0)
+    flight.tell(2, total=2)
+    landed(flying, loop)
+    with pytest.raises(NotArmed):
+        pilotage.result(job)
+
+
+@pytest.mark.parametrize("velocity", [(12.0, 0.0, 0.0), (0.0, 0.0, 9.0)])
+def test_disarming_in_the_landing_item_at_speed_is_a_failure(
+    loop: Any, flying: Any, flight: Flight, pilotage: Any, velocity: tuple[float, float, float]
+) -> None:
+    job = flight.start(until_complete=True)
+    loop.pass_time(1.0)
+    flight.tell(3)
+    flying.mute.add("GLOBAL_POSITION_INT")
+    north, east, down = (round(100 * speed) for speed in velocity)
+    flying.send("global_position_int", relative_alt=20_000, vx=north, vy=east, vz=down)
+    landed(flying, loop)
+    with pytest.raises(NotArmed, match="disarmed in flight"):
+        pilotage.result(job)
+
+
 def test_pilot_who_leaves_auto_ends_the_wait(loop: Any, flying: Any, flight: Flight, pilotage: Any) -> None:
     job = flight.start(until_complete=True)
     loop.pass_time(1.0)
