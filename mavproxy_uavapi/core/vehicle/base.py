@@ -240,6 +240,9 @@ class BaseVehicle:
         """Whether the autopilot reports a target that another ground station gave it."""
         return False
 
+    def repeat_nothing(self) -> None:
+        """Send no target again, whether the vehicle shows it or not."""
+
     @property
     def stands(self) -> bool:
         """Whether it is on the ground, and stays there unless somebody commands it."""
