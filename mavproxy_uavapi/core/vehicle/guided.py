@@ -115,7 +115,7 @@ class GuidedVehicle(Vehicle):
         north, east, up = self.leg_to(target)
         if self.height + up < FLOOR - TOLERANCE:
             raise Invalid(f"the target lies {-(self.height + up):.1f} m below home")
-        self.authority.take(job, Rank.MOVEMENT, self.inside(target))
+        await self.take(job, Rank.MOVEMENT, self.inside(target))
         self.yaw = messages.facing(heading, look_at_target, north, east)
         await self.take_up(job, target, self.yaw)
         self._repeating = self._tasks.start(self._repeat(job, target), "the watch over a target")

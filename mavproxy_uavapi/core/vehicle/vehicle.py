@@ -51,7 +51,7 @@ class Vehicle(Verbs):
         if armed and not force and self.state.landed is False:
             raise Busy("the vehicle is flying; land it first (force=true stops its motors in the air)")
         may_be_armed = armed or self.authority.on_its_way
-        self.authority.take(job, Rank.FORCE if force else Rank.STOP)
+        await self.take(job, Rank.FORCE if force else Rank.STOP)
         if may_be_armed:
             await arming.disarm(self, job, force)
         self.authority.shown(job)
@@ -66,14 +66,14 @@ class Vehicle(Verbs):
         if flies_mission(mode.upper()) and self.guard.in_force:
             self.guard.require_mission(await self.mission_to_fly(), from_here=True)
         stops = mode.upper() in STOPPING_MODES.union(self.holding_modes)
-        self.authority.take(job, Rank.STOP if stops else Rank.ARM, self.inside(switch))
+        await self.take(job, Rank.STOP if stops else Rank.ARM, self.inside(switch))
         await self.switch_to(job, mode)
 
     # -- stopping -----------------------------------------------------------------------------------------
 
     async def hold(self, job: Job) -> None:
         """Stop and stay, however it moves for us."""
-        self.authority.take(job, Rank.STOP)
+        await self.take(job, Rank.STOP)
         if not self.mode == self.next_mode == self.holding_mode:
             await self.switch_to(job, self.holding_mode)
 
