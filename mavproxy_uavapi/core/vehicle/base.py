@@ -17,7 +17,7 @@ from mavproxy_uavapi.core.mavlink.link import Address, Link, is_finite
 from mavproxy_uavapi.core.mavlink.pending_waits import PendingWaits
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle import messages, time_limits
-from mavproxy_uavapi.core.vehicle.authority import CommandAuthority
+from mavproxy_uavapi.core.vehicle.authority import CommandAuthority, Rank, no_objection
 from mavproxy_uavapi.core.vehicle.command_sender import CommandSender
 from mavproxy_uavapi.core.vehicle.dataflash import DataflashLogs
 from mavproxy_uavapi.core.vehicle.envelope_check import Spaces
@@ -30,6 +30,7 @@ from mavproxy_uavapi.core.vehicle.mission_way import Stop
 from mavproxy_uavapi.core.vehicle.mode_switch import ModeRequests, ModeSwitch
 from mavproxy_uavapi.core.vehicle.parameters import Parameters
 from mavproxy_uavapi.core.vehicle.speeds import Speeds
+from mavproxy_uavapi.core.vehicle.start_gate import pass_gate
 
 T = TypeVar("T")
 mavlink = mavutil.mavlink
@@ -259,6 +260,9 @@ class BaseVehicle:
         """Whether the autopilot reports a target that another ground station gave it."""
         return False
 
+    def repeat_nothing(self) -> None:
+        """Send no target again, whether the vehicle shows it or not."""
+
     @property
     def stands(self) -> bool:
         """Whether it is on the ground, and stays there unless somebody commands it."""
@@ -292,6 +296,19 @@ class BaseVehicle:
         ):
             return False
         return self.obeys_us
+
+    async def take(self, job: Job, rank: Rank, allow: Callable[[], None] = no_objection) -> None:
+        """Make `job` the commander, once all verbs that begin with it can begin, too.
+
+        Raises:
+            Aborted: one of these cannot; nothing has changed.
+            Busy, Paused: as `CommandAuthority.take`. Also what `allow` raises.
+        """
+        if job is not self.authority.commander:
+            self.authority.admit(rank)
+        allow()
+        await pass_gate()
+        self.authority.take(job, rank, allow)
 
     def commanding(self, job: Job, *needs: Callable[[], None]) -> Callable[[], None]:
         """The check before each message of `job`: it still commands, and no need raises."""

@@ -13,6 +13,7 @@ from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_uavapi.core.vehicle.guided import ARRIVAL_SPEED, GUIDED
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.messages import NO_YAW, VelocityTarget
+from mavproxy_uavapi.core.vehicle.start_gate import pass_gate
 from mavproxy_uavapi.core.vehicle.travelling import REST_PERIOD
 from mavproxy_uavapi.core.vehicle.turning import TurningVehicle
 
@@ -87,7 +88,7 @@ class Copter(TurningVehicle):
 
         A vehicle whose next heartbeat shows it disarmed has landed; an `arm` that waits ends.
         """
-        self.authority.take(job, Rank.STOP)
+        await self.take(job, Rank.STOP)
         if await self.stays_disarmed(job):
             return
         await self.switch_to(job, "LAND")
@@ -105,7 +106,7 @@ class Copter(TurningVehicle):
             NotFound: the vehicle is disarmed and has no home yet.
             ModeChanged: it was armed while we requested its home.
         """
-        self.authority.take(job, Rank.STOP)
+        await self.take(job, Rank.STOP)
         if await self.is_done_at_home(job):
             return
         await self.switch_to(job, "RTL")
@@ -163,6 +164,8 @@ class Copter(TurningVehicle):
         mode = self.mode
         if mode != GUIDED and not flies_mission(mode):
             raise ModeChanged(f"the vehicle is in {mode}, which cannot be paused; `brake` stops it")
+        self.authority.admit(Rank.STOP)
+        await pass_gate()
         self.authority.interrupt(job)
         try:
             await self.commands.send(messages.pause(True), self.commanding(job, lambda: self.held_by(mode)))

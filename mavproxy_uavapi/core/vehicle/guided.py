@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
+import logging
 import math
 from collections.abc import Callable
 
-from mavproxy_uavapi.core.errors import Busy, Invalid, Stale, TimedOut
+from mavproxy_uavapi.core.errors import Busy, Invalid, Stale, Superseded, TimedOut, UavApiError
 from mavproxy_uavapi.core.geodesy import moved, offset
+from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.mavlink.link import Link
 from mavproxy_uavapi.core.mavlink.pending_waits import PendingWaits
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
-from mavproxy_uavapi.core.vehicle import messages, time_limits
+from mavproxy_uavapi.core.vehicle import messages, setpoint_in_force, time_limits
 from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_uavapi.core.vehicle.envelope_check import Spaces
-from mavproxy_uavapi.core.vehicle.jobs import Job
-from mavproxy_uavapi.core.vehicle.messages import NO_YAW, GlobalTarget, NedTarget, Target, Yaw
-from mavproxy_uavapi.core.vehicle.own_target import OwnTarget
+from mavproxy_uavapi.core.vehicle.jobs import Ending, Job
+from mavproxy_uavapi.core.vehicle.messages import NO_YAW, GlobalTarget, NedTarget, Target, VelocityTarget, Yaw
+from mavproxy_uavapi.core.vehicle.own_target import TARGET_SHOWN, OwnTarget
 from mavproxy_uavapi.core.vehicle.start_gate import pass_gate
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+
+log = logging.getLogger("uavapi.copter")
 
 GUIDED = "GUIDED"
 TOLERANCE = 1.0  # m, horizontally and vertically
@@ -25,6 +31,8 @@ ARRIVAL_SPEED = 0.5  # m/s; slower than this the vehicle does not overshoot its 
 FLOOR = 0.0  # m above home: the lowest target, less TOLERANCE for the noise of the estimate
 LIFT_OFF_TIMEOUT = 5.0  # s in which an unacknowledged takeoff must show
 ON_GROUND = messages.mavlink.MAV_LANDED_STATE_ON_GROUND
+REPEATS = 3  # times that a place is sent again which the autopilot does not show
+BEAT_TIMEOUT = 2.0  # s in which a heartbeat must come before that
 TAKING_OFF = messages.mavlink.MAV_LANDED_STATE_TAKEOFF
 
 
@@ -43,6 +51,9 @@ class GuidedVehicle(Vehicle):
         self.own_target = OwnTarget(state, clock)
         self._lifts_off_for: Job | None = None  # the job that has sent the last takeoff
         self._reported_after_its_end: float | None = None  # a takeoff: since when its mode has lasted (s)
+        self.yaw = NO_YAW  # where it points on its way to the newest target
+        self._tasks = HeldTasks()
+        self._repeating: asyncio.Task[None] | None = None
 
     def require_guided_flight(self) -> None:
         """Raise NotArmed, ModeChanged or Busy unless it flies in GUIDED, after its takeoff."""
@@ -135,9 +146,10 @@ class GuidedVehicle(Vehicle):
         north, east, up = self.leg_to(target)
         if self.height + up < FLOOR - TOLERANCE:
             raise Invalid(f"the target lies {-(self.height + up):.1f} m below home")
-        self.authority.take(job, Rank.MOVEMENT, self.inside(target))
-        yaw = messages.facing(heading, look_at_target, north, east)
-        await self.take_up(job, target, yaw)
+        await self.take(job, Rank.MOVEMENT, self.inside(target))
+        self.yaw = messages.facing(heading, look_at_target, north, east)
+        await self.take_up(job, target, self.yaw)
+        self._repeating = self._tasks.start(self._repeat(job, target), "the watch over a target")
         if not wait:
             return
         limits = await self.limits()
@@ -203,21 +215,22 @@ class GuidedVehicle(Vehicle):
 
     # -- setpoints ----------------------------------------------------------------------------------------
 
-    async def send_setpoint(self, job: Job, target: Target, yaw: Yaw = NO_YAW) -> None:
-        """Send a setpoint of `job` to a vehicle that is still in GUIDED.
+    async def send_setpoint(self, job: Job, target: Target, yaw: Yaw = NO_YAW, *, must_show: bool = False) -> None:
+        """Send a setpoint of `job` to a vehicle that is still in GUIDED; with `must_show` somebody watches it.
 
         Raises:
             Superseded, Paused, NotArmed, ModeChanged: the job no longer has the vehicle; nothing is sent.
         """
         await pass_gate()
         self.commanding(job, self.flying)()
+        self.repeat_nothing()
         await self.link.send(target.to(self.address, yaw), self.state.system)
-        self.own_target.sent(target)
+        self.own_target.sent(target, must_show=must_show)
 
     async def take_up(self, job: Job, target: Target, yaw: Yaw) -> None:
         """Begin a movement. ArduCopter goes back to its own speeds when the kind of setpoint changes."""
         other_kind = not self.own_target.is_of_kind_in_force(target)
-        await self.send_setpoint(job, target, yaw)
+        await self.send_setpoint(job, target, yaw, must_show=not isinstance(target, VelocityTarget))
         await self.send_speeds(job, new_kind=other_kind)
 
     async def send_speeds(self, job: Job, *, new_kind: bool) -> None:
@@ -225,3 +238,56 @@ class GuidedVehicle(Vehicle):
         for kind, speed in self.speeds.to_send(new_kind).items():
             await self.commands.send(messages.change_speed(kind, speed), self.commanding(job, self.flying))
             self.speeds.take(kind, speed)
+
+    # -- targets that are lost on the way -----------------------------------------------------------------
+
+    def repeat_nothing(self) -> None:
+        """See `BaseVehicle.repeat_nothing`."""
+        if self._repeating is not None:
+            self._repeating.cancel()
+
+    async def _repeat(self, job: Job, target: NedTarget | GlobalTarget) -> None:
+        """Send a target again while the autopilot does not show it, at most REPEATS times; none when in doubt.
+
+        A setpoint has no acknowledgement, and a place may be sent twice. The vehicle is ours while no other job has
+        commanded it, nobody has switched its mode, and it shows no target of another station.
+        """
+        began = self.own_target.sent_at
+
+        def require_ours() -> None:
+            if self.state.mode_since > began or not (job.running or job.ending is Ending.DONE):
+                raise Superseded(f"{job.verb} does not fly the vehicle any more")
+            self.commanding(job, self.require_guided_flight)()
+
+        with contextlib.suppress(UavApiError):
+            for _ in range(REPEATS):
+                if await self._is_shown_soon():
+                    return
+                await self.waiting.message({"HEARTBEAT"}, lambda beat: beat, BEAT_TIMEOUT, "report its mode")
+                require_ours()
+                asked_at = self.clock()
+                await setpoint_in_force.ask(self.state, self.waiting, self.link)
+                if not self._is_lost(target, asked_at):
+                    return
+                require_ours()
+                log.info("vehicle %d does not show its target: it is sent again", self.state.system)
+                await self.link.send(target.to(self.address, self.yaw), self.state.system)
+                self.own_target.sent_again()
+                await self.send_speeds(job, new_kind=True)
+
+    async def _is_shown_soon(self) -> bool:
+        names = {setpoint_in_force.PLACE}
+        with contextlib.suppress(TimedOut):
+            return await self.waiting.until(names, lambda: self.own_target.look() or None, TARGET_SHOWN, "show it")
+        return False
+
+    def _is_lost(self, target: NedTarget | GlobalTarget, asked_at: float) -> bool:
+        """Whether the vehicle surely flies to no target that is newer than those before `target`.
+
+        It reports one of these since `asked_at` (s), or it reports none, and stands elsewhere. Raises Stale.
+        """
+        is_replaced = self.own_target.is_replaced_since(asked_at)
+        north, east, up = self.leg_to(target)
+        if is_replaced is not None:
+            return is_replaced
+        return math.hypot(north, east, up) > TOLERANCE and self.speed_by(target) <= ARRIVAL_SPEED

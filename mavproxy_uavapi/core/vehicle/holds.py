@@ -65,6 +65,9 @@ class Holds:
             raise Busy(
                 f"{hold.operator.name} holds vehicle {vehicle.state.system}; only an admin or the prompt takes it"
             )
+        commander = vehicle.authority.commander
+        if commander is not None and commander.operator != operator.name:
+            vehicle.repeat_nothing()
         self._operators[vehicle] = operator
         self._leases.take(vehicle, operator.name, 0 if operator == THE_PROMPT else seconds)
 

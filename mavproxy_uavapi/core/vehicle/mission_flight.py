@@ -56,7 +56,7 @@ async def fly(vehicle: Vehicle, job: Job, until_complete: bool = False, timeout:
     if not items:
         raise Busy("the vehicle has no mission; upload one first")
     _require_startable(vehicle)  # the pilot may have switched it meanwhile
-    vehicle.authority.take(job, Rank.ARM, lambda: vehicle.guard.require_mission(items, from_here=True))
+    await vehicle.take(job, Rank.ARM, lambda: vehicle.guard.require_mission(items, from_here=True))
     await begin(vehicle, job, lambda: _require_startable(vehicle))
     if until_complete:
         await _flown_to_its_end(vehicle, job, items, timeout or LONGEST)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
+from typing import NamedTuple
 
-from mavproxy_uavapi.core.errors import Superseded
+from mavproxy_uavapi.core.errors import Superseded, TimedOut
 from mavproxy_uavapi.core.geodesy import moved, offset
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle import setpoint_in_force
@@ -15,11 +16,22 @@ from mavproxy_uavapi.core.vehicle.messages import GlobalTarget, NedTarget, Targe
 TARGET_SHOWN = 2.0  # s after a setpoint, until which telemetry does not count
 LATEST = 8.0  # s after a setpoint, until which a slow link or a busy MAVProxy may still report those before it
 SAME_PLACE = 2.0  # m on each axis: reported targets within this are the same
+UNCHANGED = 1.0  # m, north, east and up: a target that is reported again differs by less
 SAME_SPEED = 0.5  # m/s: reported velocities within this are the same
 SAME_MOMENT = 3.0  # s between two messages, in which a vehicle does not change its velocity much
 NEAR_EXPECTED = 10.0  # m on each axis: our target in the local frame, whose origin the autopilot does not tell
 
+STANDSTILL = VelocityTarget(0, 0, 0)  # what GUIDED begins with
+
 Reported = GlobalTarget | VelocityTarget
+
+
+class Before(NamedTuple):
+    """What a vehicle flew before a newer setpoint: since when not (s), what, and whether it was ours."""
+
+    at: float
+    target: Reported
+    is_ours: bool
 
 
 class OwnTarget:
@@ -28,6 +40,7 @@ class OwnTarget:
     Attributes:
         newest: the setpoint; None before the first.
         sent_at: when it was sent (s).
+        is_unshown: whether it is a place that must show, and has not yet.
 
     Args:
         state: the vehicle's state.
@@ -37,32 +50,63 @@ class OwnTarget:
     def __init__(self, state: VehicleState, clock: Callable[[], float]) -> None:
         self.newest: Target | None = None
         self.sent_at = 0.0
+        self.is_unshown = False
         self._state, self._clock = state, clock
         self._shown: GlobalTarget | None = None  # our target as the autopilot reports it
         self._expected: GlobalTarget | None = None  # where it will report our target in the local frame, about
-        self._earlier: deque[tuple[float, Reported]] = deque()  # what it flew before, and when that was replaced (s)
+        self._before: deque[Before] = deque()  # oldest first
 
-    def sent(self, target: Target) -> None:
-        """Remember the setpoint that went out last."""
-        self._replace(setpoint_in_force.shown(self._state, self._state.mode_since))
-        self._replace(self.newest if isinstance(self.newest, VelocityTarget) else self._shown or self._expected)
-        self.newest, self.sent_at = target, self._clock()
-        self._shown = target if isinstance(target, GlobalTarget) else None
-        self._expected = place_of(target, self._state) if isinstance(target, NedTarget) else None
+    def sent(self, target: Target, *, must_show: bool = False) -> None:
+        """Remember the setpoint that went out last.
 
-    def _replace(self, target: Reported | None) -> None:
+        Args:
+            target: the setpoint.
+            must_show: whether somebody watches until the autopilot reports it.
+        """
+        since = self._state.mode_since
+        reported = setpoint_in_force.shown(self._state, since) or (STANDSTILL if self.sent_at < since else None)
+        self._replace(reported, is_ours=reported is not None and self._is_known(reported))
+        self._replace(self._own_before, is_ours=True)
+        is_same = target == self.newest and self._shown is not None
+        self.newest, self.sent_at, self.is_unshown = target, self._clock(), must_show
+        if not is_same:
+            self._shown = target if isinstance(target, GlobalTarget) else None
+            self._expected = place_of(target, self._state) if isinstance(target, NedTarget) else None
+
+    def sent_again(self) -> None:
+        """Note that the newest setpoint went out once more."""
+        self.sent_at = self._clock()
+
+    @property
+    def _own_before(self) -> Reported | None:
+        """The newest setpoint as the autopilot reports it, if it is known how."""
+        return self.newest if isinstance(self.newest, VelocityTarget) else self._shown or self._expected
+
+    def _is_known(self, reported: Reported) -> bool:
+        """Whether the setpoint in force is one of ours, or the standstill that GUIDED begins with."""
+        ours = (self._own_before, STANDSTILL, *(target for _, target, is_ours in self._before if is_ours))
+        return any(one is not None and _are_alike(one, reported) for one in ours)
+
+    def _replace(self, target: Reported | None, *, is_ours: bool) -> None:
         """Remember what may still be reported though a newer setpoint is on its way."""
         now = self._clock()
-        while self._earlier and now >= self._earlier[0][0] + LATEST:
-            self._earlier.popleft()
-        if self._earlier and _are_alike(self._earlier[-1][1], target):
-            self._earlier.pop()  # many clients repeat their setpoint
+        while self._before and now >= self._before[0].at + LATEST:
+            self._before.popleft()
+        if self._before and _are_alike(self._before[-1].target, target):
+            self._before.pop()  # many clients repeat their setpoint
         if target is not None:
-            self._earlier.append((now, target))
+            self._before.append(Before(now, target, is_ours))
 
     def require(self) -> None:
-        """Raise Superseded if the autopilot reports another target than ours, or a velocity."""
+        """Raise unless the autopilot flies to our target, as far as it reports one.
+
+        Raises:
+            Superseded: it reports another station's target, or a velocity.
+            TimedOut: it still reports a target of ours that the newest one replaces.
+        """
         reported = self._reported()
+        if self.flies_elsewhere:
+            raise TimedOut(f"vehicle {self._state.system} does not take its new target: it reports an older one")
         if reported is None:
             return
         if isinstance(reported, GlobalTarget) and self._is_ours(reported):
@@ -89,11 +133,53 @@ class OwnTarget:
         before = setpoint_in_force.shown(self._state, max(self.sent_at, since)) or ours
         return before is not None and isinstance(before, VelocityTarget) == isinstance(target, VelocityTarget)
 
+    # -- whether it is shown ------------------------------------------------------------------------------
+
+    def look(self) -> bool:
+        """Whether the autopilot has reported our place since it was sent; to be asked at each report."""
+        own = self._shown or self._expected
+        reported = setpoint_in_force.shown(self._state, self.sent_at + (0.0 if own else TARGET_SHOWN))
+        if not self.is_unshown or not isinstance(reported, GlobalTarget):
+            return not self.is_unshown
+        if not self._is_older(reported, ours_only=False) and self._is_ours(reported):
+            self._shown, self.is_unshown = reported, False
+        return not self.is_unshown
+
+    def is_replaced_since(self, since: float) -> bool | None:
+        """Whether it has reported, since `since` (s), a setpoint of ours that the newest replaces; None for none."""
+        reported = setpoint_in_force.shown(self._state, since)
+        return None if reported is None else not self.look() and self._is_older(reported)
+
+    def due(self, reported: Reported | None) -> Target | None:
+        """What shall be in force: the reported setpoint, or our place that replaces it and does not show yet."""
+        is_replaced = reported is not None and not self.look() and self._is_older(reported)
+        return self.newest if is_replaced else reported
+
+    @property
+    def flies_elsewhere(self) -> bool:
+        """Whether, long after our place was sent, it still flies to another place of ours, or at our velocity."""
+        reported, own = setpoint_in_force.shown(self._state, self.sent_at + LATEST), self._shown or self._expected
+        if self.look() or reported is None or not self._is_older(reported):
+            return False
+        return isinstance(reported, VelocityTarget) or (own is not None and _apart(own, reported) > SAME_PLACE)
+
+    def _is_older(self, reported: Reported, *, ours_only: bool = True) -> bool:
+        """Whether it is the very target that was in force before ours, and not the same place as ours."""
+        own = self._shown or self._expected
+        return any(
+            _is_unchanged(target, reported) and not (own is not None and _is_unchanged(target, own))
+            for _, target, is_ours in self._before
+            if is_ours or not ours_only
+        )
+
     def _reported(self) -> Reported | None:
         """The setpoint that the autopilot reports since ours must show; None without one."""
+        self.look()
         reported = setpoint_in_force.shown(self._state, self.sent_at + TARGET_SHOWN)
+        if reported is None or (self.is_unshown and self._is_older(reported)):
+            return None
         now = self._clock()
-        is_late = any(now < at + LATEST and _are_alike(earlier, reported) for at, earlier in self._earlier)
+        is_late = any(now < at + LATEST and _are_alike(target, reported) for at, target, _ in self._before)
         return None if is_late else reported
 
     def _is_ours(self, reported: GlobalTarget) -> bool:
@@ -131,6 +217,13 @@ def _are_alike(one: Reported, other: Reported | None) -> bool:
     if isinstance(one, VelocityTarget) and isinstance(other, VelocityTarget):
         return math.dist((one.vx, one.vy, one.vz), (other.vx, other.vy, other.vz)) <= SAME_SPEED
     return False
+
+
+def _is_unchanged(one: Reported, other: Reported) -> bool:
+    """Whether a report repeats a setpoint, as exactly as an autopilot does."""
+    if isinstance(one, GlobalTarget) and isinstance(other, GlobalTarget):
+        return max(_apart(one, other), abs(one.alt - other.alt)) <= UNCHANGED
+    return _are_alike(one, other)
 
 
 def _speed(velocity: VelocityTarget) -> float:

@@ -192,7 +192,7 @@ class Plane(GuidedVehicle):
         Raises:
             Busy: the mission has no landing sequence; `land_at` makes one.
         """
-        self.authority.take(job, Rank.STOP)  # a waiting arm ends
+        await self.take(job, Rank.STOP)  # a waiting arm ends
         if await self.stays_disarmed(job):
             return
         vertical = await self.is_vtol()
@@ -235,7 +235,7 @@ class Plane(GuidedVehicle):
         here = self.fresh("GLOBAL_POSITION_INT")
         place = GlobalTarget(lat, lon, alt)
         items = landing_pattern.pattern(place, (here.lat / 1e7, here.lon / 1e7), vtol=vtol)
-        self.authority.take(job, Rank.STOP, lambda: self.guard.require_mission(items, from_here=True))
+        await self.take(job, Rank.STOP, lambda: self.guard.require_mission(items, from_here=True))
         if self.mode == AUTO:  # a mission cannot change while it is flown
             await self.hold(job)
         mode = self.mode
@@ -252,7 +252,7 @@ class Plane(GuidedVehicle):
 
     async def rtl(self, job: Job, timeout: float | None = None) -> None:
         """Return to launch; done when it circles there, or has landed if its parameters say so."""
-        self.authority.take(job, Rank.STOP)
+        await self.take(job, Rank.STOP)
         if await self.is_done_at_home(job):
             return
         lands = self.state.parameters.get("RTL_AUTOLAND") in LANDING_RETURNS
@@ -298,7 +298,7 @@ class Plane(GuidedVehicle):
 
         Where it cannot climb ahead (the envelope, another vehicle, no position) it circles at once.
         """
-        self.authority.take(job, Rank.STOP)
+        await self.take(job, Rank.STOP)
         if self._is_too_low_to_circle:
             with contextlib.suppress(Rejected, TimedOut, Stale, OutsideEnvelope, TooNear):
                 await self._climb_ahead(job)
@@ -361,7 +361,7 @@ class Plane(GuidedVehicle):
         place = self._global(target)
         if place.alt < 0:
             raise Invalid(f"the target lies {-place.alt:.1f} m below home")
-        self.authority.take(job, Rank.MOVEMENT, self.inside(messages.reposition(place)))
+        await self.take(job, Rank.MOVEMENT, self.inside(messages.reposition(place)))
         await self._reposition(job, place)
         if not wait:
             return

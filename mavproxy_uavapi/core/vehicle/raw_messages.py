@@ -89,7 +89,7 @@ async def send(vehicle: Vehicle, job: Job, message: Any) -> None:
             raise vehicle.anothers()
 
     require_not_the_pilots()
-    vehicle.authority.take(job, Rank.ARM)
+    await vehicle.take(job, Rank.ARM)
     check = vehicle.commanding(job, require_not_the_pilots)
     if message.get_type() in WITH_ACK:
         await vehicle.commands.send(RawCommand(message.command, message=message), check)

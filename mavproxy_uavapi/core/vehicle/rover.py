@@ -86,7 +86,7 @@ class Rover(TravellingVehicle):
 
     async def rtl(self, job: Job, timeout: float | None = None) -> None:
         """Return to launch; done when it has stopped there. A disarmed rover at home has nothing to do."""
-        self.authority.take(job, Rank.STOP)
+        await self.take(job, Rank.STOP)
         if await self.is_done_at_home(job):
             return
         await self.switch_to(job, "RTL")

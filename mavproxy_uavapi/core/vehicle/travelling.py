@@ -43,7 +43,7 @@ class TravellingVehicle(GuidedVehicle):
         is busy, does not lengthen that time.
         """
         self.require_guided_flight()
-        self.authority.take(job, Rank.MOVEMENT, self.inside(velocity))
+        await self.take(job, Rank.MOVEMENT, self.inside(velocity))
         yaw = messages.facing(heading, look_at_target, velocity.vx, velocity.vy)
         job.steers = duration is not None
         await self.take_up(job, velocity, yaw)

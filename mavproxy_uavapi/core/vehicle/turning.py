@@ -29,6 +29,7 @@ class TurningVehicle(TravellingVehicle):
         self.require_no_takeoff()
         self.authority.accompany(job, YAW)
         await self.commands.send(messages.yaw_to(heading), self.commanding(job, self.flying))
+        self.yaw = Yaw(heading=math.radians(heading))
 
         def turned() -> bool | None:
             yaw = math.degrees(self.fresh("ATTITUDE").yaw)
@@ -48,7 +49,7 @@ class TurningVehicle(TravellingVehicle):
         """
         self.require_guided_flight()
         self.authority.accompany(job, YAW)
-        target = await setpoint_in_force.ask(self.state, self.waiting, self.link)
+        target = self.own_target.due(await setpoint_in_force.ask(self.state, self.waiting, self.link))
         self.require_no_takeoff()
         await self.send_setpoint(job, target or self.ned_from_here(0, 0, 0), Yaw(rate=math.radians(rate)))
         least, share = RATE_TOLERANCE

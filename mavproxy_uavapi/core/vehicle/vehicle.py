@@ -50,7 +50,7 @@ class Vehicle(Verbs):
         """
         if self.state.armed is not False and not force and self.state.landed is False:
             raise Busy("the vehicle is flying; land it first (force=true stops its motors in the air)")
-        self.authority.take(job, Rank.FORCE if force else Rank.STOP)
+        await self.take(job, Rank.FORCE if force else Rank.STOP)
         await arming.disarm(self, job, force)
         self.authority.shown(job)
 
@@ -80,7 +80,7 @@ class Vehicle(Verbs):
     async def end_waiting_arm(self, job: Job) -> None:
         """End an `arm` of ours that has not shown its effect, for a verb that stops the vehicle."""
         if self.authority.on_its_way and not self.state.armed:
-            self.authority.take(job, Rank.STOP)
+            await self.take(job, Rank.STOP)
             if self.arm_is_on_its_way:
                 await arming.disarm(self, job, force=False)
 
@@ -94,7 +94,7 @@ class Vehicle(Verbs):
         if flies_mission(mode.upper()) and self.guard.in_force:
             self.guard.require_mission(await self.mission_to_fly(), from_here=True)
         stops = mode.upper() in STOPPING_MODES.union(self.holding_modes)
-        self.authority.take(job, Rank.STOP if stops else Rank.ARM, self.inside(switch))
+        await self.take(job, Rank.STOP if stops else Rank.ARM, self.inside(switch))
         await self.switch_to(job, mode)
 
     # -- stopping -----------------------------------------------------------------------------------------
@@ -106,7 +106,7 @@ class Vehicle(Verbs):
 
     async def hold(self, job: Job) -> None:
         """Stop and stay, however it moves for us."""
-        self.authority.take(job, Rank.STOP)
+        await self.take(job, Rank.STOP)
         if not self.mode == self.next_mode == self.holding_mode:
             await self.switch_to(job, self.holding_mode)
 

@@ -82,6 +82,34 @@ def test_all_or_none_sends_nothing_when_one_cannot(three: Any, api: Any) -> None
     assert [drone.orders() for drone in three] == [[], [], []]
 
 
+VERBS = {
+    "go_to_ned": {"x": 9, "y": 0, "z": -20},
+    "go_to_gps_wait": {"lat": -35.0, "long": 149.0, "alt": 30},
+    "travel_at_ned": {"vx": 1, "vy": 0, "vz": 0},
+    "set_mode": {"mode": "LOITER"},
+    "guided": {},
+    "brake": {},
+    "stop": {},
+    "land": {},
+    "rtl": {},
+    "disarm": {"force": True},
+}
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_flight_goes_on_when_all_or_none_is_refused(three: Any, api: Any, verb: str) -> None:
+    """The vehicle 9 was never heard."""
+    flight = api.begin("POST", "/vehicles/1/movement/go_to_ned_wait", json={"x": 90, "y": 0, "z": -20})
+    api.loop.pass_time(2.0)
+    before = len(three[0].orders())
+    answer = api.post(f"/fleet/{verb}", {"vehicles": [1, 9], "all_or_none": True, **VERBS[verb]})
+    assert {row["code"] for row in answer.body["vehicles"].values()} == {"aborted", "no_vehicle"}
+    assert three[0].orders()[before:] == []
+    assert api.loop.run_until_complete(flight).status == 200
+    assert three[0].at == pytest.approx([90.0, 0.0, -20.0], abs=1.0)
+    assert api.post("/vehicles/1/movement/go_to_ned", {"x": 0, "y": 0, "z": -20}).status == 200
+
+
 def test_all_or_none_begins_together_when_all_can(make_drone: Any, api: Any, loop: Any) -> None:
     """The second is ready to arm later: the first waits for it, disarmed."""
     first, second = make_drone(1), make_drone(2)
