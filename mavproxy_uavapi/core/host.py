@@ -85,6 +85,7 @@ class Host:
         timing = self.endings, self.link_watch, clock, self.bridge.loop, self.warn
         self.leases = Leases(*timing)
         self.holds = Holds(Leases(*timing, whose=operator_of), clock)
+        self.registry.on_new_type += [self.leases.move, self.holds.move]
         self.envelope_watch = EnvelopeWatch(self.registry, self.jobs, self.envelopes, self.warn)
         self.listeners: list[Callable[[VehicleState, Any, float], None]] = []
         self.observers: list[Callable[[str, int, float, Mapping[str, Any]], None]] = []

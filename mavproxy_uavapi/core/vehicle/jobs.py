@@ -39,7 +39,7 @@ class Job:
         id: its number, as text.
         verb: the path that was called, `/movement/go_to_ned_wait`.
         request: the validated parameters.
-        vehicle: what it commands; two jobs of one vehicle have the same object here.
+        vehicle: what it commands; two jobs of one vehicle have the same object here, while its type is the same.
         client: the client that began it: an address, with the name of its token before it, or CONSOLE.
         holder: the name by which that client may hold a lease; the same where it gave none.
         operator: the name by which it may hold the vehicle.
