@@ -107,6 +107,7 @@ class Call:
         self.request = request
         self.path = match.path
         self.named_system = match.system
+        service.host.registry.use(match.system)
         self.names = match.names
         self._route = match.route
         self._params = self.remembered = params

@@ -25,6 +25,7 @@ class VehicleRegistry:
 
     Attributes:
         current: the system id that MAVProxy's own commands go to; 0 before it knows one.
+        streams_are_off: whether the operator has MAVProxy request no streams (`streamrate` -1).
         traffic: keeps the vehicles apart.
         on_new_type: called with the former object and the new one, when a vehicle's type changes.
 
@@ -48,6 +49,7 @@ class VehicleRegistry:
         envelopes: Envelopes | None = None,
     ) -> None:
         self.current = 0
+        self.streams_are_off = False
         self._fleet = fleet
         self._link = link
         self._link_watch = link_watch
@@ -55,12 +57,25 @@ class VehicleRegistry:
         self._clock = clock
         self._envelopes = Envelopes() if envelopes is None else envelopes
         self._vehicles: dict[int, Vehicle] = {}
+        self._used: set[int] = set()
         self.traffic = Traffic(self.all)
         self.on_new_type: list[Callable[[Vehicle, Vehicle], None]] = []
 
     def resolve(self, system: int = 0) -> int:
         """That system id; for 0 MAVProxy's current one, or else the first that was heard, or 0."""
         return system or self.current or next(iter(self._fleet.vehicles), 0)
+
+    def use(self, *systems: int) -> None:
+        """Note that somebody flies or watches those vehicles from now on; 0 changes nothing."""
+        self._used.update(system for system in systems if 0 < system < 256)
+
+    def is_used(self, system: int) -> bool:
+        """Whether it is MAVProxy's current vehicle, or one that somebody flies or watches."""
+        return system in self._used or system == self.resolve()
+
+    def is_alive(self, vehicle: Vehicle) -> bool:
+        """Whether its link is alive."""
+        return self._link_watch.is_alive(vehicle.state)
 
     def find(self, system: int = 0) -> Vehicle:
         """The vehicle with that system id; 0 as for `resolve`.
@@ -95,11 +110,12 @@ class VehicleRegistry:
         return [self.find(system) for system in self._fleet.vehicles]
 
     def commandable(self, system: int = 0) -> Vehicle:
-        """As `find`, and its link is alive.
+        """As `find`, and its link is alive; it is used from now on.
 
         Raises:
             NoVehicle, LinkLost.
         """
         vehicle = self.find(system)
+        self.use(vehicle.state.system)
         self._link_watch.require_alive(vehicle.state)
         return vehicle
