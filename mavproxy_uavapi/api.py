@@ -27,6 +27,7 @@ class Api:
         self._remote = remote
         self._server: ApiServer | None = None
         self._tasks = HeldTasks()
+        self._streams = StreamRequester(host.registry)
         self._envelope = EnvelopeFile(host.envelopes, host.warn)
 
     @property
@@ -52,7 +53,8 @@ class Api:
             raise
         self._server = server
         self.host.api_address = settings.host, settings.port
-        self._tasks.start(StreamRequester(self.host.registry).run(), "the watch over the telemetry")
+        self._streams = StreamRequester(self.host.registry)
+        self._tasks.start(self._streams.run(), "the watch over the telemetry")
         self._tasks.start(self._envelope.watch(), "the watch over the envelope's file")
         self._tasks.start(server.service.tokens.watch(), "the watch over the tokens' file")
         self._tasks.start(memory.give_back(), "the return of freed memory")
@@ -84,6 +86,7 @@ class Api:
             return
         self.host.api_address = None
         await self._tasks.end()
+        self.host.send_unwaited(self._streams.closing_messages())
         await server.service.scripts.stop()
         await server.stop()
 
@@ -94,6 +97,7 @@ class Api:
 
 def apply(settings: ApiSettings, host: Host) -> None:
     """Set what the vehicles do by these settings, whoever commands them."""
+    host.registry.use(settings.sysid)
     host.link_watch.timeout = settings.link_timeout
     host.registry.traffic.separation = settings.separation
     host.registry.traffic.waits = settings.on_conflict == "wait"

@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import math
 import time
+from collections import deque
 from collections.abc import Awaitable, Callable, Mapping
 from functools import partial
 from pathlib import Path
@@ -85,6 +86,7 @@ class Host:
         timing = self.endings, self.link_watch, clock, self.bridge.loop, self.warn
         self.leases = Leases(*timing)
         self.holds = Holds(Leases(*timing, whose=operator_of), clock)
+        self.registry.on_new_type += [self.leases.move, self.holds.move]
         self.envelope_watch = EnvelopeWatch(self.registry, self.jobs, self.envelopes, self.warn)
         self.listeners: list[Callable[[VehicleState, Any, float], None]] = []
         self.observers: list[Callable[[str, int, float, Mapping[str, Any]], None]] = []
@@ -97,6 +99,7 @@ class Host:
         self._mpstate = mpstate
         self._announced_target = 0
         self._next_look = -math.inf
+        self._unsent: deque[tuple[Any, int]] = deque()
         self._link_keeper = LinkKeeper(clock)
         self._parameters = ParameterWatch()
         self._fences = FenceWatch()
@@ -133,6 +136,7 @@ class Host:
         if not self.bridge.running:
             self.bridge.start()
         self._link_keeper.turn(self._mpstate.mav_master)
+        self._share_streamrate()
         self._share_parameters()
         self._share_fences()
 
@@ -150,10 +154,25 @@ class Host:
 
         if self.bridge.running:
             for message, system in self.bridge.run(collect()):
-                with contextlib.suppress(LinkLost):  # the vehicle does not hear us
-                    self._mavproxy_link.write(message, system)
+                self._write(message, system)
+            self._send_unsent()
         self._link_keeper.release()
         self.bridge.stop()
+
+    def _send_unsent(self) -> None:
+        while self._unsent:
+            self._write(*self._unsent.popleft())
+
+    def _write(self, message: Any, system: int) -> None:
+        with contextlib.suppress(LinkLost):  # the vehicle does not hear us
+            self._mavproxy_link.write(message, system)
+
+    def _share_streamrate(self) -> None:
+        """Hand over whether MAVProxy requests streams; `streamrate2` is for its second link and further ones."""
+        settings = self._mpstate.settings
+        are_off = min(settings.streamrate, settings.streamrate2) <= 0
+        if are_off != self.registry.streams_are_off:
+            self.bridge.call_soon(setattr, self.registry, "streams_are_off", are_off)
 
     def _share_parameters(self) -> None:
         """Hand over the parameters that MAVProxy has learnt, in order with the messages: a later PARAM_VALUE wins.
@@ -201,6 +220,11 @@ class Host:
             except UavApiError as error:
                 self.envelopes.put(OPERATOR, system, missing(f"{source}: {error}", source))
                 self.warn(f"{source} cannot be its envelope: {error}")
+
+    def send_unwaited(self, messages: list[tuple[Any, int]]) -> None:
+        """Send messages, each to a system, when MAVProxy's main loop comes to it, or when the host ends."""
+        self._unsent.extend(messages)
+        self.bridge.post(self._send_unsent)
 
     def home_of(self, system: int) -> tuple[float, float] | None:
         """Latitude and longitude of a vehicle's home, degrees; None while it is unknown."""

@@ -83,6 +83,7 @@ async def _answer(request: web.BaseRequest) -> web.StreamResponse:
         raise web.HTTPMethodNotAllowed(request.method, match.allowed)
     require_role(request, route)
     request[SERVICE].heard_from(request.get(CALLER), holder_of(request))
+    request[SERVICE].host.registry.use(match.system)
     await invite(request)
     params = await parameters(request, route.model, body=request.method in WITH_BODY and not route.raw)
     call = Call(request[SERVICE], request, params, match)

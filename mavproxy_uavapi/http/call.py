@@ -234,6 +234,7 @@ class Call:
         in_flight = sum(job.vehicle is vehicle for job in jobs.running())
         if in_flight >= self.service.settings.max_jobs and not urgent:
             raise TooManyRequests(f"{in_flight} verbs are in flight already (max_jobs)")
+        joined = jobs.running_for(vehicle, self.path, params.model_dump())
         job = jobs.begin(
             vehicle,
             self.path,
@@ -243,8 +244,12 @@ class Call:
             outlives_client=outlives_client,
             timeout=getattr(params, "timeout", None),
         )
-        job.on_disconnect = on_disconnect or job.on_disconnect
-        job.holder, job.operator = holder, self.caller.operator.name
+        if joined is None:
+            job.on_disconnect = on_disconnect
+            job.holder, job.operator = holder, self.caller.operator.name
+        else:
+            job.join(on_disconnect)
+            self._take_over(job, holder if lease else job.holder)
         if lease is not None:
             self.service.host.leases.take(vehicle, holder, lease)
         script = None
@@ -254,6 +259,13 @@ class Call:
         if is_async:
             return self.accepted(job)
         return self.answer(await self.outcome(job, script))
+
+    def _take_over(self, job: Job, holder: str) -> None:
+        """Let a job that another client began end with the lease, or the hold, that this one has."""
+        hold = self.service.host.holds.of(job.vehicle)
+        job.holder = holder
+        if hold is not None and hold.operator.name == self.caller.operator.name:
+            job.operator = hold.operator.name
 
     async def outcome(self, job: Job, script: str | None = None) -> str:
         """Await a job for the client; `script` is the client's session, if it is a script.

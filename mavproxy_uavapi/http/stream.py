@@ -43,6 +43,7 @@ def _subscription(call: Call) -> Subscription:
     if not (name or view or event):
         name = Names("*")
     systems = asked.systems or frozenset({call.named_system} if call.named_system else ())
+    call.service.host.registry.use(*systems)
     return Subscription(Wishes(name, view, event, systems, asked.rate), asyncio.get_running_loop().call_later)
 
 

@@ -22,4 +22,5 @@ async def show_vehicle(call: Call) -> dict[str, Any]:
     system, host = call.names["sysid"], call.service.host
     if not system.isascii() or not system.isdigit() or int(system) not in host.fleet.vehicles:
         raise NotFound(f"no vehicle {system} was heard")
+    host.registry.use(int(system))
     return report_of_vehicle(host, host.registry.find(int(system)))

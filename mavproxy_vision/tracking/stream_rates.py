@@ -13,7 +13,7 @@ from typing import Any
 
 from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
-from mavproxy_uavapi.core.vehicle.messages import MESSAGE_IDS, Command, set_interval
+from mavproxy_uavapi.core.vehicle.stream_requester import request_rate
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 FLIGHT = {"ATTITUDE": 25.0, "LOCAL_POSITION_NED": 25.0}  # Hz of the vehicle's clock
@@ -67,15 +67,11 @@ class Rates:
                 if (vehicle, name) in self._requested_at:  # a slow link, or a vehicle that cannot send so fast
                     self._pause[name] = min(2 * self._pause.get(name, RETRY), LONGEST_RETRY)
                 self._requested_at[vehicle, name] = now
-                await self._send(vehicle, set_interval(MESSAGE_IDS[name], rate))
+                await request_rate(vehicle, name, rate)
         for other, name in [key for key in self._requested_at if key[0] is not vehicle or key[1] not in needed]:
             del self._requested_at[other, name]
             self._pause.pop(name, None)
-            await self._send(other, set_interval(MESSAGE_IDS[name], 0))
-
-    async def _send(self, vehicle: Vehicle, command: Command) -> None:
-        # We wait for no ack: the arriving messages are the proof.
-        await vehicle.link.send(command.to(vehicle.address, 0), vehicle.state.system)
+            await request_rate(other, name, 0)
 
 
 def is_slow(state: VehicleState, name: str, longest: float) -> bool:

@@ -201,6 +201,35 @@ def test_idle_passes_mavproxys_target_to_the_asyncio_side(mpstate: Any) -> None:
         hosts.leave(mpstate, "uavapi")
 
 
+def test_idle_passes_on_whether_mavproxy_requests_streams(mpstate: Any) -> None:
+    host = hosts.join(mpstate, "uavapi")
+    now = [100.0]
+    host.clock = lambda: now[0]
+    try:
+        for name, rate, are_off in (("streamrate", -1, True), ("streamrate", 4, False), ("streamrate2", 0, True)):
+            setattr(mpstate.settings, name, rate)
+            now[0] += 1.0
+            host.idle("uavapi")
+            received(host)
+            assert host.registry.streams_are_off is are_off
+    finally:
+        hosts.leave(mpstate, "uavapi")
+
+
+def test_what_nobody_waits_for_is_sent_by_the_main_loop_or_at_the_end(mpstate: Any) -> None:
+    written = mpstate.the_master.written
+    host = hosts.join(mpstate, "uavapi")
+    try:
+        host.idle("uavapi")
+        host.send_unwaited([("first", 1)])
+        host.idle("uavapi")
+        assert written == ["first"]
+        host.send_unwaited([("second", 1)])
+    finally:
+        hosts.leave(mpstate, "uavapi")
+    assert written == ["first", "second"]
+
+
 def parameters(host: Host, system: int = 1) -> dict[str, float]:
     """What the asyncio side knows of a vehicle's parameters, after all that was fed."""
 

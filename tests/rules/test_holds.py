@@ -272,3 +272,18 @@ def test_prompt_says_what_it_takes(world: Any, words: tuple[str, ...]) -> None:
         prompt(world, *words)
     with pytest.raises(NoVehicle):
         prompt(world, "take", "9")
+
+
+@pytest.mark.parametrize(("first", "second"), [("bo", "anna"), ("anna", "boss")])
+def test_hold_that_runs_out_ends_a_flight_that_two_requested(world: Any, first: str, second: str) -> None:
+    path = "/movement/go_to_ned_wait?wait=false"
+    if first == "anna":
+        take(world, "anna", lease=5)
+    assert ask(world, first, "POST", path, FAR).status == 202
+    if second == "anna":
+        take(world, "anna", lease=5)
+    assert ask(world, second, "POST", path, FAR).status == 202
+    world.loop.pass_time(4.0)
+    assert speed(world) > 4.0
+    world.loop.pass_time(8.0)
+    assert speed(world) < 0.3

@@ -1,14 +1,18 @@
 from __future__ import annotations
 
 import asyncio
+import dataclasses
 import socket
 from typing import Any
 
 import pytest
 from aiohttp import ClientSession
+from pymavlink import mavutil
 
 from mavproxy_uavapi.api import Api
 from mavproxy_uavapi.settings import ApiModuleSettings
+
+mavlink = mavutil.mavlink
 
 
 @pytest.fixture
@@ -59,6 +63,24 @@ def test_stop_closes_the_port_and_ends_the_watch(loop: Any, api: Api, settings: 
     drone.mute.add("VFR_HUD")
     loop.pass_time(20.0)
     assert drone.received == []
+
+
+def test_stop_gives_back_the_rates_that_it_asked_for(
+    loop: Any, api: Api, host: Any, mpstate: Any, settings: Any, drone: Any
+) -> None:
+    loop.run(api.start(settings))
+    drone.mute.add("VFR_HUD")
+    loop.pass_time(10.0)
+    loop.run(api.stop())
+    assert mpstate.the_master.written == []  # MAVProxy's main loop writes them
+    host.bridge.turn()
+    (message,) = mpstate.the_master.written
+    assert (message.param1, message.param2) == (mavlink.MAVLINK_MSG_ID_VFR_HUD, 0)
+
+
+def test_vehicle_of_the_setting_is_used(loop: Any, api: Api, host: Any, settings: Any) -> None:
+    loop.run(api.start(dataclasses.replace(settings, sysid=7)))
+    assert host.registry.is_used(7)
 
 
 def test_api_watches_the_telemetry(loop: Any, api: Api, settings: Any, drone: Any) -> None:

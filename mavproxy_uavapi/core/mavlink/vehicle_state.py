@@ -92,7 +92,7 @@ class VehicleState:
 
     Attributes:
         system, component: its MAVLink address.
-        vehicle_type: MAV_TYPE of its heartbeat.
+        vehicle_type: MAV_TYPE of its heartbeats; GENERIC only until one says more.
         armed: whether it is armed; None until the first heartbeat since the last boot.
         mode: the heartbeat's custom_mode; None likewise.
         system_status: MAV_STATE of the heartbeat; None likewise.
@@ -222,7 +222,8 @@ class VehicleState:
 
     def _take_heartbeat(self, message: Any, now: float) -> None:
         self.heartbeat_at = now
-        self.vehicle_type = message.type
+        if message.type != mavlink.MAV_TYPE_GENERIC:  # a copter that boots does not know its frame yet
+            self.vehicle_type = message.type
         if message.custom_mode != self.mode:
             self.mode, self.mode_since = message.custom_mode, now
             self.mode_changes.append((now, self.mode))

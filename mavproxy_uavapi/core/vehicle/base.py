@@ -79,6 +79,13 @@ class BaseVehicle:
         self._mode_requests = ModeRequests(state, clock)
         self._requests: dict[str, asyncio.Task[Any]] = {}  # REQUEST_MESSAGE in flight, by message name
 
+    def continues(self, before: BaseVehicle) -> None:
+        """Go on as the same vehicle, whose type was another one before.
+
+        Its jobs go on, and newer ones supersede them; a pause, and speeds that were asked for, remain.
+        """
+        self.authority, self.speeds, self._mode_requests = before.authority, before.speeds, before._mode_requests
+
     # -- state --------------------------------------------------------------------------------------------
 
     @property

@@ -93,6 +93,12 @@ class Holds:
         """A call of that operator arrived."""
         self._leases.renew(operator.name)
 
+    def move(self, before: Vehicle, now: Vehicle) -> None:
+        """Keep the hold of a vehicle that is another object now, because its type has changed."""
+        if before in self._operators:
+            self._operators[now] = self._operators.pop(before)
+            self._leases.move(before, now)
+
     def close(self) -> None:
         """Forget them all."""
         self._operators.clear()

@@ -39,7 +39,7 @@ class Job:
         id: its number, as text.
         verb: the path that was called, `/movement/go_to_ned_wait`.
         request: the validated parameters.
-        vehicle: what it commands; two jobs of one vehicle have the same object here.
+        vehicle: what it commands; two jobs of one vehicle have the same object here, while its type is the same.
         client: the client that began it: an address, with the name of its token before it, or CONSOLE.
         holder: the name by which that client may hold a lease; the same where it gave none.
         operator: the name by which it may hold the vehicle.
@@ -176,6 +176,15 @@ class Job:
                 self.script = script
         return script
 
+    def join(self, on_disconnect: str | None) -> None:
+        """Take that another client requests the same; of two wishes for `on_disconnect` a hold counts.
+
+        Args:
+            on_disconnect: its wish; None for the setting's, which may be a hold, too.
+        """
+        wishes = (self.on_disconnect, on_disconnect)
+        self.on_disconnect = "hold" if "hold" in wishes else None if None in wishes else on_disconnect
+
     def end_with_script(self) -> None:
         """End the job because its script died. It goes on if another client requested the same, or waits for it."""
         others_wait = any(client != self.script for client in self._clients)
@@ -235,9 +244,9 @@ class JobBook:
         timeout: float | None = None,
     ) -> Job:
         """Start a job for `vehicle`, or join the running one that does exactly the same."""
-        for job in self.running():
-            if job.vehicle is vehicle and job.is_for(verb, request):
-                return job
+        running = self.running_for(vehicle, verb, request)
+        if running is not None:
+            return running
         job = Job(next(self._numbers), verb, request, vehicle, client=client, outlives_client=outlives_client)
         self._jobs[job.id] = self._running[job.id] = job
         job.when_ended(lambda: self._ended(job))
@@ -245,6 +254,10 @@ class JobBook:
         with noting_sent_unless_noted() as job.sent:
             job.start(body, timeout)
         return job
+
+    def running_for(self, vehicle: Any, verb: str, request: Mapping[str, Any]) -> Job | None:
+        """The running job that does exactly that for `vehicle`; None if there is none."""
+        return next((job for job in self.running() if job.vehicle is vehicle and job.is_for(verb, request)), None)
 
     def _ended(self, job: Job) -> None:
         del self._running[job.id]

@@ -89,6 +89,14 @@ class Leases:
             if lease.holder == holder:
                 lease.ends_at = self._clock() + lease.seconds
 
+    def move(self, before: Vehicle, now: Vehicle) -> None:
+        """Keep the lease of a vehicle that is another object now, because its type has changed."""
+        lease = self._leases.get(before)
+        if lease is not None:
+            self._forget(before)
+            self._leases[now] = lease
+            self._timers[now] = self._loop.call_later(max(lease.ends_at - self._clock(), 0.0), self._look, now)
+
     def close(self) -> None:
         """Forget them all."""
         for vehicle in list(self._leases):

@@ -206,6 +206,11 @@ def set_interval(message_id: int, rate: float) -> Command:
     return Command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, (message_id, 1e6 / rate if rate else 0))
 
 
+def no_interval(message_id: int) -> Command:
+    """Ask for a message no more."""
+    return Command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, (message_id, -1))
+
+
 def read_parameter(address: Address, name: str) -> Any:
     """PARAM_REQUEST_READ by name."""
     return mavlink.MAVLink_param_request_read_message(*address, name.encode(), -1)

@@ -10,7 +10,7 @@ from mavproxy_uavapi.core.mavlink.flight_modes import kind_of
 from mavproxy_uavapi.core.mavlink.link import Link
 from mavproxy_uavapi.core.mavlink.link_watch import LinkWatch
 from mavproxy_uavapi.core.mavlink.pending_waits import PendingWaits
-from mavproxy_uavapi.core.mavlink.vehicle_state import Fleet
+from mavproxy_uavapi.core.mavlink.vehicle_state import Fleet, VehicleState
 from mavproxy_uavapi.core.vehicle.copter import Copter
 from mavproxy_uavapi.core.vehicle.plane import Plane
 from mavproxy_uavapi.core.vehicle.rover import Rover
@@ -25,7 +25,9 @@ class VehicleRegistry:
 
     Attributes:
         current: the system id that MAVProxy's own commands go to; 0 before it knows one.
+        streams_are_off: whether the operator has MAVProxy request no streams (`streamrate` -1).
         traffic: keeps the vehicles apart.
+        on_new_type: called with the former object and the new one, when a vehicle's type changes.
 
     Args:
         fleet: the state of each vehicle.
@@ -47,6 +49,7 @@ class VehicleRegistry:
         envelopes: Envelopes | None = None,
     ) -> None:
         self.current = 0
+        self.streams_are_off = False
         self._fleet = fleet
         self._link = link
         self._link_watch = link_watch
@@ -54,11 +57,25 @@ class VehicleRegistry:
         self._clock = clock
         self._envelopes = Envelopes() if envelopes is None else envelopes
         self._vehicles: dict[int, Vehicle] = {}
+        self._used: set[int] = set()
         self.traffic = Traffic(self.all)
+        self.on_new_type: list[Callable[[Vehicle, Vehicle], None]] = []
 
     def resolve(self, system: int = 0) -> int:
         """That system id; for 0 MAVProxy's current one, or else the first that was heard, or 0."""
         return system or self.current or next(iter(self._fleet.vehicles), 0)
+
+    def use(self, *systems: int) -> None:
+        """Note that somebody flies or watches those vehicles from now on; 0 changes nothing."""
+        self._used.update(system for system in systems if 0 < system < 256)
+
+    def is_used(self, system: int) -> bool:
+        """Whether it is MAVProxy's current vehicle, or one that somebody flies or watches."""
+        return system in self._used or system == self.resolve()
+
+    def is_alive(self, vehicle: Vehicle) -> bool:
+        """Whether its link is alive."""
+        return self._link_watch.is_alive(vehicle.state)
 
     def find(self, system: int = 0) -> Vehicle:
         """The vehicle with that system id; 0 as for `resolve`.
@@ -72,13 +89,20 @@ class VehicleRegistry:
             others = f"; heard so far: {', '.join(map(str, heard))}" if heard else ""
             raise NoVehicle(f"no vehicle {system_id or ''} on the link yet".replace("  ", " ") + others)
         state = heard[system_id]
+        before = self._vehicles.get(system_id)
+        if type(before) is CLASSES[kind_of(state.vehicle_type)]:
+            return before
+        vehicle = self._vehicles[system_id] = self._made(state)
+        if before is not None:  # the autopilot knows its frame now, or came back with other firmware
+            vehicle.continues(before)
+            for callback in self.on_new_type:
+                callback(before, vehicle)
+        return vehicle
+
+    def _made(self, state: VehicleState) -> Vehicle:
         make = CLASSES[kind_of(state.vehicle_type)]
-        vehicle = self._vehicles.get(system_id)
-        if type(vehicle) is not make:  # the first time, or the autopilot came back with other firmware
-            vehicle = self._vehicles[system_id] = make(
-                state, self._link, self._pending, self._clock, lambda: self._envelopes.of(system_id)
-            )
-            vehicle.guard.traffic = self.traffic
+        vehicle = make(state, self._link, self._pending, self._clock, lambda: self._envelopes.of(state.system))
+        vehicle.guard.traffic = self.traffic
         return vehicle
 
     def all(self) -> list[Vehicle]:
@@ -86,11 +110,12 @@ class VehicleRegistry:
         return [self.find(system) for system in self._fleet.vehicles]
 
     def commandable(self, system: int = 0) -> Vehicle:
-        """As `find`, and its link is alive.
+        """As `find`, and its link is alive; it is used from now on.
 
         Raises:
             NoVehicle, LinkLost.
         """
         vehicle = self.find(system)
+        self.use(vehicle.state.system)
         self._link_watch.require_alive(vehicle.state)
         return vehicle

@@ -1,100 +1,163 @@
 """Requests the messages that a vehicle should send but that do not arrive.
 
-MAVProxy asks every vehicle for all streams at its `streamrate`, which stays as it is; a vehicle that it hears later
-than the first is asked up to 15 s later. What does not arrive (EXTENDED_SYS_STATE is in no stream; a stream rate may
-be 0) is requested with SET_MESSAGE_INTERVAL, and again when it stops.
+MAVProxy requests all streams of every vehicle at its `streamrate`, which stays as it is; of a vehicle that it hears
+later than the first, up to 15 s later. What does not arrive (EXTENDED_SYS_STATE is in no stream) is requested with
+SET_MESSAGE_INTERVAL. Many vehicles may share one radio, so a vehicle that nobody uses is asked once for what the list
+of vehicles shows. Where the operator has switched MAVProxy's streams off, only vehicles that are used are asked, for
+what they cannot be flown without.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
-from mavproxy_uavapi.core.errors import UavApiError
-from mavproxy_uavapi.core.held_tasks import HeldTasks
-from mavproxy_uavapi.core.vehicle.messages import MESSAGE_IDS, set_interval
+from mavproxy_uavapi.core.errors import LinkLost
+from mavproxy_uavapi.core.vehicle.messages import MESSAGE_IDS, no_interval, set_interval
 from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
-LOOK_EVERY = 2.0  # s
+LOOK_EVERY = 1.0  # s
+GAP = 0.05  # s from one request to the next, so that they do not fill a radio's buffer
 MISSING_AFTER = 3.0  # s without a message until it is requested
-ASK_AGAIN = 30.0  # s between requests, after the first few
-FIRST_ASKINGS = 3
+PAUSES = (2.0, 4.0, 8.0, 16.0)  # s from each request without effect to the next one; then there are no more
+STEADY = 30.0  # s from a request until a message that arrives counts as helped
 
 # Hz: enough for flight (positions) and for a status (the rest), and few enough for a telemetry radio.
 WANTED = {
-    "GLOBAL_POSITION_INT": 4,
-    "LOCAL_POSITION_NED": 4,
-    "ATTITUDE": 4,
-    "EXTENDED_SYS_STATE": 2,
-    "SYS_STATUS": 2,
-    "EKF_STATUS_REPORT": 2,
-    "GPS_RAW_INT": 2,
-    "VFR_HUD": 2,
-    "POSITION_TARGET_LOCAL_NED": 2,
-    "POSITION_TARGET_GLOBAL_INT": 2,
+    "GLOBAL_POSITION_INT": 4.0,
+    "LOCAL_POSITION_NED": 4.0,
+    "ATTITUDE": 4.0,
+    "EXTENDED_SYS_STATE": 2.0,
+    "SYS_STATUS": 2.0,
+    "EKF_STATUS_REPORT": 2.0,
+    "GPS_RAW_INT": 2.0,
+    "VFR_HUD": 2.0,
+    "POSITION_TARGET_LOCAL_NED": 2.0,
+    "POSITION_TARGET_GLOBAL_INT": 2.0,
+}
+# Of a vehicle that nobody uses: what `GET /vehicles` shows, with what keeps it from being armed.
+LISTED = dict.fromkeys(("GLOBAL_POSITION_INT", "SYS_STATUS", "EKF_STATUS_REPORT", "GPS_RAW_INT"), 0.5)
+# Without MAVProxy's streams: all but what is only shown, half as often.
+NEEDED = {name: rate / 2 for name, rate in WANTED.items() if name not in ("GPS_RAW_INT", "VFR_HUD")}
+RATES: Mapping[tuple[bool, bool], Mapping[str, float]] = {  # whether it is used, and the streams are off
+    (True, False): WANTED,
+    (False, False): LISTED,
+    (True, True): NEEDED,
+    (False, True): {},
 }
 IN_GUIDED = {"POSITION_TARGET_LOCAL_NED", "POSITION_TARGET_GLOBAL_INT"}  # in other modes they say nothing
-AT_ONCE = IN_GUIDED | {"EXTENDED_SYS_STATE"}  # requested without waiting for MAVProxy's streams to bring them
+IN_NO_STREAM = {"EXTENDED_SYS_STATE", "POSITION_TARGET_LOCAL_NED"}
+AT_ONCE = IN_GUIDED | IN_NO_STREAM  # requested without waiting for MAVProxy's streams to bring them
+
+
+async def request_rate(vehicle: Vehicle, name: str, rate: float) -> None:
+    """Request a message at `rate` Hz; 0 for the rate of its stream.
+
+    It waits for no ack: the arriving messages are the proof.
+
+    Raises:
+        LinkLost: MAVProxy has no link.
+    """
+    await vehicle.link.send(set_interval(MESSAGE_IDS[name], rate).to(vehicle.address, 0), vehicle.state.system)
+
+
+@dataclass
+class Asked:
+    """The requests of one message since a boot: the rate (Hz), and when (s), until one has a lasting effect."""
+
+    rate: float
+    at: list[float] = field(default_factory=list)
+
+
+@dataclass
+class Watch:
+    """One vehicle since a boot: the reboots before, since when it is watched (s), and what was requested."""
+
+    reboots: int
+    since: float
+    asked: dict[str, Asked] = field(default_factory=dict)
 
 
 class StreamRequester:
     """Watches what arrives from each vehicle that MAVProxy hears.
 
     Args:
-        registry: the vehicles.
+        registry: the vehicles, and which are used.
     """
 
     def __init__(self, registry: VehicleRegistry) -> None:
         self._registry = registry
-        self._watched_since: dict[tuple[int, int], float] = {}  # by system id and number of reboots
-        self._asked_at: defaultdict[tuple[int, int, str], list[float]] = defaultdict(list)
+        self._watches: dict[int, Watch] = {}  # by system id
+        self._requested: set[tuple[int, str]] = set()  # system id and name of each message that was ever requested
 
     async def run(self) -> None:
         """Watch, until cancelled."""
-        watched: set[int] = set()
-        tasks = HeldTasks()  # one for each vehicle: one that does not acknowledge delays no other
-        try:
-            while True:
-                for system in {vehicle.state.system for vehicle in self._registry.all()} - watched:
-                    watched.add(system)
-                    tasks.start(self._watch(system), f"the watch over the telemetry of vehicle {system}")
-                await asyncio.sleep(LOOK_EVERY)
-        finally:
-            await tasks.end()
-
-    async def _watch(self, system: int) -> None:
         while True:
-            with contextlib.suppress(UavApiError):  # its link is lost, or it refuses: nothing can be requested
-                await self.look(self._registry.commandable(system))
-            await asyncio.sleep(LOOK_EVERY)
+            request = next(self.due(), None)
+            if request is None:
+                await asyncio.sleep(LOOK_EVERY)
+            else:
+                await self._send(*request)
+                await asyncio.sleep(GAP)
 
-    async def look(self, vehicle: Vehicle) -> None:
-        """Request what is missing now.
+    async def _send(self, vehicle: Vehicle, name: str, rate: float) -> None:
+        system = vehicle.state.system
+        asked = self._watches[system].asked
+        if name not in asked or asked[name].rate != rate:
+            asked[name] = Asked(rate)
+        asked[name].at.append(vehicle.clock())
+        self._requested.add((system, name))
+        with contextlib.suppress(LinkLost):
+            await request_rate(vehicle, name, rate)
 
-        Raises:
-            LinkLost: it went away meanwhile.
-        """
-        for name in self.missing(vehicle):
-            key = (vehicle.state.system, vehicle.state.reboots, name)
-            self._asked_at[key].append(vehicle.clock())
-            await vehicle.commands.send(set_interval(MESSAGE_IDS[name], WANTED[name]))
+    def due(self) -> Iterator[tuple[Vehicle, str, float]]:
+        """The requests that are due now, with their rate (Hz); those of vehicles that are used come first."""
+        vehicles = self._registry.all()
+        for vehicle in sorted(vehicles, key=lambda vehicle: not self._registry.is_used(vehicle.state.system)):
+            if self._registry.is_alive(vehicle):
+                yield from self._due_of(vehicle)
+            elif self._registry.is_used(vehicle.state.system):
+                self._watches.pop(vehicle.state.system, None)  # when it is back, it is asked again
 
-    def missing(self, vehicle: Vehicle) -> list[str]:
-        """The wanted messages that do not arrive and whose next request is due."""
-        now = vehicle.clock()
-        since = self._watched_since.setdefault((vehicle.state.system, vehicle.state.reboots), now)
-        missing = []
-        guided = vehicle.state.armed and vehicle.mode == "GUIDED"
-        for name in [name for name in WANTED if guided or name not in IN_GUIDED]:
-            age = vehicle.state.age(name, now)
-            if age is None:
-                age = MISSING_AFTER if name in AT_ONCE else now - since
-            if age < MISSING_AFTER:
-                continue
-            asked_at = self._asked_at[(vehicle.state.system, vehicle.state.reboots, name)]
-            pause = LOOK_EVERY if len(asked_at) < FIRST_ASKINGS else ASK_AGAIN
-            if not asked_at or now - asked_at[-1] >= pause:
-                missing.append(name)
-        return missing
+    def _due_of(self, vehicle: Vehicle) -> Iterator[tuple[Vehicle, str, float]]:
+        now, state = vehicle.clock(), vehicle.state
+        watch = self._watches.get(state.system)
+        if watch is None or watch.reboots != state.reboots:
+            watch = self._watches[state.system] = Watch(state.reboots, now)
+        for name, rate in self._wanted(vehicle).items():
+            asked = watch.asked.get(name)
+            if asked is not None and asked.rate < rate:
+                yield vehicle, name, rate  # nobody used it then
+            elif self._is_missing(vehicle, name, now - watch.since):
+                if asked is None or self._may_ask_again(vehicle, asked.at, now):
+                    yield vehicle, name, rate
+            elif asked is not None and asked.at and now - asked.at[-1] > STEADY:
+                asked.at.clear()
+
+    def _wanted(self, vehicle: Vehicle) -> Mapping[str, float]:
+        used, guided = self._registry.is_used(vehicle.state.system), vehicle.state.armed and vehicle.mode == "GUIDED"
+        wanted = RATES[used, self._registry.streams_are_off]
+        return {name: rate for name, rate in wanted.items() if guided or name not in IN_GUIDED}
+
+    def _is_missing(self, vehicle: Vehicle, name: str, watched_for: float) -> bool:
+        age = vehicle.state.age(name, vehicle.clock())
+        if age is not None:
+            return age >= MISSING_AFTER
+        return name in AT_ONCE or self._registry.streams_are_off or watched_for >= MISSING_AFTER
+
+    def _may_ask_again(self, vehicle: Vehicle, asked_at: list[float], now: float) -> bool:
+        pauses = PAUSES if self._registry.is_used(vehicle.state.system) else ()
+        return not asked_at or (len(asked_at) <= len(pauses) and now - asked_at[-1] >= pauses[len(asked_at) - 1])
+
+    def closing_messages(self) -> list[tuple[Any, int]]:
+        """What gives all rates back, and the systems that it goes to: a message in no stream is sent no more."""
+        closing_messages = []
+        for system, name in sorted(self._requested):
+            number = MESSAGE_IDS[name]
+            command = no_interval(number) if name in IN_NO_STREAM else set_interval(number, 0)
+            closing_messages.append((command.to(self._registry.find(system).address, 0), system))
+        return closing_messages

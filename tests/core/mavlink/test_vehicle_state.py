@@ -144,6 +144,10 @@ def test_copter_that_does_not_know_its_frame_yet_is_a_vehicle(fleet: Fleet, hear
     state = hear("heartbeat", type=mavlink.MAV_TYPE_GENERIC)
     hear("heartbeat")
     assert (state.component, state.vehicle_type) == (1, QUADROTOR)
+    hear("heartbeat", type=mavlink.MAV_TYPE_GENERIC)  # it boots again
+    assert state.vehicle_type == QUADROTOR
+    hear("heartbeat", type=mavlink.MAV_TYPE_FIXED_WING)
+    assert state.vehicle_type == mavlink.MAV_TYPE_FIXED_WING
 
 
 @pytest.mark.parametrize("component", [mavlink.MAV_COMP_ID_GIMBAL, mavlink.MAV_COMP_ID_ADSB, 191])

@@ -1,15 +1,22 @@
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any
 
 import pytest
 from pymavlink import mavutil
 
+from mavproxy_uavapi.core.errors import LinkLost
 from mavproxy_uavapi.core.vehicle.messages import MESSAGE_IDS
 from mavproxy_uavapi.core.vehicle.stream_requester import (
-    ASK_AGAIN,
-    FIRST_ASKINGS,
+    GAP,
+    IN_GUIDED,
+    LISTED,
     LOOK_EVERY,
+    MISSING_AFTER,
+    NEEDED,
+    PAUSES,
+    STEADY,
     WANTED,
     StreamRequester,
 )
@@ -34,6 +41,14 @@ def watch(loop: Any, registry: Any) -> Any:
 
 def requested(drone: Any) -> list[tuple[int, float]]:
     return [(int(command.param1), command.param2) for command in drone.commands(INTERVAL)]
+
+
+def numbers(drone: Any) -> set[int]:
+    return {number for number, _ in requested(drone)}
+
+
+def ids(names: set[str]) -> set[int]:
+    return {MESSAGE_IDS[name] for name in names}
 
 
 def test_messages_that_arrive_are_not_requested(drone: Any, watch: Any) -> None:
@@ -75,18 +90,104 @@ def test_message_that_stops_later_is_requested_again(drone: Any, watch: Any) -> 
     assert requested(drone)[0][0] == MESSAGE_IDS["VFR_HUD"]
 
 
-def test_asking_without_success_becomes_rare(drone: Any, watch: Any) -> None:
+@pytest.mark.parametrize("answer", [mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENIED, None])
+def test_message_that_never_comes_is_requested_a_few_times_and_delays_no_other(
+    loop: Any, host: Any, make_drone: Any, watch: Any, answer: int | None
+) -> None:
+    drone = make_drone()
+    drone.mute |= set(WANTED)
+    host.fleet.vehicles[1].messages.clear()
+    drone.answers[INTERVAL] = [answer]
+    watch(MISSING_AFTER + LOOK_EVERY + len(WANTED) * GAP)
+    assert numbers(drone) == ids(set(WANTED) - IN_GUIDED)
+    watch(600.0)
+    assert Counter(number for number, _ in requested(drone)) == dict.fromkeys(numbers(drone), len(PAUSES) + 1)
+
+
+def test_message_that_stops_again_and_again_is_requested_a_few_times_a_minute(
+    loop: Any, drone: Any, watch: Any
+) -> None:
+    for _ in range(60):
+        drone.mute ^= {"VFR_HUD"}
+        watch(5.0)
+    assert len(requested(drone)) <= (len(PAUSES) + 1) * (1 + 300 / STEADY)
+
+
+def test_vehicle_that_nobody_uses_is_asked_once_for_what_the_list_shows(
+    loop: Any, host: Any, watch: Any, make_drone: Any
+) -> None:
+    _, other = make_drone(1), make_drone(2)
+    other.mute |= set(WANTED)
+    host.fleet.vehicles[2].messages.clear()
+    watch(60.0)
+    assert sorted(requested(other)) == sorted((MESSAGE_IDS[name], 1e6 / rate) for name, rate in LISTED.items())
+    host.registry.commandable(2)
+    watch(LOOK_EVERY + len(WANTED) * GAP)
+    wanted = {(MESSAGE_IDS[name], 1e6 / rate) for name, rate in WANTED.items() if name not in IN_GUIDED}
+    assert set(requested(other)[len(LISTED) :]) == wanted
+
+
+def test_what_a_vehicle_was_asked_for_the_list_is_requested_at_full_rate_when_it_is_used(
+    loop: Any, host: Any, watch: Any, make_drone: Any
+) -> None:
+    _, other = make_drone(1), make_drone(2)
+    other.mute.add("SYS_STATUS")
+    watch(10.0)
+    other.mute.clear()  # it helped
+    watch(60.0)
+    host.registry.use(2)
+    watch(60.0)
+    number = MESSAGE_IDS["SYS_STATUS"]
+    assert requested(other) == [(number, 1e6 / LISTED["SYS_STATUS"]), (number, 1e6 / WANTED["SYS_STATUS"])]
+
+
+def test_without_streams_only_vehicles_that_are_used_are_asked_for_what_they_need(
+    loop: Any, host: Any, watch: Any, make_drone: Any
+) -> None:
+    drones = [make_drone(system) for system in (1, 2, 3)]
+    for drone in drones:
+        drone.mute |= set(WANTED)
+        host.fleet.vehicles[drone.system].messages.clear()
+    host.registry.streams_are_off = True
+    host.registry.use(2)
+    watch(LOOK_EVERY + 2 * len(NEEDED) * GAP)
+    needed = {(MESSAGE_IDS[name], 1e6 / rate) for name, rate in NEEDED.items() if name not in IN_GUIDED}
+    assert [set(requested(drone)) for drone in drones] == [needed, needed, set()]
+
+
+def test_vehicle_of_mavproxys_choice_is_used_as_long_as_it_is_that(
+    loop: Any, host: Any, watch: Any, make_drone: Any
+) -> None:
+    drones = [make_drone(system) for system in (1, 2)]
+    for drone in drones:
+        drone.mute.add("VFR_HUD")
+    host.registry.current = 2
+    watch(10.0)
+    assert [numbers(drone) for drone in drones] == [set(), ids({"VFR_HUD"})]
+
+
+def test_rates_are_given_back(loop: Any, host: Any, make_drone: Any) -> None:
+    drone = make_drone()
+    drone.mute |= {"VFR_HUD", "EXTENDED_SYS_STATE"}
+    requester = StreamRequester(host.registry)
+    task = loop.create_task(requester.run())
+    loop.pass_time(10.0)
+    task.cancel()
+    closing_messages = {(int(m.param1), int(m.param2), system) for m, system in requester.closing_messages()}
+    assert closing_messages == {(MESSAGE_IDS["VFR_HUD"], 0, 1), (MESSAGE_IDS["EXTENDED_SYS_STATE"], -1, 1)}
+
+
+def test_lost_link_of_mavproxy_does_not_end_the_watch(loop: Any, host: Any, drone: Any, watch: Any) -> None:
     drone.mute.add("VFR_HUD")
-    watch(100.0)
-    few = FIRST_ASKINGS + 100 / ASK_AGAIN
-    assert FIRST_ASKINGS < len(requested(drone)) <= few
 
+    def down(*_: Any) -> None:
+        raise LinkLost("MAVProxy has no link")
 
-def test_refusal_does_not_end_the_watch(drone: Any, watch: Any) -> None:
-    drone.mute |= {"GLOBAL_POSITION_INT", "VFR_HUD"}
-    drone.answers[INTERVAL] = [mavlink.MAV_RESULT_DENIED]
-    watch(30.0)
-    assert {number for number, _ in requested(drone)} == {MESSAGE_IDS["GLOBAL_POSITION_INT"], MESSAGE_IDS["VFR_HUD"]}
+    up, host.link.on_send = host.link.on_send, down
+    watch(5.0)
+    host.link.on_send = up
+    watch(10.0)
+    assert numbers(drone) == ids({"VFR_HUD"})
 
 
 def test_nothing_is_requested_while_the_link_is_lost_and_all_again_when_it_is_back(drone: Any, watch: Any) -> None:
@@ -102,12 +203,13 @@ def test_nothing_is_requested_while_the_link_is_lost_and_all_again_when_it_is_ba
 
 
 def test_each_vehicle_is_watched_and_one_that_is_silent_to_commands_delays_no_other(
-    loop: Any, watch: Any, make_drone: Any
+    loop: Any, host: Any, watch: Any, make_drone: Any
 ) -> None:
     deaf, other = make_drone(1), make_drone(2)
     for drone in (deaf, other):
         drone.mute |= {"VFR_HUD", "ATTITUDE"}
-    deaf.on_send = lambda *_: None
+        host.registry.use(drone.system)
+    deaf.answers[INTERVAL] = [None]
     watch(6.0)
     assert {number for number, _ in requested(other)} == {MESSAGE_IDS["VFR_HUD"], MESSAGE_IDS["ATTITUDE"]}
 

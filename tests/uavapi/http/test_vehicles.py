@@ -50,6 +50,21 @@ def test_path_of_a_vehicle_means_that_vehicle(two: Any, api: Any, loop: Any) -> 
     assert "COMMAND_LONG" not in {message.get_type() for message in second.received}
 
 
+@pytest.mark.parametrize(
+    "path",
+    ["/vehicles/2", "/vehicles/2/telemetry/gps", "/vehicles/2/command/arm", "/telemetry/stream?view=gps&vehicles=2"],
+)
+def test_vehicle_that_a_call_names_is_watched_from_now_on(
+    two: Any, api: Any, loop: Any, host: Any, path: str
+) -> None:
+    api.get("/vehicles")
+    assert [host.registry.is_used(system) for system in (1, 2)] == [True, False]
+    call = api.begin("GET", path)
+    loop.pass_time(0.1)
+    assert host.registry.is_used(2)
+    call.cancel()
+
+
 def test_a_vehicle_that_was_not_heard_is_503(two: Any, api: Any) -> None:
     answer = api.get("/vehicles/9/command/arm")
     assert (answer.status, answer.body["code"]) == (503, "no_vehicle")

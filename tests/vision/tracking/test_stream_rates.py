@@ -1,12 +1,12 @@
 from __future__ import annotations
 
 import asyncio
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from pymavlink import mavutil
 
+from mavproxy_uavapi.core.mavlink.link import Address
 from mavproxy_uavapi.core.mavlink.vehicle_state import Received, VehicleState
 from mavproxy_vision.tracking.stream_rates import TRUTH, Rates
 
@@ -20,12 +20,12 @@ class Vehicle:
     def __init__(self) -> None:
         self.now = 100.0
         self.state = VehicleState(1, 1, mavlink.MAV_TYPE_QUADROTOR, self.now)
-        self.address, self.link = (1, 1), self
+        self.address, self.link = Address(1, 1), self
         self.requested: list[tuple[float, float]] = []
         self.rates = Rates(lambda: self.now)
 
     async def send(self, message: Any, _system: int) -> None:
-        self.requested.append((message.param1, message.param2))
+        self.requested.append((message.param1, 1e6 / message.param2))
 
     def hear(self, seconds: float, *names: str) -> None:
         """Messages of these names arrive at the rate that is needed."""
@@ -43,12 +43,8 @@ class Vehicle:
 
 
 @pytest.fixture
-def vehicle(monkeypatch: pytest.MonkeyPatch) -> Vehicle:
+def vehicle() -> Vehicle:
     """A vehicle that sends both messages fast enough."""
-    monkeypatch.setattr(
-        "mavproxy_vision.tracking.stream_rates.set_interval",
-        lambda message_id, rate: SimpleNamespace(to=lambda *_: SimpleNamespace(param1=message_id, param2=rate)),
-    )
     made = Vehicle()
     made.hear(2.0, "SIM_STATE", "ATTITUDE")
     return made
