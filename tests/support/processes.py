@@ -201,6 +201,11 @@ class Rig:
             self.sleep(0.05)
         return value
 
+    def speed_up(self, factor: float) -> None:
+        """Have the embedded vehicle's clock run so many times as fast as ours."""
+        assert self.control is not None
+        self.control.ask("parameter", name="SIM_SPEEDUP", value=factor)
+
     def switch_mode(self, name: str) -> None:
         """The pilot changes the mode at MAVProxy's prompt."""
         self.mavproxy.type(f"mode {name}")
