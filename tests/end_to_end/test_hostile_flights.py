@@ -109,14 +109,14 @@ def pilot_arms(rig):
 @both
 @pytest.mark.parametrize("verb", ["land", pytest.param("rtl", marks=pytest.mark.long)])
 def test_going_down_is_not_kept_from_the_vehicle_by_streams(rig, harness, verb):
-    rig.in_the_air(50)
+    rig.in_the_air(150)
     rig.ok(rig.get("/command/set_sim_speedup", sim_factor=1))  # it sinks a little in each try
     with Streams(rig) as streams:
         for number in range(TRIES):
             before = len(streams.answers)
             answer = rig.get(f"/command/{verb}?wait=false")
             assert answer.status_code == 202
-            harness.eventually(lambda: mode(rig) == verb.upper(), 3, f"{verb} number {number}")
+            harness.eventually(lambda: mode(rig) == verb.upper(), 60, f"{verb} number {number}")
             time.sleep(0.2)
             assert streams.refusals(before) <= {"busy", "mode_changed", "superseded"}
             assert job_of(rig, answer.headers["Location"])["state"] == "running"
