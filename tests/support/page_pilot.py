@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from tests.support.chromium import Page
+from tests.support.chromium import PATIENCE, Page
 
 ESCAPE = 27
 BUTTON = "[...document.querySelectorAll('{tag}')].find(b => b.textContent === '{label}' && b.checkVisibility())"
@@ -31,9 +31,9 @@ class Pilot:
     def __init__(self, page: Page, rig: Any) -> None:
         self.page, self.rig = page, rig
 
-    async def sees(self, element: str, text: str) -> None:
+    async def sees(self, element: str, text: str, seconds: float = PATIENCE) -> None:
         """Wait until an element shows that text."""
-        await self.page.until(f"document.querySelector({element!r}).innerText.includes({text!r})")
+        await self.page.until(f"document.querySelector({element!r}).innerText.includes({text!r})", seconds)
 
     async def sees_live(self) -> None:
         """Wait until the page says that its numbers are live; it says `not live` before."""
