@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import gc
+from typing import Any
 
 import pytest
 
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 
-def test_what_comes_in_time_is_given_and_what_fails_fails() -> None:
+def test_what_comes_in_time_is_given_and_what_fails_fails(loop: Any) -> None:
     async def give() -> int:
         await asyncio.sleep(0)
         return 7
@@ -18,13 +19,13 @@ def test_what_comes_in_time_is_given_and_what_fails_fails() -> None:
     async def fail() -> None:
         raise ValueError("no")
 
-    assert asyncio.run(wait_with_timeout(5, give())) == 7
-    assert asyncio.run(wait_with_timeout(None, give())) == 7
+    assert loop.run(wait_with_timeout(5, give())) == 7
+    assert loop.run(wait_with_timeout(None, give())) == 7
     with pytest.raises(ValueError, match="no"):
-        asyncio.run(wait_with_timeout(5, fail()))
+        loop.run(wait_with_timeout(5, fail()))
 
 
-def test_what_takes_longer_is_cancelled() -> None:
+def test_what_takes_longer_is_cancelled(loop: Any) -> None:
     ended: list[str] = []
 
     async def long() -> None:
@@ -38,13 +39,13 @@ def test_what_takes_longer_is_cancelled() -> None:
             await wait_with_timeout(0.01, long())
         await asyncio.sleep(0)
 
-    asyncio.run(wait())
+    loop.run(wait())
     assert ended == ["cancelled"]
 
 
 @pytest.mark.parametrize("turns", range(6))
 @pytest.mark.parametrize("first", ["event", "cancel"])
-def test_a_cancellation_around_the_turn_in_which_it_comes_is_not_lost(turns: int, first: str) -> None:
+def test_a_cancellation_around_the_turn_in_which_it_comes_is_not_lost(loop: Any, turns: int, first: str) -> None:
     async def race() -> bool:
         event, went_on = asyncio.Event(), []
 
@@ -53,7 +54,7 @@ def test_a_cancellation_around_the_turn_in_which_it_comes_is_not_lost(turns: int
             await asyncio.sleep(0.01)
             went_on.append(True)
 
-        task = asyncio.get_running_loop().create_task(fly())
+        task = loop.create_task(fly())
         await asyncio.sleep(0.01)
         steps = [event.set, task.cancel]
         for step in steps if first == "event" else reversed(steps):
@@ -64,14 +65,13 @@ def test_a_cancellation_around_the_turn_in_which_it_comes_is_not_lost(turns: int
         assert task.cancelled()
         return bool(went_on)
 
-    assert not asyncio.run(race())
+    assert not loop.run(race())
 
 
-def test_failure_in_the_turn_of_a_cancellation_is_no_complaint_of_asyncio() -> None:
+def test_failure_in_the_turn_of_a_cancellation_is_no_complaint_of_asyncio(loop: Any) -> None:
     complaints: list[object] = []
 
     async def main() -> None:
-        loop = asyncio.get_running_loop()
         loop.set_exception_handler(lambda _, context: complaints.append(context))
         failing = loop.create_future()
         waiting = loop.create_task(wait_with_timeout(5, failing))
@@ -81,6 +81,6 @@ def test_failure_in_the_turn_of_a_cancellation_is_no_complaint_of_asyncio() -> N
         with pytest.raises(asyncio.CancelledError):
             await waiting
 
-    asyncio.run(main())
+    loop.run(main())
     gc.collect()
     assert complaints == []

@@ -172,13 +172,12 @@ def test_slow_headers_are_hung_up_on_and_hold_up_nobody(embedded_rig):
 
 
 def test_more_than_the_allowed_rate_is_429(embedded_rig):
-    embedded_rig.mavproxy.type("uavapi set max_rate 10")
-    embedded_rig.mavproxy.ask("uavapi set max_rate", "10.0 ")
+    embedded_rig.set("max_rate", "1.0")  # however slowly they are asked, 40 come faster
     try:
         statuses = [embedded_rig.get("/jobs").status_code for _ in range(40)]
         assert statuses[0] == 200 and 429 in statuses
     finally:
-        embedded_rig.mavproxy.type("uavapi set max_rate 500")
+        embedded_rig.set("max_rate", "500.0")
 
 
 UPLOAD = """
@@ -195,7 +194,6 @@ told = {"read": status("/jobs"), "upload": status("/mission/upload-script", body
 host, port = url.removeprefix("http://").split(":")
 time.sleep(2)  # until the connections of those calls have ended
 idle = [socket.create_connection((host, int(port))) for _ in range(60)]
-time.sleep(2)
 def ended(one):
     one.setblocking(False)
     try:
@@ -204,7 +202,13 @@ def ended(one):
         return False
     except ConnectionError:
         return True
-told["open"] = sum(not ended(one) for one in idle)
+def still_open():
+    return sum(not ended(one) for one in idle)
+deadline = time.monotonic() + 60
+while still_open() > 20 and time.monotonic() < deadline:
+    time.sleep(0.1)
+time.sleep(1)
+told["open"] = still_open()
 told["read among idle ones"] = status("/jobs")
 print(json.dumps(told))
 """
@@ -220,7 +224,7 @@ def test_network_that_may_fly_has_a_share_of_the_connections_and_no_scripts(lan,
 
         def reported():
             command = [*lan.inside, sys.executable, "-c", UPLOAD, url]
-            done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
+            done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=150)
             return json.loads(done.stdout)
 
         assert reported() == {"read": 200, "upload": 403, "open": 20, "read among idle ones": 200}

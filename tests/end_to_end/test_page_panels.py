@@ -18,7 +18,6 @@ from tests.support.pictures import grey_png
 pytestmark = [pytest.mark.needs("chromium"), pytest.mark.needs("tmux")]
 cv2 = pytest.importorskip("cv2")
 
-SPEEDUP = 1.5  # the rendered camera runs on the wall clock
 SCRIPT = "import time\nprint('the script is up', flush=True)\ntime.sleep(300)\n"
 
 FIELD = {
@@ -151,7 +150,7 @@ async def land_on_the_tag(pilot: Pilot) -> None:
     await pilot.page.until("document.querySelector('vision-view img').naturalWidth === 480")
     await pilot.finds_it_accessible()
     await pilot.hold("Land on the tag")
-    await pilot.sees("vision-view .answer", "Landed on tag 0")
+    await pilot.sees("vision-view .answer", "Landed on tag 0", 180)
     assert pilot.rig.control.ask("state")["position"][:2] == pytest.approx([8, -5], abs=0.4)
 
 
@@ -192,11 +191,12 @@ def rig(harness: Any, tmp_path: Path) -> Iterator[Any]:
     """A vehicle that has a log, because it was armed once."""
     folders = {"vehicle_logs": "logs", "scripts_path": "scripts", "script_logs": "script-logs"}
     settings = {name: str(tmp_path / folder) for name, folder in folders.items()}
-    made = harness.embedded(tmp_path, speedup=SPEEDUP, tiles=str(map_of(tmp_path)), **settings)
+    made = harness.embedded(tmp_path, tiles=str(map_of(tmp_path)), **settings)
     try:
         harness.eventually(lambda: made.status()["ready_to_arm"], 60, what="getting ready to arm")
         made.ok(made.get("/command/arm"))
         made.ok(made.get("/command/disarm"))
+        made.speed_up(1)  # the rendered camera runs on the wall clock, and a landing ends without it
         yield made
     finally:
         made.stop()

@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 import requests
 
-SPEEDUP = 2
+SPEEDUP = 1  # a landing ends after 5 s of the vehicle without a frame
 SET_MESSAGE_INTERVAL, REQUEST_MESSAGE = 511, 512
 NOTHING_MORE = 2.0  # s in which nothing more may be sent
 in_lock_step = pytest.mark.sitl  # here on ArduPilot only
@@ -27,9 +27,10 @@ def posted(request: Any, harness: Any, poster: Any, tmp_path_factory: pytest.Tem
     """A rig whose MAVProxy looks at what is posted."""
     directory = tmp_path_factory.mktemp("failures")
     make = harness.embedded if request.param == "embedded" else harness.ardupilot_with_faults
-    made = make(directory, speedup=SPEEDUP)
+    made = make(directory)
     try:
         harness.eventually(lambda: made.status()["ready_to_arm"], 120, "getting ready to arm")
+        made.ok(made.get("/command/set_sim_speedup", sim_factor=SPEEDUP))
         keywords = {"source": "http", "gimbal": True, "width": 480, "height": 360, "attempts": 1, "leash": 3}
         keywords["directory"] = str(directory)
         made.mavproxy.ask(f"module load vision:{json.dumps(keywords, separators=(',', ':'))}", "looking for")
@@ -61,7 +62,7 @@ class Scene:
         """Land, beside what the test does meanwhile."""
         self._landing = threading.Thread(target=lambda: setattr(self, "answer", self._land(body)))
         self._landing.start()
-        self.harness.eventually(lambda: self.flight().get("running"), 10, "the landing's beginning")
+        self.harness.eventually(lambda: self.flight().get("running"), 60, "the landing's beginning")
 
     def _land(self, body: dict[str, Any]) -> requests.Response:
         answer: requests.Response = self.rig.post("/vision/land", timeout=120, **body)
@@ -89,7 +90,7 @@ class Scene:
 
     def in_view(self) -> None:
         """Wait until frames come."""
-        self.harness.eventually(lambda: self.rig.get("/vision/tags").status_code == 200, 10, "frames")
+        self.harness.eventually(lambda: self.rig.get("/vision/tags").status_code == 200, 60, "frames")
 
     def holds(self) -> bool:
         """Whether it stays in the air, in GUIDED, once it has stopped."""
@@ -242,9 +243,9 @@ def test_a_frozen_camera_ends_the_landing(scene: Scene) -> None:
     with camera:
         scene.in_view()
         scene.begin()
-        scene.harness.eventually(lambda: camera.height < 3.5, 20, "its descending")
+        scene.harness.eventually(lambda: camera.height < 3.5, 60, "its descending")
         camera.frozen = True
-        scene.harness.eventually(lambda: scene.rig.status()["mode"] == "RTL", 30, "returning")
+        scene.harness.eventually(lambda: scene.rig.status()["mode"] == "RTL", 60, "returning")
         body = scene.end()
     assert "the camera: frozen" in reason(body)
     assert body["info"]["action"] == "rtl"
@@ -257,7 +258,7 @@ def test_link_silence_of_four_seconds_is_rested_out(scene: Scene) -> None:
     with scene.camera(tag) as camera:
         scene.in_view()
         scene.begin()
-        scene.harness.eventually(lambda: "descending" in str(scene.flight().get("phase")), 20, "its descending")
+        scene.harness.eventually(lambda: "descending" in str(scene.flight().get("phase")), 60, "its descending")
         scene.rig.control.fault("silence", seconds=4.0, sending=True, receiving=True)
         body = scene.end()
     assert body.get("result") == "Landed on tag 0", body
@@ -269,9 +270,9 @@ def test_the_pilots_hand_ends_a_landing_and_nothing_more_is_sent(scene: Scene) -
     with scene.camera() as camera:
         scene.in_view()
         scene.begin()
-        scene.harness.eventually(lambda: camera.height < 4.0, 20, "its descending")
+        scene.harness.eventually(lambda: camera.height < 4.0, 60, "its descending")
         scene.rig.control.fault("pilot_mode", mode="LOITER")
-        body = scene.end(20)
+        body = scene.end(60)
         mark = scene.rig.control.ask("received")["last"]
         time.sleep(NOTHING_MORE)
     assert body["code"] == "mode_changed"
@@ -286,12 +287,12 @@ def test_a_battery_failsafe_has_its_way(scene: Scene) -> None:
     with scene.camera(scene.tag(north=0.0, east=-1.2)) as camera:
         scene.in_view()
         scene.begin()
-        scene.harness.eventually(lambda: camera.height < 4.5, 20, "its descending")
+        scene.harness.eventually(lambda: camera.height < 4.5, 60, "its descending")
         if scene.rig.is_ardupilot:
             scene.rig.mavproxy.type("param set SIM_BATT_VOLTAGE 9.9")
         else:
             scene.rig.control.fault("low_battery", voltage=9.9)
-        body = scene.end(40)
+        body = scene.end(60)
         mark = scene.rig.control.ask("received")["last"]
         time.sleep(NOTHING_MORE)
     assert body["code"] == "mode_changed"

@@ -135,9 +135,9 @@ class Page:
         assert "exceptionDetails" not in result, result
         return result["result"].get("value")
 
-    async def until(self, script: str) -> None:
+    async def until(self, script: str, seconds: float = PATIENCE) -> None:
         """Wait until a script gives something true; a page that is being loaded has none to run it in."""
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + seconds
         while True:
             with contextlib.suppress(AssertionError):
                 if await self.evaluate(script):

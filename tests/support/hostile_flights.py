@@ -21,12 +21,13 @@ def ask():
     data = None if body == "-" else body.encode()
     request = urllib.request.Request(os.environ["UAVAPI_URL"] + path, data, {"Content-Type": "application/json"})
     urllib.request.urlopen(request, timeout=600)
+    print(os.getpid(), flush=True)
 
 threading.Thread(target=ask, daemon=True).start()
 time.sleep(lives)
 os.kill(os.getpid(), die)
 """
-"""A script that asks for something, lives for so many s, and dies of a signal."""
+"""A script that asks for something, says its process id when it is answered, and dies of a signal after so many s."""
 WPL = """QGC WPL 110
 0\t1\t0\t16\t0\t0\t0\t0\t-35.363261\t149.165230\t584\t1
 1\t0\t3\t22\t0\t0\t0\t0\t0\t0\t10\t1

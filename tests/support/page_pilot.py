@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
-from collections.abc import AsyncIterator
+from collections.abc import Awaitable, Callable
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from tests.support.chromium import Page
+from tests.support.chromium import PATIENCE, Page
 
 ESCAPE = 27
 BUTTON = "[...document.querySelectorAll('{tag}')].find(b => b.textContent === '{label}' && b.checkVisibility())"
+WATCHED_HOLD = """
+{{
+  const element = {element}, {{button}} = element;
+  const begin = () => {{ hold.pressed = hold.disabled = false; return !button.disabled; }};
+  const hold = window.hold = {{element, begin, acted: false}};
+  element.addEventListener('confirmed', () => hold.acted = true);
+  for (const kind of ['pointerdown', 'keydown']) element.addEventListener(kind, () => hold.pressed = true);
+  new MutationObserver(() => hold.disabled = true).observe(button, {{attributeFilter: ['disabled']}});
+}}"""
+"""What happens to a button: whether it was pressed, disabled since `begin`, and has acted."""
+Act = Callable[..., Awaitable[object]]
 
 
 class Pilot:
@@ -21,9 +31,9 @@ class Pilot:
     def __init__(self, page: Page, rig: Any) -> None:
         self.page, self.rig = page, rig
 
-    async def sees(self, element: str, text: str) -> None:
+    async def sees(self, element: str, text: str, seconds: float = PATIENCE) -> None:
         """Wait until an element shows that text."""
-        await self.page.until(f"document.querySelector({element!r}).innerText.includes({text!r})")
+        await self.page.until(f"document.querySelector({element!r}).innerText.includes({text!r})", seconds)
 
     async def sees_live(self) -> None:
         """Wait until the page says that its numbers are live; it says `not live` before."""
@@ -35,41 +45,46 @@ class Pilot:
 
     async def hold_the(self, element: str) -> None:
         """Hold the button that the script `element` gives, until it acts."""
-        async with self._acting(element):
-            x, y = await self.page.middle(element)
-            await self.page.press(x, y)
-        await self.page.release(x, y)
+        await self._hold(element, self.page.press, self.page.release)
 
     async def hold_by_touch(self, label: str) -> None:
         """Hold a finger on a button until it acts."""
         element = BUTTON.format(tag="hold-button", label=label)
-        async with self._acting(element):
-            await self.page.touch(*await self.page.middle(element))
-        await self.page.lift()
+        await self._hold(element, self.page.touch, lambda *_: self.page.lift())
 
     async def hold_by_key(self, label: str, key: str, code: int) -> None:
         """Put the focus on a button and hold a key until it acts."""
         element = BUTTON.format(tag="hold-button", label=label)
-        async with self._acting(element):
+
+        async def press(*_: float) -> None:
             await self.page.evaluate(f"{element}.button.focus()")
             await self.page.key("keyDown", key, code)
-        await self.page.key("keyUp", key, code)
+
+        await self._hold(element, press, lambda *_: self.page.key("keyUp", key, code))
+
+    async def _hold(self, element: str, press: Act, release: Act) -> None:
+        """Hold a button until it acts; `press` and `release` take the button's place.
+
+        The page ends a hold when it disables the button, as it does when no news come for a while: then again.
+        """
+        await self.page.evaluate(WATCHED_HOLD.format(element=element))
+        while not await self.page.evaluate("hold.acted"):
+            await self.page.until("hold.begin()")
+            place = await self.page.middle(element)
+            await press(*place)
+            await self.page.until("hold.acted || hold.disabled || hold.pressed && !hold.element.matches('.held')")
+            await release(*place)
+            assert await self.page.evaluate("hold.acted || hold.disabled"), f"the hold of {element} has ended"
 
     async def press_twice(self, label: str) -> None:
         """Press a button as assistive technology does, which cannot hold it."""
         element = BUTTON.format(tag="hold-button", label=label)
-        async with self._acting(element):
-            await self.page.evaluate(f"{element}.button.click()")
-            await self.page.until(f"{element}.button.ariaLabel.includes('press again to confirm')")
-            assert not await self.page.evaluate("acted")
-            await self.page.evaluate(f"{element}.button.click()")
-
-    @contextlib.asynccontextmanager
-    async def _acting(self, element: str) -> AsyncIterator[None]:
-        """Do something to a button that may be used, and wait until it has acted."""
         await self.page.until(f"!{element}.button.disabled")
         await self.page.evaluate(f"window.acted = false; {element}.addEventListener('confirmed', () => acted = true)")
-        yield
+        await self.page.evaluate(f"{element}.button.click()")
+        await self.page.until(f"{element}.button.ariaLabel.includes('press again to confirm')")
+        assert not await self.page.evaluate("acted")
+        await self.page.evaluate(f"{element}.button.click()")
         await self.page.until("acted")
 
     async def click(self, label: str) -> None:

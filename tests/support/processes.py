@@ -9,13 +9,14 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import select
 import signal
 import socket
 import subprocess
 import sys
 import sysconfig
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -171,6 +172,16 @@ class Rig:
             session.request(method, self.url + path, json=body, timeout=(5, after))
             raise AssertionError("it answered too soon")
 
+    @contextlib.contextmanager
+    def unanswered(self, method: str, path: str, body: dict[str, Any] | None = None) -> Iterator[None]:
+        """Meanwhile a request waits for its answer; then its client hangs up."""
+        with socket.create_connection(("127.0.0.1", self.port), timeout=PATIENCE) as connection:
+            content = b"" if body is None else json.dumps(body).encode()
+            lines = (f"{method} {path} HTTP/1.1", f"Host: 127.0.0.1:{self.port}", "Content-Type: application/json")
+            connection.sendall("\r\n".join([*lines, f"Content-Length: {len(content)}", "", ""]).encode() + content)
+            yield
+            assert select.select([connection], [], [], 0)[0] == [], "it answered too soon"
+
     def ok(self, answer: Any) -> dict[str, Any]:
         """The body of an answer that must be a success."""
         assert answer.status_code == 200, f"{answer.status_code} {answer.text}"
@@ -200,6 +211,11 @@ class Rig:
             assert self.clock() < deadline, f"{what} did not happen within {timeout:g} s"
             self.sleep(0.05)
         return value
+
+    def speed_up(self, factor: float) -> None:
+        """Have the embedded vehicle's clock run so many times as fast as ours."""
+        assert self.control is not None
+        self.control.ask("parameter", name="SIM_SPEEDUP", value=factor)
 
     def switch_mode(self, name: str) -> None:
         """The pilot changes the mode at MAVProxy's prompt."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import threading
 import time
 from types import SimpleNamespace
 
@@ -148,16 +149,22 @@ def test_a_frame_that_does_not_arrive_is_reported(monkeypatch):
 
 
 class Counting:
-    """Work that takes a while in its thread: how often it was done, and how much of it at once."""
+    """Work that takes a while in its thread: how often it was done, and how much of it at once.
+
+    It lasts until `may_end` is set.
+    """
 
     def __init__(self, result):
         self.result, self.count, self.at_once, self.most = result, 0, 0, 0
+        self.may_end = threading.Event()
+        self.may_end.set()
 
     def __call__(self, *_):
         self.count += 1
         self.at_once += 1
         self.most = max(self.most, self.at_once)
         time.sleep(0.01)
+        assert self.may_end.wait(60)
         self.at_once -= 1
         return self.result
 
@@ -234,6 +241,7 @@ def test_a_picture_is_drawn_once_for_all_who_ask(monkeypatch):
 
 def test_a_slow_drawing_is_joined_rather_than_overtaken(monkeypatch):
     drawing = Counting(b"\xff\xd8")
+    drawing.may_end.clear()
     monkeypatch.setattr(http, "jpeg", drawing)
     over = handlers(0.0, Posted(0.0))
 
@@ -243,6 +251,7 @@ def test_a_slow_drawing_is_joined_rather_than_overtaken(monkeypatch):
             over.tracker.result = FrameResult(number, NOW, NOW, NOW, (64, 48), ())
             requested.append(asyncio.create_task(over.frame(None)))
             await asyncio.sleep(0)
+        drawing.may_end.set()
         await asyncio.gather(*requested)
 
     asyncio.run(run())

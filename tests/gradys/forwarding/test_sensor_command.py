@@ -10,7 +10,9 @@ from typing import Any
 import pytest
 
 from mavproxy_gradys.errors import NoReading
+from mavproxy_gradys.forwarding import sensor_command
 from mavproxy_gradys.forwarding.sensor_command import MOST_OUTPUT, SensorCommand
+from tests.support.children import begin_limits_with, is_gone
 from tests.support.processes import eventually
 
 NOW = 1_800_000_000.0
@@ -18,14 +20,6 @@ NOW = 1_800_000_000.0
 
 def read(*command: str, longest: float = 60.0) -> Any:
     return asyncio.run(SensorCommand(command, longest, lambda: NOW).read())
-
-
-def runs(pid: int) -> bool:
-    """Whether a process runs; one that only waits to be reaped does not."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except FileNotFoundError:
-        return False
 
 
 def test_it_gives_what_it_prints() -> None:
@@ -55,26 +49,30 @@ def test_a_failure_says_why(command: list[str], cause: str, words: str) -> None:
     assert str(raised.value).startswith(words) and str(raised.value)[-1] != ":"
 
 
-def test_one_that_takes_too_long_is_killed_with_its_children(tmp_path: Path) -> None:
+def test_one_that_takes_too_long_is_killed_with_its_children(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pids = tmp_path / "pids"
+    begin_limits_with(monkeypatch, sensor_command, pids)
     with pytest.raises(NoReading, match=r"sh did not end within 0\.5 s"):
         read("sh", "-c", f"sleep 600 & echo $! $$ > {pids}; wait", longest=0.5)
     for pid in map(int, pids.read_text().split()):
-        eventually(lambda pid=pid: not runs(pid), what="its end")
+        eventually(lambda pid=pid: is_gone(pid), what="its end")
 
 
 def test_a_child_that_outlives_it_is_killed(tmp_path: Path) -> None:
     pids = tmp_path / "pids"
     measured = read("sh", "-c", f"sleep 600 > /dev/null 2>&1 & echo $! > {pids}; echo 7")
     assert measured.content == b"7\n"
-    eventually(lambda: not runs(int(pids.read_text())), what="its end")
+    eventually(lambda: is_gone(int(pids.read_text())), what="its end")
 
 
-def test_a_child_that_keeps_the_output_open_ends_with_the_time(tmp_path: Path) -> None:
+def test_a_child_that_keeps_the_output_open_ends_with_the_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     pids = tmp_path / "pids"
+    begin_limits_with(monkeypatch, sensor_command, pids)
     with pytest.raises(NoReading, match="did not end"):
         read("sh", "-c", f"sleep 600 & echo $! > {pids}; echo 7", longest=0.5)
-    eventually(lambda: not runs(int(pids.read_text())), what="its end")
+    eventually(lambda: is_gone(int(pids.read_text())), what="its end")
 
 
 def test_a_cancelled_wait_kills_it(tmp_path: Path) -> None:
@@ -90,7 +88,7 @@ def test_a_cancelled_wait_kills_it(tmp_path: Path) -> None:
 
     asyncio.run(cancel())
     for pid in map(int, pids.read_text().split()):
-        eventually(lambda pid=pid: not runs(pid), what="its end")
+        eventually(lambda pid=pid: is_gone(pid), what="its end")
 
 
 def test_nothing_is_left_open(descriptors: Any) -> None:
@@ -101,7 +99,7 @@ def test_nothing_is_left_open(descriptors: Any) -> None:
         with pytest.raises(NoReading):
             read("yes")
     assert descriptors() == before
-    assert not any(runs(int(pid)) for pid in _children())
+    assert all(is_gone(int(pid)) for pid in _children())
 
 
 def _children() -> list[str]:

@@ -23,6 +23,7 @@ from mavproxy_gradys.station.intake import Intake
 from mavproxy_gradys.station.sqlite_store import SqliteStore
 from mavproxy_gradys.station.statistics import Statistics
 from mavproxy_gradys.station.updates import Updates, parse
+from tests.support.at_once import AtOnce
 
 FORM = {"id": "10", "lat": "-15.84", "lng": "-47.9", "alt": "20.1", "device": "uav", "type": "102", "seq": "0"}
 
@@ -101,6 +102,7 @@ def ask(
     loop: Any, tmp_path: Path, clock: Any, at_once: type, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[Callable[..., Any]]:
     loop.patience = 0.05
+    loop.set_default_executor(AtOnce())  # of threads its clock would know nothing
     monkeypatch.setattr("mavproxy_gradys.station.sqlite_store.ThreadPoolExecutor", at_once)
     store = SqliteStore(tmp_path / "station.db", clock)
     watch = FleetWatch(store, AlarmLimits(10, 20))

@@ -13,6 +13,7 @@ from mavproxy_gradys.errors import NotStored
 from mavproxy_gradys.station.reading_row import ReadingRow, reading_row
 from tests.support.ports import free_port
 from tests.support.postgres import PostgresCluster
+from tests.support.station_rows import shown
 
 pytestmark = pytest.mark.needs("pg_lsclusters", "postgresql")
 DAY = 86400
@@ -106,14 +107,14 @@ def test_the_fleet_is_one_for_all_workers(make: Any, run: Any, monkeypatch: pyte
     one, other = make("worker-1"), make("worker-2")
 
     async def reported() -> list[tuple[str, str]]:
-        await asyncio.sleep(0.2)
         return [(newest.device, newest.value) for newest in (await one.fleet()).newest]
 
+    expected = [("uav-1", "2"), ("uav-2", "8")]
     run(one.add([row(1, TODAY, value=1), row(1, TODAY, "uav-2", value=8)]))
     run(other.add([row(2, TODAY + 1, value=2)]))
-    assert run(reported()) == [("uav-1", "2"), ("uav-2", "8")]
+    run(shown([one, other], reported, expected))
     run(one.add([row(3, TODAY + 0.5, value=3)]))  # late, and kept by another worker than the newer one
-    assert run(reported()) == [("uav-1", "2"), ("uav-2", "8")]
+    run(shown([one, other], reported, expected))
 
 
 def test_what_the_database_refuses_is_a_value_error(make: Any, run: Any) -> None:

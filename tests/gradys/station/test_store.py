@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
 from typing import Any
 
@@ -13,7 +12,7 @@ from mavproxy_gradys.forwarding.readings import Sampler, Stored
 from mavproxy_gradys.station.newest import Newest
 from mavproxy_gradys.station.reading_row import reading_row
 from mavproxy_gradys.station.store import HistoryQuery, ReadingQuery, Store
-from tests.support.station_rows import row
+from tests.support.station_rows import row, shown
 
 
 async def every(store: Store, **requested: Any) -> list[tuple[Any, ...]]:
@@ -95,15 +94,12 @@ def test_history_of_a_list(store: Store, run: Any) -> None:
 def test_the_fleet_shows_the_newest_of_each(store: Store, run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("mavproxy_gradys.station.postgres_store.SHOW_EVERY", 0.01, raising=False)
 
-    async def shown() -> list[Newest]:
-        await asyncio.sleep(0.2)
-        return list((await store.fleet()).newest)
+    async def reported() -> list[tuple[str, str, str]]:
+        return [(n.device, n.quantity, n.value) for n in (await store.fleet()).newest]
 
     run(store.add([row(5, value=5), row(4, value=4), row(6, device="uav-2", quantity="volt", value="x")]))
-    assert [(n.device, n.quantity, n.value) for n in run(shown())] == [
-        ("uav-1", "alt", "5"),
-        ("uav-2", "volt", '"x"'),
-    ]
+    expected = [("uav-1", "alt", "5"), ("uav-2", "volt", '"x"')]
+    run(shown([store], reported, expected))
     run(store.show([Newest("uav-3", "3", "alt", "m", "9", 1_699_999_999.0, 1_699_999_999.0)]))
     run(store.add([row(2, value=2)]))  # late
-    assert [(n.device, n.value) for n in run(shown())] == [("uav-1", "5"), ("uav-2", '"x"'), ("uav-3", "9")]
+    run(shown([store], reported, [*expected, ("uav-3", "alt", "9")]))

@@ -11,8 +11,9 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.core.errors import BadRequest, TimedOut, ToolFailed
-from mavproxy_uavapi.programs import cameras
+from mavproxy_uavapi.programs import cameras, program
 from mavproxy_uavapi.programs.cameras import TOOLS, Shot, size_of, take
+from tests.support.children import begin_limits_with, until_gone, until_noted
 
 SHOT = Shot(1280, 720, 150)
 WRITES = 'for last; do :; done\nprintf "\\377\\330\\377 picture" > "$last"\n'
@@ -107,29 +108,31 @@ def test_tool_that_hangs_is_ended_with_its_children(
     temporary: Path, fake: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(cameras, "TIME_LIMIT", 0.5)
-    fake("fswebcam", f"sleep 60 &\necho $! > {tmp_path}/pid\nwait\n")
-    began = time.monotonic()
-    with pytest.raises(TimedOut, match=r"0\.5 s"):
-        asyncio.run(take("fswebcam", SHOT))
-    assert time.monotonic() - began < 20
-    status = Path("/proc", (tmp_path / "pid").read_text().strip(), "stat")
-    assert not status.exists() or ") Z " in status.read_text()  # nobody may have reaped it yet
+    begin_limits_with(monkeypatch, program, tmp_path / "pid")
+    fake("fswebcam", f"sleep 600 &\necho $! > {tmp_path}/pid\nwait\n")
+
+    async def hang() -> None:
+        began = time.monotonic()
+        with pytest.raises(TimedOut, match=r"0\.5 s"):
+            await take("fswebcam", SHOT)
+        assert time.monotonic() - began < 60
+        await until_gone(tmp_path / "pid")
+
+    asyncio.run(hang())
     assert list(temporary.iterdir()) == []
 
 
 def test_client_that_hangs_up_leaves_nothing(temporary: Path, fake: Any, tmp_path: Path) -> None:
-    fake("fswebcam", f"echo up > {tmp_path}/up\nsleep 60\n")
+    note = tmp_path / "pid"
+    fake("fswebcam", f"sleep 600 &\necho $! > {note}\nwait\n")
 
     async def hang_up() -> None:
         task = asyncio.create_task(take("fswebcam", SHOT))
-        for _ in range(1000):
-            if (tmp_path / "up").exists():
-                break
-            await asyncio.sleep(0.02)
+        await until_noted(note)
         task.cancel()
         with pytest.raises(asyncio.CancelledError):
             await task
-        await asyncio.sleep(0.2)
+        await until_gone(note)
 
     asyncio.run(hang_up())
     assert list(temporary.iterdir()) == []

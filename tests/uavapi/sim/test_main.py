@@ -11,6 +11,7 @@ import time
 import pytest
 from pymavlink import mavutil
 
+SET_MESSAGE_INTERVAL, SYSTEM_TIME = 511, 2
 SIM = [sys.executable, "-m", "mavproxy_uavapi.sim", "--port", "0"]
 
 
@@ -24,40 +25,53 @@ def running(*arguments):
             yield process, ports
         finally:
             process.terminate()
-            process.wait(5)
+            process.wait(60)
 
 
 def test_mavlink_over_tcp_reconnects_and_a_clean_end():
     with running("--sysid", "3", "--speedup", "20", "--control", "0") as (process, (port, control)):
         for _ in range(2):
             connection = mavutil.mavlink_connection(f"tcp:127.0.0.1:{port}", retries=1)
-            heartbeat = connection.wait_heartbeat(timeout=5)
+            heartbeat = connection.wait_heartbeat(timeout=60)
             assert heartbeat.get_srcSystem() == 3
             connection.close()
-        with socket.create_connection(("127.0.0.1", control), timeout=5) as line:
+        with socket.create_connection(("127.0.0.1", control), timeout=60) as line:
             line.sendall(b'{"op": "state"}\n')
             state = json.loads(line.makefile().readline())
         assert state["mode"] == "STABILIZE"
         process.send_signal(signal.SIGTERM)
-        assert process.wait(5) == 0
+        assert process.wait(60) == 0
         assert process.stderr.read() == ""
 
 
 def test_speedup_runs_simulated_time_faster():
     with running("--speedup", "10") as (_, (port,)):
         connection = mavutil.mavlink_connection(f"tcp:127.0.0.1:{port}", retries=1)
-        connection.wait_heartbeat(timeout=5)
-        started, heartbeats = time.monotonic(), 0
-        while time.monotonic() - started < 1.0:
-            heartbeats += connection.recv_match(type="HEARTBEAT", blocking=True, timeout=1) is not None
+        connection.wait_heartbeat(timeout=60)
+        connection.mav.command_long_send(1, 1, SET_MESSAGE_INTERVAL, 0, SYSTEM_TIME, 100_000, 0, 0, 0, 0, 0)
+        deadline = time.monotonic() + 60
+        while not 5 <= speedup_of(connection, 0.5) <= 15:  # a process may rest meanwhile
+            assert time.monotonic() < deadline
         connection.close()
-        assert 6 <= heartbeats <= 13
+
+
+def speedup_of(connection, seconds):
+    """The vehicle's seconds for each of ours, in so many of ours."""
+    first, began, ended = heard(connection), time.monotonic(), 0.0
+    while ended < began + seconds:
+        last, ended = heard(connection), time.monotonic()
+    return (last - first) / (ended - began)
+
+
+def heard(connection):
+    """The vehicle's clock (s)."""
+    return connection.recv_match(type="SYSTEM_TIME", blocking=True, timeout=60).time_boot_ms / 1000
 
 
 def test_udp_peers_get_heartbeats_and_can_answer():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ground:
         ground.bind(("127.0.0.1", 0))
-        ground.settimeout(5)
+        ground.settimeout(60)
         with running("--udp", f"127.0.0.1:{ground.getsockname()[1]}", "--speedup", "5"):
             data, _ = ground.recvfrom(2048)
     assert data[0] == 0xFD
@@ -68,7 +82,7 @@ def test_a_taken_port_is_one_line_and_status_1():
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        ended = subprocess.run([*SIM[:-1], str(port)], capture_output=True, text=True, timeout=10, check=False)
+        ended = subprocess.run([*SIM[:-1], str(port)], capture_output=True, text=True, timeout=60, check=False)
     assert ended.returncode == 1
     assert ended.stderr.count("\n") == 1
     assert str(port) in ended.stderr
@@ -78,6 +92,6 @@ def test_a_taken_port_is_one_line_and_status_1():
     "arguments", [["--speedup", "0"], ["--sysid", "300"], ["--home", "1,2"], ["--battery", "0"], ["--wind", "x"]]
 )
 def test_bad_options_are_refused(arguments):
-    ended = subprocess.run([*SIM, *arguments], capture_output=True, text=True, timeout=10, check=False)
+    ended = subprocess.run([*SIM, *arguments], capture_output=True, text=True, timeout=60, check=False)
     assert ended.returncode == 2
     assert arguments[0] in ended.stderr
