@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mavproxy_uavapi.core.envelope import braking
 from mavproxy_uavapi.core.errors import Busy, Rejected
 from mavproxy_uavapi.core.mavlink.flight_modes import MISSION_MODES, flies_mission
 from mavproxy_uavapi.core.vehicle import messages, time_limits
@@ -51,12 +52,18 @@ class Rover(TravellingVehicle):
 
     @property
     def standstill(self) -> Target:
-        """Its present place: for a rover even a velocity of 0 has a direction, and it might turn."""
-        return self.ned_from_here(0, 0, 0)
+        """The place where it can stop: for a rover even a velocity of 0 has a direction, and it might turn.
+
+        A place that it has passed by then would make it turn round.
+        """
+        here, age = self.fresh("LOCAL_POSITION_NED"), self.state.age("LOCAL_POSITION_NED", self.clock()) or 0.0
+        velocity = here.vx, here.vy, 0.0
+        north, east, _ = braking.of_rover(self.state.parameters).to_rest(velocity, age + braking.LATENCY)
+        return self.ned_from_here(north, east, 0.0)
 
     async def limits(self) -> FlightLimits:
-        """Its speed, for deadlines; it requests it if it is unknown."""
-        parameters = await self.parameters.read([("WP_SPEED",), ("CRUISE_SPEED",)])
+        """Its speed, for deadlines; it requests it if it is unknown, and so how it brakes, for `standstill`."""
+        parameters = await self.parameters.read([("WP_SPEED",), ("CRUISE_SPEED",), *braking.WANTED_OF_ROVER])
         cruise = parameters.get("WP_SPEED") or parameters.get("CRUISE_SPEED") or SPEED
         return time_limits.limits({"WP_SPD": cruise, "WP_ACC": 1.0}, self.speeds.in_force)
 

@@ -82,11 +82,11 @@ class TravellingVehicle(GuidedVehicle):
             TimedOut: it still moves.
         """
         deadline = self.clock() + REST_TIMEOUT
-        still_since = self.clock()
+        still_since, standstill = self.clock(), self.standstill
         while self.clock() - still_since < REST_SHOWN:
             if self.clock() > deadline:
                 raise TimedOut(f"vehicle {self.state.system} does not stop within {REST_TIMEOUT:g} s")
-            await self.send_setpoint(job, self.standstill)
+            await self.send_setpoint(job, standstill)
             self.authority.shown(job)  # from now on a newer movement may replace it
             await asyncio.sleep(REST_PERIOD)
             if not self.stands_still:
