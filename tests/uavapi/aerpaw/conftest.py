@@ -26,7 +26,7 @@ class FakeApi:
         armed, mode, alt, yaw: of the vehicle (m above home, degrees).
         asked: method, path and parameters of the verbs, as they came.
         refusals: by path, the status and body that a verb gets instead.
-        takes: by path, s that a verb takes; for ever with None.
+        takes: by path, s that a verb takes, or an event that it waits for; for ever with None.
         why_not: reasons why it cannot be armed.
         delays: by path, s until a request of that path reaches the verb, as on a slow machine.
         begun: paths of verbs in the order in which they took the vehicle.
@@ -37,7 +37,7 @@ class FakeApi:
         self.armed, self.mode, self.alt, self.yaw = False, LOITER, 0.0, 0.0
         self.requested: list[tuple[str, str, dict[str, Any]]] = []
         self.refusals: dict[str, tuple[int, dict[str, Any]]] = {}
-        self.takes: dict[str, float | None] = {}
+        self.takes: dict[str, float | threading.Event | None] = {}
         self.delays: dict[str, float] = {}
         self.begun: list[str] = []
         self.gone: list[str] = []
@@ -52,11 +52,11 @@ class FakeApi:
 
     def start(self) -> None:
         self._thread.start()
-        assert self._up.wait(5)
+        assert self._up.wait(60)
 
     def stop(self) -> None:
         self._loop.call_soon_threadsafe(self._loop.stop)
-        self._thread.join(5)
+        self._thread.join(60)
         self._loop.run_until_complete(self._runner.cleanup())
         self._loop.close()
 
@@ -138,18 +138,25 @@ class FakeApi:
         job = {"job": number, "verb": path, "request": values, "state": "running", "error": None}
         self._jobs[number] = job
         if values.get("wait") == "false":
-            self._loop.call_later(self.takes.get(path, 0.0) or 0.0, self._obey, job)
+            takes = self.takes.get(path, 0.0)
+            self._loop.call_later(takes if isinstance(takes, float) else 0.0, self._obey, job)
             return web.json_response({"id": "7", "job": number}, status=202)
         self.begun.append(path)
         self._commander = job
         try:
-            takes = self.takes.get(path, 0.0)
-            await asyncio.sleep(3600 if takes is None else takes)
+            await self._work(self.takes.get(path, 0.0))
         except asyncio.CancelledError:
             self.gone.append(path)
             raise
         self._obey(job)
         return web.json_response({"id": "7", "result": "done"})
+
+    async def _work(self, takes: float | threading.Event | None) -> None:
+        if isinstance(takes, threading.Event):
+            while not takes.is_set():  # noqa: ASYNC110  the test's thread sets it
+                await asyncio.sleep(EVERY)
+        else:
+            await asyncio.sleep(3600 if takes is None else takes)
 
     def _obey(self, job: dict[str, Any]) -> None:
         job["state"], path, values = "succeeded", job["verb"], job["request"]
