@@ -204,7 +204,7 @@ class VisionHandlers:
 
     async def post_frame(self, call: Call) -> dict[str, Any]:
         """Take a frame: the body is a JPEG or PNG; needs source `http`."""
-        call.require_right(self.tracker.system)  # its landings follow what the frames show
+        self._require_own_frames(call)
         worker = self.tracker.worker
         if worker is None or not isinstance(worker.source, Posted):
             raise BadRequest("frames are taken with `vision set source http` only")
@@ -217,6 +217,18 @@ class VisionHandlers:
         if why_not:  # it is posted anyway; the status reports it too
             raise BadImage(why_not)
         return self._answer("Frame taken")
+
+    def _require_own_frames(self, call: Call) -> None:
+        """Let only those post frames who may command the vehicle: its landings follow what the frames show.
+
+        Raises:
+            Forbidden: the caller's token is not for that vehicle.
+            Busy: somebody else holds it.
+        """
+        host, system = self.tracker.host, self.tracker.system
+        call.require_right(system)
+        if system in host.fleet.vehicles:
+            host.holds.require(host.registry.find(system), call.caller.operator)
 
     # -- flying --------------------------------------------------------------------------------------------
 

@@ -42,7 +42,7 @@ async def upload(call: Call) -> Answer:
 async def download(call: Call) -> Answer:
     """The vehicle's mission, freshly read from it: `home`, and `items` from number 1 on."""
     vehicle = call.vehicle
-    home, items = await vehicle.waypoints.download()
+    home, items = await vehicle.waypoints.read()
     members = {
         "home": None if home is None else home.report(0),
         "items": [i.report(n) for n, i in enumerate(items, 1)],
@@ -53,7 +53,7 @@ async def download(call: Call) -> Answer:
 async def fence(call: Call) -> Answer:
     """The areas of the autopilot's fence, freshly read from it; its cylinder is in the parameters FENCE_*."""
     vehicle = call.vehicle
-    items, system = await vehicle.waypoints.download_fence(), vehicle.state.system
+    items, system = await vehicle.waypoints.read_fence(), vehicle.state.system
     if not items:
         return call.answer("Success", fence=formats.EMPTY)
     areas = formats.of_fence(items, f"the fence of vehicle {system}", lambda: call.service.host.home_of(system))

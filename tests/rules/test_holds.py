@@ -16,6 +16,7 @@ from mavproxy_uavapi.http.connection import Connection
 from mavproxy_uavapi.prompt import authority
 from tests.support import tokens
 from tests.support.wire import Wire
+from tests.support.world import PLACE, Sent, item_at
 
 FAR = {"x": 300, "y": 0, "z": -8}
 GO = "/movement/go_to_ned"
@@ -287,3 +288,38 @@ def test_hold_that_runs_out_ends_a_flight_that_two_requested(world: Any, first: 
     assert speed(world) > 4.0
     world.loop.pass_time(8.0)
     assert speed(world) < 0.3
+
+
+def test_frames_that_landings_follow_come_from_nobody_else(make_world: Any, tmp_path: Path) -> None:
+    world = make_world(camera={}, tokens=tokens.write(tmp_path / "tokens", tokens.ALL))
+    taken = "400 bad_request"  # the simulated camera takes no frames, from whomever
+    assert ask(world, "bo", "POST", "/vision/frame", b"").outcome == taken
+    take(world, "anna", lease=20)
+    outcomes = {name: ask(world, name, "POST", "/vision/frame", b"").outcome for name in ("bo", "anna", "boss")}
+    assert outcomes == {"bo": "409 busy", "anna": taken, "boss": taken}
+
+
+def test_who_reads_the_mission_all_the_time_does_not_delay_its_start(world: Any) -> None:
+    def seconds_to_start() -> float:
+        began = world.loop.time()
+        assert ask(world, "anna", "POST", "/mission/start", {}).status == 200
+        taken = world.loop.time() - began
+        assert ask(world, "anna", "GET", "/command/guided").status == 200
+        return float(taken)
+
+    async def far_away(message: Any, _system: int) -> None:
+        world.sent.append(Sent(world.loop.time(), message))
+        world.loop.call_later(0.15, lambda: world._arriving.append(message))
+
+    async def read() -> None:
+        while True:
+            wire = await world.request("GET", "/mission/waypoints", headers=tokens.bearer("bo"))
+            await wire.reply
+
+    world.send = far_away
+    world.copter.mission.items[:] = [item_at(PLACE[0] + n / 1e4, PLACE[1]) for n in range(40)]
+    take(world, "anna", lease=600)
+    alone = seconds_to_start()
+    world._streams += [world.loop.create_task(read()) for _ in range(3)]
+    world.loop.pass_time(5.0)
+    assert alone > 5.0 and [seconds_to_start() < alone + 1.0 for _ in range(3)] == [True] * 3

@@ -69,7 +69,7 @@ def handlers(age, source):
         result=result,
         image=IMAGE,
         worker=SimpleNamespace(source=source, detector=SimpleNamespace(model=CameraModel())),
-        host=SimpleNamespace(clock=lambda: NOW, target=1),
+        host=SimpleNamespace(clock=lambda: NOW, target=1, fleet=SimpleNamespace(vehicles={})),
         system=1,
         health=CameraHealth("frozen"),
         settings=SimpleNamespace(source="http"),

@@ -8,7 +8,9 @@ MAVProxy's own `wp` module receives the same messages, but answers only those of
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AbstractContextManager
 from typing import Any, TypeVar
 
@@ -39,6 +41,10 @@ Progress = Callable[[int, int], None]
 Check = Callable[[], None]
 
 
+class GaveWay(Exception):
+    """A read ended, because a verb waits for its turn."""
+
+
 class Waypoints:
     """The mission that one vehicle holds.
 
@@ -64,6 +70,8 @@ class Waypoints:
         self._waiting = waiting
         self._allow = allow
         self._turns = Turns("transfers of the mission")
+        self._verbs = 0  # that have a turn or wait for one
+        self._reads: dict[int, asyncio.Task[list[Any]]] = {}  # that callers wait for, by the kind of list
         self.changed_at = 0.0
 
     # -- verbs --------------------------------------------------------------------------------------------
@@ -76,17 +84,20 @@ class Waypoints:
             Busy: other transfers of ours take too long.
             TimedOut, LinkLost.
         """
-        async with self._turns.one():
+        async with self._turn():
             return await self._download()
 
-    async def download_fence(self) -> list[Any]:
-        """The messages MISSION_ITEM_INT of the fence that the autopilot itself keeps.
+    async def read(self) -> tuple[MissionItem | None, list[MissionItem]]:
+        """As `download`, to show it: simultaneous callers share a download, and it gives way to all but reads."""
+        return _home_and_items(await self._read(MISSION))
+
+    async def read_fence(self) -> list[Any]:
+        """The messages MISSION_ITEM_INT of the fence that the autopilot itself keeps, as `read`.
 
         Raises:
             Rejected, Busy, TimedOut, LinkLost: as `download`; also where the vehicle has no fence protocol.
         """
-        async with self._turns.one():
-            return await self._fetch(FENCE)
+        return await self._read(FENCE)
 
     async def upload(
         self, items: Sequence[MissionItem], progress: Progress = lambda done, of: None, check: Check = lambda: None
@@ -112,7 +123,7 @@ class Waypoints:
             progress(done, of)
 
         self._allow(items)
-        async with self._turns.one():
+        async with self._turn():
             _, old = await self._download()
             await pass_gate()
             check()
@@ -132,7 +143,7 @@ class Waypoints:
             Rejected: the vehicle flies it.
             Busy, TimedOut, LinkLost.
         """
-        async with self._turns.one():
+        async with self._turn():
             check()
             self.changed_at = self._waiting.clock()
             with self._talk(ANSWERS) as talk:
@@ -140,6 +151,40 @@ class Waypoints:
                 remaining = await self._ask_count(talk) - 1
             if remaining > 0:
                 raise Rejected(f"the vehicle accepted the clearing, but its mission still has {remaining} items")
+
+    # -- turns --------------------------------------------------------------------------------------------
+
+    @contextlib.asynccontextmanager
+    async def _turn(self) -> AsyncIterator[None]:
+        """A turn of a verb. Raises Busy if other verbs take too long."""
+        self._verbs += 1
+        try:
+            async with self._turns.one():
+                yield
+        finally:
+            self._verbs -= 1
+
+    async def _read(self, kind: int) -> list[Any]:
+        task = self._reads.get(kind)
+        if task is None:
+            task = self._reads[kind] = asyncio.get_running_loop().create_task(self._read_in_turn(kind))
+            task.add_done_callback(lambda done: self._was_read(kind, done))
+        return await asyncio.shield(task)
+
+    async def _read_in_turn(self, kind: int) -> list[Any]:
+        while True:
+            async with self._turns.one():
+                with contextlib.suppress(GaveWay):
+                    return await self._fetch(kind, self._give_way)
+
+    def _give_way(self) -> None:
+        if self._verbs:
+            raise GaveWay
+
+    def _was_read(self, kind: int, task: asyncio.Task[Any]) -> None:
+        del self._reads[kind]
+        if not task.cancelled():
+            task.exception()  # the callers may have gone; asyncio would report the exception as never retrieved
 
     # -- the protocol -------------------------------------------------------------------------------------
 
@@ -180,14 +225,15 @@ class Waypoints:
         return await self._ask(talk, question, _count_of, f"report how many {NAMES[kind]} items it has")
 
     async def _download(self) -> tuple[MissionItem | None, list[MissionItem]]:
-        items = [from_message(message) for message in await self._fetch(MISSION)]
-        return (items[0], items[1:]) if items else (None, [])
+        return _home_and_items(await self._fetch(MISSION))
 
-    async def _fetch(self, kind: int) -> list[Any]:
-        """The messages of all items of a list."""
+    async def _fetch(self, kind: int, check: Check = lambda: None) -> list[Any]:
+        """The messages of all items of a list; `check` is called before each request, and may end the transfer."""
         with self._talk(ANSWERS) as talk:
             messages = []
+            check()
             for seq in range(await self._ask_count(talk, kind)):
+                check()
                 question = mavlink.MAVLink_mission_request_int_message(*self._address, seq, kind)
                 messages.append(await self._ask(talk, question, _item_number(seq), f"send {NAMES[kind]} item {seq}"))
             await self._send(mavlink.MAVLink_mission_ack_message(*self._address, mavlink.MAV_MISSION_ACCEPTED, kind))
@@ -298,6 +344,11 @@ class Waypoints:
         name = entry.name if entry else f"MAV_MISSION_RESULT_{message.type}"
         texts = self._state.statustexts_since(self.changed_at) if self.changed_at else []
         return Rejected(f"vehicle {self._state.system} refused to {action} ({name})", name, texts)
+
+
+def _home_and_items(messages: Sequence[Any]) -> tuple[MissionItem | None, list[MissionItem]]:
+    items = [from_message(message) for message in messages]
+    return (items[0], items[1:]) if items else (None, [])
 
 
 def _count_of(message: Any) -> int | None:

@@ -129,9 +129,52 @@ def test_download_has_home_and_the_items(loop: Any, copter: Any, store: Store) -
     assert loop.run(copter.waypoints.download()) == (None, [])
 
 
+def test_simultaneous_reads_share_a_download(loop: Any, copter: Any, store: Store) -> None:
+    async def read() -> list[Any]:
+        return await asyncio.gather(*(copter.waypoints.read() for _ in range(3)))
+
+    assert loop.run(read()) == [(HOME, OLD)] * 3
+    assert store.received.count("MISSION_REQUEST_LIST") == 1
+
+
+def test_read_whose_caller_has_gone_is_there_for_the_next_one(loop: Any, copter: Any, store: Store) -> None:
+    gone = loop.create_task(copter.waypoints.read())
+    loop.pass_time(0.03)
+    gone.cancel()
+    assert loop.run(copter.waypoints.read()) == (HOME, OLD)
+    assert store.received.count("MISSION_REQUEST_LIST") == 1
+
+
+def test_reads_fail_together_and_the_next_one_asks_again(loop: Any, copter: Any, store: Store) -> None:
+    store.lost["MISSION_REQUEST_LIST"] = 4
+    reads = [loop.create_task(copter.waypoints.read()) for _ in range(2)]
+    loop.pass_time(10.0)
+    assert [type(task.exception()) for task in reads] == [TimedOut, TimedOut]
+    assert loop.run(copter.waypoints.read()) == (HOME, OLD)
+
+
+@pytest.mark.parametrize("verb", ["download", "upload", "clear"])
+def test_read_gives_way_to_a_verb_and_begins_anew(loop: Any, copter: Any, store: Store, verb: str) -> None:
+    def duration_of(arguments: tuple[Any, ...]) -> float:
+        started = loop.time()
+        loop.run(getattr(copter.waypoints, verb)(*arguments))
+        return float(loop.time() - started)
+
+    store.items = [HOME, *OLD * 50]
+    arguments = (store.items[1:],) if verb == "upload" else ()
+    alone = duration_of(arguments)
+    store.items = [HOME, *OLD * 50]
+    reads = [loop.create_task(read()) for read in (copter.waypoints.read, copter.waypoints.read_fence)]
+    loop.pass_time(0.5)
+    assert not reads[0].done()
+    assert duration_of(arguments) < alone + 0.1
+    assert loop.run(reads[0]) == (HOME, [] if verb == "clear" else OLD * 50)
+    assert len(loop.run(reads[1])) == len(store.fence)
+
+
 def test_the_fence_is_read_by_its_own_list(loop: Any, copter: Any, store: Store) -> None:
     loop.call_later(0.005, store.say, "mission_count")  # another's question about the mission is no answer
-    messages = loop.run(copter.waypoints.download_fence())
+    messages = loop.run(copter.waypoints.read_fence())
     assert [from_message(message) for message in messages] == store.fence
     assert {message.mission_type for message in messages} == {mavlink.MAV_MISSION_TYPE_FENCE}
     assert store.items == [HOME, *OLD]

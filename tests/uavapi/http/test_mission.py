@@ -32,8 +32,8 @@ def vehicles_mission(api: Any, loop: Any, copter: Any, monkeypatch: pytest.Monke
     async def download() -> Any:
         return HOME, list(held)
 
-    for verb in (upload, clear, download):
-        monkeypatch.setattr(copter.waypoints, verb.__name__, verb)
+    for name, verb in (("upload", upload), ("clear", clear), ("read", download)):
+        monkeypatch.setattr(copter.waypoints, name, verb)
     return held
 
 
@@ -105,10 +105,10 @@ def test_fence_is_geojson(api: Any, copter: Any, msg: Any, monkeypatch: pytest.M
 
     held: list[Any] = []
 
-    async def download_fence() -> list[Any]:
+    async def read_fence() -> list[Any]:
         return held
 
-    monkeypatch.setattr(copter.waypoints, "download_fence", download_fence)
+    monkeypatch.setattr(copter.waypoints, "read_fence", read_fence)
     assert api.get("/mission/fence").body["fence"]["features"] == []
     for seq, (x, y) in enumerate(corners):
         held.append(msg("mission_item_int", seq=seq, command=vertex, param1=3.0, x=x, y=y))
