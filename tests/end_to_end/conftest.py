@@ -43,7 +43,10 @@ def faulty_rig(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPath
     The embedded vehicle flies in lock step here, ArduPilot by real processes.
     """
     directory = tmp_path_factory.mktemp(request.param)
-    made = LockstepRig(directory) if request.param == "lockstep" else ardupilot_with_faults(directory)
+    if request.param == "lockstep":
+        made: Rig = LockstepRig(directory)
+    else:
+        made = ardupilot_with_faults(directory, link_timeout=5, max_age=5)
     yield made
     made.stop()
 

@@ -59,7 +59,8 @@ def test_cancelled_verb_ends_on_its_vehicle_only(rig: Rig) -> None:
                 assert await drone.telemetry.shows(lambda drone=drone: drone.velocity.north > 1.5, 30)  # type: ignore[misc]
             travels[1].cancel()
             assert await fleet[1].telemetry.shows(lambda: fleet[1].velocity.horizontal < 0.3, 30)
-            assert fleet[2].velocity.north > 1.5 and not travels[2].done()
+            assert await fleet[2].telemetry.shows(lambda: fleet[2].velocity.north > 1.5, 30)
+            assert not travels[2].done()
             travels[2].cancel()
             await asyncio.gather(fleet[1].land(), fleet[2].land())
 

@@ -10,6 +10,7 @@ import pytest
 
 from tests.support.chromium import chromium
 from tests.support.page_pilot import BUTTON, Pilot
+from tests.support.processes import SILENCE
 
 RIG_SPEEDUP = 5  # so that the page counts no number as old on a busy machine
 pytestmark = pytest.mark.needs("chromium")
@@ -73,6 +74,7 @@ async def fly_a_drawn_mission(pilot: Pilot) -> None:
 
 
 async def see_the_link_lost(pilot: Pilot) -> None:
+    pilot.rig.set("link_timeout", "5.0")
     pilot.rig.control.fault("silence", sending=True, receiving=True)
     await pilot.sees("#trouble", "LINK LOST: vehicle 1")
     await pilot.page.until("[...document.querySelectorAll('.tile')].every(tile => tile.classList.contains('old'))")
@@ -82,6 +84,7 @@ async def see_the_link_lost(pilot: Pilot) -> None:
     await pilot.sees("#hold-result", "vehicle 1: no heartbeat")
     pilot.rig.control.ask("clear")
     await pilot.sees_live()
+    pilot.rig.set("link_timeout", f"{SILENCE:.1f}")
 
 
 async def give_the_token(pilot: Pilot) -> None:

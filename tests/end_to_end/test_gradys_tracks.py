@@ -61,8 +61,6 @@ def flown_since(rig: Any, start: float) -> list[tuple[float, float, float]]:
 
 def test_a_track_is_flown_again_over_http_with_progress_and_ends_at_home(rig, track, harness):
     start = time.time()
-    answer = rig.post("/mission/fly-track?wait=false", track=track.read_text())
-    assert answer.status_code == 202
     legs = len(waypoints(parse(track.read_text())))
     reported = []
 
@@ -71,7 +69,10 @@ def test_a_track_is_flown_again_over_http_with_progress_and_ends_at_home(rig, tr
         reported.append(job["progress"])
         return job["state"] != "running"
 
-    harness.eventually(over, 120, "the flight's end")
+    with rig.slowly():
+        answer = rig.post("/mission/fly-track?wait=false", track=track.read_text())
+        assert answer.status_code == 202
+        harness.eventually(over, 180, "the flight's end")
     assert rig.get(answer.headers["Location"]).json()["result"] == f"Flew {legs} legs and landed at home"
     reported_legs = [progress["leg"] for progress in reported if "leg" in progress]
     assert reported_legs == sorted(reported_legs)
@@ -97,10 +98,11 @@ def test_a_track_is_flown_at_the_prompt(rig, track, command):
 def test_the_pilot_ends_it_and_nothing_more_is_sent(rig, track, harness):
     answers: list[Any] = []
     waiting = threading.Thread(target=lambda: answers.append(rig.post("/mission/fly-track", track=track.read_text())))
-    waiting.start()
-    harness.eventually(lambda: flight(rig)["state"] == "running" and flight(rig)["leg"] >= 2, 60, "the second leg")
-    rig.mavproxy.type("mode LOITER")
-    waiting.join(30)
+    with rig.slowly():
+        waiting.start()
+        harness.eventually(lambda: (now := flight(rig))["state"] == "running" and now["leg"] >= 2, what="a second leg")
+        rig.mavproxy.type("mode LOITER")
+        waiting.join(60)
     assert (answers[0].status_code, answers[0].json()["code"]) == (409, "mode_changed")
     assert rig.status()["mode"] == "LOITER"
     assert flight(rig)["state"] == "failed"

@@ -52,7 +52,7 @@ def vehicle(request, harness, tmp_path_factory):
     if request.param == "embedded":
         rig = harness.embedded(directory, **folders)
     else:
-        rig = harness.ardupilot_with_faults(directory, **folders)
+        rig = harness.ardupilot_with_faults(directory, link_timeout=5, max_age=5, **folders)
     rig.settings = folders
     answer = requests.post(rig.url + "/mission/upload-script", files={"file": ("deadly.py", DEADLY)}, timeout=10)
     rig.ok(answer)

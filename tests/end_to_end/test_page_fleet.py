@@ -11,7 +11,7 @@ import pytest
 
 from tests.support.chromium import chromium
 from tests.support.page_pilot import BUTTON, Pilot
-from tests.support.processes import Rig
+from tests.support.processes import SILENCE, Rig
 from tests.support.several_vehicles import listed, several_vehicles
 
 pytestmark = pytest.mark.needs("chromium")
@@ -71,6 +71,7 @@ async def choose_while_a_button_is_held(pilot: Pilot) -> None:
 
 async def hold_all_while_one_is_silent(pilot: Pilot, silent: Rig) -> None:
     assert silent.control is not None
+    pilot.rig.set("link_timeout", "5.0")
     silent.control.fault("silence", sending=True, receiving=True)
     await pilot.sees("#trouble", "LINK LOST: vehicle 1")
     await pilot.sees("flight-status", "GUIDED")
@@ -80,6 +81,7 @@ async def hold_all_while_one_is_silent(pilot: Pilot, silent: Rig) -> None:
     await pilot.sees("flight-status", "BRAKE")
     silent.control.ask("clear")
     await pilot.sees_live()
+    pilot.rig.set("link_timeout", f"{SILENCE:.1f}")
     await pilot.click("HOLD ALL")
     await pilot.sees("#hold-result", "every vehicle held")
     assert {vehicle["mode"] for vehicle in listed(pilot.rig).values()} == {"BRAKE"}

@@ -13,10 +13,10 @@ RIG_LOGS = True
 def test_mode_that_the_pilot_types_ends_the_movement(rig):
     rig.in_the_air(10)
     x, y, z = rig.ned()
-    waiting = rig.begin("POST", "/movement/go_to_ned_wait", {"x": x + 400, "y": y, "z": z})
+    waiting = rig.begin("POST", "/movement/go_to_ned_wait", {"x": x + 4000, "y": y, "z": z})
     rig.eventually(lambda: abs(rig.ned()[0] - x) > 2, what="its moving")
     rig.mavproxy.type("mode LOITER")
-    answer = waiting.answer(10)
+    answer = waiting.answer(60)
     assert (answer.status_code, answer.json()["code"]) == (409, "mode_changed")
     assert rig.status()["mode"] == "LOITER"
     rig.ok(rig.get("/command/rtl"))

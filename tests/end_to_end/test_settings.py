@@ -71,7 +71,7 @@ def rig(harness, tmp_path_factory):
     terminal = rig.terminal = Terminal(f"uavapi-test-{rig.port}")
     try:
         instance = harness.start_embedded(rig, speedup=4)
-        load = harness.load(rig.port, config=str(config), link_timeout=8, script_grace=8)
+        load = harness.load(rig.port, config=str(config), link_timeout=8, max_age=None, script_grace=8)
         command = [*harness.mavproxy_command(instance, load, logs=True), f"--logfile={directory / 'mav.tlog'}"]
         terminal.start(command, {"UAVAPI_MAX_AGE": "7", "UAVAPI_LINK_TIMEOUT": "7", "UAVAPI_SCRIPT_GRACE": "7"})
         rig.wait_until_up()
@@ -128,8 +128,8 @@ def test_misspelt_key_is_one_line_and_loads_nothing(rig, harness, tmp_path):
     rig.terminal.enter("module load uavapi:" + json.dumps({"config": str(file)}, separators=(",", ":")))
     printed = "".join(shown(rig, harness, "Failed to load module"))
     assert "no key 'script_gracee' in [api]; did you mean script_grace?" in printed
-    load = harness.load(rig.port, config=str(rig.directory / "uav.ini")).removeprefix("--cmd=")
-    rig.terminal.enter(load)
+    load = harness.load(rig.port, config=str(rig.directory / "uav.ini"), link_timeout=None, max_age=None)
+    rig.terminal.enter(load.removeprefix("--cmd="))
     rig.wait_until_up()
 
 
@@ -164,7 +164,7 @@ def test_setting_is_set_by_http_as_at_the_prompt_which_says_so(rig, harness):
 
 def test_setting_that_changes_in_flight_ends_no_call(rig):
     rig.in_the_air(6)
-    answer = rig.post("/movement/travel_at_ned?wait=false", vx=3, vy=0, vz=0, duration=30)
+    answer = rig.post("/movement/travel_at_ned?wait=false", vx=3, vy=0, vz=0, duration=300)
     assert answer.status_code == 202, answer.text
     rig.terminal.enter("uavapi set debug COPTER")
     rig.terminal.enter("uavapi set script_grace 5")

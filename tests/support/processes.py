@@ -35,6 +35,7 @@ FEW_MODULES = "log,signing,wp,rally,fence,ftp,param,arm,mode,rc,misc,cmdlong,out
 # A copter whose landings and returns are quick. It stays armed on the ground for longer than ArduPilot's 10 s, which
 # are 1 s here.
 PARAMETERS = {"LAND_SPEED": 100, "RTL_ALT": 0, "RTL_LOIT_TIME": 500, "DISARM_DELAY": 120}
+SILENCE = 15  # s after which the API misses a vehicle, or its telemetry
 PATIENCE = 60.0  # s for a process to show what it should
 
 
@@ -217,6 +218,15 @@ class Rig:
         assert self.control is not None
         self.control.ask("parameter", name="SIM_SPEEDUP", value=factor)
 
+    @contextlib.contextmanager
+    def slowly(self) -> Iterator[None]:
+        """Meanwhile the vehicle's clock runs twice as fast as ours, not ten times: a test sees more of a flight."""
+        self.ok(self.get("/command/set_sim_speedup", sim_factor=2))
+        try:
+            yield
+        finally:
+            self.ok(self.get("/command/set_sim_speedup", sim_factor=SPEEDUP))
+
     def switch_mode(self, name: str) -> None:
         """The pilot changes the mode at MAVProxy's prompt."""
         self.mavproxy.type(f"mode {name}")
@@ -293,8 +303,13 @@ def mavproxy_command(instance: int | Sequence[int], *arguments: str, logs: bool 
 
 
 def load(port: int, **settings: Any) -> str:
-    """The option that loads our module on that port."""
-    return "--cmd=module load uavapi:" + json.dumps({"port": port, **settings}, separators=(",", ":"))
+    """The option that loads our module on that port; a setting of None is left out.
+
+    The limits of silence are longer than the module's own: a machine that does much else may pause for seconds.
+    """
+    given = {"port": port, "link_timeout": SILENCE, "max_age": SILENCE, **settings}
+    given = {name: value for name, value in given.items() if value is not None}
+    return "--cmd=module load uavapi:" + json.dumps(given, separators=(",", ":"))
 
 
 def start_embedded(rig: Rig, *arguments: str, speedup: float = SPEEDUP) -> int:
