@@ -74,9 +74,12 @@ def test_climb_on_the_spot_is_sent_again(at_first: World) -> None:
     assert at_first.at == pytest.approx((30.0, 0.0, -12.0), abs=1.0)
 
 
-def test_target_after_a_hold_is_sent_again(make_world: Any) -> None:
+@pytest.mark.parametrize("seconds", [0.5, 2.0, 5.0])
+def test_target_after_a_velocity_is_sent_again(make_world: Any, seconds: float) -> None:
+    """The autopilot drops the velocity after 3 s."""
     world = make_world()
-    assert world.ask("POST", "/movement/travel_at_ned", {"vx": 3, "vy": 0, "vz": 0, "duration": 2}).outcome == "200"
+    assert world.ask("POST", "/movement/travel_at_ned", {"vx": 3, "vy": 0, "vz": 0}).outcome == "200"
+    world.loop.pass_time(seconds)
     lose(world)
     assert world.ask("POST", "/movement/go_to_ned_wait", SECOND).outcome == "200"
 

@@ -21,7 +21,7 @@ SAME_SPEED = 0.5  # m/s: reported velocities within this are the same
 SAME_MOMENT = 3.0  # s between two messages, in which a vehicle does not change its velocity much
 NEAR_EXPECTED = 10.0  # m on each axis: our target in the local frame, whose origin the autopilot does not tell
 
-STANDSTILL = VelocityTarget(0, 0, 0)  # what GUIDED begins with
+STANDSTILL = VelocityTarget(0, 0, 0)  # what GUIDED begins with, and what follows a velocity that is not repeated
 
 Reported = GlobalTarget | VelocityTarget
 
@@ -67,6 +67,8 @@ class OwnTarget:
         reported = setpoint_in_force.shown(self._state, since) or (STANDSTILL if self.sent_at < since else None)
         self._replace(reported, is_ours=reported is not None and self._is_known(reported))
         self._replace(self._own_before, is_ours=True)
+        if isinstance(self.newest, VelocityTarget):
+            self._replace(STANDSTILL, is_ours=True)  # what follows when the autopilot drops it
         is_same = target == self.newest and self._shown is not None
         self.newest, self.sent_at, self.is_unshown = target, self._clock(), must_show
         if not is_same:
