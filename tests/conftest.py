@@ -20,6 +20,7 @@ import pytest
 from packaging.requirements import Requirement
 
 from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.mainloop.bridge import Bridge
 from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
 from tests.support.drone import Drone
 from tests.support.fake_link import FakeLink
@@ -197,6 +198,12 @@ def boards() -> Any:
     from tests.support import boards
 
     return boards
+
+
+@pytest.fixture
+def long_waits(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What waits for the asyncio thread in vain does so for two minutes: no slow machine looks like that."""
+    monkeypatch.setattr(Bridge.run, "__defaults__", (120.0,))
 
 
 # Begun first, in this order.

@@ -187,9 +187,15 @@ def test_no_fix_no_push_and_stale_no_push(harness, recorder, tmp_path):
         assert (form["id"], form["ip"]) == ("7", "127.0.0.1/")  # uavapi is not loaded
         rig.mavproxy.ask("gradys status", "ip names no API")
         rig.control.fault("silence", sending=True, receiving=False)
-        time.sleep(3.0)  # real processes: until the last position is older than max_age
+        mark = rig.mavproxy.mark()
+
+        def nothing_to_send():
+            rig.mavproxy.type("gradys status")
+            return "nothing to send: the position of vehicle 7 is" in rig.mavproxy.output(mark)
+
+        harness.eventually(nothing_to_send, 60, "the last position's being older than max_age")
+        time.sleep(1.0)  # one may be on its way
         reported = len(recorder.updates)
-        rig.mavproxy.ask("gradys status", "nothing to send: the position of vehicle 7 is")
         time.sleep(2.0)
         assert len(recorder.updates) == reported
     finally:
@@ -218,6 +224,7 @@ def test_stop_and_start(rig, recorder, harness):
     tell(rig, recorder)
     harness.eventually(lambda: recorder.updates, 10, "an update")
     rig.mavproxy.ask("gradys stop", "gradys: stopped")
+    time.sleep(1.0)  # one may be on its way
     reported = len(recorder.updates)
     time.sleep(2.5)
     assert len(recorder.updates) == reported

@@ -7,7 +7,6 @@ import shutil
 import signal
 import subprocess
 import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -131,9 +130,7 @@ def test_unloading_says_offline(rig, harness, tmp_path):
     settings = json.dumps({"sink": sink, "spool": f"{tmp_path}/spool.db"}, separators=(",", ":"))
     rig.mavproxy.ask(f"module load gradys:{settings}", "Loaded module gradys")
     harness.eventually(lambda: subscriber.readings("fleet/uav-10/position"), 15, "a position")
-    began = time.monotonic()
     rig.mavproxy.ask("module unload gradys", "Unloaded module gradys")
-    assert time.monotonic() - began < 3
     harness.eventually(lambda: ("fleet/uav-10/status", "offline", False) in subscriber.heard, 5, "offline")
     subscriber.stop()
 

@@ -100,7 +100,7 @@ def test_the_pilot_ends_it_and_nothing_more_is_sent(rig, track, harness):
     waiting = threading.Thread(target=lambda: answers.append(rig.post("/mission/fly-track", track=track.read_text())))
     with rig.slowly():
         waiting.start()
-        harness.eventually(lambda: (now := flight(rig))["state"] == "running" and now["leg"] >= 2, what="leg 2")
+        harness.eventually(lambda: (now := flight(rig))["state"] == "running" and now["leg"] >= 2, what="two legs")
         rig.mavproxy.type("mode LOITER")
         waiting.join(60)
     assert (answers[0].status_code, answers[0].json()["code"]) == (409, "mode_changed")

@@ -181,7 +181,7 @@ def test_a_forked_child_does_not_keep_the_port(mavproxy):
         "from MAVProxy.modules.lib import mp_module\n"
         "def init(mpstate):\n"
         "    if os.fork() == 0:\n"
-        "        time.sleep(30)\n"
+        "        time.sleep(120)\n"
         "        os._exit(0)\n"
         "    return mp_module.MPModule(mpstate, 'forker')\n",
         encoding="utf-8",
@@ -211,10 +211,10 @@ def test_tab_completes_the_commands_and_settings(mavproxy, harness, tmp_path):
 
     def type_and_see(text: str, *keys: str) -> None:
         subprocess.run([*tmux, "send-keys", *keys], check=True)
-        harness.eventually(lambda: text in screen(), 30, f"{text!r} on the screen")
+        harness.eventually(lambda: text in screen(), 120, f"{text!r} on the screen")
 
     try:
-        harness.eventually(lambda: "Received" in screen(), 30, "the parameters' arrival")
+        harness.eventually(lambda: "Received" in screen(), 120, "the parameters' arrival")
         type_and_see("listening on", f'module load uavapi:{{"port":{free_port()}}}', "Enter")
         type_and_see("start   status", "uavapi st", "Tab", "Tab")
         type_and_see("calls in flight", "atus", "Enter")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -113,9 +112,7 @@ def test_start_that_takes_long_says_so_and_mavproxy_goes_on(rig, prompt, tmp_pat
     pipe = tmp_path / "uav.log"
     os.mkfifo(pipe)
     prompt.ask(f'module load uavapi:{{"port":{rig.port},"log_path":"{pipe}"}}', "Loaded module uavapi")
-    started = time.monotonic()
-    output = prompt.ask("uavapi status", f"it would be {rig.url}")
-    assert time.monotonic() - started < 1.5, output
+    prompt.ask("uavapi status", f"it would be {rig.url}")
     prompt.says(f"still trying to listen on {rig.url}; a line follows when it is done")
     with pytest.raises(requests.ConnectionError):
         rig.get("/telemetry/status", timeout=5)

@@ -234,7 +234,7 @@ def test_a_disk_that_hangs_at_the_unload_is_not_waited_for_and_its_readings_are_
     monkeypatch.setattr("mavproxy_gradys.module.LONGEST_END", 0.1)
     monkeypatch.setattr(Spool, "append", hang)
     put(module, 7)
-    assert requested.wait(10)
+    assert requested.wait(60)
     module.unload()
     assert "gradys: 7 readings" in capsys.readouterr().out
     hung.set()
@@ -282,7 +282,7 @@ def test_after_a_defect_too_an_unload_says_what_is_lost(
 
 
 def test_a_sink_that_takes_long_to_say_goodbye_costs_no_reading(
-    make: Any, main_loop: Any, capsys: Any, monkeypatch: Any, tmp_path: Path
+    make: Any, main_loop: Any, capsys: Any, monkeypatch: Any, tmp_path: Path, long_waits: None
 ) -> None:
     leaving = asyncio.Event()
 
@@ -294,7 +294,7 @@ def test_a_sink_that_takes_long_to_say_goodbye_costs_no_reading(
             await leaving.wait()
 
     monkeypatch.setattr("mavproxy_gradys.forwarding.sender.make_sink", lambda *_: Slow())
-    monkeypatch.setattr("mavproxy_gradys.module.LONGEST_END", 0.5)
+    monkeypatch.setattr("mavproxy_gradys.module.LONGEST_END", 5.0)
     module = make(sink="http://127.0.0.1:9/r", quantities="")
     main_loop.until(lambda: "no ground station" in capsys.readouterr().out)
     put(module, 5)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import selectors
+import time
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
@@ -63,10 +64,9 @@ class MainLoop:
         for module in self.modules:
             module.idle_task()
 
-    def until(self, condition: Callable[[], Any], turns: int = 500) -> None:
+    def until(self, condition: Callable[[], Any], seconds: float = 60.0) -> None:
         """Turn until that holds."""
-        for _ in range(turns):
-            if condition():
-                return
+        deadline = time.monotonic() + seconds
+        while not condition():
+            assert time.monotonic() < deadline, "it did not happen"
             self.turn(0.01)
-        raise AssertionError("it did not happen")

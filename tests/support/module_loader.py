@@ -27,7 +27,7 @@ class Loader:
         """In another thread, while the main loop waits."""
         thread = threading.Thread(target=module.unload)
         thread.start()
-        thread.join(5.0)
+        thread.join(60.0)
         assert not thread.is_alive()
         self.main_loop.modules.remove(module)
 
@@ -36,7 +36,7 @@ def ask(port: int, path: str, **request: Any) -> tuple[int, Any]:
     """The status and body of an answer; `request` goes to `urllib.request.Request`."""
     asked = urllib.request.Request(f"http://127.0.0.1:{port}{path}", **request)
     try:
-        with urllib.request.urlopen(asked, timeout=5) as response:
+        with urllib.request.urlopen(asked, timeout=60) as response:
             return response.status, json.load(response)
     except urllib.error.HTTPError as error:
         with error:

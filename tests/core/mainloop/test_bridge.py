@@ -120,14 +120,15 @@ def test_what_is_to_be_sent_goes_out_between_two_messages_of_a_burst(bridge: Bri
     assert sent == ["command"]
 
 
-def test_new_work_waits_while_the_main_loop_is_at_messages(bridge: Bridge) -> None:
+def test_new_work_waits_while_the_main_loop_is_at_messages(bridge: Bridge, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("mavproxy_uavapi.core.mainloop.bridge.LONGEST_WAIT", 60.0)
     bridge.run(bridge.wait_for_main_loop())  # it is at none
     bridge.feed("one")
     waiting = asyncio.run_coroutine_threadsafe(bridge.wait_for_main_loop(), bridge.loop)
     in_loop(bridge)
     assert not waiting.done()
     bridge.turn()
-    waiting.result(2.0)
+    waiting.result(30.0)
 
 
 def test_new_work_does_not_wait_for_ever(bridge: Bridge) -> None:

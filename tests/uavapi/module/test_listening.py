@@ -81,14 +81,14 @@ def test_set_does_not_open_what_was_stopped(module: Any, output: Any) -> None:
 
 
 def test_commands_of_a_startup_script_come_before_the_main_loop(
-    loader: Loader, port: int, output: Any, capsys: Any
+    loader: Loader, port: int, output: Any, capsys: Any, long_waits: None
 ) -> None:
     module = loader.load(port=port)
     started = time.monotonic()
     other = free_port()
     for line in ("status", "vehicles", "start", f"set port {other}"):
         module.command(line.split())
-    assert time.monotonic() - started < 1.0
+    assert time.monotonic() - started < 30
     assert f"not listening; it would be http://127.0.0.1:{port}" in capsys.readouterr().out
     output("listening")
     assert listens(other)
@@ -106,21 +106,21 @@ def test_startup_script_may_keep_it_from_listening(loader: Loader, main_loop: An
 
 
 def test_start_that_takes_long_holds_nothing_up_and_says_so_and_what_came_of_it(
-    loader: Loader, main_loop: Any, port: int, output: Any, monkeypatch: Any
+    loader: Loader, main_loop: Any, port: int, output: Any, monkeypatch: Any, long_waits: None
 ) -> None:
     begun, released = threading.Event(), threading.Event()
 
     def slow(*_: Any) -> None:
         begun.set()
-        released.wait(10)
+        released.wait(120)
 
     monkeypatch.setattr("mavproxy_uavapi.core.background.SLOW", 0.05)
     module = loader.load(port=port)
     module.logs.open = slow
     started = time.monotonic()
     main_loop.turn()
-    assert time.monotonic() - started < 0.5
-    assert begun.wait(5)
+    assert time.monotonic() - started < 30
+    assert begun.wait(60)
     still = f"uavapi: still trying to listen on http://127.0.0.1:{port}; a line follows when it is done\n"
     assert output("still") == still
     released.set()
@@ -143,7 +143,7 @@ def test_start_that_fails_for_an_unforeseen_reason_is_reported(
 
 
 def test_start_that_hangs_does_not_hold_up_the_unload(
-    loader: Loader, main_loop: Any, port: int, monkeypatch: Any
+    loader: Loader, main_loop: Any, port: int, monkeypatch: Any, long_waits: None
 ) -> None:
     module = loader.load(port=port)
     hanging = threading.Event()
@@ -155,9 +155,9 @@ def test_start_that_hangs_does_not_hold_up_the_unload(
     monkeypatch.setattr("mavproxy_uavapi.http.app.ApiServer.start", lambda _: hang())
     started = time.monotonic()
     main_loop.turn()
-    assert time.monotonic() - started < 0.5
-    assert hanging.wait(5)
+    assert time.monotonic() - started < 30
+    assert hanging.wait(60)
     started = time.monotonic()
     loader.unload(module)
-    assert time.monotonic() - started < 2.0
+    assert time.monotonic() - started < 30
     assert not listens(port)
