@@ -201,7 +201,8 @@ def test_all_recovers_by_itself_when_the_link_returns(make_world: Any) -> None:
 def test_vehicle_that_rebooted_can_be_flown_again(make_world: Any) -> None:
     world = make_world()
     world.reboot(DARK)
-    world.loop.pass_time(DARK + 2.0)
+    world.loop.pass_time(DARK + 3.0)  # its streams are requested again, show the reboot, and a heartbeat follows
+    assert world.host.fleet.vehicles[1].reboots == 1
     assert world.ask("GET", "/telemetry/status").body["info"]["armed"] is False
     assert world.ask("GET", "/command/arm").outcome == "200"
     assert world.ask("GET", "/command/takeoff?alt=3").outcome == "200"
