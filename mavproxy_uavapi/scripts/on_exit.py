@@ -58,4 +58,6 @@ def _in_other_hands(vehicle: Vehicle) -> str | None:
     if vehicle.mode != FLOWN_BY_SCRIPTS:
         return f"the vehicle is in {vehicle.mode}"
     flies = vehicle.authority.flies
-    return None if flies is None else f"{flies.verb} flies the vehicle"
+    if flies is not None:
+        return f"{flies.verb} flies the vehicle"
+    return None if vehicle.obeys_us else "another ground station flies the vehicle"

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.core.vehicle.endings import Policy
-from mavproxy_uavapi.core.vehicle.messages import VelocityTarget
+from mavproxy_uavapi.core.vehicle.messages import NedTarget, VelocityTarget
 from mavproxy_uavapi.scripts.on_exit import after_death
 from mavproxy_uavapi.scripts.runs import Run
 
@@ -21,17 +21,29 @@ def after(loop: Any, host: Any, action: str, sysid: int = 1, others: tuple[str, 
     return str(loop.run(after_death(host, sysid, run_of(), list(others))))
 
 
-def test_hold_stops_the_vehicle_and_leaves_it_in_guided(loop: Any, host: Any, flying: Any) -> None:
+@pytest.fixture
+def flown(flying: Any, pilotage: Any, copter: Any) -> Any:
+    """The drone on its way to a place that a client gave it."""
+    pilotage.do(copter.go_to, NedTarget(90.0, 0.0, -20.0))
+    return flying
+
+
+def test_hold_stops_the_vehicle_and_leaves_it_in_guided(loop: Any, host: Any, flown: Any) -> None:
     assert after(loop, host, "hold") == "hold is done"
-    setpoint = flying.setpoints()[-1]
+    setpoint = flown.setpoints()[-1]
     assert (setpoint.vx, setpoint.vy, setpoint.vz) == (0, 0, 0)
-    assert flying.mode == "GUIDED"
+    assert flown.mode == "GUIDED"
+
+
+def test_a_vehicle_that_another_station_flies_is_left_alone(loop: Any, host: Any, flying: Any) -> None:
+    assert after(loop, host, "hold") == "left alone: another ground station flies the vehicle"
+    assert flying.orders() == []
 
 
 @pytest.mark.parametrize(("action", "mode"), [("land", "LAND"), ("rtl", "RTL")])
-def test_land_and_rtl_bring_it_down(loop: Any, host: Any, flying: Any, action: str, mode: str) -> None:
+def test_land_and_rtl_bring_it_down(loop: Any, host: Any, flown: Any, action: str, mode: str) -> None:
     assert after(loop, host, action) == f"{action} is done"
-    assert (flying.mode, flying.armed) == (mode, False)
+    assert (flown.mode, flown.armed) == (mode, False)
 
 
 @pytest.mark.parametrize("action", ["hold", "land", "rtl"])
@@ -68,13 +80,14 @@ def test_no_vehicle_is_reported(loop: Any, host: Any) -> None:
     assert "nothing can be done" in after(loop, host, "land", sysid=9)
 
 
-def test_pilot_who_takes_the_vehicle_meanwhile_keeps_it(loop: Any, host: Any, flying: Any) -> None:
+@pytest.mark.parametrize("seconds", [0.1, 2.0])
+def test_pilot_who_takes_the_vehicle_meanwhile_keeps_it(loop: Any, host: Any, flown: Any, seconds: float) -> None:
     host.endings.on_script_exit = Policy.LAND
     task = loop.create_task(after_death(host, 1, run_of(), []))
-    loop.pass_time(2.0)
-    flying.pilot("LOITER")
+    loop.pass_time(seconds)
+    flown.pilot("LOITER")
     assert "LOITER" in loop.run(task)
-    assert flying.mode == "LOITER"
+    assert flown.mode == "LOITER"
 
 
 def test_another_script_that_runs_on_keeps_the_vehicle(loop: Any, host: Any, flying: Any) -> None:
@@ -94,9 +107,7 @@ def test_a_dead_scripts_own_job_ends_with_it(
     assert flying.setpoints()[-1].vx == 0.0
 
 
-def test_a_dead_scripts_mission_is_uploaded_to_its_end(
-    loop: Any, host: Any, flying: Any, pilotage: Any, copter: Any
-) -> None:
+def test_a_dead_scripts_mission_is_uploaded_to_its_end(loop: Any, host: Any, flown: Any, pilotage: Any) -> None:
     async def upload(_job: Any) -> None:
         await asyncio.sleep(60.0)
 
