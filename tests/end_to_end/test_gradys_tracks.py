@@ -90,9 +90,10 @@ def test_a_track_is_flown_again_over_http_with_progress_and_ends_at_home(rig, tr
 
 @pytest.mark.parametrize("command", ["gradys track fly", "uavapi fly"])
 def test_a_track_is_flown_at_the_prompt(rig, track, command):
+    before = rig.mavproxy.mark()
     rig.mavproxy.ask(f"{command} {track}", "legs with vehicle 1")
     rig.mavproxy.ask("gradys track", "track flight running")
-    rig.mavproxy.says("legs and landed at home", timeout=120)
+    rig.mavproxy.says("legs and landed at home", before, timeout=120)
 
 
 def test_the_pilot_ends_it_and_nothing_more_is_sent(rig, track, harness):
