@@ -43,7 +43,10 @@ export class HoldButton extends HTMLElement {
     setAttribute(this.button, "aria-label", `${label}: hold for a second, or press twice`);
     setAttribute(this.button, "title", this.getAttribute("title") || "hold for a second");
     const disabled = this.hasAttribute("disabled");
-    if (disabled) this.end();
+    if (disabled) {
+      this.end();
+      this.physical = false; // a disabled button gets no click of the pointer's end
+    }
     if (this.button.disabled !== disabled) this.button.disabled = disabled;
   }
 

@@ -132,6 +132,13 @@ CHECKS = {
            a.setToken('');
            return same([early, asked], [0, 1]); })()""",
     ],
+    "hold_button": [
+        # one that was disabled under a finger takes the next press
+        """{const b = document.createElement('hold-button'); b.setAttribute('label', 'Arm'); document.body.append(b);
+           b.button.dispatchEvent(new PointerEvent('pointerdown', {button: 0}));
+           b.toggleAttribute('disabled'); b.toggleAttribute('disabled');
+           b.button.click(); b.remove(); b.button.ariaLabel.includes('press again')}""",
+    ],
     "hold_order": [
         # an answer of the API counts until the vehicle tells of another mode; then nothing is said of now
         f"""(async () => {{{STRIPS} drop();
