@@ -314,8 +314,9 @@ class BaseVehicle:
         if job is not self.authority.commander:
             self.authority.admit(rank)
         allow()
-        await pass_gate()
-        self.authority.take(job, rank, allow)
+        if await pass_gate():
+            allow()
+        self.authority.take(job, rank)
 
     def commanding(self, job: Job, *needs: Callable[[], None]) -> Callable[[], None]:
         """The check before each message of `job`: it still commands, and no need raises."""

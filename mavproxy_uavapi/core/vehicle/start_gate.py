@@ -81,12 +81,17 @@ class _Place:
 _place: contextvars.ContextVar[_Place | None] = contextvars.ContextVar("place", default=None)
 
 
-async def pass_gate() -> None:
+async def pass_gate() -> bool:
     """Wait for the other verbs, if the present verb has a place at a gate; called before the checks for a message.
+
+    Returns:
+        Whether it has one, so that time may have passed.
 
     Raises:
         Aborted: another verb of the gate has failed.
     """
     place = _place.get()
-    if place is not None:
-        await place.passed()
+    if place is None:
+        return False
+    await place.passed()
+    return True
