@@ -265,7 +265,7 @@ def test_idle_strangers_leave_mavproxy_the_descriptors_to_connect_again(harness,
         rig.control.close()
         rig.control = None
         rig.processes[0].stop()  # the link blinks
-        rig.mavproxy.says("refused sleeping")
+        rig.mavproxy.says("vehicle 1: link lost")
         strangers_come()
         rig.start(
             "sim-again", [sys.executable, "-m", "mavproxy_uavapi.sim", f"--instance={instance}", "--speedup=10"]

@@ -45,3 +45,15 @@ def make_world(
     for world in worlds:
         world.close()
         world.host.bridge._calls.close()
+
+
+@pytest.fixture
+def world(make_world: Any) -> Any:
+    """A copter that hovers in GUIDED."""
+    return make_world()
+
+
+@pytest.fixture
+def on_ground(make_world: Any) -> Any:
+    """Armed in GUIDED."""
+    return make_world(lambda world: world.armed())

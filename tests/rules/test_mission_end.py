@@ -1,0 +1,63 @@
+"""When a mission with `until_complete` has ended, in virtual time: not by motors that stop on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from mavproxy_uavapi.core.vehicle.messages import FORCE_DISARM
+from tests.support.world import PLACE
+
+ARM = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
+
+
+def on_the_way(world: Any, *, lands: bool = False) -> Any:
+    """A request for a mission of a waypoint far away, and of a landing there; it waits for the end."""
+    items = [{"command": "NAV_WAYPOINT", "lat": PLACE[0] + 0.004, "long": PLACE[1], "alt": 30}]
+    if lands:
+        items = [{"command": "NAV_LAND", "lat": PLACE[0], "long": PLACE[1], "alt": 0}]
+    assert world.ask("POST", "/mission/waypoints", {"items": items}).outcome == "200"
+    waiting = world.begin("POST", "/mission/start", {"until_complete": True})
+    world.loop.pass_time(4.0)
+    assert not waiting.reply.done()
+    return waiting
+
+
+def kill(world: Any) -> None:
+    world.pilot_command(ARM, 0, FORCE_DISARM)
+
+
+def boots(world: Any) -> None:
+    world.reboot(1.5)
+
+
+@pytest.fixture
+def high(make_world: Any) -> Any:
+    return make_world(lambda world: world.flying(height=30.0))
+
+
+@pytest.mark.parametrize("end", [kill, boots])
+@pytest.mark.parametrize("lands", [False, True])
+def test_vehicle_that_loses_its_motors_in_the_last_item_of_its_mission_has_not_completed_it(
+    high: Any, end: Callable[[Any], None], lands: bool
+) -> None:
+    waiting = on_the_way(high, lands=lands)
+    end(high)
+    assert high.answer(waiting).outcome == "409 not_armed"
+
+
+def test_mission_that_lands_is_complete_when_it_stands_disarmed(high: Any) -> None:
+    waiting = on_the_way(high, lands=True)
+    assert high.answer(waiting).outcome == "200"
+    assert not high.copter.armed
+    assert high.at[2] == pytest.approx(0.0, abs=0.1)
+
+
+def test_mission_whose_last_item_is_a_waypoint_is_complete_there(high: Any) -> None:
+    waiting = on_the_way(high)
+    assert high.answer(waiting).outcome == "200"
+    assert high.copter.armed
+    assert high.at[0] > 430.0
