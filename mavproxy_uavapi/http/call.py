@@ -217,25 +217,32 @@ class Call:
             identity: what identifies the request, if the parameters do not.
         """
         self.require_flyable(vehicle)  # again: somebody may have taken it while a body arrived
-        params = self.remembered = identity or self.remembered
-        is_async, on_disconnect, lease, holder = (
-            self.is_async,
-            self.on_disconnect,
-            self.lease,
-            holder_of(self.request),
-        )
+        self.remembered = identity or self.remembered
+        is_async = self.is_async
 
         async def body(job: Job) -> str:
             with self.naming_source():
                 await self.service.host.registry.traffic.in_turn(job, verb)
             return result if isinstance(result, str) else result()
 
-        jobs = self.service.host.jobs
-        in_flight = sum(job.vehicle is vehicle for job in jobs.running())
+        in_flight = sum(job.vehicle is vehicle for job in self.service.host.jobs.running())
         if in_flight >= self.service.settings.max_jobs and not urgent:
             raise TooManyRequests(f"{in_flight} verbs are in flight already (max_jobs)")
-        joined = jobs.running_for(vehicle, self.path, params.model_dump())
-        job = jobs.begin(
+        job = self._begin(vehicle, body, outlives_client)
+        script = None
+        if is_async or (outlives_client and not urgent):  # other jobs end with their client, or stop the vehicle
+            self.job = job
+            script = await job.go_on_for(self.service.scripts.session_of(self.peer))
+        if is_async:
+            return self.accepted(job)
+        return self.answer(await self.outcome(job, script))
+
+    def _begin(self, vehicle: Vehicle, body: Callable[[Job], Awaitable[str]], outlives_client: bool) -> Job:
+        """Begin a job, or join the one that does the same already, with what this client wishes for it."""
+        host, params, holder = self.service.host, self.remembered, holder_of(self.request)
+        on_disconnect, lease = self.on_disconnect, self.lease  # read first: what is wrong in them begins nothing
+        joined = host.jobs.running_for(vehicle, self.path, params.model_dump())
+        job = host.jobs.begin(
             vehicle,
             self.path,
             params.model_dump(),
@@ -251,14 +258,8 @@ class Call:
             job.join(on_disconnect)
             self._take_over(job, holder if lease else job.holder)
         if lease is not None:
-            self.service.host.leases.take(vehicle, holder, lease)
-        script = None
-        if is_async or (outlives_client and not urgent):  # other jobs end with their client, or stop the vehicle
-            self.job = job
-            script = await job.go_on_for(self.service.scripts.session_of(self.peer))
-        if is_async:
-            return self.accepted(job)
-        return self.answer(await self.outcome(job, script))
+            host.leases.take(vehicle, holder, lease)
+        return job
 
     def _take_over(self, job: Job, holder: str) -> None:
         """Let a job that another client began end with the lease, or the hold, that this one has."""

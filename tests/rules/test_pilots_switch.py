@@ -91,6 +91,18 @@ def test_a_deleted_arm_is_undone_if_it_was_sent(arming: Any) -> None:
     assert not world.vehicle.armed
 
 
+def test_an_arm_whose_client_wishes_a_hold_and_hangs_up_is_undone_if_it_was_sent(make_world: Any) -> None:
+    world = make_world(World.boot)
+    world.in_mode("GUIDED")
+    world.loop.pass_time(3.0)
+    arm = world.begin("GET", "/command/arm?on_disconnect=hold")
+    while not commands(world, ARM, 0):
+        world.loop.pass_time(0.001)
+    arm.hang_up()
+    world.loop.pass_time(3.0)
+    assert not world.vehicle.armed
+
+
 def test_a_pilot_who_armed_since_the_last_heartbeat_keeps_it_from_a_land_and_loses_it_by_a_disarm(
     make_world: Any,
 ) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import math
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
@@ -16,6 +15,7 @@ from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission, kind_of, mo
 from mavproxy_uavapi.core.mavlink.link import Address, Link, is_finite
 from mavproxy_uavapi.core.mavlink.pending_waits import PendingWaits
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
+from mavproxy_uavapi.core.shared_tasks import SharedTasks
 from mavproxy_uavapi.core.vehicle import messages, time_limits
 from mavproxy_uavapi.core.vehicle.authority import CommandAuthority, Rank, no_objection
 from mavproxy_uavapi.core.vehicle.command_sender import CommandSender
@@ -77,7 +77,7 @@ class BaseVehicle:
         self.parameters = Parameters(state, self.link, self.waiting)
         self.logs = DataflashLogs(state, self.link, self.waiting)
         self._mode_requests = ModeRequests(state, clock)
-        self._requests: dict[str, asyncio.Task[Any]] = {}  # REQUEST_MESSAGE in flight, by message name
+        self._requests = SharedTasks[Any]()  # REQUEST_MESSAGE, by message name
 
     def continues(self, before: BaseVehicle) -> None:
         """Go on as the same vehicle, whose type was another one before.
@@ -389,17 +389,7 @@ class BaseVehicle:
             Rejected: it has no such message.
             TimedOut, LinkLost.
         """
-        task = self._requests.get(name)
-        if task is None:
-            task = asyncio.get_running_loop().create_task(self._request(name))
-            self._requests[name] = task
-            task.add_done_callback(lambda done: self._requested(name, done))
-        return await asyncio.shield(task)
-
-    def _requested(self, name: str, task: asyncio.Task[Any]) -> None:
-        del self._requests[name]
-        if not task.cancelled():
-            task.exception()  # the caller may have gone; asyncio would report the exception as never retrieved
+        return await self._requests.outcome(name, lambda: self._request(name))
 
     async def _request(self, name: str) -> Any:
         def from_autopilot(message: Any) -> Any:

@@ -12,7 +12,8 @@ from mavproxy_uavapi.core.vehicle import messages, setpoint_in_force, time_limit
 from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_uavapi.core.vehicle.guided import ARRIVAL_SPEED, GUIDED
 from mavproxy_uavapi.core.vehicle.jobs import Job
-from mavproxy_uavapi.core.vehicle.messages import NO_YAW, VelocityTarget
+from mavproxy_uavapi.core.vehicle.messages import NO_YAW
+from mavproxy_uavapi.core.vehicle.own_target import STANDSTILL
 from mavproxy_uavapi.core.vehicle.start_gate import pass_gate
 from mavproxy_uavapi.core.vehicle.travelling import REST_PERIOD
 from mavproxy_uavapi.core.vehicle.turning import TurningVehicle
@@ -21,7 +22,6 @@ TAKEOFF_SHARE = 0.05  # of the altitude, between TAKEOFF_TOLERANCE's two ends
 TAKEOFF_TOLERANCE = (0.3, 1.0)  # m
 TAKEOFF_END = 3.0  # s at its altitude after which a takeoff counts as done, even if the autopilot still reports it
 SLOWDOWN = 0.3  # s that a pause on the ground needs to slow the motors from full throttle
-REST = VelocityTarget(0, 0, 0)
 DROP_TIMEOUT = 5.0  # s until a stopped vehicle must report that it has dropped its old movement
 STOP_TIMEOUT = 20.0  # s from full speed to rest
 SPEED_MODES = {"GUIDED", "RTL", *MISSION_MODES}  # others refuse DO_CHANGE_SPEED
@@ -35,7 +35,7 @@ class Copter(TurningVehicle):
     def hold_message(self) -> Any:
         """A zero velocity in GUIDED, else BRAKE."""
         if self.mode == self.next_mode == GUIDED:
-            return VelocityTarget(0, 0, 0).to(self.address, NO_YAW)
+            return STANDSTILL.to(self.address, NO_YAW)
         return super().hold_message()
 
     @property
@@ -142,8 +142,8 @@ class Copter(TurningVehicle):
         """
         deadline = self.clock() + DROP_TIMEOUT
         while self.clock() <= deadline:
-            await self.send_setpoint(job, REST)
-            if await setpoint_in_force.ask(self.state, self.waiting, self.link) == REST:
+            await self.send_setpoint(job, STANDSTILL)
+            if await setpoint_in_force.ask(self.state, self.waiting, self.link) == STANDSTILL:
                 return
             await asyncio.sleep(REST_PERIOD)
         raise TimedOut(
@@ -190,7 +190,7 @@ class Copter(TurningVehicle):
         self.authority.accompany(job, "resume", stopped_too=True)
         interrupted = self.authority.interrupted
         if interrupted is not None and interrupted.steers and not interrupted.running and mode == GUIDED:
-            await self.send_setpoint(job, REST)  # its setpoints have stopped
+            await self.send_setpoint(job, STANDSTILL)  # its setpoints have stopped
         await self._continue(job, mode)
 
     async def _continue(self, job: Job, mode: str) -> None:

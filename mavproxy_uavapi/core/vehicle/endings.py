@@ -189,7 +189,8 @@ class FlightEndings:
         verb = _verb(vehicle, action)
 
         async def body(job: Job) -> str:
-            if not (at_once or (action == HOLD and vehicle.stops_in_its_mode)):
+            switches_mode = action != DISARM and not (action == HOLD and vehicle.stops_in_its_mode)
+            if switches_mode and not at_once:
                 await vehicle.hear_again()  # a pilot may have taken it since the last heartbeat
                 if self.what_follows(vehicle, policy, modes) != action:
                     raise ModeChanged(f"the vehicle is in {vehicle.mode} now: nothing is sent")

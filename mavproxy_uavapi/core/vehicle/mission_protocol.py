@@ -8,7 +8,6 @@ MAVProxy's own `wp` module receives the same messages, but answers only those of
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AbstractContextManager
@@ -19,6 +18,7 @@ from pymavlink import mavutil
 from mavproxy_uavapi.core.errors import Busy, LinkLost, Rejected, TimedOut, UavApiError
 from mavproxy_uavapi.core.mavlink.link import Address, Link
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
+from mavproxy_uavapi.core.shared_tasks import SharedTasks
 from mavproxy_uavapi.core.vehicle.message_exchange import MessageExchange
 from mavproxy_uavapi.core.vehicle.message_waiter import MessageWaiter
 from mavproxy_uavapi.core.vehicle.mission_files import HOME, MissionItem, difference, from_message
@@ -71,7 +71,7 @@ class Waypoints:
         self._allow = allow
         self._turns = Turns("transfers of the mission")
         self._verbs = 0  # that have a turn or wait for one
-        self._reads: dict[int, asyncio.Task[list[Any]]] = {}  # that callers wait for, by the kind of list
+        self._reads = SharedTasks[list[Any]]()  # by the kind of list
         self.changed_at = 0.0
 
     # -- verbs --------------------------------------------------------------------------------------------
@@ -165,11 +165,7 @@ class Waypoints:
             self._verbs -= 1
 
     async def _read(self, kind: int) -> list[Any]:
-        task = self._reads.get(kind)
-        if task is None:
-            task = self._reads[kind] = asyncio.get_running_loop().create_task(self._read_in_turn(kind))
-            task.add_done_callback(lambda done: self._was_read(kind, done))
-        return await asyncio.shield(task)
+        return await self._reads.outcome(kind, lambda: self._read_in_turn(kind))
 
     async def _read_in_turn(self, kind: int) -> list[Any]:
         while True:
@@ -180,11 +176,6 @@ class Waypoints:
     def _give_way(self) -> None:
         if self._verbs:
             raise GaveWay
-
-    def _was_read(self, kind: int, task: asyncio.Task[Any]) -> None:
-        del self._reads[kind]
-        if not task.cancelled():
-            task.exception()  # the callers may have gone; asyncio would report the exception as never retrieved
 
     # -- the protocol -------------------------------------------------------------------------------------
 

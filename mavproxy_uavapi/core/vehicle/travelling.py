@@ -11,6 +11,7 @@ from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_uavapi.core.vehicle.guided import ARRIVAL_SPEED, GuidedVehicle
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.messages import NedTarget, Target, VelocityTarget
+from mavproxy_uavapi.core.vehicle.own_target import STANDSTILL
 
 RESENDS_PER_TIMEOUT = 3  # velocity setpoints sent in each GUID_TIMEOUT
 ROUNDING = 1e-6  # s; a shorter remainder is a rounding error, not a setpoint
@@ -25,7 +26,7 @@ class TravellingVehicle(GuidedVehicle):
     @property
     def standstill(self) -> Target:
         """The setpoint that stops it."""
-        return VelocityTarget(0, 0, 0)
+        return STANDSTILL
 
     async def travel(
         self,

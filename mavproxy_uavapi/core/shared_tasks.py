@@ -1,0 +1,33 @@
+"""Work that simultaneous callers share. Pure asyncio."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Coroutine, Hashable
+from typing import Any, Generic, TypeVar
+
+T = TypeVar("T")
+
+
+class SharedTasks(Generic[T]):
+    """Tasks by key: who asks for one that is under way waits for its outcome. Its callers may leave; it goes on."""
+
+    def __init__(self) -> None:
+        self._running: dict[Hashable, asyncio.Task[T]] = {}
+
+    async def outcome(self, key: Hashable, work: Callable[[], Coroutine[Any, Any, T]]) -> T:
+        """What `work` gives, begun unless it is under way for that key.
+
+        Raises:
+            Exception: what `work` raises.
+        """
+        task = self._running.get(key)
+        if task is None:
+            task = self._running[key] = asyncio.get_running_loop().create_task(work())
+            task.add_done_callback(lambda done: self._ended(key, done))
+        return await asyncio.shield(task)
+
+    def _ended(self, key: Hashable, task: asyncio.Task[T]) -> None:
+        del self._running[key]
+        if not task.cancelled():
+            task.exception()  # the callers may have gone; asyncio would report the exception as never retrieved
