@@ -10,8 +10,9 @@ from typing import Any
 import pytest
 
 from tests.support import processes
+from tests.support.lan import Lan
 from tests.support.lockstep_rig import LockstepRig
-from tests.support.processes import Lan, Rig, ardupilot, ardupilot_with_faults, embedded
+from tests.support.processes import Rig, ardupilot, ardupilot_with_faults, embedded
 
 
 @pytest.fixture(scope="module", params=["embedded", pytest.param("ardupilot", marks=pytest.mark.sitl)])

@@ -18,7 +18,7 @@ import sysconfig
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import requests
 
@@ -385,17 +385,3 @@ def ardupilot_with_faults(directory: Path, *, speedup: int = SPEEDUP, **settings
         rig.stop()
         raise
     return rig
-
-
-class Lan(NamedTuple):
-    """A network namespace with an address of its own, as another computer on the LAN has one.
-
-    Attributes:
-        here: our address on it.
-        network: both addresses.
-        inside: the words before a command that is to run on the other computer.
-    """
-
-    here: str
-    network: str
-    inside: tuple[str, ...]
