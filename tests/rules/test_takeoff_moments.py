@@ -169,3 +169,14 @@ def test_movement_while_a_takeoff_is_stopped_is_paused(on_ground: Any) -> None:
     on_ground.loop.pass_time(4.0)
     assert on_ground.ask("GET", "/movement/stop").outcome == "200"
     assert on_ground.ask("POST", "/movement/go_to_ned", FAR).outcome == "409 paused"
+
+
+def test_movement_after_a_takeoff_that_its_pilot_has_ended_is_flown(on_ground: Any) -> None:
+    """The last report of the takeoff is from before the pilot's mode."""
+    climbing = on_ground.begin("GET", "/command/takeoff?alt=20")
+    on_ground.loop.pass_time(5.0)
+    on_ground.hears = lambda message: message.get_type() != "EXTENDED_SYS_STATE"
+    on_ground.in_mode("LOITER")
+    assert on_ground.answer(climbing).outcome == "409 mode_changed"
+    assert on_ground.ask("GET", "/command/guided").outcome == "200"
+    assert on_ground.ask("POST", "/movement/go_to_ned", FAR).outcome == "200"

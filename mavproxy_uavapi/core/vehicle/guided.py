@@ -65,8 +65,14 @@ class GuidedVehicle(Vehicle):
 
     @property
     def is_taking_off(self) -> bool:
-        """Whether the autopilot reports a takeoff, ours or another one, or that it has left the ground just now."""
-        reported = self.state.recent_field("EXTENDED_SYS_STATE", "landed_state")
+        """Whether the autopilot reports a takeoff, ours or another one, or that it has left the ground just now.
+
+        A change of mode ends a takeoff, so a report from before it does not count.
+        """
+        received = self.state.messages.get("EXTENDED_SYS_STATE")
+        if received is None or received.at < self.state.mode_since or not self.state.is_recent(received):
+            return False
+        reported = received.message.landed_state
         has_just_left = reported == ON_GROUND and self.state.landed is False  # as a newer heartbeat says
         return bool(reported == TAKING_OFF or has_just_left)
 
