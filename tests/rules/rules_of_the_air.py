@@ -157,7 +157,7 @@ class Judge:
         return flight.shown_at is not None or self._shows(flight)
 
     def _shows(self, flight: Any) -> bool:
-        if flight.verb == "hold" and flight.mode == "GUIDED":
+        if flight.verb == "hold" and any(sent.is_setpoint for sent in flight.sent):
             return True  # zero velocities: a newer movement replaces them
         expected = wanted_mode(flight)
         return flight.verb != "stop" and expected != "" and self._world.copter.mode == expected

@@ -342,3 +342,12 @@ def test_mode_that_arrives_after_its_flight_was_deleted_is_left_by_brake(state: 
     state.ask_for_mode(later=0.0, mode=mode, wait="true")
     state.delete_and_see_it_stand(deaf=0.0)
     assert state.world.drone.mode == "BRAKE"
+
+
+def test_movement_replaces_a_hold_by_zero_velocities_that_began_before_the_heartbeat_in_guided(state: Authority) -> None:
+    state.begin(where="GUIDED", on_disconnect="hold")
+    state.ask_for_mode(later=0.3, mode="BRAKE", wait="true")
+    state.ask_for_mode(later=0.0, mode="GUIDED", wait="true")
+    state.hang_up(later=0.02, which=3)
+    state.ask_to_move(later=3.0, path="go_to_ned", place={"x": 30, "y": 0, "z": -10}, wait="false")
+    assert state.world.speed > rules_of_the_air.STILL
