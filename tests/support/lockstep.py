@@ -95,8 +95,7 @@ class Lockstep:
         self.directory = Path(tempfile.mkdtemp())
         self.tracker = Tracker(self.host, self.settings.snapshot())
         self.flights = FlightJobs(self.tracker, lambda: self.directory)
-        self.loop.call_soon(self._step)
-        self.loop.call_soon(self._streams)
+        self._timers = {self._step: self.loop.call_soon(self._step), self._streams: self.loop.call_soon(self._streams)}
         self.eye = Eye(self, rendered=rendered)
 
     def run(self, coroutine: Any) -> Any:
@@ -113,11 +112,11 @@ class Lockstep:
             self._heard_at = self.loop.time()
             for message in self._parser.parse_buffer(self.link.drain()) or []:
                 self.host._receive(message)
-        self.loop.call_later(STEP, self._step)
+        self._timers[self._step] = self.loop.call_later(STEP, self._step)
 
     def _streams(self) -> None:
         self.wire.deliver(mavlink.MAVLink_request_data_stream_message(1, 1, 0, STREAM_RATE, 1))
-        self.loop.call_later(STREAMS_EVERY, self._streams)
+        self._timers[self._streams] = self.loop.call_later(STREAMS_EVERY, self._streams)
 
     # -- flights ---------------------------------------------------------------------------------------------
 
@@ -246,6 +245,8 @@ class Lockstep:
             for task in tasks:
                 task.cancel()
             self.loop.run_until_complete(asyncio.gather(*tasks, return_exceptions=True))
+        for timer in self._timers.values():
+            timer.cancel()  # else the vehicle flies on for as long as the threads take to end
         self.loop.run_until_complete(self.loop.shutdown_default_executor())
         self.loop.close()
         self.host.bridge._calls.close()
