@@ -59,11 +59,13 @@ class Battery:
         """Draw amperes at this loss of volts for dt seconds."""
         self.current = min(current, HIGHEST_CURRENT)
         self.consumed += self.current * dt / 3.6
-        full = max(0.0, min(HIGHEST_VOLTAGE, self._parameters["SIM_BATT_VOLTAGE"]))
-        charge = max(0.0, 1 - self.consumed / self._capacity) if self._capacity > 0 else 1.0
-        rest = full * (EMPTY_SHARE + (1 - EMPTY_SHARE) * charge**0.6)
+        rest = max(0.0, min(HIGHEST_VOLTAGE, self._parameters["SIM_BATT_VOLTAGE"]))
+        capacity = self._capacity
         if self.forced_voltage is not None:
             rest = self.forced_voltage
+        elif capacity > 0:
+            charge = max(0.0, 1 - self.consumed / capacity)
+            rest *= EMPTY_SHARE + (1 - EMPTY_SHARE) * charge**0.6
         self.voltage = max(0.0, rest - sag)
         self.consumed_wh += self.voltage * self.current * dt / 3600
 
@@ -75,8 +77,7 @@ class Battery:
         if self.low:
             return False
         low_voltage, low_mah = self._parameters["BATT_LOW_VOLT"], self._parameters["BATT_LOW_MAH"]
-        capacity = self._parameters["BATT_CAPACITY"]
-        if low_mah > 0 and capacity - self.consumed < low_mah:
+        if low_mah > 0 and self._parameters["BATT_CAPACITY"] - self.consumed < low_mah:
             self.low = True
         elif low_voltage > 0 and self.voltage < low_voltage:
             self._below_since = now if self._below_since is None else self._below_since

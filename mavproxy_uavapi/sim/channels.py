@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from bisect import bisect
 from collections.abc import Mapping
 
 from .parameters import ParameterStore
@@ -10,11 +12,14 @@ NEUTRAL = (1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800)
 """What SITL's radio sends at first: sticks centred, throttle down, mode switch on 6."""
 OVERRIDE_TIMEOUT = 3.0
 """RC_OVERRIDE_TIME, seconds that an RC_CHANNELS_OVERRIDE lasts."""
+RELEASED = (0, -math.inf)
+"""Pulse and time of an override that there is not."""
 MODE_SWITCH_EDGES = (1231, 1361, 1491, 1621, 1750)
 """Pulse widths between the six positions of the flight mode switch."""
 STICK_DEADZONE = 20
 CHANNEL_COUNT = 16
-SERVO_COUNT = 16
+SERVO_FUNCTIONS = tuple(f"SERVO{channel}_FUNCTION" for channel in range(1, 17))
+"""The parameter of each output."""
 MOTOR_FUNCTIONS = (33, 34, 35, 36)
 STEERING_FUNCTION, THROTTLE_FUNCTION = 26, 70
 DISABLED_OUTPUT = 0
@@ -41,29 +46,28 @@ class Sticks:
 
     def pulses(self, now: float) -> list[int]:
         """All 16 channels, 0 where there is none."""
-        pulses = list(self._radio)
-        for channel, (pulse, since) in self._override.items():
-            if now - since <= OVERRIDE_TIMEOUT:
-                pulses[channel] = pulse
-        return pulses
+        return [self._pulse(channel, now) for channel in range(1, CHANNEL_COUNT + 1)]
+
+    def _pulse(self, channel: int, now: float) -> int:
+        pulse, since = self._override.get(channel - 1, RELEASED)
+        return pulse if now - since <= OVERRIDE_TIMEOUT else self._radio[channel - 1]
 
     def axis(self, channel: int, now: float) -> float:
         """A centring stick as -1..1, zero within the dead zone."""
-        offset = self.pulses(now)[channel - 1] - 1500
+        offset = self._pulse(channel, now) - 1500
         if abs(offset) <= STICK_DEADZONE:
             return 0.0
         return max(-1.0, min(1.0, offset / 500))
 
     def throttle(self, now: float) -> float:
         """The throttle stick as 0..1."""
-        return max(0.0, min(1.0, (self.pulses(now)[2] - 1000) / 1000))
+        return max(0.0, min(1.0, (self._pulse(3, now) - 1000) / 1000))
 
     def mode_switch(self, channel: int, now: float) -> int | None:
         """Position 1..6 of the flight mode switch on channel; None when FLTMODE_CH names no channel."""
         if not 1 <= channel <= CHANNEL_COUNT:
             return None
-        pulse = self.pulses(now)[channel - 1]
-        return 1 + sum(pulse >= edge for edge in MODE_SWITCH_EDGES)
+        return 1 + bisect(MODE_SWITCH_EDGES, self._pulse(channel, now))
 
 
 class Servos:
@@ -71,15 +75,15 @@ class Servos:
 
     def __init__(self, parameters: ParameterStore) -> None:
         self._parameters = parameters
-        self._pulses = [DISABLED_OUTPUT] * SERVO_COUNT
+        self._pulses = [DISABLED_OUTPUT] * len(SERVO_FUNCTIONS)
 
     def function(self, channel: int) -> int:
         """SERVOn_FUNCTION of channel (from 1)."""
-        return int(self._parameters[f"SERVO{channel}_FUNCTION"])
+        return int(self._parameters[SERVO_FUNCTIONS[channel - 1]])
 
     def set(self, channel: int, pulse: int) -> bool:
         """Drive a free output; False when the channel does not exist or something else drives it."""
-        if not 1 <= channel <= SERVO_COUNT or self.function(channel) not in (0, 1):
+        if not 1 <= channel <= len(SERVO_FUNCTIONS) or self.function(channel) not in (0, 1):
             return False
         self._pulses[channel - 1] = pulse & 0xFFFF
         return True
@@ -90,7 +94,5 @@ class Servos:
 
     def driven(self, by_function: Mapping[int, int]) -> list[int]:
         """All outputs; those with a SERVOn_FUNCTION of by_function show its pulse."""
-        return [
-            by_function.get(self.function(channel), self._pulses[channel - 1])
-            for channel in range(1, SERVO_COUNT + 1)
-        ]
+        functions = [int(self._parameters[name]) for name in SERVO_FUNCTIONS]
+        return [by_function.get(function, pulse) for function, pulse in zip(functions, self._pulses, strict=True)]

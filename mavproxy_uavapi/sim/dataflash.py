@@ -9,6 +9,7 @@ import math
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -44,6 +45,7 @@ def record(name: str, *fields: int | float | bytes) -> bytes:
     return HEAD + bytes([kind]) + struct.pack(_packing(letters), *fields)
 
 
+@cache
 def _packing(letters: str) -> str:
     return "<" + "".join(CODES.get(letter, letter) for letter in letters)
 

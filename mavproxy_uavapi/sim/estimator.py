@@ -63,7 +63,7 @@ class Estimator:
     @property
     def ready(self) -> bool:
         """Whether there is an absolute position that modes may navigate by."""
-        return self._time >= max(self.ready_after, self.blind_until)
+        return self._time >= self.ready_after and self._time >= self.blind_until
 
     @property
     def flags(self) -> int:

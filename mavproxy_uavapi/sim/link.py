@@ -27,7 +27,8 @@ class PeerLink:
         self.streams = Streams(self._groups)
         self.parameter_cursor: int | None = None
         """Next index of a running PARAM_REQUEST_LIST, or None."""
-        self._encoder = mavlink.MAVLink(None, srcSystem=system, srcComponent=COMPONENT)
+        self._source = (system, COMPONENT)
+        self._encoder = mavlink.MAVLink(None)
         self._outbox: list[tuple[Any, tuple[int, int] | None]] = []
 
     def restart(self) -> None:
@@ -54,10 +55,7 @@ class PeerLink:
 
     def _pack(self, message: Any, source: tuple[int, int] | None) -> bytes:
         encoder = self._encoder
-        own = (encoder.srcSystem, encoder.srcComponent)
-        if source is not None:
-            encoder.srcSystem, encoder.srcComponent = source
+        encoder.srcSystem, encoder.srcComponent = source or self._source
         data = bytes(message.pack(encoder))
-        encoder.srcSystem, encoder.srcComponent = own
         encoder.seq = (encoder.seq + 1) % 256
         return data

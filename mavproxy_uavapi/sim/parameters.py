@@ -34,19 +34,13 @@ class Parameter:
     value: float
 
 
-class ParameterStore:
-    """All parameters, by name and by index; they outlive a reboot."""
+class ParameterStore(dict[str, float]):
+    """All parameters, by name and by index, and as a dict their values; they outlive a reboot."""
 
     def __init__(self, blocks: Blocks = copter.BLOCKS) -> None:
         self.ordered = [Parameter(index, *row) for index, row in enumerate(_rows(blocks))]
         self._by_name = {parameter.name: parameter for parameter in self.ordered}
-
-    def __len__(self) -> int:
-        return len(self.ordered)
-
-    def __getitem__(self, name: str) -> float:
-        """Value by name; KeyError when the vehicle does not have it."""
-        return self._by_name[name].value
+        super().__init__((parameter.name, parameter.value) for parameter in self.ordered)
 
     def find(self, name: str, index: int = -1) -> Parameter | None:
         """The parameter at index, or by name when index is -1; None when there is none."""
@@ -58,7 +52,7 @@ class ParameterStore:
         """Store value as the parameter's type can hold it; None for an unknown name."""
         parameter = self._by_name.get(name)
         if parameter is not None:
-            parameter.value = _as_stored(value, parameter.kind)
+            self[name] = parameter.value = _as_stored(value, parameter.kind)
         return parameter
 
 

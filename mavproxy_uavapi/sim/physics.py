@@ -12,6 +12,7 @@ from typing import TypeVar
 
 from .geodesy import Ned, wrap_pi
 from .options import Wind
+from .shaping import limit_size
 
 GRAVITY = 9.80665
 DRAG = 0.1
@@ -101,7 +102,7 @@ class Body:
 
     def _turn(self, yaw_rate: float, dt: float) -> None:
         change = YAW_ACCELERATION * dt
-        self.yaw_rate += max(-change, min(change, yaw_rate - self.yaw_rate))
+        self.yaw_rate += limit_size(yaw_rate - self.yaw_rate, change)
         self.yaw = wrap_pi(self.yaw + self.yaw_rate * dt)
         cos_yaw, sin_yaw = math.cos(self.yaw), math.sin(self.yaw)
         forward = self.thrust_north * cos_yaw + self.thrust_east * sin_yaw

@@ -132,16 +132,18 @@ class PositionController:
         north, east = shaping.limit_length(north, east, limits.speed)
         error = (north - self.velocity[0], east - self.velocity[1])
         current = (self.acceleration[0], self.acceleration[1])
-        self._advance_xy(shaping.accelerate_2d(error, current, limits.acceleration, JERK, dt), dt)
+        north, east = shaping.accelerate_2d(error, current, limits.acceleration, JERK, dt)
+        self._advance(0, north, dt)
+        self._advance(1, east, dt)
 
     def accelerate_at(self, acceleration: Ned, dt: float) -> None:
         """Apply a commanded acceleration (m/s/s) within the speed limits."""
         limits = self.limits
         north, east = shaping.limit_length(acceleration.north, acceleration.east, limits.acceleration)
-        self._advance_xy((north, east), dt)
+        self._advance(0, north, dt)
+        self._advance(1, east, dt)
         self.velocity[0], self.velocity[1] = shaping.limit_length(self.velocity[0], self.velocity[1], limits.speed)
-        down = max(-limits.acceleration_z, min(limits.acceleration_z, acceleration.down))
-        self._advance_z(down, dt)
+        self._advance(2, max(-limits.acceleration_z, min(limits.acceleration_z, acceleration.down)), dt)
         self.velocity[2] = max(-limits.speed_up, min(limits.speed_down, self.velocity[2]))
 
     def climb_at(self, down: float, dt: float) -> None:
@@ -149,33 +151,28 @@ class PositionController:
         limits = self.limits
         down = max(-limits.speed_up, min(limits.speed_down, down))
         error = down - self.velocity[2]
-        self._advance_z(shaping.accelerate_1d(error, self.acceleration[2], limits.acceleration_z, JERK, dt), dt)
+        self._advance(2, shaping.accelerate_1d(error, self.acceleration[2], limits.acceleration_z, JERK, dt), dt)
 
-    def _advance_xy(self, acceleration: tuple[float, float], dt: float) -> None:
-        for axis, value in enumerate(acceleration):
-            self.acceleration[axis] = value
-            self.velocity[axis] += value * dt
-            self.position[axis] += self.velocity[axis] * dt
-
-    def _advance_z(self, acceleration: float, dt: float) -> None:
-        self.acceleration[2] = acceleration
-        self.velocity[2] += acceleration * dt
-        self.position[2] += self.velocity[2] * dt
+    def _advance(self, axis: int, acceleration: float, dt: float) -> None:
+        self.acceleration[axis] = acceleration
+        self.velocity[axis] += acceleration * dt
+        self.position[axis] += self.velocity[axis] * dt
 
     def thrust(self, position: Ned, velocity: Ned, dt: float) -> Ned:
         """Acceleration (m/s/s beyond weight) that keeps the vehicle, now at position, on the trajectory."""
-        acceleration = [0.0, 0.0, 0.0]
-        for axis in range(3):
-            gain = VELOCITY_P_Z if axis == 2 else VELOCITY_P_XY
-            reference = self.velocity[axis] + POSITION_P * (self.position[axis] - position[axis])
-            error = reference - velocity[axis]
-            integral = self._integral[axis] + INTEGRATOR * error * dt
-            self._integral[axis] = max(-INTEGRATOR_LIMIT, min(INTEGRATOR_LIMIT, integral))
-            # The drag at the desired speed is known; the integrator has to correct the wind only.
-            known = self.acceleration[axis] + DRAG * self.velocity[axis]
-            acceleration[axis] = known + gain * error + self._integral[axis]
-        north, east = shaping.limit_length(acceleration[0], acceleration[1], GRAVITY * math.tan(self.limits.lean))
-        return Ned(north, east, max(-GRAVITY, min(0.9 * GRAVITY, acceleration[2])))
+        north = self._push(0, VELOCITY_P_XY, position.north, velocity.north, dt)
+        east = self._push(1, VELOCITY_P_XY, position.east, velocity.east, dt)
+        down = self._push(2, VELOCITY_P_Z, position.down, velocity.down, dt)
+        north, east = shaping.limit_length(north, east, GRAVITY * math.tan(self.limits.lean))
+        return Ned(north, east, max(-GRAVITY, min(0.9 * GRAVITY, down)))
+
+    def _push(self, axis: int, gain: float, position: float, velocity: float, dt: float) -> float:
+        desired = self.velocity[axis]
+        error = desired + POSITION_P * (self.position[axis] - position) - velocity
+        integral = shaping.limit_size(self._integral[axis] + INTEGRATOR * error * dt, INTEGRATOR_LIMIT)
+        self._integral[axis] = integral
+        # The drag at the desired speed is known; the integrator has to correct the wind only.
+        return self.acceleration[axis] + DRAG * desired + gain * error + integral
 
 
 def _stopping_distance(speed: float, acceleration: float) -> float:

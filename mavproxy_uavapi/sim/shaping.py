@@ -40,7 +40,7 @@ def accelerate_1d(error: float, current: float, limit: float, jerk: float, dt: f
     """Next acceleration, given a speed error (m/s) and the current acceleration (m/s/s)."""
     magnitude = min(square_root_speed(abs(error), VELOCITY_GAIN, BRAKING_SHARE * jerk), limit)
     change = ACCELERATION_GAIN * ((magnitude if error > 0 else -magnitude) - current)
-    return current + max(-jerk, min(jerk, change)) * dt
+    return current + limit_size(change, jerk) * dt
 
 
 def accelerate_2d(
@@ -57,6 +57,13 @@ def accelerate_2d(
         change_n *= jerk / change
         change_e *= jerk / change
     return current[0] + change_n * dt, current[1] + change_e * dt
+
+
+def limit_size(value: float, largest: float) -> float:
+    """The value within -largest..largest."""
+    if value < largest:
+        return value if value > -largest else -largest
+    return largest
 
 
 def limit_length(north: float, east: float, longest: float) -> tuple[float, float]:

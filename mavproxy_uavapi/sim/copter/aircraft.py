@@ -12,7 +12,7 @@ from ..options import Options
 from ..parameters import ParameterStore
 from ..position_control import Limits, PositionController, Speed
 from ..vehicle import Vehicle
-from .demand import Demand
+from .demand import NO_LIFT, Demand
 from .land_detector import LandDetector
 from .precland import PrecisionLander
 from .yaw_control import AutoYaw
@@ -153,7 +153,7 @@ class Aircraft(Vehicle):
         elif self.motors_turn:
             self._spool = min(1.0, self._spool + change)
         lifting = self.armed and not self.landed and not demand.idle
-        thrust = demand.thrust if lifting else Demand().thrust
+        thrust = demand.thrust if lifting else NO_LIFT
         self.body.step(thrust, demand.yaw_rate if lifting else 0.0, dt)
         self.battery.hover(self.throttle, dt)
 

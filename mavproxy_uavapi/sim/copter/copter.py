@@ -200,10 +200,9 @@ class SimulatedCopter(Aircraft):
         self._disarm_when_forgotten()
 
     def _update_auto_armed(self) -> None:
-        throttle = self.sticks.throttle(self.now)
         if not self.armed:
             self.auto_armed = False
-        elif throttle > 0:
+        elif self.sticks.throttle(self.now) > 0:
             self.auto_armed = True
         elif self.mode.manual_throttle and self.landed:
             self.auto_armed = False

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from ..geodesy import Ned
 from ..physics import GRAVITY
@@ -10,8 +10,7 @@ from ..physics import GRAVITY
 NO_LIFT = Ned(0.0, 0.0, GRAVITY)
 
 
-@dataclass(frozen=True)
-class Demand:
+class Demand(NamedTuple):
     """The demand for one step.
 
     thrust is m/s/s beyond weight, yaw_rate rad/s; idle lets the motors spool down to ground idle.

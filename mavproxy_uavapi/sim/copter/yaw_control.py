@@ -9,6 +9,7 @@ import math
 from enum import Enum, auto
 
 from ..geodesy import wrap_pi
+from ..shaping import limit_size
 
 ANGLE_P = 4.5
 """ATC_ANG_YAW_P."""
@@ -28,6 +29,9 @@ class YawMode(Enum):
     RATE = auto()
     ROI = auto()
     ARMED = auto()
+
+
+TURNING = (YawMode.RATE, YawMode.ANGLE_RATE)
 
 
 class AutoYaw:
@@ -88,7 +92,7 @@ class AutoYaw:
 
     def stop_turning(self) -> None:
         """Stop turning: the setpoints with a yaw rate have stopped coming."""
-        if self.mode in (YawMode.RATE, YawMode.ANGLE_RATE):
+        if self.mode in TURNING:
             self.hold()
 
     def look_at(self, north: float, east: float) -> None:
@@ -106,17 +110,17 @@ class AutoYaw:
     ) -> float:
         """Yaw rate for the airframe now heading yaw; course is the desired velocity north, east."""
         feed_forward = 0.0
-        if self.mode is YawMode.HOLD:
-            return 0.0
-        if self.mode is YawMode.RATE:
-            return max(-self.slew, min(self.slew, self._rate))
         if self.mode is YawMode.COURSE:
             if math.hypot(*course) <= speed_limit * MIN_COURSE_SHARE:
                 self._target = yaw
                 return 0.0
             self._target = math.atan2(course[1], course[0])
+        elif self.mode is YawMode.HOLD:
+            return 0.0
+        elif self.mode is YawMode.RATE:
+            return limit_size(self._rate, self.slew)
         elif self.mode is YawMode.FIXED:
-            step = max(-self._speed * dt, min(self._speed * dt, self._offset))
+            step = limit_size(self._offset, self._speed * dt)
             self._offset -= step
             self._target = wrap_pi(self._target + step)
             feed_forward = step / dt
@@ -134,4 +138,4 @@ class AutoYaw:
         size = abs(error)
         speed = ANGLE_P * size if size <= linear else math.sqrt(2 * BRAKING * (size - linear / 2))
         rate = math.copysign(speed, error) + feed_forward
-        return max(-self.slew, min(self.slew, rate))
+        return limit_size(rate, self.slew)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 
-@dataclass(frozen=True)
-class Drive:
+class Drive(NamedTuple):
     """speed is m/s forward under control of the speed controller, turn_rate rad/s clockwise.
 
     With rolls the motor gives what brings the car to that speed in the end, and nothing brakes.
