@@ -18,8 +18,8 @@ export class HoldButton extends HTMLElement {
     this.append(this.button);
     this.describe();
     const {button} = this;
-    button.addEventListener("pointerdown", event => { if (event.button === 0) this.begin(); });
-    for (const name of ["pointerup", "pointerleave", "pointercancel", "blur"]) button.addEventListener(name, () => this.end());
+    button.addEventListener("pointerdown", event => { if (event.button === 0) this.press(); });
+    button.addEventListener("blur", () => this.end());
     button.addEventListener("keydown", event => this.keyDown(event));
     button.addEventListener("keyup", event => { if (isPress(event)) this.end(); });
     button.addEventListener("click", event => this.clicked(event));
@@ -45,25 +45,35 @@ export class HoldButton extends HTMLElement {
     const disabled = this.hasAttribute("disabled");
     if (disabled) {
       this.end();
-      this.physical = false; // a disabled button gets no click of the pointer's end
+      this.physical = false; // a disabled button gets no click of the key's end
     }
     if (this.button.disabled !== disabled) this.button.disabled = disabled;
+  }
+
+  /** A pointer holds it until that leaves the place of the press; the button may move meanwhile, as what is above it grows. */
+  press() {
+    const place = this.button.getBoundingClientRect(), {signal} = this.pointer = new AbortController();
+    addEventListener("pointermove", event => { if (!isIn(place, event)) this.end(); }, {signal});
+    for (const name of ["pointerup", "pointercancel"]) addEventListener(name, () => this.end(), {signal});
+    this.begin();
   }
 
   keyDown(event) {
     if (!isPress(event)) return;
     event.preventDefault(); // no click of its own
-    if (!event.repeat) this.begin();
+    if (event.repeat) return;
+    this.physical = true;
+    this.begin();
   }
 
   begin() {
     if (this.timer || this.button.disabled) return;
-    this.physical = true;
     this.classList.add("held");
     this.timer = setTimeout(() => this.confirm(), HOLD);
   }
 
   end() {
+    this.pointer?.abort();
     clearTimeout(this.timer);
     this.timer = 0;
     this.classList.remove("held");
@@ -88,6 +98,10 @@ export class HoldButton extends HTMLElement {
     this.askedAt = 0;
     this.dispatchEvent(new CustomEvent("confirmed", {bubbles: true}));
   }
+}
+
+function isIn({left, top, right, bottom}, {clientX, clientY}) {
+  return clientX >= left && clientX <= right && clientY >= top && clientY <= bottom;
 }
 
 function isPress(event) { return event.key === " " || event.key === "Enter"; }

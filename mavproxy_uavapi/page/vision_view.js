@@ -16,7 +16,7 @@ export class VisionView extends CommandPanel {
     this.land = element("hold-button", {label: "Land on the tag", on: {confirmed: () => this.send("/vision/land")}});
     this.search = element("hold-button", {label: "Search for it", on: {confirmed: () => this.send("/vision/search")}});
     const stop = element("button", {type: "button", class: "stop", on: {click: () => this.stop()}}, "Stop");
-    this.append(element("figure", {}, this.picture), this.note, element("div", {class: "buttons"}, labelled("tag", this.tag), this.land, this.search, stop), this.answer);
+    this.append(element("figure", {}, this.picture), element("div", {class: "buttons"}, labelled("tag", this.tag), this.land, this.search, stop), this.note, this.answer);
     this.addEventListener("opened", () => this.watch());
   }
 

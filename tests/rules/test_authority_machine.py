@@ -344,7 +344,7 @@ def test_mode_that_arrives_after_its_flight_was_deleted_is_left_by_brake(state: 
     assert state.world.drone.mode == "BRAKE"
 
 
-def test_movement_replaces_a_hold_by_zero_velocities_that_began_before_the_heartbeat_in_guided(state: Authority) -> None:
+def test_movement_replaces_a_hold_by_zero_velocities_that_began_in_brake(state: Authority) -> None:
     state.begin(where="GUIDED", on_disconnect="hold")
     state.ask_for_mode(later=0.3, mode="BRAKE", wait="true")
     state.ask_for_mode(later=0.0, mode="GUIDED", wait="true")

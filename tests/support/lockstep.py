@@ -95,7 +95,7 @@ class Lockstep:
         self.directory = Path(tempfile.mkdtemp())
         self.tracker = Tracker(self.host, self.settings.snapshot())
         self.flights = FlightJobs(self.tracker, lambda: self.directory)
-        self._timers = {self._step: self.loop.call_soon(self._step), self._streams: self.loop.call_soon(self._streams)}
+        self._timers = {again: self.loop.call_soon(again) for again in (self._step, self._streams)}
         self.eye = Eye(self, rendered=rendered)
 
     def run(self, coroutine: Any) -> Any:
