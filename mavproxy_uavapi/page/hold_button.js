@@ -52,6 +52,7 @@ export class HoldButton extends HTMLElement {
 
   /** A pointer holds it until that leaves the place of the press; the button may move meanwhile, as what is above it grows. */
   press() {
+    if (this.timer) return; // a second finger
     const place = this.button.getBoundingClientRect(), {signal} = this.pointer = new AbortController();
     addEventListener("pointermove", event => { if (!isIn(place, event)) this.end(); }, {signal});
     for (const name of ["pointerup", "pointercancel"]) addEventListener(name, () => this.end(), {signal});
