@@ -139,6 +139,7 @@ class CommandAuthority:
         before = self.commander
         if before is not None and before.running and self._rank < Rank.STOP:
             self._suspended = before, self._rank, self._shown
+            before.is_interrupted = True
         else:
             self._supersede([before], job)
         self.begin_pause()
@@ -183,6 +184,7 @@ class CommandAuthority:
         self._paused_at = None
         if self._suspended is not None:
             self.commander, self._rank, self._shown = self._suspended
+            self.commander.is_interrupted = False
             self._suspended = None
 
     def _take(self, job: Job, rank: Rank) -> None:

@@ -57,7 +57,7 @@ class Copter(TurningVehicle):
         self.authority.take(job, Rank.ARM, self.inside(messages.takeoff(alt)))
         await self.lift_off(job, alt)
         if was_paused:  # a pause outlives a takeoff in the autopilot
-            await self._continue(job, GUIDED)
+            await self.end_stop(job, GUIDED)
         limits = await self.limits()
         low, high = TAKEOFF_TOLERANCE
         tolerance = min(max(TAKEOFF_SHARE * alt, low), high)
@@ -132,7 +132,7 @@ class Copter(TurningVehicle):
         if was_paused and mode.upper() == GUIDED and self.authority.paused:
             if self.state.armed:
                 await self._drop_movement(job)
-            await self._continue(job, GUIDED)
+            await self.end_stop(job, GUIDED)
 
     async def _drop_movement(self, job: Job) -> None:
         """Give a stopped vehicle a zero velocity in place of its old setpoint, until it reports that.
@@ -154,7 +154,8 @@ class Copter(TurningVehicle):
     async def stop(self, job: Job) -> None:
         """Hold the vehicle still, in GUIDED or in its mission, until `resume`; done when telemetry shows it.
 
-        A movement in progress waits; no other begins. A mission that cannot be paused now is left for BRAKE.
+        A movement in progress waits; no other begins. A mission that cannot be paused, or does not answer, is left for
+        BRAKE.
 
         Raises:
             ModeChanged: it is in another mode.
@@ -169,14 +170,14 @@ class Copter(TurningVehicle):
         self.authority.interrupt(job)
         try:
             await self.commands.send(messages.pause(True), self.commanding(job, lambda: self.held_by(mode)))
-        except TimedOut:
-            pass  # the acks may be lost: telemetry shows whether it stands still
-        except Rejected:
-            if mode == GUIDED:
+        except (Rejected, TimedOut) as error:
+            if mode != GUIDED:  # a mission may stand at a waypoint, and go on
+                await self.switch_to(job, self.holding_mode)
+                mode = self.holding_mode
+            elif isinstance(error, Rejected):
                 self.authority.end_pause()
                 raise
-            await self.switch_to(job, self.holding_mode)
-            mode = self.holding_mode
+            # else the acks may be lost: telemetry shows whether it stands still
         names = {"LOCAL_POSITION_NED"}
         await self.flown(mode, names, lambda: self.stands_still or None, STOP_TIMEOUT, "stop")
         self.authority.shown(job)
@@ -191,12 +192,7 @@ class Copter(TurningVehicle):
         interrupted = self.authority.interrupted
         if interrupted is not None and interrupted.steers and not interrupted.running and mode == GUIDED:
             await self.send_setpoint(job, STANDSTILL)  # its setpoints have stopped
-        await self._continue(job, mode)
-
-    async def _continue(self, job: Job, mode: str) -> None:
-        """End the pause of a vehicle that is in `mode`."""
-        await self.commands.send(messages.pause(False), self.commanding(job, lambda: self.require_mode(mode)))
-        self.authority.end_pause()
+        await self.end_stop(job, mode)
 
     async def hold(self, job: Job) -> None:
         """Stop and stay: by zero velocities in GUIDED, else by BRAKE.
@@ -222,4 +218,4 @@ class Copter(TurningVehicle):
             await self.commands.send(messages.pause(True), self.commanding(job, self.flying))
             await asyncio.sleep(SLOWDOWN)
         await self.rest(job)
-        await self._continue(job, GUIDED)
+        await self.end_stop(job, GUIDED)

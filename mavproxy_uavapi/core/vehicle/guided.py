@@ -234,10 +234,15 @@ class GuidedVehicle(Vehicle):
         self.own_target.sent(target, must_show=must_show)
 
     async def take_up(self, job: Job, target: Target, yaw: Yaw) -> None:
-        """Begin a movement. ArduCopter goes back to its own speeds when the kind of setpoint changes."""
-        other_kind = not self.own_target.is_of_kind_in_force(target)
+        """Begin a movement. ArduCopter goes back to its own speeds when the kind of setpoint changes.
+
+        A vehicle that does not take its speeds after the setpoint is stopped: else it flies there at another speed.
+        """
+        other_kind, steers = not self.own_target.is_of_kind_in_force(target), job.steers
         await self.send_setpoint(job, target, yaw, must_show=not isinstance(target, VelocityTarget))
+        job.steers = True
         await self.send_speeds(job, new_kind=other_kind)
+        job.steers = steers
 
     async def send_speeds(self, job: Job, *, new_kind: bool) -> None:
         """Send the speeds that go with a movement; `new_kind`: whether its setpoint is of another kind."""

@@ -46,6 +46,7 @@ class Job:
         began_at, ended_at: on the loop's clock (s); ended_at is None while it runs.
         ending: why it ended; None while it runs.
         steers: whether the job flies the vehicle by a stream of setpoints, without which the vehicle must stop.
+        is_interrupted: whether it waits for the end of a `stop`.
         modes: names of the flight modes that it switched to; in any other mode the pilot has the vehicle.
         script: the session of a script that the job goes on for; None for no script.
         outlives_client: whether it goes on when its client hangs up (land, rtl).
@@ -77,6 +78,7 @@ class Job:
         self.ended_at: float | None = None
         self.ending: Ending | None = None
         self.steers = False
+        self.is_interrupted = False
         self.modes: set[str] = set()
         self.script: str | None = None
         self._task: asyncio.Task[None] | None = None
@@ -93,8 +95,8 @@ class Job:
         return not self._finished.is_set()
 
     def is_for(self, verb: str, request: Mapping[str, Any]) -> bool:
-        """Whether it does exactly what another request asks for."""
-        return self.verb == verb and self.request == dict(request)
+        """Whether it does exactly what another request asks for; what a `stop` interrupted does not."""
+        return self.verb == verb and self.request == dict(request) and not self.is_interrupted
 
     @property
     def outcome_name(self) -> str:

@@ -75,6 +75,8 @@ async def begin(vehicle: Vehicle, job: Job, startable: Callable[[], None]) -> No
     job.modes |= MISSION_MODES  # also where the vehicle is in AUTO already
     if vehicle.mode != AUTO:
         await vehicle.switch_to(job, AUTO, startable)
+    if vehicle.authority.paused:
+        await vehicle.end_stop(job, vehicle.mode)
     await vehicle.commands.send(messages.start_mission(), vehicle.commanding(job, lambda: _held(vehicle)))
     started = vehicle.clock()
 

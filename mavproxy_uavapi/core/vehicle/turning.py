@@ -49,7 +49,10 @@ class TurningVehicle(TravellingVehicle):
         """
         self.require_guided_flight()
         self.authority.accompany(job, YAW)
-        target = self.own_target.due(await setpoint_in_force.ask(self.state, self.waiting, self.link))
+        asked_at = self.clock()
+        reported = await setpoint_in_force.ask(self.state, self.waiting, self.link)
+        is_outdated = self.own_target.sent_at >= asked_at  # by what has been sent meanwhile
+        target = self.own_target.newest if is_outdated else self.own_target.due(reported)
         self.require_no_takeoff()
         await self.send_setpoint(job, target or self.ned_from_here(0, 0, 0), Yaw(rate=math.radians(rate)))
         least, share = RATE_TOLERANCE

@@ -99,6 +99,12 @@ class Vehicle(Verbs):
 
     # -- stopping -----------------------------------------------------------------------------------------
 
+    async def end_stop(self, job: Job, mode: str) -> None:
+        """Have a vehicle go on that `stop` holds in `mode`, unless it is stopped anew meanwhile."""
+        await self.commands.send(messages.pause(False), self.commanding(job, lambda: self.require_mode(mode)))
+        if job is not self.authority.interrupted:
+            self.authority.end_pause()
+
     @property
     def stops_in_its_mode(self) -> bool:
         """Whether `hold` switches no mode."""

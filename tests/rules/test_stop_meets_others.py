@@ -1,0 +1,156 @@
+"""A `stop` among other verbs: what ends it, what it ends, and what goes on afterwards."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from mavproxy_uavapi.sim.mission import Item
+from tests.support.world import PLACE, World, item_at
+
+PAUSE, SPEED = mavlink.MAV_CMD_DO_PAUSE_CONTINUE, mavlink.MAV_CMD_DO_CHANGE_SPEED
+FAR = {"x": 300, "y": 0, "z": -8}
+GO = "/movement/go_to_ned_wait"
+
+
+def speed(world: World) -> float:
+    return math.hypot(*world.copter.body.velocity)
+
+
+def stop(world: World) -> str:
+    return world.ask("GET", "/movement/stop").outcome
+
+
+def commands(world: World, number: int, since: float) -> list[Any]:
+    return [message for message in world.orders(since) if getattr(message, "command", None) == number]
+
+
+def begin_and_stop(world: World, path: str) -> Any:
+    """Begin what ends a stop, and stop again as soon as it has sent that; the call that ends the first stop."""
+    since = world.loop.time() - 1e-3
+    call = world.begin("GET", path)
+    while not commands(world, PAUSE, since):
+        world.loop.pass_time(0.01)
+    assert stop(world) == "200"
+    assert [message.param1 for message in commands(world, PAUSE, since)] == [1.0, 0.0]  # it goes on, and pauses
+    return call
+
+
+@pytest.mark.parametrize("seconds", [0.0, 0.3, 1.0])
+def test_stop_while_a_takeoff_ends_an_earlier_stop(on_ground: World, seconds: float) -> None:
+    world = on_ground
+    assert stop(world) == "200"
+    world.fault("delay_acks", command=PAUSE, seconds=seconds)
+    takeoff = begin_and_stop(world, "/command/takeoff?alt=20")
+    world.loop.pass_time(5.0)
+    assert world.at[2] == pytest.approx(0.0, abs=0.1)
+    assert world.ask("GET", "/movement/resume").outcome == "200"
+    assert world.answer(takeoff).outcome == "200"  # it has waited, as any movement does
+
+
+@pytest.mark.parametrize("seconds", [0.0, 0.3])
+def test_stop_while_guided_ends_an_earlier_stop(world: World, seconds: float) -> None:
+    world.begin("POST", GO, FAR)
+    world.loop.pass_time(3.0)
+    assert stop(world) == "200"
+    world.fault("delay_acks", command=PAUSE, seconds=seconds)
+    begin_and_stop(world, "/command/guided")
+    assert world.ask("POST", "/movement/go_to_ned", FAR).outcome == "409 paused"
+    assert speed(world) < 0.1
+
+
+def test_a_mission_that_stands_and_does_not_answer_is_left_for_brake(make_world: Any) -> None:
+    def waits(world: World) -> None:
+        world.flying()
+        frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
+        here = round((PLACE[0] + 5e-5) * 1e7), round(PLACE[1] * 1e7)
+        a_minute = Item(mavlink.MAV_CMD_NAV_WAYPOINT, frame, 60, 0, 0, 0, *here, 10.0)
+        world.copter.mission.items[:] = [item_at(*PLACE), a_minute, item_at(PLACE[0] + 0.003, PLACE[1])]
+        world.in_mode("AUTO")
+        world.by_hand(mavlink.MAV_CMD_MISSION_START)
+        world.simulator.run(12.0)
+
+    world = make_world(waits)
+    assert speed(world) < 0.1
+    world.uplink_until = world.loop.time() + 8.0
+    assert stop(world) == "200"
+    assert world.copter.mode.name == "BRAKE"
+    world.loop.pass_time(90.0)
+    assert speed(world) < 0.1
+
+
+def test_the_same_takeoff_again_ends_the_stop(on_ground: World) -> None:
+    world = on_ground
+    world.begin("GET", "/command/takeoff?alt=10")
+    world.loop.pass_time(0.3)
+    assert stop(world) == "200"
+    assert world.ask("GET", "/command/takeoff?alt=10").outcome == "200"
+    assert world.at[2] == pytest.approx(-10.0, abs=0.5)
+
+
+@pytest.mark.parametrize("wait", ["true", "false"])
+def test_the_same_movement_again_is_refused_as_any_other(world: World, wait: str) -> None:
+    first = world.begin("POST", GO, FAR)
+    world.loop.pass_time(3.0)
+    assert stop(world) == "200"
+    again = world.ask("POST", f"{GO}?wait={wait}", FAR)
+    if wait == "true":
+        assert again.outcome == "409 paused"
+    else:
+        world.loop.pass_time(0.1)
+        assert world.ask("GET", again.headers["location"]).body["error"]["code"] == "paused"
+    assert world.ask("GET", "/movement/resume").outcome == "200"
+    assert world.answer(first).outcome == "200"
+
+
+@pytest.mark.parametrize("body", [{}, {"until_complete": True}])
+def test_a_mission_is_started_anew_after_a_stop(make_world: Any, body: dict[str, bool]) -> None:
+    world = make_world(World.on_mission)
+    world.begin("POST", "/mission/start", body)
+    world.loop.pass_time(5.0)
+    assert stop(world) == "200"
+    again = world.begin("POST", "/mission/start", body)
+    world.loop.pass_time(5.0)
+    assert speed(world) > 3.0
+    assert world.answer(again).outcome == "200"
+
+
+def test_a_yaw_rate_does_not_revive_a_velocity_that_ends(world: World) -> None:
+    late: list[Any] = []
+
+    def is_not_late(message: Any) -> bool:
+        if message.get_type() != "POSITION_TARGET_LOCAL_NED":
+            return True
+        late.append(message)
+        return False
+
+    travel = world.begin("POST", "/movement/travel_at_ned", {"vx": 6, "vy": 0, "vz": 0, "duration": 5})
+    world.loop.pass_time(4.9)
+    world.hears = is_not_late
+    world.begin("POST", "/movement/set_yaw_rate", {"yaw_rate": 20})  # asks what is in force
+    world.loop.pass_time(0.05)
+    assert world.answer(travel).outcome == "200"
+    world.hears = lambda _message: True
+    world.host.bridge.feed(late[0])
+    world.host.bridge.turn()
+    world.loop.pass_time(1.0)
+    setpoints = [message for message in world.orders() if message.get_type() == "SET_POSITION_TARGET_LOCAL_NED"]
+    assert [message.vx for message in setpoints[-2:]] == [0.0, 0.0]  # the end, and the yaw rate
+
+
+@pytest.mark.parametrize("fault", ["refuse", "drop"])
+@pytest.mark.parametrize("path", [GO, "/movement/go_to_ned"])
+def test_a_movement_whose_speed_is_not_taken_ends_at_rest(make_world: Any, path: str, fault: str) -> None:
+    world = make_world(lambda world: world.flying("LOITER"))
+    assert world.ask("GET", "/command/set_ground_speed?new_v=3").outcome == "200"
+    assert world.ask("GET", "/command/guided").outcome == "200"
+    if fault == "refuse":
+        world.fault("refuse", command=SPEED, result=mavlink.MAV_RESULT_FAILED, text="no")
+    else:
+        world.fault("drop", message="COMMAND_LONG", command=SPEED)
+    assert world.ask("POST", path, FAR).outcome in ("500 rejected", "504 timeout")
+    world.loop.pass_time(8.0)
+    assert speed(world) < 0.1
