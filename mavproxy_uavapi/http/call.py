@@ -20,6 +20,7 @@ from mavproxy_uavapi.core.timeout import wait_with_timeout
 from mavproxy_uavapi.core.values import boolean
 from mavproxy_uavapi.core.vehicle.copter import Copter
 from mavproxy_uavapi.core.vehicle.jobs import Job
+from mavproxy_uavapi.core.vehicle.start_gate import begun_before
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.files.tokens import Token, Tokens
 from mavproxy_uavapi.http.broadcast import TelemetryBroadcast
@@ -257,8 +258,9 @@ class Call:
         else:
             job.join(on_disconnect)
             self._take_over(job, holder if lease else job.holder)
+            begun_before()
         if lease is not None:
-            host.leases.take(vehicle, holder, lease)
+            host.leases.ask(job, holder, lease)
         return job
 
     def _take_over(self, job: Job, holder: str) -> None:

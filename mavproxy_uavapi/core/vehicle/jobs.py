@@ -88,6 +88,8 @@ class Job:
         self._sessions_sought = 0
         self._goes_on_for_others = False  # than a script
         self._when_ended: list[Callable[[], None]] = []
+        self._commands = False
+        self._when_commanding: list[Callable[[], None]] = []
 
     @property
     def running(self) -> bool:
@@ -129,6 +131,7 @@ class Job:
             self._finish(Ending.DEFECT, error=UavApiError(sentence))
             raise
         else:
+            self.commands()
             self._finish(Ending.DONE, result)
 
     def abort(self, error: UavApiError, ending: Ending | None = None) -> None:
@@ -156,6 +159,19 @@ class Job:
     def when_ended(self, callback: Callable[[], None]) -> None:
         """Call `callback` when the outcome of a running job is known."""
         self._when_ended.append(callback)
+
+    def commands(self) -> None:
+        """Note that it commands its vehicle, or has done what it should without that."""
+        self._commands = True
+        callbacks, self._when_commanding = self._when_commanding, []
+        for callback in callbacks:
+            callback()
+
+    def when_commanding(self, callback: Callable[[], None]) -> None:
+        """Call `callback` once the job commands its vehicle, at once if it does already; never if it is refused."""
+        self._when_commanding.append(callback)
+        if self._commands:
+            self.commands()
 
     async def go_on_for(self, session: Awaitable[str | None]) -> str | None:
         """Have the job go on without its clients: while a script lives, or to its end if no script asks for that.

@@ -83,6 +83,21 @@ class Leases:
             self._leases[vehicle] = Lease(holder, seconds, self._clock() + seconds)
             self._timers[vehicle] = self._loop.call_later(seconds, self._look, vehicle)
 
+    def ask(self, job: Job, holder: str, seconds: float) -> None:
+        """As `take` once a client's job commands; a refused call changes no lease.
+
+        The lease of another client is left alone, unless this one has the flight.
+        """
+
+        def begun() -> None:
+            lease, authority = self.of(job.vehicle), job.vehicle.authority
+            flights = [flight for flight in (authority.commander, authority.interrupted) if flight is not None]
+            has_flight = seconds > 0 and holder in map(self._whose, flights)
+            if lease is None or lease.holder == holder or has_flight:
+                self.take(job.vehicle, holder, seconds)
+
+        job.when_commanding(begun)
+
     def renew(self, holder: str) -> None:
         """A call of that client arrived."""
         for lease in self._leases.values():

@@ -81,6 +81,13 @@ class _Place:
 _place: contextvars.ContextVar[_Place | None] = contextvars.ContextVar("place", default=None)
 
 
+def begun_before() -> None:
+    """The present verb joins a job, which has its vehicle already: nobody waits at the gate for its end."""
+    place = _place.get()
+    if place is not None:
+        place.come()
+
+
 async def pass_gate() -> bool:
     """Wait for the other verbs, if the present verb has a place at a gate; called before the checks for a message.
 

@@ -125,6 +125,17 @@ def test_all_or_none_begins_together_when_all_can(make_drone: Any, api: Any, loo
     assert second.armed
 
 
+@pytest.mark.parametrize("verb", ["land", "rtl"])
+def test_all_or_none_does_not_wait_for_one_that_does_it_already(three: Any, api: Any, verb: str) -> None:
+    api.begin("POST", f"/fleet/{verb}", json={"vehicles": [1]})
+    api.loop.pass_time(1.5)
+    both = api.begin("POST", f"/fleet/{verb}", json={"vehicles": [1, 2], "all_or_none": True})
+    api.loop.pass_time(1.5)
+    assert three[1].mode == verb.upper() and three[0].armed
+    assert api.loop.run_until_complete(both).status == 200
+    assert not three[1].armed
+
+
 def test_who_waits_at_the_gate_still_heeds_the_pilot(make_drone: Any, api: Any, loop: Any) -> None:
     first, second = make_drone(1), make_drone(2)
     second.ready = False
