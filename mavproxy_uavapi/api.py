@@ -88,6 +88,8 @@ class Api:
         await self._tasks.end()
         self.host.send_unwaited(self._streams.closing_messages())
         await server.service.scripts.stop()
+        for vehicle in self.host.registry.all():
+            vehicle.repeat_nothing()
         await server.stop()
 
     def filenos(self) -> list[int]:

@@ -9,6 +9,8 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from tests.support.world import World
+
 ARM, PAUSE = mavlink.MAV_CMD_COMPONENT_ARM_DISARM, mavlink.MAV_CMD_DO_PAUSE_CONTINUE
 MODE = mavlink.MAV_CMD_DO_SET_MODE
 GO = "/movement/go_to_ned_wait"
@@ -31,7 +33,31 @@ def speed(world: Any) -> float:
     return math.hypot(*world.copter.body.velocity)
 
 
+def test_arm_against_a_disarm_on_its_way_is_busy(on_ground: Any) -> None:
+    disarm = on_ground.begin("GET", "/command/disarm")
+    on_ground.loop.pass_time(0.03)
+    assert on_ground.ask("GET", "/command/arm").outcome == "409 busy"
+    assert on_ground.answer(disarm).outcome == "200"
+    assert not on_ground.copter.armed
+
+
 # -- an arm that waits ------------------------------------------------------------------------------------
+
+
+def test_arm_on_its_way_is_undone_by_the_closing_message(make_world: Any) -> None:
+    world = make_world(World.boot)
+    world.in_mode("GUIDED")
+    world.loop.pass_time(3.0)
+    world.begin("GET", "/command/arm")
+    while not any(getattr(message, "command", None) == ARM for message in world.orders()):
+        world.loop.pass_time(0.01)
+
+    async def unload() -> list[Any]:
+        world.host.jobs.abort_remote("the API is stopping")
+        return [message for message, _ in world.host.endings.closing_messages()]
+
+    (message,) = world.loop.run(unload())
+    assert (message.command, message.param1) == (ARM, 0)
 
 
 @pytest.mark.parametrize("verb", ["disarm", "land", "rtl", "brake"])

@@ -93,6 +93,43 @@ def test_lease_is_given_back(world: Any) -> None:
     assert speed(world) > 4.0
 
 
+@pytest.mark.parametrize("lease", [0, 20])
+def test_refused_call_of_another_leaves_it(world: Any, lease: int) -> None:
+    world.ask("POST", QUIET, FAR)
+    assert world.ask("GET", f"/command/takeoff?alt=5&lease={lease}&client=other").outcome == "409 busy"
+    assert shown(world)["client"] == "mission@127.0.0.1"
+    world.loop.pass_time(12.0)
+    assert speed(world) < 0.3
+
+
+@pytest.mark.parametrize("lease", [0, 20])
+def test_client_without_the_flight_neither_ends_nor_takes_it(world: Any, lease: int) -> None:
+    world.ask("POST", QUIET, FAR)
+    assert world.ask("GET", f"/command/set_ground_speed?new_v=6&lease={lease}&client=other").outcome == "200"
+    assert shown(world)["client"] == "mission@127.0.0.1"
+
+
+def test_call_that_begins_no_flight_takes_one_when_it_is_done(world: Any) -> None:
+    world.ask("POST", "/movement/go_to_ned?client=mission", FAR)
+    assert world.ask("DELETE", "/mission/waypoints?lease=5&client=mission").outcome == "200"
+    world.loop.pass_time(12.0)
+    assert speed(world) < 0.3
+
+
+@pytest.mark.parametrize("policy", [Policy.LAND, Policy.RTL])
+@pytest.mark.parametrize("hold", [False, True])
+def test_vehicle_that_the_end_of_the_api_stopped_stays(world: Any, policy: Policy, hold: bool) -> None:
+    """Nobody can renew a lease by then."""
+    world.host.endings.on_lease_end = policy
+    if hold:
+        assert world.ask("POST", "/authority/take", {"lease": 5}).outcome == "200"
+    world.ask("POST", f"/movement/go_to_ned_wait?wait=false{'' if hold else '&lease=5'}", FAR)
+    world.loop.pass_time(2.0)
+    world.loop.call_soon(world.host.jobs.abort_remote, "the API is stopping")
+    world.loop.pass_time(15.0)
+    assert world.copter.mode.name == "GUIDED" and speed(world) < 0.3
+
+
 def test_lease_that_runs_out_while_the_link_is_silent_counts_when_it_is_back(world: Any) -> None:
     world.ask("POST", QUIET, FAR)
     world.loop.pass_time(1.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from mavproxy_uavapi.api import Api
 from mavproxy_uavapi.core.roles import THE_PROMPT
 from mavproxy_uavapi.core.vehicle.guided import REPEATS
 from tests.support.world import MODES, World
@@ -204,6 +206,16 @@ def test_lost_target_of_a_client_that_hung_up_is_not_sent_again(at_first: World)
     at_first.loop.pass_time(0.5)
     wire.hang_up()
     at_first.loop.pass_time(30.0)
+    assert len(setpoints(at_first)) == 1
+
+
+def test_lost_target_is_not_sent_again_after_the_api_has_stopped(at_first: World) -> None:
+    loop, api = at_first.loop, Api(at_first.host)
+    loop.run(api.start(dataclasses.replace(at_first.service.settings, port=0)))
+    assert at_first.ask("POST", "/movement/go_to_ned", SECOND).outcome == "200"
+    loop.pass_time(0.5)
+    loop.run(api.stop())
+    loop.pass_time(10.0)
     assert len(setpoints(at_first)) == 1
 
 

@@ -13,6 +13,7 @@ from typing import Any
 
 from mavproxy_uavapi.core.errors import LinkLost, ModeChanged, NotArmed, Paused
 from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission
+from mavproxy_uavapi.core.vehicle import messages
 from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_uavapi.core.vehicle.jobs import Ending, Job, JobBook
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
@@ -153,11 +154,8 @@ class FlightEndings:
 
     def closing_messages(self) -> list[tuple[Any, int]]:
         """Messages that must be sent before the link is given back, and the systems that they go to."""
-        closing_messages = []
-        for job in self._closing.values():
-            if job.running:
-                closing_messages.append((job.vehicle.hold_message(), job.vehicle.state.system))
-        return closing_messages
+        running = [job for job in self._closing.values() if job.running]
+        return [(_closing_message(job), job.vehicle.state.system) for job in running]
 
     def see_to(
         self, vehicle: Vehicle, policy: Policy, why: str, client: str, modes: Collection[str] = ()
@@ -198,8 +196,15 @@ class FlightEndings:
             return f"{action} is done"
 
         job = self._jobs.begin(vehicle, f"{action} {why}", {}, body, client=client, outlives_client=True)
+        job.holder = job.operator = ""  # it is nobody's flight: no lease that runs out ends it
         vehicle.authority.take(job, Rank.STOP)  # at once, because a command that comes now is newer
         return job
+
+
+def _closing_message(job: Job) -> Any:
+    if job.verb.startswith(DISARM):
+        return messages.disarm(force=False).to(job.vehicle.address, 0)
+    return job.vehicle.hold_message()
 
 
 def _verb(vehicle: Vehicle, action: str) -> Callable[[Job], Awaitable[None]]:

@@ -35,6 +35,7 @@ class Vehicle(Verbs):
             Rejected: it did not get ready, or refused; with the autopilot's reasons.
         """
         if self.state.armed and self.mode == "GUIDED":
+            self.authority.admit(Rank.ARM)
             return
         if self.is_under_way:
             raise self.anothers()
