@@ -154,8 +154,8 @@ class Copter(TurningVehicle):
     async def stop(self, job: Job) -> None:
         """Hold the vehicle still, in GUIDED or in its mission, until `resume`; done when telemetry shows it.
 
-        A movement in progress waits; no other begins. A mission that cannot be paused, or does not answer, is left for
-        BRAKE.
+        A movement in progress waits; no other begins. A mission that cannot be paused, or does not answer, is left
+        for BRAKE.
 
         Raises:
             ModeChanged: it is in another mode.
