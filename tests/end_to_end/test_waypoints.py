@@ -113,6 +113,19 @@ def test_start_begins_at_the_first_item_and_progress_is_reported(rig):
     rig.on_the_ground()
 
 
+def test_mission_is_started_anew_after_a_stop(rig):
+    rig.ok(rig.post("/mission/waypoints", items=[*JSON["items"], {"command": "NAV_LOITER_UNLIM", "alt": 14}]))
+    rig.in_the_air(10)
+    job = rig.post("/mission/start?wait=false", until_complete=True).json()["job"]
+    rig.eventually(lambda: rig.status()["mode"] == "AUTO")
+    rig.ok(rig.get("/movement/stop"))
+    rig.ok(rig.post("/mission/start"))
+    rig.eventually(lambda: rig.ok(rig.get("/mission/progress"))["info"]["last_reached"] == 4)
+    assert rig.get(f"/jobs/{job}").json()["error"]["code"] == "superseded"
+    rig.ok(rig.get("/command/guided"))
+    rig.on_the_ground()
+
+
 def test_pilot_who_leaves_auto_ends_the_wait(rig):
     rig.ok(rig.post("/mission/waypoints", items=[*JSON["items"], {"command": "NAV_LOITER_UNLIM", "alt": 14}]))
     rig.in_the_air(10)
