@@ -318,13 +318,12 @@ class TagFlight:
         if landing.refused and self.report.verb == "land":
             action = "hold"  # its position is safe
         self.report.action = action
-        await self.hear_again()
         if self.plnd is not None:
             try:
                 await self.plnd.switch_off()  # it would also act in RTL
             except Rejected as error:
                 reason = f"{reason} ({error})"
-        self.vehicle.held_by("GUIDED")
+        await self.hear_again()  # last, because the above takes its time
         try:
             if action == "rtl":
                 await self.fly_by("RTL", self.vehicle.rtl)

@@ -33,11 +33,11 @@ async def arm(vehicle: BaseVehicle, job: Job, timeout: float | None) -> None:
             raise ModeChanged(f"the pilot or another client switched the vehicle to {vehicle.mode} meanwhile")
 
     deadline = vehicle.clock() + (max(timeout - REASON_TIME, timeout / 2) if timeout else TIMEOUT)
-    await _get_ready(vehicle, lambda: vehicle.has_position, check_unclaimed, deadline)
+    await _get_ready(vehicle, job, lambda: vehicle.has_position, check_unclaimed, deadline)
     if vehicle.mode != GUIDED:
         await vehicle.switch_to(job, GUIDED, check_unclaimed)
     still_guided = _requires_guided(vehicle)
-    await _get_ready(vehicle, lambda: vehicle.is_ready_to_arm, still_guided, deadline)
+    await _get_ready(vehicle, job, lambda: vehicle.is_ready_to_arm, still_guided, deadline)
     still_guided()
 
     def shown() -> bool:
@@ -86,8 +86,10 @@ def _requires_guided(vehicle: BaseVehicle) -> Callable[[], None]:
 
 
 async def _get_ready(
-    vehicle: BaseVehicle, is_ready: Callable[[], bool], check: Callable[[], None], deadline: float
+    vehicle: BaseVehicle, job: Job, is_ready: Callable[[], bool], check: Callable[[], None], deadline: float
 ) -> None:
+    """Wait until it is ready, and after a moment also for the next heartbeat: its pilot may have it by now."""
+
     def ready() -> bool | None:
         check()
         return True if is_ready() or vehicle.state.armed else None
@@ -98,6 +100,9 @@ async def _get_ready(
         await vehicle.waiting.until(names, ready, remaining, "get ready")
     except TimedOut:
         raise await _why_not_ready(vehicle, remaining) from None
+    if job.is_late and not vehicle.state.armed:
+        await vehicle.hear_again()
+        check()
 
 
 async def _why_not_ready(vehicle: BaseVehicle, waited: float) -> Rejected:

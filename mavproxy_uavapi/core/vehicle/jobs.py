@@ -15,6 +15,7 @@ from mavproxy_uavapi.core.errors import Aborted, Superseded, TimedOut, UavApiErr
 from mavproxy_uavapi.core.sent_messages import SentNames, noting_sent_unless_noted
 
 FINISHED_KEPT = 100
+MOMENT = 1.0  # s after its request, in which its client knows what the pilot did
 CONSOLE = "console"  # the client of what was typed at MAVProxy's prompt
 
 
@@ -95,6 +96,11 @@ class Job:
     def running(self) -> bool:
         """Whether it has no outcome yet."""
         return not self._finished.is_set()
+
+    @property
+    def is_late(self) -> bool:
+        """Whether it was requested more than a moment ago: then a mode switch waits for `hear_again`."""
+        return self._loop.time() - self.began_at > MOMENT
 
     def is_for(self, verb: str, request: Mapping[str, Any]) -> bool:
         """Whether it does exactly what another request asks for; what a `stop` interrupted does not."""

@@ -74,6 +74,8 @@ async def begin(vehicle: Vehicle, job: Job, startable: Callable[[], None]) -> No
     await vehicle.commands.send(messages.set_mission_current(1), vehicle.commanding(job, startable))
     job.modes |= MISSION_MODES  # also where the vehicle is in AUTO already
     if vehicle.mode != AUTO:
+        if job.is_late:
+            await vehicle.hear_again()  # a pilot may have taken it since the last heartbeat
         await vehicle.switch_to(job, AUTO, startable)
     if vehicle.authority.paused:
         await vehicle.end_stop(job, vehicle.mode)

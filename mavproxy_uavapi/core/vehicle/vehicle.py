@@ -93,10 +93,19 @@ class Vehicle(Verbs):
         """
         switch = messages.set_mode(mode_number(self.state.vehicle_type, mode))
         if flies_mission(mode.upper()) and self.guard.in_force:
+            since = self.state.mode_since
             self.guard.require_mission(await self.mission_to_fly(), from_here=True)
+            if job.is_late:
+                await self.hear_again()
+            self.require_own_mode(since)
         stops = mode.upper() in STOPPING_MODES.union(self.holding_modes)
         await self.take(job, Rank.STOP if stops else Rank.ARM, self.inside(switch))
         await self.switch_to(job, mode)
+
+    def require_own_mode(self, since: float) -> None:
+        """Raise ModeChanged if another has switched its mode; `since`: what `state.mode_since` was."""
+        if self.state.mode_since != since and not self.obeys_us:
+            raise ModeChanged(f"the pilot or a failsafe switched the vehicle to {self.mode} meanwhile")
 
     # -- stopping -----------------------------------------------------------------------------------------
 

@@ -319,3 +319,24 @@ def test_a_target_that_is_no_number_is_not_reported_and_the_landing_goes_on_by_i
     assert rig.mode == "LAND"
     assert plnd(rig) == before
     assert all(map(is_finite, rig.wire.sent))
+
+
+def test_pilot_who_takes_it_while_plnd_is_switched_off_keeps_it(flying: Any) -> None:
+    rig = flying(plnd=True, alt=5.0, attempts=1)
+    rig.eye.blind = lambda pose: -pose[0][2] < 3.0
+    rig.each_step.append(lambda: setattr(rig.eye, "blind", lambda _: True) if -rig.truth.down < 3.0 else None)
+    job = rig.land(method="landing_target")
+    until(rig, lambda: rig.mode == "LAND")
+    until(rig, lambda: rig.mode == "GUIDED")
+    since = len(rig.wire.sent)
+    while not sent(rig, "PARAM_REQUEST_READ", since):
+        rig.pass_time(0.01)
+    hear = rig.host._receive
+    silent(rig, "HEARTBEAT")
+    since = len(rig.wire.sent)
+    pilot(rig, MODES["LOITER"])
+    rig.pass_time(0.9)
+    rig.host._receive = hear
+    assert rig.outcome(job).code == "mode_changed"
+    modes = [message for message in sent(rig, "COMMAND_LONG", since) if message.command == SWITCH_MODE]
+    assert modes == [] and rig.mode == "LOITER"
