@@ -10,6 +10,7 @@ import re
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, TypeVar, cast
 
 from aiohttp import web
@@ -169,7 +170,7 @@ class Call:
             Busy: somebody else holds it, and the route does not stop it.
         """
         self.require_right(vehicle.state.system)
-        if self._route is not None and self._route.commands and not self._route.stops:
+        if self._route is not None and self._route.obeys_holder:
             self.require_unheld(vehicle)
 
     def require_unheld(self, vehicle: Vehicle) -> None:
@@ -255,6 +256,8 @@ class Call:
         if joined is None:
             job.on_disconnect = on_disconnect
             job.holder, job.operator = holder, self.caller.operator.name
+            if self._route is not None and self._route.obeys_holder:
+                job.require_permit = partial(host.holds.require, vehicle, self.caller.operator)
         else:
             job.join(on_disconnect)
             self._take_over(job, holder if lease else job.holder)
@@ -269,6 +272,7 @@ class Call:
         job.holder = holder
         if hold is not None and hold.operator.name == self.caller.operator.name:
             job.operator = hold.operator.name
+            job.require_permit = partial(self.service.host.holds.require, job.vehicle, self.caller.operator)
 
     async def outcome(self, job: Job, script: str | None = None) -> str:
         """Await a job for the client; `script` is the client's session, if it is a script.

@@ -39,6 +39,11 @@ class Route:
         return self.methods != ("GET",)
 
     @property
+    def obeys_holder(self) -> bool:
+        """Whether it is refused while somebody else holds the vehicle."""
+        return self.commands and not self.stops
+
+    @property
     def pattern(self) -> re.Pattern[str]:
         """Matches the paths of this route, with any value for each `{name}`."""
         return re.compile(re.sub(r"\\{(\w+)\\}", r"(?P<\1>[^/]+)", re.escape(self.path)))

@@ -323,3 +323,31 @@ def test_who_reads_the_mission_all_the_time_does_not_delay_its_start(world: Any)
     world._streams += [world.loop.create_task(read()) for _ in range(3)]
     world.loop.pass_time(5.0)
     assert alone > 5.0 and [seconds_to_start() < alone + 1.0 for _ in range(3)] == [True] * 3
+
+
+@pytest.mark.parametrize("joined", [False, True])
+def test_an_arm_that_waits_ends_when_another_operator_takes_the_vehicle(
+    make_world: Any, tmp_path: Path, joined: bool
+) -> None:
+    def unready(world: Any) -> None:
+        world.boot()
+        world.fault("ekf_bad", seconds=10.0)
+        world.simulator.run(1.0)
+
+    world = make_world(unready, tokens=tokens.write(tmp_path / "tokens", tokens.ALL))
+    arm = world.begin("GET", "/command/arm", headers=tokens.bearer("bo"))
+    world.loop.pass_time(2.0)
+    take(world, "anna", lease=100)
+    if joined:  # then it is the new holder's, too
+        assert ask(world, "anna", "GET", "/command/arm").outcome == "200"
+    assert world.answer(arm).outcome == ("200" if joined else "409 busy")
+    assert world.copter.armed is joined
+
+
+def test_a_mission_that_is_being_read_does_not_begin_when_another_operator_takes_the_vehicle(world: Any) -> None:
+    world.copter.mission.items[:] = [item_at(PLACE[0] + 1e-6 * number, PLACE[1]) for number in range(100)]
+    start = world.begin("POST", "/mission/start", b"{}", headers=tokens.bearer("bo"))
+    world.loop.pass_time(0.5)
+    take(world, "anna")
+    assert world.answer(start).outcome == "409 busy"
+    assert world.copter.mode.name == "GUIDED"

@@ -10,6 +10,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.geodesy import METRES_PER_DEGREE
+from mavproxy_uavapi.core.roles import THE_PROMPT
 from mavproxy_uavapi.core.vehicle.traffic import expected
 from tests.support.at_once import AtOnce
 from tests.support.crossing_flights import APART, Fleet
@@ -189,3 +190,41 @@ def test_a_mission_is_held_against_the_others_before_it_begins(pair: Fleet) -> N
     assert mode(pair, 1) == "GUIDED"
     assert pair.ask(2, "movement/go_to_gps_wait", to(-60, APART)).outcome == "200"
     assert pair.ask(1, "mission/start").outcome == "200"
+
+
+def other_station(fleet: Fleet) -> None:
+    fleet.by_hand(1, of_another_station(1, -20.0, 0.0))
+
+
+def other_operator(fleet: Fleet) -> None:
+    fleet.world.host.holds.take(fleet.world.host.registry.find(1), THE_PROMPT, 0)
+
+
+def pilot_and_back(fleet: Fleet) -> None:
+    fleet.world.in_mode("LOITER")
+    fleet.world.loop.pass_time(1.5)
+    fleet.world.in_mode("GUIDED")
+
+
+@pytest.mark.parametrize(
+    ("other", "outcome"),
+    [
+        (other_station, "409 superseded"),
+        (other_operator, "409 busy"),
+        (pilot_and_back, "409 mode_changed"),
+        (lambda _: None, "200"),
+    ],
+)
+def test_command_that_waits_ends_when_somebody_else_has_the_vehicle(
+    make: Callable[..., Fleet], other: Callable[[Fleet], None], outcome: str
+) -> None:
+    fleet = make(2, separation=SEPARATION, on_conflict="wait")
+    fleet.world.loop.pass_time(1.0)
+    going = fleet.begin(1, "movement/go_to_gps_wait", to(0, 30))
+    fleet.world.loop.pass_time(3.0)
+    before = len(orders(fleet))
+    other(fleet)
+    fleet.world.loop.pass_time(10.0)
+    assert len(orders(fleet)) == before
+    assert fleet.ask(2, "movement/go_to_gps_wait", to(60, 15)).outcome == "200"
+    assert fleet.world.answer(going).outcome == outcome

@@ -91,6 +91,7 @@ async def _get_ready(
     """Wait until it is ready, and after a moment also for the next heartbeat: its pilot may have it by now."""
 
     def ready() -> bool | None:
+        job.require_permit()
         check()
         return True if is_ready() or vehicle.state.armed else None
 

@@ -119,10 +119,11 @@ class CommandAuthority:
             allow: asked after the rank; what it raises refuses the job.
 
         Raises:
-            Busy, Paused: as `admit`; then nothing has changed. Likewise what `allow` raises.
+            Busy, Paused: as `admit` and `Job.require_permit`; then nothing has changed. Likewise what `allow` raises.
         """
         if job is not self.commander:
             self.admit(rank)
+            job.require_permit()
         allow()
         if job is not self.commander:
             self._supersede([self.commander, self.interrupted], job)
@@ -163,9 +164,10 @@ class CommandAuthority:
             allow: as for `take`.
 
         Raises:
-            Busy, Paused: as `admit`. Also what `allow` raises.
+            Busy, Paused: as `admit` and `Job.require_permit`. Also what `allow` raises.
         """
         self.admit(rank, stopped_too=stopped_too)
+        job.require_permit()
         allow()
         self._supersede([self._companions.get(kind)], job)
         self._companions[kind] = job

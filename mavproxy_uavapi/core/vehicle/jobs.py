@@ -56,6 +56,7 @@ class Job:
         progress: its last report, such as distance_to_go (m) and altitude (m above home).
         result: the text of its success.
         error: why it failed.
+        require_permit: raises Busy if another operator holds the vehicle, from whom the job must not take it.
         sent: names of the messages sent for it; None where the HTTP call that began it notes them.
     """
 
@@ -68,6 +69,7 @@ class Job:
         self.request = dict(request)
         self.vehicle = vehicle
         self.outlives_client = outlives_client
+        self.require_permit: Callable[[], None] = lambda: None
         self.on_disconnect: str | None = None
         self.stage: dict[str, str | int] = {}
         self.progress: dict[str, float] = {}

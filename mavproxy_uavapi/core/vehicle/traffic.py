@@ -89,10 +89,14 @@ class Traffic:
 
         Raises:
             TooNear: one is, also after LONGEST_WAIT.
-            Superseded: a newer command took the vehicle meanwhile.
+            Superseded: a newer command, or another ground station, took the vehicle meanwhile.
+            ModeChanged: its pilot did.
+            Busy: another operator did.
+            TimedOut, LinkLost: no heartbeat shows whether he did.
         """
         vehicle = job.vehicle
         before, deadline = vehicle.authority.commander, vehicle.clock() + LONGEST_WAIT
+        mode_since, was_foreign = vehicle.state.mode_since, vehicle.has_foreign_target
         while True:
             try:
                 return await verb(job)
@@ -101,8 +105,13 @@ class Traffic:
                     raise
                 job.progress = {"waits_for_vehicle": error.near["vehicle"]}
             await asyncio.sleep(RETRY)
+            await vehicle.hear_again()
             if vehicle.authority.commander is not before:
                 raise Superseded(f"{job.verb} was superseded by {vehicle.authority.commander.verb} while it waited")
+            if vehicle.has_foreign_target and not was_foreign:
+                raise Superseded(f"another ground station gave the vehicle a target while {job.verb} waited")
+            vehicle.require_own_mode(mode_since)
+            job.require_permit()
 
     @property
     def _kept(self) -> float:
