@@ -10,7 +10,7 @@ from dataclasses import replace
 from mavproxy_uavapi.core.errors import ModeChanged, Rejected, TimedOut
 from mavproxy_uavapi.core.vehicle import messages
 from mavproxy_uavapi.core.vehicle.base import BaseVehicle
-from mavproxy_uavapi.core.vehicle.jobs import Job
+from mavproxy_uavapi.core.vehicle.jobs import MOMENT, Job
 
 TIMEOUT = 90.0  # s until an estimator that does not settle is reported
 REASON_TIME = 2.0  # s of a client's timeout that are kept for asking why the vehicle is not ready
@@ -95,13 +95,15 @@ async def _get_ready(
         check()
         return True if is_ready() or vehicle.state.armed else None
 
-    remaining = max(deadline - vehicle.clock(), 0.1)
+    began = vehicle.clock()
+    remaining = max(deadline - began, 0.1)
     names = {"SYS_STATUS", "EKF_STATUS_REPORT", "HEARTBEAT"}
     try:
         await vehicle.waiting.until(names, ready, remaining, "get ready")
     except TimedOut:
         raise await _why_not_ready(vehicle, remaining) from None
-    if job.is_late and not vehicle.state.armed:
+    has_waited = vehicle.clock() - began > MOMENT or (job.is_late and vehicle.mode != GUIDED)
+    if has_waited and not vehicle.state.armed:
         await vehicle.hear_again()
         check()
 
