@@ -38,7 +38,8 @@ def test_raw_message_is_the_vehicles_command_once_it_is_allowed(rig):
     body = {"name": "COMMAND_LONG", "fields": mode | {f"param{number}": 0 for number in range(3, 8)}}
     assert rig.post("/message", **body).json()["code"] == "forbidden"
     rig.set("allow_raw", "True")
-    assert rig.ok(rig.post("/message", **body))["result"] == "COMMAND_LONG accepted"
+    accepted = rig.eventually(lambda: (answer := rig.post("/message", **body)).ok and answer, what="an ack in time")
+    assert accepted.json()["result"] == "COMMAND_LONG accepted"
     rig.eventually(lambda: rig.status()["mode"] == "ALT_HOLD", 5, "mode ALT_HOLD")
     rig.ok(rig.get("/command/guided"))
 
