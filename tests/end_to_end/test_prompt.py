@@ -55,6 +55,11 @@ def test_mavproxys_own_wp_module_still_works_beside_ours(rig, tmp_path):
     rig.mavproxy.ask("wp list", "Saved 5 waypoints")
 
 
+def sent_by(entry):
+    """The names of the messages, however often each was sent: on a busy machine an ack comes late."""
+    return {name.partition(" x")[0] for name in entry["sent"]}
+
+
 def test_the_trail_reports_who_requested_what_and_what_was_sent(rig):
     rig.on_the_ground()
     rig.ok(rig.get("/command/set_home"))
@@ -66,6 +71,6 @@ def test_the_trail_reports_who_requested_what_and_what_was_sent(rig):
     file = rig.directory / "uavapi-audit.jsonl"
     entries = {entry["verb"]: entry for entry in map(json.loads, file.read_text(encoding="utf-8").splitlines())}
     home, takeoff, guided = (entries[f"/command/{verb}"] for verb in ("set_home", "takeoff", "guided"))
-    assert (home["outcome"], set(home["sent"])) == ("ok", {"COMMAND_LONG"})
+    assert (home["outcome"], sent_by(home)) == ("ok", {"COMMAND_LONG"})
     assert (takeoff["outcome"], takeoff["sent"], takeoff["request"]["alt"]) == ("not_armed", [], 3)
-    assert (guided["outcome"], guided["client"], set(guided["sent"])) == ("ok", "127.0.0.1", {"COMMAND_LONG"})
+    assert (guided["outcome"], guided["client"], sent_by(guided)) == ("ok", "127.0.0.1", {"COMMAND_LONG"})
