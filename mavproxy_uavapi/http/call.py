@@ -175,7 +175,10 @@ class Call:
 
     def require_unheld(self, vehicle: Vehicle) -> None:
         """Raise Busy if somebody else of the same or a higher role holds the vehicle."""
-        self.service.host.holds.require(vehicle, self.caller.operator)
+        self._permit(vehicle)()
+
+    def _permit(self, vehicle: Vehicle) -> Callable[[], None]:
+        return partial(self.service.host.holds.require, vehicle, self.caller.operator)
 
     def require_right(self, system: int) -> None:
         """Raise Forbidden unless the caller's token is for that vehicle, whoever holds it."""
@@ -257,7 +260,7 @@ class Call:
             job.on_disconnect = on_disconnect
             job.holder, job.operator = holder, self.caller.operator.name
             if self._route is not None and self._route.obeys_holder:
-                job.require_permit = partial(host.holds.require, vehicle, self.caller.operator)
+                job.require_permit = self._permit(vehicle)
         else:
             job.join(on_disconnect)
             self._take_over(job, holder if lease else job.holder)
@@ -272,7 +275,7 @@ class Call:
         job.holder = holder
         if hold is not None and hold.operator.name == self.caller.operator.name:
             job.operator = hold.operator.name
-            job.require_permit = partial(self.service.host.holds.require, job.vehicle, self.caller.operator)
+            job.require_permit = self._permit(job.vehicle)
 
     async def outcome(self, job: Job, script: str | None = None) -> str:
         """Await a job for the client; `script` is the client's session, if it is a script.

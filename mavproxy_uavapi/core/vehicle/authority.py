@@ -171,7 +171,7 @@ class CommandAuthority:
         allow()
         self._supersede([self._companions.get(kind)], job)
         self._companions[kind] = job
-        job.commands()
+        job.note_command()
 
     def shown(self, job: Job) -> None:
         """Note that telemetry shows the effect of the commander's verb: from now on any rank supersedes it."""
@@ -194,7 +194,7 @@ class CommandAuthority:
         self.commander, self._rank, self._shown = job, rank, False
         kinds = [kind for kind in self._companions if rank > Rank.MOVEMENT or kind == YAW]
         self._supersede([self._companions.pop(kind) for kind in kinds], job)
-        job.commands()
+        job.note_command()
 
     @staticmethod
     def _supersede(jobs: list[Job | None], by: Job) -> None:

@@ -172,6 +172,9 @@ class Copter(TurningVehicle):
             await self.commands.send(messages.pause(True), self.commanding(job, lambda: self.held_by(mode)))
         except (Rejected, TimedOut) as error:
             if mode != GUIDED:  # a mission may stand at a waypoint, and go on
+                if isinstance(error, TimedOut):
+                    await self.hear_again()  # a pilot may have taken it meanwhile
+                self.held_by(mode)
                 await self.switch_to(job, self.holding_mode)
                 mode = self.holding_mode
             elif isinstance(error, Rejected):

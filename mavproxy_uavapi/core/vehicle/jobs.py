@@ -139,7 +139,7 @@ class Job:
             self._finish(Ending.DEFECT, error=UavApiError(sentence))
             raise
         else:
-            self.commands()
+            self.note_command()
             self._finish(Ending.DONE, result)
 
     def abort(self, error: UavApiError, ending: Ending | None = None) -> None:
@@ -168,7 +168,7 @@ class Job:
         """Call `callback` when the outcome of a running job is known."""
         self._when_ended.append(callback)
 
-    def commands(self) -> None:
+    def note_command(self) -> None:
         """Note that it commands its vehicle, or has done what it should without that."""
         self._commands = True
         callbacks, self._when_commanding = self._when_commanding, []
@@ -179,7 +179,7 @@ class Job:
         """Call `callback` once the job commands its vehicle, at once if it does already; never if it is refused."""
         self._when_commanding.append(callback)
         if self._commands:
-            self.commands()
+            self.note_command()
 
     async def go_on_for(self, session: Awaitable[str | None]) -> str | None:
         """Have the job go on without its clients: while a script lives, or to its end if no script asks for that.
