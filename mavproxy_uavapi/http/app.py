@@ -17,8 +17,8 @@ from aiohttp.http_exceptions import HttpProcessingError
 from mavproxy_uavapi.core.errors import NotFound
 from mavproxy_uavapi.http.access import require_role
 from mavproxy_uavapi.http.auditing import audited
-from mavproxy_uavapi.http.bodies import invite
-from mavproxy_uavapi.http.call import SERVICE, Call, Service, holder_of, parameters
+from mavproxy_uavapi.http.bodies import invite, parameters
+from mavproxy_uavapi.http.call import SERVICE, Call, Service, holder_of
 from mavproxy_uavapi.http.caller import CALLER
 from mavproxy_uavapi.http.connection import IDLE_TIMEOUT, LINGER, headers_are_here
 from mavproxy_uavapi.http.cors import TRUSTED_ORIGIN, add_cors_headers

@@ -1,12 +1,21 @@
-"""Request bodies before they are read: which are refused, and 100-continue."""
+"""Request bodies: which are refused, 100-continue, the time that they have, and the parameters in them."""
 
 from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable
+from typing import Any, TypeVar, cast
 
 from aiohttp import HttpVersion11, web
 
 from mavproxy_uavapi.core.errors import BadRequest
+from mavproxy_uavapi.core.timeout import wait_with_timeout
+from mavproxy_uavapi.http.requests import Request, parse
+
+T = TypeVar("T")
 
 CONTINUE = b"HTTP/1.1 100 Continue\r\n\r\n"
+BODY_TIMEOUT = 10.0  # s from the headers to the end of the body
 
 
 async def invite(request: web.BaseRequest) -> None:
@@ -31,3 +40,42 @@ async def invite(request: web.BaseRequest) -> None:
         except ConnectionError as error:
             raise BadRequest("the client hung up before its body was requested") from error
         request.writer.output_size = 0  # the answer's first byte is still to come
+
+
+async def in_time(body: Awaitable[T]) -> T:
+    """The body, when it has arrived.
+
+    Raises:
+        BadRequest: it did not arrive within BODY_TIMEOUT, or the client hung up.
+    """
+    try:
+        return await wait_with_timeout(BODY_TIMEOUT, body)
+    except asyncio.TimeoutError as error:
+        raise BadRequest(f"the body did not arrive within {BODY_TIMEOUT:g} s") from error
+    except ConnectionError as error:
+        raise BadRequest("the client hung up before its body had arrived") from error
+
+
+async def _body(request: web.BaseRequest, form: bool) -> Any:
+    return dict(await request.post()) if form else await request.json()
+
+
+async def parameters(request: web.BaseRequest, model: type[Request], body: bool) -> Request:
+    """The request's parameters: the query's, overridden by those of the body if the route takes one.
+
+    Raises:
+        BadRequest: the body is not a JSON object.
+        Invalid: a value is of the wrong type or out of range.
+    """
+    values: dict[str, Any] = dict(request.query)
+    if not body or not request.can_read_body:
+        return parse(model, "query", values)
+    form = request.content_type == "application/x-www-form-urlencoded"
+    try:
+        body_is_here = request.content.is_eof()  # usually, and then no timeout is needed
+        members = await (_body(request, form) if body_is_here else in_time(_body(request, form)))
+    except (ValueError, LookupError, RecursionError) as error:  # unknown charset; nested too deeply
+        raise BadRequest(f"the body is not {'a form' if form else 'JSON'}: {error}") from error
+    if not isinstance(members, dict):
+        raise BadRequest("the body is not a JSON object")
+    return parse(model, "body", {**values, **cast(dict[str, Any], members)})

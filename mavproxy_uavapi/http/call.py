@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import logging
 import math
@@ -11,13 +10,12 @@ from collections.abc import Awaitable, Callable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
 from aiohttp import web
 
-from mavproxy_uavapi.core.errors import BadRequest, Forbidden, Invalid, NotSupported, TooManyRequests
+from mavproxy_uavapi.core.errors import Forbidden, Invalid, NotSupported, TooManyRequests
 from mavproxy_uavapi.core.host import Host
-from mavproxy_uavapi.core.timeout import wait_with_timeout
 from mavproxy_uavapi.core.values import boolean
 from mavproxy_uavapi.core.vehicle.copter import Copter
 from mavproxy_uavapi.core.vehicle.jobs import Job
@@ -29,7 +27,7 @@ from mavproxy_uavapi.http.browser import is_browser
 from mavproxy_uavapi.http.bucket import Bucket
 from mavproxy_uavapi.http.caller import CALLER, Caller, client_of
 from mavproxy_uavapi.http.log_throttle import LogThrottle
-from mavproxy_uavapi.http.requests import Request, parse
+from mavproxy_uavapi.http.requests import Request
 from mavproxy_uavapi.http.responses import Answer, envelope
 from mavproxy_uavapi.http.router import NOWHERE, Match
 from mavproxy_uavapi.http.streaming import MOST_OPEN, SharedSlots
@@ -361,44 +359,4 @@ def holder_of(request: web.BaseRequest) -> str:
     return address if name is None else f"{name}@{address}"
 
 
-BODY_TIMEOUT = 10.0  # s from the headers to the end of the body
 SERVICE = web.RequestKey("service", Service)
-
-
-async def in_time(body: Awaitable[T]) -> T:
-    """The body, when it has arrived.
-
-    Raises:
-        BadRequest: it did not arrive within BODY_TIMEOUT, or the client hung up.
-    """
-    try:
-        return await wait_with_timeout(BODY_TIMEOUT, body)
-    except asyncio.TimeoutError as error:
-        raise BadRequest(f"the body did not arrive within {BODY_TIMEOUT:g} s") from error
-    except ConnectionError as error:
-        raise BadRequest("the client hung up before its body had arrived") from error
-
-
-async def _body(request: web.BaseRequest, form: bool) -> Any:
-    return dict(await request.post()) if form else await request.json()
-
-
-async def parameters(request: web.BaseRequest, model: type[Request], body: bool) -> Request:
-    """The request's parameters: the query's, overridden by those of the body if the route takes one.
-
-    Raises:
-        BadRequest: the body is not a JSON object.
-        Invalid: a value is of the wrong type or out of range.
-    """
-    values: dict[str, Any] = dict(request.query)
-    if not body or not request.can_read_body:
-        return parse(model, "query", values)
-    form = request.content_type == "application/x-www-form-urlencoded"
-    try:
-        body_is_here = request.content.is_eof()  # usually, and then no timeout is needed
-        members = await (_body(request, form) if body_is_here else in_time(_body(request, form)))
-    except (ValueError, LookupError, RecursionError) as error:  # unknown charset; nested too deeply
-        raise BadRequest(f"the body is not {'a form' if form else 'JSON'}: {error}") from error
-    if not isinstance(members, dict):
-        raise BadRequest("the body is not a JSON object")
-    return parse(model, "body", {**values, **cast(dict[str, Any], members)})

@@ -10,7 +10,8 @@ from mavproxy_uavapi.core.envelope.space import Space
 from mavproxy_uavapi.core.envelope.store import ALL, API, Key
 from mavproxy_uavapi.core.errors import BadRequest, NotFound
 from mavproxy_uavapi.http.access import require_owner
-from mavproxy_uavapi.http.call import Call, in_time
+from mavproxy_uavapi.http.bodies import in_time
+from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.responses import Answer, envelope
 
 

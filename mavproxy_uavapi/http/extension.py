@@ -5,7 +5,8 @@ A module puts its routes into `Host.extensions`, by path; the API serves them wh
     host.extensions["/vision/land"] = Route("/vision/land", land, LandRequest, FLY, EITHER, job=True)
 """
 
-from mavproxy_uavapi.http.call import Call, in_time
+from mavproxy_uavapi.http.bodies import in_time
+from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import NED_REACH, Blocking, Empty, Number, Request, Written
 from mavproxy_uavapi.http.responses import Answer, envelope
 from mavproxy_uavapi.http.route import ADMIN, EITHER, FLY, POST, WATCH, Route

@@ -10,7 +10,7 @@ from aiohttp.base_protocol import BaseProtocol
 from aiohttp.http_exceptions import HttpProcessingError
 
 from mavproxy_uavapi.core.errors import BadRequest
-from mavproxy_uavapi.http.call import in_time
+from mavproxy_uavapi.http.bodies import in_time
 
 CHUNK = 65536  # bytes
 WRAPPING = 65536  # bytes of a form in addition to its file

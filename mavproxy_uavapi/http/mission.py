@@ -11,7 +11,8 @@ from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission
 from mavproxy_uavapi.core.vehicle import mission_files, mission_flight
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
-from mavproxy_uavapi.http.call import Call, in_time
+from mavproxy_uavapi.http.bodies import in_time
+from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.forms import file_of
 from mavproxy_uavapi.http.requests import MissionFile, Read, StartMission
 from mavproxy_uavapi.http.responses import Answer

@@ -14,7 +14,8 @@ from pydantic import Field
 
 from mavproxy_uavapi.core.errors import BadRequest, NotFound, UavApiError
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
-from mavproxy_uavapi.http.call import Call, in_time
+from mavproxy_uavapi.http.bodies import in_time
+from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import Number, Request, parse
 from mavproxy_uavapi.http.responses import MULTI_STATUS, Answer, dumps, reason
 

@@ -15,7 +15,7 @@ from aiohttp import TCPConnector, web
 from aiohttp.test_utils import TestClient, TestServer, make_mocked_request
 
 from mavproxy_uavapi.core.errors import BadRequest, Invalid, NotFound, TooManyRequests, UavApiError
-from mavproxy_uavapi.http import call as calls
+from mavproxy_uavapi.http import bodies
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.caller import CALLER, Caller
 from mavproxy_uavapi.http.requests import parse
@@ -136,7 +136,7 @@ def test_what_is_no_frame_of_the_camera_is_reported():
 
 
 def test_a_frame_that_does_not_arrive_is_reported(monkeypatch):
-    monkeypatch.setattr(calls, "BODY_TIMEOUT", 0.05)
+    monkeypatch.setattr(bodies, "BODY_TIMEOUT", 0.05)
 
     async def slow():
         yield b"\xff\xd8"

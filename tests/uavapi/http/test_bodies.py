@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.http.call import BODY_TIMEOUT
+from mavproxy_uavapi.http.bodies import BODY_TIMEOUT
 from mavproxy_uavapi.http.routes import ROUTES
 from tests.support.api_port import OWNER, START, Port
 

@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.http.call import BODY_TIMEOUT, Call, in_time
+from mavproxy_uavapi.http.bodies import BODY_TIMEOUT, in_time
+from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.caller import CALLER, Caller
 from mavproxy_uavapi.http.requests import Blocking, Empty, Servo
 from mavproxy_uavapi.http.route import FLY, POST, Route
