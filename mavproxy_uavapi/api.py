@@ -85,11 +85,11 @@ class Api:
         if server is None:
             return
         self.host.api_address = None
+        for vehicle in self.host.registry.all():
+            vehicle.repeat_nothing()  # at once: to end scripts takes its time
         await self._tasks.end()
         self.host.send_unwaited(self._streams.closing_messages())
         await server.service.scripts.stop()
-        for vehicle in self.host.registry.all():
-            vehicle.repeat_nothing()
         await server.stop()
 
     def filenos(self) -> list[int]:
