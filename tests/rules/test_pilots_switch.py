@@ -9,6 +9,8 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.vehicle.endings import Policy
+from tests.rules.test_low_planes import LOW, height, sinking, until
+from tests.support import stages
 from tests.support.wire import Wire
 from tests.support.world import World
 
@@ -39,6 +41,39 @@ def test_a_plane_that_its_pilot_takes_in_its_takeoff_is_not_switched_to_guided(m
     assert commands(world, SET_MODE, since) == []
     world.hears = lambda _message: True
     assert world.answer(takeoff).outcome == "409 mode_changed"
+    assert commands(world, SET_MODE, since) == [] and world.vehicle.mode.name == "LOITER"
+
+
+def test_a_plane_that_its_pilot_takes_while_it_climbs_before_a_circle_is_not_switched_to_loiter(
+    make_world: Any,
+) -> None:
+    world = make_world(sinking, vehicle="plane")
+    stopping = world.begin("GET", "/movement/stop")
+    until(world, lambda: world.host.registry.find(1).mode == "GUIDED")
+    world.hears = lambda message: not is_heartbeat(message)
+    world.in_mode("RTL")  # in which it climbs on
+    since = world.loop.time()
+    until(world, lambda: height(world) > LOW)
+    world.loop.pass_time(0.5)
+    assert commands(world, SET_MODE, since) == []
+    world.hears = lambda _message: True
+    assert world.answer(stopping).outcome == "409 mode_changed"
+    assert commands(world, SET_MODE, since) == [] and world.vehicle.mode.name == "RTL"
+
+
+def test_a_plane_that_its_pilot_takes_while_its_landing_is_sought_is_not_sent_home(make_world: Any) -> None:
+    world = make_world(stages.cruising, vehicle="plane")
+    world.vehicle.mission.items[:] = [stages.item(world, mavlink.MAV_CMD_NAV_WAYPOINT, 1000.0, 0.0, 60.0)] * 150
+    world.host.endings.on_lease_end = Policy.LAND
+    assert world.ask("POST", "/movement/go_to_ned?lease=1", {"x": 900, "y": 0, "z": -60}).status == 200
+    until(world, lambda: any(one.get_type() == "MISSION_REQUEST_INT" for one in world.orders(0)))
+    world.hears = lambda message: not is_heartbeat(message)
+    world.in_mode("LOITER")
+    since = world.loop.time()
+    world.loop.pass_time(6.0)
+    assert commands(world, SET_MODE, since) == []
+    world.hears = lambda _message: True
+    world.loop.pass_time(5.0)
     assert commands(world, SET_MODE, since) == [] and world.vehicle.mode.name == "LOITER"
 
 

@@ -154,3 +154,38 @@ def test_a_movement_whose_speed_is_not_taken_ends_at_rest(make_world: Any, path:
     assert world.ask("POST", path, FAR).outcome in ("500 rejected", "504 timeout")
     world.loop.pass_time(8.0)
     assert speed(world) < 0.1
+
+
+@pytest.mark.parametrize("lost", ["heartbeats", "orders", None])
+@pytest.mark.parametrize(
+    ("method", "path"),
+    [
+        ("POST", "/mission/start"),
+        ("GET", "/command/set_mode?mode=AUTO"),
+        ("GET", "/command/rtl"),
+        ("GET", "/command/land"),
+    ],
+)
+def test_stop_while_our_own_switch_is_on_its_way(make_world: Any, method: str, path: str, lost: str | None) -> None:
+    world = make_world(on_a_mission_in_guided)
+    world.loop.pass_time(2.0)
+    if lost == "heartbeats":
+        world.hears = lambda message: message.get_type() != "HEARTBEAT"
+    elif lost == "orders":
+        world.uplink_until = world.loop.time() + 1.5
+    switch = world.begin(method, path, {} if method == "POST" else None)
+    while not commands(world, mavlink.MAV_CMD_DO_SET_MODE, 0.0):
+        world.loop.pass_time(0.005)
+    stopping = world.begin("GET", "/movement/stop")
+    world.loop.pass_time(1.2)
+    world.hears = lambda _message: True
+    assert world.answer(stopping).outcome == "200"
+    assert world.copter.mode.name == "BRAKE" and speed(world) < 0.1
+    assert world.answer(switch).outcome == "409 superseded"
+    world.loop.pass_time(10.0)
+    assert world.copter.mode.name == "BRAKE" and speed(world) < 0.1
+
+
+def on_a_mission_in_guided(world: World) -> None:
+    world.flying()
+    world.copter.mission.items[:] = [item_at(*PLACE), item_at(PLACE[0] + 0.003, PLACE[1])]

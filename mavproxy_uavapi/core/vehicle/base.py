@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from pymavlink import mavutil
 
-from mavproxy_uavapi.core.errors import ModeChanged, NotArmed, Rejected, Stale, Superseded
+from mavproxy_uavapi.core.errors import ModeChanged, NotArmed, Rejected, Stale
 from mavproxy_uavapi.core.geodesy import offset
 from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission, kind_of, mode_name, mode_names, mode_number
 from mavproxy_uavapi.core.mavlink.link import Address, Link, is_finite
@@ -246,19 +246,6 @@ class BaseVehicle:
         if self.guard.in_force:
             self.guard.check.require_way([[self.guard.check.here(), *(Stop(p.lat, p.lon, p.alt) for p in places)]])
 
-    async def mission_to_fly(self) -> list[MissionItem]:
-        """The mission that it holds, for a verb that takes the vehicle then.
-
-        Raises:
-            Superseded: another job has taken it meanwhile, by a newer command.
-            Rejected, TimedOut, LinkLost.
-        """
-        commander = self.authority.commander
-        _, items = await self.waypoints.download()
-        if self.authority.commander is not commander:
-            raise Superseded("a newer command took the vehicle while its mission was read")
-        return items
-
     def _allow_upload(self, items: Sequence[MissionItem]) -> None:
         self.guard.require_mission(items, from_here=False)
 
@@ -286,10 +273,14 @@ class BaseVehicle:
         return ModeChanged(f"the vehicle is {moving} in {self.mode}; `guided` takes it over")
 
     @property
+    def is_in_own_mode(self) -> bool:
+        """Whether it is in a mode that we chose or have commanded in."""
+        return self.guard.ordered_at >= self.state.mode_since or self._mode_requests.chose_the_mode
+
+    @property
     def obeys_us(self) -> bool:
-        """Whether it is in a mode that we chose or have commanded in, and has no other's target."""
-        commanded = self.guard.ordered_at >= self.state.mode_since or self._mode_requests.chose_the_mode
-        return commanded and not self.has_foreign_target
+        """Whether it is in a mode of ours, and has no other's target."""
+        return self.is_in_own_mode and not self.has_foreign_target
 
     @property
     def flies_for_us(self) -> bool:

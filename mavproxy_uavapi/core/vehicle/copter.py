@@ -23,7 +23,6 @@ TAKEOFF_TOLERANCE = (0.3, 1.0)  # m
 TAKEOFF_END = 3.0  # s at its altitude after which a takeoff counts as done, even if the autopilot still reports it
 SLOWDOWN = 0.3  # s that a pause on the ground needs to slow the motors from full throttle
 DROP_TIMEOUT = 5.0  # s until a stopped vehicle must report that it has dropped its old movement
-STOP_TIMEOUT = 20.0  # s from full speed to rest
 SPEED_MODES = {"GUIDED", "RTL", *MISSION_MODES}  # others refuse DO_CHANGE_SPEED
 
 
@@ -155,7 +154,7 @@ class Copter(TurningVehicle):
         """Hold the vehicle still, in GUIDED or in its mission, until `resume`; done when telemetry shows it.
 
         A movement in progress waits; no other begins. A mission that cannot be paused, or does not answer, is left
-        for BRAKE.
+        for BRAKE. So is a vehicle to which a mode switch of ours is on its way: a pause might meet either mode.
 
         Raises:
             ModeChanged: it is in another mode.
@@ -163,8 +162,13 @@ class Copter(TurningVehicle):
         await self.end_waiting_arm(job)
         self.require_armed()
         mode = self.mode
-        if mode != GUIDED and not flies_mission(mode):
+        if not any(one == GUIDED or flies_mission(one) for one in (mode, self.next_mode)):
             raise ModeChanged(f"the vehicle is in {mode}, which cannot be paused; `brake` stops it")
+        if self.next_mode != mode:
+            await self.take(job, Rank.STOP)
+            await self.switch_to(job, self.holding_mode)
+            await self.until_it_stands(job, self.holding_mode)
+            return
         self.authority.admit(Rank.STOP)
         await pass_gate()
         self.authority.interrupt(job)
@@ -181,9 +185,7 @@ class Copter(TurningVehicle):
                 self.authority.end_pause()
                 raise
             # else the acks may be lost: telemetry shows whether it stands still
-        names = {"LOCAL_POSITION_NED"}
-        await self.flown(mode, names, lambda: self.stands_still or None, STOP_TIMEOUT, "stop")
-        self.authority.shown(job)
+        await self.until_it_stands(job, mode)
 
     async def resume(self, job: Job) -> None:
         """Continue the movement that `stop` interrupted."""

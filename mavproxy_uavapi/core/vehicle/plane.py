@@ -245,9 +245,11 @@ class Plane(GuidedVehicle):
 
     async def come_down(self, job: Job) -> None:
         """Land if it can; without a landing sequence, or refused, it returns, and circles at home."""
+        since = self.state.mode_since
         try:
             await self.land(job)
         except (Busy, Rejected):
+            await self.confirm_own_mode(job, since)
             await self.rtl(job)
 
     async def rtl(self, job: Job, timeout: float | None = None) -> None:
@@ -300,8 +302,10 @@ class Plane(GuidedVehicle):
         """
         await self.take(job, Rank.STOP)
         if self._is_too_low_to_circle:
+            since = self.state.mode_since
             with contextlib.suppress(Rejected, TimedOut, Stale, OutsideEnvelope, TooNear):
                 await self._climb_ahead(job)
+            await self.confirm_own_mode(job, since)
         await super().hold(job)
 
     @property

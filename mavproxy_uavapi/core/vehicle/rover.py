@@ -16,7 +16,6 @@ from mavproxy_uavapi.core.vehicle.travelling import TravellingVehicle
 RADIUS = 2.0  # m; used until WP_RADIUS is known
 SPEED = 2.0  # m/s; used until CRUISE_SPEED is known
 AT_HOME = 2.0  # waypoint radii from home within which a returned rover stops
-STOP_TIMEOUT = 20.0  # s from full speed to rest
 DRIVING_MODES = {"GUIDED", "RTL", "SMART_RTL", *MISSION_MODES}  # in others a pilot drives, or it stands
 
 
@@ -118,10 +117,7 @@ class Rover(TravellingVehicle):
         await self.end_waiting_arm(job)
         self.require_armed()
         await self.hold(job)
-        await self.flown(
-            self.holding_mode, {"LOCAL_POSITION_NED"}, lambda: self.stands_still or None, STOP_TIMEOUT, "stop"
-        )
-        self.authority.shown(job)
+        await self.until_it_stands(job, self.holding_mode)
 
     async def come_down(self, job: Job) -> None:
         """Stop where it is."""

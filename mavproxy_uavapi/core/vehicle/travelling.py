@@ -18,6 +18,7 @@ ROUNDING = 1e-6  # s; a shorter remainder is a rounding error, not a setpoint
 REST_PERIOD = 0.3  # s between two setpoints of a standstill
 REST_SHOWN = 1.0  # s
 REST_TIMEOUT = 10.0  # s
+STOP_TIMEOUT = 20.0  # s from full speed to rest
 
 
 class TravellingVehicle(GuidedVehicle):
@@ -92,6 +93,12 @@ class TravellingVehicle(GuidedVehicle):
             await asyncio.sleep(REST_PERIOD)
             if not self.stands_still:
                 still_since = self.clock()
+
+    async def until_it_stands(self, job: Job, mode: str) -> None:
+        """Wait until telemetry shows that it stands still in `mode`, for the job that stops it."""
+        names = {"LOCAL_POSITION_NED"}
+        await self.flown(mode, names, lambda: self.stands_still or None, STOP_TIMEOUT, "stop")
+        self.authority.shown(job)
 
     @property
     def stands_still(self) -> bool:

@@ -5,11 +5,21 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from mavproxy_uavapi.core.errors import Busy, ModeChanged, NotArmed, NotFound, NotSupported, Rejected, TimedOut
+from mavproxy_uavapi.core.errors import (
+    Busy,
+    ModeChanged,
+    NotArmed,
+    NotFound,
+    NotSupported,
+    Rejected,
+    Superseded,
+    TimedOut,
+)
 from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission, mode_names, mode_number
 from mavproxy_uavapi.core.vehicle import arming, messages
 from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_uavapi.core.vehicle.jobs import Job
+from mavproxy_uavapi.core.vehicle.mission_files import MissionItem
 from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
 from mavproxy_uavapi.core.vehicle.verbs import Verbs
 
@@ -95,16 +105,38 @@ class Vehicle(Verbs):
         if flies_mission(mode.upper()) and self.guard.in_force:
             since = self.state.mode_since
             self.guard.require_mission(await self.mission_to_fly(), from_here=True)
-            if job.is_late:
-                await self.hear_again()
-            self.require_own_mode(since)
+            await self.confirm_own_mode(job, since)
         stops = mode.upper() in STOPPING_MODES.union(self.holding_modes)
         await self.take(job, Rank.STOP if stops else Rank.ARM, self.inside(switch))
         await self.switch_to(job, mode)
 
+    async def mission_to_fly(self) -> list[MissionItem]:
+        """The mission that it holds, for a verb that takes the vehicle then.
+
+        Raises:
+            Superseded: another job has taken it meanwhile, by a newer command.
+            Rejected, TimedOut, LinkLost.
+        """
+        commander = self.authority.commander
+        _, items = await self.waypoints.download()
+        if self.authority.commander is not commander:
+            raise Superseded("a newer command took the vehicle while its mission was read")
+        return items
+
+    async def confirm_own_mode(self, job: Job, since: float) -> None:
+        """Have a job that is late hear a heartbeat before it switches the mode, as its pilot may have done meanwhile.
+
+        Raises:
+            ModeChanged: as `require_own_mode`.
+            TimedOut, LinkLost: no heartbeat comes.
+        """
+        if job.is_late:
+            await self.hear_again()
+        self.require_own_mode(since)
+
     def require_own_mode(self, since: float) -> None:
         """Raise ModeChanged if another has switched its mode; `since`: what `state.mode_since` was."""
-        if self.state.mode_since != since and not self.obeys_us:
+        if self.state.mode_since != since and not self.is_in_own_mode:
             raise ModeChanged(f"the pilot or a failsafe switched the vehicle to {self.mode} meanwhile")
 
     # -- stopping -----------------------------------------------------------------------------------------

@@ -1,0 +1,55 @@
+"""What follows a script that ends while its vehicle is in the air."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+import pytest
+
+from mavproxy_uavapi.aerpaw import on_exit
+from mavproxy_uavapi.aerpaw.vehicles import Drone
+
+TRAVEL = "/movement/travel_at_ned"
+
+
+@pytest.mark.parametrize(
+    ("policy", "verbs"),
+    [("rtl", ["/command/rtl"]), ("land", ["/command/land"]), ("hold", [TRAVEL]), ("nothing", [])],
+)
+def test_vehicle_in_the_air_follows_the_policy(api: Any, flying: Drone, policy: str, verbs: list[str]) -> None:
+    flying._has_commanded = True
+    assert asyncio.run(on_exit.apply_policy(flying, policy))
+    assert api.verbs() == verbs
+
+
+@pytest.mark.parametrize(
+    ("policy", "verb"), [("rtl", "/command/rtl"), ("land", "/movement/stop"), ("hold", "/movement/stop")]
+)
+def test_rover_stops_where_a_copter_lands(api: Any, rover: Any, policy: str, verb: str) -> None:
+    rover._has_commanded = True
+    assert asyncio.run(on_exit.apply_policy(rover, policy))
+    assert api.verbs() == [verb]
+
+
+def test_vehicle_that_the_script_never_commanded_is_left_alone(api: Any, flying: Drone) -> None:
+    assert asyncio.run(on_exit.apply_policy(flying, "rtl"))
+    assert api.requested == []
+
+
+def test_vehicle_that_its_pilot_has_is_left_alone(api: Any, flying: Drone) -> None:
+    flying._has_commanded, api.mode = True, 5
+    assert asyncio.run(on_exit.apply_policy(flying, "rtl"))
+    assert api.requested == []
+
+
+def test_vehicle_on_the_ground_is_disarmed(api: Any, flying: Drone) -> None:
+    flying._has_commanded, api.alt = True, 0.0
+    assert asyncio.run(on_exit.apply_policy(flying, "rtl"))
+    assert api.verbs() == ["/command/disarm"]
+
+
+def test_refused_return_is_reported(api: Any, flying: Drone) -> None:
+    flying._has_commanded = True
+    api.refusals["/command/rtl"] = (503, {"detail": "silent", "code": "link_lost"})
+    assert not asyncio.run(on_exit.apply_policy(flying, "rtl"))
