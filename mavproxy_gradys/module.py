@@ -67,7 +67,7 @@ class GradysModule(SharedModule[GradysSettings]):
         self.gradys = Gradys(self.host)
         self._background = BackgroundCommands(self.host, NAME)
         self._lost = ""  # what was still unwritten at the end
-        self._track = TrackConsole(self.host, self.gradys.tracks)
+        self._track = TrackConsole(self.host, self.gradys.tracks, self._background)
         self._routes = GradysHandlers(self.gradys).routes()
         self.remembered.keep(self.module_settings.shown)
 

@@ -8,6 +8,8 @@ from urllib.parse import urlsplit
 from aiohttp import web
 from aiohttp.typedefs import Handler, Middleware
 
+from mavproxy_uavapi.core.addresses import is_our_name
+
 # Only our own files run or load: a device's name stays text, whatever it contains.
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data:; "
@@ -26,13 +28,23 @@ async def add_headers(_request: web.Request, response: web.StreamResponse) -> No
     response.headers.update(HEADERS)
 
 
-@web.middleware
-async def same_origin(request: web.Request, handler: Handler) -> web.StreamResponse:
-    """Refuse requests from pages of other sites."""
-    origin = request.headers.get("Origin")
-    if origin is not None and urlsplit(origin).netloc != request.host:
-        return web.json_response({"detail": "a page of another site may not call"}, status=403)
-    return await handler(request)
+def same_site(public_name: str) -> Middleware:
+    """Refuse requests from pages of other sites, and to a foreign host name, which may be rebound to our address.
+
+    Args:
+        public_name: a further name by which this machine is reached; empty for none.
+    """
+
+    @web.middleware
+    async def check(request: web.Request, handler: Handler) -> web.StreamResponse:
+        if not is_our_name(request.host) and urlsplit(f"//{request.host}").hostname != public_name.lower():
+            return web.json_response({"detail": "this is not that host; see --public-name"}, status=403)
+        origin = request.headers.get("Origin")
+        if origin is not None and urlsplit(origin).netloc != request.host:
+            return web.json_response({"detail": "a page of another site may not call"}, status=403)
+        return await handler(request)
+
+    return check
 
 
 def require_token(token: str) -> Middleware:

@@ -27,7 +27,7 @@ from aiohttp import web
 from aiohttp.typedefs import Handler, Middleware
 
 from mavproxy_gradys.errors import NotStored
-from mavproxy_gradys.station.access import add_headers, require_token, same_origin
+from mavproxy_gradys.station.access import add_headers, require_token, same_site
 from mavproxy_gradys.station.exports import ParquetMissing, csv_readings, csv_text, parquet_readings
 from mavproxy_gradys.station.fleet import FleetVehicle, changes
 from mavproxy_gradys.station.fleet_watch import FleetWatch
@@ -37,7 +37,7 @@ from mavproxy_gradys.station.intake import Intake
 from mavproxy_gradys.station.queries import MOST_EXPORTED, MOST_ROWS, history_query, reading_query
 from mavproxy_gradys.station.reading_row import COLUMNS, reading_row
 from mavproxy_gradys.station.updates import DEVICE_COLUMNS, Updates, newest_of_update, parse
-from mavproxy_uavapi.http.streaming import EventStream
+from mavproxy_uavapi.http.streaming import EventStream, StreamingResponse
 
 RECEIVED, DROPPED = 103, 101
 LARGEST_BODY = 16 * 1024 * 1024  # bytes
@@ -55,6 +55,7 @@ class Station:
         health: the state of broker and database.
         watched: whether to answer as if a browser always watched.
         token: bearer token that senders must send; empty for none.
+        public_name: a host name of it, besides its own and its addresses; empty for none.
         clock: s since 1970.
     """
 
@@ -66,6 +67,7 @@ class Station:
         *,
         watched: bool = False,
         token: str = "",
+        public_name: str = "",
         clock: Callable[[], float] = time.time,
     ) -> None:
         self._intake = intake
@@ -73,15 +75,14 @@ class Station:
         self._watch = watch
         self._health = health
         self._watched = watched
-        self._token = token
+        self._access: list[Middleware] = [same_site(public_name), require_token(token)]
         self._clock = clock
         self._updates = Updates(clock)
         self._watchers = 0
 
     def app(self) -> web.Application:
         """The application."""
-        middlewares: list[Middleware] = [same_origin, require_token(self._token), errors_as_answers]
-        app = web.Application(client_max_size=LARGEST_BODY, middlewares=middlewares)
+        app = web.Application(client_max_size=LARGEST_BODY, middlewares=[*self._access, errors_as_answers])
         app.on_response_prepare.append(add_headers)
         for path in ("/update-info/", "/update-info"):
             app.router.add_post(path, self.update)
@@ -169,11 +170,12 @@ class Station:
         query = reading_query(request.query, 1000, MOST_EXPORTED)
         response = download("text/csv; charset=utf-8", "readings.csv")
         try:
-            async with contextlib.aclosing(self._store.readings(query)) as chunks:
-                async for text in csv_readings(chunks):
-                    if not response.prepared:
-                        await response.prepare(request)
-                    await response.write(text)
+            with contextlib.suppress(ConnectionError):  # the client has gone, or reads nothing
+                async with contextlib.aclosing(self._store.readings(query)) as chunks:
+                    async for text in csv_readings(chunks):
+                        if not response.prepared:
+                            await response.prepare(request)
+                        await response.write(text)
         except NotStored:
             if not response.prepared:
                 raise
@@ -191,9 +193,10 @@ class Station:
             return web.json_response({"detail": str(missing)}, status=501)
         with file:
             response = download("application/vnd.apache.parquet", "readings.parquet")
-            await response.prepare(request)
-            while part := file.read(CHUNK):
-                await response.write(part)
+            with contextlib.suppress(ConnectionError):  # the client has gone, or reads nothing
+                await response.prepare(request)
+                while part := file.read(CHUNK):
+                    await response.write(part)
         return response
 
     async def history(self, request: web.Request) -> web.Response:
@@ -265,7 +268,8 @@ async def errors_as_answers(request: web.Request, handler: Handler) -> web.Strea
         return web.json_response({"detail": str(error), "code": error.code}, status=error.status)
 
 
-def download(kind: str, name: str) -> web.StreamResponse:
-    """An answer that a browser saves."""
-    headers = {"Content-Type": kind, "Content-Disposition": f'attachment; filename="{name}"'}
-    return web.StreamResponse(headers=headers)
+def download(kind: str, name: str) -> StreamingResponse:
+    """An answer that a browser saves; a client that does not read it keeps the store's cursor for a while only."""
+    response = StreamingResponse(kind)
+    response.headers["Content-Disposition"] = f'attachment; filename="{name}"'
+    return response

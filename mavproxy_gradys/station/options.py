@@ -25,6 +25,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--watched", action="store_true", help="answer as if a browser always watched")
     token = os.environ.get("STATION_TOKEN", "")
     made.add_argument("--token", default=token, help="bearer token that senders must send")
+    made.add_argument("--public-name", default="", help="a host name of it, besides its own and its addresses")
     made.add_argument("--certificate", type=Path, help="TLS certificate and key, PEM")
     made.add_argument("--silent", type=positive, default=10.0, help="alarm after s without a reading (%(default)g)")
     made.add_argument("--battery", type=positive, default=20.0, help="alarm below %% of the battery (%(default)g)")

@@ -67,7 +67,8 @@ async def worker(options: argparse.Namespace) -> AsyncIterator[web.Application]:
         watch = FleetWatch(store, AlarmLimits(options.silent, options.battery))
         health = start_consumer(options, intake, watch, tasks) if options.broker else StationHealth(watch)
         tasks.start(watch.run(), "the reading of the fleet's state")
-        yield Station(intake, watch, health, watched=options.watched, token=options.token).app()
+        access = {"token": options.token, "public_name": options.public_name}
+        yield Station(intake, watch, health, watched=options.watched, **access).app()
     finally:
         await tasks.end()
         await store.close()

@@ -77,12 +77,13 @@ class TrackConsole:
     Args:
         host: the vehicles, and access to the main loop.
         tracks: the recording and the flights.
+        background: runs the commands; its owner ends them.
     """
 
-    def __init__(self, host: Host, tracks: Tracking) -> None:
+    def __init__(self, host: Host, tracks: Tracking, background: BackgroundCommands) -> None:
         self._host = host
         self._tracks = tracks
-        self._background = BackgroundCommands(host, "gradys")
+        self._background = background
 
     def command(self, args: list[str]) -> None:
         """Run the typed command. Main loop only."""

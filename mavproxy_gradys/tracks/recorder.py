@@ -129,10 +129,22 @@ class Recorder:
 
 
 def append(file: Path, text: str, tail: str) -> None:
-    """Add `text` before the `tail` that ends the file."""
-    with file.open("r+b") as stream:
-        stream.seek(-len(tail.encode()), os.SEEK_END)
-        stream.write((text + tail).encode())
+    """Add `text` before the `tail` that ends the file.
+
+    Raises:
+        OSError: the disk is full, for instance; the file is as before.
+    """
+    with file.open("r+b", buffering=0) as stream:
+        end = stream.seek(-len(tail.encode()), os.SEEK_END)
+        rest = (text + tail).encode()
+        try:
+            while rest:
+                rest = rest[stream.write(rest) :]
+        except OSError:
+            stream.truncate(end)
+            stream.seek(end)
+            stream.write(tail.encode())
+            raise
 
 
 def replace(file: Path, text: str) -> None:

@@ -19,6 +19,7 @@ class Tracking:
         self._host = host
         self._recorder: Recorder | None = None
         self._flights: list[TrackFlight] = []  # the running ones, and each vehicle's newest
+        self._closed = False
 
     async def record(
         self, file: Path, *, style: str, period: float, latest: Path | None, system: int = 0
@@ -50,7 +51,13 @@ class Tracking:
         return recorder
 
     async def fly(self, flight: TrackFlight, job: Job) -> str:
-        """Fly a track; see `TrackFlight.fly`."""
+        """Fly a track; see `TrackFlight.fly`.
+
+        Raises:
+            Aborted: the module was unloaded meanwhile.
+        """
+        if self._closed:
+            raise Aborted(f"{VERB}: gradys is unloaded")
         self._flights = [*self._reported_flights(), flight]
         return await flight.fly(job)
 
@@ -59,7 +66,8 @@ class Tracking:
         return [flight for flight in self._flights if flight.running or newest[flight.copter] is flight]
 
     async def close(self) -> None:
-        """End the recording and the flights; the vehicles hold."""
+        """End the recording and the flights; the vehicles hold. None begins any more."""
+        self._closed = True
         for flight in self._flights:
             if flight.job is not None and flight.job.running:
                 flight.job.abort(Aborted(f"{VERB}: gradys is unloaded"), Ending.UNLOADED)

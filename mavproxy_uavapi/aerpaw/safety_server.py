@@ -95,7 +95,7 @@ class SafetyCheckerServer:
             if function is None:
                 return serialize_response(name, result=False, message=f"there is no request {name}")
             result, reason = function(*(message.get("params") or []))
-        except (ValueError, TypeError, KeyError) as error:  # the request is malformed
+        except (ValueError, TypeError, KeyError, ArithmeticError, RecursionError) as error:  # it is malformed
             return serialize_response(name, result=False, message=f"Server error: {error}")
         return serialize_response(name, result=result, message=reason)
 

@@ -8,6 +8,8 @@ from typing import Any
 
 __all__ = ["deserialize_msg", "serialize_msg", "serialize_request", "serialize_response"]
 
+LARGEST = 1024 * 1024  # bytes of a message
+
 
 def serialize_msg(raw_json: str) -> bytes:
     """Encode a text."""
@@ -30,10 +32,14 @@ def deserialize_msg(compressed_msg: bytes) -> dict[str, Any]:
     Raises:
         ValueError: it is malformed.
     """
+    inflate = zlib.decompressobj()
     try:
-        message = json.loads(zlib.decompress(compressed_msg))
+        text = inflate.decompress(compressed_msg, LARGEST)
     except zlib.error as error:
         raise ValueError(f"Failed to decompress message: {error}") from error
+    if not inflate.eof:
+        raise ValueError(f"it is incomplete, or larger than {LARGEST} bytes")
+    message = json.loads(text)
     if not isinstance(message, dict):
         raise ValueError(f"{message!r} is not a message")
     return message

@@ -1,9 +1,12 @@
-"""IP addresses, and URLs of them. Pure."""
+"""IP addresses, and URLs of them. Pure, but for this machine's name."""
 
 from __future__ import annotations
 
+import functools
 import ipaddress
 import re
+import socket
+from urllib.parse import urlsplit
 
 EVERYWHERE = {
     "0.0.0.0": "127.0.0.1",
@@ -20,6 +23,29 @@ def is_loopback(host: str) -> bool:
         return ipaddress.ip_address(host.partition("%")[0]).is_loopback
     except ValueError:  # another name
         return False
+
+
+def is_our_name(host: str) -> bool:
+    """Whether a Host header names this machine: `localhost`, its name, or an IP address.
+
+    A foreign name server cannot make any of these point to this machine.
+    """
+    return _names_us(host, socket.gethostname().lower())
+
+
+@functools.lru_cache(maxsize=256)  # each request has one, mostly the same
+def _names_us(host: str, own: str) -> bool:
+    try:
+        name = (urlsplit(f"//{host}").hostname or "").lower()
+    except ValueError:  # for example a bracket that is not closed
+        return False
+    if name in ("localhost", own, f"{own}.local"):
+        return True
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    return True
 
 
 def bracketed(host: str) -> str:

@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from aiohttp import web
 from pydantic import ConfigDict, Field, create_model
 
-from mavproxy_uavapi.core.errors import Invalid, UavApiError, without_frames
+from mavproxy_uavapi.core.errors import Invalid, NoVehicle, UavApiError, without_frames
 from mavproxy_uavapi.core.vehicle.start_gate import StartGate
 from mavproxy_uavapi.http.auditing import audited
 from mavproxy_uavapi.http.call import Call
@@ -72,6 +72,11 @@ async def _command(call: Call, route: Route) -> web.StreamResponse:
     known = call.service.host.fleet.vehicles
     every = [call.named_system] if call.named_system else sorted(known)  # a path that names a vehicle means no other
     systems = every if p.vehicles == "all" else list(dict.fromkeys(p.vehicles))
+    if not systems:
+        raise NoVehicle("there is no vehicle yet") if p.vehicles == "all" else Invalid("it is empty", "vehicles")
+    others = sorted(set(p.each) - set(map(str, systems)))
+    if others:
+        raise Invalid(f"not one of the vehicles: {', '.join(others)}", "each")
     common = p.model_extra or {}
     params = {system: parse(route.model, "body", {**common, **p.each.get(str(system), {})}) for system in systems}
     gate = StartGate(len(systems)) if p.all_or_none else None

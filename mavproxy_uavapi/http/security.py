@@ -8,17 +8,14 @@ a browser sends neither with a GET; other headers show it there (`check_page`).
 from __future__ import annotations
 
 import asyncio
-import functools
 import hmac
-import ipaddress
 import logging
 import math
-import socket
 from collections.abc import Callable, Mapping
-from urllib.parse import urlsplit
 
 from aiohttp import web
 
+from mavproxy_uavapi.core.addresses import is_our_name
 from mavproxy_uavapi.core.errors import Forbidden, TooManyRequests, UavApiError, Unauthorized, without_frames
 from mavproxy_uavapi.files.tokens import Token, digest_of
 from mavproxy_uavapi.http.browser import is_browser
@@ -88,29 +85,6 @@ def check_page(headers: Mapping[str, str], trusted: tuple[str, ...] = ()) -> Non
         raise Forbidden(
             "the browser does not name the page that sends this command; use a program, /docs, the token, or https"
         )
-
-
-def is_our_name(host: str) -> bool:
-    """Whether a Host header names this machine: `localhost`, its name, or an IP address.
-
-    A foreign name server cannot make any of these point to this machine.
-    """
-    return _names_us(host, socket.gethostname().lower())
-
-
-@functools.lru_cache(maxsize=256)  # each request has one, mostly the same
-def _names_us(host: str, own: str) -> bool:
-    try:
-        name = (urlsplit(f"//{host}").hostname or "").lower()
-    except ValueError:  # for example a bracket that is not closed
-        return False
-    if name in ("localhost", own, f"{own}.local"):
-        return True
-    try:
-        ipaddress.ip_address(name)
-    except ValueError:
-        return False
-    return True
 
 
 def no_token(_credentials: bytes) -> Token | None:

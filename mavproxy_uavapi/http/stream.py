@@ -24,7 +24,7 @@ from mavproxy_uavapi.http.streaming import (
 from mavproxy_uavapi.http.subscription import Names, Subscription, Wishes
 
 MOST_SAID = 4096  # bytes of a message from a WebSocket's client; no message is expected
-HEARD_EVERY = 0.1  # s between two of its messages; more of them wait on its side
+HEARD_EVERY = 0.1  # s between two of its messages, pings too; more of them wait on its side
 
 
 async def stream(call: Call) -> web.StreamResponse:
@@ -55,16 +55,20 @@ def _require_some(parameter: str, asked: Names, known: tuple[str, ...]) -> None:
 
 
 async def _websocket(request: web.BaseRequest, subscription: Subscription) -> web.StreamResponse:
-    # With compression each message would have to be encoded for each client.
-    socket = web.WebSocketResponse(compress=False, max_msg_size=MOST_SAID)
+    # With compression each message would have to be encoded for each client. aiohttp would answer a flood of pings by
+    # itself, and let nobody else have the loop.
+    socket = web.WebSocketResponse(compress=False, autoping=False, max_msg_size=MOST_SAID)
     limit_buffers(request.transport)
     await socket.prepare(request)
     sender = asyncio.create_task(_send_all(socket, request, subscription))
     try:
-        async for message in socket:  # until either side closes it
-            if message.type is WSMsgType.ERROR:
-                break
-            await asyncio.sleep(HEARD_EVERY)
+        with suppress(ConnectionError):  # the client has gone
+            async for message in socket:  # until either side closes it
+                if message.type is WSMsgType.ERROR:
+                    break
+                if message.type is WSMsgType.PING:
+                    await socket.pong(message.data)
+                await asyncio.sleep(HEARD_EVERY)
     finally:
         sender.cancel()
         with suppress(asyncio.CancelledError, ConnectionError):

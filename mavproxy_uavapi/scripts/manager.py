@@ -105,11 +105,14 @@ class Scripts:
             ToolFailed: there is no tmux, or the script could not be started; nothing is left behind.
         """
         path = await asyncio.to_thread(self.store.find, name)
+        # A client that hangs up now leaves neither an unwatched script nor the lock: it may ask again at once.
+        return await asyncio.shield(self._launch_alone(path, args, operator))
+
+    async def _launch_alone(self, path: Path, args: Sequence[str], operator: str) -> Run:
         async with self._launching:
             if self.running_run(path.name) is not None:
                 raise BadRequest(f"{path.name} is already running")
-            # A client that hangs up now must not leave an unwatched script.
-            return await asyncio.shield(self._launch(path, args, operator))
+            return await self._launch(path, args, operator)
 
     async def _launch(self, path: Path, args: Sequence[str], operator: str) -> Run:
         run = self._trusted_run(await self._create(path, args, operator))

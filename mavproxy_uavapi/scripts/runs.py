@@ -6,7 +6,7 @@ import fcntl
 import json
 import os
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
@@ -176,8 +176,9 @@ def load(path: Path) -> Run:
         OSError, ValueError: there is no valid record.
     """
     out_log = path.with_name(path.name.replace(RECORD, "_out.log"))
-    alive = _is_locked(out_log)  # first, because a run writes its record before it ends
-    record = json.loads(path.read_text(encoding="utf-8"))
+    # First, because a run writes its record before it ends.
+    alive = _lives(out_log, path, lambda: _read(path).get("pid"))
+    record = _read(path)
     fields = {name: record[name] for name in Run.__dataclass_fields__ if name in record}
     try:
         fields |= {"path": path, "out_log": out_log, "err_log": Path(record["err_log"]), "alive": alive}
@@ -191,7 +192,14 @@ def refreshed(run: Run) -> Run:
     try:
         return load(run.path)
     except (OSError, ValueError):  # the record was removed
-        return replace(run, alive=_is_locked(run.out_log))
+        return replace(run, alive=_lives(run.out_log, run.path, lambda: run.pid))
+
+
+def _read(path: Path) -> dict[str, Any]:
+    record = json.loads(path.read_text(encoding="utf-8"))
+    if not isinstance(record, dict):
+        raise ValueError(f"{path} is no record of a run")
+    return record
 
 
 def of_script(logs: Path, script: str) -> list[Run]:
@@ -217,12 +225,22 @@ def tail(log: Path, size: int = TAIL) -> str:
         return ""
 
 
-def _is_locked(log: Path) -> bool:
+def _lives(log: Path, record: Path, pid: Callable[[], int | None]) -> bool:
+    """Whether the runner of a run lives: it locks its log. Where somebody removed that, its process tells."""
     try:
         with log.open("rb") as file:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:
         return True
     except FileNotFoundError:
-        return False
+        return _runs(pid(), record)
     return False
+
+
+def _runs(pid: int | None, record: Path) -> bool:
+    """Whether that process is the runner of the record. A log that is removed in flight must not end a script."""
+    try:
+        command = Path(f"/proc/{pid}/cmdline").read_bytes()
+    except OSError:
+        return False
+    return os.fsencode(record) in command.split(b"\0")

@@ -28,6 +28,7 @@ from mavproxy_vision.tracking.tracker import Tracker
 
 TIDY_EVERY = 1.0  # s between two tries to restore parameters
 TIDY_TRIES = 10
+UNLOADED = "vision was unloaded"
 log = logging.getLogger("vision")
 
 
@@ -49,9 +50,14 @@ class FlightTask:
         self.begun = False
 
     async def __call__(self, job: Job) -> None:
-        """Run the flight as that job."""
-        self.begun = True
+        """Run the flight as that job.
+
+        Raises:
+            Aborted: the module was unloaded meanwhile.
+        """
         flights = self._flights
+        flights.require_loaded()
+        self.begun = True
         flight = TagFlight(flights.tracker, self._copter, job, self.report, flights.replace_running_flight)
         flights.on_flight_begun(flight)
         try:
@@ -157,6 +163,11 @@ class FlightJobs:
 
         return by_plnd
 
+    def require_loaded(self) -> None:
+        """Raise Aborted once `abort_all` has ended everything."""
+        if self._unloaded:
+            raise Aborted(UNLOADED)
+
     def on_flight_begun(self, flight: TagFlight) -> None:
         """The flight is being prepared; it does not have the vehicle yet."""
         self._begun.add(flight)
@@ -260,7 +271,7 @@ class FlightJobs:
 
     def abort_all(self) -> None:
         """End all flights, because the module is unloaded."""
-        self._end("vision was unloaded", Ending.UNLOADED)
+        self._end(UNLOADED, Ending.UNLOADED)
         self._unloaded = True
         self._leave_host()
 

@@ -55,7 +55,7 @@ def fly_track(world: Any, request: dict[str, Any]) -> Typed:
     file: Path = world.directory / "track.txt"
     file.write_text(request["track"])
     words = ["fly", str(file), "--ground", str(request["ground"])]
-    console = TrackConsole(world.host, world.gradys.tracks)
+    console = TrackConsole(world.host, world.gradys.tracks, BackgroundCommands(world.host, "gradys"))
     return Typed(world, "gradys", lambda: console.command(words))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import csv
 import io
@@ -81,6 +82,26 @@ class Asker:
         assert answer.status == 200, answer.body
         return json.loads(answer.body)
 
+    def unread(self, path: str) -> int:
+        """How many bytes of an answer are left to a client that begins to read after two minutes."""
+
+        async def begun() -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
+            reader, writer = await asyncio.open_connection(self._client.host, self._client.port, limit=1024)
+            writer.write(f"GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
+            return reader, writer
+
+        async def rest() -> int:
+            count = 0
+            with contextlib.suppress(ConnectionError):
+                while part := await reader.read(65536):
+                    count += len(part)
+            writer.close()
+            return count
+
+        reader, writer = self._loop.run(begun())
+        self._loop.pass_time(120.0)
+        return int(self._loop.run(rest()))
+
     def look(self) -> None:
         self._loop.run(self.watch.update())
 
@@ -106,7 +127,8 @@ def ask(
     monkeypatch.setattr("mavproxy_gradys.station.sqlite_store.ThreadPoolExecutor", at_once)
     store = SqliteStore(tmp_path / "station.db", clock)
     watch = FleetWatch(store, AlarmLimits(10, 20))
-    station = Station(Intake(store, Statistics(), clock), watch, StationHealth(watch), watched=True, clock=clock)
+    options: dict[str, Any] = {"watched": True, "public_name": "fleet.example", "clock": clock}
+    station = Station(Intake(store, Statistics(), clock), watch, StationHealth(watch), **options)
 
     async def start() -> TestClient[Any, Any]:
         client = TestClient(TestServer(station.app()))
@@ -281,3 +303,21 @@ def test_pages_of_other_sites_are_refused(ask: Any) -> None:
 def test_a_position_that_is_no_number_is_not_taken(ask: Any) -> None:
     assert ask("POST", "/update-info/", data={**FORM, "lat": "nan"})[0] == 500
     assert json.loads(ask("GET", "/devices")[1]) == {"devices": []}
+
+
+@pytest.mark.parametrize("host", ["evil.example:8080", "localhost.evil.example"])
+def test_a_page_whose_name_was_rebound_to_us_reads_and_writes_nothing(ask: Any, host: str) -> None:
+    headers = {"Host": host, "Origin": f"http://{host}"}
+    assert ask("GET", "/readings", headers=headers)[0] == 403
+    assert ask("POST", "/readings", headers=headers, data=json.dumps({"readings": [reading(1)]}))[0] == 403
+
+
+@pytest.mark.parametrize("host", ["fleet.example", "Fleet.Example:8080"])
+def test_a_public_name_is_ours(ask: Any, host: str) -> None:
+    assert ask("GET", "/readings", headers={"Host": host})[0] == 200
+
+
+def test_a_download_that_nobody_reads_ends(ask: Any) -> None:
+    for first in range(0, 4000, 250):
+        post(ask, *(reading(first + number, value="x" * 2000) for number in range(250)))
+    assert 0 < ask.unread("/readings.csv?limit=100000") < 6_000_000  # of 8

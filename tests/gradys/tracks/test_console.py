@@ -6,6 +6,7 @@ import pytest
 
 from mavproxy_gradys.tracks.console import TrackConsole, argument_parser, report_text
 from mavproxy_gradys.tracks.service import Tracking
+from mavproxy_uavapi.core.background import BackgroundCommands
 from mavproxy_uavapi.core.errors import BadRequest
 
 
@@ -50,7 +51,7 @@ def test_track_is_flown_by_the_vehicle_that_is_named(
     monkeypatch.setattr("asyncio.to_thread", at_once)
     monkeypatch.chdir(tmp_path)
     telemetry.send("heartbeat")
-    TrackConsole(host, Tracking(host)).command(line.split())
+    TrackConsole(host, Tracking(host), BackgroundCommands(host, "gradys")).command(line.split())
     loop.pass_time(1.0)
     host.bridge.turn()
     assert capsys.readouterr().out.strip() == answer

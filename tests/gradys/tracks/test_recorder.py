@@ -1,13 +1,17 @@
 from __future__ import annotations
 
+import contextlib
+import resource
+import xml.dom.minidom
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from mavproxy_gradys.errors import NotStored
-from mavproxy_gradys.tracks.formats import parse
-from mavproxy_gradys.tracks.recorder import Recorder, replace
+from mavproxy_gradys.tracks.formats import GPX_HEAD, GPX_TAIL, GpsReading, parse
+from mavproxy_gradys.tracks.recorder import Recorder, append, replace
 
 
 @pytest.fixture(autouse=True)
@@ -95,3 +99,37 @@ def test_replacing_leaves_the_old_or_the_new(tmp_path: Path) -> None:
     replace(file, "two")
     assert file.read_text() == "two"
     assert [path.name for path in tmp_path.iterdir()] == ["latest"]
+
+
+@contextlib.contextmanager
+def disk_full_at(size: int) -> Iterator[None]:
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def placed(number: int) -> GpsReading:
+    return GpsReading(number, 357713121, -786743912, 584090)
+
+
+def test_a_track_is_readable_after_a_full_disk(tmp_path: Path) -> None:
+    file = tmp_path / "track"
+    file.touch()
+    append(file, placed(1).line("text") + "\n", "")
+    with disk_full_at(file.stat().st_size + 40), pytest.raises(OSError, match="File too large"):
+        append(file, placed(2).line("text") + "\n", "")
+    append(file, placed(3).line("text") + "\n", "")
+    assert [reading.time_usec for reading in parse(file.read_text())] == [1, 3]
+
+
+def test_a_gpx_track_is_whole_after_a_full_disk(tmp_path: Path) -> None:
+    file = tmp_path / "track.gpx"
+    file.write_text(GPX_HEAD + GPX_TAIL)
+    append(file, placed(1).gpx(1.0), GPX_TAIL)
+    with disk_full_at(file.stat().st_size + 20), pytest.raises(OSError, match="File too large"):
+        append(file, placed(2).gpx(2.0), GPX_TAIL)
+    append(file, placed(3).gpx(3.0), GPX_TAIL)
+    assert len(xml.dom.minidom.parseString(file.read_text()).getElementsByTagName("trkpt")) == 2

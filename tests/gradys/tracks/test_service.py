@@ -46,6 +46,15 @@ def test_the_flights_of_all_vehicles_are_reported_and_end_with_the_module(loop: 
     assert ["gradys is unloaded" in str(job.error) for job in jobs] == [True, True]
 
 
+def test_a_flight_whose_request_was_still_read_does_not_begin_after_the_module(
+    loop: Any, host: Any, fleet: Any
+) -> None:
+    tracks = Tracking(host)
+    loop.run(tracks.close())
+    job = begin(loop, host, tracks, 11)
+    assert isinstance(job.error, Aborted) and tracks.report()["flights"] == []
+
+
 def test_of_a_vehicle_the_newest_flight_is_reported(loop: Any, host: Any, fleet: Any) -> None:
     tracks = Tracking(host)
     jobs = [begin(loop, host, tracks, 11, name) for name in "abc"]

@@ -182,3 +182,14 @@ def test_stopping_all_is_refused_by_no_limit(three: Any, api: Any, service: Any)
     service.settings = ApiModuleSettings({"max_rate": 1, "max_jobs": 1}, environ={}).snapshot()
     for _ in range(10):
         assert api.post("/fleet/rtl?wait=false", {}).status == 200
+
+
+def test_all_before_any_vehicle_was_heard_is_no_success(api: Any) -> None:
+    answer = api.post("/fleet/land", {})
+    assert (answer.status, answer.body["code"]) == (503, "no_vehicle")
+
+
+@pytest.mark.parametrize("body", [{"vehicles": []}, {"vehicles": [1], "each": {"2": {}}}, {"each": {"one": {}}}])
+def test_nobody_and_values_for_nobody_are_422(three: Any, api: Any, body: dict[str, Any]) -> None:
+    assert api.post("/fleet/brake", body).status == 422
+    assert not any(commands(drone) for drone in three)

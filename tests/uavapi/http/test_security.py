@@ -5,10 +5,11 @@ from typing import Any
 
 import pytest
 
+from mavproxy_uavapi.core.addresses import is_our_name
 from mavproxy_uavapi.core.errors import Forbidden, Unauthorized
 from mavproxy_uavapi.core.roles import Role
 from mavproxy_uavapi.files.tokens import Token
-from mavproxy_uavapi.http.security import check_caller, check_origin, check_page, has_token, is_our_name
+from mavproxy_uavapi.http.security import check_caller, check_origin, check_page, has_token
 from mavproxy_uavapi.settings import ApiModuleSettings
 from tests.support import tokens
 from tests.support.api_port import Port

@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 from aiohttp import WSCloseCode, WSMsgType
 
+from mavproxy_uavapi.http.stream import HEARD_EVERY
 from mavproxy_uavapi.http.streaming import KEEP_ALIVE
 from mavproxy_uavapi.http.subscription import QUEUED
 from tests.support.stream_clients import UPGRADE, bytes_until, server_sent_events, socket_events
@@ -172,3 +173,18 @@ def test_quiet_websocket_is_pinged(flying: Any, api: Any, loop: Any) -> None:
     kind, took = loop.run(first())
     assert kind is WSMsgType.PING
     assert took == pytest.approx(KEEP_ALIVE, abs=1.0)
+
+
+def test_websocket_that_pings_without_end_has_to_wait(flying: Any, api: Any, loop: Any) -> None:
+    async def echoes() -> tuple[list[bytes], float]:
+        began = loop.time()
+        async with api.client.ws_connect("/telemetry/stream?names=NONE", autoping=False) as socket:
+            for number in range(20):
+                await socket.send_frame(bytes([number]), WSMsgType.PONG)
+                await socket.ping(bytes([number]))
+            messages = [await socket.receive() for _ in range(20)]
+        return [message.data for message in messages if message.type is WSMsgType.PONG], loop.time() - began
+
+    pongs, took = loop.run(echoes())
+    assert pongs == [bytes([number]) for number in range(20)]
+    assert took > 39 * HEARD_EVERY - 0.05

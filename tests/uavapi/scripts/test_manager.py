@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.core.errors import BadRequest, NotFound, NoVehicle, ToolFailed
-from mavproxy_uavapi.scripts import manager
+from mavproxy_uavapi.scripts import manager, tmux
 from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.settings import ApiModuleSettings
 
@@ -175,3 +175,41 @@ def test_deaths_are_acted_upon_and_other_ends_are_not(tmp_path: Path, monkeypatc
 
 def test_scripts_run_by_the_python_that_we_run_by(tmp_path: Path) -> None:
     assert settings(tmp_path).python_path == sys.executable
+
+
+@pytest.mark.needs("tmux")
+@pytest.mark.usefixtures("own_tmux")
+def test_client_that_hangs_up_and_asks_again_starts_no_second_copy(tmp_path: Path, monkeypatch: Any) -> None:
+    start = tmux.start
+
+    async def slow(*args: Any) -> None:
+        await asyncio.sleep(1.0)
+        await start(*args)
+
+    monkeypatch.setattr(tmux, "start", slow)
+
+    async def story(scripts: Scripts) -> None:
+        await scripts.save("a.py", SLEEPS)
+        with pytest.raises(asyncio.TimeoutError):
+            await asyncio.wait_for(scripts.execute("a", []), 0.5)
+        with pytest.raises(BadRequest):
+            await scripts.execute("a", [])
+        assert [run.script for run in await scripts.running()] == ["a.py"]
+
+    flown(tmp_path, story)
+
+
+@pytest.mark.needs("tmux")
+@pytest.mark.usefixtures("own_tmux")
+def test_script_whose_log_is_removed_lives_until_it_ends(tmp_path: Path) -> None:
+    async def story(scripts: Scripts) -> None:
+        await scripts.save("a.py", SLEEPS)
+        run = await scripts.execute("a", [])
+        await up(scripts, "a.py")
+        run.out_log.unlink()
+        await asyncio.sleep(1.0)
+        assert [one.script for one in await scripts.running()] == ["a.py"]
+        ended_run = await scripts.halt("a")
+        assert not ended_run.running
+
+    flown(tmp_path, story)

@@ -102,6 +102,16 @@ def test_unloaded_in_the_autopilots_land_it_lands(flying):
     assert not sent(rig, "SET_POSITION_TARGET_LOCAL_NED", mark)
 
 
+def test_a_flight_whose_request_was_still_read_does_not_begin_after_unloading(flying):
+    rig = flying()
+    rig.flights.abort_all()
+    mark = len(rig.wire.sent)
+    job = rig.land()
+    rig.pass_time(2.0)
+    assert str(job.error) == "vision was unloaded"
+    assert sent(rig, "SET_POSITION_TARGET_LOCAL_NED", mark) == []
+
+
 def test_a_mission_that_is_stopped_holds_before_it_writes_its_track(flying):
     rig = flying()
     rig.flights._directory = lambda: (_ for _ in ()).throw(RuntimeError("no home directory"))
