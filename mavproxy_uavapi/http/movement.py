@@ -165,4 +165,4 @@ async def stop(call: Call) -> Answer:
 async def resume(call: Call) -> Answer:
     """Continue the paused guided movement."""
     vehicle = call.vehicle
-    return await call.fly(vehicle, vehicle.resume, f"{vehicle.kind.capitalize()} has resumed")
+    return await call.fly(vehicle, vehicle.resume, f"{vehicle.kind.capitalize()} has resumed", outlives_client=True)

@@ -235,6 +235,7 @@ DONE: dict[str, Callable[[Any], bool]] = {
     "vision/search": lambda world: world.copter.armed and math.hypot(world.at[0] - 0.5, world.at[1] - 3.0) < 2.0,
     "brake": lambda world: world.copter.mode.name == "BRAKE",
     "stop": lambda world: world.copter.guided.paused,
+    "resume": lambda world: not world.copter.guided.paused,
     **dict.fromkeys(("plane: land", "quadplane: land"), lambda world: not world.vehicle.armed),
     **dict.fromkeys(("plane: rtl", "rover: rtl"), lambda world: world.vehicle.mode.name == "RTL"),
     "plane: stop": lambda world: world.vehicle.mode.name == "LOITER",

@@ -64,8 +64,8 @@ FAULTS = {
         HEARTBEAT,
     ),
     "client gone": Fault(
-        "The client hangs up: the verb ends, and the vehicle keeps its last setpoint. Verbs that land, return or "
-        "stop the vehicle go on, and so do vision's flights. A script does not hang up but fails: its movements end, "
+        "The client hangs up: the verb ends, and the vehicle keeps its last setpoint. Verbs that land, return, "
+        "stop or resume go on, and so do vision's flights. A script does not hang up but fails: its movements end, "
         "and the vehicle follows `on_script_exit` (here the default); a landing or return goes on.",
         0.1,
     ),
@@ -131,6 +131,7 @@ ACKED = {**SUCCESS, **LOST, **REFUSED, **FLIGHT, **GUIDED_ONLY}
 STOP = {**ACKED, "in AUTO": "200", "during a take-off": "200", "client gone": GOES_ON}
 RESUME = {
     **ACKED,
+    "client gone": GOES_ON,
     "acks lost for good": "504 timeout",
     "reboot": "409 mode_changed",
     "disarmed": "200",

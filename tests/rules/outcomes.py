@@ -75,7 +75,7 @@ VERBS = {
     "set_heading": Verb("/movement/set_heading", 5.0, TURN),
     "set_yaw_rate": Verb("/movement/set_yaw_rate", 3.0, TURN_RATE),
     "stop": Verb("/movement/stop", 3.0, STOP),
-    "resume": Verb("/movement/resume", 0.5, RESUME),
+    "resume": Verb("/movement/resume", 2.0, RESUME),
     "brake": Verb("/command/brake", HEARTBEAT, BRAKE),
     "guided": Verb("/command/guided", HEARTBEAT, MODE),
     "set_mode": Verb("/command/set_mode", HEARTBEAT, {**MODE, "outside the envelope": OUTSIDE}),

@@ -18,7 +18,7 @@ from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.shared_tasks import SharedTasks
 from mavproxy_uavapi.core.vehicle import messages, time_limits
 from mavproxy_uavapi.core.vehicle.authority import CommandAuthority, Rank, no_objection
-from mavproxy_uavapi.core.vehicle.command_sender import CommandSender
+from mavproxy_uavapi.core.vehicle.command_sender import HEARD_WITHIN, CommandSender
 from mavproxy_uavapi.core.vehicle.dataflash import DataflashLogs
 from mavproxy_uavapi.core.vehicle.envelope_check import Spaces
 from mavproxy_uavapi.core.vehicle.guard import STOPPING, EnvelopeGuard, GuardedLink
@@ -36,7 +36,6 @@ T = TypeVar("T")
 mavlink = mavutil.mavlink
 
 REPORT_TIMEOUT = 5.0  # s until a requested message must come
-HEARD_WITHIN = 5.0  # s until a heartbeat must come, or show what an order has done
 HOLDING_MODES = ("LOITER", "HOLD", "POSHOLD", "ALT_HOLD", "STOP", "RTL")  # what comes first in a vehicle's mode map
 FRESH = 3.0  # s; no verb uses an older position
 
@@ -108,6 +107,11 @@ class BaseVehicle:
         """The name of the last requested mode, until a heartbeat shows the outcome; else `mode`."""
         coming = self._mode_requests.on_their_way()
         return mode_name(self.state.vehicle_type, coming[-1]) if coming else self.mode
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether no switch of ours to another mode may be on its way."""
+        return all(number == self.state.mode for number in self._mode_requests.on_their_way())
 
     @property
     def is_ready_to_arm(self) -> bool:
@@ -354,7 +358,7 @@ class BaseVehicle:
             job.modes |= {mode_name(self.state.vehicle_type, goal) for goal in goals}
 
         check = self.commanding(job, switched_by_nobody_else, *needs, noted)
-        order = command or messages.set_mode(number)
+        order = replace(command or messages.set_mode(number), hears_first=mode not in self.holding_modes)
         try:
             if switch.is_ambiguous:
                 await self.commands.send(replace(order, proven_by_ack=True), check, shown=switch.shown)

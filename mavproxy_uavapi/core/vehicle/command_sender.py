@@ -35,6 +35,7 @@ IN_PROGRESS_LIMIT = 60.0  # s until a command that is still in progress is given
 RETRY_PAUSE = 1.0  # s before a patient command is sent again
 SHOWN_WITHIN = (2.0, 1.5, 1.5)  # s after each acknowledgement in which a heartbeat must show what was done
 LATE_ACK = 10.0  # s after a sending in which its ack may still come
+HEARD_WITHIN = 5.0  # s until a heartbeat must come, or show what an order has done
 TEXT_TIMEOUT = 0.5  # s that the STATUSTEXT of a refusal may come after its ack
 QUESTIONS = {mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAV_CMD_RUN_PREARM_CHECKS}  # they change nothing
 WORTH_ASKING_AGAIN = {mavlink.MAV_RESULT_TEMPORARILY_REJECTED, mavlink.MAV_RESULT_FAILED}
@@ -109,12 +110,26 @@ class CommandSender:
         Raises:
             Rejected, TimedOut, LinkLost: as `send`; also the errors of `check` and `shown`.
         """
+        sent_at: float | None = None
         for seconds in SHOWN_WITHIN:
+            if sent_at is not None and command.hears_first and await self._is_shown_since(sent_at, shown):
+                return
             await self.send(command, check, shown=shown)
+            sent_at = self._waiting.clock()
             with contextlib.suppress(TimedOut):
                 await self._waiting.until({"HEARTBEAT"}, lambda: shown() or None, seconds, action)
                 return
         raise TimedOut(f"vehicle {self._state.system} did not {action} within {sum(SHOWN_WITHIN):.1f} s")
+
+    async def _is_shown_since(self, sent_at: float, shown: Callable[[], bool]) -> bool:
+        """Whether a heartbeat that is newer than a sending shows its effect; waits for one.
+
+        Raises:
+            TimedOut, LinkLost: none comes; also the errors of `shown`.
+        """
+        names, action = {"HEARTBEAT"}, "send a heartbeat"
+        await self._waiting.until(names, lambda: self._state.heartbeat_at > sent_at or None, HEARD_WITHIN, action)
+        return shown()
 
     def _outstanding(self, number: int) -> deque[Sending]:
         """The sendings of that command whose ack may still come, oldest first."""
@@ -139,6 +154,8 @@ class CommandSender:
         for confirmation in itertools.count():
             if command.number not in QUESTIONS:
                 await pass_gate()
+            if confirmation and command.hears_first and await self._is_shown_since(unanswered[-1].at, shown):
+                return int(mavlink.MAV_RESULT_ACCEPTED)
             check()
             with self._waiting.acks(command.number, self._link.source, shown) as acks:
                 await self._link.send(command.to(address, confirmation), self._state.system)
@@ -156,9 +173,11 @@ class CommandSender:
                 continue
             if unanswered:
                 unanswered.popleft()
-            if not late:
+            is_doubtful = others > 0 and command.repeatable and result != mavlink.MAV_RESULT_ACCEPTED
+            others -= 1
+            if not late and not is_doubtful:
                 return result
-            late -= 1
+            late = max(late - 1, 0)
         times = "" if sendings == 1 else f", sent {sendings} times"
         raise TimedOut(f"vehicle {self._state.system} did not acknowledge {command.name}{times}")
 

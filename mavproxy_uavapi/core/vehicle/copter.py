@@ -33,7 +33,7 @@ class Copter(TurningVehicle):
 
     def hold_message(self) -> Any:
         """A zero velocity in GUIDED, else BRAKE."""
-        if self.mode == self.next_mode == GUIDED:
+        if self.stops_in_its_mode:
             return STANDSTILL.to(self.address, NO_YAW)
         return super().hold_message()
 
@@ -122,7 +122,7 @@ class Copter(TurningVehicle):
     @property
     def stops_in_its_mode(self) -> bool:
         """Whether `hold` stops it by setpoints, which do nothing in a pilot's mode."""
-        return self.mode == self.next_mode == GUIDED
+        return self.mode == GUIDED and self.is_settled
 
     async def set_mode(self, job: Job, mode: str) -> None:
         """Switch to any mode. GUIDED ends a `stop` too: the vehicle stays where it is, and takes movements again."""
@@ -162,9 +162,10 @@ class Copter(TurningVehicle):
         await self.end_waiting_arm(job)
         self.require_armed()
         mode = self.mode
-        if not any(one == GUIDED or flies_mission(one) for one in (mode, self.next_mode)):
+        coming = self.next_mode if self.authority.on_its_way else mode
+        if not any(one == GUIDED or flies_mission(one) for one in (mode, coming)):
             raise ModeChanged(f"the vehicle is in {mode}, which cannot be paused; `brake` stops it")
-        if self.next_mode != mode:
+        if not self.is_settled:
             await self.take(job, Rank.STOP)
             await self.switch_to(job, self.holding_mode)
             await self.until_it_stands(job, self.holding_mode)
@@ -176,8 +177,7 @@ class Copter(TurningVehicle):
             await self.commands.send(messages.pause(True), self.commanding(job, lambda: self.held_by(mode)))
         except (Rejected, TimedOut) as error:
             if mode != GUIDED:  # a mission may stand at a waypoint, and go on
-                if isinstance(error, TimedOut):
-                    await self.hear_again()  # a pilot may have taken it meanwhile
+                await self.hear_again()  # a pilot may have taken it meanwhile
                 self.held_by(mode)
                 await self.switch_to(job, self.holding_mode)
                 mode = self.holding_mode
@@ -218,9 +218,14 @@ class Copter(TurningVehicle):
         ArduCopter reports a setpoint between full throttle and lift-off as an internal error (flow_of_ctrl), and does
         not arm again until it reboots.
         """
-        with contextlib.suppress(TimedOut):  # the setpoints are sent anyway
-            self.authority.begin_pause()  # the next commander must end the pause
-            await self.commands.send(messages.pause(True), self.commanding(job, self.flying))
-            await asyncio.sleep(SLOWDOWN)
-        await self.rest(job)
-        await self.end_stop(job, GUIDED)
+        self.authority.begin_pause()  # the next commander must end the pause
+        try:
+            with contextlib.suppress(TimedOut):  # the setpoints are sent anyway
+                await self.commands.send(messages.pause(True), self.commanding(job, self.flying))
+                await asyncio.sleep(SLOWDOWN)
+        except Rejected:
+            self.authority.end_pause()
+            await self.rest(job)
+        else:
+            await self.rest(job)
+            await self.end_stop(job, GUIDED)

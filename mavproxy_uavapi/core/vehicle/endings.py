@@ -89,9 +89,9 @@ def situation(vehicle: Vehicle, modes: Collection[str] = ()) -> Situation:
     if not state.armed:
         disarmed = Situation.ARMING if vehicle.arm_is_on_its_way else Situation.DISARMED
         return Situation.UNKNOWN if state.armed is None else disarmed
-    if mode == "GUIDED":
+    if mode == "GUIDED" and (vehicle.mode == mode or state.mode is None or vehicle.is_in_own_mode):
         return Situation.PAUSED if vehicle.authority.paused else Situation.GUIDED
-    if mode not in modes:
+    if mode == "GUIDED" or mode not in modes:  # out of a pilot's mode it comes to stand in GUIDED
         return Situation.PILOTED
     if mode in LANDINGS | RETURNS:
         flown = Situation.LAND if mode in LANDINGS else Situation.RTL

@@ -11,7 +11,7 @@ import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from mavproxy_uavapi.core.errors import Aborted
+from mavproxy_uavapi.core.errors import Aborted, Superseded
 from mavproxy_uavapi.core.mavlink.link_watch import LinkWatch
 from mavproxy_uavapi.core.vehicle.endings import FlightEndings, Situation, situation
 from mavproxy_uavapi.core.vehicle.jobs import Ending, Job
@@ -135,7 +135,12 @@ class Leases:
             self._timers[vehicle] = self._loop.call_later(max(remaining, LINK_PAUSE), self._look, vehicle)
 
     def _end(self, vehicle: Vehicle, lease: Lease) -> None:
-        commander = vehicle.authority.flies or vehicle.authority.commander
+        commander, interrupted = vehicle.authority.commander, vehicle.authority.interrupted
+        if commander is not None and interrupted is not None and self._whose(commander) != lease.holder:
+            if interrupted.running and self._whose(interrupted) == lease.holder:
+                interrupted.abort(Superseded(f"{interrupted.verb}: another client stopped it, and its lease ran out"))
+            return
+        commander = vehicle.authority.flies or commander
         if commander is None or self._whose(commander) != lease.holder:
             return  # somebody else commands by now
         if situation(vehicle, commander.modes) in (Situation.LAND, Situation.RTL):

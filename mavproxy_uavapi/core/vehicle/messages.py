@@ -52,6 +52,8 @@ class Command:
         again_after: MAV_RESULTs after which it is sent again although it is not patient.
         proven_by_ack: whether only the ack shows that it was done; an ack that may belong to an earlier command
             does not count then.
+        hears_first: whether a heartbeat must come before it is sent again: it takes a vehicle, and its pilot may
+            have taken that back meanwhile.
     """
 
     number: int
@@ -60,6 +62,7 @@ class Command:
     patient: bool = False
     again_after: frozenset[int] = frozenset()
     proven_by_ack: bool = False
+    hears_first: bool = False
 
     @property
     def name(self) -> str:
@@ -103,7 +106,7 @@ def set_mode(number: int) -> Command:
 def arm() -> Command:
     """Arm."""
     busy = frozenset({mavlink.MAV_RESULT_TEMPORARILY_REJECTED})
-    return Command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, (1, 0), again_after=busy)
+    return Command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, (1, 0), again_after=busy, hears_first=True)
 
 
 def disarm(force: bool) -> Command:

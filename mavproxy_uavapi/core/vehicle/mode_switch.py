@@ -10,6 +10,7 @@ from mavproxy_uavapi.core.mavlink.flight_modes import mode_name
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 
 ANSWERED_WITHIN = 5.0  # s in which a heartbeat shows what came of a request
+SHOWN_AFTER = 2.0  # s after which any heartbeat shows it
 
 
 class ModeRequests:
@@ -41,7 +42,7 @@ class ModeRequests:
         return at is not None and at <= self._state.mode_since <= at + ANSWERED_WITHIN
 
     def on_their_way(self) -> list[int]:
-        """The recently requested modes that no heartbeat has shown since, the newest last."""
+        """The recently requested modes of which no heartbeat has shown what came of them, the newest last."""
         now = self._clock()
         requests = [(mode, at) for mode, at in self._requested_at.items() if now - at <= ANSWERED_WITHIN]
         for changed_at, mode in self._state.mode_changes:
@@ -50,7 +51,7 @@ class ModeRequests:
                 requests = [(requested, at) for requested, at in requests if at > answered[-1]]
             else:  # a switch by the pilot or a failsafe: our earlier requests are void
                 requests = [(requested, at) for requested, at in requests if at >= changed_at]
-        return [mode for mode, _ in requests]
+        return [mode for mode, at in requests if self._state.heartbeat_at <= at + SHOWN_AFTER]
 
 
 class ModeSwitch:

@@ -108,6 +108,8 @@ class Vehicle(Verbs):
             await self.confirm_own_mode(job, since)
         stops = mode.upper() in STOPPING_MODES.union(self.holding_modes)
         await self.take(job, Rank.STOP if stops else Rank.ARM, self.inside(switch))
+        if stops and self.arm_is_on_its_way:
+            await arming.disarm(self, job, force=False)
         await self.switch_to(job, mode)
 
     async def mission_to_fly(self) -> list[MissionItem]:
