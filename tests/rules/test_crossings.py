@@ -166,3 +166,22 @@ def test_brake_undoes_an_order_to_arm(make_world: Any) -> None:
     world.ask("GET", "/command/brake")
     world.loop.pass_time(3.0)
     assert not world.copter.armed
+
+
+@pytest.mark.parametrize("how", ["&lease=12&client=a", "&on_disconnect=hold"])
+def test_end_of_a_takeoff_that_another_station_has_taken_sends_nothing(on_ground: World, how: str) -> None:
+    world = on_ground
+    takeoff = world.begin("GET", f"/command/takeoff?alt=60{how}")
+    world.loop.pass_time(6.0)
+    frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
+    place = round((PLACE[0] + 0.01) * 1e7), round(PLACE[1] * 1e7), 12.0
+    world._arriving.append(
+        mavlink.MAVLink_set_position_target_global_int_message(0, 1, 1, frame, 0b110111111000, *place, *(0.0,) * 8)
+    )
+    world.loop.pass_time(5.0)
+    assert world.host.registry.find(1).has_foreign_target and speed(world) > 5.0
+    since = world.loop.time()
+    if "hold" in how:
+        takeoff.hang_up()
+    world.loop.pass_time(8.0)
+    assert [m for m in world.orders(since) if m.get_type().startswith("SET_POSITION")] == [] and speed(world) > 5.0

@@ -66,6 +66,8 @@ LANDINGS = {"LAND", "QLAND"}
 RETURNS = {"RTL", "SMART_RTL", "QRTL"}
 # Endings that somebody requests at that moment, or that come after a new heartbeat (leases): they wait for none.
 AT_ONCE = {Ending.ABORTED, Ending.UNLOADED, Ending.LEASE_OVER}
+# Endings that nobody requests: another station that has given the vehicle a target keeps it.
+UNREQUESTED = {Ending.CLIENT_GONE, Ending.SCRIPT_GONE, Ending.LEASE_OVER, Ending.FAILED}
 # After these errors we do not have the vehicle: the pilot, a client that stopped it, or a failsafe has it.
 HAS_ANOTHER_MASTER = (ModeChanged, NotArmed, Paused, LinkLost)
 FIXED: Mapping[Ending, Policy] = {
@@ -141,6 +143,10 @@ class FlightEndings:
     def _ended(self, job: Job) -> None:
         vehicle = job.vehicle
         if isinstance(vehicle, Vehicle) and job in (vehicle.authority.commander, vehicle.authority.interrupted):
+            is_unrequested = job.ending in UNREQUESTED and not job.steers
+            if is_unrequested and vehicle.next_mode == "GUIDED" and vehicle.has_foreign_target:
+                log.info("vehicle %d, after %s: another station has it", vehicle.state.system, job.verb)
+                return
             at_once = job.ending in AT_ONCE
             policy, why = self.policy(job), f"after {job.verb}"
             closing = self._close(vehicle, policy, why, job.client, job.modes, at_once=at_once)
