@@ -37,7 +37,7 @@ def same_site(public_name: str) -> Middleware:
 
     @web.middleware
     async def check(request: web.Request, handler: Handler) -> web.StreamResponse:
-        if not is_our_name(request.host) and urlsplit(f"//{request.host}").hostname != public_name.lower():
+        if not is_our_name(request.host, public_name):
             return web.json_response({"detail": "this is not that host; see --public-name"}, status=403)
         origin = request.headers.get("Origin")
         if origin is not None and urlsplit(origin).netloc != request.host:
