@@ -305,7 +305,7 @@ def test_a_position_that_is_no_number_is_not_taken(ask: Any) -> None:
     assert json.loads(ask("GET", "/devices")[1]) == {"devices": []}
 
 
-@pytest.mark.parametrize("host", ["evil.example:8080", "localhost.evil.example"])
+@pytest.mark.parametrize("host", ["evil.example:8080", "localhost.evil.example", "[::1"])
 def test_a_page_whose_name_was_rebound_to_us_reads_and_writes_nothing(ask: Any, host: str) -> None:
     headers = {"Host": host, "Origin": f"http://{host}"}
     assert ask("GET", "/readings", headers=headers)[0] == 403
