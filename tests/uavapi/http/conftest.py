@@ -21,6 +21,7 @@ from mavproxy_uavapi.http.call import Service
 from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.settings import ApiModuleSettings
 from tests.support.api_port import TOKEN, Port
+from tests.support.at_once import AtOnce
 
 SOCKET_PATIENCE = 0.002  # real s that the sockets get before the clock jumps
 
@@ -79,6 +80,7 @@ def service(host: Any) -> Service:
 def api(loop: Any, service: Service) -> Iterator[Api]:
     """The API, with whatever vehicle the test puts on the link."""
     loop.patience = SOCKET_PATIENCE
+    loop.set_default_executor(AtOnce())  # of threads its clock would know nothing
     api = Api(loop, service)
     loop.run(api.start())
     yield api
