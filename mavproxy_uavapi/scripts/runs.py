@@ -233,11 +233,11 @@ def _lives(log: Path, record: Path, pid: Callable[[], int | None]) -> bool:
     except BlockingIOError:
         return True
     except FileNotFoundError:
-        return _runs(pid(), record)
+        return _is_runner(pid(), record)
     return False
 
 
-def _runs(pid: int | None, record: Path) -> bool:
+def _is_runner(pid: int | None, record: Path) -> bool:
     """Whether that process is the runner of the record. A log that is removed in flight must not end a script."""
     try:
         command = Path(f"/proc/{pid}/cmdline").read_bytes()

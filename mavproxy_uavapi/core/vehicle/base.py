@@ -18,12 +18,12 @@ from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.shared_tasks import SharedTasks
 from mavproxy_uavapi.core.vehicle import messages, time_limits
 from mavproxy_uavapi.core.vehicle.authority import CommandAuthority, Rank, no_objection
-from mavproxy_uavapi.core.vehicle.command_sender import HEARD_WITHIN, CommandSender
+from mavproxy_uavapi.core.vehicle.command_sender import CommandSender
 from mavproxy_uavapi.core.vehicle.dataflash import DataflashLogs
 from mavproxy_uavapi.core.vehicle.envelope_check import Spaces
 from mavproxy_uavapi.core.vehicle.guard import STOPPING, EnvelopeGuard, GuardedLink
 from mavproxy_uavapi.core.vehicle.jobs import Job
-from mavproxy_uavapi.core.vehicle.message_waiter import MessageWaiter
+from mavproxy_uavapi.core.vehicle.message_waiter import HEARD_WITHIN, MessageWaiter
 from mavproxy_uavapi.core.vehicle.mission_files import MissionItem
 from mavproxy_uavapi.core.vehicle.mission_protocol import Waypoints
 from mavproxy_uavapi.core.vehicle.mission_way import Stop
@@ -179,9 +179,7 @@ class BaseVehicle:
         Raises:
             TimedOut, LinkLost: none comes.
         """
-        asked_at = self.clock()
-        names, action = {"HEARTBEAT"}, "send a heartbeat"
-        await self.waiting.until(names, lambda: self.state.heartbeat_at > asked_at or None, HEARD_WITHIN, action)
+        await self.waiting.heartbeat_after(self.clock())
 
     def require_armed(self) -> None:
         """Raise NotArmed unless the vehicle is armed."""
@@ -358,7 +356,7 @@ class BaseVehicle:
             job.modes |= {mode_name(self.state.vehicle_type, goal) for goal in goals}
 
         check = self.commanding(job, switched_by_nobody_else, *needs, noted)
-        order = replace(command or messages.set_mode(number), hears_first=mode not in self.holding_modes)
+        order = replace(command or messages.set_mode(number), hears_first=mode.upper() not in self.holding_modes)
         try:
             if switch.is_ambiguous:
                 await self.commands.send(replace(order, proven_by_ack=True), check, shown=switch.shown)

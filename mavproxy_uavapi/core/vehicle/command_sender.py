@@ -35,7 +35,6 @@ IN_PROGRESS_LIMIT = 60.0  # s until a command that is still in progress is given
 RETRY_PAUSE = 1.0  # s before a patient command is sent again
 SHOWN_WITHIN = (2.0, 1.5, 1.5)  # s after each acknowledgement in which a heartbeat must show what was done
 LATE_ACK = 10.0  # s after a sending in which its ack may still come
-HEARD_WITHIN = 5.0  # s until a heartbeat must come, or show what an order has done
 TEXT_TIMEOUT = 0.5  # s that the STATUSTEXT of a refusal may come after its ack
 QUESTIONS = {mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAV_CMD_RUN_PREARM_CHECKS}  # they change nothing
 WORTH_ASKING_AGAIN = {mavlink.MAV_RESULT_TEMPORARILY_REJECTED, mavlink.MAV_RESULT_FAILED}
@@ -127,8 +126,7 @@ class CommandSender:
         Raises:
             TimedOut, LinkLost: none comes; also the errors of `shown`.
         """
-        names, action = {"HEARTBEAT"}, "send a heartbeat"
-        await self._waiting.until(names, lambda: self._state.heartbeat_at > sent_at or None, HEARD_WITHIN, action)
+        await self._waiting.heartbeat_after(sent_at)
         return shown()
 
     def _outstanding(self, number: int) -> deque[Sending]:

@@ -67,7 +67,7 @@ RETURNS = {"RTL", "SMART_RTL", "QRTL"}
 # Endings that somebody requests at that moment, or that come after a new heartbeat (leases): they wait for none.
 AT_ONCE = {Ending.ABORTED, Ending.UNLOADED, Ending.LEASE_OVER}
 # Endings that nobody requests: another station that has given the vehicle a target keeps it.
-UNREQUESTED = {Ending.CLIENT_GONE, Ending.SCRIPT_GONE, Ending.LEASE_OVER, Ending.FAILED}
+UNREQUESTED = {Ending.CLIENT_GONE, Ending.SCRIPT_GONE, Ending.LEASE_OVER}
 # After these errors we do not have the vehicle: the pilot, a client that stopped it, or a failsafe has it.
 HAS_ANOTHER_MASTER = (ModeChanged, NotArmed, Paused, LinkLost)
 FIXED: Mapping[Ending, Policy] = {

@@ -16,6 +16,7 @@ from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 from mavproxy_uavapi.core.vehicle.message_exchange import MessageExchange
 
+HEARD_WITHIN = 5.0  # s until a heartbeat must come, or show what an order has done
 T = TypeVar("T")
 mavlink = mavutil.mavlink
 
@@ -51,6 +52,15 @@ class MessageWaiter:
         """
         with self.expecting(names, test) as expected:
             return await expected.within(timeout, action)
+
+    async def heartbeat_after(self, since: float) -> None:
+        """Wait for a heartbeat that is newer than `since` (s): it shows what a pilot has done until then.
+
+        Raises:
+            TimedOut, LinkLost: none comes.
+        """
+        action = "send a heartbeat"
+        await self.until({"HEARTBEAT"}, lambda: self.state.heartbeat_at > since or None, HEARD_WITHIN, action)
 
     async def until(
         self, names: Collection[str], condition: Callable[[], T | None], timeout: float, action: str
