@@ -25,18 +25,11 @@ def commands(world: World, number: int, since: float) -> list[Any]:
     return [s.message for s in world.sent if s.at >= since - 1e-3 and getattr(s.message, "command", None) == number]
 
 
-def wait_for(world: World, condition: Any) -> None:
-    end = world.loop.time() + 20.0
-    while not condition():
-        assert world.loop.time() < end
-        world.loop.pass_time(0.01)
-
-
 def beat(world: World) -> float:
     """Just after a heartbeat; now."""
     state = world.host.fleet.vehicles[1]
     before = state.heartbeat_at
-    wait_for(world, lambda: state.heartbeat_at > before)
+    world.until(lambda: state.heartbeat_at > before)
     return world.loop.time()
 
 
@@ -57,7 +50,7 @@ def test_late_refusal_of_another_mode_does_not_end_what_stops(world: World, path
     world.fault("refuse", command=MODE, result=mavlink.MAV_RESULT_FAILED, count=1)
     world.fault("delay_acks", command=MODE, seconds=0.4, count=1)
     world.begin("GET", "/command/set_mode?mode=AUTO")
-    wait_for(world, lambda: commands(world, MODE, since))
+    world.until(lambda: commands(world, MODE, since))
     world.loop.pass_time(0.2)
     world.uplink_until = world.loop.time() + 0.1  # one packet is lost
     call = world.begin("GET", path)
@@ -84,13 +77,24 @@ def test_switch_is_not_repeated_over_the_pilots(make_world: Any, path: str) -> N
         world.loop.pass_time(3.0)
     since = beat(world)
     call = world.begin("GET", f"/command/{path}")
-    wait_for(world, lambda: commands(world, MODE, since))
+    world.until(lambda: commands(world, MODE, since))
     world.hears = lambda message: message.get_type() not in MUTE
     world.loop.pass_time(0.95)
     world.in_mode("LOITER")
     world.loop.pass_time(0.8)  # the second sending, at 1.5 s
     hear_all(world)
     assert world.answer(call).outcome == "409 mode_changed" and world.copter.mode.name == "LOITER"
+
+
+@pytest.mark.parametrize("path", ["brake", "set_mode?mode=brake"])
+def test_what_stops_is_sent_again_though_nothing_is_heard(world: World, path: str) -> None:
+    world.ask("POST", "/movement/go_to_ned", FAR)
+    world.loop.pass_time(3.0)
+    world.hears = lambda message: message.get_type() not in MUTE
+    world.uplink_until = world.loop.time() + 0.1  # the first packet is lost
+    world.begin("GET", f"/command/{path}")
+    world.loop.pass_time(4.0)
+    assert world.copter.mode.name == "BRAKE" and speed(world) < 0.3
 
 
 @pytest.mark.parametrize("pilot", ["LOITER", "STABILIZE"])
@@ -131,9 +135,9 @@ def test_delete_of_a_lost_guided_after_auto_stops_the_mission(make_world: Any) -
     world = make_world(mission_in_guided)
     since = beat(world)
     world.begin("POST", "/mission/start", {})
-    wait_for(world, lambda: commands(world, MODE, since))
+    world.until(lambda: commands(world, MODE, since))
     world.hears = lambda _message: False  # a blink: the heartbeat AUTO, and the order GUIDED, are lost
-    wait_for(world, lambda: world.copter.mode.name == "AUTO")
+    world.until(lambda: world.copter.mode.name == "AUTO")
     world.uplink_until = world.loop.time() + 0.1
     guided = world.begin("GET", "/command/guided?wait=false")
     world.loop.pass_time(0.11)
@@ -149,7 +153,7 @@ def test_resume_whose_client_hangs_up_is_completed(world: World) -> None:
     assert world.ask("GET", "/movement/stop").outcome == "200"
     since = world.loop.time()
     resume = world.begin("GET", "/movement/resume")
-    wait_for(world, lambda: commands(world, PAUSE, since))
+    world.until(lambda: commands(world, PAUSE, since))
     resume.hang_up()
     world.loop.pass_time(5.0)
     assert speed(world) > 5.0
@@ -162,7 +166,7 @@ def test_brake_undoes_an_order_to_arm(make_world: Any) -> None:
     world.loop.pass_time(3.0)
     since = world.loop.time()
     world.begin("GET", "/command/arm")
-    wait_for(world, lambda: commands(world, ARM, since))
+    world.until(lambda: commands(world, ARM, since))
     world.ask("GET", "/command/brake")
     world.loop.pass_time(3.0)
     assert not world.copter.armed

@@ -49,8 +49,7 @@ def test_arm_on_its_way_is_undone_by_the_closing_message(make_world: Any) -> Non
     world.in_mode("GUIDED")
     world.loop.pass_time(3.0)
     world.begin("GET", "/command/arm")
-    while not any(getattr(message, "command", None) == ARM for message in world.orders()):
-        world.loop.pass_time(0.01)
+    world.until(lambda: any(getattr(message, "command", None) == ARM for message in world.orders()))
 
     async def unload() -> list[Any]:
         world.host.jobs.abort_remote("the API is stopping")

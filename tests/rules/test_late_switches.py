@@ -30,6 +30,14 @@ def hear_all(world: World) -> None:
     world.hears = lambda _message: True
 
 
+def switch_unheard(world: World, mode: str, seconds: float) -> None:
+    """The pilot switches the mode, and no heartbeat tells of it for so long."""
+    lose_heartbeats(world)
+    world.in_mode(mode)
+    world.loop.pass_time(seconds)
+    hear_all(world)
+
+
 def unready(world: World) -> None:
     world.boot()
     world.fault("ekf_bad", seconds=30.0)
@@ -74,8 +82,7 @@ def test_mission_that_took_long_to_read_is_not_begun_in_a_pilots_mode(
 ) -> None:
     world = make_world(long_mission)
     start = world.begin("POST", "/mission/start", {})
-    while max(seqs(world, "MISSION_REQUEST_INT"), default=0) < ITEMS - 10:
-        world.loop.pass_time(0.02)
+    world.until(lambda: max(seqs(world, "MISSION_REQUEST_INT"), default=0) >= ITEMS - 10)
     lose_heartbeats(world)
     if pilot:
         world.in_mode(pilot)
@@ -90,12 +97,8 @@ def test_auto_with_an_envelope_is_not_switched_to_over_a_pilots_later_switch(mak
     world = make_world(long_mission)
     put(world)
     auto = world.begin("GET", "/command/set_mode?mode=AUTO")
-    while max(seqs(world, "MISSION_REQUEST_INT"), default=0) < ITEMS - 10:
-        world.loop.pass_time(0.02)
-    lose_heartbeats(world)
-    world.in_mode("LOITER")
-    world.loop.pass_time(1.0)
-    hear_all(world)
+    world.until(lambda: max(seqs(world, "MISSION_REQUEST_INT"), default=0) >= ITEMS - 10)
+    switch_unheard(world, "LOITER", 1.0)
     assert world.answer(auto).outcome == "409 mode_changed"
     assert modes(world) == [] and world.copter.mode.name == "LOITER"
 
@@ -103,14 +106,10 @@ def test_auto_with_an_envelope_is_not_switched_to_over_a_pilots_later_switch(mak
 def test_land_at_is_not_begun_in_a_pilots_mode(make_world: Any) -> None:
     world = make_world(stages.cruising, vehicle="plane")
     landing = world.begin("POST", "/command/land_at", LAND_AT)
-    while not seqs(world, "MISSION_ITEM_INT"):
-        world.loop.pass_time(0.01)
+    world.until(lambda: seqs(world, "MISSION_ITEM_INT"))
     world.uplink_until = math.inf  # the upload takes its time
     world.loop.pass_time(1.1)
     world.uplink_until = -math.inf
-    lose_heartbeats(world)
-    world.in_mode("LOITER")
-    world.loop.pass_time(1.5)
-    hear_all(world)
+    switch_unheard(world, "LOITER", 1.5)
     assert world.answer(landing).outcome == "409 mode_changed"
     assert modes(world) == [] and world.vehicle.mode.name == "LOITER"

@@ -9,7 +9,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.vehicle.endings import Policy
-from tests.rules.test_low_planes import LOW, height, sinking, until
+from tests.rules.test_low_planes import LOW, height, sinking
 from tests.support import stages
 from tests.support.wire import Wire
 from tests.support.world import World
@@ -32,8 +32,7 @@ def is_heartbeat(message: Any) -> bool:
 def test_a_plane_that_its_pilot_takes_in_its_takeoff_is_not_switched_to_guided(make_world: Any) -> None:
     world = make_world(World.armed, vehicle="plane")
     takeoff = world.begin("GET", "/command/takeoff?alt=53")
-    while world.vehicle.mode.name != "TAKEOFF" or world.at[2] > -40:
-        world.loop.pass_time(0.02)
+    world.until(lambda: world.vehicle.mode.name == "TAKEOFF" and world.at[2] <= -40, 0.02)
     world.hears = lambda message: not is_heartbeat(message)  # the heartbeats are lost
     world.in_mode("LOITER")
     since = world.loop.time()
@@ -49,11 +48,11 @@ def test_a_plane_that_its_pilot_takes_while_it_climbs_before_a_circle_is_not_swi
 ) -> None:
     world = make_world(sinking, vehicle="plane")
     stopping = world.begin("GET", "/movement/stop")
-    until(world, lambda: world.host.registry.find(1).mode == "GUIDED")
+    world.until(lambda: world.host.registry.find(1).mode == "GUIDED", 0.1)
     world.hears = lambda message: not is_heartbeat(message)
     world.in_mode("RTL")  # in which it climbs on
     since = world.loop.time()
-    until(world, lambda: height(world) > LOW)
+    world.until(lambda: height(world) > LOW, 0.1)
     world.loop.pass_time(0.5)
     assert commands(world, SET_MODE, since) == []
     world.hears = lambda _message: True
@@ -66,7 +65,7 @@ def test_a_plane_that_its_pilot_takes_while_its_landing_is_sought_is_not_sent_ho
     world.vehicle.mission.items[:] = [stages.item(world, mavlink.MAV_CMD_NAV_WAYPOINT, 1000.0, 0.0, 60.0)] * 150
     world.host.endings.on_lease_end = Policy.LAND
     assert world.ask("POST", "/movement/go_to_ned?lease=1", {"x": 900, "y": 0, "z": -60}).status == 200
-    until(world, lambda: any(one.get_type() == "MISSION_REQUEST_INT" for one in world.orders(0)))
+    world.until(lambda: any(one.get_type() == "MISSION_REQUEST_INT" for one in world.orders(0)), 0.1)
     world.hears = lambda message: not is_heartbeat(message)
     world.in_mode("LOITER")
     since = world.loop.time()
@@ -103,8 +102,7 @@ def arming(make_world: Any) -> Callable[[], tuple[World, Wire]]:
         world.in_mode("GUIDED")
         world.loop.pass_time(3.0)
         arm = world.begin("GET", "/command/arm?wait=false")
-        while not commands(world, ARM, 0):
-            world.loop.pass_time(0.001)
+        world.until(lambda: commands(world, ARM, 0), 0.001)
         return world, arm
 
     return begin
@@ -131,8 +129,7 @@ def test_an_arm_whose_client_wishes_a_hold_and_hangs_up_is_undone_if_it_was_sent
     world.in_mode("GUIDED")
     world.loop.pass_time(3.0)
     arm = world.begin("GET", "/command/arm?on_disconnect=hold")
-    while not commands(world, ARM, 0):
-        world.loop.pass_time(0.001)
+    world.until(lambda: commands(world, ARM, 0), 0.001)
     arm.hang_up()
     world.loop.pass_time(3.0)
     assert not world.vehicle.armed

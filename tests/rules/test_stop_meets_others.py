@@ -32,8 +32,7 @@ def begin_and_stop(world: World, path: str) -> Any:
     """Begin what ends a stop, and stop again as soon as it has sent that; the call that ends the first stop."""
     since = world.loop.time() - 1e-3
     call = world.begin("GET", path)
-    while not commands(world, PAUSE, since):
-        world.loop.pass_time(0.01)
+    world.until(lambda: commands(world, PAUSE, since))
     assert stop(world) == "200"
     assert [message.param1 for message in commands(world, PAUSE, since)] == [1.0, 0.0]  # it goes on, and pauses
     return call
@@ -174,8 +173,7 @@ def test_stop_while_our_own_switch_is_on_its_way(make_world: Any, method: str, p
     elif lost == "orders":
         world.uplink_until = world.loop.time() + 1.5
     switch = world.begin(method, path, {} if method == "POST" else None)
-    while not commands(world, mavlink.MAV_CMD_DO_SET_MODE, 0.0):
-        world.loop.pass_time(0.005)
+    world.until(lambda: commands(world, mavlink.MAV_CMD_DO_SET_MODE, 0.0), 0.005)
     stopping = world.begin("GET", "/movement/stop")
     world.loop.pass_time(1.2)
     world.hears = lambda _message: True

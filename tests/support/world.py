@@ -272,6 +272,13 @@ class World:
         """A request and its answer."""
         return self.answer(self.begin(method, path, body, kind=kind))
 
+    def until(self, is_so: Callable[[], Any], step: float = 0.01, limit: float = 120.0) -> None:
+        """Let time go by, `step` s at a time, until that is so."""
+        deadline = self.loop.time() + limit
+        while not is_so():
+            assert self.loop.time() < deadline, f"it did not come to that within {limit:g} s"
+            self.loop.pass_time(step)
+
     def answer(self, wire: Wire, within: float = 600.0) -> Reply:
         """The answer of a request in flight, which must come within that many s."""
         reply = self.loop.run(asyncio.wait_for(wire.reply, within))

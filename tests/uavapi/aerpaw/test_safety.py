@@ -13,7 +13,7 @@ from mavproxy_uavapi.aerpaw.geometry import Coordinate
 from mavproxy_uavapi.aerpaw.safety import SafetyCheckerClient
 from mavproxy_uavapi.aerpaw.safety_rules import SafetyRules
 from mavproxy_uavapi.aerpaw.safety_server import SafetyCheckerServer, main_cli, read_rules
-from mavproxy_uavapi.aerpaw.safety_wire import deserialize_msg, serialize_msg, serialize_request
+from mavproxy_uavapi.aerpaw.safety_wire import LARGEST, deserialize_msg, serialize_msg, serialize_request
 from tests.support.ports import free_port
 
 LIMITS = {"vehicle_type": "copter", "max_speed": 10, "min_speed": 1, "max_alt": 50, "min_alt": 5}
@@ -173,11 +173,20 @@ def test_landing_is_allowed_where_the_takeoff_was(client: SafetyCheckerClient) -
         (serialize_request("validate_takeoff_req", []), "Server error"),
         (serialize_request("validate_waypoint_req", ["{}", "{}"]), "Server error"),
         (serialize_msg("[1]"), "Server error"),
+        (serialize_msg("[" * 200_000), "Server error"),
+        (serialize_msg(" " * (LARGEST + 1)), "larger than"),
     ],
 )
 def test_malformed_request_is_answered(client: SafetyCheckerClient, request_bytes: bytes, says: str) -> None:
     answer = client.send_request(request_bytes)
     assert answer["result"] is False and says in answer["message"]
+    assert client.check_server_status() == (True, "")
+
+
+def test_number_that_is_too_large_is_answered(client: SafetyCheckerClient) -> None:
+    assert client.validate_takeoff_command(20, 35.002, -78.998) == (True, "")
+    allowed, reason = client.validate_landing_command(10**400, -78.998)
+    assert not allowed and "Server error" in reason
     assert client.check_server_status() == (True, "")
 
 
