@@ -68,21 +68,16 @@ class GradysModule(SharedModule[GradysSettings]):
         self._background = BackgroundCommands(self.host, NAME)
         self._lost = ""  # what was still unwritten at the end
         self._track = TrackConsole(self.host, self.gradys.tracks, self._background)
-        self._routes = GradysHandlers(self.gradys).routes()
         self.remembered.keep(self.module_settings.shown)
+        self.host.commands["fly"] = self._fly  # `uavapi fly FILE`
+        self.serve(GradysHandlers(self.gradys).routes())
 
     def begin(self) -> None:
         """Push and sense."""
-        for route in self._routes:
-            self.host.extensions[route.path] = route
-        self.host.commands["fly"] = self._fly  # `uavapi fly FILE`
         self._start()
 
     async def end(self) -> None:
         """Stop pushing and sensing."""
-        for route in self._routes:
-            if self.host.extensions.get(route.path) is route:
-                del self.host.extensions[route.path]
         if self.host.commands.get("fly") == self._fly:
             del self.host.commands["fly"]
         await self.gradys.tracks.close()
@@ -139,7 +134,7 @@ class GradysModule(SharedModule[GradysSettings]):
         print("gradys: everything is tried now; `gradys status` shows the result")
 
     def _fly(self, args: list[str]) -> None:
-        self._track.command(["fly", *args])
+        self.command(["track", "fly", *args])
 
     def _tracks(self, args: list[str]) -> None:
         self._track.command(args)

@@ -74,14 +74,13 @@ class VisionModule(SharedModule[VisionSettings]):
         self._tag_view = TagView(self.tracker)
         self._background = BackgroundCommands(self.host, NAME)
         self._handlers = VisionHandlers(self.tracker, self.flights)
-        self._routes = {route.path: route for route in self._handlers.routes()}
         self.remembered.keep(self.module_settings.shown)
+        self.serve(self._handlers.routes())
 
     # -- life ------------------------------------------------------------------------------------------------
 
     def begin(self) -> None:
         """Listen, and open the camera if one is set."""
-        self.host.extensions.update(self._routes)
         self.host.newest_frame = self._handlers.newest_frame
         self.host.bridge.call_soon(self.tracker.listen)
         if self.module_settings.snapshot().source:
@@ -98,8 +97,6 @@ class VisionModule(SharedModule[VisionSettings]):
 
     def unload(self) -> None:
         """Make the vehicle hold, then release everything."""
-        for path in self._routes:
-            self.host.extensions.pop(path, None)
         self.host.newest_frame = None
         try:
             self._abort_all()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, Generic, TypeVar
 
 from MAVProxy.modules.lib import mp_module
@@ -59,12 +59,21 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
         self._completed = {f"({name.upper()}SETTING)": settings.names, f"({name.upper()}VALUE)": list}
         self._begun = False
         self._told_failure = ""
+        self._routes: dict[str, Any] = {}
         self.host = hosts.join(mpstate, self)
         rules = [*completions, f"set {' '.join(self._completed)}", *settings.value_completions()]
         self.windows = Windows(name, mpstate, self.host.bridge, self.host.clock, self.view)
         self.add_command(name, self.command, description, rules)
         for place, words in self._completed.items():
             self.add_completion_function(place, lambda _, words=words: words())
+
+    def serve(self, routes: Iterable[Any]) -> None:
+        """Have `uavapi` serve these routes until the module is unloaded.
+
+        A constructor does it at its end: who has read `Loaded module` may call before `begin`.
+        """
+        self._routes = {route.path: route for route in routes}
+        self.host.extensions.update(self._routes)
 
     def begin(self) -> None:
         """Called once, in the first idle task: open sockets here, not earlier. It must not block.
@@ -114,6 +123,9 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
 
     def unload(self) -> None:
         """Give everything back. Runs in another thread than the main loop, which waits for it."""
+        for path, route in self._routes.items():
+            if self.host.extensions.get(path) is route:  # not its successor's
+                del self.host.extensions[path]
         super().unload()
         self.windows.clear()
         self.remove_command(self.name)

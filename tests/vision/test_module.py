@@ -101,6 +101,19 @@ def test_a_reload_leaves_nothing_to_say_at_the_end(mpstate: Any, turns: int) -> 
     hosts.leave(mpstate, None)
 
 
+def test_routes_come_and_go_with_it(mpstate: Any) -> None:
+    host = hosts.join(mpstate, None)
+    earlier = vision.init(mpstate)  # without an idle task: a client may call as soon as it is loaded
+    assert {"/vision/status", "/vision/land", "/vision/stream.mjpg"} < set(host.extensions)
+    later = vision.init(mpstate)
+    routes = dict(host.extensions)
+    earlier.unload()  # an unload that took longer than MAVProxy waits ends after the next load
+    assert host.extensions == routes
+    later.unload()
+    assert host.extensions == {}
+    hosts.leave(mpstate, None)
+
+
 def test_a_running_camera_ends_with_the_module(mpstate: Any, main_loop: Any) -> None:
     threads = threading.active_count()
     module = vision.init(mpstate, source="http")
