@@ -7,6 +7,6 @@ have in common, `copter`, `plane` and `rover` what each type adds (`kinds` lists
 """
 
 from .options import Home, Options, Wind
-from .simulator import STEP, Simulator
+from .simulator import Simulator
 
-__all__ = ["STEP", "Home", "Options", "Simulator", "Wind"]
+__all__ = ["Home", "Options", "Simulator", "Wind"]

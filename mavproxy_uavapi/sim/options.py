@@ -58,7 +58,8 @@ class Options:
 
     vehicle is a name of `kinds.KINDS`, speedup simulated seconds per wall second, gps_noise metres (1 sigma),
     ready_after the simulated seconds from boot until the estimator has a position, battery the mAh after which the
-    battery is empty; with 0 it never is.
+    battery is empty; with 0 it never is. step is the simulated seconds of one step, at any speedup: 0.02 halves what a
+    simulation costs, and its flights differ by centimetres.
     """
 
     vehicle: str = "copter"
@@ -70,3 +71,4 @@ class Options:
     gps_noise: float = 0.0
     ready_after: float = 5.0
     battery: float = 0.0
+    step: float = 0.01

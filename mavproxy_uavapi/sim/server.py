@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from .control import Control
 from .link import PeerLink
-from .simulator import STEP, Simulator
+from .simulator import Simulator
 
 BACKLOG_LIMIT = 1 << 20
 """Bytes that may wait for a slow TCP peer; a peer with more is disconnected."""
@@ -110,22 +110,22 @@ class Server:
     def run(self) -> None:
         """Serve and simulate at SIM_SPEEDUP until `stop`."""
         last = time.monotonic()
-        owed = 0.0
+        owed, step = 0.0, self.simulator.options.step
         while not self._stopped:
             now = time.monotonic()
-            owed = min(owed + (now - last) * self.simulator.speedup, BEHIND_LIMIT * self.simulator.speedup + STEP)
+            owed = min(owed + (now - last) * self.simulator.speedup, BEHIND_LIMIT * self.simulator.speedup + step)
             last = now
             owed = self._simulate(owed, now + LONGEST_BURST)
             self._flush()
-            behind = owed >= STEP
-            due = max(STEP, SHORTEST_TURN * self.simulator.speedup)
+            behind = owed >= step
+            due = max(step, SHORTEST_TURN * self.simulator.speedup)
             wait = 0.0 if behind else min((due - owed) / self.simulator.speedup, LONGEST_WAIT)
             self._serve(wait)
 
     def _simulate(self, owed: float, deadline: float) -> float:
-        while owed >= STEP:
+        while owed >= self.simulator.options.step:
             self.simulator.step()
-            owed -= STEP
+            owed -= self.simulator.options.step
             if time.monotonic() > deadline:
                 break
         return owed

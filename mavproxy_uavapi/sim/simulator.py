@@ -34,8 +34,6 @@ from .parameters import Parameter, ParameterStore
 from .telemetry import Telemetry
 from .transmitter import Transmitter
 
-STEP = 0.01
-"""Seconds of simulated time in one step, at any speedup."""
 PARAMETERS_PER_STEP = 20
 SYSTEM_ID_PARAMETERS = ("SYSID_THISMAV", "MAV_SYSID")
 """Its name until ArduPilot 4.6, and since."""
@@ -143,10 +141,10 @@ class Simulator:
     # Time.
 
     def step(self) -> None:
-        """Advance by STEP seconds and queue what the links get in that time."""
+        """Advance by one step and queue what the links get in that time."""
         vehicle = self.vehicle
         self.telemetry.freeze_position(vehicle.now < self.faults.gps_frozen_until)
-        vehicle.step(STEP)
+        vehicle.step(self.options.step)
         self.missions.step()
         self.dataflash.step(vehicle, self._epoch)
         self._logs.step()
@@ -164,7 +162,7 @@ class Simulator:
 
     def run(self, seconds: float) -> None:
         """Advance by about seconds of simulated time."""
-        for _ in range(round(seconds / STEP)):
+        for _ in range(round(seconds / self.options.step)):
             self.step()
 
     # What comes in.

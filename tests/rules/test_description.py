@@ -7,20 +7,13 @@ from typing import Any
 
 import pytest
 import requests
-import schemathesis
 import urllib3
-from hypothesis import HealthCheck, given, settings
-from schemathesis import GenerationMode
-from schemathesis.specs.openapi.checks import (
-    content_type_conformance,
-    response_schema_conformance,
-    status_code_conformance,
-)
+from hypothesis import HealthCheck, given, seed, settings
 
 from mavproxy_uavapi.http.openapi import document
 from mavproxy_uavapi.http.routes import ROUTES
 
-PROMISES = [status_code_conformance, content_type_conformance, response_schema_conformance]
+TRIES = 6  # of max_examples requests, until one is taken: few of what a schema allows make sense
 BREATH = 0.2  # s that a verb is given before it is aborted: it is no flight that is tried here
 # These wait for disks, programs or for ever, which virtual time does not; they have tests of their own.
 # What a fleet's verb takes depends on its vehicles too (`each`), which no schema says.
@@ -28,17 +21,16 @@ ELSEWHERE = ("/fleet", "/parameters.param", "/mission", "/telemetry/stream", "/p
 
 KNOWN_TO_THE_VEHICLE = ("GET /command/set_mode", "POST /command/set_mode")  # only it knows the names of its modes
 
-SCHEMA = schemathesis.openapi.from_dict(document(ROUTES))
 OPERATIONS = {
-    f"{operation.method.upper()} {operation.path}": operation
-    for operation in (result.ok() for result in SCHEMA.get_all_operations())
-    if not operation.path.startswith(ELSEWHERE)
+    f"{method.upper()} {path}": operation
+    for path, item in document(ROUTES)["paths"].items()
+    for method, operation in item.items()
+    if not path.startswith(ELSEWHERE)
 }
 quick = settings(
-    derandomize=True,
     database=None,
     deadline=None,
-    max_examples=8,
+    max_examples=5,
     suppress_health_check=list(HealthCheck),
 )
 
@@ -60,22 +52,45 @@ def answer(world: Any, case: Any) -> requests.Response:
     return response
 
 
-CASES = [(name, GenerationMode.POSITIVE) for name in OPERATIONS]
-CASES += [(name, GenerationMode.NEGATIVE) for name, operation in OPERATIONS.items() if len(operation.body)]
+@pytest.fixture(scope="module")
+def schemathesis() -> Any:
+    """It takes a second to import, which those who do not run these tests do not pay."""
+    import schemathesis
+
+    return schemathesis
+
+
+@pytest.fixture(scope="module")
+def schema(schemathesis: Any) -> Any:
+    return schemathesis.openapi.from_dict(document(ROUTES))
+
+
+CASES = [(name, "positive") for name in OPERATIONS]
+CASES += [(name, "negative") for name, operation in OPERATIONS.items() if "requestBody" in operation]
 
 
 @pytest.mark.parametrize(("name", "mode"), CASES)
-def test_answers_are_those_of_the_description(make_world: Any, name: str, mode: GenerationMode) -> None:
+def test_answers_are_those_of_the_description(
+    make_world: Any, schemathesis: Any, schema: Any, name: str, mode: str
+) -> None:
+    from schemathesis.specs.openapi import checks
+
     world = make_world(max_rate=100_000, max_jobs=1000)
+    method, path = name.split(" ", 1)
+    promises = [checks.status_code_conformance, checks.content_type_conformance, checks.response_schema_conformance]
     statuses = []
 
     def ask(case: Any) -> None:
         response = answer(world, case)
-        case.validate_response(response, checks=PROMISES)
+        case.validate_response(response, checks=promises)
         statuses.append(response.status_code)
 
-    quick(given(case=OPERATIONS[name].as_strategy(generation_mode=mode))(ask))()
-    if mode is GenerationMode.NEGATIVE:
-        assert {400, 422} & set(statuses)
-    elif name not in KNOWN_TO_THE_VEHICLE:
-        assert set(statuses) - {400, 422}
+    cases = schema[path][method].as_strategy(generation_mode=schemathesis.GenerationMode(mode))
+    for tries in range(TRIES):
+        seed(tries)(quick(given(case=cases)(ask)))()
+        if mode == "negative":
+            assert {400, 422} & set(statuses)
+            return
+        if set(statuses) - {400, 422}:
+            return
+    assert name in KNOWN_TO_THE_VEHICLE

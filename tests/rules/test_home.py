@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.sim import Options, Simulator
+from tests.support.world import TICK
 
 SYSTEM = 2
 
@@ -15,7 +16,7 @@ SYSTEM = 2
 @pytest.mark.parametrize("vehicle", ["rover", "plane"])
 def test_a_return_asks_where_home_is(make_world: Callable[..., Any], vehicle: str) -> None:
     def stage(world: Any) -> None:
-        simulator = Simulator(Options(sysid=SYSTEM, vehicle=vehicle, ready_after=1.0))
+        simulator = Simulator(Options(sysid=SYSTEM, vehicle=vehicle, ready_after=1.0, step=TICK))
         world.join(simulator)
         simulator.run(2.0)
 

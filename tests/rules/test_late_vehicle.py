@@ -16,7 +16,7 @@ SOON = 5.0  # s
 def world(make_world: Any) -> Any:
     """Vehicle 2 is heard 1 s after MAVProxy requested the streams of vehicle 1."""
     world = make_world(lambda world: world.boot())
-    second = Simulator(Options(seed=2, sysid=2, ready_after=1.0))
+    second = Simulator(Options(seed=2, sysid=2, ready_after=1.0, step=support.TICK))
     second.run(5.0)
     world.join(second)
     world.loop.pass_time(1.0)

@@ -22,7 +22,7 @@ quick = settings(
     derandomize=True,  # the same values in each run
     database=None,
     deadline=None,
-    max_examples=12,
+    max_examples=8,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
 

@@ -15,6 +15,7 @@ from mavproxy_uavapi.api import apply
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.sim import Options, Simulator
 from mavproxy_uavapi.sim.options import Home
+from tests.support.climbing import until_it_hovers
 from tests.support.envelopes import place
 from tests.support.mavproxy import mavproxy_state
 from tests.support.world import MODES, PARAMETERS, TICK, World
@@ -39,7 +40,7 @@ class Fleet:
         self.starts = {system: (0.0, APART * (system - 1)) for system in range(1, count + 1)}
         for system in range(2, count + 1):
             home = Home(*place(*self.starts[system]))
-            simulator = Simulator(Options(sysid=system, home=home, seed=system, ready_after=1.0))
+            simulator = Simulator(Options(sysid=system, home=home, seed=system, ready_after=1.0, step=TICK))
             for name, value in PARAMETERS.items():
                 simulator.parameters.set(name, value)
             world.join(simulator)
@@ -130,5 +131,5 @@ def hover(simulator: Simulator, height: float = 10.0) -> None:
         rest = (0,) * (7 - len(parameters))
         simulator.receive(cable, mavlink.MAVLink_command_long_message(system, 1, command, 0, *parameters, *rest))
         simulator.step()
-    simulator.run(6.0 + height / 2)
+    until_it_hovers(simulator, height)
     simulator.close_link(cable)

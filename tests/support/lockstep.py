@@ -22,16 +22,18 @@ from mavproxy_uavapi.core.errors import Aborted
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.mavlink.link import Address, require_finite
 from mavproxy_uavapi.sim.options import Home, Options, Wind
-from mavproxy_uavapi.sim.simulator import STEP, Simulator
+from mavproxy_uavapi.sim.simulator import Simulator
 from mavproxy_vision.landing.flight_jobs import FlightJobs
 from mavproxy_vision.settings import VisionModuleSettings
 from mavproxy_vision.tracking.stream_rates import TRUTH
 from mavproxy_vision.tracking.tracker import Tracker
+from tests.support.climbing import until_it_hovers
 from tests.support.eye import Eye
 from tests.support.virtual_time import TimeTravellingLoop
 
 STREAMS_EVERY = 15.0  # s: as often does MAVProxy ask for all streams at its rate
 STREAM_RATE = 4  # Hz
+STEP = 0.02  # s of the simulator
 GUIDED = 4
 ARM_DISARM, TAKEOFF = mavlink.MAV_CMD_COMPONENT_ARM_DISARM, mavlink.MAV_CMD_NAV_TAKEOFF
 
@@ -75,7 +77,7 @@ class Lockstep:
         self.loop = TimeTravellingLoop()
         asyncio.set_event_loop(self.loop)
         home = Home(heading=heading)
-        options = Options(seed=seed, home=home, wind=Wind(*wind), gps_noise=gps_noise, ready_after=1.0)
+        options = Options(seed=seed, home=home, wind=Wind(*wind), gps_noise=gps_noise, ready_after=1.0, step=STEP)
         self.simulator = Simulator(options)
         if plnd:
             self.simulator.parameters.set("PLND_TYPE", 1)  # the autopilot reads it at boot
@@ -201,8 +203,7 @@ class Lockstep:
         for command, *parameters in ((ARM_DISARM, 1), (TAKEOFF, 0, 0, 0, 0, 0, 0, alt)):
             self.wire.deliver(mavlink.MAVLink_command_long_message(1, 1, command, 0, *[*parameters, *[0] * 7][:7]))
             self.simulator.step()
-        self.simulator.run(6.0 + alt / 2)
-        assert abs(self.truth.down + alt) < 0.3
+        until_it_hovers(self.simulator, alt)
         self.link.drain()
         self.wire.sent.clear()
         self.switch_on()

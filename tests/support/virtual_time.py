@@ -43,6 +43,12 @@ class TimeTravellingLoop(asyncio.SelectorEventLoop):
         """Let that much time go by."""
         self.run_until_complete(asyncio.sleep(seconds))
 
+    async def shutdown_default_executor(self, timeout: float | None = None) -> None:
+        """Wait for the threads without turning: the clock would run on meanwhile, and call every timer on its way."""
+        if self._default_executor is not None:
+            self._default_executor.shutdown()
+            self._default_executor = None
+
     def settle(self) -> None:
         """Run what is ready, without any time going by."""
 

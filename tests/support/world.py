@@ -31,10 +31,10 @@ from mavproxy_uavapi.settings import ApiModuleSettings
 from mavproxy_uavapi.sim import Options, Simulator
 from mavproxy_uavapi.sim.control import Control
 from mavproxy_uavapi.sim.mission import Item
+from tests.support.climbing import until_it_hovers
 from tests.support.wire import CLIENT, Reply, Wire
 
-TICK = 0.02  # s; what is sent either way arrives with the next one
-STEPS = 2  # of the simulator, in each tick
+TICK = 0.02  # s, and a step of the simulator; what is sent either way arrives with the next one
 STREAMS_EVERY = 15.0  # s; MAVProxy asks for all streams so often
 STREAM_RATE = 4  # Hz, MAVProxy's default
 US = Address(255, 230)
@@ -83,7 +83,7 @@ class World:
         self.host = host = Host(mpstate, clock=loop.time, link=self, loop=loop)
         self.screen: Callable[[], str] = str
         self.directory = Path()
-        self.simulator = Simulator(Options(seed=self.seed, vehicle=vehicle, ready_after=1.0))
+        self.simulator = Simulator(Options(seed=self.seed, vehicle=vehicle, ready_after=1.0, step=TICK))
         for name, value in PARAMETERS.items():
             self.simulator.parameters.set(name, value)
         self.control = Control(self.simulator)
@@ -162,8 +162,7 @@ class World:
         """Hovering above home."""
         self.armed()
         self.by_hand(mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, height)
-        self.simulator.run(6.0 + height / 2)
-        assert abs(self.at[2] + height) < 0.3
+        until_it_hovers(self.simulator, height)
         if mode != "GUIDED":
             self.in_mode(mode)
 
@@ -217,9 +216,8 @@ class World:
             arriving, self._arriving = self._arriving, []
             for message in arriving:
                 self._deliver(message)
-            for _ in range(STEPS):
-                for simulator in self.simulators:
-                    simulator.step()
+            for simulator in self.simulators:
+                simulator.step()
             data = b"".join(cable.drain() for cable in self._cables)
             if self.loop.time() >= self.cut_until and data:
                 for message in filter(self.hears, self._parser.parse_buffer(data) or []):

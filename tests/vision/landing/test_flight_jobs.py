@@ -193,7 +193,7 @@ def test_a_flight_that_is_refused_leaves_the_one_under_way_alone(flying):
 def test_a_flight_that_is_refused_in_land_does_not_hide_the_one_under_way(flying):
     rig = flying()
     first = rig.land()
-    until(rig, lambda: rig.mode == "LAND")
+    until(rig, lambda: rig.copter.mode == "LAND")
     assert isinstance(rig.outcome(rig.begin(rig.flights.searching(rig.copter, 3, None))), ModeChanged)
     assert rig.flights.running
     assert rig.flights.report.verb == "land"
