@@ -58,8 +58,8 @@ class Options:
 
     vehicle is a name of `kinds.KINDS`, speedup simulated seconds per wall second, gps_noise metres (1 sigma),
     ready_after the simulated seconds from boot until the estimator has a position, battery the mAh after which the
-    battery is empty; with 0 it never is. step is the simulated seconds of one step, at any speedup: 0.02 halves what a
-    simulation costs, and its flights differ by centimetres.
+    battery is empty; with 0 it never is. step is the simulated seconds of one step, at any speedup; with 0.02 it all
+    costs half, and flights differ by centimetres.
     """
 
     vehicle: str = "copter"
