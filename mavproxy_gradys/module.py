@@ -70,7 +70,7 @@ class GradysModule(SharedModule[GradysSettings]):
         self._track = TrackConsole(self.host, self.gradys.tracks, self._background)
         self.remembered.keep(self.module_settings.shown)
         self.host.commands["fly"] = self._fly  # `uavapi fly FILE`
-        self.serve(GradysHandlers(self.gradys).routes())
+        self.finish_loading(GradysHandlers(self.gradys).routes())
 
     def begin(self) -> None:
         """Push and sense."""

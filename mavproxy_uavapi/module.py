@@ -86,6 +86,7 @@ class UavApiModule(SharedModule[ApiSettings]):
         )
         self.host.bridge.close_in_children(self.api.filenos)
         self.remembered.keep(self.module_settings.shown)
+        self.finish_loading()
 
     def begin(self) -> None:
         """Listen, unless a startup script ran `uavapi stop`."""

@@ -75,7 +75,7 @@ class VisionModule(SharedModule[VisionSettings]):
         self._background = BackgroundCommands(self.host, NAME)
         self._handlers = VisionHandlers(self.tracker, self.flights)
         self.remembered.keep(self.module_settings.shown)
-        self.serve(self._handlers.routes())
+        self.finish_loading(self._handlers.routes())
 
     # -- life ------------------------------------------------------------------------------------------------
 

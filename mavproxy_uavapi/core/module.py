@@ -67,16 +67,24 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
         for place, words in self._completed.items():
             self.add_completion_function(place, lambda _, words=words: words())
 
-    def serve(self, routes: Iterable[Any]) -> None:
-        """Have `uavapi` serve these routes until the module is unloaded.
+    def finish_loading(self, routes: Iterable[Any] = ()) -> None:
+        """The end of each constructor: what follows `module load` in a script, or calls then, finds all in place.
 
-        A constructor does it at its end: who has read `Loaded module` may call before `begin`.
+        Args:
+            routes: `uavapi` serves them until the module is unloaded.
         """
         self._routes = {route.path: route for route in routes}
         self.host.extensions.update(self._routes)
+        if self.host.bridge.running:
+            self._begin_once()
+
+    def _begin_once(self) -> None:
+        if not self._begun:
+            self._begun = True
+            self.begin()
 
     def begin(self) -> None:
-        """Called once, in the first idle task: open sockets here, not earlier. It must not block.
+        """Called once, when MAVProxy's main loop runs: open sockets here, not earlier. It must not block.
 
         MAVProxy loads the modules of its command line before it forks, and a child would keep the socket.
         """
@@ -106,9 +114,7 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
         """MAVProxy calls this several hundred times a second, and hides what it raises."""
         try:
             self.host.idle(self)
-            if not self._begun:
-                self._begun = True
-                self.begin()
+            self._begin_once()
             self.windows.turn()
         except Exception as error:  # noqa: BLE001  MAVProxy does not report it
             self._report_failure(error)

@@ -41,6 +41,7 @@ class Demo(SharedModule[Any]):
         super().__init__(
             mpstate, "a demo", settings({}, {}), remembered, actions=actions, completions=["<status|go>"]
         )
+        self.finish_loading([SimpleNamespace(path=f"/{self.name}")])
 
     def begin(self) -> None:
         self.done.append(("begun", self.host.bridge.running))
@@ -239,3 +240,16 @@ def test_beginning_that_fails_is_reported_and_the_rest_goes_on(
     assert "ValueError: no" in capsys.readouterr().out
     demo.mavlink_packet(msg("heartbeat", system=4))
     main_loop.until(lambda: 4 in demo.host.fleet.vehicles)
+
+
+def test_loaded_while_the_main_loop_runs_it_begins_at_once(demo: Demo, mpstate: Any, main_loop: Any) -> None:
+    assert demo.done == []
+    main_loop.modules.append(demo)
+    main_loop.turn()
+    other = Demo(mpstate, OtherSettings)
+    assert other.done == [("begun", True)]
+    other.idle_task()
+    assert other.done == [("begun", True)]
+    assert set(demo.host.extensions) == {"/demo", "/other"}
+    other.unload()
+    assert set(demo.host.extensions) == {"/demo"}

@@ -113,6 +113,19 @@ def test_console_commands(mavproxy):
     prompt.ask("module unload uavapi", "Unloaded module uavapi")
 
 
+def test_the_next_line_of_a_script_finds_the_module_at_work(mavproxy):
+    """MAVProxy runs a script's lines one after the other, without an idle task between them."""
+    prompt = mavproxy.mavproxy
+    prompt.ask(load_line(mavproxy), f"listening on {mavproxy.url}")
+    script = mavproxy.directory / "vision.scr"
+    script.write_text("module load vision\nvision set source http\nvision search\n")
+    output = prompt.ask(f"script {script}", "looking for 36h11 through http")
+    assert "vehicle 1" in output and "main loop" not in output  # unknown yet, or not armed
+    assert mavproxy.ok(mavproxy.get("/vision/status"))["info"]["source"] == "http"
+    for name in ("vision", "uavapi"):
+        prompt.ask(f"module unload {name}", f"Unloaded module {name}")
+
+
 def test_a_port_in_use_is_one_clear_line_and_mavproxy_lives_on(mavproxy, harness):
     prompt = mavproxy.mavproxy
     with socket.socket() as taken:
