@@ -52,7 +52,7 @@ class OneReading(Request):
 
     quantity: Name
     value: Annotated[Any, BeforeValidator(checked)]
-    representation: Annotated[str, Field(max_length=64)] = ""
+    representation: Annotated[str, Field(max_length=64, pattern=r"^[^\x00]*$")] = ""  # a NUL is refused by stations
     time: Annotated[float | None, Field(ge=0, le=1e11)] = None
     device: Name | None = None
     sysid: Annotated[int | None, Field(ge=1, le=255)] = None

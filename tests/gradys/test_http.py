@@ -72,6 +72,8 @@ def test_a_value_that_cannot_be_stored_is_refused_once(value: Any) -> None:
         {"quantity": "a" * 65, "value": 1},
         {"quantity": "a", "value": 1, "time": float("nan")},
         {"quantity": "a", "value": 1, "sysid": 256},
+        {"quantity": "a", "value": 1, "representation": "m\0"},
+        {"quantity": "a", "value": 1, "representation": "\ud800"},
         {"quantity": "a", "value": 1, "device": "#"},
         {"readings": []},
         {"readings": [{"quantity": "a", "value": 1}] * (MOST_READINGS + 1)},
