@@ -32,7 +32,7 @@ from tests.support.eye import Eye
 from tests.support.virtual_time import TimeTravellingLoop
 
 STREAMS_EVERY = 15.0  # s: as often does MAVProxy ask for all streams at its rate
-STREAM_RATE = 4  # Hz
+STREAM_RATE = 2  # Hz
 STEP = 0.02  # s of the simulator
 GUIDED = 4
 ARM_DISARM, TAKEOFF = mavlink.MAV_CMD_COMPONENT_ARM_DISARM, mavlink.MAV_CMD_NAV_TAKEOFF

@@ -36,7 +36,7 @@ from tests.support.wire import CLIENT, Reply, Wire
 
 TICK = 0.02  # s, and a step of the simulator; what is sent either way arrives with the next one
 STREAMS_EVERY = 15.0  # s; MAVProxy asks for all streams so often
-STREAM_RATE = 4  # Hz, MAVProxy's default
+STREAM_RATE = 2  # Hz; MAVProxy's default is 4, of which most is of no use here
 US = Address(255, 230)
 HOUSEKEEPING = {mavlink.MAV_CMD_SET_MESSAGE_INTERVAL}  # what is asked for whether anybody flies or not
 MODES = {"STABILIZE": 0, "ALT_HOLD": 2, "AUTO": 3, "GUIDED": 4, "LOITER": 5, "RTL": 6, "LAND": 9, "BRAKE": 17}
