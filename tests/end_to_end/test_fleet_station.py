@@ -78,15 +78,15 @@ def test_readings_of_a_mavproxy_reach_the_database(fleet: Fleet, harness: Any, t
         rig.mavproxy.ask(f"module load gradys:{settings}", "Loaded module gradys")
         count = "SELECT count(*) FROM readings WHERE device = 'uav-10' AND quantity = '{}'"
         positions = count.format("position")
-        harness.eventually(lambda: int(fleet.database.sql(positions)) >= 3, 30, "three positions")
+        harness.eventually(lambda: int(fleet.database.sql(positions)) >= 3, what="three positions")
         fleet.database.kill()
-        harness.eventually(lambda: fleet.workers[0].health()["status"] == "failing", 10, "its being noticed")
+        harness.eventually(lambda: fleet.workers[0].health()["status"] == "failing", what="its being noticed")
         body = {"readings": [{"quantity": "temperature", "value": n} for n in range(50)]}
         assert rig.post("/gradys/readings", **body).status_code == 200
         fleet.database.start()
         rig.mavproxy.ask("gradys flush", "tried now")
         harness.eventually(lambda: int(fleet.database.sql(count.format("temperature"))) == 50, 60, "all fifty")
-        harness.eventually(lambda: rig.get("/gradys/status").json()["info"]["spooled"] < 5, 30, "an empty spool")
+        harness.eventually(lambda: rig.get("/gradys/status").json()["info"]["spooled"] < 5, what="an empty spool")
         for worker in fleet.workers:
             worker.wait()
             vehicles = requests.get(f"{worker.url}/fleet", timeout=10).json()["vehicles"]
@@ -181,7 +181,7 @@ def test_a_worker_reads_by_tls_with_a_password(tmp_path: Path) -> None:
             "fleet/1/alt", json.dumps(reading), 1, port=broker.port, hostname="127.0.0.1",
             auth={"username": "station", "password": "s3cr:t"}, tls={"ca_certs": certificate},
         )  # fmt: skip
-        eventually(lambda: worker.metrics()["station_readings_stored_total"] == 1, 30, "the reading")
+        eventually(lambda: worker.metrics()["station_readings_stored_total"] == 1, what="the reading")
     finally:
         for one in workers:
             one.stop()

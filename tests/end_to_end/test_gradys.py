@@ -86,7 +86,7 @@ def test_the_form_is_that_of_the_original_once_a_second_on_one_connection(rig, r
 def test_dropped_by_the_station_is_counted_separately_at_the_prompt_and_over_http(rig, recorder, harness):
     recorder.body = {"id": 1, "type": 101, "seq": 0, "lat": 0, "lng": 0, "alt": 0, "DATA": "0"}
     tell(rig, recorder)
-    harness.eventually(lambda: report(rig)["dropped_by_station"] >= 2, 10, "two dropped updates")
+    harness.eventually(lambda: report(rig)["dropped_by_station"] >= 2, what="two dropped updates")
     output = rig.mavproxy.ask("gradys status", "next is")
     assert "of them dropped by the station: no browser watches" in output
     assert report(rig)["round_trip_ms"]["last"] > 0
@@ -98,7 +98,7 @@ def test_redirects_are_refused(rig, recorder, harness):
     recorder.status = 307
     recorder.headers = {"Location": f"http://127.0.0.1:{elsewhere.server_port}/update-info/"}
     tell(rig, recorder)
-    harness.eventually(lambda: "redirects" in (report(rig)["last_error"] or ""), 10, "the refusal")
+    harness.eventually(lambda: "redirects" in (report(rig)["last_error"] or ""), what="the refusal")
     elsewhere.stop()
     assert elsewhere.updates == []
 
@@ -106,7 +106,7 @@ def test_redirects_are_refused(rig, recorder, harness):
 def test_a_token_goes_along_and_is_not_shown(rig, recorder, harness):
     rig.mavproxy.ask("gradys set token s3cret", "gradys: pushing to")
     tell(rig, recorder)
-    harness.eventually(lambda: recorder.updates, 10, "an update")
+    harness.eventually(lambda: recorder.updates, what="an update")
     assert recorder.updates[0][2]["Authorization"] == "Bearer s3cret"
     assert "s3cret" not in rig.mavproxy.ask("gradys set token", "(set)")
     rig.mavproxy.ask("gradys set token None", "gradys: pushing to")
@@ -130,10 +130,10 @@ def test_tls_needs_a_certificate_that_is_trusted(rig, harness, certificate):
     station = Recorder(free_port(), certificate)
     try:
         tell(rig, station, "https://")
-        harness.eventually(lambda: "not trusted" in (report(rig)["last_error"] or ""), 10, "the refusal")
+        harness.eventually(lambda: "not trusted" in (report(rig)["last_error"] or ""), what="the refusal")
         assert station.updates == []
         rig.mavproxy.ask(f"gradys set ca_file {certificate}", "gradys: pushing to")
-        harness.eventually(lambda: station.updates, 10, "an update over TLS")
+        harness.eventually(lambda: station.updates, what="an update over TLS")
         rig.mavproxy.ask("gradys set ca_file /no/such/file", "No such file")
         rig.mavproxy.ask("gradys set ca_file None", "gradys: pushing to")
     finally:
@@ -147,7 +147,7 @@ def test_ipv6(rig, harness):
         pytest.skip("this machine has no IPv6 loopback")
     try:
         rig.mavproxy.ask(f"gradys set gs [::1]:{station.server_port}", "gradys: pushing to")
-        harness.eventually(lambda: station.updates, 10, "an update over IPv6")
+        harness.eventually(lambda: station.updates, what="an update over IPv6")
         assert station.forms[0]["ip"] == f"[::1]:{rig.port}/"
     finally:
         station.stop()
@@ -182,7 +182,7 @@ def test_no_fix_no_push_and_stale_no_push(harness, recorder, tmp_path):
         gradys = json.dumps({"gs": f"127.0.0.1:{recorder.server_port}", "max_age": 2}, separators=(",", ":"))
         command = harness.mavproxy_command(instance, f"--cmd=module load gradys:{gradys}")
         rig.mavproxy = rig.start("mavproxy", command)
-        harness.eventually(lambda: len(recorder.updates) >= 2, 30, "two updates")
+        harness.eventually(lambda: len(recorder.updates) >= 2, what="two updates")
         form = recorder.forms[-1]
         assert (form["id"], form["ip"]) == ("7", "127.0.0.1/")  # uavapi is not loaded
         rig.mavproxy.ask("gradys status", "ip names no API")
@@ -222,7 +222,7 @@ def test_routes_are_served_whichever_module_was_loaded_first_and_go_with_it(harn
 
 def test_stop_and_start(rig, recorder, harness):
     tell(rig, recorder)
-    harness.eventually(lambda: recorder.updates, 10, "an update")
+    harness.eventually(lambda: recorder.updates, what="an update")
     rig.mavproxy.ask("gradys stop", "gradys: stopped")
     time.sleep(1.0)  # one may be on its way
     reported = len(recorder.updates)
@@ -230,7 +230,7 @@ def test_stop_and_start(rig, recorder, harness):
     assert len(recorder.updates) == reported
     assert report(rig)["running"] is False
     rig.mavproxy.ask("gradys start", "gradys: pushing to")
-    harness.eventually(lambda: len(recorder.updates) > reported, 10, "an update")
+    harness.eventually(lambda: len(recorder.updates) > reported, what="an update")
 
 
 @pytest.mark.parametrize(
@@ -258,11 +258,11 @@ def test_the_original_stations_program_and_ours_agree(rig, harness, tmp_path):
     station.says("listening on")
     rig.mavproxy.ask(f"gradys set gs 127.0.0.1:{port}", "gradys: pushing to")
     url = f"http://127.0.0.1:{port}"
-    harness.eventually(lambda: report(rig)["dropped_by_station"] >= 1, 10, "a dropped update")
+    harness.eventually(lambda: report(rig)["dropped_by_station"] >= 1, what="a dropped update")
     assert requests.get(f"{url}/devices", timeout=5).json() == {"devices": []}
     with requests.get(f"{url}/watch", stream=True, timeout=5) as watching:
         assert watching.status_code == 200
-        device = harness.eventually(lambda: requests.get(f"{url}/devices", timeout=5).json()["devices"], 10)[0]
+        device = harness.eventually(lambda: requests.get(f"{url}/devices", timeout=5).json()["devices"])[0]
     assert (device["id"], device["device"], device["type"], device["status"]) == (10, "uav", 102, "active")
     assert "uav" in requests.get(f"{url}/devices.csv", timeout=5).text
     broken = requests.post(f"{url}/update-info/", data={"id": "1", "lat": "None", "device": "uav"}, timeout=5)

@@ -44,7 +44,7 @@ class Broker:
     def start(self) -> None:
         assert MOSQUITTO is not None
         self._process = self._rig.start("mosquitto", [MOSQUITTO, "-c", str(self._config), "-v"])
-        self._harness.eventually(lambda: "running" in self._process.output(), 10, "the broker's start")
+        self._harness.eventually(lambda: "running" in self._process.output(), what="the broker's start")
 
     def stop(self) -> None:
         self._process.stop()
@@ -92,12 +92,12 @@ def test_readings_positions_and_the_last_will(rig, harness, tmp_path):
     sink = f"mqtt://uav:secret@127.0.0.1:{broker.port}/fleet/{{sysid}}/{{quantity}}"
     rig.mavproxy.ask(f'module load gradys:{{"spool":"{tmp_path}/spool.db"}}', "Loaded module gradys")
     rig.mavproxy.ask(f"gradys set sink {sink}", "gradys: no ground station")
-    harness.eventually(lambda: len(subscriber.readings("fleet/10/position")) >= 3, 15, "three positions")
+    harness.eventually(lambda: len(subscriber.readings("fleet/10/position")) >= 3, what="three positions")
     assert ("fleet/10/status", "online", False) in subscriber.heard
     assert "secret" not in rig.mavproxy.ask("gradys status", "sink mqtt://uav:***@")
 
     late = Subscriber(broker.port)  # a new subscriber has the last position and the status at once
-    harness.eventually(lambda: len(late.heard) >= 2, 5, "what is retained")
+    harness.eventually(lambda: len(late.heard) >= 2, what="what is retained")
     retained = {topic for topic, _, kept in late.heard if kept}
     assert retained == {"fleet/10/position", "fleet/10/status"}
     late.stop()
@@ -106,7 +106,7 @@ def test_readings_positions_and_the_last_will(rig, harness, tmp_path):
     broker.stop()
     for value in range(50):
         numbers += rig.ok(rig.post("/gradys/readings", quantity="temperature", value=value))["seq"]
-    harness.eventually(lambda: _sink(rig)["last_error"], 20, "the broker's being missed")
+    harness.eventually(lambda: _sink(rig)["last_error"], what="the broker's being missed")
     subscriber.stop()
     # No reading is retained: those that came before the subscription would be heard by nobody.
     rig.mavproxy.popen.send_signal(signal.SIGSTOP)
@@ -114,12 +114,12 @@ def test_readings_positions_and_the_last_will(rig, harness, tmp_path):
     subscriber = Subscriber(broker.port)
     rig.mavproxy.popen.send_signal(signal.SIGCONT)
     rig.mavproxy.ask("gradys flush", "tried now")
-    harness.eventually(lambda: len(subscriber.readings("fleet/10/temperature")) >= 50, 30, "all fifty")
+    harness.eventually(lambda: len(subscriber.readings("fleet/10/temperature")) >= 50, what="all fifty")
     seen = list(dict.fromkeys(reading["seq"] for reading in subscriber.readings("fleet/10/temperature")))
     assert seen == numbers
 
     rig.mavproxy.popen.send_signal(signal.SIGKILL)
-    harness.eventually(lambda: ("fleet/10/status", "offline", False) in subscriber.heard, 30, "the last will")
+    harness.eventually(lambda: ("fleet/10/status", "offline", False) in subscriber.heard, what="the last will")
     subscriber.stop()
 
 
@@ -129,9 +129,9 @@ def test_unloading_says_offline(rig, harness, tmp_path):
     sink = f"mqtt://uav:secret@127.0.0.1:{broker.port}"
     settings = json.dumps({"sink": sink, "spool": f"{tmp_path}/spool.db"}, separators=(",", ":"))
     rig.mavproxy.ask(f"module load gradys:{settings}", "Loaded module gradys")
-    harness.eventually(lambda: subscriber.readings("fleet/uav-10/position"), 15, "a position")
+    harness.eventually(lambda: subscriber.readings("fleet/uav-10/position"), what="a position")
     rig.mavproxy.ask("module unload gradys", "Unloaded module gradys")
-    harness.eventually(lambda: ("fleet/uav-10/status", "offline", False) in subscriber.heard, 5, "offline")
+    harness.eventually(lambda: ("fleet/uav-10/status", "offline", False) in subscriber.heard, what="offline")
     subscriber.stop()
 
 
@@ -140,7 +140,7 @@ def test_a_wrong_password_is_reported(rig, harness, tmp_path):
     sink = f"mqtt://uav:wrong@127.0.0.1:{broker.port}/fleet/{{sysid}}/{{quantity}}"
     settings = json.dumps({"sink": sink, "spool": f"{tmp_path}/spool.db"}, separators=(",", ":"))
     rig.mavproxy.ask(f"module load gradys:{settings}", "Loaded module gradys")
-    error = harness.eventually(lambda: _sink(rig)["last_error"], 15, "the refusal")
+    error = harness.eventually(lambda: _sink(rig)["last_error"], what="the refusal")
     assert "Not authorized" in error and "wrong" not in error
     rig.mavproxy.ask("module unload gradys", "Unloaded module gradys")
 
@@ -156,12 +156,12 @@ def test_tls_is_checked_by_the_ca_file(rig, harness, tmp_path):
     sink = f"mqtts://uav:secret@127.0.0.1:{broker.port}/fleet/{{sysid}}/{{quantity}}"
     settings = json.dumps({"sink": sink, "spool": f"{tmp_path}/spool.db"}, separators=(",", ":"))
     rig.mavproxy.ask(f"module load gradys:{settings}", "Loaded module gradys")
-    error = harness.eventually(lambda: _sink(rig)["last_error"], 20, "a certificate that nobody vouches for")
+    error = harness.eventually(lambda: _sink(rig)["last_error"], what="a certificate that nobody vouches for")
     assert "certificate" in error.lower()
     assert subscriber.heard == []
     rig.mavproxy.ask(f"gradys set ca_file {cert}", "gradys: no ground station")
     rig.mavproxy.ask("gradys flush", "tried now")
-    harness.eventually(lambda: len(subscriber.readings("fleet/10/position")) >= 3, 20, "three positions")
+    harness.eventually(lambda: len(subscriber.readings("fleet/10/position")) >= 3, what="three positions")
     subscriber.stop()
     rig.mavproxy.ask("module unload gradys", "Unloaded module gradys")
 
@@ -181,7 +181,7 @@ def test_a_vehicle_of_another_mavproxy_that_comes_near_is_reported_at_the_prompt
     rig.in_the_air(10)
     mark = rig.mavproxy.mark()
     rig.mavproxy.type(f"gradys set hear mqtt://uav:secret@127.0.0.1:{broker.port}")
-    harness.eventually(lambda: "fleet/+/position" in broker._process.output(), 15, "the subscription")
+    harness.eventually(lambda: "fleet/+/position" in broker._process.output(), what="the subscription")
     here = rig.ok(rig.get("/telemetry/gps"))["info"]["position"]
     client = mqtt.Client(mqtt.CallbackAPIVersion.VERSION2)
     client.username_pw_set("uav", "secret")

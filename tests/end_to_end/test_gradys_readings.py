@@ -42,7 +42,7 @@ class Receiver:
         self._process = self._rig.start("station", [*command, f"--database={self._database}"])
         mark = 0
         self._process.says("listening on", mark)
-        self._harness.eventually(self.answers, 10, "the station's answer")
+        self._harness.eventually(self.answers, what="the station's answer")
 
     def answers(self) -> bool:
         try:
@@ -98,9 +98,9 @@ def post(rig: Any, value: float, quantity: str = "temperature") -> list[int]:
 
 
 def test_sampled_and_posted_readings_arrive(loaded, receiver, harness):
-    harness.eventually(lambda: report(loaded)["sinks"], 5, "the sink")
+    harness.eventually(lambda: report(loaded)["sinks"], what="the sink")
     (number,) = post(loaded, 21.5)
-    harness.eventually(lambda: len(receiver.readings(quantity="alt")) >= 4, 15, "four samples")
+    harness.eventually(lambda: len(receiver.readings(quantity="alt")) >= 4, what="four samples")
     received = receiver.readings()
     samples = [r["seq"] for r in received if r["quantity"] == "alt"]
     assert samples == sorted(set(samples))  # what is posted is stored at once, before samples that wait half a second
@@ -114,7 +114,7 @@ def test_sampled_and_posted_readings_arrive(loaded, receiver, harness):
 
 
 def test_what_a_receiver_cannot_take_is_refused_before_it_is_kept(loaded, harness):
-    harness.eventually(lambda: loaded.get("/gradys/status").status_code == 200, 5, "the route")
+    harness.eventually(lambda: loaded.get("/gradys/status").status_code == 200, what="the route")
     url = f"{loaded.url}/gradys/readings"
     headers = {"Content-Type": "application/json"}
     for body in ('{"quantity":"a","value":NaN}', '{"quantity":"a/b","value":1}', '{"quantity":"a"}', "{}", "[]", "x"):
@@ -123,17 +123,17 @@ def test_what_a_receiver_cannot_take_is_refused_before_it_is_kept(loaded, harnes
 
 
 def test_an_outage_costs_nothing_and_order_is_kept(loaded, receiver, harness):
-    harness.eventually(receiver.readings, 10, "a reading")
+    harness.eventually(receiver.readings, what="a reading")
     receiver.stop()
     posted = []
     for number in range(100):
         posted += post(loaded, number)
-    spooled = harness.eventually(lambda: report(loaded)["sinks"][0]["last_error"] and report(loaded), 10, "the error")
+    spooled = harness.eventually(lambda: report(loaded)["sinks"][0]["last_error"] and report(loaded), what="an error")
     assert spooled["spooled"] >= 100 and spooled["oldest_unsent_s"] >= 0
     loaded.mavproxy.ask("gradys status", "cannot connect")
     receiver.start()
     loaded.mavproxy.ask("gradys flush", "tried now")
-    harness.eventually(lambda: len(receiver.readings(quantity="temperature")) == 100, 30, "all hundred")
+    harness.eventually(lambda: len(receiver.readings(quantity="temperature")) == 100, what="all hundred")
     received = receiver.readings(quantity="temperature")
     assert [r["seq"] for r in received] == posted
     assert [r["value"] for r in received] == list(range(100))
@@ -183,11 +183,11 @@ def test_a_captive_portal_takes_nothing(rig, harness, receiver, portal, tmp_path
     rig.mavproxy.ask(gradys(receiver, tmp_path, sink=sink, quantities=""), "Loaded module gradys")
     try:
         posted = [number for value in range(10) for number in post(rig, value)]
-        error = harness.eventually(lambda: report(rig)["sinks"][0]["last_error"], 10, "the error")
+        error = harness.eventually(lambda: report(rig)["sinks"][0]["last_error"], what="the error")
         assert "names no numbers" in error or "redirects to /login" in error
         assert report(rig)["spooled"] == 10
         rig.mavproxy.ask(f"gradys set sink {receiver.url}/readings", "gradys: no ground station")
-        received = harness.eventually(lambda: len(receiver.readings()) == 10 and receiver.readings(), 30, "all ten")
+        received = harness.eventually(lambda: len(receiver.readings()) == 10 and receiver.readings(), what="all ten")
         assert [reading["seq"] for reading in received] == posted
     finally:
         rig.mavproxy.ask("module unload gradys", "Unloaded module gradys")
@@ -269,7 +269,7 @@ def test_a_full_disk_is_reported_and_nothing_else_suffers(harness, rig, tmp_path
             reported = report(rig)
             return reported["quantities"][0]["taken"] >= before + 8 and reported["spool"]["problem"]
 
-        harness.eventually(samples_wait, 20, "samples that the disk does not take")
+        harness.eventually(samples_wait, what="samples that the disk does not take")
         rig.mavproxy.ask("gradys status", "NOT KEPT just now")
         output = rig.mavproxy.ask("module unload gradys", "Unloaded module gradys")
         assert re.search(r"\d+ readings are lost: .*full", output)

@@ -132,7 +132,7 @@ def test_mistakes_at_the_prompt_are_one_clear_answer(rig, tmp_path):
 def test_gpx(rig, harness, tmp_path):
     file = tmp_path / "a.gpx"
     rig.mavproxy.ask(f"gradys track record {file} 0.2", "(gpx)")
-    harness.eventually(lambda: file.read_text().count("<trkpt") >= 3, 10, "three points")
+    harness.eventually(lambda: file.read_text().count("<trkpt") >= 3, what="three points")
     rig.mavproxy.ask("gradys track stop", "readings are in")
     assert file.read_text().endswith("</gpx>\n")
 

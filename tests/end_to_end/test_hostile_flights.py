@@ -80,17 +80,17 @@ def rig(vehicle):
 def test_arm_that_waits_does_not_take_the_vehicle_from_the_pilot_who_arms_it(rig, harness):
     rig.ok(rig.get("/command/set_mode", mode="STABILIZE"))
     rig.control.fault("ekf_bad")
-    harness.eventually(lambda: not rig.status()["ekf_ok"], 30, "the loss of its position")
+    harness.eventually(lambda: not rig.status()["ekf_ok"], what="the loss of its position")
     waiting = rig.begin("GET", "/command/arm")
     time.sleep(0.3)
-    harness.eventually(lambda: pilot_arms(rig), 5, "the pilot's arming")
+    harness.eventually(lambda: pilot_arms(rig), what="the pilot's arming")
     time.sleep(0.5)
     rig.control.fault("pilot_sticks", throttle=1500)
     answer = waiting.answer(30)
     assert (answer.status_code, answer.json().get("code")) == (409, "mode_changed")
     rig.control.ask("clear")
-    harness.eventually(lambda: rig.status()["ekf_ok"], 30, "readiness")
-    harness.eventually(lambda: rig.get("/telemetry/ned").status_code == 200 and height(rig) > 3, 30, "his flight")
+    harness.eventually(lambda: rig.status()["ekf_ok"], what="readiness")
+    harness.eventually(lambda: rig.get("/telemetry/ned").status_code == 200 and height(rig) > 3, what="his flight")
     since = mark(rig)
     time.sleep(1.0)
     assert sent(rig, since) == []
@@ -158,7 +158,7 @@ def test_disarm_is_not_kept_from_the_vehicle_by_streams(rig):
 def test_stop_holds_a_vehicle_still_against_a_stream_until_resume(rig, harness):
     rig.in_the_air(10)
     with Streams(rig, count=1) as streams:
-        harness.eventually(lambda: speed(rig) > 2, 10, "its flying")
+        harness.eventually(lambda: speed(rig) > 2, what="its flying")
         rig.ok(rig.get("/movement/stop"))
         before = len(streams.answers) + 1  # one may be on its way
         for _ in range(10):
@@ -166,7 +166,7 @@ def test_stop_holds_a_vehicle_still_against_a_stream_until_resume(rig, harness):
             time.sleep(0.1)
         assert set(streams.answers[before:]) == {(409, "paused")}
         rig.ok(rig.get("/movement/resume"))
-        harness.eventually(lambda: speed(rig) > 2, 10, "its flying again")
+        harness.eventually(lambda: speed(rig) > 2, what="its flying again")
 
 
 # -- F4: the setpoint in force is the autopilot's ---------------------------------------------------------
@@ -181,7 +181,7 @@ def test_yaw_rate_leaves_another_stations_target_in_force(rig, harness):
     rig.control.fault("other_station", position=target)
     time.sleep(0.2)
     rig.get("/movement/set_yaw_rate", yaw_rate=30)
-    harness.eventually(lambda: math.dist(rig.ned(), target) < 1.5, 20, "the other station's target")
+    harness.eventually(lambda: math.dist(rig.ned(), target) < 1.5, what="the other station's target")
     rig.get("/movement/set_yaw_rate", yaw_rate=0)
 
 
@@ -292,7 +292,7 @@ def test_mission_that_is_deleted_is_left_by_brake(rig, harness):
     )
     answer = rig.post("/mission/start?wait=false", until_complete=True)
     assert answer.status_code == 202
-    harness.eventually(lambda: mode(rig) == "AUTO" and speed(rig) > 2, 20, "its mission")
+    harness.eventually(lambda: mode(rig) == "AUTO" and speed(rig) > 2, what="its mission")
     assert rig.delete(answer.headers["Location"]).status_code == 200
     assert mode(rig) == "BRAKE"
     harness.eventually(lambda: speed(rig) < 0.5, 10, "standing still")
@@ -313,7 +313,7 @@ def test_mission_that_is_deleted_is_left_by_brake(rig, harness):
 def test_telemetry_that_is_not_a_number_is_not_flown_by(rig, harness, message, path, body):
     rig.in_the_air(10)
     rig.control.fault("nan", message=message)
-    harness.eventually(lambda: None in reported(rig, message), 10, "its arrival")
+    harness.eventually(lambda: None in reported(rig, message), what="its arrival")
     since = mark(rig)
     answer = rig.post(path, **body)
     assert (answer.status_code, answer.json().get("code")) == (503, "stale"), answer.text
@@ -338,7 +338,7 @@ def test_first_command_goes_out_before_anything_is_requested(rig, harness, verb)
     since, asked_at = mark(rig), time.time()
     waiting = rig.begin("GET", f"/command/{verb}")
     expected = COMMANDS[verb]
-    received = harness.eventually(lambda: until_command(rig, since, expected), 10, f"{verb} on the wire")
+    received = harness.eventually(lambda: until_command(rig, since, expected), what=f"{verb} on the wire")
     took = received[-1]["wall"] - asked_at
     print(f"{verb} was on the wire after {1000 * took:.1f} ms")
     assert [m["fields"]["param_id"] for m in received if m["name"] == "PARAM_REQUEST_READ"] == []

@@ -62,7 +62,7 @@ def test_fifty_rounds_of_load_and_unload_leave_nothing_behind(mavproxy, harness)
     before = resources(prompt.pid)
     for _ in range(ROUNDS):
         one_round()
-    assert harness.eventually(lambda: no_more_than(before, prompt.pid), 5, f"having no more than {before}")
+    assert harness.eventually(lambda: no_more_than(before, prompt.pid), what=f"having no more than {before}")
     for name in ("uavapi", "vision", "gradys"):
         prompt.ask(name, f"Unknown command '{name}'")
     with socket.socket() as probe:
@@ -77,7 +77,7 @@ def test_reload_takes_the_port_over(mavproxy, harness):
         output = prompt.ask(f"module reload {load_line(mavproxy).removeprefix('module load ')}", "listening on")
         assert "Reloaded module uavapi" not in output or "Failed" not in output
         mavproxy.wait_until_up()
-    assert harness.eventually(lambda: no_more_than(before, prompt.pid), 5, f"having no more than {before}")
+    assert harness.eventually(lambda: no_more_than(before, prompt.pid), what=f"having no more than {before}")
     prompt.ask("module unload uavapi", "Unloaded module uavapi")
 
 

@@ -36,14 +36,14 @@ def unread(embedded_rig: Any) -> Iterator[list[socket.socket]]:
 
 def test_streams_that_nobody_reads_cost_a_reader_nothing(embedded_rig, harness, unread):
     rig = embedded_rig
-    harness.eventually(lambda: status_of_one_more(rig) == 429, 30, "a refusal of one more")
+    harness.eventually(lambda: status_of_one_more(rig) == 429, what="a refusal of one more")
     assert status_of_one_more(rig, "Mozilla/5.0") == 200  # the pilot's page on the same machine
     for _ in range(50):  # how long they take is for benchmarks/bench_streams.py to say
         rig.ok(rig.get("/telemetry/gps", timeout=5))
     for client in unread:
         client.close()
 
-    harness.eventually(lambda: status_of_one_more(rig) == 200, 30, "a free place")
+    harness.eventually(lambda: status_of_one_more(rig) == 200, what="a free place")
 
 
 def status_of_one_more(rig: Any, program: str = "a script") -> int:
@@ -59,7 +59,7 @@ def test_flight_that_was_begun_at_the_prompt_is_in_the_trail(embedded_rig, harne
     rig.mavproxy.ask("module load vision", "Loaded module vision")
     rig.mavproxy.ask("vision search 3", "`arm` it first")
     file = rig.directory / "uavapi-audit.jsonl"
-    (entry,) = harness.eventually(lambda: of_console(file), 10, "an entry")
+    (entry,) = harness.eventually(lambda: of_console(file), what="an entry")
     assert (entry["verb"], entry["request"], entry["outcome"]) == ("/vision/search", {"id": 3}, "not_armed")
     assert "console /vision/search(id=3): not_armed" in rig.mavproxy.ask("uavapi log 3", "all of them:")
     assert file.stat().st_mode & 0o777 == 0o600

@@ -73,7 +73,7 @@ class Broker:
         """Start it; it listens when this returns."""
         command = [str(MOSQUITTO), "-c", str(self._config)]
         self._process = Process(command, self._directory.parent / "mosquitto.log", self._directory)
-        eventually(self.listens, 20, "the broker's start")
+        eventually(self.listens, what="the broker's start")
 
     def listens(self) -> bool:
         """Whether it takes connections."""
