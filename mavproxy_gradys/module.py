@@ -78,8 +78,6 @@ class GradysModule(SharedModule[GradysSettings]):
 
     async def end(self) -> None:
         """Stop pushing and sensing."""
-        if self.host.commands.get("fly") == self._fly:
-            del self.host.commands["fly"]
         await self.gradys.tracks.close()
         try:
             with contextlib.suppress(asyncio.TimeoutError):  # the spool is closed in its own thread
@@ -92,6 +90,8 @@ class GradysModule(SharedModule[GradysSettings]):
 
     def unload(self) -> None:
         """Release our own resources, then the shared ones; print what is lost."""
+        if self.host.commands.get("fly") == self._fly:  # not its successor's
+            del self.host.commands["fly"]
         try:
             super().unload()
         finally:

@@ -103,7 +103,7 @@ def test_routes_come_and_go_with_it(mpstate: Any) -> None:
         "/mission/fly-track",
     }
     module.unload()
-    assert host.extensions == {}
+    assert host.extensions == {} and host.commands == {}
 
 
 def test_setting_takes_effect_at_once(make: Any, main_loop: Any, capsys: Any) -> None:
