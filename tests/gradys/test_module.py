@@ -125,7 +125,7 @@ def test_the_prompt_waits_for_no_goodbye(make: Any, main_loop: Any, capsys: Any,
 
         async def close(self) -> None:
             leaving.set()
-            await asyncio.to_thread(left.wait, 20)
+            await asyncio.to_thread(left.wait, 120)
 
     monkeypatch.setattr("mavproxy_gradys.forwarding.sender.make_sink", lambda *_: Slow())
     module = make(sink="http://127.0.0.1:9/r", quantities="")
@@ -133,7 +133,7 @@ def test_the_prompt_waits_for_no_goodbye(make: Any, main_loop: Any, capsys: Any,
     module.command(["set", "gs", "127.0.0.1:8"])
     module.command(["stop"])
     module.command(["set", "period", "2"])
-    assert leaving.wait(10)
+    assert leaving.wait(60)
     assert "pushing to" not in capsys.readouterr().out  # the prompt was free all the time
     left.set()
     main_loop.until(lambda: "stopped" in capsys.readouterr().out)

@@ -124,7 +124,7 @@ class Worker:
             self._command, self._directory / f"worker-{self.port}.log", self._directory, {"PYTHONPATH": root}
         )
 
-    def wait(self, timeout: float = 30.0) -> None:
+    def wait(self, timeout: float = 60.0) -> None:
         """Wait until broker and database are there."""
         eventually(lambda: self.health().get("status") == "ok", timeout, f"the health of {self.url}")
 

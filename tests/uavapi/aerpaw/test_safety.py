@@ -146,7 +146,7 @@ def client(config: Path) -> Iterator[SafetyCheckerClient]:
         yield made
         made.socket.linger = 1000
         made.socket.send(STOP)
-        server.thread.join(5)
+        server.thread.join(60)
     assert not server.thread.is_alive()
 
 

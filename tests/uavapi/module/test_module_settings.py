@@ -127,5 +127,5 @@ def test_setting_that_needs_no_other_listening_leaves_calls_in_flight_alone(
     assert listens(port)
     module.command(["stop"])
     output("stopped")
-    client.join(5.0)
+    client.join(60.0)
     assert answers[0][1]["code"] == "aborted"

@@ -38,7 +38,7 @@ def test_unload_ends_a_call_in_flight_and_answers_it(
     client.start()
     main_loop.until(module.host.jobs.running)
     loader.unload(module)
-    client.join(5.0)
+    client.join(60.0)
     assert answers[0][0] == 409
     assert answers[0][1]["code"] == "aborted"
 

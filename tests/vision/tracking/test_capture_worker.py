@@ -140,7 +140,7 @@ def test_a_defect_in_either_thread_is_no_camera(broken):
     worker.start()
     source.post(picture(7))
     for thread in worker._threads:
-        thread.join(10)
+        thread.join(60)
     assert not any(thread.is_alive() for thread in worker._threads)
     assert worker.health.state == "closed"
     assert "RuntimeError('broken')" in worker.health.error
