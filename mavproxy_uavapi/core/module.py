@@ -75,16 +75,11 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
         """
         self._routes = {route.path: route for route in routes}
         self.host.extensions.update(self._routes)
-        if self.host.bridge.running:
-            self._begin_once()
-
-    def _begin_once(self) -> None:
-        if not self._begun:
-            self._begun = True
-            self.begin()
+        if self.host.bridge.running:  # MAVProxy's main loop runs, and has just called us
+            self.idle_task()
 
     def begin(self) -> None:
-        """Called once, when MAVProxy's main loop runs: open sockets here, not earlier. It must not block.
+        """Called once, in the first idle task: open sockets here, not earlier. It must not block.
 
         MAVProxy loads the modules of its command line before it forks, and a child would keep the socket.
         """
@@ -114,7 +109,9 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
         """MAVProxy calls this several hundred times a second, and hides what it raises."""
         try:
             self.host.idle(self)
-            self._begin_once()
+            if not self._begun:
+                self._begun = True
+                self.begin()
             self.windows.turn()
         except Exception as error:  # noqa: BLE001  MAVProxy does not report it
             self._report_failure(error)

@@ -1,8 +1,8 @@
 """The interface for other modules that add paths to the API; they import nothing else of `mavproxy_uavapi.http`.
 
-A module puts its routes into `Host.extensions`, by path; the API serves them while it is loaded:
+A module gives its routes to `SharedModule.finish_loading`; the API serves them while the module is loaded:
 
-    host.extensions["/vision/land"] = Route("/vision/land", land, LandRequest, FLY, EITHER, job=True)
+    self.finish_loading([Route("/vision/land", land, LandRequest, FLY, EITHER, job=True)])
 """
 
 from mavproxy_uavapi.http.bodies import in_time

@@ -244,7 +244,6 @@ def test_beginning_that_fails_is_reported_and_the_rest_goes_on(
 
 def test_loaded_while_the_main_loop_runs_it_begins_at_once(demo: Demo, mpstate: Any, main_loop: Any) -> None:
     assert demo.done == []
-    main_loop.modules.append(demo)
     main_loop.turn()
     other = Demo(mpstate, OtherSettings)
     assert other.done == [("begun", True)]
@@ -253,3 +252,17 @@ def test_loaded_while_the_main_loop_runs_it_begins_at_once(demo: Demo, mpstate: 
     assert set(demo.host.extensions) == {"/demo", "/other"}
     other.unload()
     assert set(demo.host.extensions) == {"/demo"}
+
+
+def test_beginning_that_fails_while_it_is_loaded_leaves_a_module_that_can_be_unloaded(
+    demo: Demo, mpstate: Any, main_loop: Any, capsys: Any
+) -> None:
+    class Failing(Demo):
+        def begin(self) -> None:
+            raise ValueError("no")
+
+    main_loop.turn()
+    failing = Failing(mpstate, OtherSettings)
+    assert "other: its idle task fails" in capsys.readouterr().out
+    failing.unload()
+    assert list(mpstate.command_map) == ["demo"]
