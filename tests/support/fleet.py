@@ -124,9 +124,9 @@ class Worker:
             self._command, self._directory / f"worker-{self.port}.log", self._directory, {"PYTHONPATH": root}
         )
 
-    def wait(self, timeout: float = 60.0) -> None:
+    def wait(self) -> None:
         """Wait until broker and database are there."""
-        eventually(lambda: self.health().get("status") == "ok", timeout, f"the health of {self.url}")
+        eventually(lambda: self.health().get("status") == "ok", what=f"the health of {self.url}")
 
     def health(self) -> dict[str, Any]:
         """What it says of itself; nothing while it does not."""
