@@ -217,9 +217,10 @@ def pytest_configure() -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Have the garbage collector pass over what was imported and collected: it stays, and is much."""
+    """Have the garbage collector pass over what was imported and collected, and seldom look at the rest."""
     gc.collect()
     gc.freeze()
+    gc.set_threshold(50_000, 20, 100)
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
