@@ -22,6 +22,7 @@ from packaging.requirements import Requirement
 from mavproxy_uavapi.core.host import Host
 from mavproxy_uavapi.core.mainloop.bridge import Bridge
 from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
+from tests.support import chromium
 from tests.support.drone import Drone
 from tests.support.fake_link import FakeLink
 from tests.support.mavproxy import MainLoop, mavproxy_state
@@ -246,5 +247,6 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     for item in items:
         for marker in item.iter_markers("needs"):
             program, package = marker.args[0], marker.args[-1]
-            if shutil.which(program, path=os.environ["PATH"] + ":/usr/sbin") is None:
+            programs = chromium.PROGRAMS if program == "chromium" else (program,)
+            if not any(shutil.which(one, path=os.environ["PATH"] + ":/usr/sbin") for one in programs):
                 item.add_marker(pytest.mark.skip(reason=f"{program} is not installed (apt-get install {package})"))

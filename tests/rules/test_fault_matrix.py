@@ -32,6 +32,7 @@ AT_REST = 0.5  # m/s: slower than this a vehicle holds
 # Verbs that go the way of another one of the table.
 ALIKE = ("vision/search", "prompt: vision land", "script: land", "script: go_to_ned_wait", "drive_body_wait")
 ALIKE += ("travel_at_body, with duration", "set_air_speed", "set_climb_speed", "set_descent_speed")
+ALIKE += ("prompt: uavapi fly", "go_to_gps_wait", "drive_wait")
 CELLS = [
     pytest.param(name, fault, marks=pytest.mark.long if name in ALIKE else ())
     for name, verb in outcomes.VERBS.items()
