@@ -30,7 +30,7 @@ OPERATIONS = {
 quick = settings(
     database=None,
     deadline=None,
-    max_examples=5,
+    max_examples=3,
     suppress_health_check=list(HealthCheck),
 )
 

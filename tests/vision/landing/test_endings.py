@@ -92,10 +92,15 @@ ENDS: dict[str, tuple[Any, str, str, str]] = {
 }  # fmt: skip
 REFUSED_IN_LAND = ("another search", "movement")
 NOT_IN_A_TAKEOFF = ("another search", "movement")  # 409 busy
+ALIKE = ("vision stop", "unload of the last module", "RTL by the pilot", "AUTO by the pilot")  # as another end is
+CELLS = [
+    pytest.param(name, end, marks=pytest.mark.long if end in ALIKE and name != "land" else ())
+    for name in FLIGHTS
+    for end in ENDS
+]
 
 
-@pytest.mark.parametrize("end", ENDS)
-@pytest.mark.parametrize("name", FLIGHTS)
+@pytest.mark.parametrize(("name", "end"), CELLS)
 def test_what_follows_a_flight_is_what_the_table_says(lockstep, name, end):
     rig, job = under_way(lockstep, name)
     act, code, after_guided, after_land = ENDS[end]
