@@ -3,7 +3,8 @@
 The URL's path is the topic; {sysid}, {device} and {quantity} stand for the reading's values:
 `mqtt://broker/fleet/{device}/{quantity}`. Positions are retained, so that a new subscriber gets the last one at once.
 Beside them each vehicle's retained topic `status` has `online`; by our last will the broker sets it to `offline` when
-the connection breaks. A connection has one will, so each status topic has its own connection.
+the connection breaks. A connection has one will, so each status topic has its own connection. It keeps its client id:
+a new one ends the one before at the broker, whose will is then not published after the new one's `online`.
 
 With `#ack=station` at the end of the URL the station's confirmation is the acknowledgement; see `confirmations.py`.
 Unconfirmed readings are published again, so they expire at the broker after EXPIRY, retained positions too.
@@ -64,6 +65,7 @@ class MqttSink:
         self._confirmations: defaultdict[str, Confirmations] = defaultdict(Confirmations)  # by status topic
         self._reply_topics: dict[str, str] = {}  # by status topic
         self._clients: dict[str, aiomqtt.Client] = {}  # by status topic
+        self._client_ids: defaultdict[str, str] = defaultdict(lambda: uuid.uuid4().hex)  # by status topic
         self._names = Resolver()
         self._connecting: defaultdict[str, asyncio.Lock] = defaultdict(asyncio.Lock)
         self._tasks = HeldTasks()
@@ -215,6 +217,7 @@ class MqttSink:
             self._port,
             self._timeout,
             self._ca_file,
+            identifier=self._client_ids[status],
             max_inflight_messages=WINDOW,
             will=aiomqtt.Will(status, OFFLINE, qos=1, retain=True),
             protocol=aiomqtt.ProtocolVersion.V5 if self._station_confirms else aiomqtt.ProtocolVersion.V311,

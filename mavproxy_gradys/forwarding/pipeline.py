@@ -70,7 +70,8 @@ class ReadingPipeline:
             if quantity.is_sensor:
                 self._sensors.start(self._sense(self._sensor(quantity), self._started_thread()), name)
             else:
-                self._tasks.start(self._sample(self._sampler(quantity), self._started_thread()), name)
+                sampling = self._sample(self._sampler(quantity), self._started_thread(), settings.max_age)
+                self._tasks.start(sampling, name)
 
     async def stop(self) -> None:
         """Stop, and close the spool; readings that cannot be written stay in memory until the next start."""
@@ -184,17 +185,16 @@ class ReadingPipeline:
         finally:
             await sampler.source.close()
 
-    async def _sample(self, sampler: Sampler, spool_thread: SpoolThread) -> None:
+    async def _sample(self, sampler: Sampler, spool_thread: SpoolThread, max_age: float) -> None:
         loop = asyncio.get_running_loop()
         ticker = Ticker(sampler.quantity.period, loop.time())
         while True:
             await asyncio.sleep(ticker.wait(loop.time()))
             for state in list(self._host.fleet.vehicles.values()):
-                self._put(spool_thread, self._read(sampler, state))
+                self._put(spool_thread, self._read(sampler, state, max_age))
 
-    def _read(self, sampler: Sampler, state: VehicleState) -> Reading | None:
-        assert self._settings is not None
-        now, wall, max_age = self._host.clock(), self._wall(), self._settings.max_age
+    def _read(self, sampler: Sampler, state: VehicleState, max_age: float) -> Reading | None:
+        now, wall = self._host.clock(), self._wall()
         if sampler.quantity.name != POSITION or sampler.quantity.message:
             return sampler.sample(state, now, wall, max_age)
         try:

@@ -60,7 +60,9 @@ class Advice:
         return (north, east) if math.hypot(north, east) < FASTEST else (0.0, 0.0)
 
     def warnings(self, ours: dict[str, Track], names: set[str], separation: float, now: float) -> list[str]:
-        """A sentence for each pair that will be nearer than `separation` m, once until it is apart again.
+        """A sentence for each pair that will be nearer than `separation` m.
+
+        A pair is warned of once, until it is apart again or one of the two lands or falls silent.
 
         Args:
             ours: our vehicles in the air, by name.
@@ -69,6 +71,7 @@ class Advice:
             now: s.
         """
         self._others = {name: track for name, track in self._others.items() if now - track.at < OLD}
+        self._warned = {(one, other) for one, other in self._warned if one in ours and other in self._others}
         sentences = []
         for name, track in ours.items():
             for other in self._others.keys() - names:

@@ -13,7 +13,8 @@ class Newest(NamedTuple):
 
     Attributes:
         device, id, quantity, representation, value: as in `ReadingRow`.
-        time: when it was measured, s since 1970 by the vehicle's clock.
+        time: when it was measured, s since 1970 by the vehicle's clock; not later than it was stored, by the store's
+            clock: a reading from the future would hide all that come before that time.
         received: when the device's last reading of this quantity was stored, s since 1970 by the store's clock.
     """
 
@@ -63,4 +64,5 @@ class NewestReadings:
 def newest_of(rows: Iterable[ReadingRow], received: float) -> Iterable[Newest]:
     """The newest readings of rows that were stored at `received`."""
     for row in rows:
-        yield Newest(row.device, row.id, row.quantity, row.representation, row.value, row.time, received)
+        measured = min(row.time, received)
+        yield Newest(row.device, row.id, row.quantity, row.representation, row.value, measured, received)

@@ -23,7 +23,8 @@ CREATE TABLE IF NOT EXISTS readings (
     PRIMARY KEY (device, seq)) WITHOUT ROWID
 """
 NEWEST = """
-SELECT device, id, quantity, representation, value, max(time), received FROM readings GROUP BY device, quantity
+SELECT device, id, quantity, representation, value, max(min(time, received)), received
+FROM readings GROUP BY device, quantity
 """
 HISTORY = """
 SELECT min(time), max(time), min(number), max(number), count(*), max(received - time)
@@ -56,6 +57,8 @@ class SqliteStore:
                 self._db.execute("PRAGMA synchronous=FULL")
                 self._db.execute(SCHEMA)
                 self._newest.put(Newest(*row) for row in self._db.execute(NEWEST))
+                # Counted once: it takes a look at the whole file, and no other process adds to it.
+                (self._stored,) = self._db.execute("SELECT count(*) FROM readings").fetchone()
             except BaseException:
                 self._db.close()
                 raise
@@ -78,6 +81,7 @@ class SqliteStore:
         """See `Store.add`; device and number identify a reading."""
         received = self._clock()
         new = await self._do(lambda: self._insert(rows, received))
+        self._stored += new
         self._repeats += len(rows) - new
         self._newest.put(newest_of(rows, received))
         return new
@@ -99,8 +103,7 @@ class SqliteStore:
 
     async def counts(self) -> StoreCounts:
         """See `Store.counts`; repeats since the start."""
-        (count,) = await self._do(lambda: self._db.execute("SELECT count(*) FROM readings").fetchone())
-        return StoreCounts(int(count), self._repeats)
+        return StoreCounts(self._stored, self._repeats)
 
     async def readings(self, query: ReadingQuery) -> AsyncGenerator[Sequence[tuple[Any, ...]], None]:
         """See `Store.readings`."""

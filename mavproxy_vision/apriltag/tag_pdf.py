@@ -52,8 +52,8 @@ def _page(family: str, number: int, size: float, paper: tuple[str, float, float]
 
 def _document(width: float, height: float, drawing: bytes) -> bytes:
     objects = [
-        b"<< /Type /Catalog /VisionHandlers 2 0 R >>",
-        b"<< /Type /VisionHandlers /Kids [3 0 R] /Count 1 >>",
+        b"<< /Type /Catalog /Pages 2 0 R >>",
+        b"<< /Type /Pages /Kids [3 0 R] /Count 1 >>",
         f"<< /Type /Page /Parent 2 0 R /MediaBox [0 0 {width:.4f} {height:.4f}] /Contents 4 0 R "
         f"/Resources << /Font << /F1 5 0 R >> >> >>".encode(),
         b"<< /Length %d >>\nstream\n%s\nendstream" % (len(drawing), drawing),

@@ -62,7 +62,7 @@ class Target:
         self.ambiguous = 0  # frames in a row that showed two tags of the same id
         self.last: TargetMeasurement | None = None
         self.is_final = False  # whether detections elsewhere no longer move the position
-        self._variance = np.zeros(3)
+        self._variance = np.zeros(3)  # m², at `seen_at`
         self._rejected = 0
         self._recent: deque[TargetMeasurement] = deque()
         self._wrong_way = 0
@@ -96,15 +96,15 @@ class Target:
         if self.place is None:
             self._begin(measurement, noise)
             return True
-        self._variance += DRIFT**2 * max(measurement.at - self.seen_at, 0.0)
-        if self._distance(measurement) > GATE + 0.08 * measurement.range + math.sqrt(float(self._variance.max())):
+        variance = self._variance + DRIFT**2 * max(measurement.at - self.seen_at, 0.0)
+        if self._distance(measurement) > GATE + 0.08 * measurement.range + math.sqrt(float(variance.max())):
             self._rejected += 1
             if self._rejected >= REJECTED_IN_A_ROW and not self.is_final:
                 self._begin(measurement, noise)
             return False
-        gain = self._variance / (self._variance + noise)
+        gain = variance / (variance + noise)
         self.place = self.place + gain * (measurement.place - self.place)
-        self._variance = self._variance * (1 - gain)
+        self._variance = variance * (1 - gain)
         self._count(measurement)
         return True
 

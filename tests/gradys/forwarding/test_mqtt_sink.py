@@ -44,6 +44,7 @@ class Broker:
         connects, publishes: s that each takes.
         refuses: topic that it refuses.
         made: how many clients there were.
+        client_ids: the ids that they gave themselves.
         open: connections that nobody has closed.
         output: (topic, retained) of what was published.
     """
@@ -52,10 +53,12 @@ class Broker:
         self.connects = self.publishes = 0.0
         self.refuses = ""
         self.made = self.open = 0
+        self.client_ids: list[str] = []
         self.output: list[tuple[str, bool]] = []
 
-    def client(self, *_: Any, **__: Any) -> Client:
+    def client(self, *_: Any, identifier: str, **__: Any) -> Client:
         self.made += 1
+        self.client_ids.append(identifier)
         return Client(self)
 
 
@@ -179,3 +182,16 @@ def test_one_vehicle_finds_out_that_the_broker_is_not_there(loop: Any, sink: Mqt
         sent(loop, sink, *(Reading(f"uav-{n}", n, "alt", "m", 1.0, 0.0) for n in range(1, 101)))
     assert broker.made == 1
     loop.pass_time(20)
+
+
+def test_a_new_connection_ends_the_one_before_at_the_broker(loop: Any, sink: MqttSink, broker: Broker) -> None:
+    """By the same client id. Else its will says `offline` once the broker misses it, after the new one's `online`."""
+    other = Reading("uav-8", 8, "alt", "m", 1.0, 0.0)
+    sent(loop, sink, ALT, other)
+    for topic in ("fleet/7/alt", "fleet/8/alt"):
+        broker.refuses = topic
+        sent(loop, sink, ALT, other)
+    broker.refuses = ""
+    sent(loop, sink, ALT, other)
+    seven, eight = broker.client_ids[:2]
+    assert broker.client_ids == [seven, eight, seven, eight] and seven != eight

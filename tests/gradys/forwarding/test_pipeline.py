@@ -201,3 +201,22 @@ def test_no_password_gets_into_the_file(
     loop.run(pipeline.stop())
     content = b"".join(file.read_bytes() for file in tmp_path.iterdir())
     assert b"acknowledged" in content and b"s3cret" not in content
+
+
+def test_sampling_goes_on_while_a_stop_waits_for_the_disk(
+    loop: Any, pipeline: Any, start: Any, telemetry: Any, monkeypatch: Any
+) -> None:
+    save = SpoolThread.save
+
+    async def slow(self: Any) -> None:
+        await asyncio.sleep(2)
+        await save(self)
+
+    monkeypatch.setattr(SpoolThread, "save", slow)
+    start(sink="http://a/r", quantities="position@0.5")
+    loop.pass_time(1)
+    stopping = loop.create_task(pipeline.stop())
+    for _ in range(3):
+        telemetry.send_all()
+        loop.pass_time(0.5)
+    loop.run(stopping)  # the loop's end asserts that there was no defect

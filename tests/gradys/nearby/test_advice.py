@@ -69,3 +69,16 @@ def test_our_own_positions_and_old_ones_say_nothing() -> None:
 )  # fmt: skip
 def test_what_is_no_position_is_passed_over(payload: Any) -> None:
     assert Advice().take(payload, 0.0) == ""
+
+
+def test_a_pair_of_which_one_was_gone_is_warned_of_anew() -> None:
+    advice, names = Advice(), {"uav-1"}
+    ours = {"uav-1": at(0, 0)}
+    advice.take(position(0, 5), 0.0)
+    assert len(advice.warnings(ours, names, 8.0, 0.0)) == 1
+    assert advice.warnings({}, names, 8.0, 1.0) == []  # ours has landed, beside the other
+    advice.take(position(0, 5), 2.0)
+    assert len(advice.warnings(ours, names, 8.0, 2.0)) == 1
+    assert advice.warnings(ours, names, 8.0, 2.0 + OLD) == []  # the other has fallen silent
+    advice.take(position(0, 5), 3.0 + OLD)
+    assert len(advice.warnings(ours, names, 8.0, 3.0 + OLD)) == 1

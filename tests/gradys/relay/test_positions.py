@@ -63,3 +63,11 @@ def test_without_a_position_nothing_is_sent_and_an_older_reading_changes_nothing
 def test_other_messages_are_refused(payload: bytes) -> None:
     with pytest.raises(ValueError):
         Positions().put(payload, 100.0)
+
+
+def test_a_reading_from_the_future_hides_none_that_follow() -> None:
+    positions = Positions()
+    put(positions, time=9000, value=[1, 0, 0])
+    assert [form["lat"] for form in forms(positions)] == ["1.0"]
+    put(positions, time=100, value=[2, 0, 0])  # the vehicle's clock has been set right
+    assert [form["lat"] for form in forms(positions)] == ["2.0"]

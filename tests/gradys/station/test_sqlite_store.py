@@ -19,6 +19,7 @@ def test_an_sqlite_file_is_found_again(tmp_path: Path, run: Any, clock: Any) -> 
     again = SqliteStore(tmp_path / "s.db", clock)
     assert [newest.value for newest in run(again.fleet()).newest] == ["3"]
     assert run(again.add([row(1)])) == 0
+    assert run(again.counts()) == (3, 1)
     run(again.close())
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from typing import Any
 
 import pytest
@@ -103,3 +104,21 @@ def test_the_fleet_shows_the_newest_of_each(store: Store, run: Any, monkeypatch:
     run(store.show([Newest("uav-3", "3", "alt", "m", "9", 1_699_999_999.0, 1_699_999_999.0)]))
     run(store.add([row(2, value=2)]))  # late
     run(shown([store], reported, [*expected, ("uav-3", "alt", "9")]))
+
+
+def test_a_reading_from_the_future_hides_none_that_follow(
+    store: Store, run: Any, clock: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A vehicle's clock is hours fast, and is set right."""
+    monkeypatch.setattr("mavproxy_gradys.station.postgres_store.SHOW_EVERY", 0.01, raising=False)
+
+    async def reported() -> list[str]:
+        return [newest.value for newest in (await store.fleet()).newest]
+
+    now = time.time()
+    clock.now = now - 1.0
+    run(store.add([row(1, value=1, time=now + 7200)]))
+    run(shown([store], reported, ["1"]))
+    clock.now = now + 1.0
+    run(store.add([row(2, value=2, time=now + 0.5)]))
+    run(shown([store], reported, ["2"]))

@@ -95,3 +95,18 @@ def test_the_old_place_is_given_up_when_all_sightings_are_elsewhere():
     for step in range(5, 40):
         target.take([measurement(step * 0.05, (9, 2, 0))])
     assert target.place == pytest.approx([9, 2, 0], abs=0.05)
+
+
+@pytest.mark.parametrize("away", [0.8, 2.0])
+@pytest.mark.parametrize("is_final", [False, True])
+def test_detections_elsewhere_do_not_widen_the_gate(away, is_final):
+    """A tag that the rotors blow away, or another one, is not followed."""
+    target = Target()
+    for step in range(20):
+        target.take([measurement(step / 30, (0, 0, 0))])
+    target.is_final = is_final
+    rejected = 100 if is_final else 11
+    for step in range(20, 20 + rejected):
+        target.take([measurement(step / 30, (away + 0.5, 0, 0))])
+    assert target.place == pytest.approx([0, 0, 0], abs=0.001)
+    assert target.seen_at == pytest.approx(19 / 30)
