@@ -119,11 +119,14 @@ class Host:
         if self.members[:1] != [member]:
             return
         now = self.clock()
-        if now >= self._next_look:
-            self._look()
-            self._next_look = now + LOOK_EVERY
+        looks = now >= self._next_look
+        if looks and not self.bridge.running:
+            self.bridge.start()
         self.share_target()
         self.bridge.turn()
+        if looks:  # last: whatever fails there, vehicles are heard and commands go out
+            self._next_look = now + LOOK_EVERY
+            self._look()
 
     def share_target(self) -> None:
         """Hand over which vehicle MAVProxy's own commands go to."""
@@ -133,15 +136,13 @@ class Host:
             self.bridge.call_soon(setattr, self.registry, "current", target)
 
     def _look(self) -> None:
-        if not self.bridge.running:
-            self.bridge.start()
         self._link_keeper.turn(self._mpstate.mav_master)
         self._share_streamrate()
         self._share_parameters()
         self._share_fences()
 
     def end(self) -> None:
-        """Send the closing messages, and end the asyncio thread.
+        """Send the closing messages, and end the asyncio thread and all that it kept open.
 
         MAVProxy's main loop waits for us, or has ended, and sends nothing. So this thread sends, only here.
         """
@@ -152,12 +153,15 @@ class Host:
             await self.envelope_watch.close()
             return [message for messages in self.closing_messages for message in messages()]
 
-        if self.bridge.running:
-            for message, system in self.bridge.run(collect()):
-                self._write(message, system)
-            self._send_unsent()
-        self._link_keeper.release()
-        self.bridge.stop()
+        try:
+            if self.bridge.running:
+                for message, system in self.bridge.run(collect()):
+                    self._write(message, system)
+                self._send_unsent()
+        finally:
+            self._link_keeper.release()
+            self.bridge.stop()
+            self.audit.close()
 
     def _send_unsent(self) -> None:
         while self._unsent:
@@ -277,4 +281,3 @@ def leave(mpstate: Any, member: Any) -> None:
     if not host.members:
         delattr(mpstate, ATTRIBUTE)
         host.end()
-        host.audit.close()

@@ -3,6 +3,7 @@ from __future__ import annotations
 import asyncio
 import json
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,6 +15,7 @@ from mavproxy_uavapi.core import host as hosts
 from mavproxy_uavapi.core.audit import FILE
 from mavproxy_uavapi.core.errors import LinkLost
 from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.mainloop.bridge import Bridge
 from mavproxy_uavapi.core.sent_messages import note_sent
 from mavproxy_uavapi.core.vehicle.message_waiter import MessageWaiter
 
@@ -318,3 +320,28 @@ def test_trail_of_a_job_without_http_is_written_when_the_last_module_leaves(
     entry = json.loads(line)
     assert (entry["client"], entry["verb"], entry["outcome"]) == ("console", "/vision/land", "ok")
     assert (entry["detail"], entry["sent"], entry["system"]) == ("landed", ["COMMAND_LONG"], 7)
+
+
+def test_chore_that_fails_keeps_no_message_from_its_vehicle(
+    loop: Any, host: Host, msg: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    host.members.append("uavapi")
+    monkeypatch.setattr(host.bridge, "start", lambda: None)  # the test's loop runs already
+    monkeypatch.setattr(host, "_look", lambda: 1 / 0)
+    host.feed("uavapi", msg("heartbeat"))
+    with pytest.raises(ZeroDivisionError):
+        host.idle("uavapi")
+    loop.settle()
+    host.idle("uavapi")  # the next look comes later
+    assert 1 in host.fleet.vehicles
+
+
+def test_host_ends_even_if_its_loop_does_not_answer(mpstate: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Bridge.run, "__defaults__", (0.1,))
+    host = hosts.join(mpstate, "uavapi")
+    host.idle("uavapi")
+    host.bridge.call_soon(time.sleep, 0.5)
+    time.sleep(0.05)
+    with pytest.raises(TimeoutError):
+        hosts.leave(mpstate, "uavapi")
+    assert not host.bridge.running and mpstate.select_extra == {}

@@ -10,8 +10,9 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from tests.rules.fault_scenes import track
+from tests.support import stages
 from tests.support.envelopes import FIELD, feature, field, place
-from tests.support.world import item_at
+from tests.support.world import World, item_at
 
 OUT = 409, "outside_envelope"
 
@@ -247,7 +248,7 @@ RAW: dict[str, dict[str, Any]] = {
     "SET_MODE": {"base_mode": 1, "custom_mode": 0},
     "MISSION_ITEM_INT": {**GUIDED_ITEM, **{f"param{number}": 0 for number in range(1, 5)}},
     "MISSION_CLEAR_ALL": {"mission_type": "MAV_MISSION_TYPE_FENCE"},
-    "PARAM_SET": {"param_id": "RTL_ALT", "param_value": 30000, "param_type": 9},
+    "PARAM_SET": {"param_id": "rtl_alt", "param_value": 30000, "param_type": 9},
     "COMMAND_LONG": {**COMMAND, "command": "MAV_CMD_NAV_TAKEOFF", "param7": 200},
     "COMMAND_INT": {"frame": 3, "command": "MAV_CMD_DO_REPOSITION", "current": 0, "autocontinue": 0, "param1": -1,
                     "param2": 0, "param3": 0, "param4": 0, "x": -353700000, "y": 1491652300, "z": 10},
@@ -273,3 +274,28 @@ def test_mission_that_was_changed_after_it_was_looked_at_is_not_flown(make_world
     assert world.ask("POST", "/message", {"name": "MISSION_COUNT", "fields": count}).outcome == "200"
     world.loop.pass_time(0.1)
     refused(world, "POST", "/message", {"name": "COMMAND_LONG", "fields": {**COMMAND, "command": 300}})
+
+
+@pytest.mark.parametrize("kind", ["copter", "plane", "rover"])
+def test_own_mission_is_watched(make_world: Any, kind: str) -> None:
+    """The autopilot reports the mission's target then, and no other station's."""
+    world = make_world(World.on_mission if kind == "copter" else stages.on_mission, vehicle=kind)
+    world.in_mode("GUIDED")
+    world.loop.pass_time(1.5)
+    put(world, field(3000, 3000))
+    assert world.ask("POST", "/mission/start", {}).outcome == "200"
+    vehicle = world.host.registry.find(1)
+    for _ in range(5):
+        world.loop.pass_time(1.0)
+        assert (vehicle.mode, vehicle.flies_for_us) == ("AUTO", True)
+
+
+def test_refused_order_does_not_make_the_pilots_mission_ours(make_world: Any) -> None:
+    world = make_world(World.on_mission)
+    put(world, field(60, 400))
+    assert world.ask("GET", "/command/set_mode?mode=SMART_RTL").outcome == "500 rejected"
+    since = world.loop.time()
+    world.loop.pass_time(20.0)
+    assert not world.host.registry.find(1).flies_for_us
+    assert [message for message in world.orders(since) if not asks(message)] == []
+    assert world.vehicle.mode.name == "AUTO"

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from mavproxy_uavapi.core.vehicle.endings import Policy
 from tests.rules.test_envelope import put
 from tests.support import stages
 from tests.support.world import PLACE, World, item_at
@@ -17,9 +18,9 @@ ITEMS = 150  # whose download takes a few seconds
 LAND_AT = {"lat": PLACE[0] + 0.01, "long": PLACE[1]}
 
 
-def modes(world: World) -> list[Any]:
+def modes(world: World, since: float = -math.inf) -> list[Any]:
     """The modes that were requested."""
-    return [message for message in world.orders() if getattr(message, "command", None) == SET_MODE]
+    return [message for message in world.orders(since) if getattr(message, "command", None) == SET_MODE]
 
 
 def lose_heartbeats(world: World) -> None:
@@ -113,3 +114,47 @@ def test_land_at_is_not_begun_in_a_pilots_mode(make_world: Any) -> None:
     switch_unheard(world, "LOITER", 1.5)
     assert world.answer(landing).outcome == "409 mode_changed"
     assert modes(world) == [] and world.vehicle.mode.name == "LOITER"
+
+
+@pytest.mark.parametrize("pilot", ["LOITER", "AUTO"])
+def test_land_at_that_the_pilot_ends_in_its_upload_puts_the_mission_back(make_world: Any, pilot: str) -> None:
+    world = make_world(stages.cruising, vehicle="plane")
+    before = [item.command for item in world.vehicle.mission.items]
+    landing = world.begin("POST", "/command/land_at", LAND_AT)
+    world.until(lambda: seqs(world, "MISSION_ITEM_INT"), 0.01)
+    world.fault("pilot_mode", mode=pilot)
+    world.uplink_until = world.loop.time() + 1.1  # in the middle of the transfer
+    reply = world.answer(landing)
+    assert reply.outcome == "409 mode_changed" and "was put back" in reply.body["detail"]
+    assert [item.command for item in world.vehicle.mission.items] == before
+    assert modes(world) == [] and world.vehicle.mode.name == pilot
+
+
+@pytest.mark.parametrize(("vehicle", "vtol"), [("plane", ""), ("quadplane", "&vtol=true")])
+def test_takeoff_of_a_plane_is_not_begun_over_a_pilots_switch(make_world: Any, vehicle: str, vtol: str) -> None:
+    world = make_world(World.armed, vehicle=vehicle)
+    world.hears = lambda message: message.get_type() != "PARAM_VALUE"  # each parameter takes its second
+    takeoff = world.begin("GET", f"/command/takeoff?alt=50{vtol}")
+    world.loop.pass_time(0.1)
+    world.fault("pilot_mode", mode="FBWA")
+    world.until(lambda: world.host.registry.find(1).mode == "FBWA", 0.02)
+    since = world.loop.time()
+    assert world.answer(takeoff).outcome == "409 mode_changed"
+    assert modes(world, since) == [] and world.vehicle.mode.name == "FBWA"
+
+
+@pytest.mark.parametrize("policy", [Policy.HOLD, Policy.RTL])
+def test_lease_that_runs_out_leaves_a_mission_that_the_pilot_has_begun_anew(make_world: Any, policy: Policy) -> None:
+    world = make_world(World.on_mission)
+    world.in_mode("GUIDED")
+    world.loop.pass_time(1.5)
+    world.host.endings.on_lease_end = policy
+    assert world.ask("POST", "/mission/start?lease=30&client=mission", {}).outcome == "200"
+    for mode in ("LOITER", "AUTO"):
+        world.loop.pass_time(3.0)
+        world.fault("pilot_mode", mode=mode)
+        world.until(lambda mode=mode: world.host.registry.find(1).mode == mode)
+    since = world.loop.time()
+    world.loop.pass_time(35.0)
+    assert "the lease of mission" in world.screen()
+    assert world.orders(since) == [] and world.vehicle.mode.name == "AUTO"

@@ -12,9 +12,11 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from mavproxy_uavapi.core.geodesy import METRES_PER_DEGREE
 from mavproxy_uavapi.core.roles import THE_PROMPT
 from mavproxy_uavapi.core.vehicle.traffic import expected
+from tests.rules.test_envelope import put
 from tests.support.at_once import AtOnce
 from tests.support.crossing_flights import APART, Fleet
-from tests.support.envelopes import place
+from tests.support.envelopes import field, place
+from tests.support.world import item_at
 
 SEPARATION = 8.0  # m
 WPL_ITEM = "{}\t{}\t{}\t16\t0\t0\t0\t0\t{}\t{}\t{}\t1\n"
@@ -228,3 +230,37 @@ def test_command_that_waits_ends_when_somebody_else_has_the_vehicle(
     assert len(orders(fleet)) == before
     assert fleet.ask(2, "movement/go_to_gps_wait", to(60, 15)).outcome == "200"
     assert fleet.world.answer(going).outcome == outcome
+
+
+def test_the_way_of_a_mission_that_is_flown_counts_for_the_others(pair: Fleet) -> None:
+    assert pair.ask(2, "movement/go_to_gps_wait", to(0, 60)).outcome == "200"
+    places = [place(0, 0), place(0, 0), place(150, 0), place(150, -100)]
+    rows = [(number, int(not number), 3 * bool(number), *at, 10) for number, at in enumerate(places)]
+    plan = "QGC WPL 110\n" + "".join(WPL_ITEM.format(*row) for row in rows)
+    uploaded = pair.world.ask("POST", "/vehicles/1/mission/waypoints", plan.encode(), "text/plain")
+    assert uploaded.outcome == pair.ask(1, "mission/start").outcome == "200"
+    pair.loop.pass_time(4.0)
+    assert pair.ask(2, "movement/go_to_gps", to(150, 0)).outcome == "409 too_near"
+
+
+def test_an_order_that_the_autopilot_refuses_does_not_hide_the_way_that_is_flown(pair: Fleet) -> None:
+    assert pair.ask(2, "movement/go_to_gps_wait", to(0, 60)).outcome == "200"
+    assert pair.ask(1, "movement/go_to_gps", to(200, 0)).outcome == "200"
+    pair.loop.pass_time(3.0)
+    assert pair.ask(1, "command/set_mode", {"mode": "SMART_RTL"}).outcome == "500 rejected"
+    assert pair.ask(2, "movement/go_to_gps", to(150, 0)).outcome == "409 too_near"
+
+
+def test_a_vehicle_that_its_pilot_takes_while_it_waits_for_the_others_is_left_alone(pair: Fleet) -> None:
+    world = pair.world
+    for simulator, count in zip(world.simulators, (3, 150), strict=True):
+        simulator.copter.mission.items[:] = [item_at(*place(0, 0))] * count
+    world.host.registry.traffic.separation = 0
+    put(world, field(3000, 3000))  # missions are read before they may be flown
+    auto = world.begin("POST", "/fleet/set_mode", {"vehicles": [1, 2], "mode": "AUTO", "all_or_none": True})
+    world.loop.pass_time(1.0)
+    world.fault("pilot_mode", mode="LOITER")
+    world.until(lambda: world.host.registry.find(1).mode == "LOITER", 0.05)
+    reply = world.answer(auto)
+    assert reply.body["vehicles"]["1"]["code"] == "mode_changed", reply.body
+    assert mode(pair, 1) == "LOITER"

@@ -70,9 +70,17 @@ class TcpLink:
         self._master.fd = NO_DESCRIPTOR
 
     def _begin(self) -> None:
-        attempt = socket.socket(socket.AF_INET, socket.SOCK_STREAM | socket.SOCK_CLOEXEC)
+        self._due = self._clock() + PAUSE  # for the case that this attempt fails at once
+        try:
+            attempt = socket.socket(socket.AF_INET, socket.SOCK_STREAM | socket.SOCK_CLOEXEC)
+        except OSError:  # no descriptor is free
+            return
         attempt.setblocking(False)
-        attempt.connect_ex(self._address)
+        try:
+            attempt.connect_ex(self._address)
+        except OSError:  # its name cannot be looked up
+            attempt.close()
+            return
         self._attempt, self._due = attempt, self._clock() + PATIENCE
         self._look(attempt)
 

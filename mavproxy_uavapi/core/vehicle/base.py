@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -286,28 +287,48 @@ class BaseVehicle:
 
     @property
     def flies_for_us(self) -> bool:
-        """Whether it flies by a command of ours."""
+        """Whether it flies by a command of ours, and does not land, return or hold."""
         if not self.state.armed or self.stands or self.authority.commander is None:
             return False
         if self.mode in STOPPING or self.mode in self.holding_modes:
             return False
-        if not (
-            self.mode == "GUIDED" or flies_mission(self.mode) or (self.mode == "TAKEOFF" and self.kind == "plane")
-        ):
-            return False
-        return self.obeys_us
+        if flies_mission(self.mode):
+            moves = self.authority.rank < Rank.STOP  # a plane lands by a mission, too
+        else:
+            moves = self.mode == "GUIDED" or (self.mode == "TAKEOFF" and self.kind == "plane")
+        return moves and self.obeys_us
+
+    def require_own_mode(self, since: float) -> None:
+        """Raise ModeChanged if another has switched its mode; `since`: what `state.mode_since` was."""
+        if self.state.mode_since != since and not self.is_in_own_mode:
+            raise ModeChanged(f"the pilot or a failsafe switched the vehicle to {self.mode} meanwhile")
+
+    @contextlib.contextmanager
+    def ordering(self, job: Job) -> Iterator[None]:
+        """While `job` sends a command: if the autopilot refuses it, what it was told before still counts."""
+        before = self.guard.ordered
+        try:
+            yield
+        except Rejected:
+            if self.authority.commander is job:
+                self.guard.take_up(before)
+            raise
 
     async def take(self, job: Job, rank: Rank, allow: Callable[[], None] = no_objection) -> None:
         """Make `job` the commander, once all verbs that begin with it can begin, too.
 
         Raises:
             Aborted: one of these cannot; nothing has changed.
+            ModeChanged: its pilot has switched the mode meanwhile, and `job` does not stop it.
             Busy, Paused: as `CommandAuthority.take`. Also what `allow` raises.
         """
         if job is not self.authority.commander:
             self.authority.admit(rank)
         allow()
+        since = self.state.mode_since
         if await pass_gate():
+            if rank < Rank.STOP:
+                self.require_own_mode(since)
             allow()
         self.authority.take(job, rank)
 
@@ -358,10 +379,11 @@ class BaseVehicle:
         check = self.commanding(job, switched_by_nobody_else, *needs, noted)
         order = replace(command or messages.set_mode(number), hears_first=mode.upper() not in self.holding_modes)
         try:
-            if switch.is_ambiguous:
-                await self.commands.send(replace(order, proven_by_ack=True), check, shown=switch.shown)
-                switch.count_from(self.clock())
-            await self.commands.send_until_shown(order, check, switch.shown, f"show mode {mode.upper()}")
+            with self.ordering(job):
+                if switch.is_ambiguous:
+                    await self.commands.send(replace(order, proven_by_ack=True), check, shown=switch.shown)
+                    switch.count_from(self.clock())
+                await self.commands.send_until_shown(order, check, switch.shown, f"show mode {mode.upper()}")
         except Rejected:
             self._mode_requests.forget(number)
             raise

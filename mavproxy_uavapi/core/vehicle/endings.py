@@ -168,7 +168,7 @@ class FlightEndings:
     ) -> Job | None:
         """Begin what policy and telemetry call for, for a vehicle that no job flies; None where nothing is sent.
 
-        In GUIDED it may fly for another station: unless it obeys us, it is left alone.
+        Its pilot may have chosen its mode, or another station its target: unless it obeys us, it is left alone.
 
         Args:
             vehicle: the vehicle to command.
@@ -177,8 +177,8 @@ class FlightEndings:
             client: the client in whose name the job runs.
             modes: modes that the ended job switched to.
         """
-        if vehicle.next_mode == "GUIDED" and not vehicle.obeys_us:
-            log.info("vehicle %d, %s: it flies for another station, so nothing is sent", vehicle.state.system, why)
+        if not vehicle.obeys_us:
+            log.info("vehicle %d, %s: it flies for another one, so nothing is sent", vehicle.state.system, why)
             return None
         return self._close(vehicle, policy, why, client, modes, at_once=False)
 

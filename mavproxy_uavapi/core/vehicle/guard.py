@@ -31,7 +31,7 @@ CHECKED_FOR = 30.0  # s for which a mission that was looked at may be started
 # The modes that end a flight, or hold it, or are watched. In any other nobody keeps the envelope.
 STOPPING = {"BRAKE", "HOLD", "LAND", "RTL", "SMART_RTL", "QLAND", "QRTL"}
 KEPT = {"GUIDED", *STOPPING}
-# Parameters that decide where an autopilot flies by itself, and how long it goes on without us.
+# Parameters that decide where an autopilot flies by itself, and how long it goes on without us; in any case.
 PROTECTED = ("FENCE_", "RTL_", "SRTL_", "Q_RTL_", "GUID_", "WP_LOITER_RAD")
 
 
@@ -189,7 +189,7 @@ class EnvelopeGuard:
             if order.now or self._vehicle.state.armed is not False:
                 self._require_checked_mission()
         elif isinstance(order, orders.SetParameter):
-            if order.name.startswith(PROTECTED):
+            if order.name.upper().startswith(PROTECTED):
                 raise OutsideEnvelope(f"{order.name} decides where the autopilot flies; an envelope is in force")
         elif isinstance(order, orders.ChangeMission):
             return  # no vehicle flies it before it was looked at

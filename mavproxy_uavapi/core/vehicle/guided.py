@@ -117,7 +117,8 @@ class GuidedVehicle(Vehicle):
             self._lifts_off_for = job
 
         try:
-            await self.commands.send(messages.takeoff(alt), self.commanding(job, self.flying, noted))
+            with self.ordering(job):
+                await self.commands.send(messages.takeoff(alt), self.commanding(job, self.flying, noted))
         except TimedOut:  # the ack may be lost: telemetry shows whether the takeoff began
             ratio = max(self.state.time_ratio.ratio, 0.1)
             await self.flown(
@@ -188,7 +189,7 @@ class GuidedVehicle(Vehicle):
     @property
     def has_foreign_target(self) -> bool:
         """Whether the autopilot reports another target or velocity than the newest of ours."""
-        return self.own_target.is_foreign
+        return self.mode == GUIDED and self.own_target.is_foreign  # in AUTO it reports the mission's
 
     @property
     def target_place(self) -> tuple[float, float] | None:

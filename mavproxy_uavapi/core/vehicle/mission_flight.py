@@ -71,7 +71,8 @@ async def begin(vehicle: Vehicle, job: Job, startable: Callable[[], None]) -> No
         startable: what must hold until it is in AUTO; raises where it does not.
     """
     vehicle.waypoints.changed_at = vehicle.clock()
-    await vehicle.commands.send(messages.set_mission_current(1), vehicle.commanding(job, startable))
+    with vehicle.ordering(job):
+        await vehicle.commands.send(messages.set_mission_current(1), vehicle.commanding(job, startable))
     job.modes |= MISSION_MODES  # also where the vehicle is in AUTO already
     if vehicle.mode != AUTO:
         if job.is_late:

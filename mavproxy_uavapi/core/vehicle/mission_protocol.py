@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 
 from pymavlink import mavutil
 
-from mavproxy_uavapi.core.errors import Busy, LinkLost, Rejected, TimedOut, UavApiError
+from mavproxy_uavapi.core.errors import LinkLost, Rejected, TimedOut, UavApiError
 from mavproxy_uavapi.core.mavlink.link import Address, Link
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.shared_tasks import SharedTasks
@@ -130,8 +130,9 @@ class Waypoints:
             self.changed_at = self._waiting.clock()
             try:
                 await self._put(items, checked_progress)
-            except (Rejected, TimedOut, LinkLost, Busy) as error:
-                raise _with(error, await self._undo(old, error)) from error
+            except UavApiError as error:
+                error.args = (f"{error}{await self._undo(old, error)}",)
+                raise
 
     async def clear(self, check: Check = lambda: None) -> None:
         """Remove the mission, and check that it is gone.
@@ -318,8 +319,7 @@ class Waypoints:
         if isinstance(error, LinkLost):
             return "; its mission may be incomplete now, because the link is lost"
         try:
-            _, present = await self._download()
-            if present == list(old):
+            if await self._holds(old):
                 return "; its old mission is unchanged"
             if old:
                 await self._put(old, lambda done, of: None)
@@ -329,6 +329,14 @@ class Waypoints:
         except (Rejected, TimedOut, LinkLost) as failure:
             return f"; its mission is incomplete now, and the old one could not be put back: {failure}"
         return f"; its old mission ({len(old)} items) was put back" if old else "; it has no mission, as before"
+
+    async def _holds(self, items: Sequence[MissionItem]) -> bool:
+        """Whether its mission is this one. In the middle of an upload it does not tell, and does not hold it."""
+        try:
+            _, present = await self._download()
+        except Rejected:
+            return False
+        return present == list(items)
 
     def _refusal(self, message: Any, action: str) -> Rejected:
         entry = mavlink.enums["MAV_MISSION_RESULT"].get(message.type)
@@ -348,15 +356,3 @@ def _count_of(message: Any) -> int | None:
 
 def _item_number(seq: int) -> Callable[[Any], Any | None]:
     return lambda message: message if message.get_type().startswith("MISSION_ITEM") and message.seq == seq else None
-
-
-def _with(error: Rejected | TimedOut | LinkLost | Busy, addition: str) -> UavApiError:
-    """The same error with a longer sentence."""
-    sentence = f"{error}{addition}"
-    if isinstance(error, Busy):
-        return Busy(sentence)
-    if isinstance(error, Rejected):
-        return Rejected(sentence, error.ack, error.statustext)
-    if isinstance(error, TimedOut):
-        return TimedOut(sentence, error.statustext)
-    return LinkLost(sentence)

@@ -155,25 +155,14 @@ class Plane(GuidedVehicle):
         self.require_mode(GUIDED)
         self.require_ground(job)
         self.authority.take(job, Rank.ARM, self.inside(messages.takeoff(alt)))
-        allowed = self.allowed(CIRCLES + time_limits.leg_time(await self.limits(), 0.0, alt), timeout)
         if vtol:
             await self.lift_off(job, alt)
         else:
             await self.switch_to(job, TAKEOFF)
-            handover = max(alt - HEIGHT_TOLERANCE, LOWEST_CIRCLE)
-
-            def has_climbed() -> bool | None:
-                self.report_leg(job, abs(alt - self.height))
-                over = self.state.landed is False and not self.is_taking_off
-                return True if self.height >= LOWEST_CIRCLE and (over or self.height >= handover) else None
-
-            names = {"GLOBAL_POSITION_INT", "EXTENDED_SYS_STATE"}
-            await self.flown(TAKEOFF, names, has_climbed, allowed, f"climb in {TAKEOFF}")
-            await self.hear_again()
-            self.held_by(TAKEOFF)
-            await self.switch_to(job, GUIDED)
-            here = self.fresh("GLOBAL_POSITION_INT")
-            await self._reposition(job, GlobalTarget(here.lat / 1e7, here.lon / 1e7, alt))
+        # Read only now: a pilot may switch the mode while the vehicle is asked.
+        allowed = self.allowed(CIRCLES + time_limits.leg_time(await self.limits(), 0.0, alt), timeout)
+        if not vtol:
+            await self._climb(job, alt, allowed)
 
         def reached() -> bool | None:
             self.report_leg(job, abs(alt - self.height))
@@ -183,6 +172,23 @@ class Plane(GuidedVehicle):
 
         await self.flown(GUIDED, {"GLOBAL_POSITION_INT"}, reached, allowed, f"reach {alt:g} m")
         self.authority.shown(job)
+
+    async def _climb(self, job: Job, alt: float, allowed: float) -> None:
+        """Climb in TAKEOFF, then circle at `alt` in GUIDED; `allowed`: s for the climb."""
+        handover = max(alt - HEIGHT_TOLERANCE, LOWEST_CIRCLE)
+
+        def has_climbed() -> bool | None:
+            self.report_leg(job, abs(alt - self.height))
+            over = self.state.landed is False and not self.is_taking_off
+            return True if self.height >= LOWEST_CIRCLE and (over or self.height >= handover) else None
+
+        names = {"GLOBAL_POSITION_INT", "EXTENDED_SYS_STATE"}
+        await self.flown(TAKEOFF, names, has_climbed, allowed, f"climb in {TAKEOFF}")
+        await self.hear_again()
+        self.held_by(TAKEOFF)
+        await self.switch_to(job, GUIDED)
+        here = self.fresh("GLOBAL_POSITION_INT")
+        await self._reposition(job, GlobalTarget(here.lat / 1e7, here.lon / 1e7, alt))
 
     async def land(self, job: Job, timeout: float | None = None) -> None:
         """Land and disarm: a QuadPlane where it is, another plane by its mission's landing sequence.
@@ -395,6 +401,7 @@ class Plane(GuidedVehicle):
         return GlobalTarget(*moved(here.lat / 1e7, here.lon / 1e7, north, east), here.relative_alt / 1000.0 + up)
 
     async def _reposition(self, job: Job, place: GlobalTarget) -> None:
-        await self.commands.send(messages.reposition(place), self.commanding(job, self.flying))
+        with self.ordering(job):
+            await self.commands.send(messages.reposition(place), self.commanding(job, self.flying))
         self.own_target.sent(place)
         await self.send_speeds(job, new_kind=False)

@@ -22,7 +22,8 @@ from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 mavlink = mavutil.mavlink
 
-TARGETS = ("target_system", "target_component")  # the vehicle's address; a message need not name it
+# The vehicle's address; a message need not name it. MANUAL_CONTROL calls the system `target`.
+TARGETS = {"target_system": 0, "target_component": 1, "target": 0}
 WITH_ACK = ("COMMAND_LONG", "COMMAND_INT")
 BITS = {f"{sign}int{bits}_t": (sign == "", bits) for sign in ("", "u") for bits in (8, 16, 32, 64)}  # signed, size
 LARGEST_FLOAT = 3.4028234e38  # in single precision
@@ -60,14 +61,15 @@ def message_named(name: str, fields: Mapping[str, Any], address: Address) -> Any
     if unknown:
         raise Invalid(f"{kind.msgname} has no field {unknown[0][:64]!r}", "fields", unknown[0])
     signature = inspect.signature(kind.__init__).parameters
-    values = dict(zip(TARGETS, address, strict=True)) | dict(fields)
+    targets = {field: address[place] for field, place in TARGETS.items()}
+    values = targets | dict(fields)
     arguments = {}
     for field in kind.fieldnames:
         if field in values:
             arguments[field] = _value(kind, field, values[field])
         elif signature[field].default is inspect.Parameter.empty:
             raise Invalid(f"{kind.msgname} needs {field}", "fields", field)
-    for field, own in zip(TARGETS, address, strict=True):
+    for field, own in targets.items():
         if field in fields and arguments[field] != own:
             raise Invalid(f"{field} of this vehicle is {own}; name another vehicle in the path", "fields", field)
     return kind(**arguments)
@@ -92,7 +94,8 @@ async def send(vehicle: Vehicle, job: Job, message: Any) -> None:
     await vehicle.take(job, Rank.ARM)
     check = vehicle.commanding(job, require_not_the_pilots)
     if message.get_type() in WITH_ACK:
-        await vehicle.commands.send(RawCommand(message.command, message=message), check)
+        with vehicle.ordering(job):
+            await vehicle.commands.send(RawCommand(message.command, message=message), check)
     else:
         await pass_gate()
         check()

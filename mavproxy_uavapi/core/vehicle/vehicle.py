@@ -136,11 +136,6 @@ class Vehicle(Verbs):
             await self.hear_again()
         self.require_own_mode(since)
 
-    def require_own_mode(self, since: float) -> None:
-        """Raise ModeChanged if another has switched its mode; `since`: what `state.mode_since` was."""
-        if self.state.mode_since != since and not self.is_in_own_mode:
-            raise ModeChanged(f"the pilot or a failsafe switched the vehicle to {self.mode} meanwhile")
-
     # -- stopping -----------------------------------------------------------------------------------------
 
     async def end_stop(self, job: Job, mode: str) -> None:

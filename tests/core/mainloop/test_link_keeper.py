@@ -171,3 +171,35 @@ def test_socket_that_is_connected_to_itself_is_no_link() -> None:
         alone.bind((LOOPBACK, 0))
         alone.connect(alone.getsockname())
         assert not link_keeper.is_connected(alone)
+
+
+@pytest.mark.parametrize("fails", ["getaddrinfo", "socket"])
+def test_attempt_that_cannot_begin_is_made_again_after_a_pause(
+    fails: str, vehicle: Vehicle, link: Any, keeper: LinkKeeper, clock: Clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A name that cannot be looked up, or no free descriptor."""
+    tries: list[float] = []
+
+    class Failing(socket.socket):
+        def __init__(self, *args: Any) -> None:
+            tries.append(clock())
+            if fails == "socket":
+                raise OSError(24, "Too many open files")
+            super().__init__(*args)
+
+        def connect_ex(self, address: Any) -> int:
+            raise socket.gaierror(-2, "Name or service not known")
+
+    crash(vehicle, link)
+    monkeypatch.setattr(link_keeper.socket, "socket", Failing)
+    for _ in range(30):
+        keeper.turn([link])
+        clock.now += 0.1
+    assert len(tries) == 2
+    monkeypatch.undo()
+    vehicle.start()
+    clock.now += PAUSE
+    for _ in range(50):
+        keeper.turn([link])
+        select.select([], [], [], 0.01)
+    assert link.port is not None

@@ -16,6 +16,7 @@ SERVO: dict[str, Any] = {
     "command": "MAV_CMD_DO_SET_SERVO", "confirmation": 0,
     "param1": 9, "param2": 1500, "param3": 0, "param4": 0, "param5": 0, "param6": 0, "param7": 0,
 }  # fmt: skip
+STICKS = dict.fromkeys(("x", "y", "z", "r", "buttons"), 0)
 
 
 def test_names_of_the_enum_are_numbers_and_the_target_is_the_vehicle() -> None:
@@ -51,6 +52,7 @@ def test_arrays_are_lists() -> None:
         ("STATUSTEXT", {"severity": 6, "text": "a" * 51}, "fields.text", "at most 50 bytes"),
         ("STATUSTEXT", {"severity": 6, "text": 7}, "fields.text", "at most 50 bytes"),
         ("STATUSTEXT", {"severity": -1, "text": ""}, "fields.severity", "from 0 to 255"),
+        ("MANUAL_CONTROL", STICKS | {"target": 2}, "fields.target", "another vehicle in the path"),
         ("MANUAL_CONTROL", dict.fromkeys(("target", "x", "y", "z", "r", "buttons"), -40000), "fields.target", "0 to"),
     ],
 )  # fmt: skip
