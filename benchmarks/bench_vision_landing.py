@@ -46,7 +46,7 @@ def fly(seed: int, method: str) -> dict[str, Any]:
         wind=(case["wind"], chance.uniform(0, 360)),
         gps_noise=case["noise"],
         heading=chance.uniform(0, 360),
-        plnd=method == "landing_target",
+        precision_landing=method == "landing_target",
         sim_tags=f"0:0.30@{north:.3f},{east:.3f},{chance.uniform(0, 360):.0f}",
         sim_latency=case["latency"],
         latency=case["latency"],

@@ -51,14 +51,14 @@ class PrecisionDescent(Descent):
 
     Args:
         flight: the flight.
-        plnd: the vehicle's precision landing.
+        precision_landing: the vehicle's precision landing.
     """
 
     by_velocity = False
 
-    def __init__(self, flight: TagFlight, plnd: PrecisionLanding) -> None:
+    def __init__(self, flight: TagFlight, precision_landing: PrecisionLanding) -> None:
         super().__init__(flight)
-        flight.plnd = self.plnd = plnd
+        flight.precision_landing = self.precision_landing = precision_landing
 
     async def prepare(self) -> None:
         """Check whether the method works, before the vehicle is taken over.
@@ -66,7 +66,7 @@ class PrecisionDescent(Descent):
         Raises:
             NotSupported, Rejected: the autopilot has no precision landing, or needs a reboot for it.
         """
-        await self.plnd.check()
+        await self.precision_landing.check()
 
     async def __call__(self, landing: Landing) -> None:
         """Land.
@@ -78,7 +78,7 @@ class PrecisionDescent(Descent):
             TimedOut: it stays low above the target, in LAND.
         """
         flight, vehicle = self.flight, self.flight.vehicle
-        await self.plnd.set_up(vehicle.commanding(flight.job, lambda: vehicle.held_by("GUIDED")))
+        await self.precision_landing.set_up(vehicle.commanding(flight.job, lambda: vehicle.held_by("GUIDED")))
         while True:
             order = await flight.fly(landing)
             if order.phase is Phase.FAILED:
@@ -86,9 +86,9 @@ class PrecisionDescent(Descent):
             await self._be_heard(landing)
             if await self._follow_down(landing):
                 break
-        self.plnd.in_use = False
+        self.precision_landing.in_use = False
         with contextlib.suppress(UavApiError):  # it has landed; `FlightJobs` tries again
-            await self.plnd.give_back()
+            await self.precision_landing.give_back()
 
     async def _be_heard(self, landing: Landing) -> None:
         """Send targets until the autopilot reports that it has one."""

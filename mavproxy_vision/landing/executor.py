@@ -54,7 +54,7 @@ class TagFlight:
 
     Attributes:
         autopilot: the mode in which the autopilot flies for us now (LAND, RTL); None in GUIDED.
-        plnd: the vehicle's precision landing, if this flight has used it.
+        precision_landing: the vehicle's precision landing, if this flight has used it.
         phase: its present activity.
         ended: set when the flight is over and has sent its last message.
 
@@ -75,7 +75,7 @@ class TagFlight:
         replace_running_flight: Callable[[TagFlight], Awaitable[None]],
     ) -> None:
         self.tracker, self.vehicle, self.job, self.report = tracker, vehicle, job, report
-        self.plnd: PrecisionLanding | None = None
+        self.precision_landing: PrecisionLanding | None = None
         self.phase = "on its way"
         self.autopilot: str | None = None
         self.ended = asyncio.Event()
@@ -318,9 +318,9 @@ class TagFlight:
         if landing.refused and self.report.verb == "land":
             action = "hold"  # its position is safe
         self.report.action = action
-        if self.plnd is not None:
+        if self.precision_landing is not None:
             try:
-                await self.plnd.switch_off()  # it would also act in RTL
+                await self.precision_landing.switch_off()  # it would also act in RTL
             except Rejected as error:
                 reason = f"{reason} ({error})"
         await self.hear_again()  # last, because the above takes its time

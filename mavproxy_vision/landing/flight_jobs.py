@@ -124,7 +124,7 @@ class FlightJobs:
         self._flight: TagFlight | None = None
         self._begun: set[TagFlight] = set()  # all that are not over, including those without a vehicle yet
         self._unfinished: set[TagFlight] = set()  # those of them that have taken over the vehicle
-        self._plnd: dict[int, PrecisionLanding] = {}
+        self._precision_landings: dict[int, PrecisionLanding] = {}
         self._tidying: set[PrecisionLanding] = set()
         self._tasks = HeldTasks()
         self._unloaded = False
@@ -154,14 +154,14 @@ class FlightJobs:
         if method != "landing_target":
             return Descent
 
-        def by_plnd(flight: TagFlight) -> Descent:
+        def by_precision_landing(flight: TagFlight) -> Descent:
             vehicle = flight.vehicle
-            plnd = self._plnd.get(vehicle.state.system)
-            if plnd is None or plnd.vehicle is not vehicle:
-                plnd = self._plnd[vehicle.state.system] = PrecisionLanding(vehicle)
-            return PrecisionDescent(flight, plnd)
+            precision_landing = self._precision_landings.get(vehicle.state.system)
+            if precision_landing is None or precision_landing.vehicle is not vehicle:
+                precision_landing = self._precision_landings[vehicle.state.system] = PrecisionLanding(vehicle)
+            return PrecisionDescent(flight, precision_landing)
 
-        return by_plnd
+        return by_precision_landing
 
     def require_loaded(self) -> None:
         """Raise Aborted once `abort_all` has ended everything."""
@@ -189,11 +189,11 @@ class FlightJobs:
         if self._flight is flight:
             self._flight = None
         flight.ended.set()
-        plnd = flight.plnd
-        if plnd is not None and not any(other.plnd is plnd for other in self._unfinished):
-            plnd.in_use = False
-            if plnd.before and plnd not in self._tidying:
-                self._tasks.start(self._tidy(plnd), "the return of parameters")
+        landing = flight.precision_landing
+        if landing is not None and not any(other.precision_landing is landing for other in self._unfinished):
+            landing.in_use = False
+            if landing.before and landing not in self._tidying:
+                self._tasks.start(self._tidy(landing), "the return of parameters")
         self._leave_host()
 
     async def keep(self, track: FlightLog, report: Report) -> None:
@@ -227,20 +227,20 @@ class FlightJobs:
 
     # -- parameters that are still to be given back ----------------------------------------------------------
 
-    async def _tidy(self, plnd: PrecisionLanding) -> None:
+    async def _tidy(self, landing: PrecisionLanding) -> None:
         """Restore parameters as soon as the vehicle hears us, and no flight needs them."""
-        self._tidying.add(plnd)
+        self._tidying.add(landing)
         tries = 0
-        while plnd.before and tries < TIDY_TRIES:
-            if not plnd.in_use and self.tracker.host.link_watch.is_alive(plnd.vehicle.state):
+        while landing.before and tries < TIDY_TRIES:
+            if not landing.in_use and self.tracker.host.link_watch.is_alive(landing.vehicle.state):
                 try:
-                    await plnd.give_back()
+                    await landing.give_back()
                 except UavApiError as error:
                     tries += 1
                     if tries == TIDY_TRIES:
                         log.warning("vision: %s", error)
             await asyncio.sleep(TIDY_EVERY)
-        self._tidying.discard(plnd)
+        self._tidying.discard(landing)
         self._leave_host()
 
     # -- from the prompt, and at the end ---------------------------------------------------------------------
@@ -293,7 +293,11 @@ class FlightJobs:
 
     def closing_messages(self) -> list[tuple[Any, int]]:
         """The messages that restore the remaining parameters, and the systems that they go to."""
-        return [(message, plnd.vehicle.state.system) for plnd in self._plnd.values() for message in plnd.remaining()]
+        return [
+            (message, landing.vehicle.state.system)
+            for landing in self._precision_landings.values()
+            for message in landing.remaining()
+        ]
 
 
 def _ended(tracker: Tracker, flight: TagFlight, reason: str, ending: Ending) -> Aborted:

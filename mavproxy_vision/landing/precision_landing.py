@@ -51,7 +51,7 @@ class PrecisionLanding:
     Attributes:
         vehicle: the vehicle.
         before: the values that are not restored yet, by name.
-        in_use: whether a landing needs PLND; nothing is restored then.
+        in_use: whether a landing needs them; nothing is restored then.
     """
 
     def __init__(self, vehicle: Vehicle) -> None:

@@ -13,7 +13,7 @@ FAR_TAG = "0:0.30@1.6,-1.2"
 LARGE = {"tags": "0:0.6", "sim_tags": "0:0.6@0.8,-0.6"}
 SMALL = {"width": 320, "height": 240, "fps": 12.0, "sim_noise": 3.0, "sim_jitter": 0.0}
 SWITCH_MODE, TAKEOFF = 176, 22
-PLND = ("PLND_ENABLED", "PLND_STRICT", "PLND_RET_MAX", "PLND_ALT_MIN", "PLND_ALT_MAX")
+LANDING_PARAMETERS = ("PLND_ENABLED", "PLND_STRICT", "PLND_RET_MAX", "PLND_ALT_MIN", "PLND_ALT_MAX")
 MODES = {"LAND": 9, "RTL": 6, "BRAKE": 17, "GUIDED": 4, "LOITER": 5}
 
 
@@ -33,8 +33,8 @@ def sent(rig: Any, kind: str, since: int = 0) -> list[Any]:
     return [message for message in rig.wire.sent[since:] if message.get_type() == kind]
 
 
-def plnd(rig: Any) -> dict[str, float]:
-    return {name: rig.simulator.parameters[name] for name in PLND}
+def landing_parameters(rig: Any) -> dict[str, float]:
+    return {name: rig.simulator.parameters[name] for name in LANDING_PARAMETERS}
 
 
 def silent(rig: Any, name: str) -> None:

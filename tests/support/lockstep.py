@@ -69,7 +69,7 @@ class Lockstep:
         wind: tuple[float, float] = (0.0, 0.0),
         gps_noise: float = 0.0,
         heading: float = 353.0,
-        plnd: bool = False,
+        precision_landing: bool = False,
         rendered: bool = False,
         **settings: Any,
     ) -> None:
@@ -79,7 +79,7 @@ class Lockstep:
         home = Home(heading=heading)
         options = Options(seed=seed, home=home, wind=Wind(*wind), gps_noise=gps_noise, ready_after=1.0, step=STEP)
         self.simulator = Simulator(options)
-        if plnd:
+        if precision_landing:
             self.simulator.parameters.set("PLND_TYPE", 1)  # the autopilot reads it at boot
             self.simulator._boot(self.simulator.copter.mission)
         mpstate = SimpleNamespace(

@@ -12,7 +12,19 @@ import pytest
 
 from mavproxy_uavapi.core.vehicle.messages import NedTarget
 from mavproxy_vision.landing.mission import MissionPlan
-from tests.support.landing import LARGE, MODES, SMALL, SWITCH_MODE, TAG, TAKEOFF, height, pilot, plnd, sent, until
+from tests.support.landing import (
+    LARGE,
+    MODES,
+    SMALL,
+    SWITCH_MODE,
+    TAG,
+    TAKEOFF,
+    height,
+    landing_parameters,
+    pilot,
+    sent,
+    until,
+)
 
 FLIGHTS = ["land", "landing_target", "search", "takeoff", "leg"]
 
@@ -20,7 +32,10 @@ FLIGHTS = ["land", "landing_target", "search", "takeoff", "leg"]
 def under_way(lockstep: Any, name: str) -> tuple[Any, Any]:
     """A flight of that kind in its middle, and its job."""
     precise = name == "landing_target"
-    rig = lockstep(**{**SMALL, "sim_tags": TAG if name == "land" else "", **(LARGE if precise else {})}, plnd=precise)
+    rig = lockstep(
+        **{**SMALL, "sim_tags": TAG if name == "land" else "", **(LARGE if precise else {})},
+        precision_landing=precise,
+    )
     if name in ("takeoff", "leg"):
         rig.switch_on()
         rig.open_eye()
@@ -30,7 +45,7 @@ def under_way(lockstep: Any, name: str) -> tuple[Any, Any]:
         until(rig, lambda: rig.truth.north > 2.0 if name == "leg" else height(rig) > 0.5)
         return rig, job
     rig.start(7.0)
-    rig.before = plnd(rig)
+    rig.before = landing_parameters(rig)
     if name == "search":
         job = rig.begin(rig.flights.searching(rig.copter, None, None), "/vision/search")
         until(rig, lambda: "searching" in rig.flights.phase)
@@ -125,7 +140,7 @@ def test_what_follows_a_flight_is_what_the_table_says(lockstep, name, end):
         assert math.hypot(*rig.simulator.copter.body.velocity[:2]) < 0.3
         assert height(rig) < began + 4.0  # a climb of 2.5 m/s ends at 1 m/s/s
     if name == "landing_target":
-        assert plnd(rig) == rig.before
+        assert landing_parameters(rig) == rig.before
     flown = [m for m in rig.wire.sent[mark:] if m.get_type() in ("SET_POSITION_TARGET_LOCAL_NED", "LANDING_TARGET")]
     moving = [m for m in flown if m.get_type() == "LANDING_TARGET" or (m.vx, m.vy, m.vz) != (0, 0, 0)]
     assert end == "another search" or not moving

@@ -359,7 +359,7 @@ def test_stopped_it_holds(flying):
 
 
 def test_landing_target_lands_and_puts_the_parameters_back(flying):
-    rig = flying(plnd=True)
+    rig = flying(precision_landing=True)
     parameters = rig.simulator.parameters
     before = {name: parameters[name] for name in ("PLND_ENABLED", "PLND_STRICT", "PLND_ALT_MIN", "PLND_ALT_MAX")}
     during: list[float] = []
@@ -380,7 +380,7 @@ def test_a_precision_landing_that_was_off_at_boot_asks_for_a_reboot(flying):
 
 
 def test_a_tag_lost_high_up_under_land_is_taken_back_to_guided(flying):
-    rig = flying(plnd=True, alt=5.0, attempts=1)
+    rig = flying(precision_landing=True, alt=5.0, attempts=1)
     rig.eye.blind = below(3.0)
     rig.each_step.append(lambda: setattr(rig.eye, "blind", lambda _: True) if -rig.truth.down < 3.0 else None)
     error = rig.outcome(rig.land(method="landing_target"))

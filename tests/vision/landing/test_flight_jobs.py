@@ -139,7 +139,7 @@ def test_a_mission_flies_to_its_place_at_its_own_speed(flying, setting, fastest)
 
 @pytest.mark.parametrize("ended", ["stop", "unload"])
 def test_a_flight_that_is_ended_while_it_is_prepared_never_begins(lockstep, ended):
-    rig = lockstep(sim_tags=TAG, plnd=True, **SMALL)
+    rig = lockstep(sim_tags=TAG, precision_landing=True, **SMALL)
     rig.switch_on()
     rig.open_eye()
     hear = rig.host._receive

@@ -15,7 +15,19 @@ from mavproxy_uavapi.core.vehicle.messages import NedTarget
 from mavproxy_vision.errors import LandingFailed
 from mavproxy_vision.geometry.frames import Attitude, vector
 from mavproxy_vision.landing.precision_landing import WANTED, landing_target
-from tests.support.landing import LARGE, MODES, PLND, SWITCH_MODE, holds, pilot, plnd, sent, silent, unheard, until
+from tests.support.landing import (
+    LANDING_PARAMETERS,
+    LARGE,
+    MODES,
+    SWITCH_MODE,
+    holds,
+    landing_parameters,
+    pilot,
+    sent,
+    silent,
+    unheard,
+    until,
+)
 
 
 @pytest.mark.parametrize(("forward", "right"), [(1.0, 0.5), (-1.0, 0.5), (0.3, -2.0)])
@@ -29,21 +41,21 @@ def test_the_angles_of_landing_target_mean_the_same_as_its_position(forward, rig
 # -- stopped, and taken over -----------------------------------------------------------------------------------
 
 
-def test_stopped_in_land_by_landing_target_it_holds_and_plnd_is_as_before(flying):
-    rig = flying(alt=6.0, plnd=True, **LARGE)
-    before = plnd(rig)
+def test_stopped_in_land_by_landing_target_it_holds_and_its_parameters_are_as_before(flying):
+    rig = flying(alt=6.0, precision_landing=True, **LARGE)
+    before = landing_parameters(rig)
     job = rig.land(method="landing_target")
     until(rig, lambda: rig.mode == "LAND")
     rig.pass_time(2.0)
     assert rig.stop()
     rig.outcome(job)
     assert holds(rig, "BRAKE")
-    assert plnd(rig) == before
+    assert landing_parameters(rig) == before
 
 
 @pytest.mark.parametrize("switch_after", [0.3, 1.0])  # s of silence, of which 1.2 s would have it taken back
 def test_a_pilot_who_takes_it_while_the_telemetry_is_silent_keeps_it(flying, switch_after):
-    rig = flying(alt=6.0, plnd=True, **LARGE)
+    rig = flying(alt=6.0, precision_landing=True, **LARGE)
     job = rig.land(method="landing_target")
     until(rig, lambda: rig.copter.mode == "LAND")
     rig.pass_time(1.5)
@@ -60,7 +72,7 @@ def test_a_pilot_who_takes_it_while_the_telemetry_is_silent_keeps_it(flying, swi
 
 
 def test_a_pilot_who_takes_it_as_the_tag_is_lost_keeps_it(flying):
-    rig = flying(alt=6.0, plnd=True, **LARGE)
+    rig = flying(alt=6.0, precision_landing=True, **LARGE)
     job = rig.land(method="landing_target")
     until(rig, lambda: rig.copter.mode == "LAND")
     rig.pass_time(1.5)
@@ -73,9 +85,9 @@ def test_a_pilot_who_takes_it_as_the_tag_is_lost_keeps_it(flying):
     assert isinstance(rig.outcome(job), ModeChanged) and rig.mode == "LOITER"
 
 
-def test_stopped_and_unloaded_in_one_breath_it_holds_and_plnd_is_as_before(flying):
-    rig = flying(alt=6.0, plnd=True, **LARGE)
-    before = plnd(rig)
+def test_stopped_and_unloaded_in_one_breath_it_holds_and_its_parameters_are_as_before(flying):
+    rig = flying(alt=6.0, precision_landing=True, **LARGE)
+    before = landing_parameters(rig)
     rig.land(method="landing_target")
     until(rig, lambda: rig.mode == "LAND")
     rig.pass_time(1.0)
@@ -84,12 +96,12 @@ def test_stopped_and_unloaded_in_one_breath_it_holds_and_plnd_is_as_before(flyin
     flights.abort_all = lambda: (flights.stop("stopped"), abort_all())
     rig.unload(last=True)
     assert holds(rig, "BRAKE")
-    assert plnd(rig) == before
+    assert landing_parameters(rig) == before
 
 
 def test_closing_messages_of_an_unloaded_module_are_removed_once_its_parameters_are_restored(flying):
-    rig = flying(alt=6.0, plnd=True, **LARGE)
-    before, words = plnd(rig), rig.host.closing_messages
+    rig = flying(alt=6.0, precision_landing=True, **LARGE)
+    before, words = landing_parameters(rig), rig.host.closing_messages
     rig.land(method="landing_target")
     until(rig, lambda: rig.mode == "LAND")
     rig.pass_time(1.0)
@@ -100,11 +112,11 @@ def test_closing_messages_of_an_unloaded_module_are_removed_once_its_parameters_
     assert rig.flights.closing_messages in words
     rig.host._receive = hear
     until(rig, lambda: rig.flights.closing_messages not in words)
-    assert plnd(rig) == before
+    assert landing_parameters(rig) == before
 
 
 def test_what_is_on_its_way_to_land_by_landing_target_refuses_movements(flying):
-    rig = flying(alt=6.0, plnd=True, **LARGE)
+    rig = flying(alt=6.0, precision_landing=True, **LARGE)
     hear = unheard(rig, "LAND")
     job = rig.land(method="landing_target")
     until(rig, lambda: rig.mode == "LAND")
@@ -116,8 +128,8 @@ def test_what_is_on_its_way_to_land_by_landing_target_refuses_movements(flying):
 
 
 def test_a_landing_target_that_supersedes_another_gives_back_what_was_before_both(flying):
-    rig = flying(alt=6.0, plnd=True, **LARGE)
-    before = plnd(rig)
+    rig = flying(alt=6.0, precision_landing=True, **LARGE)
+    before = landing_parameters(rig)
     rig.land(method="landing_target")
     until(rig, lambda: rig.simulator.parameters["PLND_ENABLED"] == 1)
     second = rig.land(method="landing_target")
@@ -127,15 +139,15 @@ def test_a_landing_target_that_supersedes_another_gives_back_what_was_before_bot
     )
     assert rig.outcome(second).startswith("Landed on tag 0")
     assert set(during[:-50]) == {1}
-    assert plnd(rig) == before
+    assert landing_parameters(rig) == before
 
 
 @pytest.mark.parametrize("pause", [0.0, 1.1])
 def test_parameters_are_given_back_after_two_landings_in_a_row(flying, pause):
-    rig = flying(alt=7.0, plnd=True, **LARGE)
+    rig = flying(alt=7.0, precision_landing=True, **LARGE)
     for name, value in (("PLND_RET_MAX", 4), ("PLND_ALT_MAX", 8), ("PLND_STRICT", 2), ("PLND_ALT_MIN", 0.75)):
         rig.simulator.parameters.set(name, value)
-    before = plnd(rig)
+    before = landing_parameters(rig)
     hear = rig.host._receive
     late = [rig.loop.call_later(0, int)]
 
@@ -154,20 +166,22 @@ def test_parameters_are_given_back_after_two_landings_in_a_row(flying, pause):
     until(rig, lambda: rig.copter.mode == "BRAKE")
     rig.outcome(rig.begin(lambda job: rig.copter.set_mode(job, "GUIDED"), "/command/guided"))
     during: list[dict[str, float]] = []
-    rig.each_step.append(lambda: during.append(plnd(rig)) if rig.mode == "LAND" and rig.flights.running else None)
+    rig.each_step.append(
+        lambda: during.append(landing_parameters(rig)) if rig.mode == "LAND" and rig.flights.running else None
+    )
     assert rig.outcome(rig.land(method="landing_target")).startswith("Landed on tag 0")
-    expected = {name: WANTED[name] for name in PLND}
+    expected = {name: WANTED[name] for name in LANDING_PARAMETERS}
     assert during[100] == expected
     rig.pass_time(20.0)
-    assert plnd(rig) == before
+    assert landing_parameters(rig) == before
 
 
 @pytest.mark.parametrize("answers", ["slow", "lost"])
 def test_pilot_who_switches_while_parameters_are_set_ends_that(flying, answers):
-    rig = flying(alt=6.0, plnd=True, **LARGE)
+    rig = flying(alt=6.0, precision_landing=True, **LARGE)
     for name, value in (("PLND_RET_MAX", 4), ("PLND_ALT_MAX", 8), ("PLND_STRICT", 2), ("PLND_ALT_MIN", 0.75)):
         rig.simulator.parameters.set(name, value)
-    before, hear = plnd(rig), rig.host._receive
+    before, hear = landing_parameters(rig), rig.host._receive
 
     def hampered(message: Any) -> None:
         if message.get_type() != "PARAM_VALUE":
@@ -187,12 +201,12 @@ def test_pilot_who_switches_while_parameters_are_set_ends_that(flying, answers):
     rig.host._receive = hear
     rig.pass_time(20.0)
     assert [m.param_id for m in sent(rig, "PARAM_SET", mark) if m.param_value != before[m.param_id]] == []
-    assert plnd(rig) == before
+    assert landing_parameters(rig) == before
     assert rig.mode == "LOITER"
 
 
 def test_a_parting_is_not_cut_short_by_the_next_flight(flying):
-    rig = flying(alt=6.0, plnd=True, **LARGE)
+    rig = flying(alt=6.0, precision_landing=True, **LARGE)
     job = rig.land(method="landing_target")
     until(rig, lambda: rig.mode == "LAND")
     rig.pass_time(1.0)
@@ -210,7 +224,7 @@ def test_a_parting_is_not_cut_short_by_the_next_flight(flying):
 
 
 def test_a_landing_that_is_stopped_before_it_took_over_leaves_the_one_under_way_alone(flying):
-    rig = flying(alt=6.0, plnd=True, **LARGE)
+    rig = flying(alt=6.0, precision_landing=True, **LARGE)
     first = rig.land(method="landing_target")
     until(rig, lambda: rig.mode == "GUIDED" and rig.simulator.parameters["PLND_ENABLED"] == 1)
     ask = rig.copter.parameters.read
@@ -231,7 +245,7 @@ def test_a_landing_that_is_stopped_before_it_took_over_leaves_the_one_under_way_
 
 
 def test_without_positions_land_is_taken_back_and_ends(flying):
-    rig = flying(alt=6.0, plnd=True, **LARGE)
+    rig = flying(alt=6.0, precision_landing=True, **LARGE)
     job = rig.land(method="landing_target")
     until(rig, lambda: rig.mode == "LAND")
     rig.pass_time(2.0)
@@ -244,7 +258,7 @@ def test_without_positions_land_is_taken_back_and_ends(flying):
 
 
 def test_a_landing_by_landing_target_ends_at_the_time_limit(flying):
-    rig = flying(alt=7.0, plnd=True, time_limit=10, **LARGE)
+    rig = flying(alt=7.0, precision_landing=True, time_limit=10, **LARGE)
     rig.simulator.parameters.set("LAND_SPEED", 30)
     rig.simulator.parameters.set("LAND_SPEED_HIGH", 30)
     error = rig.outcome(rig.land(method="landing_target"))
@@ -254,23 +268,23 @@ def test_a_landing_by_landing_target_ends_at_the_time_limit(flying):
 
 
 def test_parameters_are_given_back_when_a_lost_link_returns(flying):
-    rig = flying(alt=6.0, plnd=True, **LARGE)
-    before = plnd(rig)
+    rig = flying(alt=6.0, precision_landing=True, **LARGE)
+    before = landing_parameters(rig)
     job = rig.land(method="landing_target")
     until(rig, lambda: rig.mode == "LAND")
     rig.pass_time(1.0)
     rig.simulator.faults.silence(rig.simulator.copter.now, 7.0, sending=True, receiving=True)
     assert isinstance(rig.outcome(job), LinkLost)
-    assert plnd(rig) != before
+    assert landing_parameters(rig) != before
     rig.pass_time(20.0)
-    assert plnd(rig) == before
+    assert landing_parameters(rig) == before
 
 
 @pytest.mark.parametrize("stuck", ["PLND_ENABLED", "PLND_ALT_MAX"])
 def test_a_parameter_that_cannot_be_given_back_does_not_keep_it_from_returning(flying, stuck):
-    rig = flying(alt=6.0, plnd=True, attempts=1, **LARGE)
+    rig = flying(alt=6.0, precision_landing=True, attempts=1, **LARGE)
     rig.simulator.parameters.set("PLND_ALT_MAX", 8)
-    before = plnd(rig)
+    before = landing_parameters(rig)
     job = rig.land(method="landing_target")
     until(rig, lambda: rig.mode == "LAND")
     rig.eye.blind = lambda _: True
@@ -283,11 +297,11 @@ def test_a_parameter_that_cannot_be_given_back_does_not_keep_it_from_returning(f
     assert ("does not take PLND_ENABLED = 0" in str(error)) == (stuck == "PLND_ENABLED")
     parameters.set = take  # it was a bad link, say
     rig.pass_time(30.0)
-    assert plnd(rig) == before
+    assert landing_parameters(rig) == before
 
 
 def test_a_landing_that_succeeded_is_one_even_when_the_battery_is_pulled_at_once(flying):
-    rig = flying(plnd=True, **LARGE)
+    rig = flying(precision_landing=True, **LARGE)
     job = rig.land(method="landing_target")
     until(rig, lambda: rig.mode == "LAND")
     until(rig, lambda: rig.simulator.copter.armed is False)
@@ -297,7 +311,7 @@ def test_a_landing_that_succeeded_is_one_even_when_the_battery_is_pulled_at_once
 
 
 def test_motors_that_stop_in_flight_are_no_landing(flying):
-    rig = flying(alt=6.0, plnd=True, **LARGE)
+    rig = flying(alt=6.0, precision_landing=True, **LARGE)
     job = rig.land(method="landing_target")
     until(rig, lambda: rig.mode == "LAND")
     rig.pass_time(1.5)
@@ -308,8 +322,8 @@ def test_motors_that_stop_in_flight_are_no_landing(flying):
 
 
 def test_a_target_that_is_no_number_is_not_reported_and_the_landing_goes_on_by_itself(flying):
-    rig = flying(alt=6.0, plnd=True, **LARGE)
-    before = plnd(rig)
+    rig = flying(alt=6.0, precision_landing=True, **LARGE)
+    before = landing_parameters(rig)
     job = rig.land(method="landing_target")
     until(rig, lambda: rig.mode == "LAND")
     rig.pass_time(1.5)
@@ -317,12 +331,12 @@ def test_a_target_that_is_no_number_is_not_reported_and_the_landing_goes_on_by_i
     assert "a number in it is not finite" in str(rig.outcome(job))
     rig.pass_time(3.0)
     assert rig.mode == "LAND"
-    assert plnd(rig) == before
+    assert landing_parameters(rig) == before
     assert all(map(is_finite, rig.wire.sent))
 
 
-def test_pilot_who_takes_it_while_plnd_is_switched_off_keeps_it(flying: Any) -> None:
-    rig = flying(plnd=True, alt=5.0, attempts=1)
+def test_pilot_who_takes_it_while_precision_landing_is_switched_off_keeps_it(flying: Any) -> None:
+    rig = flying(precision_landing=True, alt=5.0, attempts=1)
     rig.eye.blind = lambda pose: -pose[0][2] < 3.0
     rig.each_step.append(lambda: setattr(rig.eye, "blind", lambda _: True) if -rig.truth.down < 3.0 else None)
     job = rig.land(method="landing_target")
