@@ -25,7 +25,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from commands_vehicle import MODES, PATIENCE, SYSTEM, Key, Vehicle
+from commands_vehicle import MODES, SYSTEM, TIMEOUT, Key, Vehicle
 from figures import machine, percentile, put_first, table
 from http_clients import Client
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -85,7 +85,7 @@ class Connection:
 
     def __init__(self, port: int) -> None:
         self._port = port
-        self.socket = socket.create_connection(("127.0.0.1", port), PATIENCE)
+        self.socket = socket.create_connection(("127.0.0.1", port), TIMEOUT)
         self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._file = self.socket.makefile("rb")
 
@@ -251,7 +251,7 @@ class Bench:
             on_ground = info["landed_state"] == "on_ground"
             return bool(info["mode"] == mode and info["armed"] == armed and on_ground == landed)
 
-        given_up_at = time.monotonic() + PATIENCE
+        given_up_at = time.monotonic() + TIMEOUT
         while not shown():
             assert time.monotonic() < given_up_at, f"the API does not see that the vehicle is in {mode}"
             time.sleep(0.002)
@@ -313,7 +313,7 @@ def mavproxy(vehicle: Vehicle) -> Iterator[Any]:
         try:
             made.mavproxy = made.start("mavproxy", [*command, harness.load(made.port, max_rate=100000)])
             made.wait_until_up()
-            made.mavproxy.says("Received", timeout=PATIENCE)  # the parameters
+            made.mavproxy.says("Received", timeout=TIMEOUT)  # the parameters
             yield made
         finally:
             made.stop()
@@ -346,7 +346,7 @@ def main() -> int:
                 bench.round(STREAMED)
             bench.close()
             ended.set()
-            others[-1].join(PATIENCE)
+            others[-1].join(TIMEOUT)
     finally:
         for process in others:
             if process.is_alive():

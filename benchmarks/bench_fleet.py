@@ -24,7 +24,7 @@ from tests.support.fleet import MOSQUITTO, Fleet
 from tests.support.postgres import program
 
 WARM_UP = 3.0  # s that do not count
-PATIENCE = 60.0  # s for the backlog
+TIMEOUT = 60.0  # s for the backlog
 DELAYS = """
 SELECT count(*), percentile_disc(0.5) WITHIN GROUP (ORDER BY received - time), percentile_disc(0.99) WITHIN GROUP
     (ORDER BY received - time) FROM (SELECT extract(epoch FROM received) AS received, extract(epoch FROM time) AS time
@@ -80,7 +80,7 @@ def loaded(fleet: Fleet, directory: Path, rate: float, options: argparse.Namespa
     used = {name: (usage.cpu() - cpu[name]) / (ended - began) for name, usage in usages.items()}
     memory = max(Usage(worker.pid).memory() for worker in fleet.workers)
     stored = int(fleet.database.sql("SELECT sum(stored) FROM workers"))
-    generator.says("acknowledged", timeout=PATIENCE)
+    generator.says("acknowledged", timeout=TIMEOUT)
     report = json.loads(generator.output().splitlines()[-1])
     generator.stop()
     missing = still_missing(fleet, report["sent"])
@@ -106,7 +106,7 @@ def loaded(fleet: Fleet, directory: Path, rate: float, options: argparse.Namespa
 
 def still_missing(fleet: Fleet, sent: int) -> int:
     """How many readings are no row yet when nothing more has come for a while."""
-    stored, deadline = -1, time.monotonic() + PATIENCE
+    stored, deadline = -1, time.monotonic() + TIMEOUT
     while stored < sent and time.monotonic() < deadline:
         time.sleep(0.5)
         stored = int(fleet.database.sql("SELECT sum(stored) FROM workers") or 0)

@@ -21,7 +21,7 @@ from mavproxy_uavapi.core.vehicle import time_limits
 MODES = {name: number for number, name in mavutil.mode_mapping_acm.items()}
 BURST = 10  # messages in each of the vehicle's datagrams
 BURSTS_PER_SECOND = 5
-PATIENCE = 10.0  # s
+TIMEOUT = 10.0  # s
 ON_ITS_WAY = 1.0  # s that a message may arrive after the answer to its request
 DATAGRAM = 1 << 16
 SYSTEM = 1
@@ -209,16 +209,16 @@ class Vehicle:
     def arrival(self, key: Key, answer: socket.socket) -> float | None:
         """When the first message of that key has arrived, s of time.time(); None where an answer came without it."""
         self._pipe.send(("await", key))
-        assert multiprocessing.connection.wait([self._pipe, answer], PATIENCE), f"nothing sent for {key}"
+        assert multiprocessing.connection.wait([self._pipe, answer], TIMEOUT), f"nothing sent for {key}"
         at: float | None = self._pipe.recv() if self._pipe.poll(ON_ITS_WAY) else None
         return at
 
     def _ask(self, *order: Any) -> None:
         self._pipe.send(order)
-        assert self._pipe.poll(PATIENCE), f"the peer does not answer to {order}"
+        assert self._pipe.poll(TIMEOUT), f"the peer does not answer to {order}"
         self._pipe.recv()
 
     def close(self) -> None:
         """End the process."""
         self._pipe.send(None)
-        self._process.join(PATIENCE)
+        self._process.join(TIMEOUT)

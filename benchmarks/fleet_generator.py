@@ -103,9 +103,9 @@ class Generator:
             if self._selector.select(left):
                 self._acknowledged += len(self._socket.recv(MANY))
 
-    def finish(self, patience: float) -> None:
+    def finish(self, timeout: float) -> None:
         """Wait for the last acknowledgements."""
-        end = time.monotonic() + patience
+        end = time.monotonic() + timeout
         while self.acknowledged < self.sent and time.monotonic() < end:
             self._read(0.1)
         self._socket.close()

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from sim_station import HOME, PATIENCE, Station
+from sim_station import HOME, TIMEOUT, Station
 
 BINARIES = {"copter": "arducopter", "rover": "ardurover", "plane": "arduplane", "quadplane": "arduplane"}
 MODELS = {"copter": "+"}  # others are called as their type
@@ -34,7 +34,7 @@ def running(command: list[str], port: int, directory: str) -> Iterator[Station]:
     """The process and a station of it; the process is killed at the end, whatever it does."""
     with subprocess.Popen(command, cwd=directory, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
         try:
-            deadline = time.monotonic() + PATIENCE
+            deadline = time.monotonic() + TIMEOUT
             while True:
                 with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port), timeout=1):
                     break

@@ -20,7 +20,7 @@ WATCHED = (
     "MISSION_CURRENT",
     "EKF_STATUS_REPORT",
 )
-PATIENCE = 600.0  # s of the wall clock that anything may take
+TIMEOUT = 600.0  # s of the wall clock that anything may take
 NAN = math.nan
 Item = tuple[int, tuple[float, ...], tuple[float, float] | None, float]
 """A mission item: the command, its first parameters, the place in m north and east of home, and the altitude in m."""
@@ -81,7 +81,7 @@ class Station:
 
     def wait(self, condition: Callable[[], bool], most: float = math.inf) -> float:
         """Until it holds, or so many seconds of the vehicle have passed; the seconds that it took."""
-        started, deadline = self.at, time.monotonic() + PATIENCE
+        started, deadline = self.at, time.monotonic() + TIMEOUT
         while not condition() and self.at - started < most:
             assert time.monotonic() < deadline, "the vehicle does not get there"
             self.hear()

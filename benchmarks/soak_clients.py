@@ -15,7 +15,7 @@ from soak_notes import Notes
 
 CLIENTS = 12
 SLACK = 3.0  # s; a busy machine: the API itself ends a verb at its timeout
-PATIENT = 60.0  # s for verbs without a deadline: an ack that says IN_PROGRESS may take 10 s each time
+VERB_TIMEOUT = 60.0  # s for verbs without a deadline: an ack that says IN_PROGRESS may take 10 s each time
 QUICK = 5.0  # s for reads; one that was never told is asked of the vehicle, for 2 s
 KNOWN = {200, 202, 400, 404, 405, 408, 409, 413, 422, 429, 503, 504}
 READS = ("general", "gps", "gps_raw", "ned", "attitude", "sys_status", "sensor_status", "battery_info", "error_info")
@@ -113,21 +113,21 @@ class Clients:
             ("GET", "/command/land", {"params": {"timeout": timeout}}, bounded),
             ("GET", "/command/rtl", {"params": {"timeout": timeout}}, bounded),
             ("POST", "/movement/go_to_ned_wait", {"json": {**ned, "timeout": timeout}}, bounded),
-            ("POST", "/movement/go_to_ned", {"json": ned}, PATIENT),
+            ("POST", "/movement/go_to_ned", {"json": ned}, VERB_TIMEOUT),
             ("POST", "/movement/drive_wait", {"json": {"x": 5, "y": 5, "z": 0, "timeout": timeout}}, bounded),
-            ("POST", "/movement/drive", {"json": {"x": 5, "y": -5, "z": 0}}, PATIENT),
-            ("POST", "/movement/travel_at_ned", {"json": {"vx": 1, "vy": 1, "vz": 0, "duration": 20}}, PATIENT),
-            ("GET", "/command/brake", {}, PATIENT),
-            ("GET", "/command/guided", {}, PATIENT),
-            ("GET", "/command/set_mode", {"params": {"mode": dice.choice(MODES)}}, PATIENT),
-            ("GET", "/command/disarm", {}, PATIENT),
-            ("GET", "/movement/set_heading", {"params": {"heading": dice.randrange(360)}}, PATIENT),
-            ("GET", "/movement/set_yaw_rate", {"params": {"yaw_rate": 10}}, PATIENT),
-            ("GET", "/movement/stop", {}, PATIENT),
-            ("GET", "/movement/resume", {}, PATIENT),
-            ("GET", "/command/set_ground_speed", {"params": {"new_v": 5}}, PATIENT),
-            ("GET", "/command/set_home", {}, PATIENT),
-            ("POST", "/peripherical/servo_output", {"json": {"channel": 9, "pwm": 1500}}, PATIENT),
+            ("POST", "/movement/drive", {"json": {"x": 5, "y": -5, "z": 0}}, VERB_TIMEOUT),
+            ("POST", "/movement/travel_at_ned", {"json": {"vx": 1, "vy": 1, "vz": 0, "duration": 20}}, VERB_TIMEOUT),
+            ("GET", "/command/brake", {}, VERB_TIMEOUT),
+            ("GET", "/command/guided", {}, VERB_TIMEOUT),
+            ("GET", "/command/set_mode", {"params": {"mode": dice.choice(MODES)}}, VERB_TIMEOUT),
+            ("GET", "/command/disarm", {}, VERB_TIMEOUT),
+            ("GET", "/movement/set_heading", {"params": {"heading": dice.randrange(360)}}, VERB_TIMEOUT),
+            ("GET", "/movement/set_yaw_rate", {"params": {"yaw_rate": 10}}, VERB_TIMEOUT),
+            ("GET", "/movement/stop", {}, VERB_TIMEOUT),
+            ("GET", "/movement/resume", {}, VERB_TIMEOUT),
+            ("GET", "/command/set_ground_speed", {"params": {"new_v": 5}}, VERB_TIMEOUT),
+            ("GET", "/command/set_home", {}, VERB_TIMEOUT),
+            ("POST", "/peripherical/servo_output", {"json": {"channel": 9, "pwm": 1500}}, VERB_TIMEOUT),
         ]
         # Those that take the vehicle from one another come less often, so that something is seen of each.
         return dice.choice(choices[:13] if dice.random() < 0.25 else choices[13:])
@@ -151,7 +151,7 @@ class Clients:
         await asyncio.sleep(self._dice.uniform(0, 1))
         await self._ask("GET /jobs/N", "GET", f"/jobs/{number}", QUICK)
         if self._dice.random() < 0.7:
-            await self._ask("DELETE /jobs/N", "DELETE", f"/jobs/{number}", PATIENT)
+            await self._ask("DELETE /jobs/N", "DELETE", f"/jobs/{number}", VERB_TIMEOUT)
 
     async def _hang_up(self) -> None:
         """A verb whose client goes away."""

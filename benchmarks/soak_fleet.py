@@ -20,7 +20,7 @@ from figures import machine, table
 from tests.support.fleet_faults import Audit, FaultyFleet
 from tests.support.network_namespace import NetworkNamespace
 
-PATIENCE = 600.0  # s
+TIMEOUT = 600.0  # s
 
 
 def report(audit: Audit, ack: str) -> str:
@@ -62,7 +62,7 @@ def main() -> int:
             began = time.monotonic()
             fleet.suffer(random.Random(options.seed), options.minutes * 60, options.longest)
             took = time.monotonic() - began
-            audit = fleet.audit(PATIENCE)
+            audit = fleet.audit(TIMEOUT)
         finally:
             fleet.stop()
             if namespace is not None:

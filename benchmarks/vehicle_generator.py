@@ -21,7 +21,7 @@ from tap import SO_TIMESTAMPNS, Forwarding
 
 BURST, BURSTS_PER_SECOND = 10, 5  # messages in a datagram
 GUIDED = 4
-PATIENCE = 20.0  # s
+TIMEOUT = 20.0  # s
 DATAGRAM = 1 << 16
 MODE_COMMANDS = {"SET_MODE", "COMMAND_LONG"}
 
@@ -205,7 +205,7 @@ class Copters:
         self.out_port: int = self._answer()
 
     def _answer(self) -> Any:
-        assert self._pipe.poll(PATIENCE), "the vehicles do not answer"
+        assert self._pipe.poll(TIMEOUT), "the vehicles do not answer"
         return self._pipe.recv()
 
     def speak_to(self, mavproxy: int) -> None:
@@ -229,4 +229,4 @@ class Copters:
     def close(self) -> None:
         """End the process."""
         self._pipe.send(None)
-        self.process.join(PATIENCE)
+        self.process.join(TIMEOUT)

@@ -5,7 +5,7 @@
 import {now} from "./freshness.js";
 
 const SLOTS = 2;
-const PATIENCE = 1000; // ms that a command waits for a slot; later it would surprise the pilot
+const SLOT_TIMEOUT = 1000; // ms that a command waits for a slot; later it would surprise the pilot
 
 export class CallSlots {
   constructor() {
@@ -56,7 +56,7 @@ export class CallSlots {
     return new Promise((resolve, reject) => {
       Object.assign(call, {go: resolve, fail: reject});
       this.waiting.push(call);
-      if (call.command) setTimeout(() => this.dropLate(), PATIENCE + 1);
+      if (call.command) setTimeout(() => this.dropLate(), SLOT_TIMEOUT + 1);
     });
   }
 
@@ -70,7 +70,7 @@ export class CallSlots {
     }
   }
 
-  dropLate() { this.drop(call => call.command && now() - call.since > PATIENCE, "not sent: the page was busy"); }
+  dropLate() { this.drop(call => call.command && now() - call.since > SLOT_TIMEOUT, "not sent: the page was busy"); }
 
   drop(chosen, why) {
     const dropped = this.waiting.filter(chosen);

@@ -4,8 +4,9 @@ import {CommandPanel} from "./command_panel.js";
 import {element, setText} from "./dom.js";
 import {now} from "./freshness.js";
 
-const PATIENCE = 60000; // ms for the list
+const LIST_TIMEOUT = 60000; // ms for the list
 const LONGEST = 600000; // ms for a file from MAVProxy's machine
+const URL_LIFE = 60000; // ms until the browser has taken a fetched file
 
 export class LogList extends CommandPanel {
   build() {
@@ -20,7 +21,7 @@ export class LogList extends CommandPanel {
     const {vehicle} = this;
     if (!vehicle) return;
     this.say("asking …", "wait");
-    const listed = await this.attempt(() => this.context.api.call("GET", `/vehicles/${vehicle.id}/logs`, {timeout: PATIENCE}));
+    const listed = await this.attempt(() => this.context.api.call("GET", `/vehicles/${vehicle.id}/logs`, {timeout: LIST_TIMEOUT}));
     if (!listed || vehicle !== this.vehicle) return;
     this.say("", "");
     setText(this.note, listed.logs.length ? `Vehicle ${vehicle.id} holds ${listed.logs.length} logs.` : `Vehicle ${vehicle.id} holds no logs.`);
@@ -53,7 +54,7 @@ export class LogList extends CommandPanel {
     if (!body) return;
     const url = URL.createObjectURL(body);
     element("a", {href: url, download: name}).click();
-    setTimeout(() => URL.revokeObjectURL(url), PATIENCE);
+    setTimeout(() => URL.revokeObjectURL(url), URL_LIFE);
     this.say(`${sizeText(body.size)} in ${((now() - began) / 1000).toFixed(1)} s`, "good");
   }
 }

@@ -137,14 +137,14 @@ class Runner:
             if ended_at is not None and time.monotonic() > ended_at + LAST_OUTPUT:
                 return  # a child of the script keeps its output open
             self._stop_if_requested(child)
-            for key, _ in selector.select(self._patience(ended_at)):
+            for key, _ in selector.select(self._select_timeout(ended_at)):
                 self._pass_on(selector, key)
         while child.poll() is None:  # it has closed its outputs, but still runs
             self._stop_if_requested(child)
-            for key, _ in selector.select(self._patience(None)):
+            for key, _ in selector.select(self._select_timeout(None)):
                 self._pass_on(selector, key)
 
-    def _patience(self, ended_at: float | None) -> float | None:
+    def _select_timeout(self, ended_at: float | None) -> float | None:
         if ended_at is not None:
             return LAST_OUTPUT
         if self._kill_at is None or self._record.get("killed"):

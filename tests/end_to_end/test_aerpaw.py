@@ -16,7 +16,7 @@ import requests
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "aerpaw"
 HOST = [sys.executable, "-m", "mavproxy_uavapi.aerpaw"]
-PATIENCE = 200.0  # s
+TIMEOUT = 200.0  # s
 
 
 @pytest.fixture(scope="module", params=["embedded", pytest.param("ardupilot", marks=pytest.mark.sitl)])
@@ -38,7 +38,7 @@ def begin(rig: Any, script: Path, *more: str) -> subprocess.Popen[str]:
 
 def end(process: subprocess.Popen[str]) -> tuple[int, str, str]:
     try:
-        out, err = process.communicate(timeout=PATIENCE)
+        out, err = process.communicate(timeout=TIMEOUT)
     finally:
         process.kill()
     return process.returncode, out, err
@@ -156,7 +156,7 @@ def test_script_runs_uploaded_as_it_is(rig: Any) -> None:
     files = {"file": ("square.py", (EXAMPLES / "square.py").read_bytes())}
     rig.ok(requests.post(rig.url + "/mission/upload-script", files=files, timeout=10))
     rig.ok(rig.post("/mission/execute-script", script_name="square", args=["--side", "5"]))
-    deadline = time.monotonic() + PATIENCE
+    deadline = time.monotonic() + TIMEOUT
     while (run := rig.ok(rig.get("/mission/scripts/square"))["run"])["running"]:
         assert time.monotonic() < deadline
         time.sleep(0.5)

@@ -20,7 +20,7 @@ RIG_SPEEDUP = 2  # nobody flies far here, and each message costs processor time
 pytestmark = pytest.mark.needs("chromium")
 
 EVIL = "evil.example"  # a name that the browser is told to find at 127.0.0.1
-PATIENCE = 90.0  # s for a browser to start, try everything, and tell; other tests share the machine
+TIMEOUT = 90.0  # s for a browser to start, try everything, and tell; other tests share the machine
 ARM = 400  # MAV_CMD_COMPONENT_ARM_DISARM
 # A line of the browser's log about an answer; of a refused WebSocket it only keeps the status.
 ANSWERED = re.compile(r'(?:"headers":\["HTTP/1\.1 |Unexpected response code: )(\d+)')
@@ -248,7 +248,7 @@ class Browser:
         command = [*self._inside, *started]
         process = self._harness.Process(command, self._directory / "chromium.log", self._directory)
         try:
-            report_ = site.reported.wait(PATIENCE)
+            report_ = site.reported.wait(TIMEOUT)
             if report_:  # Chromium writes its traffic late, and in order; at its end it may begin the file anew
                 self._harness.eventually(lambda: self._has_all(traffic), what="all of the traffic")
         finally:

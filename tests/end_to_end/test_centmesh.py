@@ -22,7 +22,7 @@ MISSION = """QGC WPL 110
 3	0	3	16	0	0	0	0	-35.363081	149.165450	12	1
 4	0	3	20	0	0	0	0	0	0	0	1
 """
-PATIENCE = 60.0  # s
+TIMEOUT = 60.0  # s
 
 
 @pytest.fixture
@@ -31,21 +31,21 @@ def drone(rig, harness) -> Iterator[Any]:
     port = free_port()
     rig.mavproxy.ask(f"output add 127.0.0.1:{port}", "Adding output")
     connection = mavutil.mavlink_connection(f"udp:127.0.0.1:{port}")
-    assert connection.wait_heartbeat(timeout=PATIENCE)
+    assert connection.wait_heartbeat(timeout=TIMEOUT)
     yield connection
     connection.close()
     rig.mavproxy.type(f"output remove 127.0.0.1:{port}")
 
 
 def heard(drone: Any, kind: str) -> Any:
-    message = drone.recv_match(type=kind, blocking=True, timeout=PATIENCE)
+    message = drone.recv_match(type=kind, blocking=True, timeout=TIMEOUT)
     assert message is not None, f"no {kind}"
     return message
 
 
 def switch(drone: Any, mode: str, request: Any) -> None:
     """Request a mode at each heartbeat, until one shows it."""
-    deadline = time.monotonic() + PATIENCE
+    deadline = time.monotonic() + TIMEOUT
     while drone.flightmode != mode:
         assert time.monotonic() < deadline, drone.flightmode
         request()
@@ -53,7 +53,7 @@ def switch(drone: Any, mode: str, request: Any) -> None:
 
 
 def arm(drone: Any) -> None:
-    deadline = time.monotonic() + PATIENCE
+    deadline = time.monotonic() + TIMEOUT
     while not drone.motors_armed():
         assert time.monotonic() < deadline
         drone.arducopter_arm()
@@ -62,7 +62,7 @@ def arm(drone: Any) -> None:
 
 def collect(drone: Any, file: Path, until: Any) -> None:
     """The first program's work: a line for each reading."""
-    deadline = time.monotonic() + 3 * PATIENCE
+    deadline = time.monotonic() + 3 * TIMEOUT
     with file.open("w") as lines:
         while not until():
             assert time.monotonic() < deadline
@@ -70,7 +70,7 @@ def collect(drone: Any, file: Path, until: Any) -> None:
 
 
 def lands(drone: Any) -> None:
-    deadline = time.monotonic() + PATIENCE
+    deadline = time.monotonic() + TIMEOUT
     while drone.motors_armed():
         assert time.monotonic() < deadline
         heard(drone, "HEARTBEAT")
@@ -108,7 +108,7 @@ def guide(drone: Any, lat: float, lon: float, alt: float) -> int:
 
     Returns the MAV_MISSION_RESULT. `alt` is m above home.
     """
-    deadline = time.monotonic() + PATIENCE
+    deadline = time.monotonic() + TIMEOUT
     while True:
         assert time.monotonic() < deadline
         drone.mav.mission_item_send(

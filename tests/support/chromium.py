@@ -17,7 +17,7 @@ import aiohttp
 from tests.support.ports import free_port
 from tests.support.processes import Process
 
-PATIENCE = 60.0  # s
+TIMEOUT = 60.0  # s
 PROGRAMS = ("chromium-headless-shell", "chromium")  # the first takes a third of the processor time to start
 # Chromium asks its makers' hosts for updates, hundreds of times where there is no internet; no test needs them.
 FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run", "--disable-quic"]
@@ -90,7 +90,7 @@ class Page:
             f"{{const e = {element}; e.scrollIntoView({{block: 'nearest'}}); const r = e.getBoundingClientRect(); "
             "JSON.stringify([r.x + r.width / 2, r.y + r.height / 2])}"
         )
-        deadline, before, place = time.monotonic() + PATIENCE, None, await self.evaluate(script)
+        deadline, before, place = time.monotonic() + TIMEOUT, None, await self.evaluate(script)
         while place != before:
             assert time.monotonic() < deadline, f"{element} does not stand still"
             await asyncio.sleep(0.1)
@@ -136,7 +136,7 @@ class Page:
         assert "exceptionDetails" not in result, result
         return result["result"].get("value")
 
-    async def until(self, script: str, seconds: float = PATIENCE) -> None:
+    async def until(self, script: str, seconds: float = TIMEOUT) -> None:
         """Wait until a script gives something true; a page that is being loaded has none to run it in."""
         deadline = time.monotonic() + seconds
         while True:

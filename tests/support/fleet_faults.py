@@ -178,19 +178,19 @@ class FaultyFleet:
 
     # -- the end ------------------------------------------------------------------------------------------
 
-    def drain(self, patience: float) -> tuple[int, float]:
+    def drain(self, timeout: float) -> tuple[int, float]:
         """End the sampling and wait until the spools are empty; how many were dropped, and how long (s) it took."""
         began, dropped = time.monotonic(), 0
         for process in self._flying:
             os.kill(process.pid, signal.SIGUSR1)
         for process in self._flying:
-            process.says("drained", timeout=patience)
+            process.says("drained", timeout=timeout)
             dropped += sum(json.loads(process.output().splitlines()[-1])["dropped"].values())
         return dropped, time.monotonic() - began
 
-    def audit(self, patience: float = 120.0) -> Audit:
+    def audit(self, timeout: float = 120.0) -> Audit:
         """Drain, and count in SQL."""
-        dropped, drained = self.drain(patience)
+        dropped, drained = self.drain(timeout)
         self._settle()
         sql = self._fleet.database.sql
         sql("CREATE TABLE sampled (device text, seq bigint, ms bigint)")

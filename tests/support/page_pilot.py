@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from tests.support.chromium import PATIENCE, Page
+from tests.support.chromium import TIMEOUT, Page
 
 ESCAPE = 27
 BUTTON = "[...document.querySelectorAll('{tag}')].find(b => b.textContent === '{label}' && b.checkVisibility())"
@@ -31,7 +31,7 @@ class Pilot:
     def __init__(self, page: Page, rig: Any) -> None:
         self.page, self.rig = page, rig
 
-    async def sees(self, element: str, text: str, seconds: float = PATIENCE) -> None:
+    async def sees(self, element: str, text: str, seconds: float = TIMEOUT) -> None:
         """Wait until an element shows that text."""
         await self.page.until(f"document.querySelector({element!r}).innerText.includes({text!r})", seconds)
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import psutil
 
 NOBODY = "nobody"  # PostgreSQL refuses to run as root
-PATIENCE = 30.0  # s
+TIMEOUT = 30.0  # s
 
 
 def program(name: str) -> str:
@@ -80,7 +80,7 @@ class PostgresCluster:
                 stderr=log,
                 start_new_session=True,
             )
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + TIMEOUT
         while subprocess.run(
             [program("pg_isready"), "-q", "-h", "127.0.0.1", "-p", str(self.port)], check=False
         ).returncode:
@@ -105,7 +105,7 @@ class PostgresCluster:
             with contextlib.suppress(psutil.NoSuchProcess):
                 process.kill()
         self._process.wait()
-        psutil.wait_procs(children, PATIENCE)  # as long as one lives, none starts again
+        psutil.wait_procs(children, TIMEOUT)  # as long as one lives, none starts again
 
     def stop(self) -> None:
         """End it."""

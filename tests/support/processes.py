@@ -36,10 +36,10 @@ FEW_MODULES = "log,signing,wp,rally,fence,ftp,param,arm,mode,rc,misc,cmdlong,out
 # are 1 s here.
 PARAMETERS = {"LAND_SPEED": 100, "RTL_ALT": 0, "RTL_LOIT_TIME": 500, "DISARM_DELAY": 120}
 SILENCE = 15  # s after which the API misses a vehicle, or its telemetry
-PATIENCE = 60.0  # s for a process to show what it should
+TIMEOUT = 60.0  # s for a process to show what it should
 
 
-def eventually(look: Callable[[], Any], timeout: float = PATIENCE, what: str = "it") -> Any:
+def eventually(look: Callable[[], Any], timeout: float = TIMEOUT, what: str = "it") -> Any:
     """The first true value of `look`, called until then; other processes have no clock of ours."""
     deadline = time.monotonic() + timeout
     while True:
@@ -85,7 +85,7 @@ class Process:
         self.popen.stdin.write(line.encode() + b"\n")
         self.popen.stdin.flush()
 
-    def says(self, text: str, since: int = 0, timeout: float = PATIENCE) -> str:
+    def says(self, text: str, since: int = 0, timeout: float = TIMEOUT) -> str:
         """Wait until its output holds `text`; what it wrote since."""
         eventually(lambda: self._has(text, since), timeout, f"{text!r} in {self.log.name}")
         return self.output(since)
@@ -96,7 +96,7 @@ class Process:
         assert self.popen.poll() is None, f"{self.log.name} ended: {self.output()[-2000:]}"
         return False
 
-    def ask(self, line: str, answer: str, timeout: float = PATIENCE) -> str:
+    def ask(self, line: str, answer: str, timeout: float = TIMEOUT) -> str:
         """Type a line and wait for `answer`; what was written meanwhile."""
         mark = self.mark()
         self.type(line)
@@ -176,7 +176,7 @@ class Rig:
     @contextlib.contextmanager
     def unanswered(self, method: str, path: str, body: dict[str, Any] | None = None) -> Iterator[None]:
         """Meanwhile a request waits for its answer; then its client hangs up."""
-        with socket.create_connection(("127.0.0.1", self.port), timeout=PATIENCE) as connection:
+        with socket.create_connection(("127.0.0.1", self.port), timeout=TIMEOUT) as connection:
             content = b"" if body is None else json.dumps(body).encode()
             lines = (f"{method} {path} HTTP/1.1", f"Host: 127.0.0.1:{self.port}", "Content-Type: application/json")
             connection.sendall("\r\n".join([*lines, f"Content-Length: {len(content)}", "", ""]).encode() + content)
@@ -205,7 +205,7 @@ class Rig:
         """Seconds."""
         return time.monotonic()
 
-    def eventually(self, look: Callable[[], Any], timeout: float = PATIENCE, what: str = "it") -> Any:
+    def eventually(self, look: Callable[[], Any], timeout: float = TIMEOUT, what: str = "it") -> Any:
         """The first true value of `look`, which must come within so many s of the rig's clock."""
         deadline = self.clock() + timeout
         while not (value := look()):
@@ -236,7 +236,7 @@ class Rig:
         self.mavproxy.type(f"uavapi set {name} {value}")
         self.mavproxy.ask(f"uavapi set {name}", f" {value} ")
 
-    def wait_until_up(self, timeout: float = PATIENCE) -> None:
+    def wait_until_up(self, timeout: float = TIMEOUT) -> None:
         """Wait until the API knows its vehicle."""
 
         def up() -> bool:
@@ -246,7 +246,7 @@ class Rig:
 
         eventually(up, timeout, "the API's knowing its vehicle")
 
-    def be_patient(self) -> None:
+    def stay_armed(self) -> None:
         """Have ArduPilot's copter stay armed on the ground for longer than 10 s, which are 1 s here."""
         self.mavproxy.says("Received", timeout=60)  # the parameters, without which MAVProxy sets none
         self.mavproxy.type("param set DISARM_DELAY 120")
@@ -363,7 +363,7 @@ def ardupilot(directory: Path, *, speedup: int = SPEEDUP, **settings: Any) -> Ri
     try:
         rig.mavproxy = rig.start("sim_vehicle", command, headless())
         rig.wait_until_up(120)
-        rig.be_patient()
+        rig.stay_armed()
     except BaseException:
         rig.stop()
         raise
@@ -380,7 +380,7 @@ def ardupilot_with_faults(directory: Path, *, speedup: int = SPEEDUP, **settings
         master = f"--master=tcp:127.0.0.1:{rig.control.port}"
         rig.mavproxy = rig.start("mavproxy", [*MAVPROXY, master, "--retries=20", load(rig.port, **settings)])
         rig.wait_until_up(120)
-        rig.be_patient()
+        rig.stay_armed()
     except BaseException:
         rig.stop()
         raise

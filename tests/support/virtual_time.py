@@ -15,13 +15,13 @@ class TimeTravellingLoop(asyncio.SelectorEventLoop):
     """An asyncio loop that never waits: when nothing is ready, its clock jumps to the next timer.
 
     Attributes:
-        patience: real s that sockets get to become ready before the clock jumps; 0 without sockets.
+        real_wait: real s that sockets and threads get to become ready before the clock jumps; 0 without them.
         defects: what reached the loop's exception handler; a test that expects some clears them.
     """
 
     def __init__(self) -> None:
         self.now = 1000.0
-        self.patience = 0.0
+        self.real_wait = 0.0
         self.defects: list[dict[str, Any]] = []
         self._thread = threading.get_ident()
         super().__init__(_JumpingSelector(self))
@@ -73,9 +73,9 @@ class _JumpingSelector(selectors.DefaultSelector):
             if not ready:
                 raise RuntimeError("nothing will ever happen: no timer, no socket")
             return ready
-        full = self._full() if self._loop.patience else set()
-        patience = FULL_SOCKET if full - self._stuck else 0.0
-        ready = super().select(min(timeout, max(self._loop.patience, patience)))
+        full = self._full() if self._loop.real_wait else set()
+        for_full = FULL_SOCKET if full - self._stuck else 0.0
+        ready = super().select(min(timeout, max(self._loop.real_wait, for_full)))
         if ready:
             self._stuck -= {key.fd for key, _ in ready}
         else:

@@ -24,7 +24,7 @@ def settings() -> Any:
 
 @pytest.fixture
 def api(loop: Any, host: Any) -> Any:
-    loop.patience = 0.002
+    loop.real_wait = 0.002
     api = Api(host)
     yield api
     loop.run(api.stop())

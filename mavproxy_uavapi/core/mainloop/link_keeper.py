@@ -19,7 +19,7 @@ from typing import Any
 from pymavlink import mavutil
 
 PAUSE = 1.0  # s between two attempts
-PATIENCE = 5.0  # s for one attempt
+ATTEMPT_TIMEOUT = 5.0  # s for one attempt
 NO_DESCRIPTOR = -1
 
 
@@ -81,7 +81,7 @@ class TcpLink:
         except OSError:  # its name cannot be looked up
             attempt.close()
             return
-        self._attempt, self._due = attempt, self._clock() + PATIENCE
+        self._attempt, self._due = attempt, self._clock() + ATTEMPT_TIMEOUT
         self._look(attempt)
 
     def _look(self, attempt: socket.socket) -> None:

@@ -26,7 +26,7 @@ mavlink = mavutil.mavlink
 CHUNK = 1024 * PIECE  # bytes of one request; 20 s on a telemetry radio at 57600 baud
 LIST_SILENCE = 1.5  # s without an entry until we ask again
 SILENCE = 0.7  # s without a new piece until we ask again; an ArduPilot that still sends ignores that
-PATIENCE = 10.0  # s of requests without anything new until we give up
+NO_NEWS_TIMEOUT = 10.0  # s of requests without anything new until we give up
 FOREIGN = 2.0  # s for which a piece that we did not request shows that another program downloads
 
 Bytes = tuple[int, bytes]  # where they begin, and they
@@ -94,7 +94,7 @@ class DataflashLogs:
         Raises:
             Busy: the vehicle is armed; or it sends a log to another program, which is not stopped.
             Aborted: it booted meanwhile.
-            TimedOut: nothing new came for PATIENCE s.
+            TimedOut: nothing new came for NO_NEWS_TIMEOUT s.
             LinkLost; also the errors of `save`.
         """
         async with self._turn(while_armed):
@@ -118,7 +118,7 @@ class DataflashLogs:
         known, news_at = 0, asked_at
         with self._talk("LOG_ENTRY") as talk:
             while (missing := listing.missing) is not None:
-                if self._waiting.clock() - news_at >= PATIENCE:
+                if self._waiting.clock() - news_at >= NO_NEWS_TIMEOUT:
                     raise self._no_answer("list its logs", asked_at)
                 await self._send(mavlink.MAVLink_log_request_list_message(*self._target, *missing))
                 while listing.missing is not None and (message := await talk.next(LIST_SILENCE)) is not None:
@@ -133,7 +133,7 @@ class DataflashLogs:
         with self._talk("LOG_DATA") as talk:
             while (gap := pieces.next_gap(CHUNK)) is not None:
                 fetch.check()
-                if self._waiting.clock() - news_at >= PATIENCE:
+                if self._waiting.clock() - news_at >= NO_NEWS_TIMEOUT:
                     raise fetch.others_log or self._no_answer(f"send the rest of log {entry.id}", asked_at)
                 start, end = gap
                 await self._send(
@@ -197,7 +197,7 @@ class DataflashLogs:
 
     def _no_answer(self, action: str, asked_at: float) -> TimedOut:
         texts = self._state.statustexts_since(asked_at)
-        return TimedOut(f"vehicle {self._state.system} did not {action}, asked for {PATIENCE:g} s", texts)
+        return TimedOut(f"vehicle {self._state.system} did not {action}, asked for {NO_NEWS_TIMEOUT:g} s", texts)
 
 
 class OthersLog(Busy):

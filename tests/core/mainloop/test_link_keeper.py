@@ -13,7 +13,7 @@ import pytest
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.mainloop import link_keeper
-from mavproxy_uavapi.core.mainloop.link_keeper import PATIENCE, PAUSE, LinkKeeper
+from mavproxy_uavapi.core.mainloop.link_keeper import ATTEMPT_TIMEOUT, PAUSE, LinkKeeper
 from tests.support.clock import Clock
 
 LOOPBACK = "127.0.0.1"
@@ -126,7 +126,7 @@ def test_attempt_without_an_answer_is_given_up(
     vehicle.start()
     clock.now += PAUSE
     keeper.turn([link])
-    clock.now += PATIENCE
+    clock.now += ATTEMPT_TIMEOUT
     keeper.turn([link])
     assert link.port is None
     monkeypatch.undo()

@@ -229,7 +229,7 @@ def test_patient_command_is_repeated_until_it_is_accepted(drone: Any, send: Any)
     assert took == pytest.approx(2.0, abs=0.2)
 
 
-def test_patience_ends(loop: Any, drone: Any, send: Any) -> None:
+def test_repeating_a_patient_command_ends(loop: Any, drone: Any, send: Any) -> None:
     drone.answers[HOME] = [BUSY]
     started = loop.time()
     with pytest.raises(Rejected, match="TEMPORARILY_REJECTED"):
@@ -244,7 +244,7 @@ def test_patient_command_that_is_denied_is_not_repeated(drone: Any, send: Any) -
     assert len(drone.commands(HOME)) == 1
 
 
-def test_impatient_command_is_not_repeated(drone: Any, send: Any) -> None:
+def test_command_that_is_not_patient_is_not_repeated(drone: Any, send: Any) -> None:
     drone.answers[SERVO] = [BUSY]
     with pytest.raises(Rejected):
         send()

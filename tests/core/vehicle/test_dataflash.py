@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.core.errors import Aborted, Busy, LinkLost, NotFound, TimedOut, ToolFailed
-from mavproxy_uavapi.core.vehicle.dataflash import CHUNK, PATIENCE
+from mavproxy_uavapi.core.vehicle.dataflash import CHUNK, NO_NEWS_TIMEOUT
 from mavproxy_uavapi.core.vehicle.log_pieces import PIECE, LogEntry
 from tests.support.log_vehicle import LogVehicle
 
@@ -77,7 +77,7 @@ def test_vehicle_that_lists_nothing_is_a_timeout_with_its_texts(
     with pytest.raises(TimedOut, match="did not list its logs") as caught:
         loop.run(copter.logs.read_list())
     assert caught.value.statustext == ["No logs here"]
-    assert PATIENCE <= loop.time() - began < PATIENCE + 2.0
+    assert NO_NEWS_TIMEOUT <= loop.time() - began < NO_NEWS_TIMEOUT + 2.0
 
 
 @pytest.mark.parametrize("loss", [0.0, 0.02, 0.2])
@@ -118,7 +118,7 @@ def test_vehicle_that_falls_silent_ends_the_download_and_is_told(loop: Any, copt
     began = loop.time()
     with pytest.raises(TimedOut, match="did not send the rest of log 2"):
         loop.run(task)
-    assert PATIENCE <= loop.time() - began < PATIENCE + 2.0
+    assert NO_NEWS_TIMEOUT <= loop.time() - began < NO_NEWS_TIMEOUT + 2.0
     loop.pass_time(0.1)
     assert vehicle.names()[-1] == "LOG_REQUEST_END"
     vehicle.mute.clear()

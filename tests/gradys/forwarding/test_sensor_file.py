@@ -106,7 +106,7 @@ def test_a_file_that_does_not_answer_is_asked_once(loop: Any, monkeypatch: Any, 
         with pytest.raises(NoReading, match="does not answer"):
             loop.run(source.read())
     answer.set()
-    loop.patience = 60.0
+    loop.real_wait = 60.0
     assert loop.run(source.read()) == Measured(b"23.5\n", NOW - 1.0)
     assert len(asked) == 1
     loop.run(source.close())

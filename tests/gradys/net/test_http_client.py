@@ -45,7 +45,7 @@ class Peer:
 
 def requested(loop: Any, peer: Peer, times: int = 1, **options: Any) -> list[Any]:
     """What the client makes of the peer's answers."""
-    loop.patience = 0.2
+    loop.real_wait = 0.2
 
     async def run() -> list[Any]:
         await peer.start()
@@ -151,7 +151,7 @@ def test_silence_ends_with_the_time_out(loop: Any, peer: Peer) -> None:
 
 
 def test_nobody_there_and_no_such_name(loop: Any) -> None:
-    loop.patience = 0.2
+    loop.real_wait = 0.2
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
 

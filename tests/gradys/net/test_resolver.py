@@ -42,7 +42,7 @@ def test_a_name_that_is_not_answered_holds_up_no_other_and_is_looked_up_once(loo
         server.answers.set()
         assert await names.look_up("dead1", 80) == [INFO]
 
-    loop.patience = 0.05
+    loop.real_wait = 0.05
     loop.run(look_up())
 
 

@@ -122,7 +122,7 @@ class Asker:
 def ask(
     loop: Any, tmp_path: Path, clock: Any, at_once: type, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[Callable[..., Any]]:
-    loop.patience = 0.05
+    loop.real_wait = 0.05
     loop.set_default_executor(AtOnce())  # of threads its clock would know nothing
     monkeypatch.setattr("mavproxy_gradys.station.sqlite_store.ThreadPoolExecutor", at_once)
     store = SqliteStore(tmp_path / "station.db", clock)

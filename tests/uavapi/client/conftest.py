@@ -14,7 +14,7 @@ from mavproxy_uavapi.http.app import make_handler
 from mavproxy_uavapi.http.call import Service
 from mavproxy_uavapi.settings import ApiModuleSettings
 
-SOCKET_PATIENCE = 0.002  # real s that the sockets get before the clock jumps
+SOCKET_WAIT = 0.002  # real s that the sockets get before the clock jumps
 
 
 @pytest.fixture
@@ -25,7 +25,7 @@ def service(host: Any) -> Service:
 @pytest.fixture
 def url(loop: Any, service: Service) -> Iterator[str]:
     """The API's address."""
-    loop.patience = SOCKET_PATIENCE
+    loop.real_wait = SOCKET_WAIT
     server = RawTestServer(make_handler(service))
     loop.run(server.start_server(access_log=None))
     yield str(server.make_url("")).rstrip("/")

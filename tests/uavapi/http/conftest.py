@@ -23,7 +23,7 @@ from mavproxy_uavapi.settings import ApiModuleSettings
 from tests.support.api_port import TOKEN, Port
 from tests.support.at_once import AtOnce
 
-SOCKET_PATIENCE = 0.002  # real s that the sockets get before the clock jumps
+SOCKET_WAIT = 0.002  # real s that the sockets get before the clock jumps
 
 
 class Api:
@@ -79,7 +79,7 @@ def service(host: Any) -> Service:
 @pytest.fixture
 def api(loop: Any, service: Service) -> Iterator[Api]:
     """The API, with whatever vehicle the test puts on the link."""
-    loop.patience = SOCKET_PATIENCE
+    loop.real_wait = SOCKET_WAIT
     loop.set_default_executor(AtOnce())  # of threads its clock would know nothing
     api = Api(loop, service)
     loop.run(api.start())
@@ -159,7 +159,7 @@ def idle_strangers(port: Port) -> Iterator[Callable[[int], list[socket.socket]]]
 @pytest.fixture
 def port(loop: Any, service: Any, tmp_path: Path) -> Iterator[Port]:
     """The API with a token, on a real port of the loopback."""
-    loop.patience = 0.002
+    loop.real_wait = 0.002
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         free = int(probe.getsockname()[1])

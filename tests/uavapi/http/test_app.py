@@ -31,7 +31,7 @@ def listening_on() -> int:
 
 @pytest.fixture
 def server(loop: Any, service: Any, listening_on: int) -> Any:
-    loop.patience = 0.002
+    loop.real_wait = 0.002
     service.settings = ApiModuleSettings({"port": listening_on}).snapshot()
     server = ApiServer(service)
     yield server
@@ -152,7 +152,7 @@ def test_port_that_is_taken_is_an_os_error_and_leaks_nothing(
 
 
 def test_port_can_be_bound_again_at_once(loop: Any, service: Any, listening_on: int, drone: Any) -> None:
-    loop.patience = 0.002
+    loop.real_wait = 0.002
     service.settings = ApiModuleSettings({"port": listening_on}).snapshot()
     for _ in range(3):
         server = ApiServer(service)
@@ -218,7 +218,7 @@ def test_each_vehicle_has_a_port_of_its_own(loop: Any, service: Any, make_drone:
         other_port = int(probe.getsockname()[1])
     make_drone(1)
     make_drone(2)
-    loop.patience = 0.002
+    loop.real_wait = 0.002
     service.settings = ApiModuleSettings({"port": listening_on, "ports": f"{other_port}:2"}).snapshot()
     server = ApiServer(service)
     loop.run(server.start())
@@ -247,7 +247,7 @@ def test_listening_socket_of_a_foreign_address_is_an_os_error() -> None:
 
 
 def test_handler_that_has_served_is_forgotten(loop: Any, service: Any) -> None:
-    loop.patience = 0.002
+    loop.real_wait = 0.002
 
     async def served() -> weakref.ref[Handler]:
         handler = make_handler(service)

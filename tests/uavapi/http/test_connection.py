@@ -55,7 +55,7 @@ def test_tls_handshake_that_stops_half_way_is_given_up_and_holds_up_nobody(
     key, cert = str(tmp_path / "key.pem"), str(tmp_path / "cert.pem")
     command = ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-subj", "/CN=localhost"]
     subprocess.run([*command, "-keyout", key, "-out", cert], check=True, capture_output=True)
-    loop.patience = 0.02
+    loop.real_wait = 0.02
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         free = int(probe.getsockname()[1])

@@ -7,12 +7,12 @@ import pytest
 from mavproxy_uavapi.http import docs_page
 from mavproxy_uavapi.settings import ApiModuleSettings
 
-FILE_PATIENCE = 2.0  # real s that the executor gets with its files before the clock jumps
+FILE_WAIT = 2.0  # real s that the executor gets with its files before the clock jumps
 
 
 @pytest.fixture(autouse=True)
-def patient(api: Any, loop: Any) -> None:
-    loop.patience = FILE_PATIENCE
+def time_for_files(api: Any, loop: Any) -> None:
+    loop.real_wait = FILE_WAIT
 
 
 def fetch(api: Any, loop: Any, path: str, **kwargs: Any) -> Any:

@@ -12,14 +12,14 @@ from mavproxy_uavapi.core.errors import Rejected
 from mavproxy_uavapi.core.vehicle.mission_files import HOME, read
 from mavproxy_uavapi.http.examples import WPL
 
-FILE_PATIENCE = 2.0  # real s that the executor gets before the clock jumps
+FILE_WAIT = 2.0  # real s that the executor gets before the clock jumps
 ITEMS = {"items": [{"command": "NAV_TAKEOFF", "alt": 10}]}
 
 
 @pytest.fixture
 def vehicles_mission(api: Any, loop: Any, copter: Any, monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """The vehicle's mission, as uploads and clearings leave it."""
-    loop.patience = FILE_PATIENCE
+    loop.real_wait = FILE_WAIT
     held: list[Any] = []
 
     async def upload(items: Any, progress: Any, **_checks: Any) -> None:

@@ -14,8 +14,8 @@ HTML = {"Accept": "text/html,application/xhtml+xml,*/*;q=0.8"}
 
 
 @pytest.fixture(autouse=True)
-def patient(api: Any, loop: Any) -> None:
-    loop.patience = 2.0  # real s that the executor gets with its files before the clock jumps
+def time_for_files(api: Any, loop: Any) -> None:
+    loop.real_wait = 2.0  # real s that the executor gets with its files before the clock jumps
 
 
 def fetch(api: Any, loop: Any, path: str, **headers: str) -> Any:

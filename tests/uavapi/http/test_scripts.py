@@ -18,14 +18,14 @@ from mavproxy_uavapi.scripts import runs
 from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.settings import ApiModuleSettings
 
-THREAD_PATIENCE = 10.0  # real s; an idle loop waits for the thread that reads the file, and its clock stands
-FILE_PATIENCE = 2.0  # real s that the executor gets with its files before the clock jumps
+THREAD_WAIT = 10.0  # real s; an idle loop waits for the thread that reads the file, and its clock stands
+FILE_WAIT = 2.0  # real s that the executor gets with its files before the clock jumps
 
 
 @pytest.fixture
 def configured(api: Any, loop: Any, service: Any, tmp_path: Path) -> Any:
     """`configured(**settings)`: the service with those, and its scripts in a folder of the test's."""
-    loop.patience = FILE_PATIENCE
+    loop.real_wait = FILE_WAIT
 
     def configure(**keywords: Any) -> Any:
         folders = {"scripts_path": str(tmp_path / "scripts"), "script_logs": str(tmp_path / "logs")}
@@ -203,7 +203,7 @@ def test_log_is_text_and_following_ends_with_the_run(api: Any, loop: Any) -> Non
 
 def test_log_of_an_ended_run_comes_in_pieces(api: Any, loop: Any, ran: runs.Run) -> None:
     ran.out_log.write_bytes(b"x\n" * 200_000)
-    loop.patience = THREAD_PATIENCE
+    loop.real_wait = THREAD_WAIT
 
     async def count() -> int:
         line_ends = 0

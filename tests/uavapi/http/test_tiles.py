@@ -10,8 +10,8 @@ from tests.support.pictures import png_header
 
 
 @pytest.fixture(autouse=True)
-def patient(api: Any, loop: Any) -> None:
-    loop.patience = 2.0  # real s that the executor gets with its files before the clock jumps
+def time_for_files(api: Any, loop: Any) -> None:
+    loop.real_wait = 2.0  # real s that the executor gets with its files before the clock jumps
 
 
 @pytest.fixture
