@@ -115,7 +115,7 @@ class VisionHandlers:
             Route("/vision/tags", self._served(self.tags), Empty, WATCH),
             Route("/vision/frame.jpg", self._served(self.frame), Empty, WATCH),
             Route("/vision/stream.mjpg", self._served(self.stream), StreamRequest, WATCH),
-            Route("/vision/frame", self._served(self.post_frame), FrameRequest, FLY, POST, raw=True, trail=False),
+            Route("/vision/frame", self._served(self.post_frame), FrameRequest, FLY, POST, raw=True, audited=False),
             Route("/vision/land", self._served(self.land), LandRequest, FLY, POST, job=True),
             Route("/vision/search", self._served(self.search), SearchRequest, FLY, POST, job=True),
             Route("/vision/mission", self._served(self.mission), MissionRequest, FLY, POST, job=True),

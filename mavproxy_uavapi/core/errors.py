@@ -43,7 +43,7 @@ class UavApiError(Exception):
 
     status = 500
     code = "internal"
-    in_trail = False  # whether the audit trail has an entry of its own for it
+    is_audited = False  # whether the audit trail has an entry of its own for it
 
     @property
     def detail(self) -> str | list[dict[str, Any]]:

@@ -14,13 +14,13 @@ class SentNames:
     """Names of messages, in the order in which they were sent; bounded, however long a command takes.
 
     Attributes:
-        in_trail: whether the trail has them; messages sent later are noted for no command.
+        is_audited: whether the trail has them; messages sent later are noted for no command.
     """
 
     def __init__(self) -> None:
         self._runs: list[tuple[str, int]] = []
         self._more = 0
-        self.in_trail = False
+        self.is_audited = False
 
     def add(self, name: str) -> None:
         """Note a message that is sent."""
@@ -33,7 +33,7 @@ class SentNames:
 
     def summary(self) -> tuple[str, ...]:
         """The names; three or more of one name in a row appear once, with their number: `NAME x240`."""
-        self.in_trail = True
+        self.is_audited = True
         names = [
             text for name, count in self._runs for text in ([name] * count if count < MANY else [f"{name} x{count}"])
         ]
@@ -66,7 +66,7 @@ def noting_sent() -> Iterator[SentNames]:
 def noting_sent_unless_noted() -> Iterator[SentNames | None]:
     """As `noting_sent`; None within an HTTP call, which notes them itself."""
     sent = _sent.get()
-    if sent is not None and not sent.in_trail:
+    if sent is not None and not sent.is_audited:
         yield None
     else:
         with noting_sent() as names:

@@ -88,7 +88,7 @@ async def _answer(request: web.BaseRequest) -> web.StreamResponse:
     params = await parameters(request, route.model, body=request.method in WITH_BODY and not route.raw)
     call = Call(request[SERVICE], request, params, match)
     with call.naming_source():
-        answer = await (audited(call, route.action) if route.commands and route.trail else route.action(call))
+        answer = await (audited(call, route.action) if route.commands and route.audited else route.action(call))
     if isinstance(answer, web.StreamResponse):
         return answer
     response = success(answer)

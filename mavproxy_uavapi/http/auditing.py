@@ -22,7 +22,7 @@ async def audited(call: Call, action: Action) -> Answer:
             answer: Answer = await action(call)
         except UavApiError as error:
             trace.leave(error.code, str(error))
-            error.in_trail = True
+            error.is_audited = True
             raise
         except asyncio.CancelledError:
             trace.leave_at_end("client_gone", GONE)

@@ -33,7 +33,7 @@ async def errors_as_answers(request: web.BaseRequest, handler: Handler) -> web.S
     try:
         return await handler(request)
     except UavApiError as error:
-        if error.status in REFUSALS and not error.in_trail:
+        if error.status in REFUSALS and not error.is_audited:
             request[SERVICE].host.audit.refused(client_of(request), error.code)
         return failure(without_frames(error))
     except web.HTTPException as error:

@@ -61,7 +61,9 @@ def _fleet_route(route: Route) -> Route:
     200 if every vehicle has done it, else 207; `vehicles` has the answer of each.
     """
     # The call of each vehicle is in the audit trail.
-    return Route(f"/fleet/{name}", action, _model_for(route.model), route.needs, POST, stops=route.stops, trail=False)
+    return Route(
+        f"/fleet/{name}", action, _model_for(route.model), route.needs, POST, stops=route.stops, audited=False
+    )
 
 
 async def _command(call: Call, route: Route) -> web.StreamResponse:

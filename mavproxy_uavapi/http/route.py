@@ -30,7 +30,7 @@ class Route:
     job: bool = False  # whether the action runs as a job; a client need not wait for it
     stops: bool = False  # whether it stops a vehicle; no limit refuses it then
     verb: str = ""  # the vehicle's method that it calls, if not every type of vehicle has it
-    trail: bool = True  # whether a command is audited; not for one that comes many times a second
+    audited: bool = True  # whether a command is audited; not for one that comes many times a second
     message: str = ""  # the MAVLink message that the answer shows, if it shows one and nothing else
 
     @property

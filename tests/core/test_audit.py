@@ -30,7 +30,7 @@ def lines(folder: Path) -> list[dict[str, Any]]:
     return [json.loads(line) for line in (folder / FILE).read_text(encoding="ascii").splitlines()]
 
 
-def test_trail_rotates_and_keeps_five_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_audit_file_rotates_and_keeps_five_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(audits, "FILE_BYTES", 2000)
     audit = Audit(tmp_path)
     for number in range(100):
@@ -42,7 +42,7 @@ def test_trail_rotates_and_keeps_five_files(tmp_path: Path, monkeypatch: pytest.
     assert lines(tmp_path)[-1]["verb"] == "/command/99"
 
 
-def test_trail_is_its_owners_alone(audit: Audit, tmp_path: Path) -> None:
+def test_audit_file_is_its_owners_alone(audit: Audit, tmp_path: Path) -> None:
     audit.add(entry())
     audit.close()
     assert (tmp_path / FILE).stat().st_mode & 0o777 == 0o600
@@ -89,7 +89,7 @@ def test_stalled_disk_holds_nobody_up_and_what_it_lost_is_reported(
     assert len(written) == WAITING + 2
 
 
-def test_trail_in_no_folder_keeps_its_memory_and_says_so_once(
+def test_audit_in_no_folder_keeps_its_memory_and_says_so_once(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     audit = Audit(tmp_path / "not" / "there")

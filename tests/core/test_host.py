@@ -298,7 +298,7 @@ def test_host_is_made_again_after_the_last_member_left(mpstate: Any, descriptors
     assert descriptors() == before
 
 
-def test_trail_of_a_job_without_http_is_written_when_the_last_module_leaves(
+def test_audit_trail_of_a_job_without_http_is_written_when_the_last_module_leaves(
     mpstate: Any, main_loop: Any, tmp_path: Path
 ) -> None:
     mpstate.status.logdir = str(tmp_path)

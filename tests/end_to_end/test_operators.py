@@ -68,8 +68,8 @@ def test_operators_of_the_prompt_fly_watch_hand_over_and_go(rig: Any) -> None:
             raise requests.ConnectionError("it has ended")
     assert rig.call("GET", "/vehicles", headers=tower).status_code == 401
     assert "anna@127.0.0.1 /command/takeoff" in rig.mavproxy.ask("uavapi log", "all of them")
-    trail = [path.read_text() for path in rig.directory.rglob("uavapi-audit.jsonl")]
-    texts = [*trail, rig.mavproxy.output().replace(anna["Authorization"].split()[1], "", 1)]
+    audit = [path.read_text() for path in rig.directory.rglob("uavapi-audit.jsonl")]
+    texts = [*audit, rig.mavproxy.output().replace(anna["Authorization"].split()[1], "", 1)]
     assert not any(anna["Authorization"].split()[1] in text for text in texts), "it is shown once, at the prompt"
     file.chmod(0o644)
     rig.mavproxy.says("chmod 600")

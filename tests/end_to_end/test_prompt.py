@@ -60,7 +60,7 @@ def sent_by(entry):
     return {name.partition(" x")[0] for name in entry["sent"]}
 
 
-def test_the_trail_reports_who_requested_what_and_what_was_sent(rig):
+def test_the_audit_trail_reports_who_requested_what_and_what_was_sent(rig):
     rig.on_the_ground()
     rig.ok(rig.get("/command/set_home"))
     rig.get("/command/takeoff?alt=3")

@@ -53,7 +53,7 @@ def status_of_one_more(rig: Any, program: str = "a script") -> int:
         return answer.status_code
 
 
-def test_flight_that_was_begun_at_the_prompt_is_in_the_trail(embedded_rig, harness):
+def test_flight_that_was_begun_at_the_prompt_is_in_the_audit_trail(embedded_rig, harness):
     pytest.importorskip("cv2")
     rig = embedded_rig
     rig.mavproxy.ask("module load vision", "Loaded module vision")

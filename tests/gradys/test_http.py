@@ -168,7 +168,7 @@ def sizes(service: Service, loop: Any) -> list[int]:
     return [len(json.dumps(jobs)), *(len(json.dumps(entry.request)) for entry in service.host.audit.entries)]
 
 
-def test_neither_job_nor_trail_keeps_the_tracks_text(loop: Any, service: Service) -> None:
+def test_neither_job_nor_audit_trail_keeps_the_tracks_text(loop: Any, service: Service) -> None:
     assert loop.run(fly_track(service, track_call(service, wait="false"))).status == 202
     with pytest.raises(Invalid):
         loop.run(fly_track(service, track_call(service, LONG + "nonsense")))

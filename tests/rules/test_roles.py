@@ -209,7 +209,7 @@ def test_port_of_a_vehicle_is_no_way_round(world: Any) -> None:
     assert world.copter.mode.name == "GUIDED"
 
 
-def test_trail_and_commander_have_the_name(world: Any) -> None:
+def test_audit_trail_and_commander_have_the_name(world: Any) -> None:
     assert ask(world, "anna", "POST", "/movement/go_to_ned_wait?wait=false&lease=5", {**FAR, "y": 9}).status == 202
     report = ask(world, "tower", "GET", "/vehicles/1").body
     assert report["commanded_by"]["client"] == "anna@127.0.0.1"

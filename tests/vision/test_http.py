@@ -116,12 +116,12 @@ def posted(over, body):
     return asyncio.run(run())
 
 
-def test_a_posted_frame_is_taken_and_leaves_no_trail():
+def test_a_posted_frame_is_taken_and_is_not_audited():
     over = handlers(0.0, Posted(0.0))
     assert posted(over, jpeg(IMAGE))["result"] == "Frame taken"
     assert over.tracker.worker.source.read().image.shape == (48, 64)
     routes = over.routes()
-    assert [route.path for route in routes if not route.trail] == ["/vision/frame"]
+    assert [route.path for route in routes if not route.audited] == ["/vision/frame"]
 
 
 def test_what_is_no_frame_of_the_camera_is_reported():

@@ -70,12 +70,12 @@ def test_job_that_succeeds_without_its_client_is_traced_with_its_result(
     assert "Copter braking" in entry.detail
 
 
-def test_route_without_a_trail_leaves_no_trace(service: Any, api: Any, host: Any) -> None:
+def test_route_that_is_not_audited_leaves_no_trace(service: Any, api: Any, host: Any) -> None:
     async def take(_call: Any) -> dict[str, Any]:
         return {}
 
-    for trail in (True, False):
-        host.extensions["/take"] = Route("/take", take, Empty, FLY, POST, trail=trail)
+    for is_audited in (True, False):
+        host.extensions["/take"] = Route("/take", take, Empty, FLY, POST, audited=is_audited)
         for _ in range(3):
             assert api.post("/take").status == 200
         assert len(service.host.audit.entries) == 3

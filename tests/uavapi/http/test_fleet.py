@@ -168,7 +168,7 @@ def test_what_is_not_there_has_an_answer_too(three: Any, api: Any) -> None:
     assert (rows["9"]["status"], rows["9"]["code"]) == (503, "no_vehicle")
 
 
-def test_each_vehicles_call_is_in_the_trail(three: Any, api: Any, host: Any) -> None:
+def test_each_vehicles_call_is_in_the_audit_trail(three: Any, api: Any, host: Any) -> None:
     api.post("/fleet/brake", {"vehicles": [1, 2]})
     assert [(entry.verb, entry.system, entry.outcome) for entry in host.audit.entries] == [
         ("/fleet/brake", 1, "ok"),

@@ -97,7 +97,7 @@ def test_those_of_other_modules_are_listed_without_passwords_and_set_at_the_prom
     assert VISION.snapshot().fps == 20.0
 
 
-def test_new_value_is_in_force_in_the_trail_and_on_the_prompt(
+def test_new_value_is_in_force_in_the_audit_trail_and_on_the_prompt(
     api: Any, settings: ApiModuleSettings, capsys: Any
 ) -> None:
     answer = put(api, "max_age", 7)
@@ -149,7 +149,7 @@ def test_every_setting_is_judged() -> None:
     assert not SETTABLE & THE_PROMPTS.keys()
 
 
-def test_secret_that_somebody_tries_to_set_is_not_in_the_trail(api: Any, settings: ApiModuleSettings) -> None:
+def test_secret_that_somebody_tries_to_set_is_not_in_the_audit_trail(api: Any, settings: ApiModuleSettings) -> None:
     assert put(api, "token", "hunter2").status == 422
     (entry,) = api.service.host.audit.entries
     assert (entry.verb, entry.outcome) == ("/settings/token", "invalid")
