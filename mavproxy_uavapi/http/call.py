@@ -152,15 +152,15 @@ class Call:
 
         Raises:
             NotSupported: its type does not have the route's verb.
-            Forbidden, Busy: as `require_flyable`.
+            Forbidden, Busy: as `require_permission`.
         """
         vehicle = self.service.host.registry.commandable(self.system)
-        self.require_flyable(vehicle)
+        self.require_permission(vehicle)
         if self._route is not None and self._route.verb and not vehicle.has(self._route.verb):
             raise NotSupported(f"a {vehicle.kind} does not have {self.path}")
         return vehicle
 
-    def require_flyable(self, vehicle: Vehicle) -> None:
+    def require_permission(self, vehicle: Vehicle) -> None:
         """Let only those on who may cause a message to the vehicle, and command it if the route does.
 
         Raises:
@@ -219,7 +219,7 @@ class Call:
             urgent: whether it ends a flight or a movement; no limit on jobs refuses it then.
             identity: what identifies the request, if the parameters do not.
         """
-        self.require_flyable(vehicle)  # again: somebody may have taken it while a body arrived
+        self.require_permission(vehicle)  # again: somebody may have taken it while a body arrived
         self.remembered = identity or self.remembered
         is_async = self.is_async
 

@@ -34,7 +34,7 @@ def error_of(job: Job) -> dict[str, Any]:
 
 
 def status_of(host: Host, vehicle: Vehicle) -> dict[str, Any]:
-    """Whether the vehicle is flyable, and why not, as `/telemetry/status` has it."""
+    """Whether the vehicle is ready to fly, and why not, as `/telemetry/status` has it."""
     return status(vehicle, host.link_watch.is_alive(vehicle.state), host.clock())
 
 

@@ -136,7 +136,7 @@ async def home_info(call: Call) -> dict[str, Any]:
 
 
 async def status(call: Call) -> dict[str, Any]:
-    """Whether the vehicle is flyable, and why not."""
+    """Whether the vehicle is ready to fly, and why not."""
     vehicle, host = call.known_vehicle, call.service.host
     now = host.clock()
     info = status_of(vehicle, host.link_watch.is_alive(vehicle.state), now)
