@@ -41,7 +41,7 @@ Progress = Callable[[int, int], None]
 Check = Callable[[], None]
 
 
-class GaveWay(Exception):
+class ReadInterrupted(Exception):
     """A read ended, because a verb waits for its turn."""
 
 
@@ -171,12 +171,12 @@ class Waypoints:
     async def _read_in_turn(self, kind: int) -> list[Any]:
         while True:
             async with self._turns.one():
-                with contextlib.suppress(GaveWay):
-                    return await self._fetch(kind, self._give_way)
+                with contextlib.suppress(ReadInterrupted):
+                    return await self._fetch(kind, self._yield_to_verbs)
 
-    def _give_way(self) -> None:
+    def _yield_to_verbs(self) -> None:
         if self._verbs:
-            raise GaveWay
+            raise ReadInterrupted
 
     # -- the protocol -------------------------------------------------------------------------------------
 
