@@ -21,7 +21,7 @@ from mavproxy_uavapi.http.streaming import (
     limit_buffers,
     while_read,
 )
-from mavproxy_uavapi.http.subscription import Names, Subscription, Wishes
+from mavproxy_uavapi.http.subscription import NamePatterns, Subscription, Wishes
 
 MOST_SAID = 4096  # bytes of a message from a WebSocket's client; no message is expected
 HEARD_EVERY = 0.1  # s between two of its messages, pings too; more of them wait on its side
@@ -37,20 +37,20 @@ async def stream(call: Call) -> web.StreamResponse:
 
 def _subscription(call: Call) -> Subscription:
     asked = call.params(StreamFilter)
-    name, view, event = Names(asked.names.upper()), Names(asked.view), Names(asked.events)
+    name, view, event = NamePatterns(asked.names.upper()), NamePatterns(asked.view), NamePatterns(asked.events)
     _require_some("view", view, stream_views.NAMES)
     _require_some("events", event, stream_news.NAMES)
     if not (name or view or event):
-        name = Names("*")
+        name = NamePatterns("*")
     systems = asked.systems or frozenset({call.named_system} if call.named_system else ())
     call.service.host.registry.use(*systems)
     return Subscription(Wishes(name, view, event, systems, asked.rate), asyncio.get_running_loop().call_later)
 
 
-def _require_some(parameter: str, asked: Names, known: tuple[str, ...]) -> None:
+def _require_some(parameter: str, asked: NamePatterns, known: tuple[str, ...]) -> None:
     """Raise Invalid if a name that was asked for can never come."""
     for pattern in asked.patterns:
-        if not any(one in Names(pattern) for one in known):
+        if not any(one in NamePatterns(pattern) for one in known):
             raise Invalid(f"{pattern!r} is none of {', '.join(known)}", "query", parameter)
 
 

@@ -17,7 +17,7 @@ QUEUED = 1000  # entries; a client that reads slower than that loses the oldest
 TOGETHER = 100  # events that a client gets at once
 
 
-class Names:
+class NamePatterns:
     """A list of names by comma, with `*` and `?`.
 
     Args:
@@ -49,9 +49,9 @@ class Wishes:
         rate: highest rate in Hz of each message of each component, and of each view; None for all.
     """
 
-    name: Names = field(default_factory=Names)
-    view: Names = field(default_factory=Names)
-    event: Names = field(default_factory=Names)
+    name: NamePatterns = field(default_factory=NamePatterns)
+    view: NamePatterns = field(default_factory=NamePatterns)
+    event: NamePatterns = field(default_factory=NamePatterns)
     systems: frozenset[int] = frozenset()
     rate: float | None = None
 

@@ -17,7 +17,7 @@ MOST_REQUESTS = 2  # for a name in one boot
 SET_TIMEOUT = 2.0  # s until a value is confirmed
 TIMEOUT = 1.0  # s; ArduPilot answers a known name at once and an unknown one not at all
 
-Names = tuple[str, ...]  # of one quantity, of which a firmware has one
+ParameterNames = tuple[str, ...]  # of one quantity, of which a firmware has one
 
 
 class Parameters:
@@ -29,7 +29,7 @@ class Parameters:
         self._waiting = waiting
         self._requests: dict[tuple[int, str], int] = {}  # times, by boot and name
 
-    async def read(self, quantities: Iterable[Names]) -> dict[str, float]:
+    async def read(self, quantities: Iterable[ParameterNames]) -> dict[str, float]:
         """Values by name, of those that the vehicle has.
 
         ArduPilot does not answer for an unknown name. A name is requested twice in a boot, because a message may be

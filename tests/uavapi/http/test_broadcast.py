@@ -8,7 +8,7 @@ import pytest
 
 from mavproxy_uavapi.http.broadcast import TICK, TelemetryBroadcast
 from mavproxy_uavapi.http.stream_news import JOBS_TOLD_FIRST
-from mavproxy_uavapi.http.subscription import Names, Subscription, Wishes
+from mavproxy_uavapi.http.subscription import NamePatterns, Subscription, Wishes
 
 
 @pytest.fixture
@@ -18,7 +18,9 @@ def hear(host: Any, loop: Any) -> Any:
     contexts: list[Any] = []
 
     def hear(**wishes: Any) -> Any:
-        subscription = Subscription(Wishes(**{kind: Names(text) for kind, text in wishes.items()}), loop.call_later)
+        subscription = Subscription(
+            Wishes(**{kind: NamePatterns(text) for kind, text in wishes.items()}), loop.call_later
+        )
 
         async def begin() -> None:
             contexts.append(broadcast.heard_by(subscription))
@@ -148,7 +150,7 @@ def test_nothing_ticks_when_nobody_listens(flying: Any, hear: Any, loop: Any, ho
     broadcast = TelemetryBroadcast(host)
 
     async def listen() -> None:
-        with broadcast.heard_by(Subscription(Wishes(event=Names("*")))):
+        with broadcast.heard_by(Subscription(Wishes(event=NamePatterns("*")))):
             assert broadcast._ticks is not None
 
     loop.run(listen())

@@ -6,9 +6,9 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.http.stream_event import Event, When, of_message
-from mavproxy_uavapi.http.subscription import QUEUED, TOGETHER, Names, Subscription, Wishes
+from mavproxy_uavapi.http.subscription import QUEUED, TOGETHER, NamePatterns, Subscription, Wishes
 
-ALL = Wishes(Names("*"))
+ALL = Wishes(NamePatterns("*"))
 THEN = When(0.0, 0.0)
 
 
@@ -34,7 +34,7 @@ def test_reader_that_falls_behind_loses_the_oldest_and_is_told_how_many(loop: An
 
 
 def test_rate_lets_the_first_through_and_counts_components_apart(loop: Any, msg: Any) -> None:
-    subscription = Subscription(Wishes(Names("*"), rate=2.0))
+    subscription = Subscription(Wishes(NamePatterns("*"), rate=2.0))
     passed = []
     for tenth in range(11):
         for component in (1, 154):
@@ -45,7 +45,7 @@ def test_rate_lets_the_first_through_and_counts_components_apart(loop: Any, msg:
 
 
 def test_of_what_comes_too_often_the_newest_is_passed_on_when_its_time_has_come(loop: Any, msg: Any) -> None:
-    subscription = Subscription(Wishes(Names("*"), rate=2.0), loop.call_later)
+    subscription = Subscription(Wishes(NamePatterns("*"), rate=2.0), loop.call_later)
     for tenth in range(3):
         subscription.offer(attitude(msg, tenth), tenth / 10)
     assert numbers(take(loop, subscription)) == [0]
@@ -59,7 +59,7 @@ def test_of_what_comes_too_often_the_newest_is_passed_on_when_its_time_has_come(
 
 
 def test_slow_reader_with_a_rate_gets_the_newest_of_each_and_every_event(loop: Any, msg: Any) -> None:
-    subscription = Subscription(Wishes(Names("*"), event=Names("mode"), rate=2.0))
+    subscription = Subscription(Wishes(NamePatterns("*"), event=NamePatterns("mode"), rate=2.0))
     for second in range(3 * QUEUED):
         for system in (1, 2):
             subscription.offer(attitude(msg, second, system=system), float(second))
@@ -75,7 +75,7 @@ def test_slow_reader_with_a_rate_gets_the_newest_of_each_and_every_event(loop: A
 
 
 def test_no_rate_holds_an_event_back(loop: Any) -> None:
-    subscription = Subscription(Wishes(event=Names("mode"), rate=1.0), loop.call_later)
+    subscription = Subscription(Wishes(event=NamePatterns("mode"), rate=1.0), loop.call_later)
     for mode in ("GUIDED", "LOITER", "GUIDED"):
         subscription.offer(Event("event", "mode", 1, THEN, lambda mode=mode: {"info": mode}), 0.0)
     assert [json.loads(event.json(0))["info"] for event in take(loop, subscription)] == ["GUIDED", "LOITER", "GUIDED"]
@@ -84,12 +84,12 @@ def test_no_rate_holds_an_event_back(loop: Any) -> None:
 @pytest.mark.parametrize(
     ("wishes", "wanted"),
     [
-        (Wishes(Names("GPS*")), True),
-        (Wishes(Names("ATTITUDE, GPS_RAW_INT")), True),
-        (Wishes(Names("GPS_RAW_IN")), False),
-        (Wishes(view=Names("*"), event=Names("*")), False),
-        (Wishes(Names("*"), systems=frozenset({3})), True),
-        (Wishes(Names("*"), systems=frozenset({4, 5})), False),
+        (Wishes(NamePatterns("GPS*")), True),
+        (Wishes(NamePatterns("ATTITUDE, GPS_RAW_INT")), True),
+        (Wishes(NamePatterns("GPS_RAW_IN")), False),
+        (Wishes(view=NamePatterns("*"), event=NamePatterns("*")), False),
+        (Wishes(NamePatterns("*"), systems=frozenset({3})), True),
+        (Wishes(NamePatterns("*"), systems=frozenset({4, 5})), False),
     ],
 )
 def test_names_may_have_wildcards(msg: Any, wishes: Wishes, wanted: bool) -> None:
@@ -97,7 +97,7 @@ def test_names_may_have_wildcards(msg: Any, wishes: Wishes, wanted: bool) -> Non
 
 
 def test_event_of_no_vehicle_is_for_those_who_want_one(loop: Any) -> None:
-    assert Event("event", "alive", 0, THEN, dict) in Wishes(event=Names("*"), systems=frozenset({4}))
+    assert Event("event", "alive", 0, THEN, dict) in Wishes(event=NamePatterns("*"), systems=frozenset({4}))
 
 
 def test_event_tells_each_client_what_that_has_lost(msg: Any) -> None:
