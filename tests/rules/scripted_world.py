@@ -250,7 +250,7 @@ class ScriptedWorld:
             self.streams.pop(client).cancel()
 
     def unload(self) -> list[Any]:
-        """The module is unloaded; its last words."""
+        """The module is unloaded; its closing messages."""
 
         async def end() -> list[Any]:
             self.host.jobs.abort_remote("the module is unloaded")

@@ -157,7 +157,7 @@ class Lockstep:
         self.run(aborted())
 
     def unload(self, *, last: bool = False) -> list[Any]:
-        """What `module unload vision` does; of the last module nobody sends any more, but for the last words."""
+        """What `module unload vision` does; of the last module only the closing messages are sent."""
 
         async def never(_message: Any, _system: int) -> None:
             await asyncio.Event().wait()  # MAVProxy's main loop waits for the unload, and sends nothing
@@ -165,7 +165,7 @@ class Lockstep:
         async def unloaded() -> list[Any]:
             self.flights.abort_all()
             await asyncio.sleep(0)
-            return [message for words in self.host.closing_messages for message, _ in words()] if last else []
+            return [message for closing in self.host.closing_messages for message, _ in closing()] if last else []
 
         if last:
             self.wire.send = never  # type: ignore[method-assign]

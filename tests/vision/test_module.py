@@ -89,7 +89,7 @@ def test_loading_and_unloading_leaves_nothing_behind(mpstate: Any, descriptors: 
 @pytest.mark.parametrize("turns", [0, 1], ids=["before the first turn", "running"])
 def test_a_reload_leaves_nothing_to_say_at_the_end(mpstate: Any, turns: int) -> None:
     host = hosts.join(mpstate, None)  # another module that stays
-    words = list(host.closing_messages)
+    before = list(host.closing_messages)
     if turns:
         host.bridge.start()
     for _ in range(3):
@@ -97,7 +97,7 @@ def test_a_reload_leaves_nothing_to_say_at_the_end(mpstate: Any, turns: int) -> 
         for _ in range(turns):
             module.idle_task()
         module.unload()
-    assert host.closing_messages == words
+    assert host.closing_messages == before
     hosts.leave(mpstate, None)
 
 

@@ -49,7 +49,7 @@ def test_once_a_second_with_numbers_that_advance(loop: Any, telemetry: Any, post
     assert poster.forms[0]["ip"] == "192.0.2.2:8000/"
 
 
-def test_slow_answers_do_not_make_the_cadence_drift(loop: Any, telemetry: Any, poster: Any, push: Any) -> None:
+def test_slow_answers_do_not_make_the_interval_drift(loop: Any, telemetry: Any, poster: Any, push: Any) -> None:
     poster.takes = 0.7
     push(poster)
     sending(loop, 5, telemetry)
@@ -106,7 +106,7 @@ def test_a_station_that_is_down_is_tried_less_and_less_often(
     assert 0 < report["next_try_s"] <= 30
 
 
-def test_after_an_outage_the_cadence_is_the_old_one_and_nothing_old_is_sent(
+def test_after_an_outage_the_interval_is_the_old_one_and_nothing_old_is_sent(
     loop: Any, telemetry: Any, poster: Any, push: Any, down: Any
 ) -> None:
     poster.answer = down

@@ -101,7 +101,7 @@ def test_stopped_and_unloaded_in_one_breath_it_holds_and_its_parameters_are_as_b
 
 def test_closing_messages_of_an_unloaded_module_are_removed_once_its_parameters_are_restored(flying):
     rig = flying(alt=6.0, precision_landing=True, **LARGE)
-    before, words = landing_parameters(rig), rig.host.closing_messages
+    before, closing_messages = landing_parameters(rig), rig.host.closing_messages
     rig.land(method="landing_target")
     until(rig, lambda: rig.mode == "LAND")
     rig.pass_time(1.0)
@@ -109,9 +109,9 @@ def test_closing_messages_of_an_unloaded_module_are_removed_once_its_parameters_
     silent(rig, "PARAM_VALUE")
     rig.unload()
     rig.pass_time(5.0)
-    assert rig.flights.closing_messages in words
+    assert rig.flights.closing_messages in closing_messages
     rig.host._receive = hear
-    until(rig, lambda: rig.flights.closing_messages not in words)
+    until(rig, lambda: rig.flights.closing_messages not in closing_messages)
     assert landing_parameters(rig) == before
 
 
@@ -205,7 +205,7 @@ def test_pilot_who_switches_while_parameters_are_set_ends_that(flying, answers):
     assert rig.mode == "LOITER"
 
 
-def test_a_parting_is_not_cut_short_by_the_next_flight(flying):
+def test_closing_messages_are_not_cut_short_by_the_next_flight(flying):
     rig = flying(alt=6.0, precision_landing=True, **LARGE)
     job = rig.land(method="landing_target")
     until(rig, lambda: rig.mode == "LAND")

@@ -13,7 +13,7 @@ def measurement(at, place, travelled=(0, 0, -5), height=5.0, tag=0):
     return TargetMeasurement(at, vector(*place), vector(*travelled), 5.0, height, tag)
 
 
-def test_three_sightings_make_a_target():
+def test_three_measurements_make_a_target():
     target = Target()
     for step in range(3):
         assert not target.is_confirmed
@@ -88,7 +88,7 @@ def test_near_the_ground_height_says_nothing_about_size():
     assert target.contradiction is None
 
 
-def test_the_old_place_is_given_up_when_all_sightings_are_elsewhere():
+def test_the_old_place_is_given_up_when_all_measurements_are_elsewhere():
     target = Target()
     for step in range(5):
         target.take([measurement(step * 0.05, (1, 2, 0))])
