@@ -43,9 +43,9 @@ class Case:
 
 def children(pid: int) -> list[int]:
     """The processes that a process has started."""
-    found = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii")
+    main_thread = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii")
     threads = [path.read_text(encoding="ascii") for path in Path(f"/proc/{pid}/task").glob("*/children")]
-    return [int(one) for one in " ".join([found, *threads]).split()]
+    return [int(one) for one in " ".join([main_thread, *threads]).split()]
 
 
 class Bench:

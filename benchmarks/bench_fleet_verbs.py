@@ -68,10 +68,10 @@ class Bench:
         """From a request for the other vehicle to its socket, s."""
         self._copters.expect(OTHER)
         with contextlib.closing(Connection(self._rig.port)) as connection:
-            asked = time.time()
+            requested_at = time.time()
             status, body = connection.ask("GET", f"/vehicles/{OTHER}/command/{self._mode()}")
         assert status == 200, body
-        return self._copters.told_at() - asked
+        return self._copters.commanded_at() - requested_at
 
     def spread(self) -> None:
         """From the first vehicle to the last, for one verb to all."""
@@ -80,7 +80,7 @@ class Bench:
         with contextlib.closing(Connection(self._rig.port)) as connection:
             status, body = connection.ask("POST", f"/fleet/{self._mode()}", {})
         assert status == 200, body
-        times = [self._copters.told_at() for _ in everybody]
+        times = [self._copters.commanded_at() for _ in everybody]
         self.spreads.append(max(times) - min(times))
 
 

@@ -74,8 +74,8 @@ class Bench:
 
     def _load_module(self, expected: bool) -> None:
         if expected and not self._loaded:
-            given = f'{{"port":{self._rig.port},"max_rate":{self._rate}}}'
-            self._rig.mavproxy.ask(f"module load uavapi:{given}", "listening on")
+            settings = f'{{"port":{self._rig.port},"max_rate":{self._rate}}}'
+            self._rig.mavproxy.ask(f"module load uavapi:{settings}", "listening on")
             self._rig.wait_until_up()
         elif self._loaded and not expected:
             self._rig.mavproxy.ask("module unload uavapi", "Unloaded")

@@ -160,8 +160,8 @@ class Bench:
         with contextlib.suppress(requests.RequestException):
             answer = self.rig.get("/gradys/status", timeout=2)
             if answer.status_code == requests.codes.ok:
-                found: dict[str, Any] = answer.json()["info"]
-                return found
+                status: dict[str, Any] = answer.json()["info"]
+                return status
         return None
 
     def is_delivered(self) -> bool:
@@ -307,22 +307,22 @@ def main() -> int:
     arguments.add_argument("--kills", type=int, default=4, help="kill -9 so often (%(default)s)")
     arguments.add_argument("--cuts", type=int, default=6, help="cut the power so often (%(default)s)")
     arguments.add_argument("--seed", type=int, default=1, help="of the moments (%(default)s)")
-    given = arguments.parse_args()
-    chance = random.Random(given.seed)
+    options = arguments.parse_args()
+    chance = random.Random(options.seed)
     print(machine())
     lost = 0
     if MOSQUITTO is None:
         print("crash: Mosquitto is not installed (apt install mosquitto)")
-    elif given.kills:
-        rows, lost = kills(given.kills, chance)
-        print(f"{given.kills} kills")
+    elif options.kills:
+        rows, lost = kills(options.kills, chance)
+        print(f"{options.kills} kills")
         print(table(["readings", "posted", "answered 200", "of these delivered", "doubled", "lost"], rows))
     if os.geteuid() != 0 or shutil.which("mkfs.ext4") is None:
         print("crash: power cuts need root and mkfs.ext4")
-    elif given.cuts:
-        rows, gone = cuts(given.cuts, chance)
+    elif options.cuts:
+        rows, gone = cuts(options.cuts, chance)
         lost += gone
-        print(f"{given.cuts} power cuts")
+        print(f"{options.cuts} power cuts")
         print(table(["", "answered 200", "on the disk", "delivered", "both", "lost"], rows))
     return int(lost > 0)
 

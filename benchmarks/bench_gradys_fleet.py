@@ -99,14 +99,14 @@ def main() -> int:
     arguments.add_argument("--vehicles", type=int, default=100)
     arguments.add_argument("--seconds", type=float, default=30.0)
     arguments.add_argument("--generate", type=int, help=argparse.SUPPRESS)
-    given = arguments.parse_args()
-    if given.generate:
-        generate(given.generate, given.vehicles)
+    options = arguments.parse_args()
+    if options.generate:
+        generate(options.generate, options.vehicles)
     if MOSQUITTO is None:
         print("fleet: Mosquitto is not installed (apt install mosquitto)")
         return 0
     with tempfile.TemporaryDirectory() as name:
-        return run(harness, Path(name), given.vehicles, given.seconds)
+        return run(harness, Path(name), options.vehicles, options.seconds)
 
 
 def run(tools: Any, directory: Path, vehicles: int, seconds: float) -> int:

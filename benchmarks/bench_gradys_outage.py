@@ -62,17 +62,17 @@ def run(tools: Any, directory: Path, seconds: float) -> int:
         back = time.monotonic()
         rig.start("station", command).says("listening on")
         expected = len(posted) + taken
-        found = tools.eventually(lambda: arrived(url, expected), 120, "everything's arrival")
+        answer = tools.eventually(lambda: arrived(url, expected), 120, "everything's arrival")
         took = time.monotonic() - back
     finally:
         rig.stop()
-    numbers = [reading["seq"] for reading in found["readings"]]
-    times = [reading["received"] for reading in found["readings"]]
+    numbers = [reading["seq"] for reading in answer["readings"]]
+    times = [reading["received"] for reading in answer["readings"]]
     lost = set(posted) - set(numbers)
     in_order = times == sorted(times)
     print(f"outage {seconds:g} s: {len(posted)} posted and {taken} positions = {expected} readings")
     print(f"  arrived {len(numbers)}, lost {len(lost)}, once each: {len(numbers) == len(set(numbers))}", end="")
-    print(f" (repeats that the receiver dropped: {found['repeats']}), in order: {in_order}")
+    print(f" (repeats that the receiver dropped: {answer['repeats']}), in order: {in_order}")
     print(f"  all there {took:.1f} s after the receiver's start")
     return int(bool(lost) or not in_order or took > 30)
 
@@ -82,10 +82,10 @@ def arrived(url: str, expected: int) -> dict[str, Any] | None:
     try:
         if requests.get(url, params={"limit": 1}, timeout=5).json()["count"] < expected:
             return None
-        found: dict[str, Any] = requests.get(url, params={"limit": 1_000_000}, timeout=30).json()
+        answer: dict[str, Any] = requests.get(url, params={"limit": 1_000_000}, timeout=30).json()
     except requests.ConnectionError:
         return None
-    return found
+    return answer
 
 
 if __name__ == "__main__":

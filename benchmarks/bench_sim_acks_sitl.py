@@ -56,16 +56,16 @@ FRAMES = {"relative": 3, "AMSL": 0, "terrain": 10, "local": 1, "body": 8, "unkno
 
 def answers(station: Station, base: int) -> dict[int, tuple[int | None, tuple[str, ...]]]:
     """By command its answer in mode `base`, which is set again before each."""
-    found = {}
+    results = {}
     for number, parameters in COMMANDS.items():
         station.mode(base)
         station.run(0.3)
         station.texts.clear()
         result = station.command(number, *parameters)
         station.run(0.3)
-        found[number] = result, tuple(text for text in station.texts if not text.startswith("PreArm"))
+        results[number] = result, tuple(text for text in station.texts if not text.startswith("PreArm"))
     station.mode(base)
-    return found
+    return results
 
 
 def item_answer(station: Station, current: int, command: int, frame: int, *numbers: float) -> int | None:
@@ -83,17 +83,17 @@ def item_answer(station: Station, current: int, command: int, frame: int, *numbe
 def items(kind: str, station: Station) -> dict[str, int | None]:
     """The answers to items for now, in the present mode."""
     here = (0.0, 0.0, 0.0, 0.0, 60.0, 0.0, 40.0)
-    found = {f"frame {name}": item_answer(station, 2, 16, frame, *here) for name, frame in FRAMES.items()}
+    results = {f"frame {name}": item_answer(station, 2, 16, frame, *here) for name, frame in FRAMES.items()}
     for index in range(4):
         bad = [*here]
         bad[index] = NAN
-        found[f"parameter {index + 1} NaN"] = item_answer(station, 2, 16, 3, *bad)
-    found["altitude NaN"] = item_answer(station, 2, 16, 3, 0, 0, 0, 0, 60, 0, NAN)
-    found["altitude 1e6"] = item_answer(station, 2, 16, 3, 0, 0, 0, 0, 60, 0, 1e6)
-    found["an altitude"] = item_answer(station, 3, 16, 3, *here)
+        results[f"parameter {index + 1} NaN"] = item_answer(station, 2, 16, 3, *bad)
+    results["altitude NaN"] = item_answer(station, 2, 16, 3, 0, 0, 0, 0, 60, 0, NAN)
+    results["altitude 1e6"] = item_answer(station, 2, 16, 3, 0, 0, 0, 0, 60, 0, 1e6)
+    results["an altitude"] = item_answer(station, 3, 16, 3, *here)
     for command in (17, 19, 21, 31, 82, 12345, *(() if "plane" in kind else PLACELESS)):
-        found[f"command {command}"] = item_answer(station, 2, command, 3, *here)
-    return found
+        results[f"command {command}"] = item_answer(station, 2, command, 3, *here)
+    return results
 
 
 def uploads(station: Station) -> dict[int, int]:
@@ -117,11 +117,11 @@ def rates(station: Station) -> dict[str, int]:
 
 def current(station: Station, seconds: float) -> float:
     """Mean current of the battery, A."""
-    found, end = [], station.at + seconds
+    amperes, end = [], station.at + seconds
     while station.at < end:
         station.hear()
-        found.append(station.last["SYS_STATUS"].current_battery / 100)
-    return round(sum(found) / len(found), 1)
+        amperes.append(station.last["SYS_STATUS"].current_battery / 100)
+    return round(sum(amperes) / len(amperes), 1)
 
 
 def after_target(station: Station, kind: str, send: Callable[[], object]) -> tuple[int, bool]:

@@ -80,29 +80,29 @@ class Bench:
 
     def _latencies(self, command: Callable[[int, str], float]) -> list[float]:
         """s from the command to the vehicle's socket, for each try."""
-        found = []
+        latencies = []
         for number in range(self._tries):
             system = 1 if command == self._by_prompt else 1 + number % self._count
             turn = number if command == self._by_prompt else number // self._count
             self._copters.expect(system)
-            asked = command(system, MODES[turn % 2])
-            found.append(self._copters.told_at() - asked)
+            requested_at = command(system, MODES[turn % 2])
+            latencies.append(self._copters.commanded_at() - requested_at)
             time.sleep(BETWEEN_TRIES)
-        return found
+        return latencies
 
     def _by_http(self, system: int, mode: str) -> float:
         connection = Connection(self._rigs[OURS].port)
-        asked = time.time()
+        requested_at = time.time()
         status, body = connection.ask("GET", f"/vehicles/{system}/command/{mode.lower()}")
         assert status == 200, body
         connection.close()
-        return asked
+        return requested_at
 
     def _by_prompt(self, _system: int, mode: str) -> float:
         """MAVProxy's own command, for its current vehicle."""
-        asked = time.time()
+        requested_at = time.time()
         self._rigs[PLAIN].mavproxy.type(f"mode {mode}")
-        return asked
+        return requested_at
 
 
 def free_ports(count: int) -> list[int]:

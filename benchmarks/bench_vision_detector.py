@@ -111,13 +111,13 @@ def ghosts(count: int) -> None:
     chance = np.random.default_rng(77)
     renderer = Renderer(MODEL, MOUNT, (), Look(), 5)
     detectors = {name: Detector(MODEL, DetectorOptions((name,), {0: SIZE})) for name in (*FAMILIES, "36h10")}
-    found = dict.fromkeys(detectors, 0)
+    false_frames = dict.fromkeys(detectors, 0)
     for _ in range(count):
         place = vector(*chance.uniform(-60, 60, 2), -chance.uniform(0.5, 15))
         image = renderer.render(place, Attitude(*chance.uniform(-0.4, 0.4, 2), chance.uniform(-3.1, 3.1)))
         for name, detector in detectors.items():
-            found[name] += bool(detector.detect(image))
-    print(f"\nfalse frames of {count} without a tag: {found}")
+            false_frames[name] += bool(detector.detect(image))
+    print(f"\nfalse frames of {count} without a tag: {false_frames}")
 
 
 def main() -> int:

@@ -87,8 +87,8 @@ def measure(made: Any, forwarding: Forwarding, case: Case, seconds: float) -> No
 def run(made: Any, forwarding: Forwarding, folder: str, options: argparse.Namespace) -> dict[str, Case]:
     """All rounds of all cases."""
     cases = {name: Case() for name in CASES}
-    given = json.dumps({"source": folder, "far": True, "fps": 240}, separators=(",", ":"))
-    made.mavproxy.ask(f"module load vision:{given}", "looking for")
+    settings = json.dumps({"source": folder, "far": True, "fps": 240}, separators=(",", ":"))
+    made.mavproxy.ask(f"module load vision:{settings}", "looking for")
     made.mavproxy.ask("vision stop", "stopped")
     context = multiprocessing.get_context("spawn")
     for _ in range(options.rounds):

@@ -48,8 +48,8 @@ def main() -> int:
         if options.first:
             put_first(*(process.pid for process in made.processes))
         fly(made, HEIGHT)
-        given = json.dumps({"source": "sim"}, separators=(",", ":"))
-        made.mavproxy.ask(f"module load vision:{given}", "looking for")
+        settings = json.dumps({"source": "sim"}, separators=(",", ":"))
+        made.mavproxy.ask(f"module load vision:{settings}", "looking for")
         rows = [land(made, number) for number in range(options.landings)]
     headings = ["landing", "median ms", "p99 ms", "detector ms (last frame)", "frames/s", "off the tag, m"]
     print(table(headings, rows))

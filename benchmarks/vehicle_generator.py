@@ -59,11 +59,11 @@ class Copter:
     Args:
         system: its system id.
         ports: where the MAVProxys listen for it.
-        told: called when it is told a mode, with the time (s of time.time()).
+        on_mode: called when it is commanded a mode, with the time (s of time.time()).
     """
 
-    def __init__(self, system: int, ports: list[int], told: Callable[[int, float], None]) -> None:
-        self._system, self._told = system, told
+    def __init__(self, system: int, ports: list[int], on_mode: Callable[[int, float], None]) -> None:
+        self._system, self._on_mode = system, on_mode
         self._mavproxys = [("127.0.0.1", port) for port in ports]
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
@@ -115,7 +115,7 @@ class Copter:
             mode = asked_mode(message)
             if mode is not None:
                 self._mode = mode
-                self._told(self._system, seconds + nanoseconds / 1e9)
+                self._on_mode(self._system, seconds + nanoseconds / 1e9)
                 self.live()
 
 
@@ -135,7 +135,7 @@ class Generator:
         self._forwarding.attach(self)  # type: ignore[arg-type]  it is watched as a tap is
         self._awaited: set[int] = set()
         self._active = 0
-        self._copters = [Copter(number, of_it, self._told) for number, of_it in enumerate(ports, 1)]
+        self._copters = [Copter(number, of_it, self._on_mode) for number, of_it in enumerate(ports, 1)]
         for copter in self._copters:
             self.watch(copter.socket, copter.read)
         pipe.send(self._forwarding.port)
@@ -144,7 +144,7 @@ class Generator:
         """Read a socket whenever there is something."""
         self._selector.register(sock, selectors.EVENT_READ, read)
 
-    def _told(self, system: int, at: float) -> None:
+    def _on_mode(self, system: int, at: float) -> None:
         if system in self._awaited:
             self._awaited.remove(system)
             self._pipe.send(at)
@@ -170,7 +170,7 @@ class Generator:
     def obey(self, order: Any) -> bool:
         """One order from the pipe; False for the end.
 
-        `("active", n)`: telemetry goes to MAVProxy n. `("await", systems)`: answer when each of them was told a mode.
+        `("active", n)`: telemetry goes to MAVProxy n. `("await", systems)`: answer when each got a mode.
         `("between", start, end)`: answer the delays (s) of what was sent then, and how many were lost.
         """
         if order is None:
@@ -216,7 +216,7 @@ class Copters:
         """Count the next change of mode of each of these copters."""
         self._pipe.send(("await", systems))
 
-    def told_at(self) -> float:
+    def commanded_at(self) -> float:
         """When the next expected change of mode arrived at its socket, s of time.time()."""
         return float(self._answer())
 
