@@ -45,18 +45,18 @@ def main() -> None:
     arguments.add_argument("--style", choices=("text", "tuple"), default="text")
     arguments.add_argument("--latest", type=Path, help="a file that holds the newest reading alone")
     arguments.add_argument("--count", type=int, default=0, help="readings to collect; 0: until Ctrl-C")
-    given = arguments.parse_args()
-    api = Api(given.url)
+    options = arguments.parse_args()
+    api = Api(options.url)
     began, collected = time.monotonic(), 0
-    with given.file.open("w", encoding="ascii") as track:
-        while not given.count or collected < given.count:
-            text = line(api.get("/telemetry/message/GPS_RAW_INT")["info"], given.style) + "\n"
+    with options.file.open("w", encoding="ascii") as track:
+        while not options.count or collected < options.count:
+            text = line(api.get("/telemetry/message/GPS_RAW_INT")["info"], options.style) + "\n"
             track.write(text)
             track.flush()
-            if given.latest is not None:
-                replace(given.latest, text)
+            if options.latest is not None:
+                replace(options.latest, text)
             collected += 1
-            time.sleep(max(0.0, began + collected * given.seconds - time.monotonic()))
+            time.sleep(max(0.0, began + collected * options.seconds - time.monotonic()))
 
 
 if __name__ == "__main__":

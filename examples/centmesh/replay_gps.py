@@ -44,14 +44,14 @@ def main() -> None:
     arguments = parser(__doc__, altitude=None)
     arguments.add_argument("file", type=Path)
     arguments.add_argument("--ground", type=float, help="m AMSL; by default the track's lowest reading")
-    given = arguments.parse_args()
-    lines = [text.strip() for text in given.file.read_text(encoding="ascii").splitlines() if text.strip()]
+    options = arguments.parse_args()
+    lines = [text.strip() for text in options.file.read_text(encoding="ascii").splitlines() if text.strip()]
     track = [reading for reading in map(parse, lines) if reading.fix >= FIX_3D]
     if not track:
-        sys.exit(f"{given.file}: no reading with a 3D fix")
-    ground = min(reading.alt for reading in track) if given.ground is None else given.ground
+        sys.exit(f"{options.file}: no reading with a 3D fix")
+    ground = min(reading.alt for reading in track) if options.ground is None else options.ground
     heights = [round(max(reading.alt - ground, LOWEST), 2) for reading in track]
-    api = Api(given.url)
+    api = Api(options.url)
     with rtl_on_interrupt(api):
         api.get("/command/arm")
         api.get("/command/takeoff", alt=heights[0])
