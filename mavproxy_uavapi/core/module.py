@@ -58,7 +58,7 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
         # MAVProxy stumbles over a rule that is shorter than what was typed, so that of all settings has a value.
         self._completed = {f"({name.upper()}SETTING)": settings.names, f"({name.upper()}VALUE)": list}
         self._begun = False
-        self._told_failure = ""
+        self._reported_failure = ""
         self._routes: dict[str, Any] = {}
         self.host = hosts.join(mpstate, self)
         rules = [*completions, f"set {' '.join(self._completed)}", *settings.value_completions()]
@@ -119,8 +119,8 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
     def _report_failure(self, error: Exception) -> None:
         """Print why an idle task failed: once, not several hundred times a second."""
         failure = f"{type(error).__name__}: {error}"
-        if failure != self._told_failure:
-            self._told_failure = failure
+        if failure != self._reported_failure:
+            self._reported_failure = failure
             print(f"{self.name}: its idle task fails, `module reload {self.name}` may help: {failure}")
             log.debug("idle task of %s", self.name, exc_info=error)
 

@@ -167,15 +167,15 @@ def read_text(path: Path) -> str:
         raise SettingError(f"{path} is no text", "tokens") from error
 
 
-def _require_private(path: Path, found: os.stat_result) -> None:
+def _require_private(path: Path, status: os.stat_result) -> None:
     """Raise SettingError unless it is a file of a sensible size that only we, or root, can use."""
-    if not stat.S_ISREG(found.st_mode):
+    if not stat.S_ISREG(status.st_mode):
         raise SettingError(f"{path} is no file", "tokens")
-    if stat.S_IMODE(found.st_mode) & 0o077:
+    if stat.S_IMODE(status.st_mode) & 0o077:
         raise SettingError(f"others can use {path}: `chmod 600 {path}`", "tokens")
-    if found.st_uid not in (0, os.geteuid()):
+    if status.st_uid not in (0, os.geteuid()):
         raise SettingError(f"{path} belongs to somebody else", "tokens")
-    if found.st_size > LARGEST:
+    if status.st_size > LARGEST:
         raise SettingError(f"{path} has more than {LARGEST // 1024} kB", "tokens")
 
 

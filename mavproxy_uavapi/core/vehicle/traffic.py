@@ -141,16 +141,16 @@ class Traffic:
         reach = sum(math.hypot(*_velocity(one)) + max(*_pace(one)) for one in (vehicle, other)) * seconds
         return math.hypot(*offset(a.lat, a.lon, b.lat, b.lon), a.up - b.up) > 2 * self.separation + reach
 
-    def _too_near(self, vehicle: Any, other: Any, found: Meeting, here: Stop) -> TooNear:
-        lat, lon = LocalFrame((here.lat, here.lon)).degrees(found.at)
+    def _too_near(self, vehicle: Any, other: Any, meeting: Meeting, here: Stop) -> TooNear:
+        lat, lon = LocalFrame((here.lat, here.lon)).degrees(meeting.at)
         system, age = other.state.system, _age(other)
-        when = f"in {found.seconds:.0f} s" if age <= OLD else f"whose position is {age:.0f} s old"
+        when = f"in {meeting.seconds:.0f} s" if age <= OLD else f"whose position is {age:.0f} s old"
         sentence = (
-            f"it would come within {found.gap:.1f} m of vehicle {system}, {when}; {self.separation:g} m are kept"
+            f"it would come within {meeting.gap:.1f} m of vehicle {system}, {when}; {self.separation:g} m are kept"
         )
         home = _home_amsl(vehicle)
-        at = {"lat": round(lat, 7), "long": round(lon, 7), "alt": round(found.at.up - home, 2)}
-        return TooNear(sentence, {"vehicle": system, "in_s": round(found.seconds, 1), "at": at})
+        at = {"lat": round(lat, 7), "long": round(lon, 7), "alt": round(meeting.at.up - home, 2)}
+        return TooNear(sentence, {"vehicle": system, "in_s": round(meeting.seconds, 1), "at": at})
 
 
 def expected(vehicle: Any, seconds: float) -> list[Stop]:
