@@ -236,7 +236,7 @@ class Authority(RuleBasedStateMachine):
         if drone.mode == "GUIDED" and drone.armed:
             drone.target, drone.moving, drone.lifting = [40.0, 40.0, -15.0], None, False
             if velocity != (0, 0, 0):
-                drone.target, drone.moving, drone._told_at = None, list(velocity), self.world.loop.time()
+                drone.target, drone.moving, drone._setpoint_at = None, list(velocity), self.world.loop.time()
         self.then(later)
 
     # -- the envelope -----------------------------------------------------------------------------------------

@@ -62,7 +62,7 @@ class Drone:
         self.target: list[float] | None = None
         self.moving: list[float] | None = None  # the velocity that it was told (m/s)
         self.paused = self.lifting = False
-        self._told_at = self._idle_since = self._booted_at = 0.0
+        self._setpoint_at = self._idle_since = self._booted_at = 0.0
         self._sequence = 0
         self._arriving: deque[Any] = deque()
         self._stream: asyncio.Task[None] | None = None
@@ -232,7 +232,7 @@ class Drone:
             return
         if self.target is not None:
             self._towards(self.target, seconds)
-        elif self.moving is not None and self._loop.time() - self._told_at < self.parameters["GUID_TIMEOUT"]:
+        elif self.moving is not None and self._loop.time() - self._setpoint_at < self.parameters["GUID_TIMEOUT"]:
             self.at = [here + speed * seconds for here, speed in zip(self.at, self.moving, strict=True)]
         if self.at[2] >= 0.0 and not self.lifting:
             self.at[2], self.landed = 0.0, mavlink.MAV_LANDED_STATE_ON_GROUND
@@ -296,7 +296,7 @@ class Drone:
     def _take_setpoint(self, message: Any) -> None:
         if self.mode != "GUIDED" or not self.armed:
             return
-        self.yaw_rate, self.lifting, self._told_at = message.yaw_rate, False, self._loop.time()
+        self.yaw_rate, self.lifting, self._setpoint_at = message.yaw_rate, False, self._loop.time()
         if self.landed == mavlink.MAV_LANDED_STATE_TAKEOFF:
             self.landed = mavlink.MAV_LANDED_STATE_IN_AIR
         if message.type_mask & mavlink.POSITION_TARGET_TYPEMASK_X_IGNORE:

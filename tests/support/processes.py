@@ -307,9 +307,9 @@ def load(port: int, **settings: Any) -> str:
 
     The limits of silence are longer than the module's own: a machine that does much else may pause for seconds.
     """
-    given = {"port": port, "link_timeout": SILENCE, "max_age": SILENCE, **settings}
-    given = {name: value for name, value in given.items() if value is not None}
-    return "--cmd=module load uavapi:" + json.dumps(given, separators=(",", ":"))
+    options = {"port": port, "link_timeout": SILENCE, "max_age": SILENCE, **settings}
+    options = {name: value for name, value in options.items() if value is not None}
+    return "--cmd=module load uavapi:" + json.dumps(options, separators=(",", ":"))
 
 
 def start_embedded(rig: Rig, *arguments: str, speedup: float = SPEEDUP) -> int:

@@ -24,7 +24,7 @@ class FakeApi:
 
     Attributes:
         armed, mode, alt, yaw: of the vehicle (m above home, degrees).
-        asked: method, path and parameters of the verbs, as they came.
+        requested: method, path and parameters of the verbs, as they came.
         refusals: by path, the status and body that a verb gets instead.
         takes: by path, s that a verb takes, or an event that it waits for; for ever with None.
         why_not: reasons why it cannot be armed.

@@ -180,8 +180,8 @@ def test_what_is_no_token_is_none(header: str | None) -> None:
     assert not has_token(header, "")
 
 
-def settings(**given: Any) -> Any:
-    return ApiModuleSettings(given, environ={}).snapshot()
+def settings(**values: Any) -> Any:
+    return ApiModuleSettings(values, environ={}).snapshot()
 
 
 def test_what_a_proxy_passes_on_needs_the_token_wherever_the_proxy_is() -> None:
