@@ -11,9 +11,6 @@ from ..demand import STAY, Demand
 from ..takeoff import TakeoffRun
 from .base import NavigatingMode
 
-FLYING_FOR = 10.0
-"""Seconds of flight after which the mode takes the plane as it is."""
-
 
 class Takeoff(NavigatingMode):
     """Takes off in the direction that the plane stands in."""
