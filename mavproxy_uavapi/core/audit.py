@@ -60,8 +60,8 @@ class Entry:
 
     def cut(self) -> Entry:
         """The entry with long values cut."""
-        words = {name: cut(getattr(self, name)) for name in ("client", "verb", "request", "detail")}
-        return replace(self, **words)
+        texts = {name: cut(getattr(self, name)) for name in ("client", "verb", "request", "detail")}
+        return replace(self, **texts)
 
 
 def utc_now() -> str:

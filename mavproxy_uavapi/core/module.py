@@ -64,8 +64,8 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
         rules = [*completions, f"set {' '.join(self._completed)}", *settings.value_completions()]
         self.windows = Windows(name, mpstate, self.host.bridge, self.host.clock, self.view)
         self.add_command(name, self.command, description, rules)
-        for place, words in self._completed.items():
-            self.add_completion_function(place, lambda _, words=words: words())
+        for place, words_of in self._completed.items():
+            self.add_completion_function(place, lambda _, words_of=words_of: words_of())
 
     def finish_loading(self, routes: Iterable[Any] = ()) -> None:
         """The end of each constructor: what follows `module load` in a script, or calls then, finds all in place.

@@ -77,9 +77,9 @@ def ways(items: Sequence[MissionItem], setting: Setting) -> Iterator[list[Stop]]
         place = places[seq - 1]
         if item.command == mavlink.MAV_CMD_DO_JUMP:
             target = int(item.params[0])
-            there = next((stop for stop in places[max(target, 1) - 1 :] if stop is not None), None)
-            if here is not None and there is not None:
-                yield [here, there._replace(up=_height(there, here))]
+            jumped_to = next((stop for stop in places[max(target, 1) - 1 :] if stop is not None), None)
+            if here is not None and jumped_to is not None:
+                yield [here, jumped_to._replace(up=_height(jumped_to, here))]
         if place is None:
             continue
         if here is None and math.isnan(place.lat):

@@ -201,15 +201,15 @@ def place_of(target: NedTarget, state: VehicleState) -> GlobalTarget | None:
     local, place = state.messages.get("LOCAL_POSITION_NED"), state.messages.get("GLOBAL_POSITION_INT")
     if local is None or place is None:
         return None
-    here, there = local.message, place.message
-    later = (there.time_boot_ms - here.time_boot_ms) / 1000.0  # s
+    ned, position = local.message, place.message
+    later = (position.time_boot_ms - ned.time_boot_ms) / 1000.0  # s
     if abs(later) > SAME_MOMENT:
         return None
-    north = target.x - here.x - later * here.vx
-    east = target.y - here.y - later * here.vy
-    down = target.z - here.z - later * here.vz
-    lat, lon = moved(there.lat / 1e7, there.lon / 1e7, north, east)
-    return GlobalTarget(lat, lon, there.relative_alt / 1000.0 - down)
+    north = target.x - ned.x - later * ned.vx
+    east = target.y - ned.y - later * ned.vy
+    down = target.z - ned.z - later * ned.vz
+    lat, lon = moved(position.lat / 1e7, position.lon / 1e7, north, east)
+    return GlobalTarget(lat, lon, position.relative_alt / 1000.0 - down)
 
 
 def _are_alike(one: Reported, other: Reported | None) -> bool:

@@ -66,7 +66,7 @@ async def request_rate(vehicle: Vehicle, name: str, rate: float) -> None:
 
 
 @dataclass
-class Asked:
+class RateRequests:
     """The requests of one message since a boot: the rate (Hz), and when (s), until one has a lasting effect."""
 
     rate: float
@@ -79,7 +79,7 @@ class Watch:
 
     reboots: int
     since: float
-    asked: dict[str, Asked] = field(default_factory=dict)
+    requests: dict[str, RateRequests] = field(default_factory=dict)
 
 
 class StreamRequester:
@@ -106,10 +106,10 @@ class StreamRequester:
 
     async def _send(self, vehicle: Vehicle, name: str, rate: float) -> None:
         system = vehicle.state.system
-        asked = self._watches[system].asked
-        if name not in asked or asked[name].rate != rate:
-            asked[name] = Asked(rate)
-        asked[name].at.append(vehicle.clock())
+        requests = self._watches[system].requests
+        if name not in requests or requests[name].rate != rate:
+            requests[name] = RateRequests(rate)
+        requests[name].at.append(vehicle.clock())
         self._requested.add((system, name))
         with contextlib.suppress(LinkLost):
             await request_rate(vehicle, name, rate)
@@ -129,14 +129,14 @@ class StreamRequester:
         if watch is None or watch.reboots != state.reboots:
             watch = self._watches[state.system] = Watch(state.reboots, now)
         for name, rate in self._wanted(vehicle).items():
-            asked = watch.asked.get(name)
-            if asked is not None and asked.rate < rate:
+            requests = watch.requests.get(name)
+            if requests is not None and requests.rate < rate:
                 yield vehicle, name, rate  # nobody used it then
             elif self._is_missing(vehicle, name, now - watch.since):
-                if asked is None or self._may_ask_again(vehicle, asked.at, now):
+                if requests is None or self._may_ask_again(vehicle, requests.at, now):
                     yield vehicle, name, rate
-            elif asked is not None and asked.at and now - asked.at[-1] > STEADY:
-                asked.at.clear()
+            elif requests is not None and requests.at and now - requests.at[-1] > STEADY:
+                requests.at.clear()
 
     def _wanted(self, vehicle: Vehicle) -> Mapping[str, float]:
         used, guided = self._registry.is_used(vehicle.state.system), vehicle.state.armed and vehicle.mode == "GUIDED"
