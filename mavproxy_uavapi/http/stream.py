@@ -36,20 +36,20 @@ async def stream(call: Call) -> web.StreamResponse:
 
 
 def _subscription(call: Call) -> Subscription:
-    asked = call.params(StreamFilter)
-    name, view, event = NamePatterns(asked.names.upper()), NamePatterns(asked.view), NamePatterns(asked.events)
+    wanted = call.params(StreamFilter)
+    name, view, event = NamePatterns(wanted.names.upper()), NamePatterns(wanted.view), NamePatterns(wanted.events)
     _require_some("view", view, stream_views.NAMES)
     _require_some("events", event, stream_news.NAMES)
     if not (name or view or event):
         name = NamePatterns("*")
-    systems = asked.systems or frozenset({call.named_system} if call.named_system else ())
+    systems = wanted.systems or frozenset({call.named_system} if call.named_system else ())
     call.service.host.registry.use(*systems)
-    return Subscription(Wishes(name, view, event, systems, asked.rate), asyncio.get_running_loop().call_later)
+    return Subscription(Wishes(name, view, event, systems, wanted.rate), asyncio.get_running_loop().call_later)
 
 
-def _require_some(parameter: str, asked: NamePatterns, known: tuple[str, ...]) -> None:
+def _require_some(parameter: str, wanted: NamePatterns, known: tuple[str, ...]) -> None:
     """Raise Invalid if a name that was asked for can never come."""
-    for pattern in asked.patterns:
+    for pattern in wanted.patterns:
         if not any(one in NamePatterns(pattern) for one in known):
             raise Invalid(f"{pattern!r} is none of {', '.join(known)}", "query", parameter)
 

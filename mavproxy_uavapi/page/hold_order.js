@@ -46,13 +46,13 @@ export class HoldOrder {
 
   /** Whether a vehicle has stopped, and if not why. */
   outcomeOf(id, at) {
-    const vehicle = this.fleet.vehicles.get(id), report = vehicle?.views.vehicle, told = report?.value;
-    const answer = this.answers?.[id], modes = HOLDS[told?.type];
-    const holds = told && (told.armed === false || modes?.includes(told.mode));
+    const vehicle = this.fleet.vehicles.get(id), report = vehicle?.views.vehicle, state = report?.value;
+    const answer = this.answers?.[id], modes = HOLDS[state?.type];
+    const holds = state && (state.armed === false || modes?.includes(state.mode));
     if (holds && report.at > this.at && vehicle.isAlive(at)) return {stopped: true};
     if (!answer) return {stopped: false, why: "no answer"};
     if (answer.status !== 200) return {stopped: false, why: answer.detail};
-    const fliesAgain = Boolean(modes && told.mode && told.armed) && !holds && report.at > this.answeredAt + SETTLED;
-    return {stopped: !fliesAgain, fliesAgain, why: `flies again (${told?.mode})`};
+    const fliesAgain = Boolean(modes && state.mode && state.armed) && !holds && report.at > this.answeredAt + SETTLED;
+    return {stopped: !fliesAgain, fliesAgain, why: `flies again (${state?.mode})`};
   }
 }

@@ -21,8 +21,8 @@ export class AttitudeView extends Panel {
     this.classList.toggle("old", old);
     const attitude = known ? fresh.value : {roll: 0, pitch: 0, yaw: 0};
     this.paint(attitude, old);
-    const told = ["roll", "pitch", "yaw"].map(name => `${name} ${Math.round(attitude[name])}°`).join(", ");
-    setAttribute(this.canvas, "aria-label", old ? "attitude not known now" : told);
+    const angles = ["roll", "pitch", "yaw"].map(name => `${name} ${Math.round(attitude[name])}°`).join(", ");
+    setAttribute(this.canvas, "aria-label", old ? "attitude not known now" : angles);
   }
 
   paint({roll, pitch, yaw}, old) {

@@ -25,8 +25,8 @@ export class MessageList extends Panel {
     const severity = event === "statustext" ? info.severity : event === "link" && !info.alive ? 2 : 6;
     const key = `${system} ${clock} ${text}`;
     if ([...this.list.children].some(row => row.key === key)) return; // told again after a reconnection
-    const told = new Date(time * 1000).toLocaleTimeString([], {hour12: false});
-    const row = element("li", {class: severity <= WORST ? "bad" : ""}, element("time", {}, told),
+    const clockTime = new Date(time * 1000).toLocaleTimeString([], {hour12: false});
+    const row = element("li", {class: severity <= WORST ? "bad" : ""}, element("time", {}, clockTime),
       element("b", {}, system ? String(system) : ""), element("span", {title: SEVERITIES[severity]}, text));
     row.key = key;
     this.list.prepend(row);
