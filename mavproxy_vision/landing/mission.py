@@ -48,17 +48,17 @@ class MissionPlan:
         if self.north is None or self.east is None:
             raise Invalid("a mission needs north and east, or lat and long")
         lat, lon = home
-        there = lon + self.east / (METRES_PER_DEGREE * math.cos(math.radians(lat)))
-        return lat + self.north / METRES_PER_DEGREE, (there + 180.0) % 360.0 - 180.0
+        longitude = lon + self.east / (METRES_PER_DEGREE * math.cos(math.radians(lat)))
+        return lat + self.north / METRES_PER_DEGREE, (longitude + 180.0) % 360.0 - 180.0
 
 
 async def _require_inside(vehicle: Copter, plan: MissionPlan, grounded: bool) -> None:
     """Raise OutsideEnvelope unless the climb and the way there stay in the envelope."""
     home = await vehicle.home()
-    there = plan.place((home.latitude / 1e7, home.longitude / 1e7))
+    destination = plan.place((home.latitude / 1e7, home.longitude / 1e7))
     here = vehicle.fresh("GLOBAL_POSITION_INT")
     climb = [GlobalTarget(here.lat / 1e7, here.lon / 1e7, plan.alt)] if grounded else []
-    vehicle.require_route([*climb, GlobalTarget(*there, plan.alt)])
+    vehicle.require_route([*climb, GlobalTarget(*destination, plan.alt)])
 
 
 async def fly(flight: TagFlight, plan: MissionPlan, descent_method: Callable[[TagFlight], Descent]) -> None:
