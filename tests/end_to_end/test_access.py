@@ -190,7 +190,7 @@ def status(path, body=None, headers={}):
         return urllib.request.urlopen(urllib.request.Request(url + path, body, headers), timeout=10).status
     except urllib.error.HTTPError as error:
         return error.code
-told = {"read": status("/jobs"), "upload": status("/mission/upload-script", body, kind)}
+report = {"read": status("/jobs"), "upload": status("/mission/upload-script", body, kind)}
 host, port = url.removeprefix("http://").split(":")
 time.sleep(2)  # until the connections of those calls have ended
 idle = [socket.create_connection((host, int(port))) for _ in range(60)]
@@ -208,9 +208,9 @@ deadline = time.monotonic() + 60
 while still_open() > 20 and time.monotonic() < deadline:
     time.sleep(0.1)
 time.sleep(1)
-told["open"] = still_open()
-told["read among idle ones"] = status("/jobs")
-print(json.dumps(told))
+report["open"] = still_open()
+report["read among idle ones"] = status("/jobs")
+print(json.dumps(report))
 """
 
 

@@ -61,7 +61,7 @@ def test_vision_is_the_newest_frame_of_that_module(rig, harness):
         requests.post(f"{rig.url}/vision/frame", data=picture.tobytes(), timeout=10)
         return rig.get("/peripherical/take_photo", command="vision")
 
-    answer = harness.eventually(lambda: (found := photo()).status_code == 200 and found)
+    answer = harness.eventually(lambda: (response := photo()).status_code == 200 and response)
     assert cv2.imdecode(numpy.frombuffer(answer.content, numpy.uint8), 1).shape == (48, 64, 3)
     rig.mavproxy.ask("module unload vision", "Unloaded module vision")
     assert rig.get("/peripherical/take_photo", command="vision").status_code == 400

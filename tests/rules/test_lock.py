@@ -56,15 +56,14 @@ def versions(name: str, where: dict[str, str] | None = None) -> dict[str, str]:
     return pins
 
 
-def unmet(requested: list[Requirement], there: dict[str, str], where: dict[str, str] | None = None) -> list[str]:
+def unmet(requested: list[Requirement], pins: dict[str, str], where: dict[str, str] | None = None) -> list[str]:
     """Which of the requirements those versions do not meet."""
     return [
         str(line)
         for line in requested
         if (line.marker is None or line.marker.evaluate(where or {"extra": ""}))
         and not (
-            (version := there.get(canonicalize_name(line.name)))
-            and line.specifier.contains(version, prereleases=True)
+            (version := pins.get(canonicalize_name(line.name))) and line.specifier.contains(version, prereleases=True)
         )
     ]
 
@@ -81,10 +80,10 @@ def test_a_lock_meets_what_the_project_asks_for(name, extras, python, machine, a
 @pytest.mark.parametrize("name", ["lean.txt", "dev.txt"])
 def test_a_lock_has_what_its_packages_ask_for_but_what_is_left_out(name):
     without = {line.name for line in listed("without.in")}
-    there = versions(name)
-    for package in there:
+    pins = versions(name)
+    for package in pins:
         requested = [Requirement(line) for line in importlib.metadata.requires(package) or []]
-        assert unmet([line for line in requested if line.name not in without], there) == [], package
+        assert unmet([line for line in requested if line.name not in without], pins) == [], package
 
 
 def test_what_is_left_out_is_in_no_lock_and_still_required_by_mavproxy():

@@ -11,7 +11,7 @@ MINUTE = 60.0
 PATH = "/movement/go_to_ned_wait"
 
 
-class Asked(NamedTuple):
+class Requested(NamedTuple):
     """A request, when it was sent (s), and its answer."""
 
     at: float
@@ -19,7 +19,7 @@ class Asked(NamedTuple):
     reply: Any
 
 
-async def hammer(world: Any, seed: int, requested: list[Asked]) -> None:
+async def hammer(world: Any, seed: int, requested: list[Requested]) -> None:
     """A client that sends the vehicle somewhere else as soon as it has its answer, but for a breath."""
     dice = random.Random(seed)
     end = world.loop.time() + MINUTE
@@ -28,13 +28,13 @@ async def hammer(world: Any, seed: int, requested: list[Asked]) -> None:
         target = {"x": dice.randint(-20, 20), "y": dice.randint(-20, 20), "z": -dice.randint(5, 15)}
         began = world.loop.time()
         wire = await world.request("POST", PATH, target)
-        requested.append(Asked(began, target, await asyncio.wait_for(wire.reply, MINUTE)))
+        requested.append(Requested(began, target, await asyncio.wait_for(wire.reply, MINUTE)))
         await asyncio.sleep(dice.uniform(*dice.choice([(0.0, 0.1), (0.3, 1.0), (6.0, 10.0)])))
 
 
 def test_every_request_is_answered_and_the_vehicle_ends_as_the_last_one_requested(make_world: Any) -> None:
     world = make_world()
-    requested: list[Asked] = []
+    requested: list[Requested] = []
 
     async def both() -> None:
         await asyncio.gather(hammer(world, 1, requested), hammer(world, 2, requested))

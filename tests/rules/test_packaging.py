@@ -26,12 +26,12 @@ def test_the_dashboard_asks_for_metrics_that_there_are() -> None:
     watch = FleetWatch(SqliteStore(":memory:"), AlarmLimits(10, 20))
     health = StationHealth(watch, Inbox(1, lambda: 0.0), Broker())
     text = exposition(StationCollector(Statistics(), watch, health)).decode()
-    there = set(re.findall(r"^(station_\w+)", text, re.MULTILINE))
+    exported = set(re.findall(r"^(station_\w+)", text, re.MULTILINE))
     panels = json.loads((PACKAGING / "grafana-station.json").read_text(encoding="utf-8"))["panels"]
     requested = {
         name for panel in panels for one in panel["targets"] for name in re.findall(r"station_[a-z_]+", one["expr"])
     }
-    assert len(requested) >= 10 and requested <= there
+    assert len(requested) >= 10 and requested <= exported
 
 
 def test_the_unit_starts_a_worker() -> None:

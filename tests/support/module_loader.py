@@ -32,11 +32,11 @@ class Loader:
         self.main_loop.modules.remove(module)
 
 
-def ask(port: int, path: str, **request: Any) -> tuple[int, Any]:
-    """The status and body of an answer; `request` goes to `urllib.request.Request`."""
-    asked = urllib.request.Request(f"http://127.0.0.1:{port}{path}", **request)
+def ask(port: int, path: str, **options: Any) -> tuple[int, Any]:
+    """The status and body of an answer; `options` go to `urllib.request.Request`."""
+    request = urllib.request.Request(f"http://127.0.0.1:{port}{path}", **options)
     try:
-        with urllib.request.urlopen(asked, timeout=60) as response:
+        with urllib.request.urlopen(request, timeout=60) as response:
             return response.status, json.load(response)
     except urllib.error.HTTPError as error:
         with error:

@@ -30,7 +30,7 @@ class NetworkNamespace:
     def __init__(self) -> None:
         number = os.getpid() % 250 + 1
         self._name, self._near, self._far = f"fleet-{os.getpid()}", f"fn{os.getpid()}", f"ff{os.getpid()}"
-        self.host, there = SUBNET.format(number, 1), SUBNET.format(number, 2)
+        self.host, guest = SUBNET.format(number, 1), SUBNET.format(number, 2)
         if shutil.which("ip") is None:
             raise OSError("there is no program `ip` (apt-get install iproute2)")
         try:
@@ -38,7 +38,7 @@ class NetworkNamespace:
             ip("link", "add", self._near, "type", "veth", "peer", "name", self._far, "netns", self._name)
             ip("addr", "add", f"{self.host}/24", "dev", self._near)
             ip("link", "set", self._near, "up")
-            ip("-n", self._name, "addr", "add", f"{there}/24", "dev", self._far)
+            ip("-n", self._name, "addr", "add", f"{guest}/24", "dev", self._far)
             ip("-n", self._name, "link", "set", self._far, "up")
             ip("-n", self._name, "link", "set", "lo", "up")
         except subprocess.CalledProcessError as error:

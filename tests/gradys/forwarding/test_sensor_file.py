@@ -93,10 +93,10 @@ def test_a_long_file_is_not_read_to_its_end(tmp_path: Path) -> None:
 
 
 def test_a_file_that_does_not_answer_is_asked_once(loop: Any, monkeypatch: Any, write: Any) -> None:
-    asked, answer = [], threading.Event()
+    files, answer = [], threading.Event()
 
     def hang(file: str) -> Any:
-        asked.append(file)
+        files.append(file)
         answer.wait()
         return newest(file)
 
@@ -108,5 +108,5 @@ def test_a_file_that_does_not_answer_is_asked_once(loop: Any, monkeypatch: Any, 
     answer.set()
     loop.real_wait = 60.0
     assert loop.run(source.read()) == Measured(b"23.5\n", NOW - 1.0)
-    assert len(asked) == 1
+    assert len(files) == 1
     loop.run(source.close())

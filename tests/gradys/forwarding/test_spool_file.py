@@ -216,10 +216,10 @@ def test_a_link_to_itself_is_an_error_of_ours(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(shutil.which("mount") is None, reason="mount")
-@pytest.mark.parametrize("there", [True, False])
-def test_a_disk_that_nobody_may_write_is_an_error_of_ours(file: Path, there: bool) -> None:
+@pytest.mark.parametrize("exists", [True, False])
+def test_a_disk_that_nobody_may_write_is_an_error_of_ours(file: Path, exists: bool) -> None:
     file.parent.mkdir()
-    if there:
+    if exists:
         kept(file)
         file.chmod(0o644)
     folder = str(file.parent)

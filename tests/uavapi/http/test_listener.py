@@ -29,43 +29,43 @@ def busy(group: str = "127.0.0.1") -> Any:
 
 
 def test_there_is_room_up_to_the_reserve() -> None:
-    there = [connection() for _ in range(MOST - RESERVE - 1)]
-    assert to_replace(there, "127.0.0.1", True, MOST) is None
-    there.append(connection())
-    assert to_replace(there, "127.0.0.1", True, MOST) is there[0]
+    connections = [connection() for _ in range(MOST - RESERVE - 1)]
+    assert to_replace(connections, "127.0.0.1", True, MOST) is None
+    connections.append(connection())
+    assert to_replace(connections, "127.0.0.1", True, MOST) is connections[0]
 
 
 def test_reserve_is_for_those_who_have_passed_the_door() -> None:
-    there = [connection() for _ in range(MOST - RESERVE - 1)] + [busy() for _ in range(RESERVE)]
-    assert to_replace(there, "127.0.0.1", True, MOST) is None
-    assert to_replace([*there, busy()], "127.0.0.1", True, MOST) is there[0]
+    connections = [connection() for _ in range(MOST - RESERVE - 1)] + [busy() for _ in range(RESERVE)]
+    assert to_replace(connections, "127.0.0.1", True, MOST) is None
+    assert to_replace([*connections, busy()], "127.0.0.1", True, MOST) is connections[0]
 
 
 def test_connection_that_says_nothing_goes_before_an_older_one_that_was_refused() -> None:
-    there = [connection(refused=True, answering=True) for _ in range(MOST)]
-    there[7] = connection(silent=True)
-    assert to_replace(there, "127.0.0.1", True, MOST) is there[7]
+    connections = [connection(refused=True, answering=True) for _ in range(MOST)]
+    connections[7] = connection(silent=True)
+    assert to_replace(connections, "127.0.0.1", True, MOST) is connections[7]
 
 
 def test_connection_that_ends_already_takes_no_room() -> None:
-    there = [connection(closing=True) for _ in range(MOST)]
-    assert to_replace(there, "127.0.0.1", True, MOST) is None
+    connections = [connection(closing=True) for _ in range(MOST)]
+    assert to_replace(connections, "127.0.0.1", True, MOST) is None
 
 
 def test_of_callers_who_passed_the_door_the_longest_idle_goes_and_a_call_in_flight_never() -> None:
-    there = [busy() for _ in range(MOST)]
-    there[5] = connection(admitted=True, idle_since=20.0)
-    there[9] = connection(admitted=True, idle_since=10.0)
-    assert to_replace(there, "127.0.0.1", True, MOST) is there[9]
+    connections = [busy() for _ in range(MOST)]
+    connections[5] = connection(admitted=True, idle_since=20.0)
+    connections[9] = connection(admitted=True, idle_since=10.0)
+    assert to_replace(connections, "127.0.0.1", True, MOST) is connections[9]
     with pytest.raises(NoRoom) as caught:
         to_replace([busy() for _ in range(MOST)], "127.0.0.1", True, MOST)
     assert caught.value.cause == "full"
 
 
 def test_address_has_a_share_unless_it_is_the_loopback() -> None:
-    there = [connection("10.0.0.5") for _ in range(SHARE)]
-    assert to_replace(there, "10.0.0.6", False, MOST) is None
-    assert to_replace(there, "10.0.0.5", False, MOST) is there[0]
+    connections = [connection("10.0.0.5") for _ in range(SHARE)]
+    assert to_replace(connections, "10.0.0.6", False, MOST) is None
+    assert to_replace(connections, "10.0.0.5", False, MOST) is connections[0]
     assert to_replace([connection() for _ in range(SHARE)], "127.0.0.1", True, MOST) is None
     with pytest.raises(NoRoom) as caught:
         to_replace([busy("10.0.0.5") for _ in range(SHARE)], "10.0.0.5", False, MOST)
@@ -73,8 +73,8 @@ def test_address_has_a_share_unless_it_is_the_loopback() -> None:
 
 
 def test_scarce_descriptors_are_taken_from_a_stranger_or_not_at_all() -> None:
-    there = [busy(), connection(), connection()]
-    assert to_replace(there, "127.0.0.1", True, MOST, scarce=True) is there[1]
+    connections = [busy(), connection(), connection()]
+    assert to_replace(connections, "127.0.0.1", True, MOST, scarce=True) is connections[1]
     with pytest.raises(NoRoom) as caught:
         to_replace([busy()], "127.0.0.1", True, MOST, scarce=True)
     assert caught.value.cause == "descriptors"

@@ -37,11 +37,11 @@ def output(main_loop: Any, capsys: Any) -> Callable[[str], str]:
     def output(words: str) -> str:
         printed: list[str] = []
 
-        def found() -> bool:
+        def was_printed() -> bool:
             printed.append(capsys.readouterr().out)
             return words in "".join(printed)
 
-        main_loop.until(found)
+        main_loop.until(was_printed)
         return "".join(printed)
 
     return output
