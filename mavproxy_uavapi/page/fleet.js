@@ -125,7 +125,7 @@ export class Fleet extends EventTarget {
   heardView({system, view, info}, at) {
     const vehicle = this.of(system);
     vehicle.take(view, info, at);
-    if (view === "mission" && vehicle.mission.told(info.total)) this.missionChanged(vehicle);
+    if (view === "mission" && vehicle.mission.takeTotal(info.total)) this.missionChanged(vehicle);
   }
 
   missionChanged(vehicle) { this.dispatchEvent(new CustomEvent("mission", {detail: vehicle})); }

@@ -21,7 +21,7 @@ export class HeldMission {
   }
 
   /** Hear how many items the vehicle holds; whether it holds another mission than the one that was read. */
-  told(total) {
+  takeTotal(total) {
     if (!total && total !== 0) return false; // it does not tell
     const another = this.items !== null && total !== this.total && total !== this.items.length;
     this.total = total;
