@@ -31,7 +31,7 @@ ROWS = [
 
 
 @pytest.fixture
-def there(loop: Any, drone: Any) -> Any:
+def airborne(loop: Any, drone: Any) -> Any:
     """The drone in the air at (10, 20, -30), heading east."""
     drone.yaw = math.radians(90)
     drone.fly(at=(10.0, 20.0, -30.0))
@@ -42,7 +42,7 @@ def there(loop: Any, drone: Any) -> Any:
 @pytest.mark.parametrize("slash", ["", "/"])
 @pytest.mark.parametrize(("method", "path", "values", "result"), ROWS, ids=[f"{row[1]}{row[2]}" for row in ROWS])
 def test_every_row_of_the_contract(
-    there: Any, api: Any, method: str, path: str, values: dict[str, Any], result: str, slash: str
+    airborne: Any, api: Any, method: str, path: str, values: dict[str, Any], result: str, slash: str
 ) -> None:
     path = f"/movement/{path}{slash}"
     answer = api.post(path, values) if method == "POST" else api.get(path, params=values)
@@ -63,17 +63,17 @@ def one_setpoint(drone: Any) -> Any:
     ],
 )
 def test_position_is_sent_in_ned(
-    there: Any, api: Any, path: str, values: dict[str, Any], target: tuple[float, float, float]
+    airborne: Any, api: Any, path: str, values: dict[str, Any], target: tuple[float, float, float]
 ) -> None:
     api.post(f"/movement/{path}", values)
-    setpoint = one_setpoint(there)
+    setpoint = one_setpoint(airborne)
     assert (setpoint.x, setpoint.y, setpoint.z) == pytest.approx(target)
     assert setpoint.type_mask & mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE
 
 
-def test_gps_target_is_sent_above_home(there: Any, api: Any) -> None:
+def test_gps_target_is_sent_above_home(airborne: Any, api: Any) -> None:
     api.post("/movement/go_to_gps", GPS)
-    setpoint = one_setpoint(there)
+    setpoint = one_setpoint(airborne)
     assert (setpoint.lat_int, setpoint.lon_int, setpoint.alt) == (-350001000, 1490000000, 12.5)
     assert setpoint.coordinate_frame == mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
 
@@ -87,9 +87,9 @@ def test_gps_target_is_sent_above_home(there: Any, api: Any) -> None:
         ("travel_at_ned", {"vx": 1, "vy": 1, "vz": 0}, 45),
     ],
 )
-def test_look_at_target_turns_along_the_way(there: Any, api: Any, path: str, values: Any, yaw: float) -> None:
+def test_look_at_target_turns_along_the_way(airborne: Any, api: Any, path: str, values: Any, yaw: float) -> None:
     api.post(f"/movement/{path}", {**values, "look_at_target": True})
-    setpoint = one_setpoint(there)
+    setpoint = one_setpoint(airborne)
     assert not setpoint.type_mask & mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE
     assert math.degrees(setpoint.yaw) == pytest.approx(yaw, abs=0.1)
 
@@ -98,23 +98,23 @@ def test_look_at_target_turns_along_the_way(there: Any, api: Any, path: str, val
     ("path", "values"),
     [("go_to_gps", GPS), ("go_to_ned", NED), ("drive_body", BODY), ("travel_at_ned", {"vx": 1, "vy": 1, "vz": 0})],
 )
-def test_heading_is_where_it_points_all_the_way(there: Any, api: Any, path: str, values: Any) -> None:
+def test_heading_is_where_it_points_all_the_way(airborne: Any, api: Any, path: str, values: Any) -> None:
     api.post(f"/movement/{path}", {**values, "heading": 350, "look_at_target": True})
-    setpoint = one_setpoint(there)
+    setpoint = one_setpoint(airborne)
     assert not setpoint.type_mask & mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE
     assert math.degrees(setpoint.yaw) == pytest.approx(350)
 
 
-def test_body_velocity_is_turned_by_the_heading(there: Any, api: Any) -> None:
+def test_body_velocity_is_turned_by_the_heading(airborne: Any, api: Any) -> None:
     answer = api.post("/movement/travel_at_body", {"front": 2, "right": 1, "down": 0.5})
-    setpoint = one_setpoint(there)
+    setpoint = one_setpoint(airborne)
     assert answer.body["result"] == "Travelling at body velocity (2, 1, 0.5)"
     assert (setpoint.vx, setpoint.vy, setpoint.vz) == pytest.approx((-1, 2, 0.5), abs=0.01)  # it points east
 
 
-def test_duration_keeps_travelling_then_stops(there: Any, api: Any) -> None:
+def test_duration_keeps_travelling_then_stops(airborne: Any, api: Any) -> None:
     api.post("/movement/travel_at_ned", {"vx": 1, "vy": 0, "vz": 0, "duration": 4})
-    assert [setpoint.vx for setpoint in there.setpoints()] == [1, 1, 1, 1, 0]
+    assert [setpoint.vx for setpoint in airborne.setpoints()] == [1, 1, 1, 1, 0]
 
 
 @pytest.mark.parametrize(
@@ -149,41 +149,41 @@ def test_duration_keeps_travelling_then_stops(there: Any, api: Any) -> None:
     ],
 )
 def test_body_that_is_out_of_range_is_422_and_nothing_is_sent(
-    there: Any, api: Any, path: str, values: dict[str, Any]
+    airborne: Any, api: Any, path: str, values: dict[str, Any]
 ) -> None:
     answer = api.post(f"/movement/{path}", values)
     assert (answer.status, answer.body["code"]) == (422, "invalid")
     assert all(set(problem) == {"loc", "msg", "type"} for problem in answer.body["detail"])
     assert answer.body["detail"][0]["loc"][0] == "body"
-    assert there.orders() == []
+    assert airborne.orders() == []
 
 
 @pytest.mark.parametrize(
     "query",
     ["set_heading?heading=360.5", "set_heading?heading=-1", "set_heading", "set_yaw_rate?yaw_rate=nan"],
 )
-def test_query_that_is_out_of_range_is_422(there: Any, api: Any, query: str) -> None:
+def test_query_that_is_out_of_range_is_422(airborne: Any, api: Any, query: str) -> None:
     answer = api.get(f"/movement/{query}")
     assert (answer.status, answer.body["detail"][0]["loc"][0]) == (422, "query")
-    assert there.orders() == []
+    assert airborne.orders() == []
 
 
-def test_every_problem_is_listed(there: Any, api: Any) -> None:
+def test_every_problem_is_listed(airborne: Any, api: Any) -> None:
     answer = api.post("/movement/go_to_gps", {"lat": 999, "long": "x"})
     assert sorted(problem["loc"][1] for problem in answer.body["detail"]) == ["alt", "lat", "long"]
 
 
-def test_unknown_members_are_ignored(there: Any, api: Any) -> None:
+def test_unknown_members_are_ignored(airborne: Any, api: Any) -> None:
     assert api.post("/movement/go_to_ned", {**NED, "colour": "red"}).status == 200
 
 
-def test_stale_position_is_503_and_nothing_is_sent(there: Any, loop: Any, api: Any) -> None:
-    there.mute.add("LOCAL_POSITION_NED")
+def test_stale_position_is_503_and_nothing_is_sent(airborne: Any, loop: Any, api: Any) -> None:
+    airborne.mute.add("LOCAL_POSITION_NED")
     loop.pass_time(4.0)
     for path in ("go_to_ned", "drive", "drive_body"):
         answer = api.post(f"/movement/{path}", {**NED, **BODY})
         assert (answer.status, answer.body["code"]) == (503, "stale")
-    assert there.orders() == []
+    assert airborne.orders() == []
 
 
 def test_movement_on_the_ground_is_409(drone: Any, loop: Any, api: Any) -> None:
@@ -195,29 +195,29 @@ def test_movement_on_the_ground_is_409(drone: Any, loop: Any, api: Any) -> None:
     assert (answer.status, answer.body["code"]) == (409, "busy")
 
 
-def test_drive_that_is_requested_twice_aims_at_one_place(there: Any, loop: Any, api: Any) -> None:
+def test_drive_that_is_requested_twice_aims_at_one_place(airborne: Any, loop: Any, api: Any) -> None:
     values = {"x": 40, "y": 0, "z": 0}
     first = api.begin("POST", "/movement/drive_wait", json=values)
     loop.pass_time(2.0)
     second = api.begin("POST", "/movement/drive_wait", json=values)
     results = [loop.run(request).body["result"] for request in (first, second)]
     assert results == ["Copter arrived at (50.0, 20.0, -30.0)"] * 2
-    assert len(there.setpoints()) == 1
+    assert len(airborne.setpoints()) == 1
 
 
-def test_pilots_mode_change_ends_a_wait_with_409_and_nothing_more_is_sent(there: Any, loop: Any, api: Any) -> None:
+def test_pilots_mode_change_ends_a_wait_with_409_and_nothing_more_is_sent(airborne: Any, loop: Any, api: Any) -> None:
     request = api.begin("POST", "/movement/go_to_ned_wait", json={"x": 300, "y": 0, "z": -20})
     loop.pass_time(3.0)
-    there.pilot("LOITER")
+    airborne.pilot("LOITER")
     answer = loop.run(request)
     assert (answer.status, answer.body["code"]) == (409, "mode_changed")
-    before = len(there.orders())
+    before = len(airborne.orders())
     loop.pass_time(10.0)
-    assert len(there.orders()) == before
+    assert len(airborne.orders()) == before
 
 
-def test_telemetry_is_read_at_once_while_two_hundred_calls_wait(there: Any, loop: Any, api: Any) -> None:
-    there.stuck = True
+def test_telemetry_is_read_at_once_while_two_hundred_calls_wait(airborne: Any, loop: Any, api: Any) -> None:
+    airborne.stuck = True
     body = {"x": 300, "y": 0, "z": -20}
     waiting = []
     for _ in range(4):  # no more at once than the listening queue holds
@@ -228,7 +228,7 @@ def test_telemetry_is_read_at_once_while_two_hundred_calls_wait(there: Any, loop
     assert answer.status == 200
     assert loop.time() - started < 0.3
     assert not any(request.done() for request in waiting)
-    there.pilot("LOITER")
+    airborne.pilot("LOITER")
 
     async def all_of_them() -> list[int]:
         return [(await request).status for request in waiting]
@@ -237,12 +237,12 @@ def test_telemetry_is_read_at_once_while_two_hundred_calls_wait(there: Any, loop
 
 
 @pytest.mark.parametrize("wish", ["", "?on_disconnect=continue"])
-def test_client_that_hangs_up_leaves_the_vehicle_flying(there: Any, loop: Any, api: Any, wish: str) -> None:
+def test_client_that_hangs_up_leaves_the_vehicle_flying(airborne: Any, loop: Any, api: Any, wish: str) -> None:
     going = api.begin("POST", f"/movement/go_to_ned_wait{wish}", json={"x": 500, "y": 0, "z": -30})
     loop.pass_time(1.0)
     going.cancel()
     loop.pass_time(5.0)
-    one_setpoint(there)
+    one_setpoint(airborne)
 
 
 @pytest.mark.parametrize(
@@ -253,19 +253,19 @@ def test_client_that_hangs_up_leaves_the_vehicle_flying(there: Any, loop: Any, a
     ],
 )
 def test_client_that_wants_it_so_stops_the_vehicle_by_hanging_up(
-    there: Any, loop: Any, api: Any, path: str, values: dict[str, Any]
+    airborne: Any, loop: Any, api: Any, path: str, values: dict[str, Any]
 ) -> None:
     going = api.begin("POST", f"/movement/{path}?on_disconnect=hold", json=values)
     loop.pass_time(1.5)
     assert not going.done()
     going.cancel()
     loop.pass_time(5.0)
-    last = there.setpoints()[-1]
+    last = airborne.setpoints()[-1]
     assert (last.vx, last.vy, last.vz) == (0, 0, 0)
     assert last.type_mask & mavlink.POSITION_TARGET_TYPEMASK_X_IGNORE
 
 
-def test_on_disconnect_is_continue_or_hold(there: Any, api: Any) -> None:
+def test_on_disconnect_is_continue_or_hold(airborne: Any, api: Any) -> None:
     answer = api.post("/movement/go_to_ned?on_disconnect=land", NED)
     assert (answer.status, answer.body["detail"][0]["loc"]) == (422, ["query", "on_disconnect"])
-    assert there.setpoints() == []
+    assert airborne.setpoints() == []
