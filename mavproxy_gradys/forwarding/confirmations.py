@@ -12,6 +12,7 @@ from collections.abc import Set
 
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
+QUIET = 2.0  # s without a confirmation, after the first ones: what has none by then is refused, or lost
 MOST = 10_000  # numbers that are kept; beyond it all are dropped, and their readings are sent again
 
 
@@ -33,12 +34,14 @@ class Confirmations:
         self._listening = False
         self._news.set()
 
-    def expect(self, numbers: Set[int]) -> None:
-        """Note the numbers of readings that are published now."""
+    def expect(self, numbers: Set[int]) -> bool:
+        """Note the numbers of readings that are published now; whether one of them was not before."""
         if len(self._awaited) + len(self._confirmed) > MOST:
             self._awaited.clear()
             self._confirmed.clear()
+        are_new = not numbers <= self._awaited
         self._awaited |= numbers
+        return are_new
 
     def take(self, payload: object) -> None:
         """Process a message of the station; an invalid one is ignored."""
@@ -58,12 +61,19 @@ class Confirmations:
         return confirmed
 
     async def wait(self, numbers: Set[int], seconds: float) -> set[int]:
-        """Wait until all are confirmed, the time is over or the subscription has ended; the confirmed numbers."""
-        deadline = asyncio.get_running_loop().time() + seconds
+        """Wait until all are confirmed, the time is over or the subscription has ended; the confirmed numbers.
+
+        After the first ones it waits for the others only while more come within QUIET.
+        """
+        loop = asyncio.get_running_loop()
+        deadline = loop.time() + seconds
         while self._listening and not numbers <= self._confirmed:
+            remaining = deadline - loop.time()
             self._news.clear()
             try:
-                await wait_with_timeout(deadline - asyncio.get_running_loop().time(), self._news.wait())
+                await wait_with_timeout(
+                    remaining if numbers.isdisjoint(self._confirmed) else min(remaining, QUIET), self._news.wait()
+                )
             except asyncio.TimeoutError:
                 break
         return self.collect(numbers)

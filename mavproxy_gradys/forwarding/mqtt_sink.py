@@ -25,7 +25,7 @@ from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 
 from mavproxy_gradys.errors import NotDelivered
-from mavproxy_gradys.forwarding.confirmations import Confirmations
+from mavproxy_gradys.forwarding.confirmations import QUIET, Confirmations
 from mavproxy_gradys.forwarding.quantities import POSITION, STATUS
 from mavproxy_gradys.forwarding.readings import CONFIRMED_TOPIC, UAV, Reading, Stored, device_of
 from mavproxy_gradys.net.addresses import split_url
@@ -105,9 +105,10 @@ class MqttSink:
         confirmations, numbers = self._confirmations[status], {stored.seq for stored in batch}
         if late := confirmations.collect(numbers):
             return late
-        confirmations.expect(numbers)
+        # A reading that was not confirmed when it was published first delays the others no longer than it must.
+        timeout = CONFIRMATION_TIMEOUT if confirmations.expect(numbers) else QUIET
         published = await self._publish_all(status, batch)
-        confirmed = await confirmations.wait(published, CONFIRMATION_TIMEOUT)
+        confirmed = await confirmations.wait(published, timeout)
         if not confirmed:
             raise NotDelivered(f"{self._broker_name}: published, but no station has confirmed it", reached=True)
         return confirmed

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from mavproxy_gradys.forwarding.confirmations import MOST, Confirmations
+from mavproxy_gradys.forwarding.confirmations import MOST, QUIET, Confirmations
 
 
 def output(*numbers: Any) -> bytes:
@@ -57,3 +57,15 @@ def test_memory_is_bounded(confirmations: Confirmations) -> None:
     for first in range(0, 10 * MOST, 200):
         confirmations.expect(set(range(first, first + 200)))
     assert len(confirmations._awaited) + len(confirmations._confirmed) <= MOST + 200
+
+
+def test_those_that_stay_away_after_the_first_ones_are_not_waited_for_long(
+    loop: Any, confirmations: Confirmations
+) -> None:
+    assert confirmations.expect({1, 2, 3})
+    loop.call_later(1.0, confirmations.take, output(1))
+    loop.call_later(2.0, confirmations.take, output(2))
+    began = loop.time()
+    assert loop.run(confirmations.wait({1, 2, 3}, 20.0)) == {1, 2}
+    assert loop.time() - began == pytest.approx(2.0 + QUIET)
+    assert not confirmations.expect({3}) and confirmations.expect({3, 4})
