@@ -13,8 +13,9 @@ from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.errors import OutsideEnvelope
+from mavproxy_uavapi.core.mavlink.flight_modes import STOPPING_MODES
 from mavproxy_uavapi.core.vehicle import orders
-from mavproxy_uavapi.core.vehicle.guard import STOPPING, GuardedLink
+from mavproxy_uavapi.core.vehicle.guard import GuardedLink
 from mavproxy_uavapi.core.vehicle.registry import CLASSES
 from tests.rules import outcomes
 from tests.rules.test_fault_matrix import REQUESTS, STAGES, begin, prepare
@@ -23,7 +24,7 @@ from tests.support.envelopes import feature, square
 ROOT = Path(__file__).parents[2]
 VEHICLE = ROOT / "mavproxy_uavapi" / "core" / "vehicle"
 FAR_AWAY = {"type": "FeatureCollection", "features": [feature("elsewhere", square(50, 3000, 3000))]}
-STOP_MODES = STOPPING | {"GUIDED"}  # GUIDED is where the next setpoint of ours counts
+STOP_MODES = STOPPING_MODES | {"GUIDED"}  # GUIDED is where the next setpoint of ours counts
 
 
 @pytest.mark.parametrize("kind", CLASSES)
@@ -124,7 +125,3 @@ def stays_or_comes_down(message: Any, world: Any) -> bool:
         or isinstance(order, orders.ChangeSpeed)
         or (isinstance(order, orders.SetParameter) and order.name.startswith("PLND_"))
     )
-
-
-def test_stopping_modes_are_named_once() -> None:
-    assert {"BRAKE", "LAND", "RTL", "HOLD"} <= STOPPING

@@ -25,6 +25,9 @@ PLANES = {mavlink.MAV_TYPE_FIXED_WING, *VTOLS}
 # The modes in which ArduPilot runs its mission: AUTO, of all vehicles; a copter shows AUTO_RTL instead from the jump
 # to the mission's landing sequence on. A plane that returns along one changes to AUTO for it.
 MISSION_MODES = {"AUTO", "AUTO_RTL"}
+LANDING_MODES = {"LAND", "QLAND"}
+RETURN_MODES = {"RTL", "SMART_RTL", "QRTL"}
+STOPPING_MODES = {"BRAKE", "HOLD", *LANDING_MODES, *RETURN_MODES}  # they end a flight, or hold it
 
 
 def flies_mission(mode: str) -> bool:

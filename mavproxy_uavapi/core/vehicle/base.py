@@ -12,7 +12,14 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import ModeChanged, NotArmed, Rejected, Stale
 from mavproxy_uavapi.core.geodesy import offset
-from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission, kind_of, mode_name, mode_names, mode_number
+from mavproxy_uavapi.core.mavlink.flight_modes import (
+    STOPPING_MODES,
+    flies_mission,
+    kind_of,
+    mode_name,
+    mode_names,
+    mode_number,
+)
 from mavproxy_uavapi.core.mavlink.link import Address, Link, is_finite
 from mavproxy_uavapi.core.mavlink.pending_waits import PendingWaits
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
@@ -22,7 +29,7 @@ from mavproxy_uavapi.core.vehicle.authority import CommandAuthority, Rank, no_ob
 from mavproxy_uavapi.core.vehicle.command_sender import CommandSender
 from mavproxy_uavapi.core.vehicle.dataflash import DataflashLogs
 from mavproxy_uavapi.core.vehicle.envelope_check import Spaces
-from mavproxy_uavapi.core.vehicle.guard import STOPPING, EnvelopeGuard, GuardedLink
+from mavproxy_uavapi.core.vehicle.guard import EnvelopeGuard, GuardedLink
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.message_waiter import HEARD_WITHIN, MessageWaiter
 from mavproxy_uavapi.core.vehicle.mission_files import MissionItem
@@ -290,7 +297,7 @@ class BaseVehicle:
         """Whether it flies by a command of ours, and does not land, return or hold."""
         if not self.state.armed or self.stands or self.authority.commander is None:
             return False
-        if self.mode in STOPPING or self.mode in self.holding_modes:
+        if self.mode in STOPPING_MODES or self.mode in self.holding_modes:
             return False
         if flies_mission(self.mode):
             moves = self.authority.rank < Rank.STOP  # a plane lands by a mission, too

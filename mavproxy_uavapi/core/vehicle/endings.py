@@ -12,7 +12,7 @@ from enum import Enum
 from typing import Any
 
 from mavproxy_uavapi.core.errors import LinkLost, ModeChanged, NotArmed, Paused
-from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission
+from mavproxy_uavapi.core.mavlink.flight_modes import LANDING_MODES, RETURN_MODES, flies_mission
 from mavproxy_uavapi.core.vehicle import messages
 from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_uavapi.core.vehicle.jobs import Ending, Job, JobBook
@@ -62,8 +62,6 @@ WHAT_FOLLOWS: Mapping[Situation, Mapping[Policy, str | None]] = {
     Situation.LAND: {**NOTHING, Policy.HOLD: HOLD},
     Situation.RTL: {**NOTHING, Policy.HOLD: HOLD, Policy.LAND: LAND},
 }
-LANDINGS = {"LAND", "QLAND"}
-RETURNS = {"RTL", "SMART_RTL", "QRTL"}
 # Endings that somebody requests at that moment, or that come after a new heartbeat (leases): they wait for none.
 AT_ONCE = {Ending.ABORTED, Ending.UNLOADED, Ending.LEASE_OVER}
 # Endings that nobody requests: another station that has given the vehicle a target keeps it.
@@ -95,8 +93,8 @@ def situation(vehicle: Vehicle, modes: Collection[str] = ()) -> Situation:
         return Situation.PAUSED if vehicle.authority.paused else Situation.GUIDED
     if mode == "GUIDED" or mode not in modes:  # out of a pilot's mode it comes to stand in GUIDED
         return Situation.PILOTED
-    if mode in LANDINGS | RETURNS:
-        flown = Situation.LAND if mode in LANDINGS else Situation.RTL
+    if mode in LANDING_MODES | RETURN_MODES:
+        flown = Situation.LAND if mode in LANDING_MODES else Situation.RTL
         return Situation.IDLE if vehicle.stands else flown
     if mode == "TAKEOFF":
         return Situation.TAKEOFF

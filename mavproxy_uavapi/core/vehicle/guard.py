@@ -15,7 +15,7 @@ from mavproxy_uavapi.core.envelope import braking
 from mavproxy_uavapi.core.envelope.space import LocalFrame, Space, Spot, to_leg
 from mavproxy_uavapi.core.errors import OutsideEnvelope, Stale
 from mavproxy_uavapi.core.geodesy import moved, offset, rotate
-from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission, mode_name
+from mavproxy_uavapi.core.mavlink.flight_modes import STOPPING_MODES, flies_mission, mode_name
 from mavproxy_uavapi.core.mavlink.link import Address, Link
 from mavproxy_uavapi.core.vehicle import orders
 from mavproxy_uavapi.core.vehicle.envelope_check import Checked, EnvelopeCheck, Spaces
@@ -28,16 +28,11 @@ REACH = 200_000.0  # m from the vehicle: no target lies farther, with or without
 STAY = 1.0  # m: a target this near holds the vehicle where it is
 CORNER = 3.0  # m from a corner of its way, where the vehicle has passed it
 CHECKED_FOR = 30.0  # s for which a mission that was looked at may be started
-# The modes that end a flight, or hold it, or are watched. In any other nobody keeps the envelope.
-STOPPING = {"BRAKE", "HOLD", "LAND", "RTL", "SMART_RTL", "QLAND", "QRTL"}
-KEPT = {"GUIDED", *STOPPING}
+KEPT = {"GUIDED", *STOPPING_MODES}  # in any other mode nobody keeps the envelope
 # Parameters that decide where an autopilot flies by itself, and how long it goes on without us; in any case.
 PROTECTED = ("FENCE_", "RTL_", "SRTL_", "Q_RTL_", "GUID_", "WP_LOITER_RAD")
-
-
-STANDING = (
-    orders.ChangeSpeed | orders.SetParameter | orders.MoveHome | orders.ChangeMission
-)  # move nothing by themselves
+# What moves nothing by itself.
+STANDING = orders.ChangeSpeed | orders.SetParameter | orders.MoveHome | orders.ChangeMission
 
 
 class Ordered(NamedTuple):

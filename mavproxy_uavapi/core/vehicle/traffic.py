@@ -16,7 +16,7 @@ from mavproxy_uavapi.core.envelope.forecast import Forecast, Meeting, Pace, Slac
 from mavproxy_uavapi.core.envelope.space import LocalFrame
 from mavproxy_uavapi.core.errors import Stale, Superseded, TooNear
 from mavproxy_uavapi.core.geodesy import moved, offset
-from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission
+from mavproxy_uavapi.core.mavlink.flight_modes import LANDING_MODES, RETURN_MODES, flies_mission
 from mavproxy_uavapi.core.vehicle import cruise
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.mission_way import Stop
@@ -29,7 +29,6 @@ CERTAIN = 1.0  # s for which a vehicle that nobody commands through us keeps its
 LOOKED_AHEAD = 5.0  # s, likewise, before a command is sent
 RTL_HEIGHT = 15.0  # m; used until the vehicle's own is known
 STOPPED = {"BRAKE", "HOLD"}
-RETURNS, LANDS = {"RTL", "SMART_RTL", "QRTL"}, {"LAND", "QLAND"}
 RETRY, LONGEST_WAIT = 0.5, 120.0  # s between two looks of a command that waits, and until it is refused
 OLD = 3.0  # s; whose position is older may be anywhere on its way
 SWING = 0.5  # m beside its way that a vehicle is carried, and less than this does not count
@@ -161,9 +160,9 @@ def expected(vehicle: Any, seconds: float) -> list[Stop]:
         seconds: for which it keeps its velocity, where nothing else is known.
     """
     here = _place(vehicle)
-    if vehicle.mode in LANDS:
+    if vehicle.mode in LANDING_MODES:
         return [here, here._replace(up=_home_amsl(vehicle))]
-    if vehicle.mode in RETURNS:
+    if vehicle.mode in RETURN_MODES:
         return _way_home(vehicle, here)
     planned = vehicle.guard.remaining()
     if planned and (vehicle.flies_for_us or vehicle.state.landed):

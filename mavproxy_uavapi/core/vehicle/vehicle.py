@@ -15,7 +15,7 @@ from mavproxy_uavapi.core.errors import (
     Superseded,
     TimedOut,
 )
-from mavproxy_uavapi.core.mavlink.flight_modes import flies_mission, mode_names, mode_number
+from mavproxy_uavapi.core.mavlink.flight_modes import STOPPING_MODES, flies_mission, mode_names, mode_number
 from mavproxy_uavapi.core.vehicle import arming, messages
 from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_uavapi.core.vehicle.jobs import Job
@@ -23,7 +23,6 @@ from mavproxy_uavapi.core.vehicle.mission_files import MissionItem
 from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
 from mavproxy_uavapi.core.vehicle.verbs import Verbs
 
-STOPPING_MODES = {"LAND", "RTL", "SMART_RTL", "BRAKE", "QLAND", "QRTL", "HOLD"}
 HOME_RADIUS = 10.0  # m; closer than this a vehicle on the ground is at home
 
 
