@@ -14,6 +14,7 @@ from pathlib import Path
 
 from mavproxy_uavapi.core.addresses import local_url_of
 from mavproxy_uavapi.core.settings import DEFAULT
+from mavproxy_uavapi.core.values import is_unset
 from mavproxy_uavapi.launcher.fleet import SimulatedVehicle, kinds
 from mavproxy_uavapi.launcher.options import RunOptions
 from mavproxy_uavapi.launcher.values import one_word
@@ -181,14 +182,18 @@ def sitl_binary(ardupilot_path: str, kind: str) -> Path:
     return Path(ardupilot_path, "build", "sitl", "bin", BINARIES[kind])
 
 
-def api_url(options: RunOptions) -> str:
-    """The API's URL on this machine."""
-    return local_url_of(options.host, options.port)
+def api_url(options: RunOptions, environ: Mapping[str, str]) -> str:
+    """The API's URL on this machine. The certificate is a setting of the module: any source of those may have it."""
+    settings = {"certfile": environ.get("UAVAPI_CERTFILE", ""), **dict(options.further)}
+    for module in options.module:
+        name, _, keywords = module.partition(":")
+        if name == "uavapi":
+            settings.update(json.loads(keywords or "{}"))
+    return local_url_of(options.host, options.port, tls=not is_unset(str(settings["certfile"])))
 
 
-def greeting(options: RunOptions, with_token: bool) -> str:
+def greeting(options: RunOptions, url: str, with_token: bool) -> str:
     """The text printed when the API answers: its address and, with a simulated vehicle, three lines to try."""
-    url = api_url(options)
     count = len(kinds(options))
     if count > 1:
         last = options.sysid + count - 1

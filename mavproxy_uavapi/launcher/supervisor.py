@@ -44,6 +44,7 @@ class Supervisor:
 
     def __init__(self, options: RunOptions, run_dir: Path, vehicles: Sequence[SimulatedVehicle]) -> None:
         self.options = options
+        self.url = command_lines.api_url(options, os.environ)
         self.run_dir = run_dir
         self.simulated = vehicles
         self.tag = uuid.uuid4().hex
@@ -216,22 +217,22 @@ class Supervisor:
 
     async def _announce(self) -> None:
         """Print the API's address when it answers. Without a prompt, an API that does not answer ends the run."""
-        url = command_lines.api_url(self.options)
         deadline = asyncio.get_running_loop().time() + API_START_S
-        status = await answers(self.options)
+        status = await answers(self.url)
         while status is None or (status == 503 and self.options.simulated):
             self._check_api_loaded()
             if asyncio.get_running_loop().time() > deadline:
                 failure = "does not answer" if status is None else "does not see the vehicle"
-                problem = f"the API at {url} {failure} after {API_START_S:.0f} s (log: {self._where()})"
+                problem = f"the API at {self.url} {failure} after {API_START_S:.0f} s (log: {self._where()})"
                 if self.options.headless:
                     raise LaunchError(problem)
                 complain(problem)
                 return
             await asyncio.sleep(0.2)
-            status = await answers(self.options)
+            status = await answers(self.url)
         self.came_up = True
-        print("\n" + command_lines.greeting(self.options, bool(os.environ.get("UAVAPI_TOKEN"))), flush=True)
+        with_token = bool(os.environ.get("UAVAPI_TOKEN"))
+        print("\n" + command_lines.greeting(self.options, self.url, with_token), flush=True)
 
     def _check_api_loaded(self) -> None:
         """Do not wait for the API if MAVProxy could not load its module; MAVProxy reports that and goes on.

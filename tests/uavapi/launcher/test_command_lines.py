@@ -86,7 +86,7 @@ def test_token_is_on_no_command_line_and_in_no_greeting(monkeypatch):
     lines = [
         *command_lines.mavproxy_command(options, ["m"], Path("/run"), simulated(0), Path("/run/uavapi.ini")),
         *command_lines.embedded_command(options, *simulated(0)),
-        command_lines.greeting(options, with_token=True),
+        command_lines.greeting(options, "http://127.0.0.1:8000", with_token=True),
         command_lines.settings_file(options) or "",
     ]
     assert "very-secret" not in " ".join(lines)
@@ -94,16 +94,36 @@ def test_token_is_on_no_command_line_and_in_no_greeting(monkeypatch):
 
 
 def test_greeting_has_three_lines_to_try_for_a_simulated_vehicle():
-    lines = command_lines.greeting(RunOptions(simulated=True, port=8001), with_token=False).splitlines()
+    lines = command_lines.greeting(RunOptions(simulated=True), "http://127.0.0.1:8001", with_token=False).splitlines()
     assert lines == [
         "API of vehicle 10: http://127.0.0.1:8001",
         "  curl http://127.0.0.1:8001/command/arm",
         "  curl 'http://127.0.0.1:8001/command/takeoff?alt=10'",
         "  curl http://127.0.0.1:8001/telemetry/gps",
     ]
-    assert command_lines.greeting(RunOptions(), with_token=False).count("\n") == 0
-    rover = command_lines.greeting(RunOptions(simulated=True, vehicle="rover"), with_token=False)
+    assert command_lines.greeting(RunOptions(), "http://127.0.0.1:8000", with_token=False).count("\n") == 0
+    options = RunOptions(simulated=True, vehicle="rover")
+    rover = command_lines.greeting(options, "http://127.0.0.1:8000", with_token=False)
     assert "takeoff" not in rover and rover.count("\n") == 3
+
+
+@pytest.mark.parametrize(
+    ("text", "arguments", "environ", "scheme"),
+    [
+        ("", [], {}, "http"),
+        ("certfile = /c.pem\nkeyfile = /k.pem\n", [], {}, "https"),
+        ("", [], {"UAVAPI_CERTFILE": "/c.pem"}, "https"),
+        ("", [], {"UAVAPI_CERTFILE": "none"}, "http"),
+        ("", ["--module", 'uavapi:{"certfile":"/c.pem","keyfile":"/k.pem"}'], {}, "https"),
+    ],
+)
+def test_url_is_that_of_tls_whichever_source_has_the_certificate(
+    tmp_path: Path, text: str, arguments: list[str], environ: dict[str, str], scheme: str
+) -> None:
+    file = tmp_path / "uav.ini"
+    file.write_text(f"[api]\nport = 8005\n{text}", encoding="utf-8")
+    options = parse(["--config", str(file), *arguments], environ=environ)
+    assert command_lines.api_url(options, environ) == f"{scheme}://127.0.0.1:8005"
 
 
 def test_the_modules_own_keys_of_the_file_reach_the_module(tmp_path: Path) -> None:
