@@ -216,7 +216,14 @@ class Supervisor:
         return process
 
     async def _announce(self) -> None:
-        """Print the API's address when it answers. Without a prompt, an API that does not answer ends the run."""
+        """Print the API's address when it answers.
+
+        An API that does not answer ends the run of a simulation without a prompt, which nobody would look at. A
+        vehicle keeps its MAVProxy: it may fly.
+
+        Raises:
+            LaunchError: the API does not answer, as above; or see `_check_api_loaded`.
+        """
         deadline = asyncio.get_running_loop().time() + API_START_S
         status = await answers(self.url)
         while status is None or (status == 503 and self.options.simulated):
@@ -224,7 +231,7 @@ class Supervisor:
             if asyncio.get_running_loop().time() > deadline:
                 failure = "does not answer" if status is None else "does not see the vehicle"
                 problem = f"the API at {self.url} {failure} after {API_START_S:.0f} s (log: {self._where()})"
-                if self.options.headless:
+                if self.options.headless and self.options.simulated:
                     raise LaunchError(problem)
                 complain(problem)
                 return

@@ -44,7 +44,9 @@ class Api(http.server.BaseHTTPRequestHandler):
     def log_message(self, *_):
         pass
 server = http.server.HTTPServer(("127.0.0.1", json.loads(load.partition("uavapi:")[2])["port"]), Api)
-if mode != "no module":
+if mode == "silent":
+    server.server_close()
+elif mode != "no module":
     threading.Thread(target=server.serve_forever, daemon=True).start()
 if "--daemon" in sys.argv:
     stop.wait()
@@ -75,6 +77,8 @@ from mavproxy_uavapi.launcher import cli, command_lines
 environment.mavproxy_program = lambda: [sys.executable, {mavproxy!r}]
 command_lines.embedded_command = lambda *_: [sys.executable, {vehicle!r}]
 instances.ports_are_free = lambda _: True
+if os.environ["FAKE_MODE"] == "silent":
+    supervisor.API_START_S = 0.3
 supervisor.MAVPROXY_GRACE_S = supervisor.PROMPT_GRACE_S = supervisor.MAVPROXY_FORCED_S = 0.3
 sys.exit(cli.run())
 """
@@ -231,6 +235,23 @@ def test_api_that_cannot_load_ends_the_wait_in_mavproxys_words(launched):
     run = launched("--simulated", mode="no module")
     assert run.status() == 1
     assert "mavproxy-uavapi: Failed to load module: uavapi: no setting 'x'. (log: " in run.out
+    assert run.ours() == []
+
+
+def test_api_that_never_answers_leaves_a_vehicle_its_mavproxy(launched):
+    run = launched(mode="silent")
+    assert eventually(lambda: "does not answer after" in run.out or run.process.poll() is not None)
+    time.sleep(0.5)
+    assert run.process.poll() is None and is_alive(run.pids["mavproxy"]), run.out
+    run.process.terminate()
+    assert run.status() == 0
+    assert run.ours() == []
+
+
+def test_api_that_never_answers_ends_a_simulation_that_nobody_looks_at(launched):
+    run = launched("--simulated", mode="silent")
+    assert run.status() == 1
+    assert f"the API at http://127.0.0.1:{run.port} does not answer after" in run.out
     assert run.ours() == []
 
 
