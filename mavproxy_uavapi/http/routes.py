@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+import functools
+
+from aiohttp import web
 
 from mavproxy_uavapi.http import (
     authority,
@@ -21,6 +23,7 @@ from mavproxy_uavapi.http import (
     requests,
     scripts,
     settings,
+    static_files,
     stream,
     telemetry,
     tiles,
@@ -29,12 +32,19 @@ from mavproxy_uavapi.http import (
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.fleet import fleet_routes
 from mavproxy_uavapi.http.openapi import document
+from mavproxy_uavapi.http.responses import dumps
 from mavproxy_uavapi.http.route import ADMIN, EITHER, FLY, POST, WATCH, Route
 
 
-async def specification(call: Call) -> dict[str, Any]:
+async def specification(call: Call) -> web.StreamResponse:
     """The description of this API, OpenAPI 3.1, including the routes of other loaded modules."""
-    return document([*ROUTES, *call.service.host.extensions.values()])
+    body = _specification(tuple(call.service.host.extensions.values()))
+    return static_files.answer(call.request, body, "application/json", {"Cache-Control": "no-cache"})
+
+
+@functools.lru_cache(maxsize=1)  # it takes a tenth of a second, and any stranger may ask
+def _specification(extensions: tuple[Route, ...]) -> bytes:
+    return dumps(document([*ROUTES, *extensions])).encode()
 
 
 COMMAND = [

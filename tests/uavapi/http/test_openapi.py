@@ -9,7 +9,7 @@ from pydantic import Field
 
 from mavproxy_uavapi.core import errors
 from mavproxy_uavapi.core.errors import UavApiError
-from mavproxy_uavapi.http import examples, requests
+from mavproxy_uavapi.http import examples, requests, routes
 from mavproxy_uavapi.http.openapi import BY_PATH, KINDS, RAW_BODIES, TAGS, document, example_of, simplified
 from mavproxy_uavapi.http.route import FLY, Route
 from mavproxy_uavapi.http.routes import ROUTES
@@ -168,3 +168,28 @@ def test_routes_of_other_modules_are_described_too(api: Any, service: Any) -> No
     assert reported["description"].startswith("All the way.")
     assert body["openapi"] == "3.1.0"
     assert "extra" in [tag["name"] for tag in body["tags"]]
+
+
+def test_it_is_made_once_for_all_strangers_until_a_module_comes_or_goes(
+    api: Any, loop: Any, service: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[int] = []
+
+    def counted(all_routes: Any) -> Any:
+        made.append(len(all_routes))
+        return document(all_routes)
+
+    async def ask(**headers: str) -> Any:
+        async with api.client.get("/openapi.json", headers=headers) as response:
+            return response, await response.read()
+
+    monkeypatch.setattr(routes, "document", counted)
+    routes._specification.cache_clear()
+    response, body = loop.run(ask())
+    assert (response.content_type, response.charset) == ("application/json", "utf-8")
+    assert loop.run(ask())[1] == body
+    again, nothing = loop.run(ask(**{"If-None-Match": response.headers["ETag"]}))
+    assert (again.status, nothing) == (304, b"")
+    service.host.extensions["/extra/look"] = Route("/extra/look", routes.specification, requests.Empty, FLY)
+    assert b"/extra/look" in loop.run(ask())[1]
+    assert made == [len(ROUTES), len(ROUTES) + 1]
