@@ -120,7 +120,7 @@ class Scripts:
             await tmux.start(run.session, [sys.executable, "-I", runner.__file__, str(run.path)], run.path)
             run = await self._started(run)
         except ToolFailed:
-            await tmux.kill(run.session)
+            await tmux.kill(run.session, run.path)
             self._trusted.pop(run.session, None)
             await asyncio.to_thread(runs.discard, run)
             raise

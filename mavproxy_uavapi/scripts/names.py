@@ -43,8 +43,11 @@ def stem(script: str) -> str:
 
 
 def session_name(sysid: int, run: str) -> str:
-    """The tmux session of a run: `run` is `<stem>_<timestamp>`. tmux allows neither '.' nor ':' in a name."""
-    return f"{session_prefix(sysid)}{run.replace('.', '_')}"
+    """The tmux session of a run: `run` is `<stem>_<timestamp>`. tmux allows neither '.' nor ':' in a name.
+
+    No other run has the same: a script's name has no '+'.
+    """
+    return f"{session_prefix(sysid)}{run.replace('.', '+')}"
 
 
 def session_prefix(sysid: int) -> str:

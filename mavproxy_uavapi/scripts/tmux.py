@@ -37,10 +37,11 @@ async def start(session: str, command: Sequence[str], record: Path) -> None:
         raise ToolFailed(f"tmux could not start session {session}", result.stderr.strip())
 
 
-async def kill(session: str) -> None:
-    """End a session, if there is one."""
+async def kill(session: str, record: Path) -> None:
+    """End the session of that record, if there is one; a session of the same name may be another MAVProxy's."""
     with contextlib.suppress(ToolFailed):
-        await _tmux("kill-session", "-t", f"={session}")
+        if (await sessions(session)).get(session) == record:
+            await _tmux("kill-session", "-t", f"={session}")
 
 
 async def sessions(prefix: str) -> dict[str, Path | None]:

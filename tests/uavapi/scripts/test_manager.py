@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from mavproxy_uavapi.core.errors import BadRequest, NotFound, NoVehicle, ToolFailed
-from mavproxy_uavapi.scripts import manager, tmux
+from mavproxy_uavapi.scripts import manager, names, tmux
 from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.settings import ApiModuleSettings
 
@@ -129,6 +129,38 @@ def test_what_cannot_be_started_is_an_error_and_leaves_nothing(tmp_path: Path) -
 
     flown(tmp_path, story, python_path="/no/such/python")
     assert list((tmp_path / "logs").iterdir()) == []
+
+
+@pytest.mark.needs("tmux")
+@pytest.mark.usefixtures("own_tmux")
+def test_script_that_cannot_be_started_leaves_the_session_of_its_name_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(names, "session_name", lambda *_: "uavapi_9_a")
+
+    async def story(scripts: Scripts) -> None:
+        await scripts.save("a.py", SLEEPS)
+        await scripts.save("b.py", SLEEPS)
+        await scripts.execute("a", [])
+        with pytest.raises(ToolFailed, match="duplicate session"):
+            await scripts.execute("b", [])
+        await up(scripts, "a.py")
+        assert [run.script for run in await scripts.running()] == ["a.py"]
+
+    flown(tmp_path, story)
+    assert not list((tmp_path / "logs").glob("b_*"))
+
+
+@pytest.mark.needs("tmux")
+@pytest.mark.usefixtures("own_tmux")
+def test_scripts_whose_names_differ_in_a_dot_begin_in_the_same_second(tmp_path: Path) -> None:
+    async def story(scripts: Scripts) -> None:
+        for name in ("survey.v2.py", "survey_v2.py"):
+            await scripts.save(name, SLEEPS)
+            await scripts.execute(name, [])
+        assert [run.script for run in await scripts.running()] == ["survey.v2.py", "survey_v2.py"]
+
+    flown(tmp_path, story)
 
 
 def test_without_tmux_execute_is_a_clear_error_and_all_else_works(

@@ -50,7 +50,11 @@ def test_py_is_added_where_no_extension_is_given(name: str, script: str) -> None
 
 
 def test_session_names_hold_nothing_that_tmux_would_change() -> None:
-    assert names.session_name(7, "v1.2_20260102_030405") == "uavapi_7_v1_2_20260102_030405"
+    assert names.session_name(7, "v1.2_20260102_030405") == "uavapi_7_v1+2_20260102_030405"
+
+
+def test_names_that_differ_in_a_dot_have_sessions_of_their_own() -> None:
+    assert names.session_name(7, "v1.2_20260102_030405") != names.session_name(7, "v1_2_20260102_030405")
 
 
 def test_every_vehicles_sessions_share_a_prefix() -> None:

@@ -36,7 +36,9 @@ def test_end_of_the_session_stops_the_script(make_run: Callable[..., runs.Run], 
     run = make_run("trap 'echo landing; exit 0' INT; echo up; while true; do sleep 0.1; done")
     asyncio.run(tmux.start(run.session, [sys.executable, "-I", runner.__file__, str(run.path)], run.path))
     eventually(lambda: runs.tail(run.out_log))
-    asyncio.run(tmux.kill(run.session))
+    asyncio.run(tmux.kill(run.session, Path("/another")))
+    assert asyncio.run(tmux.sessions("uavapi_")) == {run.session: run.path}
+    asyncio.run(tmux.kill(run.session, run.path))
     eventually(lambda: runs.load(run.path).ended_at)
     assert run.out_log.read_text() == "up\nlanding\n"
 
