@@ -60,9 +60,9 @@ class Scripts:
     # -- life ---------------------------------------------------------------------------------------------
 
     async def start(self) -> None:
-        """Find the running scripts of an earlier API by their sessions."""
+        """Find the running scripts of an earlier API on this port, whichever vehicle it flew, by their sessions."""
         try:
-            records = await tmux.sessions(names.session_prefix(self._settings.sysid))
+            records = await tmux.sessions(names.SESSIONS)
         except ToolFailed as error:
             log.info("%s", error)  # execute will say so too
             return

@@ -8,6 +8,7 @@ from pathlib import PurePath
 from mavproxy_uavapi.core.errors import BadRequest
 
 SUFFIXES = (".py", ".sh")
+SESSIONS = "uavapi_"  # begins the names of all our tmux sessions
 LONGEST = 100  # characters; the name of a log, with its timestamp, must fit into 255 bytes
 ALLOWED = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]*")
 
@@ -47,9 +48,5 @@ def session_name(sysid: int, run: str) -> str:
 
     No other run has the same: a script's name has no '+'.
     """
-    return f"{session_prefix(sysid)}{run.replace('.', '+')}"
-
-
-def session_prefix(sysid: int) -> str:
-    """The prefix of the sessions of a vehicle's scripts; of every vehicle's if `sysid` is 0."""
-    return f"uavapi_{sysid}_" if sysid else "uavapi_"
+    vehicle = f"{sysid}_" if sysid else ""
+    return f"{SESSIONS}{vehicle}{run.replace('.', '+')}"

@@ -94,7 +94,7 @@ def test_running_script_is_not_started_twice_and_stops(tmp_path: Path) -> None:
 
 @pytest.mark.needs("tmux")
 @pytest.mark.usefixtures("own_tmux")
-def test_next_api_finds_the_scripts_of_the_last_one_and_no_others(tmp_path: Path) -> None:
+def test_next_api_of_the_port_finds_the_scripts_of_the_last_one_whichever_vehicle_it_flies(tmp_path: Path) -> None:
     async def begin(scripts: Scripts) -> None:
         await scripts.save("a.py", SLEEPS)
         await scripts.execute("a", ["x"])
@@ -113,8 +113,8 @@ def test_next_api_finds_the_scripts_of_the_last_one_and_no_others(tmp_path: Path
 
     flown(tmp_path, begin)
     assert flown(tmp_path, find) == ["a.py"]
-    assert flown(tmp_path, find, sysid=0) == ["a.py"]
-    assert flown(tmp_path, find, sysid=90) == flown(tmp_path, find, port=8001) == []
+    assert flown(tmp_path, find, sysid=0) == flown(tmp_path, find, sysid=90) == ["a.py"]
+    assert flown(tmp_path, find, port=8001) == [], "another MAVProxy's scripts are not ours"
     assert flown(tmp_path / "elsewhere", find_and_stop).exit_status == -2
 
 

@@ -58,6 +58,5 @@ def test_names_that_differ_in_a_dot_have_sessions_of_their_own() -> None:
 
 
 def test_every_vehicles_sessions_share_a_prefix() -> None:
-    assert names.session_name(7, "a").startswith(names.session_prefix(0))
-    assert not names.session_name(7, "a").startswith(names.session_prefix(70))
-    assert not names.session_name(70, "a").startswith(names.session_prefix(7))
+    assert [names.session_name(sysid, "a") for sysid in (0, 7)] == ["uavapi_a", "uavapi_7_a"]
+    assert names.SESSIONS == "uavapi_"
