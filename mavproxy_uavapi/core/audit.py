@@ -38,7 +38,7 @@ class Entry:
         verb: its path.
         request: its validated parameters.
         system: the vehicle's system id; 0 when there was none.
-        outcome: `ok`, or the code of the error.
+        outcome: `ok`, `partly` where something of it failed, or the code of the error.
         detail: the result, or the sentence of the error.
         seconds: from request to answer.
         sent: names of the messages that reached the link for it, as `SentNames` has them.

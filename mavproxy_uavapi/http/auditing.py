@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import asyncio
+import json
+
+from aiohttp import web
 
 from mavproxy_uavapi.core.audit import Entry, utc_now
 from mavproxy_uavapi.core.errors import NoVehicle, UavApiError
 from mavproxy_uavapi.core.sent_messages import SentNames, noting_sent
 from mavproxy_uavapi.http.call import Call
-from mavproxy_uavapi.http.responses import Answer
+from mavproxy_uavapi.http.responses import MULTI_STATUS, Answer
 from mavproxy_uavapi.http.route import Action
 
 GONE = "the client hung up"
@@ -27,8 +30,17 @@ async def audited(call: Call, action: Action) -> Answer:
         except asyncio.CancelledError:
             trace.leave_at_end("client_gone", GONE)
             raise
-    trace.leave_at_end("ok", answer.get("result", "") if isinstance(answer, dict) else "")
+    trace.leave_at_end(*_outcome_of(answer))
     return answer
+
+
+def _outcome_of(answer: Answer) -> tuple[str, str]:
+    """The outcome and the detail of an answer that is no error."""
+    if isinstance(answer, dict):
+        return "ok", answer.get("result", "")
+    if isinstance(answer, web.Response) and answer.status == MULTI_STATUS:
+        return "partly", json.loads(answer.text or "{}").get("result", "")
+    return "ok", ""
 
 
 class Trace:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
 from typing import Any
 
 from mavproxy_uavapi.core.envelope import formats
@@ -12,6 +13,7 @@ from mavproxy_uavapi.core.errors import BadRequest, NotFound
 from mavproxy_uavapi.http.access import require_owner
 from mavproxy_uavapi.http.bodies import in_time
 from mavproxy_uavapi.http.call import Call
+from mavproxy_uavapi.http.requests import UploadedFile
 from mavproxy_uavapi.http.responses import Answer, envelope
 
 
@@ -30,6 +32,7 @@ async def put(call: Call) -> Answer:
     """
     require_owner(call, "who may set an envelope")
     body = await in_time(call.request.read())
+    call.remembered = UploadedFile(sha256=hashlib.sha256(body).hexdigest())
     try:
         text = body.decode("utf-8")
     except UnicodeDecodeError as error:

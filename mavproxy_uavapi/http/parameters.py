@@ -79,10 +79,12 @@ async def load_parameters(call: Call) -> Answer:
     vehicle = call.vehicle
     values = parse(NewValues, "body", {"parameters": await _values(call)})
     assert isinstance(values, NewValues)
+    call.remembered = values
     done, failures = await _set_all(
         vehicle, {name.upper(): float(value) for name, value in values.parameters.items()}
     )
-    result = f"{len(done)} of {len(done) + len(failures)} parameters are set"
+    missing = f", but not {', '.join(failures)}" if failures else ""
+    result = f"{len(done)} of {len(done) + len(failures)} parameters are set{missing}"
     body = call.answer(result, parameters=done, failed=failures)
     return web.json_response(body, status=MULTI_STATUS, dumps=dumps) if failures else body
 

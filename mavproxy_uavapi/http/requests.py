@@ -216,6 +216,13 @@ class ScriptLog(Request):
     follow: Annotated[bool, Field(description="as Server-Sent Events, until the run ends")] = False
 
 
+class UploadedFile(Request):
+    """What the audit trail has of a file: its name, if it came with one, and the hash of its contents."""
+
+    file: str | None = None
+    sha256: str
+
+
 class MissionFile(Request):
     """An uploaded mission: a QGC WPL 110 file, a .plan file, or JSON items."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import json
 import time
 from contextlib import suppress
@@ -14,7 +15,7 @@ from mavproxy_uavapi.core.errors import NotFound
 from mavproxy_uavapi.http.access import require_owner
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.forms import file_of
-from mavproxy_uavapi.http.requests import ExecuteScript, ScriptLog, ScriptName
+from mavproxy_uavapi.http.requests import ExecuteScript, ScriptLog, ScriptName, UploadedFile
 from mavproxy_uavapi.http.responses import dumps, envelope
 from mavproxy_uavapi.http.streaming import COMMENT, KEEP_ALIVE, EventStream
 from mavproxy_uavapi.scripts import names, runs
@@ -33,6 +34,8 @@ async def upload_script(call: Call) -> dict[str, Any]:
     """Save a .py or .sh file, sent as the multipart field `file`; it replaces one of the same name."""
     scripts = _scripts(call)
     name, data = await file_of(call.request, scripts.store.size_limit, names.checked)
+    digest = await asyncio.to_thread(hashlib.sha256, data)
+    call.remembered = UploadedFile(file=name, sha256=digest.hexdigest())
     path = await scripts.save(name, data)
     return _answer(call, SAVED, info=f"Mission File '{name}' saved at {path} successfully.")
 

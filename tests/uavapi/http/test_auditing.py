@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import json
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -14,6 +15,7 @@ from mavproxy_uavapi.http.requests import Empty
 from mavproxy_uavapi.http.route import FLY, POST, Route
 from mavproxy_uavapi.scripts.on_exit import after_death
 from mavproxy_uavapi.scripts.runs import Run
+from tests.support.envelopes import FIELD
 
 
 def run_of(script: str) -> Run:
@@ -68,6 +70,13 @@ def test_job_that_succeeds_without_its_client_is_traced_with_its_result(
     (entry,) = service.host.audit.entries
     assert entry.outcome == "ok"
     assert "Copter braking" in entry.detail
+
+
+def test_envelope_is_in_it_by_its_hash(service: Any, api: Any, loop: Any) -> None:
+    body = json.dumps(FIELD).encode()
+    assert loop.run(api.ask("PUT", "/envelope", data=body)).status == 200
+    (entry,) = service.host.audit.entries
+    assert entry.request == {"sha256": hashlib.sha256(body).hexdigest()}
 
 
 def test_route_that_is_not_audited_leaves_no_trace(service: Any, api: Any, host: Any) -> None:

@@ -54,12 +54,15 @@ def test_a_value_that_is_never_confirmed_is_504(api: Any, drone: Any, monkeypatc
     assert (answer := put(api, "WPNAV_SPEED", 500)).status == 504, answer.body
 
 
-def test_many_are_set_and_each_failure_is_reported(api: Any, drone: Any) -> None:
+def test_many_are_set_and_each_failure_is_reported(api: Any, drone: Any, host: Any) -> None:
     body = {"parameters": {"wpnav_speed": 600, "RTL_ALT": 2000, "NO_SUCH": 1}}
     answer = api.post("/parameters", body)
     assert answer.status == 207
     assert answer.body["parameters"] == {"WPNAV_SPEED": 600.0, "RTL_ALT": 2000.0}
     assert answer.body["failed"]["NO_SUCH"]["code"] == "not_found"
+    (entry,) = host.audit.entries
+    assert entry.request == body
+    assert (entry.outcome, entry.detail) == ("partly", "2 of 3 parameters are set, but not NO_SUCH")
 
 
 def test_a_param_file_goes_out_and_in_again(api: Any, drone: Any, loop: Any) -> None:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import hashlib
 import io
 import json
 import tracemalloc
@@ -76,6 +77,12 @@ def test_upload_of_an_unfit_name_is_400_and_saves_nothing(api: Any, scripts: Any
     answer = upload(api, name)
     assert (answer.status, answer.body["code"]) == (400, "bad_request")
     assert not scripts.store.folder.exists()
+
+
+def test_upload_is_in_the_trail_by_its_name_and_hash(api: Any, scripts: Any, host: Any) -> None:
+    upload(api, data=b"print(2)\n")
+    (entry,) = host.audit.entries
+    assert entry.request == {"file": "a.py", "sha256": hashlib.sha256(b"print(2)\n").hexdigest()}
 
 
 def test_upload_without_a_file_is_400(api: Any, scripts: Any) -> None:
