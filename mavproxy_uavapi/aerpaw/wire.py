@@ -5,22 +5,55 @@ from __future__ import annotations
 import io
 import pickle
 import sys
+from collections import OrderedDict, deque
+from collections.abc import Callable
 from typing import Any
 
 from mavproxy_uavapi.aerpaw import geometry
 
 # The data types of the standard library, numpy and aerpawlib, by their names in a pickle.
 PLAIN = {
-    "builtins": {"bytearray", "complex", "frozenset", "range", "set", "slice"},
-    "collections": {"OrderedDict", "deque"},
+    "builtins": {"complex", "slice"},
     "datetime": {"date", "datetime", "time", "timedelta", "timezone"},
     "decimal": {"Decimal"},
-    "numpy": {"dtype", "ndarray"},
-    "numpy.core.multiarray": {"_reconstruct", "scalar"},
-    "numpy._core.multiarray": {"_reconstruct", "scalar"},
+    "numpy": {"dtype"},
+    "numpy.core.multiarray": {"scalar"},
+    "numpy._core.multiarray": {"scalar"},
     "_codecs": {"encode"},
 }
 OURS = {"Coordinate": geometry.Coordinate, "VectorNED": geometry.VectorNED}
+
+
+def _made_of(kind: type, *parts: type) -> Callable[..., Any]:
+    """The type as a function that takes only such data."""
+
+    def make(*data: Any) -> Any:
+        if data and not isinstance(data[0], parts):
+            raise pickle.UnpicklingError(f"a {kind.__name__} of {type(data[0]).__name__} is not accepted")
+        return kind(*data)
+
+    return make
+
+
+def _empty_array(*_: Any) -> Any:
+    """The array that the rest of its pickle fills."""
+    import numpy as np  # noqa: PLC0415  only where a peer sends one
+
+    return np.empty(0)
+
+
+# What stands in for types that take more than a pickle gives them. Of a range, a number of bytes or an array's shape
+# a message of a few bytes would make something huge, or never be read.
+STAND_INS: dict[tuple[str, str], Callable[..., Any] | None] = {
+    ("builtins", "bytearray"): _made_of(bytearray, bytes),
+    ("builtins", "frozenset"): _made_of(frozenset, list),
+    ("builtins", "set"): _made_of(set, list),
+    ("collections", "OrderedDict"): _made_of(OrderedDict, list, tuple),
+    ("collections", "deque"): _made_of(deque, list, tuple),
+    ("numpy", "ndarray"): None,  # only `_reconstruct` gets it
+    ("numpy.core.multiarray", "_reconstruct"): _empty_array,
+    ("numpy._core.multiarray", "_reconstruct"): _empty_array,
+}
 
 
 class _Unpickler(pickle.Unpickler):
@@ -35,6 +68,8 @@ class _Unpickler(pickle.Unpickler):
             return OURS[name]
         if name in PLAIN.get(module, ()):
             return super().find_class(module, name)
+        if (module, name) in STAND_INS:
+            return STAND_INS[module, name]
         one = getattr(sys.modules.get(module), name, None) if module == self._module else None
         if isinstance(one, type) and one.__module__ == module:
             return one

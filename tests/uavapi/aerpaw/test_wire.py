@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 import os
 import pickle
+from collections import OrderedDict, deque
 from dataclasses import dataclass
 from typing import Any
 
@@ -46,6 +47,46 @@ def test_places_of_peers_are_places_here() -> None:
 )
 def test_plain_data_is_taken(value: Any) -> None:
     assert wire.read(as_sent(value), "mission") == {"value": value}
+
+
+@pytest.mark.parametrize("protocol", [3, 4])
+@pytest.mark.parametrize(
+    "value", [frozenset({1}), set(), OrderedDict(a=1), deque([1, 2]), deque([1, 2], 5), bytearray(b"x"), bytearray()]
+)
+def test_containers_are_taken_with_their_contents(value: Any, protocol: int) -> None:
+    taken = wire.read(pickle.dumps({"value": value}, protocol), "mission")["value"]
+    assert (type(taken), taken) == (type(value), value)
+
+
+def test_arrays_are_taken() -> None:
+    numpy = pytest.importorskip("numpy")
+    taken = wire.read(as_sent(numpy.arange(6.0).reshape(2, 3)), "mission")["value"]
+    assert (taken.dtype, taken.tolist()) == (numpy.dtype("f8"), [[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]])
+    assert wire.read(as_sent(numpy.float32(1.5)), "mission") == {"value": 1.5}
+
+
+class Calls:
+    """What is pickled as a call of a function."""
+
+    def __init__(self, function: Any, *args: Any) -> None:
+        self.call = function, args
+
+    def __reduce__(self) -> Any:
+        return self.call
+
+
+def test_few_bytes_do_not_become_many() -> None:
+    numpy = pytest.importorskip("numpy")
+    huge = Calls(numpy.ndarray, (10**7,), "b")
+    for one in (
+        Calls(deque, Calls(range, 10**7), 0),
+        Calls(bytearray, 10**7),
+        huge,
+        Calls(deque, huge, 0),
+        Calls(set, "text"),
+    ):
+        with pytest.raises(ValueError, match=r"not accepted|not callable"):
+            wire.read(as_sent(one), "mission")
 
 
 def test_classes_of_the_script_itself_are_taken() -> None:
