@@ -122,7 +122,7 @@ class Scripts:
         except ToolFailed:
             await tmux.kill(run.session, run.path)
             self._trusted.pop(run.session, None)
-            await asyncio.to_thread(runs.discard, run)
+            await asyncio.to_thread(runs.discard, run.path)
             raise
         self._watch(run)
         log.info("%s runs in session %s", run.script, run.session)

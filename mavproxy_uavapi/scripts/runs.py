@@ -119,10 +119,11 @@ def create(
     """Create the files of a new run: record, environment (only for the runner) and two empty logs.
 
     Raises:
-        OSError: they cannot be written.
+        OSError: they cannot be written; none of them is left.
     """
     logs.mkdir(parents=True, exist_ok=True)
     started_at, name = _new_name(logs, script)
+    path = logs / f"{name}{RECORD}"
     out_log, err_log = logs / f"{name}_out.log", logs / f"{name}_err.log"
     record = {
         "script": script,
@@ -139,13 +140,16 @@ def create(
         "operator": operator,
         "token": token,
     }
-    out_log.touch()
-    err_log.touch()
-    secret = os.open(logs / f"{name}{ENVIRONMENT}", os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-    with os.fdopen(secret, "w", encoding="utf-8") as file:
-        json.dump(dict(environment), file)
-    path = logs / f"{name}{RECORD}"
-    path.write_text(json.dumps(record), encoding="utf-8")
+    try:
+        out_log.touch()
+        err_log.touch()
+        path.write_text(json.dumps(record), encoding="utf-8")
+        secret = os.open(logs / f"{name}{ENVIRONMENT}", os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        with os.fdopen(secret, "w", encoding="utf-8") as file:
+            json.dump(dict(environment), file)
+    except OSError:
+        discard(path)
+        raise
     return load(path)
 
 
@@ -162,11 +166,10 @@ def _new_name(logs: Path, script: str) -> tuple[float, str]:
         time.sleep(1.0 - started_at % 1.0)
 
 
-def discard(run: Run) -> None:
-    """Remove the files of a run that did not begin."""
-    environment = run.path.with_name(run.path.name.replace(RECORD, ENVIRONMENT))
-    for file in (run.path, environment, run.out_log, run.err_log):
-        file.unlink(missing_ok=True)
+def discard(record: Path) -> None:
+    """Remove the files of a run that did not begin, by the path of its record."""
+    for ending in (RECORD, ENVIRONMENT, "_out.log", "_err.log"):
+        record.with_name(record.name.removesuffix(RECORD) + ending).unlink(missing_ok=True)
 
 
 def load(path: Path) -> Run:

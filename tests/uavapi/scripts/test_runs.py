@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import errno
 import json
 from collections.abc import Callable
 from dataclasses import replace
@@ -26,8 +27,22 @@ def test_second_run_in_the_same_second_waits_for_the_next(make_run: MakeRun) -> 
 
 def test_discarded_run_leaves_nothing(make_run: MakeRun) -> None:
     run = make_run()
-    runs.discard(run)
+    runs.discard(run.path)
     assert list(run.path.parent.iterdir()) == []
+
+
+@pytest.mark.parametrize("where", [(Path, "write_text"), (runs.json, "dump")], ids=["record", "environment"])
+def test_full_disk_leaves_neither_logs_nor_the_secret(
+    make_run: MakeRun, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, where: tuple[object, str]
+) -> None:
+    def full(*args: object, **_: object) -> None:
+        if args[0] != tmp_path / "a.sh":
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(*where, full)
+    with pytest.raises(OSError, match="No space"):
+        make_run()
+    assert list((tmp_path / "logs").iterdir()) == []
 
 
 def test_newest_run_comes_first_and_other_scripts_are_left_out(make_run: MakeRun) -> None:
