@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from mavproxy_uavapi.core.errors import NotFound
@@ -20,7 +21,7 @@ async def list_vehicles(call: Call) -> dict[str, Any]:
 async def show_vehicle(call: Call) -> dict[str, Any]:
     """One vehicle."""
     system, host = call.names["sysid"], call.service.host
-    if not system.isascii() or not system.isdigit() or int(system) not in host.fleet.vehicles:
-        raise NotFound(f"no vehicle {system} was heard")
+    if not re.fullmatch(r"[0-9]{1,3}", system) or int(system) not in host.fleet.vehicles:
+        raise NotFound(f"no vehicle {system[:32]} was heard")
     host.registry.use(int(system))
     return report_of_vehicle(host, host.registry.find(int(system)))

@@ -71,6 +71,11 @@ def test_a_vehicle_that_was_not_heard_is_503(two: Any, api: Any) -> None:
     assert api.get("/vehicles/9").status == 404
 
 
+def test_number_of_more_digits_than_python_converts_is_a_vehicle_that_was_not_heard(two: Any, api: Any) -> None:
+    answer = api.get(f"/vehicles/{'1' * 5000}")
+    assert (answer.status, answer.body["code"]) == (404, "not_found")
+
+
 @pytest.mark.parametrize("path", ["/vehicles/0/command/arm", "/vehicles/256/telemetry/gps", "/vehicles/x/jobs"])
 def test_what_is_no_system_id_is_404(two: Any, api: Any, path: str) -> None:
     assert api.get(path).status == 404
