@@ -146,7 +146,7 @@ class UavApiModule(SharedModule[ApiSettings]):
             await self._open_logs(settings)
             await self.api.start(settings)
         except ssl.SSLError as error:
-            return f"cannot use {settings.certfile} with {settings.keyfile}: {error.reason}"
+            return f"cannot use {settings.certfile} with {settings.keyfile}: {error.strerror}"
         except OSError as error:
             reason = os.strerror(error.errno) if error.errno else str(error)
             if error.filename is not None:

@@ -162,10 +162,15 @@ def tls_context(certfile: str, keyfile: str) -> ssl.SSLContext:
     """The TLS context of the server.
 
     Raises:
-        OSError: a file cannot be read, or is not a PEM file of that kind.
+        OSError: a file cannot be read, is not a PEM file of that kind, or has a password.
     """
     for file in (certfile, keyfile):
         Path(file).open("rb").close()  # ssl's own error does not name the file
     context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
-    context.load_cert_chain(certfile, keyfile)
+    context.load_cert_chain(certfile, keyfile, password=_no_password)
     return context
+
+
+def _no_password() -> str:
+    """ssl calls it for an encrypted key; else it would ask at the terminal and hold up the asyncio thread."""
+    raise ssl.SSLError(1, "the key has a password; `openssl pkey -in KEY -out NEW` writes it without one")

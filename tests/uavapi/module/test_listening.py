@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import socket
+import subprocess
 import threading
 import time
+from pathlib import Path
 from typing import Any
+
+import pytest
 
 from tests.support.module_loader import Loader, listens
 from tests.support.ports import free_port
@@ -29,6 +33,19 @@ def test_taken_port_is_one_line_and_another_port_helps(
         module.command(["set", "port", str(other)])
         output("listening")
         assert listens(other)
+
+
+@pytest.mark.needs("openssl")
+def test_key_with_a_password_is_one_line_and_nobody_is_asked_for_it(
+    loader: Loader, port: int, tmp_path: Path, output: Any
+) -> None:
+    key, cert = str(tmp_path / "key.pem"), str(tmp_path / "cert.pem")
+    command = ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-passout", "pass:secret", "-subj", "/CN=localhost"]
+    subprocess.run([*command, "-keyout", key, "-out", cert], check=True, capture_output=True)
+    loader.load(port=port, certfile=cert, keyfile=key)
+    line = output("cannot use")
+    assert line.startswith(f"uavapi: cannot use {cert} with {key}: the key has a password; `openssl pkey -in KEY ")
+    assert not listens(port)
 
 
 def test_set_port_restarts_there(module: Any, port: int, output: Any) -> None:
