@@ -86,7 +86,7 @@ class Api:
             return
         self.host.api_address = None
         for vehicle in self.host.registry.all():
-            vehicle.repeat_nothing()  # at once: to end scripts takes its time
+            vehicle.repeat_nothing()  # at once: what follows takes its time
         await self._tasks.end()
         self.host.send_unwaited(self._streams.closing_messages())
         await server.service.scripts.stop()

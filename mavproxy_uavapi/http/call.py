@@ -37,7 +37,6 @@ from mavproxy_uavapi.settings import ApiSettings
 
 log = logging.getLogger("uavapi.http.server")
 R = TypeVar("R", bound=Request)
-T = TypeVar("T")
 
 LONGEST_LEASE = 3600.0  # s
 CLIENT_NAME = re.compile(r"[\w.:-]{1,64}", re.ASCII)  # the query's `client`

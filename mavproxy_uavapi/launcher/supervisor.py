@@ -21,7 +21,8 @@ from mavproxy_uavapi.launcher.probe import answers
 VEHICLE_START_S = 30.0
 API_START_S = 90.0
 
-# The unload of our module ends uploaded scripts, which may be landing the vehicle; see its own grace period.
+# The unload of our modules ends the verbs in flight, each with its last messages to the vehicle, and closes what
+# vision and gradys have open. Uploaded scripts go on.
 MAVPROXY_GRACE_S = 15.0
 MAVPROXY_FORCED_S = 2.0
 

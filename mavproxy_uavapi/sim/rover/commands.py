@@ -14,7 +14,6 @@ from ..transmitter import Transmitter
 from .modes import Auto, Guided, Rtl
 from .rover import SimulatedRover
 
-SPEED_TYPES = (mavlink.SPEED_TYPE_AIRSPEED, mavlink.SPEED_TYPE_GROUNDSPEED)
 DENIED_SPEED_TYPES = (mavlink.SPEED_TYPE_CLIMB_SPEED, mavlink.SPEED_TYPE_DESCENT_SPEED, mavlink.SPEED_TYPE_ENUM_END)
 
 
