@@ -82,7 +82,7 @@ class ApiSettings:
         allow_raw: whether /message sends any MAVLink message.
         cors_origins: origins of the web pages that may call.
         certfile, keyfile: PEM files for TLS; empty for none.
-        max_jobs: verbs that may be in flight at once.
+        max_jobs: verbs that may be in flight at once for one vehicle.
         max_connections: connections that may be open at once.
         max_rate: requests per second of one caller, in the long run.
         local_rate: the same on the loopback, where there is no limit (0) unless `max_rate` was set.
@@ -288,7 +288,7 @@ class ApiModuleSettings(ModuleSettings[ApiSettings]):
             MPSetting("cors_origins", str, "", "origins of web pages that may call"),
             MPSetting("certfile", str, "", "TLS certificate (PEM)"),
             MPSetting("keyfile", str, "", "TLS key (PEM)"),
-            MPSetting("max_jobs", int, 64, "verbs in flight at once", range=(1, 10000), tab="Limits"),
+            MPSetting("max_jobs", int, 64, "verbs in flight at once for one vehicle", range=(1, 10000), tab="Limits"),
             MPSetting("max_connections", int, 200, "connections open at once", range=(32, 900)),
             MPSetting("max_rate", float, 500.0, "requests/s of one caller", range=(1, 100000)),
             MPSetting("log_console", str, "", "components that log to the console", tab="Logs"),

@@ -229,7 +229,7 @@ class Call:
 
         in_flight = sum(job.vehicle is vehicle for job in self.service.host.jobs.running())
         if in_flight >= self.service.settings.max_jobs and not urgent:
-            raise TooManyRequests(f"{in_flight} verbs are in flight already (max_jobs)")
+            raise TooManyRequests(f"{in_flight} verbs of the vehicle are in flight already (max_jobs)")
         job = self._begin(vehicle, body, outlives_client)
         script = None
         if is_async or (outlives_client and not urgent):  # other jobs end with their client, or stop the vehicle
