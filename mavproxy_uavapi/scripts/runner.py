@@ -95,7 +95,7 @@ class Runner:
         return self._end(self._child.wait())
 
     def _start(self) -> None:
-        environment = self._path.with_name(self._path.name.replace("_run.json", "_env.json"))
+        environment = self._path.with_name(self._path.name.removesuffix("_run.json") + "_env.json")
         variables: dict[str, str] = json.loads(environment.read_text(encoding="utf-8"))
         environment.unlink()  # it may hold a token
         self._child = subprocess.Popen(

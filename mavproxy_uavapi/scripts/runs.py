@@ -178,7 +178,7 @@ def load(path: Path) -> Run:
     Raises:
         OSError, ValueError: there is no valid record.
     """
-    out_log = path.with_name(path.name.replace(RECORD, "_out.log"))
+    out_log = path.with_name(path.name.removesuffix(RECORD) + "_out.log")
     # First, because a run writes its record before it ends.
     alive = _lives(out_log, path, lambda: _read(path).get("pid"))
     record = _read(path)

@@ -153,12 +153,16 @@ def test_script_that_cannot_be_started_leaves_the_session_of_its_name_alone(
 
 @pytest.mark.needs("tmux")
 @pytest.mark.usefixtures("own_tmux")
-def test_scripts_whose_names_differ_in_a_dot_begin_in_the_same_second(tmp_path: Path) -> None:
+def test_scripts_with_dots_in_their_names_begin_in_the_same_second(tmp_path: Path) -> None:
     async def story(scripts: Scripts) -> None:
-        for name in ("survey.v2.py", "survey_v2.py"):
+        for name in ("survey.v2.py", "survey_v2.py", "survey_run.json.py"):
             await scripts.save(name, SLEEPS)
             await scripts.execute(name, [])
-        assert [run.script for run in await scripts.running()] == ["survey.v2.py", "survey_v2.py"]
+        assert [run.script for run in await scripts.running()] == [
+            "survey.v2.py",
+            "survey_v2.py",
+            "survey_run.json.py",
+        ]
 
     flown(tmp_path, story)
 

@@ -25,6 +25,11 @@ def test_second_run_in_the_same_second_waits_for_the_next(make_run: MakeRun) -> 
     assert make_run().path != make_run().path
 
 
+def test_script_that_is_named_like_a_record_has_its_own_logs(make_run: MakeRun) -> None:
+    run = make_run(script="a_run.json.sh")
+    assert run.out_log.exists() and run.out_log.name == run.path.name.removesuffix("_run.json") + "_out.log"
+
+
 def test_discarded_run_leaves_nothing(make_run: MakeRun) -> None:
     run = make_run()
     runs.discard(run.path)
