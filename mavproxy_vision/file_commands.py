@@ -8,6 +8,8 @@ Raises:
 from __future__ import annotations
 
 import argparse
+import os
+from collections.abc import Callable
 from typing import NoReturn
 
 import cv2
@@ -27,6 +29,20 @@ class _Words(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         raise SettingError(f"tag FILE.pdf [--family 36h11] [--id 0] [--size 0.15]: {message}")
+
+
+def outcome(work: Callable[[], str]) -> str:
+    """The line that a command returns, or the reason why a file or OpenCV ended it.
+
+    Raises:
+        SettingError: as the command.
+    """
+    try:
+        return work()
+    except OSError as error:
+        return f"{error.filename or 'a file'}: {os.strerror(error.errno or 0)}"
+    except cv2.error as error:
+        return str(error.err)
 
 
 def calibrated(args: list[str]) -> str:

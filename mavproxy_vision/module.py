@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+import asyncio
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,8 +11,6 @@ from mavproxy_vision import opencv_install
 
 if (_problem := opencv_install.problem()) is not None:
     raise ImportError(_problem)  # MAVProxy prints the text of an ImportError as one line
-
-import cv2
 
 from mavproxy_uavapi.core.background import BackgroundCommands
 from mavproxy_uavapi.core.errors import SettingError, UavApiError
@@ -264,33 +262,17 @@ class VisionModule(SharedModule[VisionSettings]):
     # -- files -----------------------------------------------------------------------------------------------
 
     def _calibrate(self, args: list[str]) -> None:
-        self._in_background(lambda: file_commands.calibrated(args))
+        self._with_files(lambda: file_commands.calibrated(args))
 
     def _snapshot(self, args: list[str]) -> None:
-        self._in_background(lambda: file_commands.snapshot(args, self.tracker.result, self.tracker.image))
+        self._with_files(lambda: file_commands.snapshot(args, self.tracker.result, self.tracker.image))
 
     def _tag(self, args: list[str]) -> None:
         settings = self.module_settings.snapshot()
-        self._in_background(lambda: file_commands.tag(args, settings.families[0], settings.tag_list[0]))
+        self._with_files(lambda: file_commands.tag(args, settings.families[0], settings.tag_list[0]))
 
-    def _in_background(self, work: Callable[[], str]) -> None:
-        """Run slow work or disk access in the background, and print its result."""
-
-        def result() -> str:
-            try:
-                return work()
-            except OSError as error:
-                return f"{error.filename or 'a file'}: {os.strerror(error.errno or 0)}"
-            except UavApiError as error:
-                return str(error)
-            except cv2.error as error:
-                return str(error.err)
-
-        def done() -> None:
-            text = result()
-            self.host.bridge.post(lambda: print(f"vision: {text}"))
-
-        self.host.bridge.loop.call_soon_threadsafe(self.host.bridge.loop.run_in_executor, None, done)
+    def _with_files(self, work: Callable[[], str]) -> None:
+        self._background.send(lambda: asyncio.to_thread(file_commands.outcome, work))
 
 
 def reopens_camera(name: str) -> bool:

@@ -1,5 +1,9 @@
 from __future__ import annotations
 
+from typing import Any
+
+import cv2
+import numpy as np
 import pytest
 
 from mavproxy_uavapi.core.errors import SettingError
@@ -37,3 +41,15 @@ def test_the_prompts_file_commands(tmp_path):
             call()
         assert "\n" not in str(refusal.value)
     assert sorted(file.name for file in tmp_path.iterdir()) == ["a.png", "t.pdf"]
+
+
+def test_a_file_or_opencv_that_ends_a_command_is_one_line(tmp_path: Any) -> None:
+    missing = tmp_path / "none" / "t.pdf"
+    tag = file_commands.outcome(lambda: file_commands.tag([str(missing)], "36h11", Tag(0, 0.1)))
+    assert tag == f"{missing}: No such file or directory"
+
+    def resize() -> str:
+        return str(cv2.resize(np.zeros((0, 0)), (1, 1)))
+
+    assert "empty" in file_commands.outcome(resize)
+    assert file_commands.outcome(lambda: "wrote it") == "wrote it"

@@ -160,6 +160,16 @@ def test_bad_words_are_explained(running: Any, capsys: Any, main_loop: Any) -> N
     assert said_later(running, capsys, main_loop, "start") == "vision: no camera is set: " + SOURCES
 
 
+def test_commands_with_files_print_their_outcome_later(
+    running: Any, capsys: Any, main_loop: Any, tmp_path: Any
+) -> None:
+    file = tmp_path / "t.pdf"
+    assert said_later(running, capsys, main_loop, "tag", str(file)) == f"vision: wrote {file}"
+    assert said_later(running, capsys, main_loop, "snapshot", "a.png") == "vision: there is no frame yet"
+    assert said_later(running, capsys, main_loop, "calibrate").startswith("vision: calibrate FOLDER")
+    assert said_later(running, capsys, main_loop, "tag", f"{file}/x") == f"vision: {file}/x: Not a directory"
+
+
 def test_a_setting_that_does_not_exist_is_an_import_error(mpstate: Any) -> None:
     with pytest.raises(ImportError, match="vision: no setting 'nonsense'"):
         vision.init(mpstate, nonsense=1)
