@@ -18,12 +18,10 @@ from mavproxy_uavapi.core.module import SharedModule
 from mavproxy_uavapi.core.remembered_settings import RememberedSettings
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.windows import View
-from mavproxy_uavapi.http.extension import NED_REACH
-from mavproxy_vision import console, file_commands
+from mavproxy_vision import console, file_commands, flight_commands
 from mavproxy_vision.http import VisionHandlers
 from mavproxy_vision.landing.flight_jobs import FlightJobs, FlightTask
-from mavproxy_vision.landing.mission import MissionPlan
-from mavproxy_vision.settings import METHODS, VisionModuleSettings, VisionSettings
+from mavproxy_vision.settings import VisionModuleSettings, VisionSettings
 from mavproxy_vision.tracking.tracker import Tracker
 from mavproxy_vision.window_view import TagView
 
@@ -32,7 +30,6 @@ COMPLETIONS = [
     "<status|start|stop|config|tags|land|search|mission|abort|help>",
     "<calibrate|snapshot|tag> (FILENAME)",
 ]
-MISSION = ("5", "8", "-5")  # m: altitude, north, east; the seed's
 RESTARTS = {  # settings that need the camera to be opened again
     "source", "family", "tags", "any_id", "far", "calibration", "fov", "width", "height", "fps", "exposure", "gain",
     "brightness", "latency", "mount", "offset", "gimbal", "threads", "vehicle",
@@ -191,69 +188,39 @@ class VisionModule(SharedModule[VisionSettings]):
     # -- flying ----------------------------------------------------------------------------------------------
 
     def _land(self, args: list[str]) -> None:
-        method = next((word for word in args if word in METHODS), self.module_settings.snapshot().method)
-        numbers = [word for word in args if word not in METHODS]
-        number = self._id(numbers)
-        if number is not False:
-            self._fly("/vision/land", {"id": number, "method": method}, self._landing)
+        method = self.module_settings.snapshot().method
+        self._fly("/vision/land", lambda: flight_commands.land(args, method), self._landing)
 
     def _landing(self, request: dict[str, Any]) -> FlightTask:
         return self.flights.landing(self.flights.copter(), request["id"], request["method"])
 
     def _search(self, args: list[str]) -> None:
-        number = self._id(args)
-        if number is not False:
-            self._fly("/vision/search", {"id": number}, self._searching)
+        self._fly("/vision/search", lambda: flight_commands.search(args), self._searching)
 
     def _searching(self, request: dict[str, Any]) -> FlightTask:
         return self.flights.searching(self.flights.copter(), request["id"], None)
 
-    def _id(self, words: list[str]) -> Any:
-        """The id among the words; None without one, False for a wrong one."""
-        if not words:
-            return None
-        if len(words) == 1 and words[0].isdigit():
-            return int(words[0])
-        print(f"vision: {' '.join(words)!r} is not an id")
-        return False
-
     def _mission(self, args: list[str]) -> None:
-        words = [*args[:3], *MISSION[len(args) :]] if len(args) < 3 else args[:3]
-        try:
-            alt, north, east = (float(word) for word in words)
-        except ValueError:
-            print("vision: mission [ALT NORTH EAST [ID|none]], in m")
-            return
-        if not 0 < alt <= 500:
-            print("vision: the altitude is more than 0 and at most 500 m above home")
-            return
-        if not max(abs(north), abs(east)) <= NED_REACH:  # NaN is refused too
-            print(f"vision: north and east are at most {NED_REACH:g} m")
-            return
-        tag = args[3] if len(args) > 3 else ""
-        number = None if tag in ("", "none") else self._id([tag])
-        if number is False:
-            return
         method = self.module_settings.snapshot().method
-        request = {"alt": alt, "north": north, "east": east, "id": number, "tag": tag != "none", "method": method}
-        self._fly("/vision/mission", request, self._mission_task)
+        self._fly("/vision/mission", lambda: flight_commands.mission(args, method), self._mission_task)
 
     def _mission_task(self, request: dict[str, Any]) -> FlightTask:
-        r = request
-        plan = MissionPlan(r["alt"], r["north"], r["east"], None, None, r["id"], r["tag"], r["method"])
-        return self.flights.mission(self.flights.copter(), plan)
+        return self.flights.mission(self.flights.copter(), flight_commands.plan(request))
 
-    def _fly(self, path: str, request: dict[str, Any], make: Callable[[dict[str, Any]], FlightTask]) -> None:
+    def _fly(
+        self, path: str, parse: Callable[[], dict[str, Any]], make: Callable[[dict[str, Any]], FlightTask]
+    ) -> None:
         """Begin a flight and print that; print its end when it comes."""
 
-        async def begin() -> Job:
+        async def begin(request: dict[str, Any]) -> Job:
             copter = self.flights.copter()
             return self.flights.begin(copter, make(request), path, request, self._background.say)
 
-        if not self._awake():
-            return
         try:
-            job = self._run(begin())
+            request = parse()
+            if not self._awake():
+                return
+            job = self._run(begin(request))
         except UavApiError as error:
             print(f"vision: {error}")
         else:
