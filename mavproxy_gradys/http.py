@@ -17,7 +17,7 @@ from mavproxy_gradys.tracks.formats import waypoints_of
 from mavproxy_gradys.tracks.request import TrackFile, TrackRequest
 from mavproxy_uavapi.core.errors import Invalid, NoVehicle
 from mavproxy_uavapi.core.vehicle.jobs import Job
-from mavproxy_uavapi.http.extension import EITHER, FLY, POST, WATCH, Answer, Call, Empty, Request, Route
+from mavproxy_uavapi.http.extension import EITHER, FLY, POST, WATCH, Answer, Call, Empty, Request, Route, envelope
 
 MOST_READINGS = 1000  # readings in one request
 LONGEST_LIST = 64
@@ -94,12 +94,12 @@ class GradysHandlers:
 
     async def status(self, call: Call) -> dict[str, Any]:
         """The counts of pushes and readings, and their outcomes."""
-        return {"device": "uav", "id": self._id(call), "result": "Success", "info": self._gradys.report()}
+        return _answer(call, "Success", info=self._gradys.report())
 
     async def flush(self, call: Call) -> dict[str, Any]:
         """Try all stations and sinks now."""
         self._gradys.flush()
-        return {"device": "uav", "id": self._id(call), "result": "Everything is tried now"}
+        return _answer(call, "Everything is tried now")
 
     async def readings(self, call: Call) -> dict[str, Any]:
         """Store measurements of a program on the companion computer; answers when they are on the disk."""
@@ -107,17 +107,12 @@ class GradysHandlers:
         readings = [self._reading(call, reading, now) for reading in call.params(Readings).readings]
         numbers = await self._gradys.pipeline.keep(readings)
         plural = "" if len(numbers) == 1 else "s"
-        return {
-            "device": "uav",
-            "id": self._id(call),
-            "result": f"Kept {len(numbers)} reading{plural}",
-            "seq": numbers,
-        }
+        return _answer(call, f"Kept {len(numbers)} reading{plural}", seq=numbers)
 
     async def recent(self, call: Call) -> dict[str, Any]:
         """The newest numbers by device and quantity; their points are [s since 1970, value]."""
         series = self._gradys.pipeline.recent.report(call.params(RecentRequest).since)
-        return {"device": "uav", "id": self._id(call), "result": "Success", "series": series}
+        return _answer(call, "Success", series=series)
 
     async def fly_track(self, call: Call) -> Answer:
         """Take off, fly through a track's places, return and land."""
@@ -148,8 +143,10 @@ class GradysHandlers:
         is_number = number.isascii() and number.isdigit()
         return is_number and device in (device_of(int(number)), self._gradys.pipeline.device_of(int(number)))
 
-    def _id(self, call: Call) -> str | None:
-        try:
-            return str(call.known_vehicle.state.system)
-        except NoVehicle:
-            return None
+
+def _answer(call: Call, result: str, **members: Any) -> dict[str, Any]:
+    try:
+        system: int | None = call.known_vehicle.state.system
+    except NoVehicle:
+        system = None
+    return envelope(system, result, **members)

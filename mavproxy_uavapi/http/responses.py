@@ -16,9 +16,9 @@ MULTI_STATUS = 207  # of an answer for several, of which not all are a success
 Handler = Callable[[web.BaseRequest], Awaitable[web.StreamResponse]]
 
 
-def envelope(system: int, result: str, **members: Any) -> dict[str, Any]:
-    """A success body: device, id (the system id as text), result, and further members."""
-    return {"device": "uav", "id": str(system), "result": result, **members}
+def envelope(system: int | None, result: str, **members: Any) -> dict[str, Any]:
+    """A success body: device, id (the system id as text; None without a vehicle), result, and further members."""
+    return {"device": "uav", "id": None if system is None else str(system), "result": result, **members}
 
 
 def dumps(body: Any) -> str:
