@@ -18,6 +18,7 @@ from mavproxy_gradys.net.schedule import Ticker
 from mavproxy_gradys.push.position_update import encode
 from mavproxy_gradys.relay.positions import Positions
 from mavproxy_gradys.station.refusal_log import RefusalLog
+from mavproxy_uavapi.core.held_tasks import HeldTasks
 
 AT_ONCE = 8  # updates in flight to a station
 log = logging.getLogger("relay")
@@ -121,6 +122,7 @@ class _Turn:
     def __init__(self, station: Pushes) -> None:
         self._station = station
         self._forms: dict[str, dict[str, str]] = {}
+        self._tasks = HeldTasks()
         self._task: asyncio.Task[None] | None = None
 
     def begin(self, forms: dict[str, dict[str, str]]) -> None:
@@ -128,11 +130,9 @@ class _Turn:
         self._forms.update(forms)
         if self._forms and (self._task is None or self._task.done()):
             waiting, self._forms = list(self._forms.values()), {}
-            self._task = asyncio.get_running_loop().create_task(self._station.push(waiting))
+            self._task = self._tasks.start(self._station.push(waiting), "the posts to a ground station")
 
     async def end(self) -> None:
         """Cancel, and close the connections."""
-        if self._task is not None:
-            self._task.cancel()
-            await asyncio.gather(self._task, return_exceptions=True)
+        await self._tasks.end()
         await self._station.close()

@@ -69,9 +69,9 @@ class Recorder:
         """Stop the recording; the last reading is written before."""
         if self._heard in self._host.listeners:
             self._host.listeners.remove(self._heard)
-        await self._tasks.end()
         if self._replacing is not None:
-            await self._replacing
+            await asyncio.wait({self._replacing})
+        await self._tasks.end()
         self._thread.shutdown(wait=False)
 
     async def _run(self, call: Any, *args: Any) -> None:
@@ -106,7 +106,7 @@ class Recorder:
             return
         self._newest = GpsReading.of(message)
         if self._replacing is None or self._replacing.done():  # on a slow disk some readings are skipped
-            self._replacing = self._host.bridge.loop.create_task(self._write_latest())
+            self._replacing = self._tasks.start(self._write_latest(), f"the writing of {self.latest}")
 
     async def _write_latest(self) -> None:
         try:

@@ -64,8 +64,11 @@ class TelemetrySource:
 
     def send(self, name: str, **fields: Any) -> None:
         """Send one message now."""
-        values = {**self.MESSAGES.get(name, {}), **fields}
-        self._host._receive(self._make(name, self.system, **values))
+
+        async def arrive() -> None:
+            self._host._receive(self._make(name, self.system, **{**self.MESSAGES.get(name, {}), **fields}))
+
+        self._host.bridge.loop.run(arrive())
 
     def send_all(self) -> None:
         """Send all messages now."""

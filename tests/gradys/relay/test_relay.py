@@ -115,3 +115,19 @@ def test_what_is_no_reading_is_left_out(loop: Any) -> None:
     assert gs.updates == []
     task.cancel()
     loop.pass_time(1)
+
+
+def test_a_defect_is_reported_while_the_relay_goes_on(loop: Any, monkeypatch: Any) -> None:
+    gs = GroundStation()
+    relay, _, task = rig(loop, gs)
+    with monkeypatch.context() as defective:
+        defective.setattr(gs, "post", None)
+        take(relay, 1, 1.0)
+        loop.pass_time(1.5)
+    assert [defect["message"] for defect in loop.defects] == ["a defect ended the posts to a ground station"]
+    loop.defects.clear()
+    take(relay, 1, 2.0)
+    loop.pass_time(1.0)
+    assert len(gs.updates) == 1
+    task.cancel()
+    loop.pass_time(1)

@@ -76,6 +76,19 @@ def test_stopping_writes_what_was_heard_last(loop: Any, host: Any, telemetry: An
     assert parse(latest.read_text())[0].time_usec == 8
 
 
+def test_a_defect_in_writing_the_latest_is_reported_and_stopping_ends_the_rest(
+    loop: Any, host: Any, telemetry: Any, tmp_path: Path, monkeypatch: Any
+) -> None:
+    recording = recorder(loop, host, tmp_path / "track", latest=tmp_path / "latest")
+    monkeypatch.setattr("mavproxy_gradys.tracks.recorder.replace", None)
+    telemetry.send("gps_raw_int", time_usec=7, lat=357713121, lon=-786743912, alt=584090, fix_type=3)
+    loop.settle()
+    assert [defect["message"] for defect in loop.defects] == [f"a defect ended the writing of {tmp_path}/latest"]
+    loop.defects.clear()
+    loop.run(recording.stop())
+    assert host.listeners == []
+
+
 def test_nothing_old_is_recorded(loop: Any, host: Any, telemetry: Any, tmp_path: Path) -> None:
     recording = recorder(loop, host, tmp_path / "track")
     sending(loop, telemetry, 6)
