@@ -12,6 +12,7 @@ from aiohttp import web
 from pydantic import Field, model_validator
 
 from mavproxy_uavapi.core.errors import BadRequest, NotFound
+from mavproxy_uavapi.core.shared_tasks import SharedTasks
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 from mavproxy_uavapi.http.extension import (
     EITHER,
@@ -106,7 +107,8 @@ class VisionHandlers:
         self.tracker, self.flights = tracker, flights
         self._posts = Slots(MOST_POSTED, "frames are on their way in")
         self._decoding, self._encoding = OneAtATime(), OneAtATime()
-        self._drawing: tuple[FrameResult, asyncio.Task[bytes]] | None = None  # the newest picture with its tags
+        self._drawing = SharedTasks[bytes]()
+        self._drawn: tuple[FrameResult, bytes] | None = None  # the newest picture with its tags
 
     def routes(self) -> list[Route]:
         """The routes."""
@@ -180,11 +182,15 @@ class VisionHandlers:
     async def _picture(self) -> bytes:
         """The newest frame with its tags; drawn once for all callers, one frame at a time."""
         result, image = self._newest()
-        if self._drawing is None or (self._drawing[1].done() and self._drawing[0] is not result):
-            lines = caption(self.tracker, self.flights)
-            work = self._encoding.run(lambda: jpeg(annotated(image, result, lines)))
-            self._drawing = result, asyncio.get_running_loop().create_task(work)
-        return await asyncio.shield(self._drawing[1])
+        if self._drawn is not None and self._drawn[0] is result:
+            return self._drawn[1]
+        return await self._drawing.outcome(None, lambda: self._draw(result, image))
+
+    async def _draw(self, result: FrameResult, image: Image) -> bytes:
+        lines = caption(self.tracker, self.flights)
+        picture = await self._encoding.run(lambda: jpeg(annotated(image, result, lines)))
+        self._drawn = result, picture
+        return picture
 
     async def stream(self, call: Call) -> web.StreamResponse:
         """Annotated frames as they arrive, in the format that browsers show (MJPEG)."""
