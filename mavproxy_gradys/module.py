@@ -17,13 +17,9 @@ try:
     from mavproxy_gradys.tracks.console import TrackConsole
 except ModuleNotFoundError as missing:  # MAVProxy prints the text of an ImportError as one line
     raise ImportError(f"gradys needs {missing.name}: pip install mavproxy-uavapi") from missing
-from mavproxy_uavapi.core.background import BackgroundCommands
-from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.module import SharedModule
-from mavproxy_uavapi.core.remembered_settings import RememberedSettings
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
-NAME = "gradys"
 log = logging.getLogger("gradys.spool")
 LONGEST_END = 3.0  # s that MAVProxy waits for the module's end
 COMPLETIONS = [
@@ -50,11 +46,9 @@ class GradysModule(SharedModule[GradysSettings]):
     """`module load gradys`."""
 
     def __init__(self, mpstate: Any, keywords: dict[str, Any]) -> None:
-        remembered = RememberedSettings(mpstate, NAME, keywords)
-        settings = GradysModuleSettings(remembered.combined)
         actions: dict[str, Callable[[list[str]], None]] = {
-            "status": lambda _: self._show(console.status),
-            "stats": lambda _: self._show(console.stats),
+            "status": lambda _: self._print_text(lambda: console.status(self.gradys.report())),
+            "stats": lambda _: self._print_text(lambda: console.stats(self.gradys.report())),
             "start": lambda _: self._start(),
             "stop": lambda _: self._stop(),
             "flush": lambda _: self._flush(),
@@ -62,13 +56,16 @@ class GradysModule(SharedModule[GradysSettings]):
             "help": lambda _: print(HELP),
         }
         super().__init__(
-            mpstate, "GrADyS ground station push", settings, remembered, actions=actions, completions=COMPLETIONS
+            mpstate,
+            keywords,
+            GradysModuleSettings,
+            "GrADyS ground station push",
+            actions=actions,
+            completions=COMPLETIONS,
         )
         self.gradys = Gradys(self.host)
-        self._background = BackgroundCommands(self.host, NAME)
         self._lost = ""  # what was still unwritten at the end
         self._track = TrackConsole(self.host, self.gradys.tracks, self._background)
-        self.remembered.keep(self.module_settings.shown)
         self.host.commands["fly"] = self._fly  # `uavapi fly FILE`
         self.finish_loading(GradysHandlers(self.gradys).routes())
 
@@ -104,14 +101,6 @@ class GradysModule(SharedModule[GradysSettings]):
             super().command(args)
         else:
             print("gradys: MAVProxy is still starting")
-
-    def _show(self, make_text: Callable[[dict[str, Any]], str]) -> None:
-        """Print the text that `make_text` makes of the report; the state belongs to the asyncio thread."""
-
-        async def report() -> dict[str, Any]:
-            return self.gradys.report()
-
-        print(make_text(self.host.bridge.run(report())))
 
     def _start(self) -> None:
         settings = self.module_settings.snapshot()
@@ -158,10 +147,6 @@ def init(mpstate: Any, **kwargs: Any) -> GradysModule:
     """MAVProxy calls this on `module load gradys`, or `gradys:{"gs":"10.0.0.5:8000"}`.
 
     Raises:
-        ImportError: a setting does not exist or its value is wrong; MAVProxy reports this kind of error in one line,
-        and goes on.
+        ImportError: as `SharedModule`.
     """
-    try:
-        return GradysModule(mpstate, kwargs)
-    except SettingError as error:
-        raise ImportError(f"gradys: {error}") from error
+    return GradysModule(mpstate, kwargs)

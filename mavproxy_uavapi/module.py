@@ -12,18 +12,14 @@ try:
     from mavproxy_uavapi.api import Api
 except ModuleNotFoundError as missing:  # MAVProxy prints the text of an ImportError as one line
     raise ImportError(f"uavapi needs {missing.name}: pip install mavproxy-uavapi") from missing
-from mavproxy_uavapi.core.background import BackgroundCommands
-from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.logs import Logs, print_above_prompt
 from mavproxy_uavapi.core.module import SharedModule
-from mavproxy_uavapi.core.remembered_settings import RememberedSettings
 from mavproxy_uavapi.core.windows import View
 from mavproxy_uavapi.prompt import authority, fleet, token, windows
 from mavproxy_uavapi.prompt.report import report, vehicles
 from mavproxy_uavapi.remote_settings import RemoteSettings
 from mavproxy_uavapi.settings import ApiModuleSettings, ApiSettings
 
-NAME = "uavapi"
 COMPLETIONS = [
     "<status|start|stop|vehicles|config|log|help>",
     "fleet <arm|brake|disarm|guided|land|rtl|stop>",
@@ -54,15 +50,13 @@ class UavApiModule(SharedModule[ApiSettings]):
     """`module load uavapi`."""
 
     def __init__(self, mpstate: Any, keywords: dict[str, Any]) -> None:
-        remembered = RememberedSettings(mpstate, NAME, keywords)
-        settings = ApiModuleSettings(remembered.combined)
         self._should_listen = True  # whether it should listen; `uavapi stop` clears it
         actions: dict[str, Callable[[list[str]], None]] = {
             "status": self._status,
             "start": lambda _: self._start(),
             "stop": lambda _: self._stop(),
             "log": self._log,
-            "vehicles": lambda _: self._print_text(vehicles),
+            "vehicles": lambda _: self._print_text(lambda: vehicles(self.api)),
             "fly": self._fly,
             "fleet": self._fleet,
             "authority": self._authority,
@@ -71,21 +65,21 @@ class UavApiModule(SharedModule[ApiSettings]):
         }
         super().__init__(
             mpstate,
+            keywords,
+            ApiModuleSettings,
             "HTTP API to fly and watch vehicles",
-            settings,
-            remembered,
             actions=actions,
             completions=COMPLETIONS,
         )
         self.logs = Logs(lambda text: self.host.bridge.post(lambda: print_above_prompt(text, self.mpstate.rl.prompt)))
-        self._background = BackgroundCommands(self.host, NAME)
         self._changing = asyncio.Lock()  # starts, stops and settings, in the typed order
         self.api = Api(
             self.host,
-            RemoteSettings(self.host.bridge, settings, self.change_setting, self._settled, self.host.members),
+            RemoteSettings(
+                self.host.bridge, self.module_settings, self.change_setting, self._settled, self.host.members
+            ),
         )
         self.host.bridge.close_in_children(self.api.filenos)
-        self.remembered.keep(self.module_settings.shown)
         self.finish_loading()
 
     def begin(self) -> None:
@@ -116,15 +110,7 @@ class UavApiModule(SharedModule[ApiSettings]):
 
     def _status(self, _args: list[str]) -> None:
         settings = self.module_settings.snapshot()
-        self._print_text(lambda api: report(api, settings))
-
-    def _print_text(self, make_text: Callable[[Api], str]) -> None:
-        """Print the text that `make_text` makes of the state, which belongs to the asyncio thread."""
-
-        async def text() -> str:
-            return make_text(self.api)
-
-        print(self.host.bridge.run(text()) if self._begun else make_text(self.api))
+        self._print_text(lambda: report(self.api, settings))
 
     def _start(self) -> None:
         self._should_listen = True
@@ -243,10 +229,6 @@ def init(mpstate: Any, **kwargs: Any) -> UavApiModule:
     """MAVProxy calls this on `module load uavapi`, or `uavapi:{"port":8001}`.
 
     Raises:
-        ImportError: a setting does not exist or its value is wrong; MAVProxy reports this kind of error in one line,
-        and goes on.
+        ImportError: as `SharedModule`.
     """
-    try:
-        return UavApiModule(mpstate, kwargs)
-    except SettingError as error:
-        raise ImportError(f"uavapi: {error}") from error
+    return UavApiModule(mpstate, kwargs)

@@ -11,9 +11,10 @@ from typing import Any
 
 from mavproxy_uavapi.core.errors import NotFound, SettingError, TimedOut
 from mavproxy_uavapi.core.mainloop.bridge import Bridge
+from mavproxy_uavapi.core.settings import ModuleSettings
 from mavproxy_uavapi.core.text import nearest
 from mavproxy_uavapi.core.timeout import wait_with_timeout
-from mavproxy_uavapi.settings import SETTABLE, ApiModuleSettings
+from mavproxy_uavapi.settings import SETTABLE, ApiSettings
 
 LONGEST = 10.0  # s until a change is in force: MAVProxy's main loop may be busy, or the disk of a log slow
 
@@ -32,7 +33,7 @@ class RemoteSettings:
     def __init__(
         self,
         bridge: Bridge,
-        settings: ApiModuleSettings,
+        settings: ModuleSettings[ApiSettings],
         change: Callable[[str, Any], None],
         settled: Callable[[], Awaitable[None]],
         members: Sequence[Any],

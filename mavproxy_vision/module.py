@@ -12,10 +12,8 @@ from mavproxy_vision import opencv_install
 if (_problem := opencv_install.problem()) is not None:
     raise ImportError(_problem)  # MAVProxy prints the text of an ImportError as one line
 
-from mavproxy_uavapi.core.background import BackgroundCommands
 from mavproxy_uavapi.core.errors import SettingError, UavApiError
 from mavproxy_uavapi.core.module import SharedModule
-from mavproxy_uavapi.core.remembered_settings import RememberedSettings
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.windows import View
 from mavproxy_vision import console, file_commands, flight_commands
@@ -25,7 +23,6 @@ from mavproxy_vision.settings import VisionModuleSettings, VisionSettings
 from mavproxy_vision.tracking.tracker import Tracker
 from mavproxy_vision.window_view import TagView
 
-NAME = "vision"
 COMPLETIONS = [
     "<status|start|stop|config|tags|land|search|mission|abort|help>",
     "<calibrate|snapshot|tag> (FILENAME)",
@@ -40,8 +37,6 @@ class VisionModule(SharedModule[VisionSettings]):
     """`module load vision`."""
 
     def __init__(self, mpstate: Any, keywords: dict[str, Any]) -> None:
-        remembered = RememberedSettings(mpstate, NAME, keywords)
-        settings = VisionModuleSettings(remembered.combined)
         actions: dict[str, Callable[[list[str]], None]] = {
             "status": lambda _: self._print_text(lambda: console.report(self.tracker, self.flights)),
             "start": lambda _: self._start(),
@@ -58,18 +53,16 @@ class VisionModule(SharedModule[VisionSettings]):
         }
         super().__init__(
             mpstate,
+            keywords,
+            VisionModuleSettings,
             "AprilTags, search and precise landing",
-            settings,
-            remembered,
             actions=actions,
             completions=COMPLETIONS,
         )
         self.tracker = Tracker(self.host, self.module_settings.snapshot())
         self.flights = FlightJobs(self.tracker, self._directory)
         self._tag_view = TagView(self.tracker)
-        self._background = BackgroundCommands(self.host, NAME)
         self._handlers = VisionHandlers(self.tracker, self.flights)
-        self.remembered.keep(self.module_settings.shown)
         self.finish_loading(self._handlers.routes())
 
     # -- life ------------------------------------------------------------------------------------------------
@@ -126,14 +119,6 @@ class VisionModule(SharedModule[VisionSettings]):
 
     def _run(self, coroutine: Any) -> Any:
         return self.host.bridge.run(coroutine)
-
-    def _print_text(self, make_text: Callable[[], str]) -> None:
-        """Print the text that `make_text` makes of the state, which belongs to the asyncio thread."""
-
-        async def text() -> str:
-            return make_text()
-
-        print(self._run(text()) if self._begun else make_text())
 
     def _start(self) -> None:
         settings = self.module_settings.snapshot()
@@ -251,13 +236,9 @@ def init(mpstate: Any, **kwargs: Any) -> VisionModule:
     """MAVProxy calls this on `module load vision`, or `vision:{"source":"sim"}`.
 
     Raises:
-        ImportError: a setting does not exist or its value is wrong; MAVProxy reports this kind of error in one line,
-        and goes on.
+        ImportError: as `SharedModule`.
     """
-    try:
-        module = VisionModule(mpstate, kwargs)
-    except SettingError as error:
-        raise ImportError(f"vision: {error}") from error
+    module = VisionModule(mpstate, kwargs)
     if (overlap := opencv_install.overlap()) is not None:
         print(f"vision: {overlap}")
     return module

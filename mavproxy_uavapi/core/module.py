@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Generic, TypeVar
 
 from MAVProxy.modules.lib import mp_module
 
 from mavproxy_uavapi.core import host as hosts
+from mavproxy_uavapi.core.background import BackgroundCommands
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.remembered_settings import RememberedSettings
 from mavproxy_uavapi.core.settings import ModuleSettings
@@ -32,36 +33,44 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
 
     Args:
         mpstate: MAVProxy's state.
+        keywords: of `module load`.
+        settings_type: validates and holds the settings; the name of their module is this module's name and its
+            console command.
         description: one line for `module list` and `help`.
-        settings: validates and holds the settings; the name of their module is this module's name and its console
-            command.
-        remembered: what outlives an unload.
         actions: what each word after the command does; `set` and `config` are added.
         completions: rules for tab completion; those for `set` are added.
+
+    Raises:
+        ImportError: a setting does not exist or its value is wrong; MAVProxy reports this kind of error in one line,
+            and goes on.
     """
 
     def __init__(
         self,
         mpstate: Any,
+        keywords: Mapping[str, Any],
+        settings_type: type[ModuleSettings[Snapshot]],
         description: str,
-        settings: ModuleSettings[Snapshot],
-        remembered: RememberedSettings,
         *,
         actions: dict[str, Action],
         completions: list[str],
     ) -> None:
-        name = settings.module
+        name = settings_type.module
+        self.remembered = RememberedSettings(mpstate, name, keywords)
+        try:
+            self.module_settings = settings_type(self.remembered.combined)
+        except SettingError as error:
+            raise ImportError(f"{name}: {error}") from error
         super().__init__(mpstate, name, description, multi_vehicle=True)
-        self.module_settings = settings
-        self.remembered = remembered
         self._actions: dict[str, Action] = {**actions, "set": self._set, "config": lambda _: self._list_settings()}
         # MAVProxy stumbles over a rule that is shorter than what was typed, so that of all settings has a value.
-        self._completed = {f"({name.upper()}SETTING)": settings.names, f"({name.upper()}VALUE)": list}
+        self._completed = {f"({name.upper()}SETTING)": settings_type.names, f"({name.upper()}VALUE)": list}
         self._begun = False
         self._reported_failure = ""
         self._routes: dict[str, Any] = {}
         self.host = hosts.join(mpstate, self)
-        rules = [*completions, f"set {' '.join(self._completed)}", *settings.value_completions()]
+        rules = [*completions, f"set {' '.join(self._completed)}", *settings_type.value_completions()]
+        self._background = BackgroundCommands(self.host, name)
         self.windows = Windows(name, mpstate, self.host.bridge, self.host.clock, self.view)
         self.add_command(name, self.command, description, rules)
         for place, words_of in self._completed.items():
@@ -73,6 +82,7 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
         Args:
             routes: `uavapi` serves them until the module is unloaded.
         """
+        self.remembered.keep(self.module_settings.shown)
         self._routes = {route.path: route for route in routes}
         self.host.extensions.update(self._routes)
         if self.host.bridge.running:  # MAVProxy's main loop runs, and has just called us
@@ -173,6 +183,14 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
         after = self.module_settings.snapshot()
         if after != before and self._begun:
             self.use_settings(name, before, after)
+
+    def _print_text(self, make_text: Callable[[], str]) -> None:
+        """Print the text that `make_text` makes of the state, which belongs to the asyncio thread."""
+
+        async def text() -> str:
+            return make_text()
+
+        print(self.host.bridge.run(text()) if self._begun else make_text())
 
     def _list_settings(self, pattern: str = "") -> None:
         try:

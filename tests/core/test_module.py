@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from types import SimpleNamespace
 from typing import Any
@@ -10,7 +11,6 @@ from MAVProxy.modules.lib.mp_settings import MPSetting
 from mavproxy_uavapi.core import host as hosts
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.module import SharedModule, value_of
-from mavproxy_uavapi.core.remembered_settings import RememberedSettings
 from mavproxy_uavapi.core.settings import ModuleSettings
 
 
@@ -30,17 +30,14 @@ class OtherSettings(DemoSettings):
 
 
 class Demo(SharedModule[Any]):
-    def __init__(self, mpstate: Any, settings: type[DemoSettings] = DemoSettings) -> None:
+    def __init__(self, mpstate: Any, settings: type[DemoSettings] = DemoSettings, **keywords: Any) -> None:
         self.done: list[Any] = []
         self.refused = ""
-        remembered = RememberedSettings(mpstate, settings.module, {})
         actions = {
             "status": lambda args: self.done.append(("status", args)),
             "go": self.done.append,
         }
-        super().__init__(
-            mpstate, "a demo", settings({}, {}), remembered, actions=actions, completions=["<status|go>"]
-        )
+        super().__init__(mpstate, keywords, settings, "a demo", actions=actions, completions=["<status|go>"])
         self.finish_loading([SimpleNamespace(path=f"/{self.name}")])
 
     def begin(self) -> None:
@@ -77,6 +74,25 @@ def test_begin_comes_once_in_the_first_idle_task_when_the_host_runs(demo: Demo, 
     main_loop.turn()
     main_loop.turn()
     assert demo.done == [("begun", True)]
+
+
+def test_keyword_that_is_refused_is_an_import_error_and_nothing_is_loaded(mpstate: Any) -> None:
+    with pytest.raises(ImportError, match="^demo: rate = 11: it takes a whole number from 1 to 10$"):
+        Demo(mpstate, rate=11)
+    assert mpstate.command_map == {}
+    assert not hasattr(mpstate, hosts.ATTRIBUTE)
+
+
+def test_text_of_the_state_is_printed_before_and_after_the_first_idle_task(
+    demo: Demo, main_loop: Any, capsys: Any
+) -> None:
+    def text() -> str:
+        return "here" if threading.current_thread() is threading.main_thread() else "in the asyncio thread"
+
+    demo._print_text(text)
+    main_loop.turn()
+    demo._print_text(text)
+    assert capsys.readouterr().out == "here\nin the asyncio thread\n"
 
 
 def test_command_without_a_word_is_status(demo: Demo) -> None:
