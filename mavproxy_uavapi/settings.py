@@ -15,7 +15,7 @@ from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.ini_file import IniFile
 from mavproxy_uavapi.core.logs import components
 from mavproxy_uavapi.core.settings import DEFAULT, ModuleSettings
-from mavproxy_uavapi.core.values import is_unset
+from mavproxy_uavapi.core.values import is_unset, words
 from mavproxy_uavapi.files import envelope_file, tile_store, tokens
 
 Network = ipaddress.IPv4Network | ipaddress.IPv6Network
@@ -196,11 +196,6 @@ def address(text: str) -> str:
     return text
 
 
-def words(text: str) -> tuple[str, ...]:
-    """`[a, b]`, `a,b` or `a b` -> ("a", "b")."""
-    return tuple(word for word in text.strip("[]").replace(",", " ").split() if not is_unset(word))
-
-
 def ports(text: str) -> Mapping[int, int]:
     """`8001:1,8002:2` -> {8001: 1, 8002: 2}: TCP ports, and the system id of the vehicle at each.
 
@@ -246,7 +241,7 @@ def log_components(text: str) -> frozenset[str]:
         SettingError: a name is not a component.
     """
     try:
-        return components(text)
+        return frozenset(components(text))
     except ValueError as error:
         raise SettingError(str(error)) from error
 

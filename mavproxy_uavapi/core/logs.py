@@ -16,6 +16,7 @@ from typing import Any
 
 from mavproxy_uavapi.core.rotating_file import RotatingFile
 from mavproxy_uavapi.core.text import escaped
+from mavproxy_uavapi.core.values import words
 
 try:
     import readline
@@ -30,6 +31,7 @@ COMPONENTS = {
     "SCRIPT": ("uavapi.script",),
 }
 ALIASES = {"VEHICLE": "COPTER", "UVICORN": "API"}
+NAMES = (*COMPONENTS, *ALIASES)
 ROOTS = ("uavapi", "gradys")
 FILE_BYTES = 5_000_000
 FILES_KEPT = 3
@@ -44,18 +46,17 @@ def component_of(logger: str) -> str:
     return "API"
 
 
-def components(text: str) -> frozenset[str]:
-    """Component names, by comma or space, in any case, aliases resolved.
+def components(text: str) -> tuple[str, ...]:
+    """Component names, by comma or space, in any case, aliases resolved, without duplicates.
 
     Raises:
         ValueError: no such component.
     """
-    words = [word.upper() for word in text.strip("[]").replace(",", " ").split() if word != "None"]
-    named = [ALIASES.get(word, word) for word in words]
+    named = [ALIASES.get(word.upper(), word.upper()) for word in words(text)]
     unknown = [word for word in named if word not in COMPONENTS]
     if unknown:
-        raise ValueError(f"no log component {unknown[0]}; there are {', '.join([*COMPONENTS, *ALIASES])}")
-    return frozenset(named)
+        raise ValueError(f"no log component {unknown[0]}; there are {', '.join(NAMES)}")
+    return tuple(dict.fromkeys(named))
 
 
 class _Named(logging.Filter):

@@ -21,6 +21,11 @@ def is_unset(text: str) -> bool:
     return text.strip().lower() in UNSET
 
 
+def words(text: str) -> tuple[str, ...]:
+    """`[a, b]`, `a,b` or `a b` -> ("a", "b")."""
+    return tuple(word for word in text.strip().strip("[]").replace(",", " ").split() if not is_unset(word))
+
+
 def boolean(text: str) -> bool:
     """`true`, `yes`, `on`, `1` and their opposites, in any case; anything else is an error.
 

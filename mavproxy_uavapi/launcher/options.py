@@ -15,10 +15,11 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from mavproxy_uavapi import __version__
+from mavproxy_uavapi.core import logs
 from mavproxy_uavapi.core.errors import SettingError
 from mavproxy_uavapi.core.ini_file import IniFile
 from mavproxy_uavapi.core.settings import CONFIG_VARIABLE, ENVIRONMENT
-from mavproxy_uavapi.core.values import boolean, is_unset
+from mavproxy_uavapi.core.values import boolean, is_unset, words
 from mavproxy_uavapi.launcher import values
 from mavproxy_uavapi.launcher.errors import OptionError
 from mavproxy_uavapi.settings import SECTIONS, ApiModuleSettings
@@ -85,7 +86,7 @@ class Row:
     @property
     def is_list(self) -> bool:
         """Whether several words may follow the flag."""
-        return self.convert in (values.words, values.components)
+        return self.convert in (words, values.components)
 
     def read(self, text: str, place: str) -> Any:
         """The value of the text; raises OptionError, which names the place, if it is wrong."""
@@ -101,7 +102,6 @@ def path(text: str) -> str:
 
 
 HIGHEST_SYSTEM = 255
-_NAMES = ", ".join(name for name in values.LOG_COMPONENTS)
 TABLE = (
     Row("port", "api", values.port, "TCP port of the HTTP API (8000)"),
     Row("host", "api", str.strip, "address it listens on (127.0.0.1); beyond this machine with a token only"),
@@ -123,11 +123,11 @@ TABLE = (
     Row("spacing", "simulated", values.distance, "m from one to the next, in a row to the east (5)"),
     Row("ardupilot_path", "simulated", path, "ArduPilot to simulate with; else the embedded vehicle"),
     Row("location", "simulated", str.strip, "home: a name or lat,lon,alt,heading in deg, m AMSL (AbraDF)"),
-    Row("gs_connection", "simulated", values.words, "addresses to forward MAVLink to (MAVProxy's --out)"),
+    Row("gs_connection", "simulated", words, "addresses to forward MAVLink to (MAVProxy's --out)"),
     Row("speedup", "simulated", values.factor, "how many times faster than real time to simulate (1)"),
     Row("battery", "simulated", values.factor, "mAh of the embedded vehicle's battery; else it never becomes empty"),
     Row("headless", "simulated", boolean, "no MAVProxy prompt; so too where stdin is not a terminal"),
-    Row("log_console", "logs", values.components, f"components that log to the console: {_NAMES}"),
+    Row("log_console", "logs", values.components, f"components that log to the console: {', '.join(logs.NAMES)}"),
     Row("log_path", "logs", path, "log file, beside which telemetry logs go, or the directory for both"),
     Row("debug", "logs", values.components, "components that log in detail"),
     Row("script_logs", "logs", path, "directory for the output of uploaded scripts"),

@@ -8,9 +8,8 @@ import re
 from collections.abc import Callable, Mapping
 
 from mavproxy_uavapi.core import logs
+from mavproxy_uavapi.core.values import words
 
-# The accepted names, including those of the original service, and the components that they mean.
-LOG_COMPONENTS = {**{name: name for name in logs.COMPONENTS}, **logs.ALIASES}
 VEHICLES = ("copter", "plane", "quadplane", "rover")
 _MODULE = re.compile(r"([A-Za-z_]\w*)(?::(\{.*\}))?", re.DOTALL)
 
@@ -64,17 +63,12 @@ def factor(text: str) -> float:
     return number
 
 
-def words(text: str) -> tuple[str, ...]:
-    """`[a, b]`, `a,b` or `a b` -> ("a", "b")."""
-    return tuple(re.findall(r"[^\s,\[\]]+", text))
-
-
 def components(text: str) -> tuple[str, ...]:
     """Log components, by their names here or in the original service, without duplicates."""
-    names = dict.fromkeys(LOG_COMPONENTS.get(word.upper(), "") for word in words(text))
-    if "" in names:
-        raise ValueError(f"expected some of {', '.join(LOG_COMPONENTS)}")
-    return tuple(names)
+    try:
+        return logs.components(text)
+    except ValueError as error:
+        raise ValueError(f"expected some of {', '.join(logs.NAMES)}") from error
 
 
 def host_port(text: str) -> str:

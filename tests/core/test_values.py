@@ -7,7 +7,7 @@ import pytest
 
 from mavproxy_uavapi.core.addresses import is_loopback
 from mavproxy_uavapi.core.errors import SettingError
-from mavproxy_uavapi.core.values import boolean, converted, is_unset, path_of
+from mavproxy_uavapi.core.values import boolean, converted, is_unset, path_of, words
 
 
 @pytest.mark.parametrize(
@@ -55,6 +55,12 @@ def test_words_for_yes_and_no_and_nothing() -> None:
     assert not any(boolean(word) for word in ("False", "no", "OFF", "0"))
     assert all(is_unset(word) for word in ("", " ", "None", "none", "[]"))
     assert not any(is_unset(word) for word in ("0", "no", "[a]", "nothing"))
+
+
+@pytest.mark.parametrize("text", ["[a, b]", "a,b", "a b", " [a b] ", "a, None, b"])
+def test_words_of_a_list(text: str) -> None:
+    assert words(text) == ("a", "b")
+    assert words("") == words("None") == words("[]") == ()
 
 
 def test_a_path_of_a_known_user() -> None:
