@@ -2,6 +2,8 @@
 
 Every 15 s MAVProxy requests all streams at its own rate, which overrides message intervals. So we watch what arrives,
 and request a message again as soon as it becomes slow. Afterwards we request the default rate.
+
+`StreamRequester` does not look at rates: of every vehicle it requests what does not arrive at all, and soon gives up.
 """
 
 from __future__ import annotations
