@@ -102,6 +102,8 @@ def path(text: str) -> str:
 
 
 HIGHEST_SYSTEM = 255
+# Some are settings of the module `uavapi`, too. Their help and errors are the command line's own, and so is the
+# default of `sysid`, the original service's: simulated vehicles need one, and the module takes the current vehicle.
 TABLE = (
     Row("port", "api", values.port, "TCP port of the HTTP API (8000)"),
     Row("host", "api", str.strip, "address it listens on (127.0.0.1); beyond this machine with a token only"),

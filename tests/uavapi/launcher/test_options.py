@@ -12,6 +12,7 @@ import pytest
 from mavproxy_uavapi.launcher import main, options
 from mavproxy_uavapi.launcher.errors import OptionError
 from mavproxy_uavapi.launcher.options import RunOptions, parse
+from mavproxy_uavapi.settings import ApiModuleSettings
 from mavproxy_vision import opencv_install
 from tests.support.launching import ini
 from tests.support.ports import free_port
@@ -24,6 +25,8 @@ def test_the_table_and_the_options_name_the_same_things():
 
 def test_defaults_are_those_of_the_original_service():
     assert parse([]) == RunOptions()
+    of_the_module = {row.name: row.default for row in ApiModuleSettings.table()}
+    assert (RunOptions().host, RunOptions().port) == (of_the_module["host"], of_the_module["port"])
     assert RunOptions().port == 8000
     assert RunOptions().sysid == 10
     assert RunOptions().uav_connection == "127.0.0.1:17171"
