@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 
 from mavproxy_uavapi.core.errors import BadRequest, NotFound
 from mavproxy_uavapi.core.shared_tasks import SharedTasks
+from mavproxy_uavapi.core.streaming import Slots, StreamingResponse
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 from mavproxy_uavapi.http.extension import (
     EITHER,
@@ -27,8 +28,6 @@ from mavproxy_uavapi.http.extension import (
     Number,
     Request,
     Route,
-    Slots,
-    StreamingResponse,
     Written,
     envelope,
     in_time,

@@ -37,7 +37,7 @@ from mavproxy_gradys.station.intake import Intake
 from mavproxy_gradys.station.queries import MOST_EXPORTED, MOST_ROWS, history_query, reading_query
 from mavproxy_gradys.station.reading_row import COLUMNS, reading_row
 from mavproxy_gradys.station.updates import DEVICE_COLUMNS, Updates, newest_of_update, parse
-from mavproxy_uavapi.http.streaming import EventStream, StreamingResponse
+from mavproxy_uavapi.core.streaming import EventStream, StreamingResponse
 
 RECEIVED, DROPPED = 103, 101
 LARGEST_BODY = 16 * 1024 * 1024  # bytes

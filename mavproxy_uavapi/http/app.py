@@ -15,13 +15,14 @@ from aiohttp import web
 from aiohttp.http_exceptions import HttpProcessingError
 
 from mavproxy_uavapi.core.errors import NotFound
+from mavproxy_uavapi.core.streaming import CORS_HEADERS
 from mavproxy_uavapi.http.access import require_role
 from mavproxy_uavapi.http.auditing import audited
 from mavproxy_uavapi.http.bodies import invite, parameters
 from mavproxy_uavapi.http.call import SERVICE, Call, Service, holder_of
 from mavproxy_uavapi.http.caller import CALLER
 from mavproxy_uavapi.http.connection import IDLE_TIMEOUT, LINGER, headers_are_here
-from mavproxy_uavapi.http.cors import TRUSTED_ORIGIN, add_cors_headers
+from mavproxy_uavapi.http.cors import cors_headers
 from mavproxy_uavapi.http.error_answers import errors_as_answers
 from mavproxy_uavapi.http.listener import Listener, listening_socket
 from mavproxy_uavapi.http.rate_limits import limit_rate, yield_to_main_loop
@@ -50,11 +51,11 @@ def make_handler(service: Service, system: int = 0) -> Handler:
         request[SERVICE] = service
         request[MATCH] = router.find(request.method, request.path)
         origin = request.headers.get("Origin")
-        if origin in service.settings.cors_origins:
-            request[TRUSTED_ORIGIN] = origin
+        if origin is not None and origin in service.settings.cors_origins:
+            request[CORS_HEADERS] = cors_headers(origin)
         response = await _behind_the_door(request)
         if not response.prepared:
-            add_cors_headers(request, response)
+            response.headers.update(request.get(CORS_HEADERS, {}))
         return response
 
     return handle

@@ -16,6 +16,7 @@ from aiohttp import web
 
 from mavproxy_uavapi.core.errors import Forbidden, Invalid, NotSupported, TooManyRequests
 from mavproxy_uavapi.core.host import Host
+from mavproxy_uavapi.core.streaming import MOST_OPEN, SharedSlots
 from mavproxy_uavapi.core.values import boolean
 from mavproxy_uavapi.core.vehicle.copter import Copter
 from mavproxy_uavapi.core.vehicle.jobs import Job
@@ -30,7 +31,6 @@ from mavproxy_uavapi.http.log_throttle import LogThrottle
 from mavproxy_uavapi.http.requests import Request
 from mavproxy_uavapi.http.responses import Answer, envelope
 from mavproxy_uavapi.http.router import NOWHERE, Match
-from mavproxy_uavapi.http.streaming import MOST_OPEN, SharedSlots
 from mavproxy_uavapi.remote_settings import RemoteSettings
 from mavproxy_uavapi.scripts.manager import Scripts
 from mavproxy_uavapi.settings import ApiSettings

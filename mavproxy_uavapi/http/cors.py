@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from aiohttp import web
-
-TRUSTED_ORIGIN: web.RequestKey[str] = web.RequestKey("trusted", str)  # the origin of the trusted page that calls
 HEADERS = {
     "Access-Control-Allow-Methods": "GET, POST, PUT, DELETE",
     "Access-Control-Allow-Headers": "Authorization, Content-Type, Prefer",
@@ -13,8 +10,6 @@ HEADERS = {
 }
 
 
-def add_cors_headers(request: web.BaseRequest, response: web.StreamResponse) -> None:
-    """Tell the browser, in an answer's headers, that the calling page may read it, if that page is trusted."""
-    origin = request.get(TRUSTED_ORIGIN)
-    if origin is not None:
-        response.headers.update({"Access-Control-Allow-Origin": origin, **HEADERS})
+def cors_headers(origin: str) -> dict[str, str]:
+    """Headers of an answer that tell the browser that a page of this origin, which is trusted, may read it."""
+    return {"Access-Control-Allow-Origin": origin, **HEADERS}

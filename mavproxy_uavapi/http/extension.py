@@ -10,7 +10,6 @@ from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import NED_REACH, Blocking, Empty, Number, Request, Written
 from mavproxy_uavapi.http.responses import Answer, envelope
 from mavproxy_uavapi.http.route import ADMIN, EITHER, FLY, POST, WATCH, Route
-from mavproxy_uavapi.http.streaming import Slots, StreamingResponse
 
 __all__ = [
     "ADMIN",
@@ -26,8 +25,6 @@ __all__ = [
     "Number",
     "Request",
     "Route",
-    "Slots",
-    "StreamingResponse",
     "Written",
     "envelope",
     "in_time",

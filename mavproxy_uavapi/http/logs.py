@@ -14,6 +14,7 @@ from pydantic import Field
 
 from mavproxy_uavapi.core.acquire import acquire
 from mavproxy_uavapi.core.errors import Busy, NotFound, Stale, ToolFailed
+from mavproxy_uavapi.core.streaming import StreamingResponse
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.log_pieces import HIGHEST_ID, LogEntry
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
@@ -21,7 +22,6 @@ from mavproxy_uavapi.files.log_store import LogFile, LogStore
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.requests import Request
 from mavproxy_uavapi.http.responses import Answer
-from mavproxy_uavapi.http.streaming import StreamingResponse
 
 T = TypeVar("T")
 PART = 64 * 1024  # bytes that are read and sent at a time

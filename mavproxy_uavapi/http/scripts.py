@@ -12,12 +12,12 @@ from typing import Any
 from aiohttp import web
 
 from mavproxy_uavapi.core.errors import NotFound
+from mavproxy_uavapi.core.streaming import COMMENT, KEEP_ALIVE, EventStream
 from mavproxy_uavapi.http.access import require_owner
 from mavproxy_uavapi.http.call import Call
 from mavproxy_uavapi.http.forms import file_of
 from mavproxy_uavapi.http.requests import ExecuteScript, ScriptLog, ScriptName, UploadedFile
 from mavproxy_uavapi.http.responses import dumps, envelope
-from mavproxy_uavapi.http.streaming import COMMENT, KEEP_ALIVE, EventStream
 from mavproxy_uavapi.scripts import names, runs
 from mavproxy_uavapi.scripts.follower import Follower
 from mavproxy_uavapi.scripts.manager import Scripts

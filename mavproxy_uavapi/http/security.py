@@ -17,12 +17,12 @@ from aiohttp import web
 
 from mavproxy_uavapi.core.addresses import is_our_name
 from mavproxy_uavapi.core.errors import Forbidden, TooManyRequests, UavApiError, Unauthorized, without_frames
+from mavproxy_uavapi.core.streaming import CORS_HEADERS
 from mavproxy_uavapi.files.tokens import Token, digest_of
 from mavproxy_uavapi.http.browser import is_browser
 from mavproxy_uavapi.http.call import SERVICE, Service
 from mavproxy_uavapi.http.caller import CALLER, Caller, address_of, group_of
 from mavproxy_uavapi.http.connection import Connection
-from mavproxy_uavapi.http.cors import TRUSTED_ORIGIN
 from mavproxy_uavapi.http.page import wants_page
 from mavproxy_uavapi.http.responses import Handler, failure
 from mavproxy_uavapi.http.router import MATCH
@@ -162,7 +162,7 @@ async def door(request: web.BaseRequest, handler: Handler) -> web.StreamResponse
     connection = Connection.of(request)
     try:
         check_origin(request.headers, settings.cors_origins)
-        if TRUSTED_ORIGIN in request and request.method == "OPTIONS":
+        if CORS_HEADERS in request and request.method == "OPTIONS":
             return web.Response(status=204)
         caller = admitted(request, service)
     except Unauthorized as error:

@@ -8,10 +8,7 @@ from contextlib import suppress
 from aiohttp import WSCloseCode, WSMsgType, web
 
 from mavproxy_uavapi.core.errors import Invalid
-from mavproxy_uavapi.http import stream_news, stream_views
-from mavproxy_uavapi.http.call import Call
-from mavproxy_uavapi.http.requests import StreamFilter
-from mavproxy_uavapi.http.streaming import (
+from mavproxy_uavapi.core.streaming import (
     COMMENT,
     KEEP_ALIVE,
     WHY,
@@ -21,6 +18,9 @@ from mavproxy_uavapi.http.streaming import (
     limit_buffers,
     while_read,
 )
+from mavproxy_uavapi.http import stream_news, stream_views
+from mavproxy_uavapi.http.call import Call
+from mavproxy_uavapi.http.requests import StreamFilter
 from mavproxy_uavapi.http.subscription import NamePatterns, Subscription, Wishes
 
 MOST_SAID = 4096  # bytes of a message from a WebSocket's client; no message is expected

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 import requests
 
-from mavproxy_uavapi.http.streaming import MOST_OPEN
+from mavproxy_uavapi.core.streaming import MOST_OPEN
 
 SHARE = MOST_OPEN // 2  # of one caller
 RIG_LOGS = True

@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
+from mavproxy_uavapi.core.streaming import MOST_OPEN
 from mavproxy_uavapi.http import listener
 from mavproxy_uavapi.http.listener import KEPT_FREE, RESERVE, SHARE, NoRoom, highest_descriptor, to_replace
-from mavproxy_uavapi.http.streaming import MOST_OPEN
 from tests.support.api_port import OWNER, Port
 
 MOST = 200

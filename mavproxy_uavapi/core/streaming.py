@@ -7,7 +7,7 @@ import json
 import logging
 import socket
 from collections import Counter
-from collections.abc import Awaitable, Iterator
+from collections.abc import Awaitable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -15,10 +15,10 @@ from aiohttp import web
 from aiohttp.abc import AbstractStreamWriter
 
 from mavproxy_uavapi.core.errors import TooManyRequests
-from mavproxy_uavapi.http.cors import add_cors_headers
 
 log = logging.getLogger("uavapi.http")
 
+CORS_HEADERS: web.RequestKey[Mapping[str, str]] = web.RequestKey("cors", Mapping)  # of the answer to a trusted page
 MOST_OPEN = 240  # streams at once, of all kinds
 KEEP_ALIVE = 15.0  # s; silence after which a comment or ping is sent, to notice dead connections
 UNREAD = 30.0  # s without reading after which a client is dropped
@@ -111,7 +111,7 @@ class StreamingResponse(web.StreamResponse):
         """Send the headers."""
         self._transport = request.transport
         limit_buffers(self._transport)
-        add_cors_headers(request, self)
+        self.headers.update(request.get(CORS_HEADERS, {}))
         return await super().prepare(request)
 
     async def write(self, data: bytes | bytearray | memoryview) -> None:
