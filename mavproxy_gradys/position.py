@@ -16,7 +16,7 @@ RECEIVERS = ("GPS_RAW_INT", "GPS2_RAW")
 
 
 @dataclass(frozen=True)
-class Position:
+class VehiclePosition:
     """A vehicle's position: degrees, m above home, and its age (s)."""
 
     lat: float
@@ -27,7 +27,7 @@ class Position:
 
 def position_of(
     state: VehicleState, now: float, *, max_age: float, link_timeout: float, has_position: bool
-) -> Position:
+) -> VehiclePosition:
     """The vehicle's position, if it is known.
 
     Args:
@@ -53,7 +53,7 @@ def position_of(
     message = received.message
     if not (message.lat or message.lon) or abs(message.lat) > 90e7 or abs(message.lon) > 180e7:
         raise NoFix(f"vehicle {state.system} does not know where it is")
-    return Position(message.lat / 1e7, message.lon / 1e7, message.relative_alt / 1000, age)
+    return VehiclePosition(message.lat / 1e7, message.lon / 1e7, message.relative_alt / 1000, age)
 
 
 def require_fix(state: VehicleState, now: float, max_age: float, has_position: bool) -> None:

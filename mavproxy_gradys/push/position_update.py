@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from urllib.parse import urlencode
 
-from mavproxy_gradys.position import Position
+from mavproxy_gradys.position import VehiclePosition
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 
 DEVICE = "uav"
@@ -19,7 +19,7 @@ SPEED_DIGITS = 3  # a single-precision float has fewer at these magnitudes
 
 
 def form(
-    state: VehicleState, position: Position, now: float, *, seq: int, ip: str, ready: bool, max_age: float
+    state: VehicleState, position: VehiclePosition, now: float, *, seq: int, ip: str, ready: bool, max_age: float
 ) -> dict[str, str]:
     """The form's fields as text, in the order in which the station's own clients send them.
 

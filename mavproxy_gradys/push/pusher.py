@@ -12,7 +12,7 @@ from mavproxy_gradys.net.http_client import FORM, Poster
 from mavproxy_gradys.net.outage_log import Outage
 from mavproxy_gradys.net.resolver import Resolver
 from mavproxy_gradys.net.schedule import Ticker
-from mavproxy_gradys.position import Position, position_of
+from mavproxy_gradys.position import VehiclePosition, position_of
 from mavproxy_gradys.push import position_update
 from mavproxy_gradys.push.statistics import StationTally, VehicleTally
 from mavproxy_gradys.settings import GradysSettings
@@ -92,7 +92,7 @@ class Pusher:
         task = self._tasks.start(self._push(state, vehicle), f"the update of vehicle {state.system}")
         task.add_done_callback(lambda _: self._in_flight.discard(state.system))
 
-    def _position(self, state: VehicleState, vehicle: VehicleTally) -> Position | None:
+    def _position(self, state: VehicleState, vehicle: VehicleTally) -> VehiclePosition | None:
         """The vehicle's position; None if it is unknown or too old, and then the tally has the reason."""
         try:
             position = position_of(
@@ -148,7 +148,7 @@ class Pusher:
             self.tally.backoff.failed(now)
             self._own_at = -ADDRESS_KEPT
 
-    def _form(self, state: VehicleState, vehicle: VehicleTally, position: Position) -> dict[str, str]:
+    def _form(self, state: VehicleState, vehicle: VehicleTally, position: VehiclePosition) -> dict[str, str]:
         return position_update.form(
             state,
             position,

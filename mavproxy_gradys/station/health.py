@@ -8,7 +8,7 @@ from mavproxy_gradys.station.fleet_watch import FleetWatch
 from mavproxy_gradys.station.inbox import Inbox
 
 
-class BrokerConnection(Protocol):
+class BrokerState(Protocol):
     """A connection; `problem` is the reason while it is down, otherwise empty."""
 
     problem: str
@@ -22,7 +22,7 @@ class StationHealth:
         inbox, broker: of a worker that consumes messages; otherwise None.
     """
 
-    def __init__(self, watch: FleetWatch, inbox: Inbox | None = None, broker: BrokerConnection | None = None) -> None:
+    def __init__(self, watch: FleetWatch, inbox: Inbox | None = None, broker: BrokerState | None = None) -> None:
         self._watch = watch
         self._inbox = inbox
         self._broker = broker

@@ -37,7 +37,7 @@ class Stopped(Exception):
     """A signal has ended the script."""
 
 
-class Host:
+class ScriptHost:
     """One script's run.
 
     Args:
@@ -199,4 +199,4 @@ def run(options: argparse.Namespace, rest: Sequence[str], load: Callable[[str], 
     if isinstance(runner, ZmqStateMachine) and not (options.zmq_identifier and options.zmq_proxy_server):
         log.error("ZMQ runners need --zmq-identifier NAME --zmq-proxy-server ADDRESS")
         return 1
-    return Host(options, runner).run()
+    return ScriptHost(options, runner).run()

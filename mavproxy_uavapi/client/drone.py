@@ -13,7 +13,7 @@ from mavproxy_uavapi.client.errors import Unreachable, error_of
 from mavproxy_uavapi.client.http import Http
 from mavproxy_uavapi.client.logs import Log
 from mavproxy_uavapi.client.places import Ned, Position
-from mavproxy_uavapi.client.readings import Command, Readings, Status
+from mavproxy_uavapi.client.readings import CommandingJob, Status, VehicleReadings
 from mavproxy_uavapi.client.telemetry import Telemetry
 from mavproxy_uavapi.core.errors import LinkLost, NoVehicle, UavApiError
 from mavproxy_uavapi.core.timeout import wait_with_timeout
@@ -30,7 +30,7 @@ SHOWN_WITHIN = 2.0  # s until the stream must show the effect that a verb's answ
 LONGEST_TRAVEL = 3600.0  # s for which the API repeats a velocity in one call
 
 
-class Drone(Readings):
+class Drone(VehicleReadings):
     """One vehicle. Its properties are its newest telemetry; they raise `Stale` if that is too old.
 
     Each verb returns when telemetry shows its effect, and otherwise raises the API's error (`UavApiError`). If its
@@ -72,14 +72,14 @@ class Drone(Readings):
         body = await self._http.get("/telemetry/home_info")
         return Position(body["lat"], body["lon"], 0.0), float(body["altitude"])
 
-    async def command(self) -> Command | None:
+    async def command(self) -> CommandingJob | None:
         """The job that commands it now; None if there is none."""
         vehicles = (await self._answer(self._http.get("/authority")))["vehicles"]
         commander = next((one["commanded_by"] for one in vehicles if one["vehicle"] == self.id), None)
         if commander is None:
             return None
         job = await self._answer(self._http.get(f"/jobs/{commander['job']}"))
-        return Command(job["job"], job["verb"], job["request"])
+        return CommandingJob(job["job"], job["verb"], job["request"])
 
     # -- logs ---------------------------------------------------------------------------------------------
 

@@ -17,7 +17,7 @@ UNKNOWN_HEADING = 65535
 
 
 @dataclass(frozen=True)
-class Attitude:
+class AttitudeReading:
     """Roll, pitch and yaw in rad; yaw clockwise from north."""
 
     roll: float
@@ -26,7 +26,7 @@ class Attitude:
 
 
 @dataclass(frozen=True)
-class Battery:
+class BatteryReading:
     """Voltage in V, current in A, level in %; None if unknown."""
 
     voltage: float | None
@@ -57,7 +57,7 @@ class Status:
 
 
 @dataclass(frozen=True)
-class Command:
+class CommandingJob:
     """The job that commands a vehicle.
 
     Attributes:
@@ -75,7 +75,7 @@ def _scaled(value: float | None, divisor: float) -> float | None:
     return None if value is None else value / divisor
 
 
-class Readings:
+class VehicleReadings:
     """The newest telemetry of a vehicle. Its properties raise `Stale` if it is too old.
 
     Attributes:
@@ -112,10 +112,10 @@ class Readings:
         return float(heading) / 100.0 % 360.0
 
     @property
-    def attitude(self) -> Attitude:
+    def attitude(self) -> AttitudeReading:
         """Its attitude."""
         fields = self.telemetry.fields("ATTITUDE")
-        return Attitude(fields["roll"], fields["pitch"], fields["yaw"])
+        return AttitudeReading(fields["roll"], fields["pitch"], fields["yaw"])
 
     @property
     def armed(self) -> bool:
@@ -129,11 +129,11 @@ class Readings:
         return mode_name(heartbeat["type"], heartbeat["custom_mode"])
 
     @property
-    def battery(self) -> Battery:
+    def battery(self) -> BatteryReading:
         """The battery that its autopilot monitors."""
         fields = self.telemetry.fields("SYS_STATUS")
         voltage, current = _scaled(fields["voltage_battery"], 1000.0), _scaled(fields["current_battery"], 100.0)
-        return Battery(voltage, current, fields["battery_remaining"])
+        return BatteryReading(voltage, current, fields["battery_remaining"])
 
     @property
     def gps(self) -> Gps:

@@ -10,7 +10,7 @@ from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.host import Host
 
-Command = Callable[[], Coroutine[Any, Any, str]]
+BackgroundCommand = Callable[[], Coroutine[Any, Any, str]]
 SLOW = 2.0  # s after which a line says that it still runs
 
 
@@ -27,7 +27,7 @@ class BackgroundCommands:
         self._name = name
         self._tasks = HeldTasks()
 
-    def send(self, command: Command, doing: str = "") -> None:
+    def send(self, command: BackgroundCommand, doing: str = "") -> None:
         """Begin a command; its result or error is printed. Main loop only.
 
         Args:
@@ -45,10 +45,10 @@ class BackgroundCommands:
         """Cancel those under way, and wait until they have cleaned up. Asyncio thread only."""
         await self._tasks.end()
 
-    def _begin(self, command: Command, doing: str) -> None:
+    def _begin(self, command: BackgroundCommand, doing: str) -> None:
         self._tasks.start(self._run(command, doing), f"what {self._name} did for the prompt")
 
-    async def _run(self, command: Command, doing: str) -> None:
+    async def _run(self, command: BackgroundCommand, doing: str) -> None:
         loop = asyncio.get_running_loop()
         slow = loop.call_later(SLOW, self.say, f"still {doing}; a line follows when it is done") if doing else None
         try:

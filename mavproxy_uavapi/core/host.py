@@ -23,7 +23,7 @@ from mavproxy_uavapi.core.mavlink.link import Link, MavproxyLink
 from mavproxy_uavapi.core.mavlink.link_watch import LinkWatch
 from mavproxy_uavapi.core.mavlink.parameter_watch import ParameterWatch
 from mavproxy_uavapi.core.mavlink.pending_waits import PendingWaits
-from mavproxy_uavapi.core.mavlink.vehicle_state import Fleet, VehicleState
+from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState, VehicleStates
 from mavproxy_uavapi.core.vehicle.endings import FlightEndings
 from mavproxy_uavapi.core.vehicle.envelope_watch import EnvelopeWatch
 from mavproxy_uavapi.core.vehicle.holds import Holds
@@ -69,7 +69,7 @@ class Host:
         loop: asyncio.AbstractEventLoop | None = None,
     ) -> None:
         self.clock = clock
-        self.fleet = Fleet()
+        self.fleet = VehicleStates()
         self.pending = PendingWaits()
         self.bridge = Bridge(mpstate.select_extra, self._receive, loop)
         self._mavproxy_link = MavproxyLink(self.bridge, mpstate)

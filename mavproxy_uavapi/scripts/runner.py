@@ -66,7 +66,7 @@ class RunLog:
             self._terminal.show(f"\n[no more log: {error.strerror}]\n".encode())
 
 
-class Runner:
+class ScriptProcess:
     """One run of a script, from its record."""
 
     def __init__(self, record: Path) -> None:
@@ -204,4 +204,4 @@ def _send(child: subprocess.Popen[bytes], number: int) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(Runner(Path(sys.argv[1])).run() & 0xFF)
+    sys.exit(ScriptProcess(Path(sys.argv[1])).run() & 0xFF)

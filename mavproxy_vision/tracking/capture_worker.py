@@ -48,7 +48,7 @@ class CameraHealth:
     error: str = ""
 
 
-class Watch:
+class FrameWatch:
     """Distinguishes new frames from repeated ones, and a live camera from a dead one.
 
     Pure: the clock is an argument.
@@ -106,7 +106,7 @@ class Worker:
         self._newest: Frame | None = None
         self._changed = threading.Condition()
         self._stop = threading.Event()
-        self._watch = Watch(source.live, clock())
+        self._watch = FrameWatch(source.live, clock())
         self._threads = [
             threading.Thread(target=self._guarded, args=(body,), name=name, daemon=True)
             for name, body in (("vision-camera", self._grab), ("vision-detector", self._look))

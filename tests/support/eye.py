@@ -21,7 +21,7 @@ from mavproxy_vision.apriltag.tag_layout import FAMILIES
 from mavproxy_vision.camera.renderer import PlacedTag, Renderer
 from mavproxy_vision.camera.source import Frame
 from mavproxy_vision.geometry.frames import Attitude, Vector, vector
-from mavproxy_vision.tracking.capture_worker import CameraHealth, Watch
+from mavproxy_vision.tracking.capture_worker import CameraHealth, FrameWatch
 from mavproxy_vision.tracking.source_factory import make_source
 from mavproxy_vision.tracking.tracker import Tracker
 
@@ -98,7 +98,7 @@ class Eye:
     def __init__(self, rig: Rig, *, rendered: bool = False) -> None:
         self.rig = rig
         self._rendered = rendered
-        self.watch = Watch(True, rig.loop.time())
+        self.watch = FrameWatch(True, rig.loop.time())
         self.frozen = self.dead = False
         self.blind: Callable[[Any], bool] = lambda _pose: False
         self._last: Frame | None = None

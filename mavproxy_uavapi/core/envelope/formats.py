@@ -10,7 +10,7 @@ from typing import Any
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.envelope import kml
-from mavproxy_uavapi.core.envelope.model import Area, Envelope, Limits, Place
+from mavproxy_uavapi.core.envelope.model import Area, Envelope, EnvelopeLimits, Place
 from mavproxy_uavapi.core.errors import BadRequest, Invalid
 
 mavlink = mavutil.mavlink
@@ -18,7 +18,7 @@ mavlink = mavutil.mavlink
 KINDS = {"inclusion": True, "exclusion": False}
 EXCLUDED = "exclu"  # in the name of a KML Placemark, in any case: its polygon is an exclusion
 MEMBERS = ("type", "features", "limits", "name")  # of a FeatureCollection; others are refused: they might be limits
-EMPTY = {"type": "FeatureCollection", "features": [], "limits": Limits().report()}
+EMPTY = {"type": "FeatureCollection", "features": [], "limits": EnvelopeLimits().report()}
 HOME_CIRCLE = 5005  # MAV_CMD_NAV_FENCE_HOME_CIRCLE_INCLUSION, which older pymavlinks do not name
 POLYGONS = {
     mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION: True,
@@ -55,7 +55,7 @@ def read(text: str, source: str) -> Envelope:
 
 
 def of_geojson(body: Mapping[str, Any], source: str) -> Envelope:
-    """The envelope of a FeatureCollection; its member `limits` is that of `Limits`.
+    """The envelope of a FeatureCollection; its member `limits` is that of `EnvelopeLimits`.
 
     Raises:
         BadRequest: it is none.
@@ -72,7 +72,7 @@ def of_geojson(body: Mapping[str, Any], source: str) -> Envelope:
     if not isinstance(limits, dict):
         raise Invalid("limits is a JSON object", "limits")
     areas = (area for number, feature in enumerate(body["features"], 1) for area in _of_feature(feature, number))
-    return Envelope(tuple(areas), Limits.of(limits), source)
+    return Envelope(tuple(areas), EnvelopeLimits.of(limits), source)
 
 
 def geojson(envelope: Envelope) -> dict[str, Any]:

@@ -42,7 +42,7 @@ class Area:
 
 
 @dataclass(frozen=True)
-class Limits:
+class EnvelopeLimits:
     """Limits besides the areas; None for none.
 
     Attributes:
@@ -62,7 +62,7 @@ class Limits:
     endurance: float | None = None
 
     @classmethod
-    def of(cls, values: Mapping[str, Any]) -> Limits:
+    def of(cls, values: Mapping[str, Any]) -> EnvelopeLimits:
         """The limits of a JSON object.
 
         Raises:
@@ -96,12 +96,12 @@ class Envelope:
     """
 
     areas: tuple[Area, ...] = ()
-    limits: Limits = field(default_factory=Limits)
+    limits: EnvelopeLimits = field(default_factory=EnvelopeLimits)
     source: str = "the envelope"
     every: bool = False
 
     def __post_init__(self) -> None:
-        if not self.areas and self.limits == Limits():
+        if not self.areas and self.limits == EnvelopeLimits():
             raise Invalid("there is neither an area nor a limit in it")
         if len(self.areas) > MOST_AREAS or sum(len(area.corners) for area in self.areas) > MOST_CORNERS:
             raise Invalid(f"it has more than {MOST_AREAS} areas or {MOST_CORNERS} corners")

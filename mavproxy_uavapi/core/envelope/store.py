@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from mavproxy_uavapi.core.envelope.model import Envelope, Limits
+from mavproxy_uavapi.core.envelope.model import Envelope, EnvelopeLimits
 from mavproxy_uavapi.core.envelope.space import Space
 
 ALL = 0  # in place of a system id: every vehicle
@@ -68,4 +68,4 @@ class Envelopes:
 
 def missing(reason: str, source: str) -> Space:
     """An envelope of which nothing is known yet: nothing is inside."""
-    return Space(Envelope(limits=Limits(height=1e-3), source=source), reason)
+    return Space(Envelope(limits=EnvelopeLimits(height=1e-3), source=source), reason)

@@ -267,7 +267,7 @@ def _keep(store: dict[Any, Received], key: Any, message: Any, now: float) -> Non
         store[key] = Received(message, now)
 
 
-class Fleet:
+class VehicleStates:
     """Every vehicle that was ever heard on the links, by system id.
 
     The state of a system is its autopilot's, by `autopilot.rank`; it changes to a better candidate when one is heard.

@@ -16,7 +16,7 @@ from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 
 @dataclass(frozen=True)
-class Hold:
+class Holder:
     """A vehicle's holder, and for how many s the hold lasts without a call; None for the prompt's."""
 
     operator: Operator
@@ -36,14 +36,14 @@ class Holds:
         self._clock = clock
         self._operators: dict[Vehicle, Operator] = {}
 
-    def of(self, vehicle: Vehicle) -> Hold | None:
+    def of(self, vehicle: Vehicle) -> Holder | None:
         """Who holds the vehicle; None if nobody does."""
         operator, lease = self._operators.get(vehicle), self._leases.of(vehicle)
         if operator == THE_PROMPT:
-            return Hold(operator, None)
+            return Holder(operator, None)
         if operator is None or lease is None or lease.ends_at <= self._clock():
             return None
-        return Hold(operator, lease.ends_at - self._clock())
+        return Holder(operator, lease.ends_at - self._clock())
 
     def require(self, vehicle: Vehicle, operator: Operator) -> None:
         """Raise Busy if somebody else of the same or a higher role holds the vehicle."""

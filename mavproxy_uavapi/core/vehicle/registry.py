@@ -10,7 +10,7 @@ from mavproxy_uavapi.core.mavlink.flight_modes import kind_of
 from mavproxy_uavapi.core.mavlink.link import Link
 from mavproxy_uavapi.core.mavlink.link_watch import LinkWatch
 from mavproxy_uavapi.core.mavlink.pending_waits import PendingWaits
-from mavproxy_uavapi.core.mavlink.vehicle_state import Fleet, VehicleState
+from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState, VehicleStates
 from mavproxy_uavapi.core.vehicle.copter import Copter
 from mavproxy_uavapi.core.vehicle.plane import Plane
 from mavproxy_uavapi.core.vehicle.rover import Rover
@@ -40,7 +40,7 @@ class VehicleRegistry:
 
     def __init__(
         self,
-        fleet: Fleet,
+        fleet: VehicleStates,
         link: Link,
         link_watch: LinkWatch,
         pending: PendingWaits,

@@ -74,7 +74,7 @@ class RateRequests:
 
 
 @dataclass
-class Watch:
+class StreamWatch:
     """One vehicle since a boot: the reboots before, since when it is watched (s), and what was requested."""
 
     reboots: int
@@ -91,7 +91,7 @@ class StreamRequester:
 
     def __init__(self, registry: VehicleRegistry) -> None:
         self._registry = registry
-        self._watches: dict[int, Watch] = {}  # by system id
+        self._watches: dict[int, StreamWatch] = {}  # by system id
         self._requested: set[tuple[int, str]] = set()  # system id and name of each message that was ever requested
 
     async def run(self) -> None:
@@ -127,7 +127,7 @@ class StreamRequester:
         now, state = vehicle.clock(), vehicle.state
         watch = self._watches.get(state.system)
         if watch is None or watch.reboots != state.reboots:
-            watch = self._watches[state.system] = Watch(state.reboots, now)
+            watch = self._watches[state.system] = StreamWatch(state.reboots, now)
         for name, rate in self._wanted(vehicle).items():
             requests = watch.requests.get(name)
             if requests is not None and requests.rate < rate:

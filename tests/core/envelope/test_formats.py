@@ -10,7 +10,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.envelope import formats
-from mavproxy_uavapi.core.envelope.model import Limits
+from mavproxy_uavapi.core.envelope.model import EnvelopeLimits
 from mavproxy_uavapi.core.envelope.space import Space
 from mavproxy_uavapi.core.errors import BadRequest, Invalid
 from mavproxy_uavapi.http.examples import ENVELOPE
@@ -53,7 +53,7 @@ def test_geojson_is_read_and_written_alike() -> None:
     assert (field.name, field.inclusion, field.ceiling, field.floor) == ("field", True, 60.0, -math.inf)
     assert field.rings[0][0] == (-35.367, 149.16) and len(field.rings[0]) == 4
     assert (mast.inclusion, mast.centre, mast.radius) == (False, (-35.3625, 149.1665), 25.0)
-    assert envelope.limits == Limits(height=60, distance=400, speed=8)
+    assert envelope.limits == EnvelopeLimits(height=60, distance=400, speed=8)
     assert formats.read(json.dumps(formats.geojson(envelope)), "a file") == envelope
     Space(envelope)
 

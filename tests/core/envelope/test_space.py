@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mavproxy_uavapi.core.envelope.model import Area, Envelope, Limits
+from mavproxy_uavapi.core.envelope.model import Area, Envelope, EnvelopeLimits
 from mavproxy_uavapi.core.envelope.space import TOUCH, LocalFrame, Space, Spot, outside_by, to_leg
 from mavproxy_uavapi.core.errors import Invalid
 from mavproxy_uavapi.core.geodesy import METRES_PER_DEGREE, offset
@@ -100,7 +100,7 @@ def test_circles_err_to_the_safe_side_by_less_than_a_thousandth() -> None:
 
 
 def test_limits_count_from_home_without_any_area() -> None:
-    space = Space(Envelope(limits=Limits(height=50, distance=100)))
+    space = Space(Envelope(limits=EnvelopeLimits(height=50, distance=100)))
     assert breach(space, (0, 0, 10), (90, 0, 40)) is None
     assert breach(space, (0, 0, 10), (0, 0, 60)).what == "the highest height"
     assert breach(space, (0, 0, 10), (0, 110, 40)).by == pytest.approx(10, abs=0.1)

@@ -6,7 +6,13 @@ from typing import Any
 import pytest
 from pymavlink import mavutil
 
-from mavproxy_uavapi.core.mavlink.vehicle_state import CHUNK_TIMEOUT, STATUSTEXTS_KEPT, Fleet, Received, VehicleState
+from mavproxy_uavapi.core.mavlink.vehicle_state import (
+    CHUNK_TIMEOUT,
+    STATUSTEXTS_KEPT,
+    Received,
+    VehicleState,
+    VehicleStates,
+)
 
 mavlink = mavutil.mavlink
 QUADROTOR = mavlink.MAV_TYPE_QUADROTOR
@@ -14,12 +20,12 @@ AIR, GROUND = mavlink.MAV_LANDED_STATE_IN_AIR, mavlink.MAV_LANDED_STATE_ON_GROUN
 
 
 @pytest.fixture
-def fleet() -> Fleet:
-    return Fleet()
+def fleet() -> VehicleStates:
+    return VehicleStates()
 
 
 @pytest.fixture
-def hear(fleet: Fleet, msg: Callable[..., Any]) -> Callable[..., VehicleState | None]:
+def hear(fleet: VehicleStates, msg: Callable[..., Any]) -> Callable[..., VehicleState | None]:
     """Feed one message; `at` is its time of arrival."""
 
     def hear(name: str, at: float = 1.0, **fields: Any) -> VehicleState | None:
@@ -34,7 +40,7 @@ def state(hear: Callable[..., Any]) -> VehicleState:
     return hear("heartbeat")
 
 
-def test_first_heartbeat_makes_a_vehicle(fleet: Fleet, hear: Any) -> None:
+def test_first_heartbeat_makes_a_vehicle(fleet: VehicleStates, hear: Any) -> None:
     assert hear("attitude", yaw=1.0) is None
     assert fleet.vehicles == {}
     state = hear("heartbeat", at=2.0, armed=True, mode="GUIDED")
@@ -57,7 +63,7 @@ def test_first_heartbeat_makes_a_vehicle(fleet: Fleet, hear: Any) -> None:
     ],
 )
 def test_what_is_no_autopilot_never_makes_a_vehicle(
-    fleet: Fleet, hear: Any, vehicle_type: int, autopilot: int
+    fleet: VehicleStates, hear: Any, vehicle_type: int, autopilot: int
 ) -> None:
     assert hear("heartbeat", system=9, type=vehicle_type, autopilot=autopilot) is None
     assert fleet.vehicles == {}
@@ -80,7 +86,9 @@ COMPANION = {"component": 191, "type": mavlink.MAV_TYPE_GENERIC, "autopilot": ma
         {"component": 2},
     ],
 )
-def test_autopilot_is_found_whatever_was_heard_before_it(fleet: Fleet, hear: Any, first: dict[str, Any]) -> None:
+def test_autopilot_is_found_whatever_was_heard_before_it(
+    fleet: VehicleStates, hear: Any, first: dict[str, Any]
+) -> None:
     hear("heartbeat", at=1.0, custom_mode=7, base_mode=128, **first)
     hear("attitude", at=1.1, component=first["component"], yaw=3.0)
     state = hear("heartbeat", at=2.0, mode="GUIDED")
@@ -91,7 +99,9 @@ def test_autopilot_is_found_whatever_was_heard_before_it(fleet: Fleet, hear: Any
     assert state.field("ATTITUDE", "yaw") is None
 
 
-def test_state_that_becomes_the_autopilots_keeps_nothing_of_the_other_as_its_own(fleet: Fleet, hear: Any) -> None:
+def test_state_that_becomes_the_autopilots_keeps_nothing_of_the_other_as_its_own(
+    fleet: VehicleStates, hear: Any
+) -> None:
     state = hear("heartbeat", component=191, autopilot=mavlink.MAV_AUTOPILOT_GENERIC)
     hear("attitude", component=191, yaw=3.0, time_boot_ms=900_000)
     hear("battery_status", component=191, id=1, voltages=[0] * 10, voltages_ext=[0] * 4)
@@ -108,19 +118,25 @@ def test_state_that_becomes_the_autopilots_keeps_nothing_of_the_other_as_its_own
     assert (state.parameters, state.statustexts_since(0.0), state.reboots) == ({}, [], 0)
 
 
-def test_second_autopilot_never_takes_over_from_the_first_even_when_that_is_silent(fleet: Fleet, hear: Any) -> None:
+def test_second_autopilot_never_takes_over_from_the_first_even_when_that_is_silent(
+    fleet: VehicleStates, hear: Any
+) -> None:
     state = hear("heartbeat", at=1.0)
     for second in range(2, 60):
         hear("heartbeat", at=float(second), component=2, armed=True)
     assert (state.component, state.armed, state.heartbeat_at) == (1, False, 1.0)
 
 
-def test_generic_autopilot_counts_when_it_is_alone_and_says_what_vehicle_it_is(fleet: Fleet, hear: Any) -> None:
+def test_generic_autopilot_counts_when_it_is_alone_and_says_what_vehicle_it_is(
+    fleet: VehicleStates, hear: Any
+) -> None:
     state = hear("heartbeat", component=5, autopilot=mavlink.MAV_AUTOPILOT_GENERIC)
     assert (state.component, state.vehicle_type) == (5, QUADROTOR)
 
 
-def test_parameters_are_known_before_and_after_their_vehicle_and_outlive_a_reboot(fleet: Fleet, hear: Any) -> None:
+def test_parameters_are_known_before_and_after_their_vehicle_and_outlive_a_reboot(
+    fleet: VehicleStates, hear: Any
+) -> None:
     fleet.learn({(1, 1): {"RTL_ALT": 1500.0}, (1, 191): {"RTL_ALT": 1.0}})
     state = hear("heartbeat")
     fleet.learn({(1, 1): {"LAND_SPEED": 50.0}, (2, 1): {"LAND_SPEED": 30.0}})
@@ -132,7 +148,9 @@ def test_parameters_are_known_before_and_after_their_vehicle_and_outlive_a_reboo
     assert hear("heartbeat", system=2).parameters == {"LAND_SPEED": 30.0}
 
 
-def test_parameters_are_those_of_the_component_that_turns_out_to_be_the_autopilot(fleet: Fleet, hear: Any) -> None:
+def test_parameters_are_those_of_the_component_that_turns_out_to_be_the_autopilot(
+    fleet: VehicleStates, hear: Any
+) -> None:
     fleet.learn({(1, 1): {"RTL_ALT": 1500.0}})
     state = hear("heartbeat", component=191, autopilot=mavlink.MAV_AUTOPILOT_GENERIC)
     assert state.parameters == {}
@@ -140,7 +158,7 @@ def test_parameters_are_those_of_the_component_that_turns_out_to_be_the_autopilo
     assert state.parameters == {"RTL_ALT": 1500.0}
 
 
-def test_copter_that_does_not_know_its_frame_yet_is_a_vehicle(fleet: Fleet, hear: Any) -> None:
+def test_copter_that_does_not_know_its_frame_yet_is_a_vehicle(fleet: VehicleStates, hear: Any) -> None:
     state = hear("heartbeat", type=mavlink.MAV_TYPE_GENERIC)
     hear("heartbeat")
     assert (state.component, state.vehicle_type) == (1, QUADROTOR)
@@ -174,7 +192,7 @@ def test_newest_prefers_the_autopilots_own_message(state: VehicleState, hear: An
     assert state.newest("VFR_HUD") is None
 
 
-def test_several_vehicles_are_kept_apart(fleet: Fleet, hear: Any) -> None:
+def test_several_vehicles_are_kept_apart(fleet: VehicleStates, hear: Any) -> None:
     hear("heartbeat", system=1)
     hear("heartbeat", system=2, armed=True, type=mavlink.MAV_TYPE_FIXED_WING)
     hear("attitude", system=2, yaw=2.0)

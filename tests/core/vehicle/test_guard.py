@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from mavproxy_uavapi.core.envelope.model import Area, Envelope, Limits
+from mavproxy_uavapi.core.envelope.model import Area, Envelope, EnvelopeLimits
 from mavproxy_uavapi.core.envelope.space import LocalFrame, Space, Spot
 from mavproxy_uavapi.core.errors import OutsideEnvelope, Stale
 from mavproxy_uavapi.core.mavlink.flight_modes import mode_number
@@ -32,7 +32,7 @@ TYPES = {
 def square(half: float, **limits: float) -> Space:
     ring = tuple(FRAME.degrees(Spot(n * half, e * half, 0)) for n, e in ((-1, -1), (1, -1), (1, 1), (-1, 1)))
     area = Area("field", inclusion=True, rings=(ring,), floor=5.0, ceiling=60.0)
-    return Space(Envelope((area,), Limits(**limits)))
+    return Space(Envelope((area,), EnvelopeLimits(**limits)))
 
 
 def test_a_stop_goes_out_though_nobody_knows_where_the_vehicle_is(make: Callable[..., Any], loop: Any) -> None:

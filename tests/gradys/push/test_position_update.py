@@ -16,7 +16,7 @@ CAPTURED = (
 )
 
 
-def where(telemetry: Any, now: float, **changes: Any) -> position_update.Position:
+def where(telemetry: Any, now: float, **changes: Any) -> position_update.VehiclePosition:
     limits = {"max_age": 5.0, "link_timeout": 5.0, "has_position": True, **changes}
     return position_of(telemetry.state, now, **limits)
 

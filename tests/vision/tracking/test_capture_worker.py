@@ -8,7 +8,7 @@ import pytest
 from mavproxy_vision.camera.source import Frame, Posted
 from mavproxy_vision.errors import NoCamera
 from mavproxy_vision.geometry.camera_model import CameraModel
-from mavproxy_vision.tracking.capture_worker import Watch, Worker
+from mavproxy_vision.tracking.capture_worker import FrameWatch, Worker
 from mavproxy_vision.tracking.tracker import Tracker
 from tests.support.clock import Clock
 from tests.support.pictures import picture
@@ -20,7 +20,7 @@ def blind(detect=lambda _: ()):
 
 
 def test_a_repeated_frame_is_not_new_and_a_silent_camera_is_noticed():
-    watch = Watch(True, 100.0)
+    watch = FrameWatch(True, 100.0)
     assert watch.is_new(Frame(picture(1), 100.1, 100.1))
     assert not watch.is_new(Frame(picture(1), 100.2, 100.2))
     assert watch.verdict(100.5) == "ok"
@@ -32,7 +32,7 @@ def test_a_repeated_frame_is_not_new_and_a_silent_camera_is_noticed():
 
 
 def test_a_folder_may_repeat_itself():
-    watch = Watch(False, 100.0)
+    watch = FrameWatch(False, 100.0)
     assert watch.is_new(Frame(picture(1), 100.1, 100.1))
     assert watch.is_new(Frame(picture(1), 100.2, 100.2))
 
