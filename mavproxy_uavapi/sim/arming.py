@@ -8,7 +8,7 @@ from .battery import Battery
 from .estimator import Estimator
 from .geodesy import Location
 from .mission import Mission
-from .mode import Mode
+from .mode import VehicleMode
 from .parameters import ParameterStore
 
 REPORT_INTERVAL = 30.0
@@ -23,7 +23,7 @@ class Candidate(Protocol):
 
     armed: bool
     home: Location | None
-    mode: Mode
+    mode: VehicleMode
     mission: Mission
     battery: Battery
     estimator: Estimator

@@ -17,9 +17,9 @@ from .frames import AMSL_FRAMES, GLOBAL_FRAMES, HIGHEST_ALTITUDE, valid_location
 from .geodesy import Location
 from .link import PeerLink
 from .streams import HEARTBEAT_INTERVAL, group_of
-from .telemetry import Telemetry
+from .telemetry import TelemetryMessages
 from .transmitter import Transmitter
-from .vehicle import Vehicle
+from .vehicle import EmbeddedVehicle
 
 ACCEPTED: int = mavlink.MAV_RESULT_ACCEPTED
 DENIED: int = mavlink.MAV_RESULT_DENIED
@@ -94,7 +94,11 @@ class Commands:
     """Carries out commands on one vehicle; reboot makes it boot again once the acknowledgement is out."""
 
     def __init__(
-        self, vehicle: Vehicle, telemetry: Telemetry, transmitter: Transmitter, reboot: Callable[[], None]
+        self,
+        vehicle: EmbeddedVehicle,
+        telemetry: TelemetryMessages,
+        transmitter: Transmitter,
+        reboot: Callable[[], None],
     ) -> None:
         self._vehicle = vehicle
         self._telemetry = telemetry

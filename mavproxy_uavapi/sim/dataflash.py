@@ -13,7 +13,7 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .vehicle import Vehicle
+    from .vehicle import EmbeddedVehicle
 
 HEAD = b"\xa3\x95"
 FORMATS: Mapping[str, tuple[int, str, str]] = {
@@ -83,7 +83,7 @@ class Dataflash:
         self._mode: int | None = None
         self._due = 0.0
 
-    def step(self, vehicle: Vehicle, epoch: float) -> None:
+    def step(self, vehicle: EmbeddedVehicle, epoch: float) -> None:
         """Record what there is to record; epoch is the unix time in seconds at which the vehicle booted."""
         if not vehicle.armed:
             self.close()
@@ -107,7 +107,7 @@ class Dataflash:
         """Forget all finished logs."""
         self.logs = []
 
-    def _open(self, vehicle: Vehicle, epoch: float) -> None:
+    def _open(self, vehicle: EmbeddedVehicle, epoch: float) -> None:
         self._data = bytearray(formats())
         self._began, self._mode, self._due = int(epoch + vehicle.now), None, 0.0
         for text in vehicle.banner:
@@ -117,7 +117,7 @@ class Dataflash:
         if self._data is not None and len(self._data) < LARGEST:
             self._data += record(name, *fields)
 
-    def _sample(self, vehicle: Vehicle, unix: float) -> None:
+    def _sample(self, vehicle: EmbeddedVehicle, unix: float) -> None:
         now, body = _microseconds(vehicle), vehicle.body
         yaw = math.degrees(body.yaw) % 360
         attitude = (math.degrees(body.roll), math.degrees(body.pitch), yaw)
@@ -140,7 +140,7 @@ class Dataflash:
         )
 
 
-def _microseconds(vehicle: Vehicle) -> int:
+def _microseconds(vehicle: EmbeddedVehicle) -> int:
     return int(vehicle.now * 1e6 + 0.5)
 
 

@@ -8,7 +8,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from .geodesy import Location, Ned, to_ned
 from .mission import Item
-from .vehicle import Vehicle
+from .vehicle import EmbeddedVehicle
 
 AMSL_FRAMES = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
 HOME_FRAMES = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
@@ -28,7 +28,9 @@ def valid_location(latitude_e7: int, longitude_e7: int, altitude: float) -> bool
     )
 
 
-def global_target(vehicle: Vehicle, frame: int, latitude_e7: int, longitude_e7: int, altitude: float) -> Ned | None:
+def global_target(
+    vehicle: EmbeddedVehicle, frame: int, latitude_e7: int, longitude_e7: int, altitude: float
+) -> Ned | None:
     """NED metres from the EKF origin, or None without an origin or for a frame that is not global.
 
     altitude is metres AMSL or above home by frame; the ground is flat here, so above terrain is above home.
@@ -41,7 +43,7 @@ def global_target(vehicle: Vehicle, frame: int, latitude_e7: int, longitude_e7: 
     return to_ned(origin, Location(latitude_e7 / 1e7, longitude_e7 / 1e7, altitude))
 
 
-def item_target(vehicle: Vehicle, item: Item) -> Ned:
+def item_target(vehicle: EmbeddedVehicle, item: Item) -> Ned:
     """Where a mission item leads; without a latitude and longitude straight up or down from here."""
     here = vehicle.estimator.location
     latitude = item.x if item.x or item.y else round(here.latitude * 1e7)

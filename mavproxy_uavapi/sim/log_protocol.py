@@ -11,7 +11,7 @@ from .dataflash import Dataflash, StoredLog
 
 if TYPE_CHECKING:
     from .link import PeerLink
-    from .vehicle import Vehicle
+    from .vehicle import EmbeddedVehicle
 
 PIECE = 90
 """Bytes of a full LOG_DATA."""
@@ -29,7 +29,7 @@ class Listing:
 
 
 @dataclass
-class Sending:
+class LogTransfer:
     """A log that is being sent: its id, the next byte, and the one after the last."""
 
     link: PeerLink
@@ -42,10 +42,10 @@ class Sending:
 class LogProtocol:
     """Answers LOG_* messages for one vehicle, from one boot to the next."""
 
-    def __init__(self, vehicle: Vehicle, dataflash: Dataflash) -> None:
+    def __init__(self, vehicle: EmbeddedVehicle, dataflash: Dataflash) -> None:
         self._vehicle = vehicle
         self._dataflash = dataflash
-        self._transfer: Listing | Sending | None = None
+        self._transfer: Listing | LogTransfer | None = None
         self._warned = False
         self._handlers = {
             "LOG_REQUEST_LIST": self._list,
@@ -94,7 +94,7 @@ class LogProtocol:
         elif 1 <= message.id <= len(logs):
             log = logs[message.id - 1]
             end = min(message.ofs + message.count, len(log.data))
-            self._transfer = Sending(link, message.id, log, message.ofs, end)
+            self._transfer = LogTransfer(link, message.id, log, message.ofs, end)
 
     def _busy(self) -> bool:
         if self._transfer is None:
@@ -120,7 +120,7 @@ class LogProtocol:
         if listing.next > listing.last:
             self._transfer = None
 
-    def _send_piece(self, sending: Sending) -> None:
+    def _send_piece(self, sending: LogTransfer) -> None:
         start = sending.next
         piece = sending.log.data[start : min(start + PIECE, sending.end)]
         data = list(piece.ljust(PIECE, b"\0"))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .geodesy import Location, Ned
-from .vehicle import Vehicle
+from .vehicle import EmbeddedVehicle
 
 
 class MessageSource:
@@ -12,7 +12,7 @@ class MessageSource:
     unix_epoch is the unix time in seconds at which the vehicle booted.
     """
 
-    def __init__(self, vehicle: Vehicle, unix_epoch: float) -> None:
+    def __init__(self, vehicle: EmbeddedVehicle, unix_epoch: float) -> None:
         self.vehicle = vehicle
         self.unix_epoch = unix_epoch
         self._frozen: tuple[float, Ned, Ned, Location] | None = None

@@ -16,7 +16,7 @@ from .mission_items import as_item, as_message, refusal, unreadable
 
 if TYPE_CHECKING:
     from .link import PeerLink
-    from .vehicle import Vehicle
+    from .vehicle import EmbeddedVehicle
 
 LIMIT = 724
 """What ArduCopter can store in SITL."""
@@ -47,7 +47,7 @@ class Upload:
 class MissionProtocol:
     """Answers MISSION_* messages for one vehicle."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: EmbeddedVehicle) -> None:
         self.vehicle = vehicle
         self._lists: dict[int, list[Item]] = {kind: [] for kind in OTHER_LISTS}
         self._upload: Upload | None = None

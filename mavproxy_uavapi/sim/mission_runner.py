@@ -12,7 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from .events import Broadcast, ItemReached
 from .mission import CONDITION, NAVIGATION, Item, State
-from .vehicle import Vehicle
+from .vehicle import EmbeddedVehicle
 
 LONGEST_CHAIN = 100
 """Most items that one step runs through; a jump loop without a waypoint ends here."""
@@ -75,7 +75,7 @@ class MissionRunner:
     With reports_all MISSION_ITEM_REACHED reports immediate items, too, and of several at once only the last one.
     """
 
-    def __init__(self, vehicle: Vehicle, flyer: Flyer, *, reports_all: bool = False) -> None:
+    def __init__(self, vehicle: EmbeddedVehicle, flyer: Flyer, *, reports_all: bool = False) -> None:
         self._vehicle = vehicle
         self._flyer = flyer
         self._reports_all = reports_all

@@ -7,7 +7,7 @@ from typing import ClassVar
 from .geodesy import Ned
 
 
-class Mode:
+class VehicleMode:
     """A mode of a vehicle: MANUAL, GUIDED and so on. Each type of vehicle adds how it moves in it."""
 
     name: ClassVar[str] = ""
@@ -29,7 +29,7 @@ class Mode:
         return None
 
 
-class MissionMode(Mode):
+class MissionMode(VehicleMode):
     """A mode that flies the mission."""
 
     def jump_to(self, seq: int) -> None:

@@ -37,7 +37,7 @@ SPEED_KINDS = {0: Speed.HORIZONTAL, 1: Speed.HORIZONTAL, 2: Speed.UP, 3: Speed.D
 
 
 @dataclass
-class Limits:
+class MotionLimits:
     """Speeds in m/s, accelerations in m/s/s, lean in radians."""
 
     speed: float = 10.0
@@ -61,7 +61,7 @@ class PositionController:
     """Holds the desired position, velocity and acceleration and computes the thrust that follows them."""
 
     def __init__(self) -> None:
-        self.limits = Limits()
+        self.limits = MotionLimits()
         self.position = [0.0, 0.0, 0.0]
         self.velocity = [0.0, 0.0, 0.0]
         self.acceleration = [0.0, 0.0, 0.0]

@@ -31,7 +31,7 @@ from .mission import Mission
 from .mission_protocol import MissionProtocol
 from .options import Options
 from .parameters import Parameter, ParameterStore
-from .telemetry import Telemetry
+from .telemetry import TelemetryMessages
 from .transmitter import Transmitter
 
 PARAMETERS_PER_STEP = 20
@@ -98,7 +98,7 @@ class Simulator:
         self._boots += 1
         seed = self.options.seed + self._boots - 1
         self.vehicle = self._kind.vehicle(self.options, self.parameters, mission, seed)
-        self.telemetry = Telemetry(self.vehicle, self._epoch)
+        self.telemetry = TelemetryMessages(self.vehicle, self._epoch)
         self.missions = MissionProtocol(self.vehicle)
         self.dataflash.close()
         self._logs = LogProtocol(self.vehicle, self.dataflash)

@@ -8,13 +8,13 @@ from typing import Any
 from .motion_messages import MotionMessages
 from .system_messages import SystemMessages
 from .truth_messages import TruthMessages
-from .vehicle import Vehicle
+from .vehicle import EmbeddedVehicle
 
 
-class Telemetry(MotionMessages, SystemMessages, TruthMessages):
+class TelemetryMessages(MotionMessages, SystemMessages, TruthMessages):
     """Builds messages by name; None where ArduPilot would not send one either."""
 
-    def __init__(self, vehicle: Vehicle, unix_epoch: float) -> None:
+    def __init__(self, vehicle: EmbeddedVehicle, unix_epoch: float) -> None:
         super().__init__(vehicle, unix_epoch)
         self._builders: dict[str, Callable[[], Any]] = {
             name.removeprefix("_build_").upper(): getattr(self, name)

@@ -11,8 +11,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from .events import Broadcast, Event, ItemReached, StatusTextEvent
 from .faults import Faults
 from .link import PeerLink
-from .telemetry import Telemetry
-from .vehicle import Vehicle
+from .telemetry import TelemetryMessages
+from .vehicle import EmbeddedVehicle
 
 TEXT_LENGTH = 50
 
@@ -20,7 +20,9 @@ TEXT_LENGTH = 50
 class Transmitter:
     """Sends for one vehicle from one boot to the next; links is its owner's list, which may change meanwhile."""
 
-    def __init__(self, vehicle: Vehicle, telemetry: Telemetry, faults: Faults, links: list[PeerLink]) -> None:
+    def __init__(
+        self, vehicle: EmbeddedVehicle, telemetry: TelemetryMessages, faults: Faults, links: list[PeerLink]
+    ) -> None:
         self._vehicle = vehicle
         self._telemetry = telemetry
         self._faults = faults

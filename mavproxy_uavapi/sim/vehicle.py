@@ -17,7 +17,7 @@ from .estimator import Estimator
 from .events import Broadcast, Event, StatusTextEvent
 from .geodesy import Location, Ned, to_ned
 from .mission import SUPPORTED, Item, Mission, State, home_item
-from .mode import MissionMode, Mode
+from .mode import MissionMode, VehicleMode
 from .options import Options
 from .parameters import ParameterStore
 from .physics import Body
@@ -36,7 +36,7 @@ BOOT_TEXTS = (
 )
 
 
-class Watch(Protocol):
+class FailsafeWatch(Protocol):
     """Failsafes of one vehicle."""
 
     active: bool
@@ -46,7 +46,7 @@ class Watch(Protocol):
         """Check everything; dt seconds have passed."""
 
 
-class Vehicle:
+class EmbeddedVehicle:
     """All state of one vehicle between two boots.
 
     Time is `now`, seconds since boot on the simulated clock. The vehicle reports to the ground through `events`; the
@@ -67,9 +67,9 @@ class Vehicle:
     neutral_sticks: ClassVar[tuple[int, ...]] = NEUTRAL
     """What SITL's radio sends on channels 1 to 8 at first."""
 
-    modes: Mapping[int, Mode]
-    mode: Mode
-    failsafes: Watch
+    modes: Mapping[int, VehicleMode]
+    mode: VehicleMode
+    failsafes: FailsafeWatch
 
     def __init__(
         self, options: Options, parameters: ParameterStore, mission: Mission, seed: int, body: Body | None = None
@@ -268,7 +268,7 @@ class Vehicle:
         self.emit(Broadcast("HEARTBEAT"))
         return True
 
-    def mode_refusal(self, mode: Mode) -> str | None:
+    def mode_refusal(self, mode: VehicleMode) -> str | None:
         """Enter the mode; the text that says why it cannot be, or None."""
         raise NotImplementedError
 

@@ -10,8 +10,8 @@ from ..geodesy import Ned
 from ..mission import Mission
 from ..options import Options
 from ..parameters import ParameterStore
-from ..position_control import Limits, PositionController, Speed
-from ..vehicle import Vehicle
+from ..position_control import MotionLimits, PositionController, Speed
+from ..vehicle import EmbeddedVehicle
 from .demand import NO_LIFT, Demand
 from .land_detector import LandDetector
 from .precland import PrecisionLander
@@ -23,7 +23,7 @@ ARRIVAL_DISTANCE = 0.1
 ARRIVAL_SPEED = 0.1
 
 
-class Aircraft(Vehicle):
+class Aircraft(EmbeddedVehicle):
     """A vehicle that hovers: all but its flight modes and what chooses among them."""
 
     def __init__(self, options: Options, parameters: ParameterStore, mission: Mission, seed: int) -> None:
@@ -86,10 +86,10 @@ class Aircraft(Vehicle):
             and math.dist(self.estimator.position, target) < radius
         )
 
-    def default_limits(self) -> Limits:
+    def default_limits(self) -> MotionLimits:
         """Speeds and accelerations of the WPNAV parameters, in SI units."""
         parameters = self.parameters
-        return Limits(
+        return MotionLimits(
             speed=max(parameters["WPNAV_SPEED"], 10) / 100,
             speed_up=max(parameters["WPNAV_SPEED_UP"], 10) / 100,
             speed_down=max(parameters["WPNAV_SPEED_DN"], 10) / 100,

@@ -10,7 +10,7 @@ from ..commands import ACCEPTED, DENIED, FAILED, CommandInt, Commands
 from ..frames import AMSL_FRAMES, HIGHEST_ALTITUDE, global_target, valid_location
 from ..link import PeerLink
 from ..position_control import SPEED_KINDS
-from ..telemetry import Telemetry
+from ..telemetry import TelemetryMessages
 from ..transmitter import Transmitter
 from .copter import SimulatedCopter
 from .modes import Guided
@@ -29,7 +29,11 @@ class CopterCommands(Commands):
     """Carries out commands on one copter."""
 
     def __init__(
-        self, copter: SimulatedCopter, telemetry: Telemetry, transmitter: Transmitter, reboot: Callable[[], None]
+        self,
+        copter: SimulatedCopter,
+        telemetry: TelemetryMessages,
+        transmitter: Transmitter,
+        reboot: Callable[[], None],
     ) -> None:
         super().__init__(copter, telemetry, transmitter, reboot)
         self._copter = copter

@@ -129,11 +129,11 @@ class SimulatedCopter(Aircraft):
         if not self.mode.positions:
             self.relax()
 
-    def mode_refusal(self, mode: modes.Mode) -> str | None:
+    def mode_refusal(self, mode: modes.VehicleMode) -> str | None:
         reason = self._refusal(mode)
         return None if reason is None else f"Mode change to {mode.name} failed: {reason}"
 
-    def _refusal(self, mode: modes.Mode) -> str | None:
+    def _refusal(self, mode: modes.VehicleMode) -> str | None:
         assert isinstance(mode, Mode)
         if self.armed:
             throttle = self.sticks.throttle(self.now)

@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from ..mission import Mission
 from ..options import Options
 from ..parameters import ParameterStore
-from ..vehicle import Vehicle
+from ..vehicle import EmbeddedVehicle
 from .body import PlaneBody
 from .demand import STAY, Demand, Throttle
 from .flight_detector import FlightDetector
@@ -27,7 +27,7 @@ CLIMB_THROTTLE = 0.06
 """Share of throttle for each m/s of climb."""
 
 
-class Airframe(Vehicle):
+class Airframe(EmbeddedVehicle):
     """All of a plane but its modes and what chooses among them."""
 
     body: PlaneBody

@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from ..commands import ACCEPTED, DENIED, FAILED, CommandInt, Commands
 from ..frames import AMSL_FRAMES, HIGHEST_ALTITUDE, global_target, valid_location
 from ..link import PeerLink
-from ..telemetry import Telemetry
+from ..telemetry import TelemetryMessages
 from ..transmitter import Transmitter
 from .modes import Auto, Guided, Loiter, Rtl
 from .plane import SimulatedPlane
@@ -22,7 +22,11 @@ class PlaneCommands(Commands):
     """Carries out commands on one plane."""
 
     def __init__(
-        self, plane: SimulatedPlane, telemetry: Telemetry, transmitter: Transmitter, reboot: Callable[[], None]
+        self,
+        plane: SimulatedPlane,
+        telemetry: TelemetryMessages,
+        transmitter: Transmitter,
+        reboot: Callable[[], None],
     ) -> None:
         super().__init__(plane, telemetry, transmitter, reboot)
         self._plane = plane

@@ -19,7 +19,7 @@ STEEPEST = 0.5
 """Share of the way from which the flare may begin by its time."""
 
 
-class Stage(Enum):
+class RunwayStage(Enum):
     """The stages in their order."""
 
     APPROACH = auto()
@@ -27,13 +27,13 @@ class Stage(Enum):
     ROLL_OUT = auto()
 
 
-class Landing:
+class RunwayLanding:
     """Lands one plane at the end of the line from start to place, NED metres."""
 
     def __init__(self, vehicle: Airframe, start: Ned, place: Ned) -> None:
         self._vehicle = vehicle
         self._start, self._place = start, place
-        self.stage = Stage.APPROACH
+        self.stage = RunwayStage.APPROACH
         self._flare_sink = 0.0
         self._touched_at = math.inf
         self._distance_told = False
@@ -89,11 +89,11 @@ class Landing:
         vehicle = self._vehicle
         course = math.atan2(self._place.east - self._start.east, self._place.north - self._start.north)
         line = vehicle.navigator.follow_line(self._beyond(course))
-        if not vehicle.body.airborne and self.stage is not Stage.APPROACH:
+        if not vehicle.body.airborne and self.stage is not RunwayStage.APPROACH:
             return self._roll_out(course)
-        if self.stage is Stage.APPROACH:
+        if self.stage is RunwayStage.APPROACH:
             self._look_for_flare()
-        if self.stage is Stage.FLARE:
+        if self.stage is RunwayStage.FLARE:
             return self._flare(line, dt)
         climb = vehicle.navigator.climb_to(self._slope_down())
         return Demand(line.bank, min(climb, 0.5), self._approach_speed, Throttle.AUTOMATIC, course)
@@ -119,7 +119,7 @@ class Landing:
         low = height <= parameters["LAND_FLARE_ALT"] and proportion > 0.15
         soon = parameters["LAND_FLARE_SEC"] > 0 and height <= sink * parameters["LAND_FLARE_SEC"]
         if low or (soon and proportion > STEEPEST) or proportion >= 1:
-            self.stage, self._flare_sink = Stage.FLARE, max(sink, 0.0)
+            self.stage, self._flare_sink = RunwayStage.FLARE, max(sink, 0.0)
             away = math.dist(vehicle.estimator.position[:2], self._place[:2])
             text = f"Flare {height:.1f}m sink={sink:.2f} speed={self._ground_speed:.1f} dist={away:.1f}"
             vehicle.say(mavlink.MAV_SEVERITY_INFO, text)
@@ -134,7 +134,7 @@ class Landing:
 
     def _roll_out(self, course: float) -> Demand:
         vehicle = self._vehicle
-        self.stage = Stage.ROLL_OUT
+        self.stage = RunwayStage.ROLL_OUT
         delay = vehicle.parameters["LAND_DISARMDELAY"]
         if vehicle.armed and not vehicle.flying and 0 < delay <= vehicle.now - vehicle.detector.last_flying:
             vehicle.disarm_now()

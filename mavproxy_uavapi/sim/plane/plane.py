@@ -91,7 +91,7 @@ class SimulatedPlane(Airframe):
 
     # What the ground station or a pilot can do.
 
-    def mode_refusal(self, mode: modes.Mode) -> str | None:
+    def mode_refusal(self, mode: modes.VehicleMode) -> str | None:
         assert isinstance(mode, Mode)
         if not mode.enter(checked=self.armed):
             return "Flight mode change failed"

@@ -12,7 +12,7 @@ from ..geodesy import Location
 from ..mission import Mission
 from ..options import Options
 from ..parameters import ParameterStore
-from ..vehicle import Vehicle
+from ..vehicle import EmbeddedVehicle
 from .body import CarBody
 from .drive import COAST, Drive
 from .navigator import FASTEST, Navigator, grip
@@ -25,7 +25,7 @@ WHEELS_TURN = 10.0
 """rad/s/s; as fast as the wheels can be turned."""
 
 
-class Chassis(Vehicle):
+class Chassis(EmbeddedVehicle):
     """All of a rover but its modes and what chooses among them."""
 
     body: CarBody

@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from ..commands import ACCEPTED, DENIED, FAILED, CommandInt, Commands
 from ..frames import global_target, valid_location
 from ..link import PeerLink
-from ..telemetry import Telemetry
+from ..telemetry import TelemetryMessages
 from ..transmitter import Transmitter
 from .modes import Auto, Guided, Rtl
 from .rover import SimulatedRover
@@ -21,7 +21,11 @@ class RoverCommands(Commands):
     """Carries out commands on one rover."""
 
     def __init__(
-        self, rover: SimulatedRover, telemetry: Telemetry, transmitter: Transmitter, reboot: Callable[[], None]
+        self,
+        rover: SimulatedRover,
+        telemetry: TelemetryMessages,
+        transmitter: Transmitter,
+        reboot: Callable[[], None],
     ) -> None:
         super().__init__(rover, telemetry, transmitter, reboot)
         self._rover = rover

@@ -73,7 +73,7 @@ class SimulatedRover(Chassis):
 
     # What the ground station or a pilot can do.
 
-    def mode_refusal(self, mode: modes.Mode) -> str | None:
+    def mode_refusal(self, mode: modes.VehicleMode) -> str | None:
         assert isinstance(mode, Mode)
         lost = (mode.needs_position or mode.needs_velocity) and not self.estimator.ready
         refused = (self.armed and lost) or not mode.enter(checked=self.armed)

@@ -2,7 +2,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.sim.streams import GROUPS, Streams, group_of
-from mavproxy_uavapi.sim.telemetry import Telemetry
+from mavproxy_uavapi.sim.telemetry import TelemetryMessages
 
 ATTITUDE = mavlink.MAVLINK_MSG_ID_ATTITUDE
 SET_INTERVAL = mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
@@ -96,7 +96,7 @@ def test_a_late_caller_is_not_flooded():
 
 
 def test_every_streamed_message_can_be_built(ground):
-    telemetry = Telemetry(ground.copter, 0.0)
+    telemetry = TelemetryMessages(ground.copter, 0.0)
     for names in GROUPS.values():
         for name in names:
             assert telemetry.knows(name)

@@ -10,7 +10,7 @@ from ..aircraft import Aircraft
 from ..demand import IDLE, Demand
 
 
-class Mode(mode.Mode):
+class Mode(mode.VehicleMode):
     """A flight mode; `step` is called at the control rate while it is the current one."""
 
     manual_throttle: ClassVar[bool] = False

@@ -17,7 +17,7 @@ MINIMUM_ALTITUDE = 0.3
 MINIMUM_CONE_SLOPE = 0.5
 
 
-class Stage(Enum):
+class RtlStage(Enum):
     """The stages in their order."""
 
     CLIMB = auto()
@@ -34,7 +34,7 @@ class Rtl(Mode):
     number = 6
     armable = False
 
-    stage = Stage.CLIMB
+    stage = RtlStage.CLIMB
     _target = Ned(0.0, 0.0, 0.0)
     _planned = False
     _arrived_at = 0.0
@@ -45,7 +45,7 @@ class Rtl(Mode):
         limits = self.aircraft.default_limits()
         limits.speed = max(self.aircraft.parameters["RTL_SPEED"], 0) / 100 or limits.speed
         self.aircraft.position.limits = limits
-        self.stage, self._planned = Stage.CLIMB, False
+        self.stage, self._planned = RtlStage.CLIMB, False
         return True
 
     def step(self, dt: float) -> Demand:
@@ -54,7 +54,7 @@ class Rtl(Mode):
             return self.wait_on_ground()
         if not self._planned:
             self._plan()
-        if self.stage is Stage.LAND:
+        if self.stage is RtlStage.LAND:
             return descend(self, dt)
         if aircraft.grounded:
             return self.wait_on_ground()
@@ -63,7 +63,7 @@ class Rtl(Mode):
         return demand
 
     def _fly_stage(self, dt: float) -> Demand:
-        if self.stage is Stage.DESCENT:
+        if self.stage is RtlStage.DESCENT:
             self.aircraft.position.fly_at(0.0, 0.0, dt)
             self.aircraft.position.go_to_altitude(self._target.down, dt)
         else:
@@ -89,19 +89,19 @@ class Rtl(Mode):
 
     def _advance(self) -> None:
         aircraft = self.aircraft
-        if self.stage is Stage.CLIMB and aircraft.arrived(self._target):
-            self.stage = Stage.RETURN
+        if self.stage is RtlStage.CLIMB and aircraft.arrived(self._target):
+            self.stage = RtlStage.RETURN
             home = aircraft.home_offset
             self._target = Ned(home.north, home.east, self._return_down)
             aircraft.yaw.by_parameter(int(aircraft.parameters["WP_YAW_BEHAVIOR"]), returning=True)
-        elif self.stage is Stage.RETURN and aircraft.arrived(self._target):
-            self.stage = Stage.LOITER
+        elif self.stage is RtlStage.RETURN and aircraft.arrived(self._target):
+            self.stage = RtlStage.LOITER
             self._arrived_at = aircraft.now
             if aircraft.yaw.mode is not YawMode.HOLD:
                 aircraft.yaw.to_armed_yaw()
-        elif self.stage is Stage.LOITER and self._waited():
+        elif self.stage is RtlStage.LOITER and self._waited():
             final = aircraft.parameters["RTL_ALT_FINAL"] / 100
-            self.stage = Stage.LAND if final <= 0 else Stage.DESCENT
+            self.stage = RtlStage.LAND if final <= 0 else RtlStage.DESCENT
             self._target = Ned(self._target.north, self._target.east, aircraft.home_offset.down - final)
             aircraft.yaw.hold()
 
@@ -119,11 +119,11 @@ class Rtl(Mode):
 
     @property
     def landing(self) -> bool:
-        return self.stage is Stage.LAND
+        return self.stage is RtlStage.LAND
 
     @property
     def target(self) -> Ned | None:
         """The waypoint of the stage; the final descent is flown without one and keeps that of the return."""
-        if self.stage is Stage.LAND or not self._planned:
+        if self.stage is RtlStage.LAND or not self._planned:
             return None
         return self._target._replace(down=self._return_down)

@@ -13,7 +13,7 @@ from ...mission import NAVIGATION, Item, State
 from ...mission_runner import MissionRunner
 from ...mode import MissionMode
 from ..demand import STAY, Demand
-from ..landing import Landing
+from ..landing import RunwayLanding
 from ..takeoff import TakeoffRun
 from .base import NavigatingMode
 
@@ -156,7 +156,7 @@ class Auto(NavigatingMode, MissionMode):
         if item.command == mavlink.MAV_CMD_NAV_LAND:
             self.submode = AutoSubmode.LAND
             plane.mission.in_landing_sequence = True
-            self._landing = Landing(plane, start, target)
+            self._landing = RunwayLanding(plane, start, target)
             return
         slope = plane.altitude > 20 or target.down > plane.estimator.position.down
         navigator.go_to(target, start, slope=slope)

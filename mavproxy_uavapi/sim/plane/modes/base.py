@@ -12,7 +12,7 @@ from ..airframe import Airframe
 from ..demand import STAY, Demand
 
 
-class Mode(mode.Mode):
+class Mode(mode.VehicleMode):
     """A mode of a plane; `step` is called at the control rate while it is the current one."""
 
     navigates: ClassVar[bool] = False

@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from ...commands import ACCEPTED, DENIED, FAILED, CommandInt
 from ...frames import HIGHEST_ALTITUDE
 from ...link import PeerLink
-from ...telemetry import Telemetry
+from ...telemetry import TelemetryMessages
 from ...transmitter import Transmitter
 from ..commands import PlaneCommands
 from .guided import QuadGuided
@@ -20,7 +20,11 @@ class QuadPlaneCommands(PlaneCommands):
     """Carries out commands on one QuadPlane."""
 
     def __init__(
-        self, plane: SimulatedQuadPlane, telemetry: Telemetry, transmitter: Transmitter, reboot: Callable[[], None]
+        self,
+        plane: SimulatedQuadPlane,
+        telemetry: TelemetryMessages,
+        transmitter: Transmitter,
+        reboot: Callable[[], None],
     ) -> None:
         super().__init__(plane, telemetry, transmitter, reboot)
         self._quadplane = plane

@@ -11,7 +11,7 @@ from ..body import PlaneBody
 from ..demand import Demand, Throttle
 from ..plane import SimulatedPlane
 from .hover import WAIT, Hover, HoverDemand
-from .transition import Stage, Transition
+from .transition import Transition, TransitionStage
 
 TURN_SHARE = 0.88
 """Of a coordinated turn's rate; what SITL's QuadPlane makes of a bank."""
@@ -52,7 +52,7 @@ class LiftFrame(SimulatedPlane):
     @property
     def hovering(self) -> bool:
         """Whether the lift motors carry it."""
-        return self.body.airborne and self.transition.stage is not Stage.WING
+        return self.body.airborne and self.transition.stage is not TransitionStage.WING
 
     @property
     def lift_ready(self) -> bool:
@@ -62,7 +62,7 @@ class LiftFrame(SimulatedPlane):
 
     def servo_pulses(self) -> list[int]:
         pulses = super().servo_pulses()
-        lift = HOVER_PULSE if self._spool > 0 and self.transition.stage is not Stage.WING else 1000
+        lift = HOVER_PULSE if self._spool > 0 and self.transition.stage is not TransitionStage.WING else 1000
         return [
             lift if self.servos.function(channel) in MOTORS else pulse
             for channel, pulse in enumerate(pulses, start=1)
@@ -118,7 +118,7 @@ class LiftFrame(SimulatedPlane):
         """On the wing, or on the way there."""
         self.transition.forward()
         if self.transition.underway:
-            most = math.radians(65) if self.transition.stage is Stage.TIMER else TRANSITION_BANK
+            most = math.radians(65) if self.transition.stage is TransitionStage.TIMER else TRANSITION_BANK
             climb = max(-TRANSITION_CLIMB, min(TRANSITION_CLIMB, demand.climb))
             bank = max(-most, min(most, demand.bank))
             factor = self.navigator.air_factor

@@ -9,7 +9,7 @@ from ...estimator import Estimator
 from ...geodesy import Ned, wrap_pi
 from ...parameters import ParameterStore
 from ...physics import GRAVITY, Body
-from ...position_control import Limits, PositionController
+from ...position_control import MotionLimits, PositionController
 from ...shaping import approach_1d
 from ..demand import Demand, Throttle
 
@@ -55,7 +55,7 @@ class Hover:
         def within(name: str, scale: float, least: float, most: float) -> float:
             return max(least, min(most, parameters[name] / scale))
 
-        self.control.limits = Limits(
+        self.control.limits = MotionLimits(
             speed=within("Q_WP_SPEED", 100, 0.5, 30.0),
             speed_up=within("Q_WP_SPEED_UP", 100, 0.1, 20.0),
             speed_down=within("Q_WP_SPEED_DN", 100, 0.1, 20.0),

@@ -24,7 +24,7 @@ LANDED_AFTER = 6.0
 """Seconds on the ground after which the landing is complete."""
 
 
-class Stage(Enum):
+class VtolLandingStage(Enum):
     """The stages in their order."""
 
     APPROACH = auto()
@@ -45,7 +45,7 @@ class VtolLanding:
         self._since = 0.0
         self._on_ground_since: float | None = None
         plane.navigator.go_to(place)
-        self.stage = Stage.APPROACH
+        self.stage = VtolLandingStage.APPROACH
         if plane.hovering:
             self._begin_position1()
         else:
@@ -77,58 +77,58 @@ class VtolLanding:
     @property
     def descending(self) -> bool:
         """Whether the vehicle goes down to land."""
-        return self.stage in (Stage.DESCEND, Stage.FINAL, Stage.COMPLETE)
+        return self.stage in (VtolLandingStage.DESCEND, VtolLandingStage.FINAL, VtolLandingStage.COMPLETE)
 
     @property
     def hovers(self) -> bool:
         """Whether the lift motors have taken over."""
-        return self.stage not in (Stage.APPROACH, Stage.AIRBRAKE)
+        return self.stage not in (VtolLandingStage.APPROACH, VtolLandingStage.AIRBRAKE)
 
     def step(self, dt: float) -> Demand:
         """The demand for one step."""
         plane = self._plane
-        if self.stage is Stage.APPROACH:
+        if self.stage is VtolLandingStage.APPROACH:
             self._look_for_airbrake()
-        if self.stage is Stage.AIRBRAKE and plane.now - self._since >= AIRBRAKE_TIME:
+        if self.stage is VtolLandingStage.AIRBRAKE and plane.now - self._since >= AIRBRAKE_TIME:
             self._begin_position1()
         if not self.hovers:
             line = plane.navigator.follow_line()
-            slow = AIRBRAKE_SHARE if self.stage is Stage.AIRBRAKE else 0.8
+            slow = AIRBRAKE_SHARE if self.stage is VtolLandingStage.AIRBRAKE else 0.8
             return Demand(line.bank, line.climb, slow * plane.navigator.airspeed, line.throttle)
         return self._hover(dt)
 
     def _look_for_airbrake(self) -> None:
         stopping = self.stopping_distance
         if self.distance <= stopping or self._plane.navigator.proportion >= 1:
-            self.stage, self._since = Stage.AIRBRAKE, self._plane.now
+            self.stage, self._since = VtolLandingStage.AIRBRAKE, self._plane.now
             values = f"v={self._speed:.1f} d={self.distance:.0f} sd={stopping:.0f} h={self.height:.1f}"
             self._say(f"VTOL airbrake {values}")
 
     def _begin_position1(self) -> None:
-        self.stage = Stage.POSITION1
+        self.stage = VtolLandingStage.POSITION1
         self._plane.hover.start()
         self._say(f"VTOL position1 v={self._speed:.1f} d={self.distance:.1f} h={self.height:.1f}")
 
     def _hover(self, dt: float) -> HoverDemand:
         plane, hover = self._plane, self._plane.hover
-        if self.stage is Stage.POSITION1:
+        if self.stage is VtolLandingStage.POSITION1:
             return self._brake_towards(dt)
-        if self.stage is Stage.POSITION2:
+        if self.stage is VtolLandingStage.POSITION2:
             if self.distance < ARRIVED and self._speed < ARRIVED_SPEED:
-                self.stage = Stage.DESCEND
+                self.stage = VtolLandingStage.DESCEND
                 self._say("Land descend started")
             return hover.go_to(self._place, dt)
-        if self.stage is Stage.DESCEND and self.height <= plane.parameters["Q_LAND_FINAL_ALT"]:
-            self.stage = Stage.FINAL
+        if self.stage is VtolLandingStage.DESCEND and self.height <= plane.parameters["Q_LAND_FINAL_ALT"]:
+            self.stage = VtolLandingStage.FINAL
             self._say("Land final started")
         if complete_landing(plane, self._touched()):
-            self.stage = Stage.COMPLETE
+            self.stage = VtolLandingStage.COMPLETE
         return hover.descend(self.height, dt, self._place)
 
     def _brake_towards(self, dt: float) -> HoverDemand:
         plane, hover = self._plane, self._plane.hover
         if self.distance <= POSITION2_FROM:
-            self.stage = Stage.POSITION2
+            self.stage = VtolLandingStage.POSITION2
             self._say(f"VTOL position2 started v={self._speed:.1f} d={self.distance:.1f} h={self.height:.1f}")
         braking = max(plane.parameters["Q_TRANS_DECEL"], 0.2)
         limits = hover.control.limits

@@ -9,13 +9,13 @@ from .auto import QuadAuto
 from .frame import LiftFrame
 from .guided import QuadGuided
 from .modes import QHover, QLand, QLoiter, QRtl, QStabilize
-from .transition import Stage
+from .transition import TransitionStage
 
 VTOL_STATES = {
-    Stage.HOVER: mavlink.MAV_VTOL_STATE_MC,
-    Stage.ACCELERATING: mavlink.MAV_VTOL_STATE_TRANSITION_TO_FW,
-    Stage.TIMER: mavlink.MAV_VTOL_STATE_TRANSITION_TO_FW,
-    Stage.WING: mavlink.MAV_VTOL_STATE_FW,
+    TransitionStage.HOVER: mavlink.MAV_VTOL_STATE_MC,
+    TransitionStage.ACCELERATING: mavlink.MAV_VTOL_STATE_TRANSITION_TO_FW,
+    TransitionStage.TIMER: mavlink.MAV_VTOL_STATE_TRANSITION_TO_FW,
+    TransitionStage.WING: mavlink.MAV_VTOL_STATE_FW,
 }
 
 

@@ -11,7 +11,7 @@ from ..chassis import Chassis
 from ..drive import Drive
 
 
-class Mode(mode.Mode):
+class Mode(mode.VehicleMode):
     """A mode of a rover; `step` is called at the control rate while it is the current one."""
 
     autopilot: ClassVar[bool] = False
