@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import ast
 import builtins
+import json
 import re
+import shutil
 import subprocess
+import sys
+import textwrap
 from collections.abc import Container, Iterator
 from functools import cache
 from pathlib import Path
@@ -16,6 +20,7 @@ ROOT = Path(__file__).parents[2]
 PAGES = ("CONTRIBUTING.md", "docs/architecture.md")
 PACKAGES = ("mavproxy_uavapi", "mavproxy_vision", "mavproxy_gradys")
 WALK_LINES = 30
+PLACE = re.compile(r"^# (new file: )?([\w/]+\.py)(?:, (in|instead of) ([\w.]+))?.*$", re.MULTILINE)
 FENCE = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 SPAN = re.compile(r"`([^`]+)`")
 FILE = re.compile(r"\.?[\w-]+(/[\w.-]*)+|[\w-]+\.(?:py|md|toml)")
@@ -141,15 +146,68 @@ def test_links_lead_somewhere(page: str) -> None:
 
 @pytest.mark.parametrize("walk", FENCE.findall(text_of("CONTRIBUTING.md")))
 def test_the_code_of_a_walk_stands_on_what_exists(walk: str) -> None:
-    places = re.findall(r"^# (new file: )?([\w/]+\.py)(?:, in (\w+))?", walk, re.MULTILINE)
+    places = PLACE.findall(walk)
     assert places
-    for new, place, holder in places:
+    for new, place, _, holder in places:
         assert (ROOT / place).exists() is (not new), place
         assert (ROOT / place).parent.is_dir(), place
-        assert not holder or holder in code().files[ROOT / place], holder
+        assert not holder or holder.partition(".")[0] in code().files[ROOT / place], holder
     known = code().names | set(dir(builtins)) | set(re.findall(r"(?:class|def) (\w+)", walk))
     bare = re.sub(r'""".*?"""|"[^"\n]*"|#.*', "", walk, flags=re.DOTALL)
     assert {name for name in re.findall(r"\b[A-Z]\w+", bare) if name not in known} == set()
+
+
+def with_fragment(text: str, how: str, holder: str, fragment: str) -> str:
+    """A file's text with a walk's fragment: in a class or a list, instead of a constant, or else at the end."""
+    if how == "instead of":
+        return re.sub(rf"\b{holder}\b", fragment.strip(), re.sub(rf"^{holder} = .*\n", "", text, flags=re.MULTILINE))
+    if not holder:
+        return f"{text}\n\n{fragment}"
+    scope: list[ast.stmt] = ast.parse(text).body
+    for name in holder.split("."):
+        (node,) = (one for one in scope if any(name in _bound(part) for part in (one, *ast.iter_child_nodes(one))))
+        scope = getattr(node, "body", [])
+    lines = text.splitlines(keepends=True)
+    if isinstance(node, ast.ClassDef):
+        return "".join(
+            [*lines[: node.end_lineno], "\n", textwrap.indent(fragment, "    "), *lines[node.end_lineno :]]
+        )
+    (values,) = (one for one in ast.walk(node) if isinstance(one, ast.List) and one.end_lineno == node.end_lineno)
+    last = (values.end_lineno or 0) - 1
+    return "".join([*lines[:last], f"{fragment.strip().rstrip(',')},\n", *lines[last:]])
+
+
+def unknown_names(fragment: str, text: str) -> set[str]:
+    """The names that a fragment uses and its file neither defines nor imports."""
+    used = {node.id for node in ast.walk(ast.parse(fragment)) if isinstance(node, ast.Name)}
+    return used - {name for node in ast.walk(ast.parse(text)) for name in _bound(node)} - set(dir(builtins))
+
+
+def test_the_verb_the_endpoint_and_the_setting_of_the_walks_work(tmp_path: Path) -> None:
+    copy = tmp_path / "mavproxy_uavapi"
+    shutil.copytree(ROOT / copy.name, copy)
+    for walk in FENCE.findall(text_of("CONTRIBUTING.md")):
+        for part in re.split(r"^(?=# )", walk, flags=re.MULTILINE):
+            if (match := PLACE.match(part)) and not match[1]:
+                file = tmp_path / match[2]
+                fragment = part[match.end() :]
+                text = with_fragment(file.read_text(encoding="utf-8"), match[3], match[4], fragment)
+                file.write_text(text, encoding="utf-8")
+                assert unknown_names(fragment, text) == set(), match[2]
+    asked = """
+        import json
+        from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
+        from mavproxy_uavapi.http.openapi import document
+        from mavproxy_uavapi.http.routes import ROUTES
+        from mavproxy_uavapi.settings import ApiModuleSettings
+        assert all(hasattr(Vehicle, route.verb) for route in ROUTES if route.verb)
+        types = document(ROUTES)["paths"]["/movement/climb_to"]["get"]["x-vehicle-types"]
+        print(json.dumps([types, ApiModuleSettings({}, environ={}).snapshot().home_age]))
+    """
+    command = [sys.executable, "-W", "ignore", "-c", textwrap.dedent(asked)]
+    done = subprocess.run(command, cwd=tmp_path, check=False, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout) == [["copter", "plane", "rover"], 1.0]
 
 
 def test_walks_are_short() -> None:

@@ -15,7 +15,7 @@ class Verbs(BaseVehicle):
     @classmethod
     def has(cls, verb: str) -> bool:
         """Whether this type of vehicle has the verb of that name."""
-        return getattr(cls, verb) is not getattr(Verbs, verb, None)
+        return getattr(cls, verb, None) is not getattr(Verbs, verb, None)
 
     def lacks(self, verb: str) -> NotSupported:
         """The error for a verb that this type does not have."""
