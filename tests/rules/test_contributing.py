@@ -1,4 +1,4 @@
-"""CONTRIBUTING.md and docs/architecture.md name what exists: files, classes and their members, make targets."""
+"""The pages name what exists: files, headings, and settings; some also classes and their members, make targets."""
 
 from __future__ import annotations
 
@@ -13,11 +13,20 @@ import textwrap
 from collections.abc import Container, Iterator
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from mavproxy_gradys.settings import GradysModuleSettings
+from mavproxy_uavapi.core.settings import ModuleSettings
+from mavproxy_uavapi.settings import ApiModuleSettings
+from mavproxy_vision.settings import VisionModuleSettings
+
 ROOT = Path(__file__).parents[2]
-PAGES = ("CONTRIBUTING.md", "docs/architecture.md")
+PAGES = ("CONTRIBUTING.md", "docs/architecture.md", "docs/safety.md", "docs/simulator.md")
+ALL_PAGES = ("README.md", "CONTRIBUTING.md", *sorted(f"docs/{page.name}" for page in (ROOT / "docs").glob("*.md")))
+OF_THE_MACHINE = {"python_path", "spool"}  # settings whose default depends on it
+FOLDERS = ("mavproxy_uavapi/", "mavproxy_vision/", "mavproxy_gradys/", "tests/", "benchmarks/", "examples/", "docs/")
 PACKAGES = ("mavproxy_uavapi", "mavproxy_vision", "mavproxy_gradys")
 WALK_LINES = 30
 PLACE = re.compile(r"^# (new file: )?([\w/]+\.py)(?:, (in|instead of) ([\w.]+))?.*$", re.MULTILINE)
@@ -137,11 +146,47 @@ def test_what_does_not_exist_is_found_out(span: str) -> None:
     assert why_wrong(span)
 
 
-@pytest.mark.parametrize("page", PAGES)
+def headings(page: Path) -> set[str]:
+    """The anchors of a page's headings, as GitHub makes them."""
+    titles = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", title).lower().replace(" ", "-") for title in titles}
+
+
+@pytest.mark.parametrize("page", ALL_PAGES)
 def test_links_lead_somewhere(page: str) -> None:
-    links = re.findall(r"\]\(([^)#]+)", text_of(page))
-    assert links
-    assert [link for link in links if not (ROOT / page).parent.joinpath(link).exists()] == []
+    for name, heading in re.findall(r"\]\((?!http)([^)#]*)#?([^)]*)\)", text_of(page)):
+        target = (ROOT / page).parent / name if name else ROOT / page
+        assert target.exists(), name
+        assert not heading or heading in headings(target), f"{name}#{heading}"
+
+
+@pytest.mark.parametrize("page", ALL_PAGES)
+def test_files_of_ours_exist(page: str) -> None:
+    ours = [span for span in spans(page) if span.startswith(FOLDERS) and FILE.fullmatch(span)]
+    assert [span for span in ours if not (ROOT / span).exists()] == []
+
+
+@pytest.mark.parametrize(
+    ("page", "kind"),
+    [
+        ("docs/settings.md", ApiModuleSettings),
+        ("docs/vision.md", VisionModuleSettings),
+        ("docs/gradys.md", GradysModuleSettings),
+    ],
+)
+def test_each_setting_has_a_row_in_its_page_with_its_default(page: str, kind: type[ModuleSettings[Any]]) -> None:
+    (table,) = re.findall(r"^\| setting \| default \| meaning \|\n(.*?)\n\n", text_of(page), re.MULTILINE | re.DOTALL)
+    defaults: dict[str, str] = {}
+    for line in table.splitlines()[1:]:
+        _, names, default, *_ = (cell.strip() for cell in re.split(r"(?<!\\)\|", line))
+        found = SPAN.findall(names)
+        texts = default.strip("`").split(", ") if len(found) > 1 and default else [default.strip("`")] * len(found)
+        defaults |= zip(found, texts, strict=True)
+    expected = {row.name: str(row.default).lower() if row.type is bool else f"{row.default}" for row in kind.table()}
+    assert {name: text.removesuffix(".0") for name, text in expected.items()} == {
+        **defaults,
+        **{name: expected[name] for name in OF_THE_MACHINE & defaults.keys()},
+    }
 
 
 @pytest.mark.parametrize("walk", FENCE.findall(text_of("CONTRIBUTING.md")))
