@@ -75,7 +75,7 @@ class ApiSettings:
         ports: further TCP ports, and the system id of the vehicle at the root of each.
         link_timeout: s without a heartbeat after which a vehicle counts as lost.
         max_age: s after which telemetry is no longer served.
-        on_disconnect: what the vehicle does when the client of a waiting verb hangs up: continue or hold.
+        on_disconnect: what the vehicle does when the client of a waiting call disconnects: continue or hold.
         allow_from: networks that may call without a token.
         allow_scripts_from: networks among these that may also run scripts.
         allow_open: whether everybody may call without a token, from anywhere.
@@ -96,7 +96,7 @@ class ApiSettings:
         script_quota: MB of all scripts together.
         envelope: file with where vehicles may fly; `vehicle` for their own fences, empty for none.
         separation: m that vehicles keep from each other; 0 keeps none.
-        on_conflict: what a command does that leads too near to another vehicle: refuse, or wait.
+        on_conflict: action for a command that comes too near another vehicle: refuse, or wait.
         on_lease_end: what the vehicle does when its client's lease runs out: hold, land or rtl.
         on_script_exit: what the vehicle does when its script dies in flight: nothing, hold, land or rtl.
         log_console, debug: components (COPTER, API, GRADYS_GS, SCRIPT) that log to the console, in detail.
@@ -271,11 +271,23 @@ class ApiModuleSettings(ModuleSettings[ApiSettings]):
             MPSetting("ports", str, "", "further ports, a vehicle at each: 8001:1,8002:2"),
             MPSetting("link_timeout", float, 5.0, "s without heartbeat until the link is lost", range=(1, 60)),
             MPSetting("max_age", float, 5.0, "s after which telemetry is stale", range=(0.1, 3600)),
-            MPSetting("on_disconnect", str, "continue", "when a client hangs up", choice=["continue", "hold"]),
+            MPSetting(
+                "on_disconnect",
+                str,
+                "continue",
+                "action when the client of a waiting call disconnects",
+                choice=["continue", "hold"],
+            ),
             MPSetting("on_lease_end", str, "hold", "when a client's lease ends", choice=["hold", "land", "rtl"]),
             MPSetting("envelope", str, "", "where vehicles may fly: a file, or `vehicle`"),
             MPSetting("separation", float, 0.0, "m that vehicles keep from each other; 0: none", range=(0, 1000)),
-            MPSetting("on_conflict", str, "refuse", "for what leads too near", choice=["refuse", "wait"]),
+            MPSetting(
+                "on_conflict",
+                str,
+                "refuse",
+                "action for a command that comes too near another vehicle",
+                choice=["refuse", "wait"],
+            ),
             MPSetting("allow_from", str, "", "networks that may call without a token", tab="Access"),
             MPSetting("allow_scripts_from", str, "", "networks among these that may run scripts, too"),
             MPSetting("allow_open", bool, False, "let everybody call without a token"),

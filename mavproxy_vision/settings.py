@@ -156,7 +156,7 @@ class VisionModuleSettings(ModuleSettings[VisionSettings]):
         return [
             MPSetting("source", str, "", "camera:0, a path, URL or folder, sim, http; none for no camera"),
             MPSetting("vehicle", int, 0, "system id that carries it; 0: MAVProxy's current one", range=(0, 255)),
-            MPSetting("family", str, "36h11", f"one or several of {', '.join(FAMILIES)}; landed on is the first"),
+            MPSetting("family", str, "36h11", f"one or several of {', '.join(FAMILIES)}; landings use the first"),
             MPSetting("tags", str, "0:0.30", "ID:SIZE or ID:SIZE@RIGHT,UP in m; the main tag first"),
             MPSetting("any_id", bool, False, "look for all ids of the families, not only for those of tags"),
             MPSetting("far", bool, False, "see a fifth farther, for a third more time"),
@@ -168,14 +168,14 @@ class VisionModuleSettings(ModuleSettings[VisionSettings]):
             MPSetting("exposure", str, "", f"ms up to {LONGEST:g}, or auto; empty leaves it to the camera"),
             MPSetting("gain", str, "", "in the camera's units; of libcamerasrc a factor; empty leaves it"),
             MPSetting("brightness", str, "", "in the camera's units; of libcamerasrc -1 to 1; empty leaves it"),
-            MPSetting("latency", float, 80.0, "ms from light to our having the frame", range=(0, 2000)),
+            MPSetting("latency", float, 80.0, "ms from capture to arrival", range=(0, 2000)),
             MPSetting("mount", str, "0", "degrees: yaw, or roll,pitch,yaw; yaw 90: top of the image to the right"),
             MPSetting("offset", str, "0,0,0", "m of the lens forward,right,down of the vehicle's centre"),
             MPSetting("gimbal", bool, False, "a gimbal keeps the camera level"),
             MPSetting(
                 "method", str, "velocity", "velocity (GUIDED) or landing_target (LAND with PLND)", choice=METHODS
             ),
-            MPSetting("attempts", int, 5, "times of looking for the tag", range=(1, 100)),
+            MPSetting("attempts", int, 5, "searches before a landing fails", range=(1, 100)),
             MPSetting("tolerance", float, 0.12, "m off the tag within which it may touch down", range=(0.02, 5)),
             MPSetting("speed", float, 1.5, "m/s, horizontally, of a search and a landing", range=(0.1, 10)),
             MPSetting(
@@ -191,7 +191,7 @@ class VisionModuleSettings(ModuleSettings[VisionSettings]):
             MPSetting(
                 "directory", str, "", "where tracks, plots and snapshots go; none for MAVProxy's log directory"
             ),
-            MPSetting("threads", int, 1, "of OpenCV", range=(1, 16)),
+            MPSetting("threads", int, 1, "threads of OpenCV", range=(1, 16)),
             MPSetting("sim_tags", str, "0:0.30@8,-5", "ID:SIZE@NORTH,EAST[,HEADING] of home"),
             MPSetting("sim_latency", float, 80.0, "ms", range=(10, 1000)),
             MPSetting("sim_jitter", float, 10.0, "ms, standard deviation", range=(0, 200)),

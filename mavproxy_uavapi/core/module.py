@@ -63,7 +63,8 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
             raise ImportError(f"{name}: {error}") from error
         super().__init__(mpstate, name, description, multi_vehicle=True)
         self._actions: dict[str, Action] = {**actions, "set": self._set, "config": lambda _: self._list_settings()}
-        # MAVProxy stumbles over a rule that is shorter than what was typed, so that of all settings has a value.
+        # MAVProxy's completion fails if the typed line is longer than a rule. So the rule for `set NAME` also has a
+        # place for the value.
         self._completed = {f"({name.upper()}SETTING)": settings_type.names, f"({name.upper()}VALUE)": list}
         self._begun = False
         self._reported_failure = ""
@@ -77,7 +78,7 @@ class SharedModule(mp_module.MPModule, Generic[Snapshot]):  # type: ignore[misc]
             self.add_completion_function(place, lambda _, words_of=words_of: words_of())
 
     def finish_loading(self, routes: Iterable[Any] = ()) -> None:
-        """The end of each constructor: what follows `module load` in a script, or calls then, finds all in place.
+        """The last step of each constructor. A script's next line, and any call, then finds all in place.
 
         Args:
             routes: `uavapi` serves them until the module is unloaded.

@@ -1,4 +1,4 @@
-"""What not every caller may do who passed the door."""
+"""Checks for actions that need more than a valid caller."""
 
 from __future__ import annotations
 

@@ -59,7 +59,7 @@ async def release(call: Call) -> Answer:
 def _vehicle(call: Call, named: int | None) -> Vehicle:
     """The vehicle that is meant, if the caller may command it."""
     if named and call.named_system not in (0, named):
-        raise Invalid(f"the path is that of vehicle {call.named_system}", "vehicle")
+        raise Invalid(f"`vehicle` contradicts the path, which names vehicle {call.named_system}", "vehicle")
     vehicle = call.service.host.registry.find(named or call.system)
     call.require_right(vehicle.state.system)
     return vehicle

@@ -28,7 +28,7 @@ class TelemetryBroadcast:
     def __init__(self, host: Host) -> None:
         self._host = host
         self._subscriptions: list[Subscription] = []
-        self._wishes: dict[tuple[str, str], bool] = {}  # whether anybody wants that, as far as it was asked
+        self._wishes: dict[tuple[str, str], bool] = {}  # whether any client wants that; filled when asked
         self._watch = NewsWatch(host)
         self._ticks: asyncio.TimerHandle | None = None
 
@@ -77,7 +77,7 @@ class TelemetryBroadcast:
             self._offer(of_message(message, at))
         for view in BY_MESSAGE.get(name, ()):
             newest = state.newest(name)
-            # Another component's message is no view where the autopilot tells the same.
+            # Another component's message is no view if the autopilot sends the same.
             if newest is not None and newest.message is message and self._wanted("view", view):
                 self._offer(_view_of(view, state.system, message, at))
         if self._ticks is not None:

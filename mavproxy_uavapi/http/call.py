@@ -112,7 +112,7 @@ class Call:
         self.job: Job | None = None
 
     def one_more_stream(self) -> AbstractContextManager[None]:
-        """Take a place for a stream; a browser counts apart, so that no script of its machine takes the page's."""
+        """Take a place for a stream. Browsers count apart, so no script of their machine can take the page's."""
         browser = " browser" if is_browser(self.request.headers) else ""
         return self.service.streams.one_more_of(self.caller.counted_as + browser)
 
@@ -160,7 +160,7 @@ class Call:
         return vehicle
 
     def require_permission(self, vehicle: Vehicle) -> None:
-        """Let only those on who may cause a message to the vehicle, and command it if the route does.
+        """Raise unless the caller may cause a message to the vehicle, and may command it if the route does.
 
         Raises:
             Forbidden: the caller's token is not for that vehicle.
@@ -267,7 +267,7 @@ class Call:
         return job
 
     def _take_over(self, job: Job, holder: str) -> None:
-        """Let a job that another client began end with the lease, or the hold, that this one has."""
+        """Bind a job that another client began to the lease, or the hold, of this one."""
         hold = self.service.host.holds.of(job.vehicle)
         job.holder = holder
         if hold is not None and hold.operator.name == self.caller.operator.name:
@@ -329,7 +329,7 @@ class Call:
 
     @property
     def lease(self) -> float | None:
-        """For how many s the client counts as alive without another call, if the query says so; 0 ends that."""
+        """How many s the client counts as alive without another call, if the query says so; 0 ends the lease."""
         text = self.request.query.get("lease")
         try:
             seconds = None if text is None else float(text)

@@ -71,7 +71,7 @@ class Caller:
 
     @property
     def operator(self) -> Operator:
-        """As whom it holds vehicles: its token's owner, or else its address."""
+        """The operator who holds vehicles by it: its token's owner, or else its address."""
         return Operator(str(self.address or NOBODY), self.role) if self.token is None else self.token.operator
 
     def flies(self, system: int) -> bool:

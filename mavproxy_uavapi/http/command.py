@@ -45,7 +45,7 @@ async def land(call: Call) -> Answer:
 async def land_at(call: Call) -> Answer:
     """Begin to land a plane at a place, by a mission that replaces its own; answers when the plane flies it."""
     vehicle, p = call.vehicle, call.params(LandAt)
-    call.require_unheld(vehicle)  # it is no mere stop: it flies to a place of the caller's
+    call.require_unheld(vehicle)  # it does more than stop: it flies to a place that the caller names
     return await call.fly(
         vehicle,
         lambda job: vehicle.land_at(job, p.lat, p.long, p.alt, vtol=p.vtol),

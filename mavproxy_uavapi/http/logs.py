@@ -44,7 +44,7 @@ class LogDownload(LogRequest):
 async def list_logs(call: Call) -> Answer:
     """The logs that the vehicle holds: id, size (bytes), and when each began.
 
-    Who may only watch gets the last list that somebody else requested.
+    A caller who may only watch gets the last list that somebody else requested.
     """
     known = call.known_vehicle
     if call.caller.flies(known.state.system):

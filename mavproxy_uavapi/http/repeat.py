@@ -2,7 +2,7 @@
 
 A program that polls sends the same bytes many times a second. Most of the work on them gives the same result each
 time: parsing, the door check, the route, the parameters. A connection keeps that result for TRUSTED_FOR. What can
-change is looked at each time: the settings, the token, the caller's rate, the vehicle's message and its age.
+change is checked each time: the settings, the token, the caller's rate, the vehicle's message and its age.
 """
 
 from __future__ import annotations

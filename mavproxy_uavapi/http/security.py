@@ -88,7 +88,7 @@ def check_page(headers: Mapping[str, str], trusted: tuple[str, ...] = ()) -> Non
 
 
 def no_token(_credentials: bytes) -> Token | None:
-    """Where no named token is known."""
+    """The token, if no named token is known: None."""
     return None
 
 

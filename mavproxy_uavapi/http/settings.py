@@ -1,4 +1,4 @@
-"""/settings: those of our modules. Only those of `uavapi` can be set here, but for what decides over callers."""
+"""/settings: the settings of our modules. Only those of `uavapi` can be set, except those that control callers."""
 
 from __future__ import annotations
 

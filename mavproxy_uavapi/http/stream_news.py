@@ -11,7 +11,7 @@ from mavproxy_uavapi.core.mavlink.vehicle_state import StatusText, VehicleState
 from mavproxy_uavapi.http.reports import commander_of, holder_of, report_of_job
 
 NAMES = ("alive", "mode", "armed", "link", "authority", "statustext", "job", "tag", "delivered")
-TEXTS_TOLD_FIRST = 20  # of the newest of a vehicle, to who begins to listen
+TEXTS_TOLD_FIRST = 20  # newest texts of a vehicle that a new listener gets
 JOBS_TOLD_FIRST = 20
 
 News = tuple[str, int, float, dict[str, Any]]  # name, system, when by the host's clock (s), what
@@ -41,7 +41,7 @@ class NewsWatch:
         self._jobs: dict[str, tuple[Any, ...]] = {}
 
     def first(self) -> list[News]:
-        """What somebody who begins to listen must know: the last texts and jobs, and all jobs that run."""
+        """What a new listener must know: the last texts and jobs, and all jobs that run."""
         now = self._host.clock()
         news: list[News] = []
         for system, state in self._host.fleet.vehicles.items():

@@ -73,7 +73,7 @@ class Subscription:
     """One client's wishes, and its events that are not yet read.
 
     Of what comes more often than `rate` the newest is kept, and passed on when its time has come. It then takes the
-    place of an older one that is not yet read, so that who reads slowly gets few new values instead of many old ones.
+    place of an older one that is not yet read, so that a slow reader gets few new values instead of many old ones.
 
     Args:
         wishes: what it wants.
@@ -99,7 +99,7 @@ class Subscription:
         """Queue an event that arrived at `now` (s), if it is wanted; a full queue loses its oldest."""
         if event not in self.wishes:
             return
-        if not self._interval or event.kind == "event":  # an event comes but once
+        if not self._interval or event.kind == "event":  # an event comes only once
             self._put(next(self._numbers), event)
             return
         key = event.system, event.component, event.kind, event.name

@@ -100,13 +100,13 @@ def _values(parameters: Mapping[str, float]) -> list[float]:
 def overshoot(braking: Braking, speed: float, acceleration: float, seconds: float, corridor: float) -> float:
     """Metres by which a stopped vehicle may pass a border over the ground: the bound of the model.
 
-    The model looks at the last reported speed. For `seconds` after it the vehicle may gather more, outwards. No
+    The model looks at the last reported speed. For `seconds` after it the vehicle may gain speed outwards. No
     vehicle is stopped within `corridor` m of an allowed way.
 
     Args:
         braking: how it stops.
         speed: the fastest that it flies, m/s.
-        acceleration: with which it gathers speed, m/s/s.
+        acceleration: how fast it gains speed, m/s/s.
         seconds: from one look until a stop after the next look has an effect.
         corridor: m.
     """

@@ -29,7 +29,7 @@ class Pace(NamedTuple):
 
 
 class Slack(NamedTuple):
-    """How far a vehicle may be from its time on a way: `ahead` s early, `behind` s late for each leg, and a share."""
+    """How far a vehicle may be off its times: `ahead` s early, `behind` s late for each leg, and a share."""
 
     ahead: float
     behind: float
@@ -52,12 +52,12 @@ class Forecast:
     apart: float
 
     def at_any_time(self) -> Forecast:
-        """The same points, each at any time: for a vehicle that does not tell where it is."""
+        """The same points, each at any time: for a vehicle that does not report its position."""
         return Forecast(self.points, np.zeros_like(self.early), np.full_like(self.late, math.inf), self.apart)
 
 
 class Meeting(NamedTuple):
-    """Where two vehicles begin to come too near: the one's place, in how many s; and how near they come, m."""
+    """Where two vehicles first come too near: our vehicle's place, the time until then (s), and the least gap (m)."""
 
     at: Spot
     seconds: float
@@ -72,7 +72,7 @@ def along(
     *,
     seconds: float = math.inf,
 ) -> Forecast:
-    """The forecast of a way, at the end of which the vehicle stays.
+    """The forecast of a way. The vehicle stays at its end.
 
     Args:
         spots: the corners, the first is where the vehicle is now.
@@ -109,7 +109,7 @@ def _leg(a: Spot, b: Spot, pace: Pace) -> tuple[float, float]:
 
 
 def meeting(ours: Forecast, theirs: Forecast, distance: float) -> Meeting | None:
-    """Where two come nearer than `distance` m first; None where they do not.
+    """Where two vehicles first come nearer than `distance` m; None if they do not.
 
     If the two are nearer than `distance` already, only a further approach counts.
     """

@@ -31,7 +31,7 @@ CIRCLES = {
 
 
 def read(text: str, source: str) -> Envelope:
-    """The envelope of a file's text, whatever of the three formats it has.
+    """The envelope in a file's text, in any of the three formats.
 
     Raises:
         BadRequest: it has none of them.

@@ -1,8 +1,8 @@
 """An envelope as geometry: whether a way stays inside, and if not, what it breaks, where and by how much. Pure.
 
 The frame is flat: north, east and up in metres, around the middle of the envelope, east by the cosine of the latitude
-there (`LocalFrame`). A straight line of it is straight in degrees, so what lies inside of a polygon is exact whatever
-the distance. Metres are those of `geodesy.py`, the autopilot's own. East of the middle they err by the share
+there (`LocalFrame`). A straight line in it is straight in degrees, so inside or outside of a polygon is exact at any
+distance. Metres are those of `geodesy.py`, the autopilot's own. East of the middle they err by the share
 tan(latitude) n + n^2 / 2, with n = (metres north of the middle) / 6378 km: at 45 degrees and 5 km by 0.08 %, at 60
 degrees and 50 km by 1.4 %. A circle is a polygon of 256 corners, which errs to the safe side by 0.0001 of its radius.
 """
@@ -107,7 +107,7 @@ class Prism:
     def outside_by(self, spot: Spot) -> float:
         """Metres to get inside; 0 inside."""
         if self.shape.is_empty:
-            return math.inf  # kept so far from its borders, nothing is left of it
+            return math.inf  # nothing of the polygon is that far from its borders
         beside = float(self.shape.distance(Point(spot.east, spot.north)))
         return math.hypot(beside, max(self.floor - spot.up, spot.up - self.ceiling, 0.0))
 
@@ -145,7 +145,7 @@ class Space:
 
     Attributes:
         envelope: as it is written.
-        missing: why nothing is known of it yet, so that nothing is inside; empty where it is known.
+        missing: why it is not known yet; then no place is inside. Empty if it is known.
 
     Raises:
         Invalid: an outline crosses itself, or it is too large.

@@ -9,23 +9,23 @@ from mavproxy_uavapi.core.envelope.model import Envelope, EnvelopeLimits
 from mavproxy_uavapi.core.envelope.space import Space
 
 ALL = 0  # in place of a system id: every vehicle
-OPERATOR, API = "setting", "api"  # who put it: the operator by the setting, a client by the API
+OPERATOR, API = "setting", "api"  # owners: the operator by the setting, a client by the API
 
 
 class Key(NamedTuple):
-    """Who put an envelope, and for which system id."""
+    """The owner of an envelope, and the system id that it is for."""
 
     by: str
     system: int
 
 
 class Envelopes:
-    """The envelopes by who put them and for which vehicle. A vehicle must be inside all that are for it.
+    """The envelopes by owner and vehicle. A vehicle must be inside all envelopes that apply to it.
 
-    So a client can make narrower what the operator has set, and never wider.
+    So a client can make the operator's envelope narrower, never wider.
 
     Attributes:
-        expects_fences: whether each vehicle's own fence is its envelope; while it is not known, nothing is inside.
+        expects_fences: whether each vehicle's own fence is its envelope; until it is known, no place is inside.
     """
 
     def __init__(self) -> None:
@@ -34,7 +34,7 @@ class Envelopes:
         self._of: dict[int, tuple[Space, ...]] = {}  # by system id, what `of` has answered
 
     def put(self, by: str, system: int, envelope: Envelope | Space | None) -> None:
-        """Put an envelope in place of that one's former one, all at once; None takes it away.
+        """Replace the owner's envelope for that system id. None removes it.
 
         Raises:
             Invalid: it makes no sense as geometry; the former one stays in force.
@@ -46,7 +46,7 @@ class Envelopes:
         self._spaces, self._of = spaces, {}
 
     def clear(self, by: str) -> None:
-        """Take all away that one has put; to be called too when `expects_fences` has changed."""
+        """Remove all envelopes of one owner. Call it also after a change of `expects_fences`."""
         self._spaces = {key: space for key, space in self._spaces.items() if key.by != by}
         self._of = {}
 
@@ -67,5 +67,5 @@ class Envelopes:
 
 
 def missing(reason: str, source: str) -> Space:
-    """An envelope of which nothing is known yet: nothing is inside."""
+    """An envelope that is not known yet: no place is inside."""
     return Space(Envelope(limits=EnvelopeLimits(height=1e-3), source=source), reason)

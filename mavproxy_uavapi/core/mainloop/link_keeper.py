@@ -107,7 +107,7 @@ def address_of(master: Any) -> Any:
 
 
 def is_connected(attempt: socket.socket) -> bool:
-    """Whether it has another end; a socket may connect to itself where nobody listens on a port of this machine."""
+    """Whether it has another end. A socket may connect to itself if nobody listens on a port of this machine."""
     if attempt.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR) != 0:
         return False
     try:

@@ -14,7 +14,7 @@ class FenceWatch:
     def changes(self, modules: Any) -> dict[int, list[Any]]:
         """By system id, the items of each fence that is new or different.
 
-        A fence that is still on its way from the vehicle is none yet.
+        A fence that MAVProxy is still reading does not count yet.
 
         Args:
             modules: MAVProxy's public modules, by name.
@@ -29,5 +29,5 @@ class FenceWatch:
         return changed
 
     def forget(self) -> None:
-        """Take every fence for new."""
+        """Treat every fence as new."""
         self._seen = {}

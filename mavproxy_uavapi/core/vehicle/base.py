@@ -87,7 +87,7 @@ class BaseVehicle:
         self._requests = SharedTasks[Any]()  # REQUEST_MESSAGE, by message name
 
     def continues(self, before: BaseVehicle) -> None:
-        """Go on as the same vehicle, whose type was another one before.
+        """Take over from the object of the same vehicle, whose type has changed.
 
         Its jobs go on, and newer ones supersede them; a pause, and speeds that were asked for, remain.
         """
@@ -118,7 +118,7 @@ class BaseVehicle:
 
     @property
     def is_settled(self) -> bool:
-        """Whether no switch of ours to another mode may be on its way."""
+        """Whether none of our mode switches may still be on its way."""
         return all(number == self.state.mode for number in self._mode_requests.on_their_way())
 
     @property
@@ -265,7 +265,7 @@ class BaseVehicle:
         return False
 
     def repeat_nothing(self) -> None:
-        """Send no target again, whether the vehicle shows it or not."""
+        """Stop sending a target again, whether the vehicle reports it or not."""
 
     @property
     def stands(self) -> bool:
@@ -274,7 +274,7 @@ class BaseVehicle:
 
     @property
     def is_under_way(self) -> bool:
-        """Whether it is armed and flies, for whomever."""
+        """Whether it is armed and flies, whoever commands it."""
         return bool(self.state.armed and not self.state.landed)
 
     def anothers(self) -> ModeChanged:
@@ -289,7 +289,7 @@ class BaseVehicle:
 
     @property
     def obeys_us(self) -> bool:
-        """Whether it is in a mode of ours, and has no other's target."""
+        """Whether it is in a mode of ours, without a target of another station."""
         return self.is_in_own_mode and not self.has_foreign_target
 
     @property
@@ -340,7 +340,7 @@ class BaseVehicle:
         self.authority.take(job, rank)
 
     def commanding(self, job: Job, *needs: Callable[[], None]) -> Callable[[], None]:
-        """The check before each message of `job`: it still commands, and no need raises."""
+        """The check before each message of `job`: it still commands, and none of `needs` raises."""
 
         def check() -> None:
             self.authority.require(job)

@@ -162,7 +162,7 @@ class CommandSender:
                 while result == mavlink.MAV_RESULT_IN_PROGRESS:
                     if self._waiting.clock() >= give_up_at:
                         waited = f"{IN_PROGRESS_LIMIT:g} s"
-                        raise TimedOut(f"vehicle {self._state.system} was not done with {command.name} in {waited}")
+                        raise TimedOut(f"vehicle {self._state.system} did not finish {command.name} within {waited}")
                     result = await acks.next(IN_PROGRESS_TIMEOUT)
             if result is None:
                 silences += 1

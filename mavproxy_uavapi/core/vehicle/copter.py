@@ -134,7 +134,7 @@ class Copter(TurningVehicle):
             await self.end_stop(job, GUIDED)
 
     async def _drop_movement(self, job: Job) -> None:
-        """Give a stopped vehicle a zero velocity in place of its old setpoint, until it reports that.
+        """Send a stopped vehicle a zero velocity until it reports that in place of its old setpoint.
 
         Raises:
             TimedOut: it does not; it stays stopped, because it would fly on to its old target.
@@ -154,7 +154,7 @@ class Copter(TurningVehicle):
         """Hold the vehicle still, in GUIDED or in its mission, until `resume`; done when telemetry shows it.
 
         A movement in progress waits; no other begins. A mission that cannot be paused, or does not answer, is left
-        for BRAKE. So is a vehicle to which a mode switch of ours is on its way: a pause might meet either mode.
+        for BRAKE. So is a vehicle during one of our mode switches: the pause might arrive in either mode.
 
         Raises:
             ModeChanged: it is in another mode.
@@ -202,7 +202,7 @@ class Copter(TurningVehicle):
     async def hold(self, job: Job) -> None:
         """Stop and stay: by zero velocities in GUIDED, else by BRAKE.
 
-        A mode switch that is on its way counts: the vehicle may have left GUIDED when it hears us.
+        A mode switch on its way counts: the vehicle may have left GUIDED when the message arrives.
         """
         self.authority.take(job, Rank.STOP)
         if not self.stops_in_its_mode:

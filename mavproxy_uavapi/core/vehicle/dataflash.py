@@ -245,4 +245,6 @@ class _Fetch:
 def require_disarmed(state: VehicleState) -> None:
     """Raise Busy unless the vehicle is known to be disarmed."""
     if state.armed is not False:
-        raise Busy(f"vehicle {state.system} is armed; logs cost its link (while_armed=true asks all the same)")
+        raise Busy(
+            f"vehicle {state.system} is armed; a transfer would load its link; while_armed=true requests it anyway"
+        )

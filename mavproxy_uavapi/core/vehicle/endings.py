@@ -62,11 +62,11 @@ WHAT_FOLLOWS: Mapping[Situation, Mapping[Policy, str | None]] = {
     Situation.LAND: {**NOTHING, Policy.HOLD: HOLD},
     Situation.RTL: {**NOTHING, Policy.HOLD: HOLD, Policy.LAND: LAND},
 }
-# Endings that somebody requests at that moment, or that come after a new heartbeat (leases): they wait for none.
+# Endings that somebody requests now, or that follow a new heartbeat (leases). They do not wait for a heartbeat.
 AT_ONCE = {Ending.ABORTED, Ending.UNLOADED, Ending.LEASE_OVER}
 # Endings that nobody requests: another station that has given the vehicle a target keeps it.
 UNREQUESTED = {Ending.CLIENT_GONE, Ending.SCRIPT_GONE, Ending.LEASE_OVER}
-# After these errors we do not have the vehicle: the pilot, a client that stopped it, or a failsafe has it.
+# After these errors the vehicle is not ours: the pilot, a client that stopped it, or a failsafe has it.
 HAS_ANOTHER_MASTER = (ModeChanged, NotArmed, Paused, LinkLost)
 FIXED: Mapping[Ending, Policy] = {
     Ending.DONE: Policy.NOTHING,
@@ -164,7 +164,7 @@ class FlightEndings:
     def see_to(
         self, vehicle: Vehicle, policy: Policy, why: str, client: str, modes: Collection[str] = ()
     ) -> Job | None:
-        """Begin what policy and telemetry call for, for a vehicle that no job flies; None where nothing is sent.
+        """Start what policy and telemetry require for a vehicle that no job flies; None if nothing is sent.
 
         Its pilot may have chosen its mode, or another station its target: unless it obeys us, it is left alone.
 
@@ -200,7 +200,7 @@ class FlightEndings:
             return f"{action} is done"
 
         job = self._jobs.begin(vehicle, f"{action} {why}", {}, body, client=client, outlives_client=True)
-        job.holder = job.operator = ""  # it is nobody's flight: no lease that runs out ends it
+        job.holder = job.operator = ""  # no client owns this flight, so no lease ends it
         vehicle.authority.take(job, Rank.STOP)  # at once, because a command that comes now is newer
         return job
 

@@ -1,4 +1,4 @@
-"""Holds ways, missions, speeds and the battery of one vehicle against its envelopes."""
+"""Checks the ways, missions, speeds and battery of one vehicle against its envelopes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LIMIT_OF = {"air": "speed", "ground": "speed", "climb": "climb", "descent": "des
 
 
 class Checked(Protocol):
-    """What the check asks of its vehicle."""
+    """What the check needs from its vehicle."""
 
     state: VehicleState
     clock: Callable[[], float]
@@ -67,14 +67,14 @@ class EnvelopeCheck:
 
     @property
     def circle(self) -> float:
-        """The radius (m) of the circles that it flies where others stand still."""
+        """The radius (m) of the circles that a plane flies where other types stand still; 0 for these."""
         if self._vehicle.kind != "plane":
             return 0.0
         return max(self.own_circle, self.guided_radius.in_force(self._vehicle.state))
 
     @property
     def own_circle(self) -> float:
-        """The same, where it was told no other radius: WP_LOITER_RAD."""
+        """The plane's default circle radius (m): WP_LOITER_RAD."""
         if self._vehicle.kind != "plane":
             return 0.0
         return abs(self._vehicle.state.parameters.get("WP_LOITER_RAD", PLANE_RADIUS)) or PLANE_RADIUS
@@ -83,7 +83,7 @@ class EnvelopeCheck:
         """Where the vehicle is.
 
         Raises:
-            Stale: it does not tell.
+            Stale: it does not report its position.
         """
         at = self._vehicle.fresh("GLOBAL_POSITION_INT")
         return Stop(at.lat / 1e7, at.lon / 1e7, 0.0 if self.drives else at.relative_alt / 1000.0)
@@ -92,12 +92,12 @@ class EnvelopeCheck:
         """The flat frame of an envelope, and its rules for this vehicle, `inset` m from its borders.
 
         Raises:
-            Stale: the envelope counts from home, which is not known.
+            Stale: the envelope is measured from home, and home is not known.
         """
         frame = space.frame((near.lat, near.lon))
         home = self._vehicle.state.messages.get("HOME_POSITION")
         if home is None and space.envelope.limits.distance is not None:
-            raise Stale("the envelope limits the distance from home, and the vehicle has not told its home yet")
+            raise Stale("the envelope limits the distance from home, and the vehicle has not reported its home yet")
         at = None if home is None else frame.metres((home.message.latitude / 1e7, home.message.longitude / 1e7))
         return frame, space.rules(at, inset, self.drives)
 
@@ -116,8 +116,8 @@ class EnvelopeCheck:
         Args:
             ways: each with its points in order.
             may_return: whether a way that begins outside may lead inside.
-            stays: whether the vehicle only holds its place: it may do so outside, but no farther outside than it is.
-            circle: the radius (m) that it keeps from the borders; None for that of its circles now.
+            stays: whether the vehicle only holds its place. Outside it may do so, but go no farther out.
+            circle: the radius (m) that it keeps from the borders; None for its present circles.
         """
         ways = [list(way) for way in ways]
         for space in self.spaces if ways else ():
@@ -154,12 +154,12 @@ class EnvelopeCheck:
         return [stop for way in ways for stop in way]
 
     def require_speeds(self) -> None:
-        """Raise OutsideEnvelope if it flies to places faster than it may."""
+        """Raise OutsideEnvelope if it flies to places faster than the envelope allows."""
         for kind, speed in cruise.speeds(self._vehicle.kind, self._vehicle.state.parameters, self._vehicle.speeds):
             self.require_speed(kind, speed, f"; set_{kind}_speed first")
 
     def require_speed(self, kind: str, speed: float, advice: str = "") -> None:
-        """Raise OutsideEnvelope if `speed` (m/s) is more than that kind may be (air, ground, climb, descent)."""
+        """Raise OutsideEnvelope if `speed` (m/s) exceeds the limit of its kind (air, ground, climb, descent)."""
         limit_of = LIMIT_OF[kind]
         for space in self.spaces:
             limit = getattr(space.envelope.limits, limit_of)
@@ -175,16 +175,14 @@ class EnvelopeCheck:
             return
         remaining = self._vehicle.state.field("SYS_STATUS", "battery_remaining")
         if remaining is None or remaining < 0:
-            raise OutsideEnvelope(
-                f"{space.envelope.source} keeps a reserve, and the battery does not tell its charge"
-            )
+            raise OutsideEnvelope(f"{space.envelope.source} keeps a reserve, and the battery reports no charge")
         seconds = cruise.seconds(self._vehicle, [stop for way in ways for stop in way])
         needed = limits.reserve + (100.0 * seconds / limits.endurance if limits.endurance else 0.0)
         if remaining < needed:
             sentence = f"the battery has {remaining} %; the way, the way home and the reserve take {needed:.0f} %"
             raise OutsideEnvelope(sentence, _excess("the battery reserve", needed - remaining, space))
 
-    # -- what a mission is held against -------------------------------------------------------------------
+    # -- what a mission is checked against ----------------------------------------------------------------
 
     def _home_amsl(self) -> float | None:
         here = self._vehicle.state.messages.get("GLOBAL_POSITION_INT")

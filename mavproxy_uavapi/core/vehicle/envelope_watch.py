@@ -32,7 +32,7 @@ from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 log = logging.getLogger("uavapi.copter")
 
 CLIENT = "envelope"  # the client of the jobs that stop vehicles
-INTERVAL = 0.25  # s between two positions, until the vehicle has told two
+INTERVAL = 0.25  # s between two positions, until two have arrived
 SLOWEST = 0.3  # m/s; slower than this nothing is stopped
 HOME_ASKED, HOME_PAUSE = 60, 2.0  # times that home is asked for, and s between them
 CORRIDOR, MISSION_CORRIDOR = 1.5, 3.0  # m beside a way that was allowed, in which the autopilot is trusted to stop
@@ -72,7 +72,7 @@ class EnvelopeWatch:
             self.look(vehicle)
 
     def _prepare(self, vehicle: Vehicle) -> None:
-        """Ask once in each boot for what the envelope counts by: home, and how the vehicle stops."""
+        """Request once in each boot what the envelope needs: home, and how the vehicle stops."""
         key = vehicle.state.system, vehicle.state.reboots
         if key not in self._prepared:
             self._prepared.add(key)
@@ -94,19 +94,19 @@ class EnvelopeWatch:
             await asyncio.sleep(HOME_PAUSE)
 
     async def close(self) -> None:
-        """End the questions that are not answered yet."""
+        """Cancel the requests that are not answered yet."""
         await self._tasks.end()
 
     def look(self, vehicle: Vehicle) -> None:
         """Stop the vehicle if it is ours and will leave, or come too near to another."""
-        vehicle.guard.remaining()  # how far it is on its way
+        vehicle.guard.remaining()  # updates how far it has come
         if not self._may_stop(vehicle):
             return
         try:
             crossing = leaving(vehicle)
             near = None if crossing else self._registry.traffic.nearing(vehicle, _until_it_stands(vehicle) + MARGIN)
         except Stale:
-            return  # where it is, or where home is, nobody knows: what moves it is refused
+            return  # its position, or home, is not known: commands that move it are refused
         if crossing is not None:
             space, breach = crossing
             what = f"{breach.what} of {space.envelope.source}"
@@ -120,7 +120,7 @@ class EnvelopeWatch:
         return vehicle.flies_for_us and (stop is None or not stop.running)
 
     def _stop_one(self, vehicle: Vehicle, other: Vehicle, meeting: Meeting) -> None:
-        """Stop that of two vehicles which has the lower rank, or else the later command."""
+        """Of two vehicles stop the one with the lower rank; with equal ranks the one with the later command."""
         ours = [one for one in (vehicle, other) if self._may_stop(one) and _moves(one)]
         if not ours:
             return
@@ -170,7 +170,7 @@ def leaving(vehicle: Vehicle) -> tuple[Space, Breach] | None:
     """The envelope that the vehicle is about to leave, and what it will break; None while it stays inside.
 
     Raises:
-        Stale: where it is, or where home is, is not known.
+        Stale: its position, or home, is not known.
     """
     here, velocity = vehicle.guard.check.here(), _velocity(vehicle)
     if math.hypot(*velocity) < SLOWEST:

@@ -26,8 +26,8 @@ from mavproxy_uavapi.core.vehicle.traffic import Traffic
 
 REACH = 200_000.0  # m from the vehicle: no target lies farther, with or without an envelope
 STAY = 1.0  # m: a target this near holds the vehicle where it is
-CORNER = 3.0  # m from a corner of its way, where the vehicle has passed it
-CHECKED_FOR = 30.0  # s for which a mission that was looked at may be started
+CORNER = 3.0  # m; a vehicle this near to a corner of its way has passed it
+CHECKED_FOR = 30.0  # s for which a checked mission may be started
 KEPT = {"GUIDED", *STOPPING_MODES}  # in any other mode nobody keeps the envelope
 # Parameters that decide where an autopilot flies by itself, and how long it goes on without us; in any case.
 PROTECTED = ("FENCE_", "RTL_", "SRTL_", "Q_RTL_", "GUID_", "WP_LOITER_RAD")
@@ -36,7 +36,9 @@ STANDING = orders.ChangeSpeed | orders.SetParameter | orders.MoveHome | orders.C
 
 
 class Ordered(NamedTuple):
-    """What the newest message has the vehicle do: a way, whether to places or by a velocity; when it went out (s)."""
+    """The movement that the newest message commands: its path, whether it leads to positions or is a velocity, and
+    when it was sent (s).
+    """
 
     way: Sequence[Stop] = ()
     is_to_place: bool = True
@@ -85,7 +87,7 @@ class EnvelopeGuard:
         Raises:
             OutsideEnvelope: it leads out of an envelope, or nobody can say where.
             TooNear: it leads too near to another vehicle.
-            Stale: it is not known where the vehicle is, or where its home is.
+            Stale: the vehicle's position, or its home, is not known.
         """
         order = orders.order_of(message)
         if isinstance(order, orders.GoTo):
@@ -94,7 +96,7 @@ class EnvelopeGuard:
             self._require_order(order)
 
     def require_mission(self, items: Sequence[MissionItem], *, from_here: bool) -> None:
-        """Raise OutsideEnvelope unless a whole mission stays inside; with `from_here` it may be flown then.
+        """Raise OutsideEnvelope unless the whole mission stays inside. With `from_here` it may then be flown.
 
         Raises:
             TooNear: from here it leads too near to another vehicle.
@@ -106,7 +108,11 @@ class EnvelopeGuard:
                 self._checked_mission = self.check.spaces, self._vehicle.clock(), way
 
     def sending(self, message: Any) -> Ordered:
-        """Note a message that is about to be sent, before others are asked about theirs; what was ordered before."""
+        """Record a message just before it is sent, so that checks for other vehicles see it.
+
+        Returns:
+            The previous order.
+        """
         before, order = self.ordered, orders.order_of(message)
         self.check.guided_radius.sent(message, self._vehicle.clock())
         if isinstance(order, orders.ChangeMission):
@@ -114,7 +120,7 @@ class EnvelopeGuard:
         if order is None or isinstance(order, STANDING):
             return before
         way: list[Stop] = []
-        with contextlib.suppress(Stale):  # what may be sent without a position, as a stop, goes out
+        with contextlib.suppress(Stale):  # a message that needs no position, such as a stop, is sent
             way = self._way_by(order)
         self.take_up(Ordered(way, not isinstance(order, orders.Fly), self._vehicle.clock()))
         return before
@@ -130,11 +136,11 @@ class EnvelopeGuard:
         return []
 
     def take_up(self, ordered: Ordered) -> None:
-        """Note what the vehicle is told to do, or what it still does because a message could not be sent."""
+        """Set the present order. If sending fails, the caller passes the previous one."""
         self.ordered, self._passed = ordered, 0
 
     def remaining(self) -> Sequence[Stop]:
-        """The corners of its way that are still ahead; empty where it has none. To be asked at each position."""
+        """The corners of its way that are still ahead; empty if it has none. Call it at each position."""
         way = self.ordered.way
         if len(way) < 2:
             return ()
@@ -187,7 +193,7 @@ class EnvelopeGuard:
             if order.name.upper().startswith(PROTECTED):
                 raise OutsideEnvelope(f"{order.name} decides where the autopilot flies; an envelope is in force")
         elif isinstance(order, orders.ChangeMission):
-            return  # no vehicle flies it before it was looked at
+            return  # it is checked before a vehicle flies it
         elif isinstance(order, orders.MoveHome):
             if self._vehicle.state.armed is not False and self.check.spaces:
                 raise OutsideEnvelope("home cannot be moved in flight: the envelope is measured from it")
@@ -208,7 +214,7 @@ class EnvelopeGuard:
         if flies_mission(mode):
             self._require_checked_mission()
         elif mode == "TAKEOFF" and self._vehicle.kind == "plane":
-            return  # the verb has asked for its height; where it levels off is watched
+            return  # the verb has checked its height; the place where it levels off is watched
         elif self.check.spaces and mode not in KEPT.union(self._vehicle.holding_modes):
             raise OutsideEnvelope(f"in {mode} nobody keeps the vehicle in the envelope; a pilot may switch to it")
 

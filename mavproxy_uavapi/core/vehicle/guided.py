@@ -31,7 +31,7 @@ ARRIVAL_SPEED = 0.5  # m/s; slower than this the vehicle does not overshoot its 
 FLOOR = 0.0  # m above home: the lowest target, less TOLERANCE for the noise of the estimate
 LIFT_OFF_TIMEOUT = 5.0  # s in which an unacknowledged takeoff must show
 ON_GROUND = messages.mavlink.MAV_LANDED_STATE_ON_GROUND
-REPEATS = 3  # times that a place is sent again which the autopilot does not show
+REPEATS = 3  # times that a place is sent again if the autopilot does not report it
 BEAT_TIMEOUT = 2.0  # s in which a heartbeat must come before that
 TAKING_OFF = messages.mavlink.MAV_LANDED_STATE_TAKEOFF
 
@@ -50,7 +50,7 @@ class GuidedVehicle(Vehicle):
         super().__init__(state, link, pending, clock, spaces)
         self.own_target = OwnTarget(state, clock)
         self._lifts_off_for: Job | None = None  # the job that has sent the last takeoff
-        self._reported_after_its_end: float | None = None  # a takeoff: since when its mode has lasted (s)
+        self._reported_after_its_end: float | None = None  # since when the mode of a finished takeoff has lasted (s)
         self.yaw = NO_YAW  # where it points on its way to the newest target
         self._tasks = HeldTasks()
         self._repeating: asyncio.Task[None] | None = None
@@ -77,9 +77,9 @@ class GuidedVehicle(Vehicle):
         return bool(reported == TAKING_OFF or has_just_left)
 
     def require_no_takeoff(self) -> None:
-        """Raise Busy during a takeoff, unless that is done and reported all the same.
+        """Raise Busy during a takeoff. One that is done, but still reported, does not count.
 
-        The authority refuses what moves a takeoff that `stop` has paused.
+        If `stop` has paused the takeoff, the authority refuses movements.
         """
         is_done = self._reported_after_its_end == self.state.mode_since
         if self.is_taking_off and not is_done and not self.authority.paused:
@@ -223,7 +223,7 @@ class GuidedVehicle(Vehicle):
     # -- setpoints ----------------------------------------------------------------------------------------
 
     async def send_setpoint(self, job: Job, target: Target, yaw: Yaw = NO_YAW, *, must_show: bool = False) -> None:
-        """Send a setpoint of `job` to a vehicle that is still in GUIDED; with `must_show` somebody watches it.
+        """Send a setpoint of `job` to a vehicle that is still in GUIDED; `must_show`: the caller watches its report.
 
         Raises:
             Superseded, Paused, NotArmed, ModeChanged: the job no longer has the vehicle; nothing is sent.
@@ -246,7 +246,7 @@ class GuidedVehicle(Vehicle):
         job.steers = steers
 
     async def send_speeds(self, job: Job, *, new_kind: bool) -> None:
-        """Send the speeds that go with a movement; `new_kind`: whether its setpoint is of another kind."""
+        """Send the speeds of a movement; `new_kind`: whether its setpoint is of another kind than the last one."""
         for kind, speed in self.speeds.to_send(new_kind).items():
             await self.commands.send(messages.change_speed(kind, speed), self.commanding(job, self.flying))
             self.speeds.take(kind, speed)
@@ -259,7 +259,7 @@ class GuidedVehicle(Vehicle):
             self._repeating.cancel()
 
     async def _repeat(self, job: Job, target: NedTarget | GlobalTarget) -> None:
-        """Send a target again while the autopilot does not show it, at most REPEATS times; none when in doubt.
+        """Send a target again while the autopilot does not report it, at most REPEATS times; not when in doubt.
 
         A setpoint has no acknowledgement, and a place may be sent twice. The vehicle is ours while no other job has
         commanded it, nobody has switched its mode, and it shows no target of another station.
@@ -294,9 +294,9 @@ class GuidedVehicle(Vehicle):
         return False
 
     def _is_lost(self, target: NedTarget | GlobalTarget, asked_at: float) -> bool:
-        """Whether the vehicle surely flies to no target that is newer than those before `target`.
+        """Whether `target` has certainly not reached the vehicle.
 
-        It reports one of these since `asked_at` (s), or it reports none, and stands elsewhere. Raises Stale.
+        Since `asked_at` (s) it reports an older target, or it reports none and stands elsewhere. Raises Stale.
         """
         is_replaced = self.own_target.is_replaced_since(asked_at)
         north, east, up = self.leg_to(target)

@@ -89,7 +89,7 @@ class Job:
         self._finished = asyncio.Event()
         self._clients: list[str | None] = []  # the waiting clients: the session of a script, None for other clients
         self._sessions_sought = 0
-        self._goes_on_for_others = False  # than a script
+        self._goes_on_for_others = False  # whether a client that is no script keeps it going
         self._when_ended: list[Callable[[], None]] = []
         self._commands = False
         self._when_commanding: list[Callable[[], None]] = []
@@ -105,7 +105,7 @@ class Job:
         return self._loop.time() - self.began_at > MOMENT
 
     def is_for(self, verb: str, request: Mapping[str, Any]) -> bool:
-        """Whether it does exactly what another request asks for; what a `stop` interrupted does not."""
+        """Whether it does exactly what another request asks for; a job that `stop` interrupted does not."""
         return self.verb == verb and self.request == dict(request) and not self.is_interrupted
 
     @property
@@ -169,7 +169,7 @@ class Job:
         self._when_ended.append(callback)
 
     def note_command(self) -> None:
-        """Note that it commands its vehicle, or has done what it should without that."""
+        """Note that it commands its vehicle, or has succeeded without a command."""
         self._commands = True
         callbacks, self._when_commanding = self._when_commanding, []
         for callback in callbacks:
@@ -182,7 +182,7 @@ class Job:
             self.note_command()
 
     async def go_on_for(self, session: Awaitable[str | None]) -> str | None:
-        """Have the job go on without its clients: while a script lives, or to its end if no script asks for that.
+        """Let the job go on without its clients: while the calling script lives, or for other clients to its end.
 
         Args:
             session: finds the session of the calling script; None for other clients. The job goes on meanwhile.
@@ -203,7 +203,7 @@ class Job:
         return script
 
     def join(self, on_disconnect: str | None) -> None:
-        """Take that another client requests the same; of two wishes for `on_disconnect` a hold counts.
+        """Another client joins the job. If either asks for `hold`, the vehicle holds.
 
         Args:
             on_disconnect: its wish; None for the setting's, which may be a hold, too.

@@ -19,7 +19,7 @@ from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 log = logging.getLogger("uavapi.copter")
 
-LINK_PAUSE = 0.2  # s until it is looked at again whether a vehicle whose lease ran out was heard since
+LINK_PAUSE = 0.2  # s between two checks for a heartbeat after a lease has run out
 
 
 @dataclass
@@ -50,7 +50,7 @@ class Leases:
         clock: monotonic seconds.
         loop: where the timers run.
         say: told each end in a sentence.
-        whose: by which name a job's client has leases.
+        whose: gives the name under which a job's client has leases.
     """
 
     def __init__(
@@ -144,7 +144,7 @@ class Leases:
         if commander is None or self._whose(commander) != lease.holder:
             return  # somebody else commands by now
         if situation(vehicle, commander.modes) in (Situation.LAND, Situation.RTL):
-            return  # what it asked for last is as good
+            return  # its last command brings the vehicle down already
         why = f"the lease of {lease.holder} ran out"
         self._say(f"vehicle {vehicle.state.system}: {why} ({lease.seconds:g} s without a call)")
         log.warning("vehicle %d: %s", vehicle.state.system, why)

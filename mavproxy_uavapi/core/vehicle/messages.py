@@ -52,8 +52,8 @@ class Command:
         again_after: MAV_RESULTs after which it is sent again although it is not patient.
         proven_by_ack: whether only the ack shows that it was done; an ack that may belong to an earlier command
             does not count then.
-        hears_first: whether a heartbeat must come before it is sent again: it takes a vehicle, and its pilot may
-            have taken that back meanwhile.
+        hears_first: whether a heartbeat must come before it is sent again: it takes the vehicle, and the pilot may
+            have taken it back meanwhile.
     """
 
     number: int
@@ -190,7 +190,7 @@ def set_mission_current(seq: int, *, reset: bool = True) -> Command:
 
 
 def select_item(address: Address, seq: int) -> Any:
-    """As `set_mission_current`, by the older message: without an answer, and heeded without a mission, too."""
+    """As `set_mission_current`, by the older message: it gets no answer, and works without a mission, too."""
     return mavlink.MAVLink_mission_set_current_message(*address, seq)
 
 

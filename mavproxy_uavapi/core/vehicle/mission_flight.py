@@ -68,7 +68,7 @@ async def begin(vehicle: Vehicle, job: Job, startable: Callable[[], None]) -> No
     Args:
         vehicle: which.
         job: who commands.
-        startable: what must hold until it is in AUTO; raises where it does not.
+        startable: raises if the mission may not start; called until the vehicle is in AUTO.
     """
     vehicle.waypoints.changed_at = vehicle.clock()
     with vehicle.ordering(job):
@@ -117,7 +117,7 @@ def _is_active(vehicle: Vehicle, since: float) -> bool:
 
 async def _flown_to_its_end(vehicle: Vehicle, job: Job, items: Sequence[MissionItem], timeout: float) -> None:
     landings = {seq for seq, item in enumerate(items, 1) if item.command in LANDINGS}
-    touchdown = Touchdown(time_limits.limits({}, {}))  # it looks from the disarming on: nothing landed sinks then
+    touchdown = Touchdown(time_limits.limits({}, {}))  # it checks after the disarming: nothing landed sinks then
     in_landing_at = in_final_at = -math.inf  # s; a vehicle that has landed and disarmed reports the first item again
 
     def ended() -> str | None:
@@ -191,6 +191,6 @@ def progress(vehicle: Vehicle) -> dict[str, Any]:
 
 
 def recent_progress(vehicle: Vehicle) -> dict[str, Any] | None:
-    """As `progress`; None while MISSION_CURRENT does not come, so that an old one is not told as new."""
+    """As `progress`; None if MISSION_CURRENT is old."""
     received = vehicle.state.newest("MISSION_CURRENT")
     return progress(vehicle) if received is not None and vehicle.state.is_recent(received) else None

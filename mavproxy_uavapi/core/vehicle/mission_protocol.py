@@ -55,7 +55,7 @@ class Waypoints:
         state: the vehicle's.
         link: the way out.
         waiting: its waits.
-        allow: called with what is to be uploaded; what it raises refuses that.
+        allow: called with the items before an upload; refuses it by raising.
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class Waypoints:
         self._waiting = waiting
         self._allow = allow
         self._turns = Turns("transfers of the mission")
-        self._verbs = 0  # that have a turn or wait for one
+        self._verbs = 0  # number of verbs that have a turn or wait for one
         self._reads = SharedTasks[list[Any]]()  # by the kind of list
         self.changed_at = 0.0
 
@@ -88,7 +88,7 @@ class Waypoints:
             return await self._download()
 
     async def read(self) -> tuple[MissionItem | None, list[MissionItem]]:
-        """As `download`, to show it: simultaneous callers share a download, and it gives way to all but reads."""
+        """As `download`, for display: simultaneous callers share a download, which gives way to all but reads."""
         return _home_and_items(await self._read(MISSION))
 
     async def read_fence(self) -> list[Any]:

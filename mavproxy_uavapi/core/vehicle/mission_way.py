@@ -1,7 +1,7 @@
 """The ways that a mission leads along, as places. Pure.
 
-Between two places an autopilot flies straight, as far as an envelope asks: what it flies otherwise (splines, scripts,
-follow me) is named and cannot be checked.
+Between two places an autopilot flies straight. Items that it flies otherwise (splines, scripts, follow me) cannot be
+checked; the error names them.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Setting:
         start: where it begins; None where that is not known yet, as before an upload.
         home_amsl: m; None where it is not known.
         radius: of circles whose item names none, m; 0 for a vehicle that stands still in them.
-        heights_matter: whether a height that nobody can tell makes it unfit to be checked.
+        heights_matter: whether the check fails if a height is not known.
     """
 
     start: Stop | None
@@ -69,7 +69,7 @@ def ways(items: Sequence[MissionItem], setting: Setting) -> Iterator[list[Stop]]
     """The straight ways, each with the points in their order.
 
     Raises:
-        OutsideEnvelope: an item leads nobody knows where.
+        OutsideEnvelope: the target of an item is not known.
     """
     places = [_place(seq, item, setting) for seq, item in enumerate(items, 1)]
     here = setting.start
@@ -98,13 +98,13 @@ def ways(items: Sequence[MissionItem], setting: Setting) -> Iterator[list[Stop]]
 
 
 def _place(seq: int, item: MissionItem, setting: Setting) -> Stop | None:
-    """Where an item leads, NaN for what stays as it is; None for one that leads nowhere."""
+    """Where an item leads, NaN for values that do not change; None for an item that moves nothing."""
     command = item.command
     if command in REFUSED or (_may_fly(item) and command not in STRAIGHT | LANDINGS | ON_THE_SPOT | HOMEWARD):
         raise OutsideEnvelope(f"mission item {seq} ({item.name}): nobody can say whether it stays in the envelope")
     if command not in STRAIGHT | LANDINGS:
         return None
-    nowhere = item.x == 0 and item.y == 0  # for ArduPilot: where it is
+    nowhere = item.x == 0 and item.y == 0  # ArduPilot takes 0, 0 as the present position
     lat, lon = (math.nan, math.nan) if nowhere else (item.x / DEGREES, item.y / DEGREES)
     if command in LANDINGS:
         return None if nowhere else Stop(lat, lon, math.nan)
@@ -120,12 +120,12 @@ def _place(seq: int, item: MissionItem, setting: Setting) -> Stop | None:
 
 
 def _may_fly(item: MissionItem) -> bool:
-    """Whether the command flies the vehicle, or is one that nobody has a name for."""
+    """Whether the command flies the vehicle, or is unknown."""
     return item.command < LAST_NAV or item.name.startswith("NAV_") or item.name.isdecimal()
 
 
 def _completed(place: Stop, here: Stop | None) -> Stop:
-    """The place with what stays as it is."""
+    """The place, with the values that do not change filled in."""
     if here is None:
         return Stop(place.lat, place.lon, 0.0) if math.isnan(place.up) else place
     lat, lon = (here.lat, here.lon) if math.isnan(place.lat) else (place.lat, place.lon)

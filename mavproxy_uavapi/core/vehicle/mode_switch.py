@@ -55,7 +55,7 @@ class ModeRequests:
 
 
 class ModeSwitch:
-    """Tells by heartbeats whether one requested switch came about.
+    """Tells by heartbeats whether one requested switch has happened.
 
     Args:
         state: the vehicle's state.
@@ -68,8 +68,8 @@ class ModeSwitch:
         self._state = state
         self._goals = goals
         self._ours = {state.mode, None, *goals, *on_their_way}  # None: no heartbeat since a reboot
-        # With another switch on its way, a heartbeat in this mode may be older than both; and the mode that a vehicle
-        # is in already does not show what else a command does.
+        # If another switch is on its way, a heartbeat in this mode may be older than both. If the vehicle is in this
+        # mode already, a heartbeat does not show what else the command does.
         self.is_ambiguous = not goals.isdisjoint((state.mode, *on_their_way)) and (
             does_more or not goals.issuperset(on_their_way)
         )

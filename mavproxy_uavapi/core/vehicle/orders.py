@@ -1,6 +1,6 @@
-"""What a message has a vehicle do, as far as an envelope has a say in it. Pure.
+"""What a message commands a vehicle to do, as far as an envelope limits it. Pure.
 
-What is not known here is `Unknown`: with an envelope in force it is not sent.
+Any other message is `Unknown`: with an envelope in force it is not sent.
 """
 
 from __future__ import annotations
@@ -64,14 +64,14 @@ class SwitchMode:
 
 @dataclass(frozen=True)
 class FlyMission:
-    """Fly the mission that the vehicle holds, from now on or, where it does not fly it, the next time."""
+    """Fly the stored mission: `now`, or when it is started the next time."""
 
     now: bool
 
 
 @dataclass(frozen=True)
 class ChangeMission:
-    """Change the mission that the vehicle holds; it is looked at as a whole before that, and before it is flown."""
+    """Change the stored mission. The whole mission is checked before the change, and before it is flown."""
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ HARMLESS_MESSAGES = {
 
 
 def order_of(message: Any) -> VehicleOrder | None:
-    """What a message of ours has the vehicle do; None for what moves it nowhere."""
+    """What our message commands the vehicle to do; None if it moves nothing."""
     name = message.get_type()
     if name in READERS:
         return READERS[name](message)
@@ -177,7 +177,7 @@ def _reposition(message: Any) -> VehicleOrder:
 
 
 def commanded_radius(message: Any) -> float | None:
-    """The radius (m) of the circles that a message has a plane in GUIDED fly; 0 for its own, None for no change."""
+    """The circle radius (m) that a message sets for a plane in GUIDED; 0 for its own, None for no change."""
     is_command = message.get_type() in ("COMMAND_INT", "COMMAND_LONG")
     if not is_command or message.command != mavlink.MAV_CMD_DO_REPOSITION or not message.param3 > 0:
         return None

@@ -13,8 +13,8 @@ from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle import setpoint_in_force
 from mavproxy_uavapi.core.vehicle.messages import GlobalTarget, NedTarget, Target, VelocityTarget
 
-TARGET_SHOWN = 2.0  # s after a setpoint, until which telemetry does not count
-LATEST = 8.0  # s after a setpoint, until which a slow link or a busy MAVProxy may still report those before it
+TARGET_SHOWN = 2.0  # s after a setpoint in which telemetry does not count
+LATEST = 8.0  # s after a setpoint in which a slow link or a busy MAVProxy may still report older ones
 SAME_PLACE = 2.0  # m on each axis: reported targets within this are the same
 UNCHANGED = 1.0  # m, north, east and up: a target that is reported again differs by less
 SAME_SPEED = 0.5  # m/s: reported velocities within this are the same
@@ -27,7 +27,7 @@ Reported = GlobalTarget | VelocityTarget
 
 
 class Before(NamedTuple):
-    """What a vehicle flew before a newer setpoint: since when not (s), what, and whether it was ours."""
+    """The previous setpoint: when it was replaced (s), its target, and whether we sent it."""
 
     at: float
     target: Reported
@@ -40,7 +40,7 @@ class OwnTarget:
     Attributes:
         newest: the setpoint; None before the first.
         sent_at: when it was sent (s).
-        is_unshown: whether it is a place that must show, and has not yet.
+        is_unshown: whether it is a place that the autopilot must report, and has not yet.
 
     Args:
         state: the vehicle's state.
@@ -81,7 +81,7 @@ class OwnTarget:
 
     @property
     def _own_before(self) -> Reported | None:
-        """The newest setpoint as the autopilot reports it, if it is known how."""
+        """The newest setpoint in the form in which the autopilot reports it; None if that is not known."""
         return self.newest if isinstance(self.newest, VelocityTarget) else self._shown or self._expected
 
     def _is_known(self, reported: Reported) -> bool:
@@ -90,7 +90,7 @@ class OwnTarget:
         return any(one is not None and _are_alike(one, reported) for one in ours)
 
     def _replace(self, target: Reported | None, *, is_ours: bool) -> None:
-        """Remember what may still be reported though a newer setpoint is on its way."""
+        """Remember a setpoint that may still be reported while a newer one is on its way."""
         now = self._clock()
         while self._before and now >= self._before[0].at + LATEST:
             self._before.popleft()
@@ -138,7 +138,7 @@ class OwnTarget:
     # -- whether it is shown ------------------------------------------------------------------------------
 
     def look(self) -> bool:
-        """Whether the autopilot has reported our place since it was sent; to be asked at each report."""
+        """Whether the autopilot has reported our place since it was sent. Call it at each report."""
         own = self._shown or self._expected
         reported = setpoint_in_force.shown(self._state, self.sent_at + (0.0 if own else TARGET_SHOWN))
         if not self.is_unshown or not isinstance(reported, GlobalTarget):
@@ -153,7 +153,7 @@ class OwnTarget:
         return None if reported is None else not self.look() and self._is_older(reported)
 
     def due(self, reported: Reported | None) -> Target | None:
-        """What shall be in force: the reported setpoint, or our place that replaces it and does not show yet."""
+        """The setpoint that should be in force: the reported one, or our newer place that is not reported yet."""
         is_replaced = reported is not None and not self.look() and self._is_older(reported)
         return self.newest if is_replaced else reported
 
@@ -194,7 +194,7 @@ class OwnTarget:
 
 
 def place_of(target: NedTarget, state: VehicleState) -> GlobalTarget | None:
-    """About where a target in the local frame is, by the vehicle's own place in both frames; None without these.
+    """Roughly where a local target is, from the vehicle's own place in both frames; None without these.
 
     The vehicle has moved between the two messages.
     """

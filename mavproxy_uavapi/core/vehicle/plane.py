@@ -86,7 +86,7 @@ class Plane(GuidedVehicle):
 
     @property
     def _hovers_in_guided(self) -> bool:
-        """Whether a report that is newer than the last order shows that it hovers, which it does until the next."""
+        """Whether a report newer than the last order shows that it hovers. It hovers until the next order."""
         if self._vtol_state != HOVER or not self.mode == self.next_mode == GUIDED:
             return False
         return self.state.messages["EXTENDED_SYS_STATE"].at > self.guard.ordered_at + TARGET_SHOWN
@@ -118,8 +118,8 @@ class Plane(GuidedVehicle):
     async def arm(self, job: Job, timeout: float | None = None) -> None:
         """As for every vehicle; first sets its mission to item 1: ArduPlane does not arm after a landing sequence.
 
-        A landing that is item 1 must not begin by that, or it would still prevent the arming. Where the mission was
-        cleared, only the older message ends its landing sequence.
+        If item 1 is a landing, selecting it must not begin the landing, which would prevent arming, too. If the
+        mission was cleared, only the older message ends the landing sequence.
         """
         if self.state.armed is False:
             self.authority.take(job, Rank.ARM)
@@ -250,7 +250,7 @@ class Plane(GuidedVehicle):
         await mission_flight.begin(self, job, lambda: self.held_by(mode) if self.mode != AUTO else None)
 
     async def come_down(self, job: Job) -> None:
-        """Land if it can; without a landing sequence, or refused, it returns, and circles at home."""
+        """Land if it can. Without a landing sequence, or if that is refused, return and circle at home."""
         since = self.state.mode_since
         try:
             await self.land(job)
@@ -323,7 +323,7 @@ class Plane(GuidedVehicle):
         """Go on in GUIDED in the direction of travel until it is high enough to circle.
 
         Raises:
-            Stale: where it flies to is not known.
+            Stale: its direction of travel is not known.
             Rejected, TimedOut, OutsideEnvelope, TooNear: it does not climb, or must not go there.
         """
         away = messages.reposition(self._straight_on(), from_any_mode=True)

@@ -1,4 +1,4 @@
-"""Any MAVLink message by its name: its fields are checked, and the authority as for every other command."""
+"""Any MAVLink message by its name. Its fields and the authority are checked, as for every command."""
 
 from __future__ import annotations
 

@@ -124,7 +124,7 @@ class Rover(TravellingVehicle):
         await self.hold(job)
 
     async def set_speed(self, job: Job, kind: str, speed: float) -> bool:
-        """As for every vehicle; a rover that goes nowhere refuses a speed: it is remembered for the next movement."""
+        """As for every vehicle. A standing rover refuses a speed, so it is kept for the next movement."""
         try:
             return await super().set_speed(job, kind, speed)
         except Rejected:

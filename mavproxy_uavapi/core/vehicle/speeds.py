@@ -15,7 +15,7 @@ class Speeds:
     def __init__(self, state: VehicleState) -> None:
         self._state = state
         self._in_force: dict[str, float] = {}
-        self._mode_since = -1.0  # when the mode began in which those are in force
+        self._mode_since = -1.0  # when the mode began in which they are in force
         self._remembered: dict[str, float] = {}
         self._reboots = 0
 

@@ -1,10 +1,10 @@
 """Requests the messages that a vehicle should send but that do not arrive.
 
-MAVProxy requests all streams of every vehicle at its `streamrate`, which stays as it is; of a vehicle that it hears
-later than the first, up to 15 s later. What does not arrive (EXTENDED_SYS_STATE is in no stream) is requested with
-SET_MESSAGE_INTERVAL. Many vehicles may share one radio, so a vehicle that nobody uses is asked once for what the list
-of vehicles shows. Where the operator has switched MAVProxy's streams off, only vehicles that are used are asked, for
-what they cannot be flown without.
+MAVProxy requests all streams of every vehicle at its `streamrate`, which stays as it is; for each vehicle after the
+first one up to 15 s late. A message that does not arrive (EXTENDED_SYS_STATE is in no stream) is requested with
+SET_MESSAGE_INTERVAL. Many vehicles may share one radio. So a vehicle that nobody uses is asked once, for what the
+list of vehicles shows. If the operator has switched MAVProxy's streams off, only vehicles in use are asked, for what
+flight needs.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ LOOK_EVERY = 1.0  # s
 GAP = 0.05  # s from one request to the next, so that they do not fill a radio's buffer
 MISSING_AFTER = 3.0  # s without a message until it is requested
 PAUSES = (2.0, 4.0, 8.0, 16.0)  # s from each request without effect to the next one; then there are no more
-STEADY = 30.0  # s from a request until a message that arrives counts as helped
+STEADY = 30.0  # s after a request; if the message still arrives then, the request has helped
 
 # Hz: enough for flight (positions) and for a status (the rest), and few enough for a telemetry radio.
 WANTED = {
@@ -131,7 +131,7 @@ class StreamRequester:
         for name, rate in self._wanted(vehicle).items():
             requests = watch.requests.get(name)
             if requests is not None and requests.rate < rate:
-                yield vehicle, name, rate  # nobody used it then
+                yield vehicle, name, rate  # nobody used the vehicle at that request
             elif self._is_missing(vehicle, name, now - watch.since):
                 if requests is None or self._may_ask_again(vehicle, requests.at, now):
                     yield vehicle, name, rate
@@ -154,7 +154,7 @@ class StreamRequester:
         return not asked_at or (len(asked_at) <= len(pauses) and now - asked_at[-1] >= pauses[len(asked_at) - 1])
 
     def closing_messages(self) -> list[tuple[Any, int]]:
-        """What gives all rates back, and the systems that it goes to: a message in no stream is sent no more."""
+        """The messages that give all rates back, and their systems. A message in no stream is switched off."""
         closing_messages = []
         for system, name in sorted(self._requested):
             number = MESSAGE_IDS[name]

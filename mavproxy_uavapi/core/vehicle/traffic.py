@@ -1,7 +1,7 @@
 """Keeps the vehicles of one MAVProxy apart: no command leads nearer to another than the setting `separation`.
 
-The way of each command is held against where the others will be: on the ways that they were allowed, at their speeds,
-with slack; where they stand, for as long as they stand. The asyncio thread only.
+The way of each command is checked against where the others will be: on their allowed ways, at their speeds, with
+slack; or where they stand, for as long as they stand. The asyncio thread only.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from mavproxy_uavapi.core.vehicle.mission_way import Stop
 Vector = tuple[float, float, float]
 PLANNED = Slack(ahead=1.0, behind=4.0, share=0.15)
 WATCHED = Slack(ahead=0.3, behind=0.5, share=0.1)
-MARGIN = 1.0  # m more than the separation, for what a forecast does not have
+MARGIN = 1.0  # m more than the separation, for errors of the forecast
 CERTAIN = 1.0  # s for which a vehicle that nobody commands through us keeps its velocity
 LOOKED_AHEAD = 5.0  # s, likewise, before a command is sent
 RTL_HEIGHT = 15.0  # m; used until the vehicle's own is known
 STOPPED = {"BRAKE", "HOLD"}
 RETRY, LONGEST_WAIT = 0.5, 120.0  # s between two looks of a command that waits, and until it is refused
-OLD = 3.0  # s; whose position is older may be anywhere on its way
-SWING = 0.5  # m beside its way that a vehicle is carried, and less than this does not count
+OLD = 3.0  # s; a vehicle with an older position may be anywhere on its way
+SWING = 0.5  # m that momentum carries a vehicle off its way; less does not count
 CORNERS = 8  # of the polygon in place of a plane's circle
 
 
@@ -40,7 +40,7 @@ class Traffic:
 
     Attributes:
         separation: m that they keep from each other; 0 keeps none.
-        waits: whether a command that leads too near to another waits for its turn, or else is refused.
+        waits: whether a command that leads too near to another vehicle waits for its turn; else it is refused.
 
     Args:
         vehicles: gives all that were heard.
@@ -61,7 +61,7 @@ class Traffic:
 
         Raises:
             TooNear: it does not.
-            Stale: it is not known where the vehicle is.
+            Stale: the vehicle's position is not known.
         """
         if not self.in_force or not way:
             return
@@ -72,7 +72,7 @@ class Traffic:
                 raise self._too_near(vehicle, other, meeting, ours[0])
 
     def nearing(self, vehicle: Any, seconds: float) -> tuple[Any, Meeting] | None:
-        """The vehicle that it is about to come too near to within that many s, and where; None for none."""
+        """The vehicle that it will come too near to within that many s, and where; None if there is none."""
         if not self.in_force:
             return None
         for other in self._others(vehicle):
@@ -87,11 +87,11 @@ class Traffic:
         """Do `verb` for a job; with `waits` it begins when no other vehicle is in its way any more.
 
         Raises:
-            TooNear: one is, also after LONGEST_WAIT.
+            TooNear: another vehicle is in its way, even after LONGEST_WAIT.
             Superseded: a newer command, or another ground station, took the vehicle meanwhile.
-            ModeChanged: its pilot did.
-            Busy: another operator did.
-            TimedOut, LinkLost: no heartbeat shows whether he did.
+            ModeChanged: its pilot took it.
+            Busy: another operator took it.
+            TimedOut, LinkLost: no heartbeat shows whether the pilot took it.
         """
         vehicle = job.vehicle
         before, deadline = vehicle.authority.commander, vehicle.clock() + LONGEST_WAIT
@@ -119,7 +119,7 @@ class Traffic:
     # -- others -------------------------------------------------------------------------------------------
 
     def _others(self, vehicle: Any) -> list[Any]:
-        """Those that are in the air or on their way there, and have told where."""
+        """The vehicles that are in the air, or on their way there, and have reported a position."""
         return [other for other in self._vehicles() if other is not vehicle and _counts(other)]
 
     def _meeting(self, vehicle: Any, ours: list[Stop], other: Any, slack: Slack, seconds: float) -> Meeting | None:
@@ -157,7 +157,7 @@ def expected(vehicle: Any, seconds: float) -> list[Stop]:
 
     Args:
         vehicle: which.
-        seconds: for which it keeps its velocity, where nothing else is known.
+        seconds: how long it keeps its velocity, if nothing else is known.
     """
     here = _place(vehicle)
     if vehicle.mode in LANDING_MODES:
@@ -178,7 +178,7 @@ def expected(vehicle: Any, seconds: float) -> list[Stop]:
 
 
 def _swung(vehicle: Any, stops: list[Stop]) -> list[Stop]:
-    """The way, by the place to which the velocity across it, or against it, carries a copter or rover first."""
+    """The path, with a first point where the vehicle comes to after it has braked its present velocity."""
     if vehicle.kind == "plane" or len(stops) < 2:
         return stops
     here, to = stops[:2]
@@ -193,7 +193,7 @@ def _swung(vehicle: Any, stops: list[Stop]) -> list[Stop]:
 
 
 def _gently_to_rest(vehicle: Any, velocity: Vector) -> Vector:
-    """Metres north, east, up that it needs to stand in GUIDED."""
+    """Metres north, east, up that it needs to come to rest in GUIDED."""
     stopping = braking.of_rover if vehicle.kind == "rover" else braking.of_guided
     return stopping(vehicle.state.parameters).to_rest(velocity, 0.0)
 

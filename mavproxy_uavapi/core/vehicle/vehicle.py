@@ -83,7 +83,7 @@ class Vehicle(Verbs):
         return True
 
     def require_disarmed(self) -> None:
-        """Raise ModeChanged unless it is disarmed: a vehicle that another one armed is left to him."""
+        """Raise ModeChanged unless it is disarmed: a vehicle that somebody else has armed is theirs."""
         if self.state.armed is not False:
             raise ModeChanged(f"the pilot or another client has armed the vehicle, in {self.mode}")
 
@@ -98,7 +98,7 @@ class Vehicle(Verbs):
         """Switch to any mode of the vehicle's type. A mode that stops it has the higher rank.
 
         Raises:
-            OutsideEnvelope: with an envelope, its mission leaves it, or in that mode nobody keeps it inside.
+            OutsideEnvelope: its mission leaves the envelope, or in that mode nobody keeps it inside.
         """
         switch = messages.set_mode(mode_number(self.state.vehicle_type, mode))
         if flies_mission(mode.upper()) and self.guard.in_force:
@@ -112,7 +112,7 @@ class Vehicle(Verbs):
         await self.switch_to(job, mode)
 
     async def mission_to_fly(self) -> list[MissionItem]:
-        """The mission that it holds, for a verb that takes the vehicle then.
+        """The stored mission, for a verb that then takes the vehicle.
 
         Raises:
             Superseded: another job has taken it meanwhile, by a newer command.
@@ -125,7 +125,7 @@ class Vehicle(Verbs):
         return items
 
     async def confirm_own_mode(self, job: Job, since: float) -> None:
-        """Have a job that is late hear a heartbeat before it switches the mode, as its pilot may have done meanwhile.
+        """Let a late job wait for a heartbeat before it switches the mode: the pilot may have switched it meanwhile.
 
         Raises:
             ModeChanged: as `require_own_mode`.
@@ -138,7 +138,7 @@ class Vehicle(Verbs):
     # -- stopping -----------------------------------------------------------------------------------------
 
     async def end_stop(self, job: Job, mode: str) -> None:
-        """Have a vehicle go on that `stop` holds in `mode`, unless it is stopped anew meanwhile."""
+        """Let a vehicle go on that `stop` holds in `mode`, unless it is stopped again meanwhile."""
         await self.commands.send(messages.pause(False), self.commanding(job, lambda: self.require_mode(mode)))
         if job is not self.authority.interrupted:
             self.authority.end_pause()
@@ -149,7 +149,7 @@ class Vehicle(Verbs):
         return False
 
     async def hold(self, job: Job) -> None:
-        """Stop and stay, however it moves for us."""
+        """Stop and stay, whatever movement of ours it flies."""
         await self.take(job, Rank.STOP)
         if not self.mode == self.next_mode == self.holding_mode:
             await self.switch_to(job, self.holding_mode)
@@ -165,7 +165,7 @@ class Vehicle(Verbs):
     # -- home ---------------------------------------------------------------------------------------------
 
     async def is_done_at_home(self, job: Job) -> bool:
-        """Whether it is disarmed, so that there is nothing to return: at home it is done.
+        """Whether it is disarmed at home, so that a return is done already.
 
         Raises:
             NotArmed: it is disarmed elsewhere.
