@@ -206,7 +206,7 @@ def ports(text: str) -> Mapping[int, int]:
     for word in words(text):
         port, _, system = word.partition(":")
         if not (port.isdecimal() and system.isdecimal() and 0 < int(port) < 65536 and 0 < int(system) < 256):
-            raise SettingError(f"{word!r} is no port and system id such as 8001:2")
+            raise SettingError(f"{word!r} is not a port and system id such as 8001:2")
         if int(port) in systems:
             raise SettingError(f"port {port} is named twice")
         systems[int(port)] = int(system)
@@ -231,7 +231,7 @@ def network(text: str) -> Network:
     try:
         return ipaddress.ip_network(text, strict=False)
     except ValueError as error:
-        raise SettingError(f"{text!r} is no network such as 192.168.1.0/24") from error
+        raise SettingError(f"{text!r} is not a network such as 192.168.1.0/24") from error
 
 
 def log_components(text: str) -> frozenset[str]:

@@ -152,7 +152,7 @@ class Audit:
             self._room.release()
 
     def close(self) -> None:
-        """Write what is left. Any thread, when the asyncio thread has ended."""
+        """Write the remaining entries. Any thread, after the asyncio thread has ended."""
         if self._report_timer is not None:
             self._report_timer.cancel()
         self._report_refusals()

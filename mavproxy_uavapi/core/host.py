@@ -45,7 +45,7 @@ class Host:
         envelopes: where vehicles may fly.
         leases: for how long a client counts as alive without a call.
         holds: which operators hold vehicles.
-        envelope_watch: stops those of ours that would leave.
+        envelope_watch: stops our vehicles before they leave their envelope.
         listeners: called with each vehicle message, after the state has taken it and the waits have seen it.
         observers: called with what happens besides: name, system id, s ago, and what; see `tell`.
         api_address: where `uavapi` listens; None while it does not.

@@ -149,7 +149,7 @@ class ModuleSettings(ABC, Generic[Snapshot]):
         return escaped(str(value))
 
     def listing(self, pattern: str = "") -> list[str]:
-        """A line for each setting: its value, and where that came from; of a single one what it means, too.
+        """A line for each setting: its value and the value's origin. A single setting also has its meaning.
 
         Args:
             pattern: a name, the beginning of names, or a pattern such as `sim_*`.

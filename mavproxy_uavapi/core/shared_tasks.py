@@ -10,7 +10,7 @@ T = TypeVar("T")
 
 
 class SharedTasks(Generic[T]):
-    """Tasks by key: who asks for one that is under way waits for its outcome. Its callers may leave; it goes on."""
+    """Tasks by key. A caller of a running task waits for its outcome. The task goes on if its callers leave."""
 
     def __init__(self) -> None:
         self._running: dict[Hashable, asyncio.Task[T]] = {}

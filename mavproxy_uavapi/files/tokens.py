@@ -85,9 +85,9 @@ def name_of(word: str) -> str:
         SettingError: it cannot.
     """
     if word in RESERVED:
-        raise SettingError(f"{word} is no name for an operator: the trail uses it", "tokens")
+        raise SettingError(f"{word} cannot name an operator: the trail uses it", "tokens")
     if not NAME.fullmatch(word):
-        raise SettingError(f"{word!r:.40} is no name of up to 32 letters, digits, `_`, `.` and `-`", "tokens")
+        raise SettingError(f"{word!r:.40} is not a name of up to 32 letters, digits, `_`, `.` and `-`", "tokens")
     return word
 
 
@@ -99,14 +99,14 @@ def rights_of(word: str) -> tuple[Role, frozenset[int]]:
     """
     role, colon, systems = word.partition(":")
     if role not in ROLES:
-        raise SettingError(f"{role!r:.40} is none of {', '.join(ROLES)}", "tokens")
+        raise SettingError(f"{role!r:.40} is not one of {', '.join(ROLES)}", "tokens")
     if not colon:
         return ROLES[role], frozenset()
     if ROLES[role] is not Role.FLY:
         raise SettingError(f"{role} is for every vehicle; only fly names some", "tokens")
     numbers = systems.split(",")
     if not all(re.fullmatch(r"[1-9][0-9]{0,2}", number) and int(number) < 256 for number in numbers):
-        raise SettingError(f"{systems!r:.40} are no system ids such as 1,2", "tokens")
+        raise SettingError(f"{systems!r:.40} are not system ids such as 1,2", "tokens")
     return Role.FLY, frozenset(map(int, numbers))
 
 
@@ -141,7 +141,7 @@ def _token(words: Sequence[str]) -> Token:
     name, (role, vehicles) = name_of(words[0]), rights_of(words[1])
     digits = HASH.fullmatch(words[2])
     if digits is None:
-        raise SettingError(f"the third word of {name} is no hash: sha256: and 64 digits 0-9a-f", "tokens")
+        raise SettingError(f"the third word of {name} is not a hash: sha256: and 64 digits 0-9a-f", "tokens")
     return Token(name, role, vehicles, bytes.fromhex(digits[1]))
 
 
@@ -164,13 +164,13 @@ def read_text(path: Path) -> str:
         reason = "it is a link" if path.is_symlink() else error.strerror
         raise SettingError(f"{path} cannot be read: {reason}", "tokens") from error
     except UnicodeDecodeError as error:
-        raise SettingError(f"{path} is no text", "tokens") from error
+        raise SettingError(f"{path} is not text", "tokens") from error
 
 
 def _require_private(path: Path, status: os.stat_result) -> None:
     """Raise SettingError unless it is a file of a sensible size that only we, or root, can use."""
     if not stat.S_ISREG(status.st_mode):
-        raise SettingError(f"{path} is no file", "tokens")
+        raise SettingError(f"{path} is not a file", "tokens")
     if stat.S_IMODE(status.st_mode) & 0o077:
         raise SettingError(f"others can use {path}: `chmod 600 {path}`", "tokens")
     if status.st_uid not in (0, os.geteuid()):

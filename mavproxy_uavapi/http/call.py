@@ -324,7 +324,7 @@ class Call:
         """What the vehicle does when the client hangs up, if the query says so."""
         action = self.request.query.get("on_disconnect")
         if action is not None and action not in ON_DISCONNECT:
-            raise Invalid(f"{action!r} is none of {', '.join(ON_DISCONNECT)}", "query", "on_disconnect")
+            raise Invalid(f"{action!r} is not one of {', '.join(ON_DISCONNECT)}", "query", "on_disconnect")
         return None if action is None else ON_DISCONNECT[action]
 
     @property
@@ -336,7 +336,7 @@ class Call:
         except ValueError:
             seconds = math.nan
         if seconds is not None and not 0 <= seconds <= LONGEST_LEASE:
-            raise Invalid(f"{text!r} is no number of seconds up to {LONGEST_LEASE:g}", "query", "lease")
+            raise Invalid(f"{text!r} is not a number of seconds up to {LONGEST_LEASE:g}", "query", "lease")
         return seconds
 
     def accepted(self, job: Job) -> web.Response:
@@ -354,7 +354,7 @@ def holder_of(request: web.BaseRequest) -> str:
     """
     name, address = request.query.get("client"), client_of(request)
     if name is not None and not CLIENT_NAME.fullmatch(name):
-        raise Invalid(f"{name!r} is no word of up to 64 letters, digits, `_`, `.`, `:` and `-`", "query", "client")
+        raise Invalid(f"{name!r} is not a word of up to 64 letters, digits, `_`, `.`, `:` and `-`", "query", "client")
     return address if name is None else f"{name}@{address}"
 
 

@@ -121,9 +121,9 @@ def check_caller(
     if caller.has_token or caller.is_in(settings.allow_from):
         return caller
     if settings.token or settings.tokens:
-        raise Unauthorized("this API wants its token: Authorization: Bearer …")
+        raise Unauthorized("this API needs its token: Authorization: Bearer …")
     if not settings.allow_open and not caller.is_local:
-        raise Forbidden(f"{remote}{' by a proxy' if forwarded else ''} is in none of the networks that may call")
+        raise Forbidden(f"{remote}{' by a proxy' if forwarded else ''} is not in a network that may call")
     return caller
 
 

@@ -51,7 +51,7 @@ def _require_some(parameter: str, wanted: NamePatterns, known: tuple[str, ...]) 
     """Raise Invalid if a name that was asked for can never come."""
     for pattern in wanted.patterns:
         if not any(one in NamePatterns(pattern) for one in known):
-            raise Invalid(f"{pattern!r} is none of {', '.join(known)}", "query", parameter)
+            raise Invalid(f"{pattern!r} is not one of {', '.join(known)}", "query", parameter)
 
 
 async def _websocket(request: web.BaseRequest, subscription: Subscription) -> web.StreamResponse:

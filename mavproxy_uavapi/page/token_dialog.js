@@ -8,7 +8,7 @@ export class TokenDialog extends Panel {
     this.input = element("input", {type: "password", autocomplete: "off", required: true, name: "token"});
     this.note = element("p", {class: "answer bad", role: "status"});
     const form = element("form", {method: "dialog", on: {submit: event => this.taken(event)}},
-      element("h2", {}, "This API wants its token"),
+      element("h2", {}, "This API needs its token"),
       element("p", {}, "It is yours, or the setting token of uavapi. This tab keeps it until it is closed."),
       element("label", {class: "field"}, element("span", {}, "token"), this.input), this.note,
       element("button", {type: "submit"}, "Use it"));

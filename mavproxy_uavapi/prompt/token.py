@@ -63,7 +63,7 @@ def _remove(path: Path, name: str) -> str:
     if len(kept) == len(lines):
         raise SettingError(f"{name!r:.40} has no token", "tokens")
     write(path, "\n".join(kept))
-    return f"the token of {name} counts no more; its open connections are closed"
+    return f"the token of {name} is no longer valid; its open connections are closed"
 
 
 def write(path: Path, text: str) -> None:

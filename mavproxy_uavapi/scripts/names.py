@@ -21,8 +21,8 @@ def checked(name: str) -> str:
     """
     if not ALLOWED.fullmatch(name) or len(name) > LONGEST:
         raise BadRequest(
-            f"{name[:LONGEST]!r} is no name for a script: letters, digits, '.', '_' and '-' only, not beginning with "
-            f"'.' or '-', and at most {LONGEST} of them"
+            f"{name[:LONGEST]!r} is not a name for a script: letters, digits, '.', '_' and '-' only, not beginning "
+            f"with '.' or '-', and at most {LONGEST} of them"
         )
     if PurePath(name).suffix not in SUFFIXES:
         raise BadRequest(f"{name!r} is neither a .py nor a .sh file")

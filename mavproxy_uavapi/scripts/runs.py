@@ -187,7 +187,7 @@ def load(path: Path) -> Run:
         fields |= {"path": path, "out_log": out_log, "err_log": Path(record["err_log"]), "alive": alive}
         return Run(**fields)
     except (TypeError, KeyError) as error:
-        raise ValueError(f"{path} is no record of a run") from error
+        raise ValueError(f"{path} is not the record of a run") from error
 
 
 def refreshed(run: Run) -> Run:
@@ -201,7 +201,7 @@ def refreshed(run: Run) -> Run:
 def _read(path: Path) -> dict[str, Any]:
     record = json.loads(path.read_text(encoding="utf-8"))
     if not isinstance(record, dict):
-        raise ValueError(f"{path} is no record of a run")
+        raise ValueError(f"{path} is not the record of a run")
     return record
 
 

@@ -77,7 +77,7 @@ def parse_families(text: str) -> tuple[str, ...]:
     names = tuple(name.lower().removeprefix("tag") for name in re.split(r"[\s,;]+", text.strip()) if name)
     for name in names:
         if name not in FAMILIES:
-            raise SettingError(f"family: {name!r} is none of {', '.join(FAMILIES)}", "family")
+            raise SettingError(f"family: {name!r} is not one of {', '.join(FAMILIES)}", "family")
     if not names:
         raise SettingError(f"family: one or several of {', '.join(FAMILIES)}", "family")
     return names

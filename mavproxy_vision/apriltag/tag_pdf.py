@@ -18,7 +18,7 @@ def tag_pdf(family: str, number: int, size: float) -> bytes:
         SettingError: there is no such tag, or it fits no paper.
     """
     if family not in FAMILIES:
-        raise SettingError(f"family {family!r} is none of {', '.join(FAMILIES)}", "family")
+        raise SettingError(f"family {family!r} is not one of {', '.join(FAMILIES)}", "family")
     require_id("id", family, number)
     require_size("size", size)
     cells = FAMILIES[family][0]

@@ -91,7 +91,7 @@ async def give_the_token(pilot: Pilot) -> None:
     pilot.rig.mavproxy.ask("uavapi set token sesame", "listening on")  # anew
     await pilot.page.visit(pilot.rig.url + "/")
     await pilot.page.until("document.querySelector('dialog').open")
-    await pilot.sees("#trouble", "this API wants its token")
+    await pilot.sees("#trouble", "this API needs its token")
     await pilot.click("HOLD ALL")  # the dialog is not in its way
     await pilot.sees("#hold-result", "HOLD ALL WAS NOT DELIVERED")
     await pilot.page.evaluate("document.querySelector('dialog input').focus()")

@@ -61,7 +61,7 @@ def test_operators_of_the_prompt_fly_watch_hand_over_and_go(rig: Any) -> None:
         assert rig.call("GET", "/command/guided", headers=anna).status_code == 409
         assert rig.call("GET", "/command/rtl?wait=false", headers=anna).status_code == 202
         rig.mavproxy.ask("uavapi authority release", "nobody holds it")
-        rig.mavproxy.ask("uavapi token remove tower", "counts no more")
+        rig.mavproxy.ask("uavapi token remove tower", "is no longer valid")
         with pytest.raises(requests.RequestException):
             for _ in stream.iter_lines():
                 pass

@@ -141,7 +141,7 @@ def test_rate_that_is_set_is_for_this_machine_too() -> None:
 def test_networks_that_may_run_scripts_are_networks() -> None:
     snapshot = ApiModuleSettings({"allow_scripts_from": "10.0.0.0/8, fd00::/8"}, environ={}).snapshot()
     assert [str(network) for network in snapshot.allow_scripts_from] == ["10.0.0.0/8", "fd00::/8"]
-    with pytest.raises(SettingError, match="allow_scripts_from: 'here' is no network"):
+    with pytest.raises(SettingError, match="allow_scripts_from: 'here' is not a network"):
         ApiModuleSettings({"allow_scripts_from": "here"}, environ={})
 
 

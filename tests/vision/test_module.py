@@ -153,7 +153,7 @@ def test_bad_words_are_explained(running: Any, capsys: Any, main_loop: Any) -> N
     assert "not an id" in output(running, capsys, "land", "x")
     assert "ALT NORTH EAST" in output(running, capsys, "mission", "a")
     assert "did you mean" in output(running, capsys, "set", "famly", "16h5")
-    assert "none of" in output(running, capsys, "set", "family", "4x4")
+    assert "not one of" in output(running, capsys, "set", "family", "4x4")
     assert "not ID:SIZE" in output(running, capsys, "set", "tags", "0")
     assert running.module_settings.snapshot().tags == "0:0.30"
     assert "one of velocity, landing_target" in output(running, capsys, "set", "method", "magic")

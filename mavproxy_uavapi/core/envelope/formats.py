@@ -102,7 +102,7 @@ def _of_feature(feature: Any, number: int) -> Iterator[Area]:
         else:
             raise Invalid(f"{name} is a {kind}: it takes Polygon, MultiPolygon, or Point with a radius")
     except (AttributeError, KeyError, TypeError, ValueError, IndexError) as error:
-        sentence = f"feature {number} makes no sense: {type(error).__name__}: {error}"
+        sentence = f"feature {number} is invalid: {type(error).__name__}: {error}"
         raise Invalid(sentence, "features", str(number)) from error
 
 
@@ -165,7 +165,7 @@ def _of_plan(fence: Any) -> Iterator[Area]:
             centre, radius = (_number(lat), _number(lon)), _number(circle["circle"]["radius"])
             yield Area(f"circle {number}", bool(circle["inclusion"]), centre=centre, radius=radius)
     except (KeyError, TypeError, ValueError) as error:
-        raise Invalid(f"the .plan file's geoFence makes no sense: {type(error).__name__}: {error}") from error
+        raise Invalid(f"the .plan file's geoFence is invalid: {type(error).__name__}: {error}") from error
 
 
 def of_fence(items: Sequence[Any], source: str, home: Callable[[], Place | None] = lambda: None) -> Envelope:

@@ -29,7 +29,7 @@ def polygons(text: str) -> list[KmlPolygon]:
     try:
         root = ElementTree.fromstring(text.encode())  # bytes: a text may not declare an encoding
     except ElementTree.ParseError as error:
-        raise ValueError(f"it is no KML: {error}") from error
+        raise ValueError(f"it is not KML: {error}") from error
     return list(_polygons_below(root, ""))
 
 

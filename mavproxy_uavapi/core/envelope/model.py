@@ -73,7 +73,7 @@ class EnvelopeLimits:
             if name not in names:
                 raise Invalid(f"there is no limit {name!r}; there are {', '.join(names)}", "limits")
             if value is not None and not (_is_number(value) and value > 0):
-                raise Invalid(f"{value!r} is no positive number", "limits", name)
+                raise Invalid(f"{value!r} is not a positive number", "limits", name)
         if (values.get("reserve") or 0) > 100:
             raise Invalid(f"{values['reserve']} %; at most 100 % is possible", "limits", "reserve")
         return cls(**{name: None if value is None else float(value) for name, value in values.items()})
@@ -113,7 +113,7 @@ def _check(area: Area) -> None:
     """Raise Invalid unless the area makes sense; whether its outline crosses itself shows in `space.py`."""
     for lat, lon in area.corners:
         if not (_is_number(lat) and _is_number(lon) and abs(lat) <= HIGHEST_LATITUDE and abs(lon) <= 180):
-            raise Invalid(f"{area.name}: {lat}, {lon} is no latitude and longitude in degrees")
+            raise Invalid(f"{area.name}: {lat}, {lon} is not a latitude and longitude in degrees")
     if area.centre is not None and not 0 < area.radius <= LARGEST:
         raise Invalid(f"{area.name}: its radius is {area.radius:g} m, not between 0 and {LARGEST:g}")
     if area.centre is None and not area.rings:

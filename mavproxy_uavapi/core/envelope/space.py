@@ -277,7 +277,7 @@ def _shape(area: Area, frame: LocalFrame) -> Any:
     rings = [[frame.metres(corner)[::-1] for corner in ring] for ring in area.rings]
     shape = Polygon(rings[0], rings[1:])
     if not shape.is_valid or shape.is_empty or shape.area < TOUCH**2:
-        raise Invalid(f"{area.name} is no polygon: {shapely.is_valid_reason(shape)}")
+        raise Invalid(f"{area.name} is not a valid polygon: {shapely.is_valid_reason(shape)}")
     return shape
 
 

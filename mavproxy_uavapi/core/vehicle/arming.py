@@ -63,7 +63,7 @@ async def arm(vehicle: BaseVehicle, job: Job, timeout: float | None) -> None:
 async def disarm(vehicle: BaseVehicle, job: Job, force: bool) -> None:
     """See `Vehicle.disarm`. A heartbeat from before the order shows nothing.
 
-    An order of ours to arm may arrive after the next heartbeat, too; then only the acknowledgement counts.
+    Our own order to arm may arrive after the next heartbeat. Then only the acknowledgement counts.
     """
     order, check = messages.disarm(force), vehicle.commanding(job)
     if vehicle.arm_is_on_its_way:
@@ -88,7 +88,7 @@ def _requires_guided(vehicle: BaseVehicle) -> Callable[[], None]:
 async def _get_ready(
     vehicle: BaseVehicle, job: Job, is_ready: Callable[[], bool], check: Callable[[], None], deadline: float
 ) -> None:
-    """Wait until it is ready, and after a moment also for the next heartbeat: its pilot may have it by now."""
+    """Wait until it is ready. After a longer wait also hear a heartbeat: the pilot may have taken it meanwhile."""
 
     def ready() -> bool | None:
         job.require_permit()

@@ -116,7 +116,7 @@ class CommandAuthority:
         Args:
             job: the job that commands.
             rank: its verb's.
-            allow: asked after the rank; what it raises refuses the job.
+            allow: called after the rank check; refuses the job by raising.
 
         Raises:
             Busy, Paused: as `admit` and `Job.require_permit`; then nothing has changed. Likewise what `allow` raises.

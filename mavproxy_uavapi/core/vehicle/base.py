@@ -176,7 +176,7 @@ class BaseVehicle:
 
     @property
     def arm_is_on_its_way(self) -> bool:
-        """Whether an order of ours to arm may yet arm it."""
+        """Whether our order to arm may still arm it."""
         return self.state.armed is False and self.clock() - self.arm_sent_at <= HEARD_WITHIN
 
     async def hear_again(self) -> None:
@@ -294,7 +294,7 @@ class BaseVehicle:
 
     @property
     def flies_for_us(self) -> bool:
-        """Whether it flies by a command of ours, and does not land, return or hold."""
+        """Whether it flies by our command, and does not land, return or hold."""
         if not self.state.armed or self.stands or self.authority.commander is None:
             return False
         if self.mode in STOPPING_MODES or self.mode in self.holding_modes:
@@ -306,7 +306,7 @@ class BaseVehicle:
         return moves and self.obeys_us
 
     def require_own_mode(self, since: float) -> None:
-        """Raise ModeChanged if another has switched its mode; `since`: what `state.mode_since` was."""
+        """Raise ModeChanged if somebody else has switched its mode; `since`: the former `state.mode_since`."""
         if self.state.mode_since != since and not self.is_in_own_mode:
             raise ModeChanged(f"the pilot or a failsafe switched the vehicle to {self.mode} meanwhile")
 

@@ -16,7 +16,7 @@ PLANE, ROVER = 12.0, 2.0  # m/s; used until their own is known
 
 
 def speeds(kind: str, parameters: Mapping[str, float], speeds: Speeds) -> list[tuple[str, float]]:
-    """Kind of speed (ground, climb, descent) and m/s, by the vehicle's type, parameters and what was set since."""
+    """Speeds in m/s by kind (ground, climb, descent), from the vehicle's type, parameters and later commands."""
     if kind == "rover":
         cruise = parameters.get("WP_SPEED") or parameters.get("CRUISE_SPEED") or ROVER
         return [("ground", _set(speeds, cruise, "ground", "air"))]

@@ -30,7 +30,7 @@ class Ending(Enum):
     SCRIPT_GONE = "script gone"
     LEASE_OVER = "lease over"
     UNLOADED = "unloaded"  # the API stops, or a module is unloaded
-    DEFECT = "defect"  # of ours
+    DEFECT = "defect"  # of this program
 
 
 class Job:
@@ -40,7 +40,7 @@ class Job:
         id: its number, as text.
         verb: the path that was called, `/movement/go_to_ned_wait`.
         request: the validated parameters.
-        vehicle: what it commands; two jobs of one vehicle have the same object here, while its type is the same.
+        vehicle: what it commands; jobs of one vehicle share this object while its type is the same.
         client: the client that began it: an address, with the name of its token before it, or CONSOLE.
         holder: the name by which that client may hold a lease; the same where it gave none.
         operator: the name by which it may hold the vehicle.
@@ -51,7 +51,7 @@ class Job:
         modes: names of the flight modes that it switched to; in any other mode the pilot has the vehicle.
         script: the session of a script that the job goes on for; None for no script.
         outlives_client: whether it goes on when its client hangs up (land, rtl).
-        on_disconnect: the `Policy`, by its value, of a client that hangs up; None for that of the setting.
+        on_disconnect: the value of the `Policy` for a client that hangs up; None for the setting's.
         stage: the present step of a verb that consists of several: its name and numbers.
         progress: its last report, such as distance_to_go (m) and altitude (m above home).
         result: the text of its success.

@@ -81,7 +81,7 @@ class Waypoints:
 
         Raises:
             Rejected: another ground station transfers a mission now.
-            Busy: other transfers of ours take too long.
+            Busy: our other transfers take too long.
             TimedOut, LinkLost.
         """
         async with self._turn():
@@ -138,7 +138,7 @@ class Waypoints:
         """Remove the mission, and check that it is gone.
 
         Args:
-            check: called before it is removed; what it raises ends that.
+            check: called before the removal; what it raises prevents it.
 
         Raises:
             Rejected: the vehicle flies it.

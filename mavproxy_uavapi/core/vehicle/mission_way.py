@@ -55,7 +55,7 @@ class Setting:
     Attributes:
         start: where it begins; None where that is not known yet, as before an upload.
         home_amsl: m; None where it is not known.
-        radius: of circles whose item names none, m; 0 for a vehicle that stands still in them.
+        radius: m, of circles whose item has no radius; 0 for a vehicle that stands still there.
         heights_matter: whether the check fails if a height is not known.
     """
 

@@ -111,7 +111,7 @@ HARMLESS_COMMANDS = {
     mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN,
     mavlink.MAV_CMD_DO_SET_SERVO,
     mavlink.MAV_CMD_CONDITION_YAW,
-    mavlink.MAV_CMD_DO_PAUSE_CONTINUE,  # what is continued was allowed when it began, and is watched
+    mavlink.MAV_CMD_DO_PAUSE_CONTINUE,  # the continued movement was allowed when it began, and is watched
     mavlink.MAV_CMD_DO_SET_REVERSE,
     mavlink.MAV_CMD_DO_LAND_START,
 }

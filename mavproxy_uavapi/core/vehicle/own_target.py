@@ -104,7 +104,7 @@ class OwnTarget:
 
         Raises:
             Superseded: it reports another station's target, or a velocity.
-            TimedOut: it still reports a target of ours that the newest one replaces.
+            TimedOut: it still reports an older target of ours.
         """
         reported = self._reported()
         if self.flies_elsewhere:
@@ -148,7 +148,7 @@ class OwnTarget:
         return not self.is_unshown
 
     def is_replaced_since(self, since: float) -> bool | None:
-        """Whether it has reported, since `since` (s), a setpoint of ours that the newest replaces; None for none."""
+        """Whether the setpoint that it has reported since `since` (s) is an older one of ours; None for no report."""
         reported = setpoint_in_force.shown(self._state, since)
         return None if reported is None else not self.look() and self._is_older(reported)
 

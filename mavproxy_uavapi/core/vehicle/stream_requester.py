@@ -41,7 +41,7 @@ WANTED = {
 }
 # Of a vehicle that nobody uses: what `GET /vehicles` shows, with what keeps it from being armed.
 LISTED = dict.fromkeys(("GLOBAL_POSITION_INT", "SYS_STATUS", "EKF_STATUS_REPORT", "GPS_RAW_INT"), 0.5)
-# Without MAVProxy's streams: all but what is only shown, half as often.
+# Without MAVProxy's streams: only what flight needs, half as often.
 NEEDED = {name: rate / 2 for name, rate in WANTED.items() if name not in ("GPS_RAW_INT", "VFR_HUD")}
 RATES: Mapping[tuple[bool, bool], Mapping[str, float]] = {  # whether it is used, and the streams are off
     (True, False): WANTED,
@@ -75,7 +75,7 @@ class RateRequests:
 
 @dataclass
 class StreamWatch:
-    """One vehicle since a boot: the reboots before, since when it is watched (s), and what was requested."""
+    """One vehicle since a boot: the number of reboots, the start of the watch (s), and the requests."""
 
     reboots: int
     since: float

@@ -32,7 +32,7 @@ STOPPED = {"BRAKE", "HOLD"}
 RETRY, LONGEST_WAIT = 0.5, 120.0  # s between two looks of a command that waits, and until it is refused
 OLD = 3.0  # s; a vehicle with an older position may be anywhere on its way
 SWING = 0.5  # m that momentum carries a vehicle off its way; less does not count
-CORNERS = 8  # of the polygon in place of a plane's circle
+CORNERS = 8  # of the polygon that replaces a plane's circle
 
 
 class Traffic:

@@ -67,7 +67,7 @@ class Vehicle(Verbs):
     async def stays_disarmed(self, job: Job) -> bool:
         """Whether it is disarmed, by a heartbeat that is newer than the call.
 
-        An order of ours to arm that may be on its way is undone first.
+        If our order to arm may be on its way, it is undone first.
 
         Raises:
             ModeChanged: the heartbeat shows it armed.

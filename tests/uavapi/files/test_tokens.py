@@ -46,21 +46,21 @@ def test_line_has_a_name_a_role_with_vehicles_and_a_hash() -> None:
     [
         ("anna fly", "NAME ROLE"),
         (f"anna bo fly {HASHES[1]}", "NAME ROLE"),
-        (f"anna king {HASHES[1]}", "'king' is none of watch, fly, admin"),
-        (f"anna prompt {HASHES[1]}", "'prompt' is none of"),
+        (f"anna king {HASHES[1]}", "'king' is not one of watch, fly, admin"),
+        (f"anna prompt {HASHES[1]}", "'prompt' is not one of"),
         (f"anna watch:1 {HASHES[1]}", "only fly names some"),
         (f"anna admin:1 {HASHES[1]}", "only fly names some"),
-        *((f"anna fly:{systems} {HASHES[1]}", "no system ids") for systems in ("", "0", "256", "1,", "a", "²")),
-        ("anna fly my-own-secret", "the third word of anna is no hash"),
-        (f"anna fly {HASHES[1].upper()}", "is no hash"),
-        (f"anna fly {HASHES[1]}0", "is no hash"),
-        (f"10.0.0.5 fly {HASHES[1]}", "is no name"),
-        (f"::1 fly {HASHES[1]}", "is no name"),
-        (f"console fly {HASHES[1]}", "console is no name for an operator"),
-        (f"a@b fly {HASHES[1]}", "is no name"),
-        (f"a/b fly {HASHES[1]}", "is no name"),
-        (f"a\x1b[31m fly {HASHES[1]}", "is no name"),
-        (f"{'a' * 33} fly {HASHES[1]}", "is no name"),
+        *((f"anna fly:{systems} {HASHES[1]}", "not system ids") for systems in ("", "0", "256", "1,", "a", "²")),
+        ("anna fly my-own-secret", "the third word of anna is not a hash"),
+        (f"anna fly {HASHES[1].upper()}", "is not a hash"),
+        (f"anna fly {HASHES[1]}0", "is not a hash"),
+        (f"10.0.0.5 fly {HASHES[1]}", "is not a name"),
+        (f"::1 fly {HASHES[1]}", "is not a name"),
+        (f"console fly {HASHES[1]}", "console cannot name an operator"),
+        (f"a@b fly {HASHES[1]}", "is not a name"),
+        (f"a/b fly {HASHES[1]}", "is not a name"),
+        (f"a\x1b[31m fly {HASHES[1]}", "is not a name"),
+        (f"{'a' * 33} fly {HASHES[1]}", "is not a name"),
         (f"first fly {HASHES[1]}", "first has a token already"),
         (f"anna fly {HASHES[0]}", "anna has the token of somebody else"),
     ],
@@ -94,7 +94,7 @@ def test_link_pipe_folder_and_binary_are_refused_and_do_not_block(file: Path, tm
     os.mkfifo(pipe, 0o600)
     binary.write_bytes(b"\xff\xfe\x00")
     binary.chmod(0o600)
-    for path, words in ((link, "it is a link"), (pipe, "no file"), (tmp_path, "no file"), (binary, "no text")):
+    for path, words in ((link, "it is a link"), (pipe, "not a file"), (tmp_path, "not a file"), (binary, "not text")):
         with pytest.raises(SettingError, match=words):
             read(path)
 

@@ -107,5 +107,5 @@ def test_record_that_was_removed_leaves_what_was_known(make_run: MakeRun) -> Non
 def test_record_of_something_else_is_a_value_error(tmp_path: Path) -> None:
     path = tmp_path / "x_run.json"
     path.write_text(json.dumps({"script": "a.py"}))
-    with pytest.raises(ValueError, match="no record"):
+    with pytest.raises(ValueError, match="not the record"):
         runs.load(path)
