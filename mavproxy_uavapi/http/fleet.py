@@ -70,7 +70,9 @@ async def _command(call: Call, route: Route) -> web.StreamResponse:
     """Call `route` for each vehicle."""
     p = call.params(FleetRequest)
     if p.all_or_none and call.is_async:
-        raise Invalid("`all_or_none` needs a waiting call; omit wait=false", "all_or_none")
+        raise Invalid(
+            "`all_or_none` needs a waiting call: without wait=false and Prefer: respond-async", "all_or_none"
+        )
     known = call.service.host.fleet.vehicles
     every = [call.named_system] if call.named_system else sorted(known)  # a path that names a vehicle means no other
     systems = every if p.vehicles == "all" else list(dict.fromkeys(p.vehicles))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import weakref
 
 from aiohttp import web
 
@@ -38,13 +39,15 @@ from mavproxy_uavapi.http.route import ADMIN, EITHER, FLY, POST, WATCH, Route
 
 async def specification(call: Call) -> web.StreamResponse:
     """The description of this API, OpenAPI 3.1, including the routes of other loaded modules."""
-    body = _specification(tuple(call.service.host.extensions.values()))
+    body = _specification(tuple(map(weakref.ref, call.service.host.extensions.values())))
     return static_files.answer(call.request, body, "application/json", {"Cache-Control": "no-cache"})
 
 
 @functools.lru_cache(maxsize=1)  # it takes a tenth of a second, and any stranger may ask
-def _specification(extensions: tuple[Route, ...]) -> bytes:
-    return dumps(document([*ROUTES, *extensions])).encode()
+def _specification(extensions: tuple[weakref.ref[Route], ...]) -> bytes:
+    """The cache keeps no module that is unloaded, by its routes."""
+    routes = [route for extension in extensions if (route := extension()) is not None]
+    return dumps(document([*ROUTES, *routes])).encode()
 
 
 COMMAND = [

@@ -183,7 +183,10 @@ def sitl_binary(ardupilot_path: str, kind: str) -> Path:
 
 
 def api_url(options: RunOptions, environ: Mapping[str, str]) -> str:
-    """The API's URL on this machine. The certificate is a setting of the module: any source of those may have it."""
+    """The API's URL on this machine.
+
+    The certificate is a setting of the module, which may have it from the file, the environment or keywords.
+    """
     settings = {"certfile": environ.get("UAVAPI_CERTFILE", ""), **dict(options.further)}
     for module in options.module:
         name, _, keywords = module.partition(":")

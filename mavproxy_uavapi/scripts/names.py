@@ -46,7 +46,7 @@ def stem(script: str) -> str:
 def session_name(sysid: int, run: str) -> str:
     """The tmux session of a run: `run` is `<stem>_<timestamp>`. tmux allows neither '.' nor ':' in a name.
 
-    No other run has the same: a script's name has no '+'.
+    No other run of the vehicle in the same folder of logs has the same: a script's name has no '+'.
     """
     vehicle = f"{sysid}_" if sysid else ""
     return f"{SESSIONS}{vehicle}{run.replace('.', '+')}"

@@ -290,6 +290,21 @@ def test_own_mission_is_watched(make_world: Any, kind: str) -> None:
         assert (vehicle.mode, vehicle.flies_for_us) == ("AUTO", True)
 
 
+@pytest.mark.parametrize(
+    "paths", [("/movement/stop", "/movement/resume"), ("/command/set_mode?mode=SMART_RTL",)], ids=["stop", "refused"]
+)
+def test_own_mission_is_watched_after_a_stop_that_is_over(make_world: Any, paths: tuple[str, ...]) -> None:
+    world = make_world(World.on_mission)
+    world.in_mode("GUIDED")
+    world.loop.pass_time(1.5)
+    assert world.ask("POST", "/mission/start", {}).outcome == "200"
+    for path in paths:
+        world.ask("GET", path)
+        world.loop.pass_time(2.0)
+    vehicle = world.host.registry.find(1)
+    assert (vehicle.mode, vehicle.flies_for_us) == ("AUTO", True)
+
+
 def test_refused_order_does_not_make_the_pilots_mission_ours(make_world: Any) -> None:
     world = make_world(World.on_mission)
     put(world, field(60, 400))

@@ -75,6 +75,7 @@ class BaseVehicle:
         self.clock = clock
         self.speeds = Speeds(state)
         self.arm_sent_at = -math.inf  # s; when the order to arm was sent last
+        self.lands_by_mission = False  # in AUTO: whether a verb that stops or lands it has begun that
         self.guard = EnvelopeGuard(self, spaces)
         self.link: Link = GuardedLink(link, self.guard)
         self.authority = CommandAuthority(state)
@@ -300,10 +301,14 @@ class BaseVehicle:
         if self.mode in STOPPING_MODES or self.mode in self.holding_modes:
             return False
         if flies_mission(self.mode):
-            moves = self.authority.rank < Rank.STOP  # a plane lands by a mission, too
+            moves = not self.lands_by_mission
         else:
             moves = self.mode == "GUIDED" or (self.mode == "TAKEOFF" and self.kind == "plane")
         return moves and self.obeys_us
+
+    def note_mission(self, job: Job) -> None:
+        """Note whether `job` lands the vehicle by its mission, as a plane does, before it sends what begins that."""
+        self.lands_by_mission = job is self.authority.commander and self.authority.rank is Rank.STOP
 
     def require_own_mode(self, since: float) -> None:
         """Raise ModeChanged if somebody else has switched its mode; `since`: the former `state.mode_since`."""
@@ -313,12 +318,13 @@ class BaseVehicle:
     @contextlib.contextmanager
     def ordering(self, job: Job) -> Iterator[None]:
         """While `job` sends a command: if the autopilot refuses it, what it was told before still counts."""
-        before = self.guard.ordered
+        before, lands = self.guard.ordered, self.lands_by_mission
         try:
             yield
         except Rejected:
             if self.authority.commander is job:
                 self.guard.take_up(before)
+                self.lands_by_mission = lands
             raise
 
     async def take(self, job: Job, rank: Rank, allow: Callable[[], None] = no_objection) -> None:
@@ -381,7 +387,10 @@ class BaseVehicle:
 
         def noted() -> None:
             self._mode_requests.note(number)
-            job.modes |= {mode_name(self.state.vehicle_type, goal) for goal in goals}
+            modes = {mode_name(self.state.vehicle_type, goal) for goal in goals}
+            job.modes |= modes
+            if any(map(flies_mission, modes)):
+                self.note_mission(job)
 
         check = self.commanding(job, switched_by_nobody_else, *needs, noted)
         order = replace(command or messages.set_mode(number), hears_first=mode.upper() not in self.holding_modes)

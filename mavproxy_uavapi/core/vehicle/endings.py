@@ -176,7 +176,7 @@ class FlightEndings:
             modes: modes that the ended job switched to.
         """
         if not vehicle.obeys_us:
-            log.info("vehicle %d, %s: it flies for another one, so nothing is sent", vehicle.state.system, why)
+            log.info("vehicle %d, %s: its mode or its target is not ours: nothing is sent", vehicle.state.system, why)
             return None
         return self._close(vehicle, policy, why, client, modes, at_once=False)
 

@@ -9,7 +9,8 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 from mavproxy_uavapi.core.envelope import braking
 from mavproxy_uavapi.core.envelope.space import LocalFrame, Space, Spot, to_leg
@@ -35,14 +36,21 @@ PROTECTED = ("FENCE_", "RTL_", "SRTL_", "Q_RTL_", "GUID_", "WP_LOITER_RAD")
 STANDING = orders.ChangeSpeed | orders.SetParameter | orders.MoveHome | orders.ChangeMission
 
 
-class Ordered(NamedTuple):
-    """The movement that the newest message commands: its path, whether it leads to positions or is a velocity, and
-    when it was sent (s).
+@dataclass(eq=False)
+class Ordered:
+    """The movement that the newest message commands.
+
+    Attributes:
+        way: its path; empty where none is known.
+        is_to_place: whether it leads to positions, or is a velocity.
+        at: when it was sent (s).
+        passed: legs of the path that the vehicle has flown.
     """
 
     way: Sequence[Stop] = ()
     is_to_place: bool = True
     at: float = -math.inf
+    passed: int = 0
 
 
 class EnvelopeGuard:
@@ -62,7 +70,6 @@ class EnvelopeGuard:
         self.check = EnvelopeCheck(vehicle, spaces)
         self.traffic: Traffic | None = None
         self.ordered = Ordered()
-        self._passed = 0  # legs of the ordered way
         self._vehicle = vehicle
         self._checked_mission: tuple[Sequence[Space], float, list[Stop]] | None = None
 
@@ -137,22 +144,23 @@ class EnvelopeGuard:
 
     def take_up(self, ordered: Ordered) -> None:
         """Set the present order. If sending fails, the caller passes the previous one."""
-        self.ordered, self._passed = ordered, 0
+        self.ordered = ordered
 
     def remaining(self) -> Sequence[Stop]:
         """The corners of its way that are still ahead; empty if it has none. Call it at each position."""
-        way = self.ordered.way
+        ordered = self.ordered
+        way = ordered.way
         if len(way) < 2:
             return ()
         try:
             here = self.check.here()
         except Stale:
-            return way[self._passed + 1 :]
+            return way[ordered.passed + 1 :]
         frame = LocalFrame((here.lat, here.lon))
         spots, at = [frame.spot((stop.lat, stop.lon), stop.up) for stop in way], Spot(0.0, 0.0, here.up)
-        while self._passed + 2 < len(way) and _is_past(at, spots[self._passed : self._passed + 3]):
-            self._passed += 1
-        return way[self._passed + 1 :]
+        while ordered.passed + 2 < len(way) and _is_past(at, spots[ordered.passed : ordered.passed + 3]):
+            ordered.passed += 1
+        return way[ordered.passed + 1 :]
 
     def beside_way(self, stop: Stop) -> float:
         """Metres from a place to the way that was allowed last; infinite where there is none."""

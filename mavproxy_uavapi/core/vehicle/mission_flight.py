@@ -72,6 +72,7 @@ async def begin(vehicle: Vehicle, job: Job, startable: Callable[[], None]) -> No
     """
     vehicle.waypoints.changed_at = vehicle.clock()
     with vehicle.ordering(job):
+        vehicle.note_mission(job)
         await vehicle.commands.send(messages.set_mission_current(1), vehicle.commanding(job, startable))
     job.modes |= MISSION_MODES  # also where the vehicle is in AUTO already
     if vehicle.mode != AUTO:

@@ -115,7 +115,7 @@ class Waypoints:
         Raises:
             Rejected: with the MAV_MISSION_RESULT as `ack`.
             OutsideEnvelope: it leaves the envelope; nothing was sent.
-            Busy, TimedOut, LinkLost.
+            Busy, TimedOut, LinkLost. Also what `check` raises, with what became of the old mission.
         """
 
         def checked_progress(done: int, of: int) -> None:

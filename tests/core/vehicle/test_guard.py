@@ -17,7 +17,9 @@ from mavproxy_uavapi.core.mavlink.link import Address
 from mavproxy_uavapi.core.mavlink.vehicle_state import Received, VehicleState
 from mavproxy_uavapi.core.vehicle import messages
 from mavproxy_uavapi.core.vehicle.envelope_watch import leaving
+from mavproxy_uavapi.core.vehicle.guard import Ordered
 from mavproxy_uavapi.core.vehicle.messages import NO_YAW, GlobalTarget, NedTarget, VelocityTarget
+from mavproxy_uavapi.core.vehicle.mission_way import Stop
 from mavproxy_uavapi.core.vehicle.registry import CLASSES
 
 HOME = (-35.0, 149.0)
@@ -189,3 +191,15 @@ def test_faster_climb_needs_more_room_below_the_ceiling(make: Any) -> None:
     fast = make("copter", square(100), at=(0, 0, 57), velocity=(0, 0, -4))
     space, breach = leaving(fast)
     assert breach.what == "field" and math.isfinite(breach.by) and space.envelope.areas
+
+
+def test_a_way_that_is_taken_up_again_is_as_far_flown_as_it_was(make: Any) -> None:
+    """Each leg of a there and back again: geometry alone does not tell on which one the vehicle is."""
+    copter = make("copter", square(300.0), at=(50.0, 0.0, 10.0))
+    corners = [Stop(*FRAME.degrees(Spot(north, 0.0, 0.0)), 10.0) for north in (0.0, 50.0, 0.0, 50.0, 100.0)]
+    ordered = Ordered(corners, passed=2)
+    copter.guard.take_up(ordered)
+    assert list(copter.guard.remaining()) == corners[4:]
+    copter.guard.take_up(Ordered())
+    copter.guard.take_up(ordered)  # what was ordered in between was refused
+    assert list(copter.guard.remaining()) == corners[4:]

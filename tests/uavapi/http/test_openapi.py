@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+import gc
 import re
+import weakref
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -193,3 +195,6 @@ def test_it_is_made_once_for_all_strangers_until_a_module_comes_or_goes(
     service.host.extensions["/extra/look"] = Route("/extra/look", routes.specification, requests.Empty, FLY)
     assert b"/extra/look" in loop.run(ask())[1]
     assert made == [len(ROUTES), len(ROUTES) + 1]
+    extension = weakref.ref(service.host.extensions.pop("/extra/look"))
+    gc.collect()
+    assert extension() is None  # nor what its module has
