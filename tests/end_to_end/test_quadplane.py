@@ -35,8 +35,8 @@ def hover(rig: Rig, alt: float = 20.0) -> None:
 
 
 def has_landed(rig: Rig) -> None:
-    status = rig.status()
-    assert (status["armed"], status["landed_state"]) == (False, "on_ground")
+    rig.eventually(lambda: rig.status()["landed_state"] == "on_ground", 10, "the report that it has landed")
+    assert rig.status()["armed"] is False
 
 
 def test_it_climbs_vertically_flies_on_the_wing_circles_and_lands_where_it_is(quadplane: Rig) -> None:
