@@ -23,7 +23,7 @@ demo-fleet: $(INSTALLED)  ## a broker, a database, a station of two workers and 
 	@$(BIN)/python benchmarks/demo_fleet.py --vehicles $(or $(VEHICLES),100)
 
 test: $(INSTALLED)  ## run the tests; ARGS="-k name" picks some
-	$(BIN)/python -m pytest -m "not sitl and not long" -n 5 --dist loadfile --no-loadscope-reorder $(ARGS)
+	$(BIN)/python -m pytest -m "not sitl and not long" -n 6 --dist loadfile --no-loadscope-reorder $(ARGS)
 
 test-all: $(INSTALLED)  ## run the tests that take long, too
 	$(BIN)/python -m pytest -m "not sitl" -n 2 --dist loadfile --no-loadscope-reorder $(ARGS)
