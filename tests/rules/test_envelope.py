@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from tests.rules.fault_scenes import track
 from tests.support import stages
-from tests.support.envelopes import FIELD, feature, field, place
+from tests.support.envelopes import FIELD, feature, field, place, square
 from tests.support.world import World, item_at
 
 OUT = 409, "outside_envelope"
@@ -314,3 +314,20 @@ def test_refused_order_does_not_make_the_pilots_mission_ours(make_world: Any) ->
     assert not world.host.registry.find(1).flies_for_us
     assert [message for message in world.orders(since) if not asks(message)] == []
     assert world.vehicle.mode.name == "AUTO"
+
+
+@pytest.mark.parametrize("command", [mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH])
+def test_mission_that_lands_is_not_stopped_at_the_floor(make_world: Any, command: int) -> None:
+    def mission_that_lands(world: Any) -> None:
+        world.flying()
+        last = item_at(*place(30, 10))
+        items = [item_at(*place(0, 0)), item_at(*place(30, 0)), last._replace(command=command, z=0.0)]
+        world.copter.mission.items[:] = items
+
+    world = make_world(mission_that_lands)
+    put(world, {"type": "FeatureCollection", "features": [feature("field", square(100), floor=3, ceiling=60)]})
+    assert world.ask("POST", "/mission/start", {}).outcome == "200"
+    world.loop.pass_time(4.0)
+    assert world.host.registry.find(1).flies_for_us
+    world.until(lambda: not world.copter.armed)
+    assert "stopped" not in world.screen() and world.copter.mode.name == "AUTO"

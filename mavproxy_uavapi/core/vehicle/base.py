@@ -76,6 +76,7 @@ class BaseVehicle:
         self.speeds = Speeds(state)
         self.arm_sent_at = -math.inf  # s; when the order to arm was sent last
         self.lands_by_mission = False  # in AUTO: whether a verb that stops or lands it has begun that
+        self.landing_items: Collection[int] | None = None  # of its mission, by number; None while it is not known
         self.guard = EnvelopeGuard(self, spaces)
         self.link: Link = GuardedLink(link, self.guard)
         self.authority = CommandAuthority(state)
@@ -301,10 +302,18 @@ class BaseVehicle:
         if self.mode in STOPPING_MODES or self.mode in self.holding_modes:
             return False
         if flies_mission(self.mode):
-            moves = not self.lands_by_mission
+            moves = not self._may_land
         else:
             moves = self.mode == "GUIDED" or (self.mode == "TAKEOFF" and self.kind == "plane")
         return moves and self.obeys_us
+
+    @property
+    def _may_land(self) -> bool:
+        """Whether in AUTO it lands or returns, or nobody knows."""
+        if self.lands_by_mission or self.landing_items is None:
+            return True
+        current = self.state.field("MISSION_CURRENT", "seq")
+        return current is None or current in self.landing_items
 
     def note_mission(self, job: Job) -> None:
         """Note whether `job` lands the vehicle by its mission, as a plane does, before it sends what begins that."""

@@ -97,6 +97,13 @@ def ways(items: Sequence[MissionItem], setting: Setting) -> Iterator[list[Stop]]
         here = place
 
 
+def landing_items(items: Sequence[MissionItem]) -> frozenset[int]:
+    """The numbers of the items that land or return the vehicle: landings, and all from DO_LAND_START on."""
+    numbered = [(seq, item.command) for seq, item in enumerate(items, 1)]
+    begins = min((seq for seq, command in numbered if command == mavlink.MAV_CMD_DO_LAND_START), default=math.inf)
+    return frozenset(seq for seq, command in numbered if seq >= begins or command in LANDINGS | HOMEWARD)
+
+
 def _place(seq: int, item: MissionItem, setting: Setting) -> Stop | None:
     """Where an item leads, NaN for values that do not change; None for an item that moves nothing."""
     command = item.command

@@ -20,6 +20,7 @@ from mavproxy_uavapi.core.vehicle import arming, messages
 from mavproxy_uavapi.core.vehicle.authority import Rank
 from mavproxy_uavapi.core.vehicle.jobs import Job
 from mavproxy_uavapi.core.vehicle.mission_files import MissionItem
+from mavproxy_uavapi.core.vehicle.mission_way import landing_items
 from mavproxy_uavapi.core.vehicle.touchdown import Touchdown
 from mavproxy_uavapi.core.vehicle.verbs import Verbs
 
@@ -101,7 +102,9 @@ class Vehicle(Verbs):
             OutsideEnvelope: its mission leaves the envelope, or in that mode nobody keeps it inside.
         """
         switch = messages.set_mode(mode_number(self.state.vehicle_type, mode))
-        if flies_mission(mode.upper()) and self.guard.in_force:
+        if flies_mission(mode.upper()) and not self.guard.in_force:
+            self.landing_items = None  # it is not read
+        elif flies_mission(mode.upper()):
             since = self.state.mode_since
             self.guard.require_mission(await self.mission_to_fly(), from_here=True)
             await self.confirm_own_mode(job, since)
@@ -122,6 +125,7 @@ class Vehicle(Verbs):
         _, items = await self.waypoints.download()
         if self.authority.commander is not commander:
             raise Superseded("a newer command took the vehicle while its mission was read")
+        self.landing_items = landing_items(items)
         return items
 
     async def confirm_own_mode(self, job: Job, since: float) -> None:

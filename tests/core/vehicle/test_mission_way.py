@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from mavproxy_uavapi.core.errors import OutsideEnvelope
 from mavproxy_uavapi.core.geodesy import offset
 from mavproxy_uavapi.core.vehicle.mission_files import MissionItem
-from mavproxy_uavapi.core.vehicle.mission_way import Setting, Stop, ways
+from mavproxy_uavapi.core.vehicle.mission_way import Setting, Stop, landing_items, ways
 
 HERE = Stop(-35.0, 149.0, 5.0)
 RELATIVE, AMSL, TERRAIN = 3, 0, 10
@@ -105,3 +105,12 @@ def test_cameras_and_speeds_lead_nowhere() -> None:
     speed = item(mavlink.MAV_CMD_DO_CHANGE_SPEED, p1=1.0, p2=5.0)
     region = item(mavlink.MAV_CMD_DO_SET_ROI_LOCATION, -36.0, 149.0, 0.0)
     assert led(camera, speed, region) == []
+
+
+def test_items_that_land_or_return() -> None:
+    land, start = item(mavlink.MAV_CMD_NAV_LAND), item(mavlink.MAV_CMD_DO_LAND_START)
+    back = item(mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH)
+    there = waypoint(-35.001)
+    assert landing_items([]) == landing_items([there]) == frozenset()
+    assert landing_items([there, land, there, back]) == {2, 4}
+    assert landing_items([there, start, there, land]) == {2, 3, 4}
