@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import random
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 from mavproxy_gradys.errors import NotDelivered, NotStored
@@ -31,8 +31,7 @@ class Sender:
         batches: number of sent batches.
         sent: number of sent readings, repeats included.
         acknowledged: number of acknowledged readings.
-        put_last: number of readings that were refused in a batch of their own, or twice not acknowledged with others;
-            they are sent when nothing else waits.
+        put_last: number of readings that were refused in a batch of their own; they are sent when nothing else waits.
         last_error: why the newest failed batch failed; empty since the last success.
 
     Args:
@@ -62,7 +61,6 @@ class Sender:
         self._clock = clock
         self._backoff = Backoff(chance, LONGEST_OF_SINKS)
         self._batch: list[Stored] = []  # the batch in flight, or the last one
-        self._left_out: set[int] = set()  # numbers of the last batch that were not acknowledged, though others were
         self._size = self._largest = BATCH
         self._outage = Outage(log, f"{address} takes no readings", f"{address} takes readings again")
         self._defects = Defects(f"the delivery to {address}")
@@ -109,19 +107,10 @@ class Sender:
             self._tell({"sink": self._name, "count": len(taken)})
         if not taken:
             raise NotDelivered("it acknowledges nothing", reached=True, for_content=True)
-        self._note_left_out([stored for stored in batch if stored.seq not in taken])
         self.last_error = ""
         self._outage.update("")
         self._backoff.succeeded()
         self._size = min(self._largest, self._size * 2)
-
-    def _note_left_out(self, readings: Sequence[Stored]) -> None:
-        """Have those sent last that were left out twice: else such readings would fill every batch in the end."""
-        for stored in readings:
-            if stored.seq in self._left_out:
-                self.spool_thread.put_last(self._name, stored)
-                self.put_last += 1
-        self._left_out = {stored.seq for stored in readings}
 
     def _failed(self, error: NotDelivered) -> None:
         """Find a refused reading by halving the batch; once it is alone, it is sent last."""

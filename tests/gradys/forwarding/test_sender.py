@@ -253,27 +253,3 @@ def test_the_option_of_a_sink_reaches_its_delivery(loop: Any, poster: Any) -> No
     with pytest.raises(NotDelivered):
         loop.run(HttpSink(sink_address("http://a/r"), poster).send(batch))
     assert {url for _, url, _ in poster.posts} == {"http://a/r"}
-
-
-def test_those_that_a_station_never_confirms_do_not_fill_the_batches(
-    loop: Any, spool_thread: Any, settings: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """It takes only some quantities, say."""
-
-    class Station:
-        async def send(self, batch: list[Stored]) -> set[int]:
-            confirmed = {stored.seq for stored in batch if stored.reading.value % 2 == 0}
-            if not confirmed:
-                raise NotDelivered("no station has confirmed it", reached=True)
-            return confirmed
-
-        async def close(self) -> None:
-            pass
-
-    monkeypatch.setattr("mavproxy_gradys.forwarding.sender.make_sink", lambda *_: Station())
-    sender = Sender(SINK, spool_thread, loop.time, lambda: 0.0)
-    loop.create_task(sender.run(settings()))
-    for _ in range(4):
-        keep(loop, spool_thread, 2 * BATCH)
-        loop.pass_time(30)
-    assert sender.acknowledged == 4 * BATCH and sender.report()["put_last"] >= 2 * BATCH
