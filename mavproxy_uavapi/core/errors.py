@@ -14,6 +14,7 @@
     |  |- NotArmed             409 not_armed
     |  |- OutsideEnvelope      409 outside_envelope
     |  |- TooNear              409 too_near       it would come too near to another vehicle
+    |  |- Expired              409 expired        it could not be sent in time, so it was not sent
     |  `- Aborted              409 aborted
     |- Invalid                 422 invalid        nothing was sent
     |  `- SettingError         422 invalid        an unknown setting, or a value that it refuses
@@ -119,6 +120,17 @@ class Paused(Conflict):
     """`stop` holds the vehicle still until `resume`."""
 
     code = "paused"
+
+
+class Expired(Conflict):
+    """A message waited too long for MAVProxy's main loop; it was not sent, and never will be."""
+
+    code = "expired"
+
+    @classmethod
+    def after(cls, seconds: float) -> Expired:
+        """For a message that was to be sent within that many s."""
+        return cls(f"not sent: MAVProxy was busy for more than {seconds:g} s")
 
 
 class NotArmed(Conflict):

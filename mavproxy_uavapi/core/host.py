@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
+import select
 import time
 from collections import deque
 from collections.abc import Awaitable, Callable, Mapping
@@ -72,6 +73,7 @@ class Host:
         self.fleet = VehicleStates()
         self.pending = PendingWaits()
         self.bridge = Bridge(mpstate.select_extra, self._receive, loop)
+        self.bridge.links_have_unread = self._links_have_unread
         self._mavproxy_link = MavproxyLink(self.bridge, mpstate)
         self.link = link or self._mavproxy_link
         self.link_watch = LinkWatch(self.pending, clock, self.bridge.loop)
@@ -134,6 +136,15 @@ class Host:
         if target != self._announced_target:
             self._announced_target = target
             self.bridge.call_soon(setattr, self.registry, "current", target)
+
+    def _links_have_unread(self) -> bool:
+        """Whether something came on one of MAVProxy's links that it has not read yet."""
+        descriptors = [getattr(master, "fd", None) for master in self._mpstate.mav_master]
+        present = [fd for fd in descriptors if isinstance(fd, int) and fd >= 0]
+        try:
+            return bool(select.select(present, [], [], 0)[0])
+        except (OSError, ValueError):  # one was closed just now: nothing more comes from it
+            return False
 
     def _look(self) -> None:
         self._link_keeper.turn(self._mpstate.mav_master)

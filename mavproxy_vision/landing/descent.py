@@ -78,7 +78,9 @@ class PrecisionDescent(Descent):
             TimedOut: it stays low above the target, in LAND.
         """
         flight, vehicle = self.flight, self.flight.vehicle
-        await self.precision_landing.set_up(vehicle.commanding(flight.job, lambda: vehicle.held_by("GUIDED")))
+        await self.precision_landing.set_up(
+            vehicle.command(flight.job).permit(lambda: vehicle.held_by("GUIDED")).check
+        )
         while True:
             order = await flight.fly(landing)
             if order.phase is Phase.FAILED:

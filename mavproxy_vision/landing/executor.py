@@ -10,6 +10,7 @@ from typing import Any, Protocol
 from mavproxy_uavapi.core.control.authority import Rank
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import Conflict, LinkLost, Rejected, Stale, UavApiError
+from mavproxy_uavapi.core.mainloop.permit import SETPOINT_LASTS
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 from mavproxy_uavapi.core.vehicle.copter import Copter
 from mavproxy_vision.apriltag.tag_layout import Tag
@@ -283,9 +284,8 @@ class TagFlight:
         Raises:
             Superseded, Paused: another job commands it; nothing is sent.
         """
-        self.vehicle.authority.require(self.job)
         self._sent_at = self.tracker.host.clock()
-        await self.vehicle.link.send(message, self.vehicle.state.system)
+        await self.vehicle.command(self.job).post(message, lasts=SETPOINT_LASTS)
 
     async def hear_again(self) -> None:
         """Rest in GUIDED until the next heartbeat, which shows what its pilot has done since the last one.

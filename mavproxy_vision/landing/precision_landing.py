@@ -161,7 +161,7 @@ class PrecisionLanding:
         for _ in range(TRIES):
             check()
             with vehicle.waiting.expecting({"PARAM_VALUE", "HEARTBEAT"}, answer) as reply:
-                await vehicle.link.send(request, vehicle.state.system)
+                await vehicle.post(request, check)
                 with contextlib.suppress(TimedOut):
                     return await reply.within(READ_BACK, f"answer for {name}")
         return None

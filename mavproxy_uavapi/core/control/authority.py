@@ -22,7 +22,8 @@ class Rank(IntEnum):
     MOVEMENT = 1  # movements, yaw, speeds
     ARM = 2  # arm, takeoff, guided, set_mode, the start of a mission
     STOP = 3  # land, rtl, brake, stop, hold, disarm
-    FORCE = 4  # disarm in flight
+    PROTECT = 4  # what stops a vehicle at its envelope, or before another vehicle
+    FORCE = 5  # disarm in flight
 
 
 def no_objection() -> None:
@@ -34,6 +35,7 @@ class CommandAuthority:
 
     Attributes:
         commander: the job that commands the vehicle, or was the last to do so.
+        epoch: changes whenever another job commands, or a pause begins or ends. Any thread may read it.
 
     Args:
         state: the vehicle's state; a pause ends when its mode changes.
@@ -41,6 +43,7 @@ class CommandAuthority:
 
     def __init__(self, state: VehicleState) -> None:
         self.commander: Job | None = None
+        self.epoch = 0
         self._state = state
         self._rank = Rank.MOVEMENT
         self._shown = True
@@ -120,7 +123,10 @@ class CommandAuthority:
 
         Raises:
             Busy, Paused: as `admit` and `Job.require_permit`; then nothing has changed. Likewise what `allow` raises.
+                A job that `stop` interrupted sends nothing until `resume`, whatever its rank: Paused.
         """
+        if job is self.interrupted:
+            raise Paused(f"{job.verb} waits: the vehicle is stopped")
         if job is not self.commander:
             self.admit(rank)
             job.require_permit()
@@ -171,20 +177,23 @@ class CommandAuthority:
         allow()
         self._supersede([self._companions.get(kind)], job)
         self._companions[kind] = job
+        self.epoch += 1
         job.note_command()
 
-    def shown(self, job: Job) -> None:
-        """Note that telemetry shows the effect of the commander's verb: from now on any rank supersedes it."""
+    def confirm(self, job: Job) -> None:
+        """Note that telemetry shows the whole effect of the commander's verb: from now on any rank supersedes it."""
         if job is self.commander:
             self._shown = True
 
     def begin_pause(self) -> None:
         """Note that the vehicle is held still, or is about to be."""
         self._paused_at = max(self._state.heartbeat_at, self._state.mode_since)
+        self.epoch += 1
 
     def end_pause(self) -> None:
         """Note the end of the pause; the movement that it interrupted goes on."""
         self._paused_at = None
+        self.epoch += 1
         if self._suspended is not None:
             self.commander, self._rank, self._shown = self._suspended
             self.commander.is_interrupted = False
@@ -192,6 +201,7 @@ class CommandAuthority:
 
     def _take(self, job: Job, rank: Rank) -> None:
         self.commander, self._rank, self._shown = job, rank, False
+        self.epoch += 1
         kinds = [kind for kind in self._companions if rank > Rank.MOVEMENT or kind == YAW]
         self._supersede([self._companions.pop(kind) for kind in kinds], job)
         job.note_command()

@@ -7,10 +7,10 @@ from collections.abc import Callable
 
 from mavproxy_uavapi.core.errors import ModeChanged
 from mavproxy_uavapi.core.telemetry.flight_modes import mode_name
-from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
+from mavproxy_uavapi.core.telemetry.vehicle_state import HEARTBEAT_PERIOD, VehicleState
 
-ANSWERED_WITHIN = 5.0  # s in which a heartbeat shows what came of a request
-SHOWN_AFTER = 2.0  # s after which any heartbeat shows it
+ANSWERED_WITHIN = 5.0  # s in which a heartbeat shows what came of a request; more on a slow link
+SHOWN_AFTER = 2.0  # s after which any heartbeat shows it, likewise
 
 
 class ModeRequests:
@@ -39,19 +39,23 @@ class ModeRequests:
     def chose_the_mode(self) -> bool:
         """Whether the vehicle came into its mode by our request."""
         at = None if self._state.mode is None else self._requested_at.get(self._state.mode)
-        return at is not None and at <= self._state.mode_since <= at + ANSWERED_WITHIN
+        return at is not None and at <= self._state.mode_since <= at + self._answered_within
 
     def on_their_way(self) -> list[int]:
         """The recently requested modes of which no heartbeat has shown what came of them, the newest last."""
-        now = self._clock()
-        requests = [(mode, at) for mode, at in self._requested_at.items() if now - at <= ANSWERED_WITHIN]
+        now, shown_after = self._clock(), max(SHOWN_AFTER, self._state.trip.deadline + HEARTBEAT_PERIOD)
+        requests = [(mode, at) for mode, at in self._requested_at.items() if now - at <= self._answered_within]
         for changed_at, mode in self._state.mode_changes:
             answered = [at for requested, at in requests if requested == mode and at <= changed_at]
             if answered:
                 requests = [(requested, at) for requested, at in requests if at > answered[-1]]
             else:  # a switch by the pilot or a failsafe: our earlier requests are void
                 requests = [(requested, at) for requested, at in requests if at >= changed_at]
-        return [mode for mode, at in requests if self._state.heartbeat_at <= at + SHOWN_AFTER]
+        return [mode for mode, at in requests if self._state.heartbeat_at <= at + shown_after]
+
+    @property
+    def _answered_within(self) -> float:
+        return max(ANSWERED_WITHIN, self._state.trip.deadline + 2 * HEARTBEAT_PERIOD)
 
 
 class ModeSwitch:

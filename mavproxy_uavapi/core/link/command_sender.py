@@ -11,24 +11,25 @@ import contextlib
 import itertools
 import logging
 from collections import defaultdict, deque
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from typing import Any
 
 from pymavlink import mavutil
 
-from mavproxy_uavapi.core.control.start_gate import pass_gate
 from mavproxy_uavapi.core.errors import Rejected, TimedOut
 from mavproxy_uavapi.core.link.link import Address, Link
 from mavproxy_uavapi.core.link.message_waiter import MessageWaiter
-from mavproxy_uavapi.core.link.messages import Command
+from mavproxy_uavapi.core.link.messages import MavCommand
+from mavproxy_uavapi.core.mainloop.permit import DEFAULT, Permit, permitted
+from mavproxy_uavapi.core.telemetry.trip import Trip
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 
 mavlink = mavutil.mavlink
 
 log = logging.getLogger("uavapi.copter")
 
-ACK_TIMEOUT = 1.5  # s until a command is sent again
+ACK_TIMEOUT = 1.5  # s until a command is sent again; more on a slow link
 SENDINGS = 4  # the first one and three more
 IN_PROGRESS_TIMEOUT = 10.0  # s by which each IN_PROGRESS extends the wait
 IN_PROGRESS_LIMIT = 60.0  # s until a command that is still in progress is given up
@@ -38,6 +39,13 @@ LATE_ACK = 10.0  # s after a sending in which its ack may still come
 TEXT_TIMEOUT = 0.5  # s that the STATUSTEXT of a refusal may come after its ack
 QUESTIONS = {mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAV_CMD_RUN_PREARM_CHECKS}  # they change nothing
 WORTH_ASKING_AGAIN = {mavlink.MAV_RESULT_TEMPORARILY_REJECTED, mavlink.MAV_RESULT_FAILED}
+
+
+Gate = Callable[[], Awaitable[object]]
+
+
+async def open_gate() -> None:
+    """Nothing to wait for."""
 
 
 @dataclass(frozen=True)
@@ -60,9 +68,10 @@ class CommandSender:
 
     async def send(
         self,
-        command: Command,
-        check: Callable[[], None] = lambda: None,
+        command: MavCommand,
+        permit: Permit = DEFAULT,
         *,
+        gate: Gate = open_gate,
         retry_for: float = 20.0,
         shown: Callable[[], bool] = lambda: False,
     ) -> None:
@@ -70,7 +79,9 @@ class CommandSender:
 
         Args:
             command: what to send.
-            check: called before each sending: what it raises ends the command, and nothing more is sent.
+            permit: its check is called before each sending, and again where the message is written if anything has
+                changed: what it raises ends the command, and nothing more is sent.
+            gate: awaited before each sending.
             retry_for: how long (s) a patient command is sent again while it is refused.
             shown: called after each heartbeat: whether telemetry shows the effect, even if the ack was lost; what
                 it raises ends the command.
@@ -78,12 +89,13 @@ class CommandSender:
         Raises:
             Rejected: refused, with MAV_RESULT and the STATUSTEXTs since the command.
             TimedOut: no ack, also after sending again.
+            Expired: MAVProxy was busy for too long.
             LinkLost: the heartbeats stopped, or there is no link.
         """
         async with self._locks[command.number]:
             started = self._waiting.clock()
             while True:
-                result = await self._ask(command, check, shown)
+                result = await self._ask(command, permit, gate, shown)
                 log.debug("%s%s: %s", command.name, command.params, result_name(result))
                 if result == mavlink.MAV_RESULT_ACCEPTED:
                     return
@@ -95,39 +107,53 @@ class CommandSender:
                     return
 
     async def send_until_shown(
-        self, command: Command, check: Callable[[], None], shown: Callable[[], bool], action: str
+        self,
+        command: MavCommand,
+        permit: Permit,
+        shown: Callable[[], bool],
+        action: str,
+        *,
+        gate: Gate = open_gate,
     ) -> None:
         """Send `command` until a heartbeat shows that it was done.
 
-        The ack is not enough: MAVLink does not number commands, so it may belong to an earlier one.
+        The ack is not enough: MAVLink does not number commands, so it may belong to an earlier one. It is sent again
+        only if a heartbeat that left the vehicle later than the command could arrive does not show it.
 
         Args:
             command: what to send.
-            check, shown: as for `send`.
+            permit, shown, gate: as for `send`.
             action: ends the sentence "vehicle 1 did not …".
 
         Raises:
-            Rejected, TimedOut, LinkLost: as `send`; also the errors of `check` and `shown`.
+            Rejected, TimedOut, Expired, LinkLost: as `send`; also the errors of the check and of `shown`.
         """
-        sent_at: float | None = None
-        for seconds in SHOWN_WITHIN:
-            if sent_at is not None and command.hears_first and await self._is_shown_since(sent_at, shown):
-                return
-            await self.send(command, check, shown=shown)
+        began = self._waiting.clock()
+        for number in range(len(SHOWN_WITHIN)):
+            await self.send(command, permit, shown=shown, gate=gate)
             sent_at = self._waiting.clock()
             with contextlib.suppress(TimedOut):
-                await self._waiting.until({"HEARTBEAT"}, lambda: shown() or None, seconds, action)
+                await self._waiting.until(
+                    {"HEARTBEAT"}, lambda: shown() or None, max(SHOWN_WITHIN[number], self._trip.deadline), action
+                )
                 return
-        raise TimedOut(f"vehicle {self._state.system} did not {action} within {sum(SHOWN_WITHIN):.1f} s")
+            if number < len(SHOWN_WITHIN) - 1 and await self._is_shown_since(sent_at, shown):
+                return
+        waited = self._waiting.clock() - began
+        raise TimedOut(f"vehicle {self._state.system} did not {action} within {waited:.1f} s")
 
     async def _is_shown_since(self, sent_at: float, shown: Callable[[], bool]) -> bool:
-        """Whether a heartbeat that is newer than a sending shows its effect; waits for one.
+        """Whether the effect of a sending shows in a heartbeat that left after it arrived; waits for one.
 
         Raises:
             TimedOut, LinkLost: none comes; also the errors of `shown`.
         """
-        await self._waiting.heartbeat_after(sent_at)
+        await self._waiting.evidence_of(sent_at)
         return shown()
+
+    @property
+    def _trip(self) -> Trip:
+        return self._state.trip
 
     def _outstanding(self, number: int) -> deque[Sending]:
         """The sendings of that command whose ack may still come, oldest first."""
@@ -136,7 +162,7 @@ class CommandSender:
             unanswered.popleft()
         return unanswered
 
-    async def _ask(self, command: Command, check: Callable[[], None], shown: Callable[[], bool]) -> int:
+    async def _ask(self, command: MavCommand, permit: Permit, gate: Gate, shown: Callable[[], bool]) -> int:
         """One exchange: the MAV_RESULT that ends it.
 
         MAVLink does not number commands. Where the ack is the only proof, an ack that may belong to an earlier
@@ -150,15 +176,18 @@ class CommandSender:
         give_up_at = self._waiting.clock() + IN_PROGRESS_LIMIT
         silences = 0
         for confirmation in itertools.count():
-            if command.number not in QUESTIONS:
-                await pass_gate()
-            if confirmation and command.hears_first and await self._is_shown_since(unanswered[-1].at, shown):
+            await gate()
+            if confirmation and command.takes and await self._is_shown_since(unanswered[-1].at, shown):
                 return int(mavlink.MAV_RESULT_ACCEPTED)
-            check()
+            permit.check()
             with self._waiting.acks(command.number, self._link.source, shown) as acks:
-                await self._link.send(command.to(address, confirmation), self._state.system)
-                unanswered.append(Sending(command.params, self._waiting.clock()))
-                result = await acks.next(ACK_TIMEOUT)
+                with permitted(permit):
+                    await self._link.send(command.to(address, confirmation), self._state.system)
+                sent_at = self._waiting.clock()
+                unanswered.append(Sending(command.params, sent_at))
+                result = await acks.next(max(ACK_TIMEOUT, self._trip.deadline))
+                if result is not None and not confirmation and command.number in QUESTIONS:
+                    self._trip.measured(self._waiting.clock() - sent_at)
                 while result == mavlink.MAV_RESULT_IN_PROGRESS:
                     if self._waiting.clock() >= give_up_at:
                         waited = f"{IN_PROGRESS_LIMIT:g} s"
@@ -179,7 +208,7 @@ class CommandSender:
         times = "" if sendings == 1 else f", sent {sendings} times"
         raise TimedOut(f"vehicle {self._state.system} did not acknowledge {command.name}{times}")
 
-    async def _refusal(self, command: Command, result: int, started: float) -> Rejected:
+    async def _refusal(self, command: MavCommand, result: int, started: float) -> Rejected:
         with contextlib.suppress(TimedOut):  # ArduPilot queues its texts, so that they may come after the ack
             await self._waiting.until(
                 {"STATUSTEXT"}, lambda: self._state.statustexts_since(started) or None, TEXT_TIMEOUT, "say why"

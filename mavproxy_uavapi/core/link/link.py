@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, Protocol
 
 from mavproxy_uavapi.core.errors import LinkLost, UavApiError
 from mavproxy_uavapi.core.mainloop.bridge import Bridge
+from mavproxy_uavapi.core.mainloop.permit import DEFAULT, Permit, permitted, present_permit
 from mavproxy_uavapi.core.sent_messages import note_sent
 
 
@@ -44,6 +45,28 @@ class Link(Protocol):
             LinkLost: there is no link, or writing failed.
             UavApiError: a number in it is not finite; nothing is sent.
         """
+
+
+class BoundedLink:
+    """A link on which nothing waits for ever: a message without a permit of its own counts as a question.
+
+    Args:
+        link: sends the messages.
+    """
+
+    def __init__(self, link: Link) -> None:
+        self._link = link
+
+    @property
+    def source(self) -> Address:
+        """See `Link.source`."""
+        return self._link.source
+
+    async def send(self, message: Any, system: int) -> None:
+        """See `Link.send`. Raises Expired as well."""
+        permit = present_permit()
+        with permitted(Permit(system=system) if permit is DEFAULT else permit):
+            await self._link.send(message, system)
 
 
 class MavproxyLink:

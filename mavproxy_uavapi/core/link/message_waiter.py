@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+from collections import deque
 from collections.abc import Callable, Collection, Iterator
 from typing import Any, Generic, TypeVar
 
@@ -16,6 +17,7 @@ from mavproxy_uavapi.core.telemetry.pending_waits import PendingWaits, Wait
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
+COPY_WITHIN = 3.0  # s in which a second copy of an ack may come: another link, a router
 HEARD_WITHIN = 5.0  # s until a heartbeat must come, or show what an order has done
 T = TypeVar("T")
 mavlink = mavutil.mavlink
@@ -34,6 +36,18 @@ class MessageWaiter:
         self.state = state
         self.clock = clock
         self._pending = pending
+        self._counted: deque[tuple[float, tuple[int, int, int]]] = deque()  # when acks have counted (s), and which
+
+    def _counts(self, ack: Any) -> bool:
+        """Whether an ack has not counted yet. A copy of it has its number."""
+        now = self.clock()
+        while self._counted and now - self._counted[0][0] > COPY_WITHIN:
+            self._counted.popleft()
+        key = ack.get_seq(), ack.command, ack.result
+        if any(key == known for _, known in self._counted):
+            return False
+        self._counted.append((now, key))
+        return True
 
     async def message(
         self, names: Collection[str], test: Callable[[Any], T | None], timeout: float, action: str
@@ -60,7 +74,16 @@ class MessageWaiter:
             TimedOut, LinkLost: none comes.
         """
         action = "send a heartbeat"
-        await self.until({"HEARTBEAT"}, lambda: self.state.heartbeat_at > since or None, HEARD_WITHIN, action)
+        await self.until({"HEARTBEAT"}, lambda: self.state.heard_since(since) or None, HEARD_WITHIN, action)
+
+    async def evidence_of(self, sent_at: float) -> None:
+        """Wait for a heartbeat that shows what has become of what we sent at `sent_at` (s); see `VehicleState.shows`.
+
+        Raises:
+            TimedOut, LinkLost: none comes.
+        """
+        longest = HEARD_WITHIN + self.state.trip.deadline
+        await self.until({"HEARTBEAT"}, lambda: self.state.shows(sent_at) or None, longest, "send a heartbeat")
 
     async def until(
         self, names: Collection[str], condition: Callable[[], T | None], timeout: float, action: str
@@ -94,7 +117,7 @@ class MessageWaiter:
         def result_of(message: Any) -> int | None:
             if message.get_type() == "HEARTBEAT":
                 return mavlink.MAV_RESULT_ACCEPTED if shown() else None
-            return message.result if message.command == command else None
+            return message.result if message.command == command and self._counts(message) else None
 
         exchange = MessageExchange(self.state, asker, {"COMMAND_ACK", "HEARTBEAT"}, result_of)
         with self._pending.registered(exchange.wait):

@@ -40,7 +40,7 @@ SPEED_TYPES = {"air": 0, "ground": 1, "climb": 2, "descent": 3}  # MAV_CMD_DO_CH
 
 
 @dataclass(frozen=True)
-class Command:
+class MavCommand:
     """A MAV_CMD and its seven parameters.
 
     Attributes:
@@ -52,8 +52,8 @@ class Command:
         again_after: MAV_RESULTs after which it is sent again although it is not patient.
         proven_by_ack: whether only the ack shows that it was done; an ack that may belong to an earlier command
             does not count then.
-        hears_first: whether a heartbeat must come before it is sent again: it takes the vehicle, and the pilot may
-            have taken it back meanwhile.
+        takes: whether it takes the vehicle, arms it or begins something: then it is sent again only if a heartbeat
+            that left the vehicle after its arrival does not show it. The pilot may have undone it meanwhile.
     """
 
     number: int
@@ -62,7 +62,7 @@ class Command:
     patient: bool = False
     again_after: frozenset[int] = frozenset()
     proven_by_ack: bool = False
-    hears_first: bool = False
+    takes: bool = False
 
     @property
     def name(self) -> str:
@@ -77,7 +77,7 @@ class Command:
 
 
 @dataclass(frozen=True)
-class PlaceCommand(Command):
+class PlaceCommand(MavCommand):
     """A MAV_CMD whose last three parameters are a place, which goes as COMMAND_INT.
 
     Attributes:
@@ -98,41 +98,43 @@ class PlaceCommand(Command):
         return mavlink.MAVLink_command_int_message(*address, frame, self.number, 0, 0, *params, *place)
 
 
-def set_mode(number: int) -> Command:
+def set_mode(number: int) -> MavCommand:
     """Switch to custom mode `number`."""
-    return Command(mavlink.MAV_CMD_DO_SET_MODE, (mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, number))
+    params = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, number
+    return MavCommand(mavlink.MAV_CMD_DO_SET_MODE, params, takes=True)
 
 
-def arm() -> Command:
+def arm() -> MavCommand:
     """Arm."""
     busy = frozenset({mavlink.MAV_RESULT_TEMPORARILY_REJECTED})
-    return Command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, (1, 0), again_after=busy, hears_first=True)
+    return MavCommand(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, (1, 0), again_after=busy, takes=True)
 
 
-def disarm(force: bool) -> Command:
+def disarm(force: bool) -> MavCommand:
     """Disarm; with `force` in flight too: the motors stop and it falls."""
-    return Command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, (0, FORCE_DISARM if force else 0))
+    params = 0, FORCE_DISARM if force else 0
+    return MavCommand(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, params, takes=True)
 
 
-def check_prearm() -> Command:
+def check_prearm() -> MavCommand:
     """Have the autopilot run its pre-arm checks and say what is wrong."""
-    return Command(mavlink.MAV_CMD_RUN_PREARM_CHECKS)
+    return MavCommand(mavlink.MAV_CMD_RUN_PREARM_CHECKS)
 
 
-def takeoff(alt: float, pitch: float = 0.0) -> Command:
+def takeoff(alt: float, pitch: float = 0.0) -> MavCommand:
     """Take off to `alt` m above home; `pitch` in degrees, for planes.
 
     Not repeatable: if the acknowledgement of the first one is lost, the second is refused.
     """
-    return Command(mavlink.MAV_CMD_NAV_TAKEOFF, (pitch, 0, 0, 0, 0, 0, alt), repeatable=False)
+    return MavCommand(mavlink.MAV_CMD_NAV_TAKEOFF, (pitch, 0, 0, 0, 0, 0, alt), repeatable=False)
 
 
-def change_speed(kind: str, speed: float) -> Command:
+def change_speed(kind: str, speed: float) -> MavCommand:
     """Set the `kind` of speed (air, ground, climb, descent) to `speed` m/s; throttle unchanged."""
-    return Command(mavlink.MAV_CMD_DO_CHANGE_SPEED, (SPEED_TYPES[kind], speed, -1), proven_by_ack=True)
+    return MavCommand(mavlink.MAV_CMD_DO_CHANGE_SPEED, (SPEED_TYPES[kind], speed, -1), proven_by_ack=True)
 
 
-def reposition(place: GlobalTarget, *, from_any_mode: bool = False) -> Command:
+def reposition(place: GlobalTarget, *, from_any_mode: bool = False) -> MavCommand:
     """Go to a place and circle there with WP_LOITER_RAD, for planes.
 
     It is taken in GUIDED only; with `from_any_mode` it switches to GUIDED.
@@ -149,44 +151,44 @@ def reposition(place: GlobalTarget, *, from_any_mode: bool = False) -> Command:
     )
 
 
-def reboot() -> Command:
+def reboot() -> MavCommand:
     """Boot the autopilot again."""
-    return Command(mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, (1,))
+    return MavCommand(mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, (1,))
 
 
-def start_landing() -> Command:
+def start_landing() -> MavCommand:
     """Fly the landing sequence of the mission (DO_LAND_START), for planes; it changes the mode to AUTO."""
-    return Command(mavlink.MAV_CMD_DO_LAND_START)
+    return MavCommand(mavlink.MAV_CMD_DO_LAND_START, takes=True)
 
 
-def set_reverse(reverse: bool) -> Command:
+def set_reverse(reverse: bool) -> MavCommand:
     """Drive backwards, or forwards again, for rovers."""
-    return Command(mavlink.MAV_CMD_DO_SET_REVERSE, (1 if reverse else 0,), proven_by_ack=True)
+    return MavCommand(mavlink.MAV_CMD_DO_SET_REVERSE, (1 if reverse else 0,), proven_by_ack=True)
 
 
-def set_home_here() -> Command:
+def set_home_here() -> MavCommand:
     """Make the current position home."""
-    return Command(mavlink.MAV_CMD_DO_SET_HOME, (1,), patient=True)
+    return MavCommand(mavlink.MAV_CMD_DO_SET_HOME, (1,), patient=True)
 
 
-def yaw_to(heading: float) -> Command:
+def yaw_to(heading: float) -> MavCommand:
     """Turn to `heading` degrees clockwise from north, the shorter way round, at the default rate."""
-    return Command(mavlink.MAV_CMD_CONDITION_YAW, (heading, 0, 0, 0), proven_by_ack=True)
+    return MavCommand(mavlink.MAV_CMD_CONDITION_YAW, (heading, 0, 0, 0), proven_by_ack=True)
 
 
-def pause(paused: bool) -> Command:
+def pause(paused: bool) -> MavCommand:
     """Pause the guided movement, or continue it."""
-    return Command(mavlink.MAV_CMD_DO_PAUSE_CONTINUE, (0 if paused else 1,), proven_by_ack=True)
+    return MavCommand(mavlink.MAV_CMD_DO_PAUSE_CONTINUE, (0 if paused else 1,), proven_by_ack=True)
 
 
-def set_servo(channel: int, pwm: int) -> Command:
+def set_servo(channel: int, pwm: int) -> MavCommand:
     """Set servo output `channel` (from 1) to `pwm` microseconds."""
-    return Command(mavlink.MAV_CMD_DO_SET_SERVO, (channel, pwm), proven_by_ack=True)
+    return MavCommand(mavlink.MAV_CMD_DO_SET_SERVO, (channel, pwm), proven_by_ack=True)
 
 
-def set_mission_current(seq: int, *, reset: bool = True) -> Command:
+def set_mission_current(seq: int, *, reset: bool = True) -> MavCommand:
     """Make mission item `seq` (from 1) the current one; `reset` also resets the mission and begins the item."""
-    return Command(mavlink.MAV_CMD_DO_SET_MISSION_CURRENT, (seq, 1 if reset else 0))
+    return MavCommand(mavlink.MAV_CMD_DO_SET_MISSION_CURRENT, (seq, 1 if reset else 0))
 
 
 def select_item(address: Address, seq: int) -> Any:
@@ -194,24 +196,24 @@ def select_item(address: Address, seq: int) -> Any:
     return mavlink.MAVLink_mission_set_current_message(*address, seq)
 
 
-def start_mission() -> Command:
+def start_mission() -> MavCommand:
     """Run the mission; on the ground this replaces raising the throttle."""
-    return Command(mavlink.MAV_CMD_MISSION_START)
+    return MavCommand(mavlink.MAV_CMD_MISSION_START, takes=True)
 
 
-def request_message(message_id: int) -> Command:
+def request_message(message_id: int) -> MavCommand:
     """Ask for one message of that id."""
-    return Command(mavlink.MAV_CMD_REQUEST_MESSAGE, (message_id,))
+    return MavCommand(mavlink.MAV_CMD_REQUEST_MESSAGE, (message_id,))
 
 
-def set_interval(message_id: int, rate: float) -> Command:
+def set_interval(message_id: int, rate: float) -> MavCommand:
     """Ask for a message at `rate` Hz; 0 for the rate of its stream."""
-    return Command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, (message_id, 1e6 / rate if rate else 0))
+    return MavCommand(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, (message_id, 1e6 / rate if rate else 0))
 
 
-def no_interval(message_id: int) -> Command:
+def no_interval(message_id: int) -> MavCommand:
     """Ask for a message no more."""
-    return Command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, (message_id, -1))
+    return MavCommand(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, (message_id, -1))
 
 
 def read_parameter(address: Address, name: str) -> Any:

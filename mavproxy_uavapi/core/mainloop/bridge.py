@@ -6,6 +6,15 @@ the asyncio side hands calls to the main loop (`on_main`), which is the only thr
 Python runs one thread at a time. A vehicle's messages come in bursts, and MAVProxy parses, logs and forwards each
 message. Meanwhile we do not wake the asyncio loop, and new requests wait (`wait_for_main_loop`). Messages to send do
 not wait: they go out between two received ones.
+
+What was right when it was queued may be wrong when it is written: MAVProxy's main loop may stand for seconds (a name
+server, a blocking write, a command at its prompt), and the pilot switches the mode meanwhile. So a call is run with
+its `Permit`: `on_main` takes it back to the asyncio thread and checks it again if
+- it has waited longer than FRESH, or
+- a heartbeat of its vehicle has come since the check, or
+- its basis has changed: another job commands.
+After a long wait it is not run before the links are read: what the pilot has done lies there. If the permit has
+expired meanwhile, it never runs; whoever waits for it hears `Expired`, also while the main loop stands.
 """
 
 from __future__ import annotations
@@ -14,18 +23,26 @@ import asyncio
 import contextlib
 import os
 import weakref
-from collections import deque
+from collections import defaultdict, deque
 from collections.abc import Callable
 from typing import Any, TypeVar
 
+from mavproxy_uavapi.core.errors import Expired
 from mavproxy_uavapi.core.mainloop.event_loop_thread import EventLoopThread
 from mavproxy_uavapi.core.mainloop.main_loop_queue import MainLoopQueue
+from mavproxy_uavapi.core.mainloop.permit import Permit, present_permit
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 
 T = TypeVar("T")
 LONGEST_WAIT = 0.05  # s that new work waits for the main loop at most
+FRESH = 0.1  # s; a call that waited longer is checked again
+READ_WITHIN = 1.0  # s in which a late call waits for unread links; a link that is never empty must not stop it
 
 _bridges: weakref.WeakSet[Bridge] = weakref.WeakSet()
+
+
+class Outdated(Exception):
+    """A call was not run: its check is too old, or something has changed since."""
 
 
 class Bridge:
@@ -35,6 +52,9 @@ class Bridge:
         select_extra: MAVProxy's table of further descriptors for its select().
         receive: called in the asyncio thread with each message that was fed.
         loop: as for `EventLoopThread`.
+
+    Attributes:
+        links_have_unread: whether MAVProxy has not read all that came on its links. Main loop only.
     """
 
     def __init__(
@@ -52,6 +72,9 @@ class Bridge:
         self._turn_ended = asyncio.Event()
         self._calls = MainLoopQueue()
         self._thread = EventLoopThread("uavapi-loop", loop)
+        self.links_have_unread: Callable[[], bool] = lambda: False
+        self._fed: defaultdict[int, int] = defaultdict(int)  # heartbeats by system id; the main loop's
+        self._delivered: defaultdict[int, int] = defaultdict(int)  # the asyncio thread's
         self._open_sockets: list[Callable[[], list[int]]] = [self._calls.filenos]
         _bridges.add(self)
 
@@ -82,6 +105,8 @@ class Bridge:
         """
         self._busy = True
         self._inbox.append(message)
+        if message.get_type() == "HEARTBEAT":
+            self._fed[message.get_srcSystem()] += 1
         self._calls.drain()
 
     def feed_call(self, call: Callable[[], None]) -> None:
@@ -112,6 +137,8 @@ class Bridge:
         self._delivering = False  # an item that comes from now on needs another call
         for _ in range(len(self._inbox)):
             item = self._inbox.popleft()
+            if not callable(item) and item.get_type() == "HEARTBEAT":
+                self._delivered[item.get_srcSystem()] += 1
             try:
                 item() if callable(item) else self._receive(item)
             except Exception as error:  # noqa: BLE001  one bad message must not stop the next
@@ -129,11 +156,30 @@ class Bridge:
         self._calls.put(call)
 
     async def on_main(self, call: Callable[[], T]) -> T:
-        """Let the main loop run `call`, and return its result or raise its exception.
+        """Let the main loop run `call`, if the present permit still holds then; its result, or its exception.
 
         If it is cancelled before the main loop gets to it, it never runs.
+
+        Raises:
+            Expired: the main loop did not get to it in time. Also what the permit's check raises.
         """
+        permit, asked_at = present_permit(), self.loop.time()
+        late_since: float | None = None
+        while True:
+            try:
+                return await self._run_on_main(call, permit, asked_at, late_since)
+            except Outdated:
+                if late_since is None and self.loop.time() - asked_at > FRESH:
+                    late_since = self.loop.time()
+                permit.check()
+                permit.again()
+
+    async def _run_on_main(
+        self, call: Callable[[], T], permit: Permit, asked_at: float, late_since: float | None
+    ) -> T:
         future: asyncio.Future[T] = self.loop.create_future()
+        checked_at, basis = self.loop.time(), (self._delivered[permit.system], permit.basis())
+        claim = [call]  # whoever pops it decides: the main loop runs it, or the timer lets it expire
 
         def settle(result: T | None, error: Exception | None) -> None:
             if future.done():
@@ -143,8 +189,29 @@ class Bridge:
             else:
                 future.set_result(result)  # type: ignore[arg-type]
 
+        def is_outdated(now: float) -> bool:
+            is_late = late_since is None and now - checked_at > FRESH
+            return is_late or (self._fed[permit.system], permit.basis()) != basis
+
+        def expire() -> None:
+            if claim:
+                claim.clear()
+                settle(None, Expired.after(permit.lasts))
+
         def run() -> None:
-            if future.cancelled():
+            if not claim:
+                return
+            now = self.loop.time()
+            if permit.system and is_outdated(now):
+                self._hand_over()  # first: the check shall know all that was read
+                self._thread.call_soon(settle, None, Outdated())
+                return
+            if late_since is not None and now - late_since < READ_WITHIN and self.links_have_unread():
+                self._calls.put(run, urgent=permit.stops)
+                return
+            try:
+                claim.pop()
+            except IndexError:  # it expired, or its task was cancelled, at this very moment
                 return
             try:
                 outcome = call(), None
@@ -153,8 +220,14 @@ class Bridge:
             else:
                 self._thread.call_soon(settle, *outcome)
 
-        self._calls.put(run)
-        return await future
+        self._calls.put(run, urgent=permit.stops)
+        remaining = max(asked_at + permit.lasts - checked_at, 0.0)
+        timer = self.loop.call_later(remaining, expire)
+        try:
+            return await future
+        finally:
+            claim.clear()
+            timer.cancel()
 
     def run(self, coroutine: Any, timeout: float = 4.0) -> Any:
         """Run a coroutine in the asyncio loop and wait for it. Any thread but the loop's own."""

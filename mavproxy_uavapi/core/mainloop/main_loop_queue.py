@@ -16,6 +16,7 @@ class MainLoopQueue:
     """
 
     def __init__(self) -> None:
+        self._urgent: deque[Callable[[], None]] = deque()
         self._calls: deque[Callable[[], None]] = deque()
         self._reader, self._writer = socket.socketpair()
         self._reader.setblocking(False)
@@ -29,20 +30,21 @@ class MainLoopQueue:
         """Both descriptors, which a forked child must close."""
         return [self._reader.fileno(), self._writer.fileno()]
 
-    def put(self, call: Callable[[], None]) -> None:
-        """Queue `call` and wake the main loop. `call` must not raise."""
-        self._calls.append(call)
+    def put(self, call: Callable[[], None], *, urgent: bool = False) -> None:
+        """Queue `call` and wake the main loop; urgent ones come first. `call` must not raise."""
+        (self._urgent if urgent else self._calls).append(call)
         try:
             self._writer.send(WAKE)
         except BlockingIOError:
             pass  # the pipe is full of unread wake-ups: it wakes the main loop anyway
         except OSError:
-            self._calls.clear()  # closed: MAVProxy unloads us, so nothing drains the queue
+            self._clear()  # closed: MAVProxy unloads us, so nothing drains the queue
 
     def drain(self) -> None:
         """Run what is queued now. Main loop only; what a call queues in turn waits for the next drain."""
-        for _ in range(len(self._calls)):
-            self._calls.popleft()()
+        for calls in (self._urgent, self._calls):
+            for _ in range(len(calls)):
+                calls.popleft()()
 
     def on_readable(self, _args: object = None) -> None:
         """The `select_extra` handler: swallow the wake-ups, then drain."""
@@ -56,6 +58,10 @@ class MainLoopQueue:
 
     def close(self) -> None:
         """Drop the queue and close both ends."""
-        self._calls.clear()
+        self._clear()
         self._reader.close()
         self._writer.close()
+
+    def _clear(self) -> None:
+        self._urgent.clear()
+        self._calls.clear()

@@ -21,6 +21,7 @@ from mavproxy_uavapi.core.link.link import Address, Link
 from mavproxy_uavapi.core.link.message_exchange import MessageExchange
 from mavproxy_uavapi.core.link.message_waiter import MessageWaiter
 from mavproxy_uavapi.core.link.turns import Turns
+from mavproxy_uavapi.core.mainloop.permit import Permit, permitted
 from mavproxy_uavapi.core.mission.mission_files import HOME, MissionItem, difference, from_message
 from mavproxy_uavapi.core.shared_tasks import SharedTasks
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
@@ -128,8 +129,10 @@ class Waypoints:
             await pass_gate()
             check()
             self.changed_at = self._waiting.clock()
+            permit = Permit(check=check, system=self._state.system)
             try:
-                await self._put(items, checked_progress)
+                with permitted(permit):  # what was asked for before the pilot began the mission does not change it
+                    await self._put(items, checked_progress)
             except UavApiError as error:
                 error.args = (f"{error}{await self._undo(old, error)}",)
                 raise

@@ -138,9 +138,12 @@ class EnvelopeWatch:
         commander = vehicle.authority.flies
 
         async def body(job: Job) -> str:
-            await vehicle.set_mode(job, mode)
+            command = vehicle.command(job)
+            await command.take(Rank.PROTECT)
+            await command.switch_mode(mode)
             if not circles:
-                await _stand(vehicle, job, mode)
+                await _stand(vehicle, mode)
+            command.confirm()
             return sentence
 
         job = self._jobs.begin(
@@ -156,13 +159,11 @@ class EnvelopeWatch:
             self._say(f"vehicle {system} was not stopped: {job.error}")
 
 
-async def _stand(vehicle: Vehicle, job: Job, mode: str) -> None:
-    """Keep the vehicle for `job` until it stands: lower ranks are refused, what stops or lands it is not."""
-    vehicle.authority.take(job, Rank.STOP)
+async def _stand(vehicle: Vehicle, mode: str) -> None:
+    """Wait until it stands."""
     longest = STANDS_WITHIN + 2 * _until_it_stands(vehicle)
     names = {"GLOBAL_POSITION_INT"}
     await vehicle.flown(mode, names, lambda: None if _moves(vehicle) else True, longest, "stand")
-    vehicle.authority.shown(job)
 
 
 def leaving(vehicle: Vehicle) -> tuple[Space, Breach] | None:

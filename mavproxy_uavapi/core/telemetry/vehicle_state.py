@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,7 +12,8 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.core.telemetry import autopilot
 from mavproxy_uavapi.core.telemetry.flight_modes import kind_of
-from mavproxy_uavapi.core.telemetry.time_ratio import TimeRatio
+from mavproxy_uavapi.core.telemetry.time_ratio import NOT_BOOT_TIME, TimeRatio
+from mavproxy_uavapi.core.telemetry.trip import Trip
 
 mavlink = mavutil.mavlink
 
@@ -21,6 +23,9 @@ MODE_CHANGES_KEPT = 16
 CHUNK = 50  # characters of a full chunk of a STATUSTEXT
 CHUNK_TIMEOUT = 2.0  # s after which the missing chunks of a text count as lost
 RECENT = 5.0  # s before the newest heartbeat; an older report does not show the present state
+CLOCKED_KEPT = 64  # messages with the vehicle's own time, of which the newest before a heartbeat dates it
+CLOCKED_WITHIN = 3.0  # s before a heartbeat; an older one does not date it
+HEARTBEAT_PERIOD = 1.0  # s
 SEQUENCE_REORDER = 128  # a step back of less than this is a message out of order, not a loss
 FAILING = {mavlink.MAV_STATE_CRITICAL, mavlink.MAV_STATE_EMERGENCY}
 ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
@@ -97,6 +102,9 @@ class VehicleState:
         mode: the heartbeat's custom_mode; None likewise.
         system_status: MAV_STATE of the heartbeat; None likewise.
         heartbeat_at: arrival of the newest heartbeat (s).
+        heartbeat_before_at: that of the heartbeat before it.
+        heartbeat_left: the vehicle's clock (s since its boot) when the newest heartbeat left it, or earlier; None
+            where no message with its time came shortly before.
         mode_since: arrival of the heartbeat that first showed the mode (s).
         mode_changes: the newest of those: arrival and mode, oldest first.
         messages: newest message by name, and by `NAME[instance]` for those that come for several devices.
@@ -121,6 +129,11 @@ class VehicleState:
     received: int = 0
     lost: int = 0
     time_ratio: TimeRatio = field(default_factory=TimeRatio)
+    trip: Trip = field(default_factory=Trip)
+    heartbeat_before_at: float = -math.inf
+    heartbeat_left: float | None = None
+    _clocked: deque[tuple[int, float, float]] = field(default_factory=lambda: deque(maxlen=CLOCKED_KEPT))
+    _heartbeat_sequence: int | None = None
     _sequence: int | None = None
     _chunks: dict[int, ChunkedText] = field(default_factory=dict)
 
@@ -156,6 +169,36 @@ class VehicleState:
     def statustexts_since(self, at: float) -> list[str]:
         """The autopilot's STATUSTEXTs since `at` (s), oldest first."""
         return [text.text for text in self.statustexts if text.at >= at]
+
+    def heard_since(self, at: float) -> bool:
+        """Whether the newest heartbeat tells what a pilot has done until `at` (s): it arrived later.
+
+        One that has waited in MAVProxy or on the link for longer than a heartbeat's period does not tell it.
+        """
+        if self.heartbeat_at <= at:
+            return False
+        if self.heartbeat_left is None or not self.trip.knows_clock:
+            return True
+        return self.heartbeat_left >= self.trip.time_at(at, self.time_ratio.ratio) - HEARTBEAT_PERIOD
+
+    def came_after(self, sent_at: float) -> bool:
+        """Whether the newest heartbeat came so long after what we sent at `sent_at` (s) that it left later.
+
+        Before a measurement of the trip the arrival must do.
+        """
+        return self.heartbeat_at > sent_at + (0.0 if self.trip.mean is None else self.trip.deadline)
+
+    def shows(self, sent_at: float) -> bool:
+        """Whether the newest heartbeat left the vehicle after what we sent at `sent_at` (s) had arrived, or was lost.
+
+        By the vehicle's own clock. Where that is not known, the heartbeat before it must have arrived after the
+        longest trip, too.
+        """
+        if self.heartbeat_at <= sent_at:
+            return False
+        if self.heartbeat_left is not None and self.trip.knows_clock:
+            return self.heartbeat_left >= self.trip.arrived_by(sent_at, self.time_ratio.ratio)
+        return self.heartbeat_before_at >= sent_at + self.trip.deadline
 
     @property
     def landed(self) -> bool | None:
@@ -194,14 +237,19 @@ class VehicleState:
             _keep(self.others, (message.get_srcComponent(), name), message, now)
             return
         self._count_loss(message.get_seq())
-        if self.time_ratio.update(getattr(message, "time_boot_ms", None), name, now):
+        boot_ms = getattr(message, "time_boot_ms", None)
+        if self.time_ratio.update(boot_ms, name, now):
             self._forget_what_a_reboot_changes()
+        if boot_ms and name not in NOT_BOOT_TIME:
+            self._clocked.append((message.get_seq(), boot_ms / 1000.0, now))
         _keep(self.messages, name, message, now)
         instance = getattr(message, "_instance_field", None)
         if instance is not None:  # one message each for several batteries, compasses, servos …
             _keep(self.messages, f"{name}[{getattr(message, instance)}]", message, now)
         if name == "HEARTBEAT":
             self._take_heartbeat(message, now)
+        elif name == "TIMESYNC" and message.tc1:
+            self.trip.answer(message.ts1, message.tc1 / 1e9, now)
         elif name == "STATUSTEXT":
             self._take_statustext(message, now)
         elif name == "PARAM_VALUE":
@@ -220,8 +268,29 @@ class VehicleState:
         fresh = VehicleState(self.system, component, vehicle_type, now, messages=own, others=others)
         vars(self).update(vars(fresh))  # in place, because others hold this object
 
+    def _time_left(self, sequence: int, now: float) -> float | None:
+        """The newest time of the vehicle's that was sent before the message of that sequence number, s since boot."""
+        before = [
+            seconds
+            for number, seconds, at in self._clocked
+            if 0 < (sequence - number) % 256 < SEQUENCE_REORDER and now - at <= CLOCKED_WITHIN
+        ]
+        return max(before, default=None)
+
+    def _is_overtaken(self, sequence: int, left: float | None) -> bool:
+        """Whether a newer heartbeat has come before this one: by its number, and by the vehicle's clock."""
+        if left is None or self.heartbeat_left is None or self._heartbeat_sequence is None:
+            return False
+        steps_back = (self._heartbeat_sequence - sequence) % 256
+        return 0 < steps_back < SEQUENCE_REORDER and left < self.heartbeat_left
+
     def _take_heartbeat(self, message: Any, now: float) -> None:
-        self.heartbeat_at = now
+        sequence = message.get_seq()
+        left = self._time_left(sequence, now)
+        if self._is_overtaken(sequence, left):
+            return
+        self.heartbeat_before_at, self.heartbeat_at = self.heartbeat_at, now
+        self.heartbeat_left, self._heartbeat_sequence = left, sequence
         if message.type != mavlink.MAV_TYPE_GENERIC:  # a copter that boots does not know its frame yet
             self.vehicle_type = message.type
         if message.custom_mode != self.mode:
@@ -254,6 +323,8 @@ class VehicleState:
 
     def _forget_what_a_reboot_changes(self) -> None:
         self.reboots += 1
+        self.trip.forget_clock()
+        self._clocked.clear()
         self.armed = self.mode = self.system_status = None
         self._chunks.clear()
         for name in FORGOTTEN_AT_REBOOT:

@@ -35,7 +35,7 @@ async def arm(vehicle: BaseVehicle, job: Job, timeout: float | None) -> None:
     deadline = vehicle.clock() + (max(timeout - REASON_TIME, timeout / 2) if timeout else TIMEOUT)
     await _get_ready(vehicle, job, lambda: vehicle.has_position, check_unclaimed, deadline)
     if vehicle.mode != GUIDED:
-        await vehicle.switch_to(job, GUIDED, check_unclaimed)
+        await vehicle.command(job).switch_mode(GUIDED, check_unclaimed)
     still_guided = _requires_guided(vehicle)
     await _get_ready(vehicle, job, lambda: vehicle.is_ready_to_arm, still_guided, deadline)
     still_guided()
@@ -49,7 +49,7 @@ async def arm(vehicle: BaseVehicle, job: Job, timeout: float | None) -> None:
 
     if not vehicle.state.armed:
         try:
-            await vehicle.commands.send(messages.arm(), vehicle.commanding(job, still_guided, noted), shown=shown)
+            await vehicle.command(job).send(messages.arm(), still_guided, noted, shown=shown)
         except Rejected:
             vehicle.arm_sent_at = -math.inf
             raise
@@ -65,16 +65,16 @@ async def disarm(vehicle: BaseVehicle, job: Job, force: bool) -> None:
 
     Our own order to arm may arrive after the next heartbeat. Then only the acknowledgement counts.
     """
-    order, check = messages.disarm(force), vehicle.commanding(job)
+    order, command = messages.disarm(force), vehicle.command(job)
     if vehicle.arm_is_on_its_way:
-        await vehicle.commands.send(replace(order, proven_by_ack=True), check)
+        await command.send(replace(order, proven_by_ack=True))
         vehicle.arm_sent_at = -math.inf
     sent_at = vehicle.clock()
 
     def shown() -> bool:
-        return vehicle.state.armed is False and vehicle.state.heartbeat_at > sent_at
+        return vehicle.state.armed is False and vehicle.state.came_after(sent_at)
 
-    await vehicle.commands.send_until_shown(order, check, shown, "show that it is disarmed")
+    await command.send_until_shown(order, shown=shown, action="show that it is disarmed")
 
 
 def _requires_guided(vehicle: BaseVehicle) -> Callable[[], None]:
@@ -111,7 +111,7 @@ async def _get_ready(
 async def _why_not_ready(vehicle: BaseVehicle, waited: float) -> Rejected:
     asked_at = vehicle.clock()
     with contextlib.suppress(Rejected, TimedOut):  # only the texts that it triggers count
-        await vehicle.commands.send(messages.check_prearm())
+        await vehicle.ask(messages.check_prearm())
     with contextlib.suppress(TimedOut):
         await vehicle.waiting.message(
             {"STATUSTEXT"}, lambda _: None, 1.0, "fall silent"

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import Any, TypeVar
 
 from pymavlink import mavutil
@@ -14,18 +12,19 @@ from mavproxy_uavapi.core.airspace import time_limits
 from mavproxy_uavapi.core.airspace.envelope_check import Spaces
 from mavproxy_uavapi.core.airspace.guard import EnvelopeGuard, GuardedLink
 from mavproxy_uavapi.core.airspace.speeds import Speeds
-from mavproxy_uavapi.core.control.authority import CommandAuthority, Rank, no_objection
+from mavproxy_uavapi.core.control.authority import CommandAuthority
+from mavproxy_uavapi.core.control.command import Command
 from mavproxy_uavapi.core.control.jobs import Job
-from mavproxy_uavapi.core.control.mode_switch import ModeRequests, ModeSwitch
-from mavproxy_uavapi.core.control.start_gate import pass_gate
-from mavproxy_uavapi.core.errors import ModeChanged, NotArmed, Rejected, Stale
+from mavproxy_uavapi.core.control.mode_switch import ModeRequests
+from mavproxy_uavapi.core.errors import ModeChanged, NotArmed, Stale
 from mavproxy_uavapi.core.geodesy import offset
 from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.link.command_sender import CommandSender
 from mavproxy_uavapi.core.link.dataflash import DataflashLogs
-from mavproxy_uavapi.core.link.link import Address, Link, is_finite
+from mavproxy_uavapi.core.link.link import Address, BoundedLink, Link, is_finite
 from mavproxy_uavapi.core.link.message_waiter import HEARD_WITHIN, MessageWaiter
 from mavproxy_uavapi.core.link.parameters import Parameters
+from mavproxy_uavapi.core.mainloop.permit import Permit, no_check, permitted
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
 from mavproxy_uavapi.core.mission.mission_protocol import Waypoints
 from mavproxy_uavapi.core.mission.mission_way import Stop
@@ -36,7 +35,6 @@ from mavproxy_uavapi.core.telemetry.flight_modes import (
     kind_of,
     mode_name,
     mode_names,
-    mode_number,
 )
 from mavproxy_uavapi.core.telemetry.pending_waits import PendingWaits
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
@@ -79,14 +77,14 @@ class BaseVehicle:
         self.lands_by_mission = False  # in AUTO: whether a verb that stops or lands it has begun that
         self.landing_items: Collection[int] | None = None  # of its mission, by number; None while it is not known
         self.guard = EnvelopeGuard(self, spaces)
-        self.link: Link = GuardedLink(link, self.guard)
+        self._link: Link = BoundedLink(GuardedLink(link, self.guard))
         self.authority = CommandAuthority(state)
         self.waiting = MessageWaiter(state, pending, clock)
-        self.commands = CommandSender(state, self.link, self.waiting)
-        self.waypoints = Waypoints(state, self.link, self.waiting, self._allow_upload)
-        self.parameters = Parameters(state, self.link, self.waiting)
-        self.logs = DataflashLogs(state, self.link, self.waiting)
-        self._mode_requests = ModeRequests(state, clock)
+        self._sender = CommandSender(state, self._link, self.waiting)
+        self.waypoints = Waypoints(state, self._link, self.waiting, self._allow_upload)
+        self.parameters = Parameters(state, self._link, self.waiting)
+        self.logs = DataflashLogs(state, self._link, self.waiting)
+        self.mode_requests = ModeRequests(state, clock)
         self._requests = SharedTasks[Any]()  # REQUEST_MESSAGE, by message name
 
     def continues(self, before: BaseVehicle) -> None:
@@ -94,9 +92,14 @@ class BaseVehicle:
 
         Its jobs go on, and newer ones supersede them; a pause, and speeds that were asked for, remain.
         """
-        self.authority, self.speeds, self._mode_requests = before.authority, before.speeds, before._mode_requests
+        self.authority, self.speeds, self.mode_requests = before.authority, before.speeds, before.mode_requests
 
     # -- state --------------------------------------------------------------------------------------------
+
+    @property
+    def airspace(self) -> EnvelopeGuard:
+        """Where it may fly."""
+        return self.guard
 
     @property
     def address(self) -> Address:
@@ -116,13 +119,13 @@ class BaseVehicle:
     @property
     def next_mode(self) -> str:
         """The name of the last requested mode, until a heartbeat shows the outcome; else `mode`."""
-        coming = self._mode_requests.on_their_way()
+        coming = self.mode_requests.on_their_way()
         return mode_name(self.state.vehicle_type, coming[-1]) if coming else self.mode
 
     @property
     def is_settled(self) -> bool:
         """Whether none of our mode switches may still be on its way."""
-        return all(number == self.state.mode for number in self._mode_requests.on_their_way())
+        return all(number == self.state.mode for number in self.mode_requests.on_their_way())
 
     @property
     def is_ready_to_arm(self) -> bool:
@@ -246,9 +249,9 @@ class BaseVehicle:
         """Whether it circles in its holding mode, and does not stand."""
         return False
 
-    def inside(self, order: messages.Target | messages.Command) -> Callable[[], None]:
+    def inside(self, order: messages.Target | messages.MavCommand) -> Callable[[], None]:
         """The check that the vehicle stays in its envelope with this order; for `CommandAuthority.take`."""
-        if isinstance(order, messages.Command):
+        if isinstance(order, messages.MavCommand):
             message = order.to(self.address, 0)
         else:
             message = order.to(self.address, messages.NO_YAW)
@@ -288,7 +291,7 @@ class BaseVehicle:
     @property
     def is_in_own_mode(self) -> bool:
         """Whether it is in a mode that we chose or have commanded in."""
-        return self.guard.ordered_at >= self.state.mode_since or self._mode_requests.chose_the_mode
+        return self.guard.ordered_at >= self.state.mode_since or self.mode_requests.chose_the_mode
 
     @property
     def obeys_us(self) -> bool:
@@ -316,104 +319,38 @@ class BaseVehicle:
         current = self.state.field("MISSION_CURRENT", "seq")
         return current is None or current in self.landing_items
 
-    def note_mission(self, job: Job) -> None:
-        """Note whether `job` lands the vehicle by its mission, as a plane does, before it sends what begins that."""
-        self.lands_by_mission = job is self.authority.commander and self.authority.rank is Rank.STOP
-
     def require_own_mode(self, since: float) -> None:
         """Raise ModeChanged if somebody else has switched its mode; `since`: the former `state.mode_since`."""
         if self.state.mode_since != since and not self.is_in_own_mode:
             raise ModeChanged(f"the pilot or a failsafe switched the vehicle to {self.mode} meanwhile")
 
-    @contextlib.contextmanager
-    def ordering(self, job: Job) -> Iterator[None]:
-        """While `job` sends a command: if the autopilot refuses it, what it was told before still counts."""
-        before, lands = self.guard.ordered, self.lands_by_mission
-        try:
-            yield
-        except Rejected:
-            if self.authority.commander is job:
-                self.guard.take_up(before)
-                self.lands_by_mission = lands
-            raise
+    # -- sending ------------------------------------------------------------------------------------------
 
-    async def take(self, job: Job, rank: Rank, allow: Callable[[], None] = no_objection) -> None:
-        """Make `job` the commander, once all verbs that begin with it can begin, too.
+    def command(self, job: Job) -> Command:
+        """The right of `job` to command the vehicle: all that moves it is sent by one."""
+        return Command(self, job, self._sender, self._link)
+
+    async def ask(self, order: messages.MavCommand) -> None:
+        """Send an order that moves nothing: a question, an interval, a servo output. It needs no right.
 
         Raises:
-            Aborted: one of these cannot; nothing has changed.
-            ModeChanged: its pilot has switched the mode meanwhile, and `job` does not stop it.
-            Busy, Paused: as `CommandAuthority.take`. Also what `allow` raises.
+            Rejected, TimedOut, Expired, LinkLost: as `CommandSender.send`.
         """
-        if job is not self.authority.commander:
-            self.authority.admit(rank)
-        allow()
-        since = self.state.mode_since
-        if await pass_gate():
-            if rank < Rank.STOP:
-                self.require_own_mode(since)
-            allow()
-        self.authority.take(job, rank)
+        await self._sender.send(order)
 
-    def commanding(self, job: Job, *needs: Callable[[], None]) -> Callable[[], None]:
-        """The check before each message of `job`: it still commands, and none of `needs` raises."""
-
-        def check() -> None:
-            self.authority.require(job)
-            for need in needs:
-                need()
-
-        return check
-
-    async def switch_to(
-        self,
-        job: Job,
-        mode: str,
-        *needs: Callable[[], None],
-        command: messages.Command | None = None,
-        onward: Collection[str] = (),
-    ) -> None:
-        """Switch the flight mode for `job` and wait until a heartbeat shows it.
+    async def post(self, message: Any, check: Callable[[], None] = no_check) -> None:
+        """Send a message that moves nothing and has no answer, or whose answer the caller awaits.
 
         Args:
-            job: the job that commands.
-            mode: the mode's name.
-            needs: called before each sending; what one raises ends the switch.
-            command: what does more than switch it, such as to begin a landing; None for DO_SET_MODE.
-            onward: modes to which the autopilot may go on from that mode by itself, before a heartbeat.
+            message: a request, a parameter.
+            check: raises if it may not be sent; called again where it is written if anything has changed.
 
         Raises:
-            Invalid: no such mode.
-            ModeChanged: the pilot or a failsafe switched it meanwhile.
-            Rejected, TimedOut, LinkLost.
+            Expired, LinkLost.
         """
-        number = mode_number(self.state.vehicle_type, mode)
-        goals = {number, *(mode_number(self.state.vehicle_type, name) for name in onward)}
-        on_their_way = self._mode_requests.on_their_way()
-        switch = ModeSwitch(self.state, goals, on_their_way, does_more=command is not None or bool(onward))
-
-        def switched_by_nobody_else() -> None:
-            switch.shown()
-
-        def noted() -> None:
-            self._mode_requests.note(number)
-            modes = {mode_name(self.state.vehicle_type, goal) for goal in goals}
-            job.modes |= modes
-            if any(map(flies_mission, modes)):
-                self.note_mission(job)
-
-        check = self.commanding(job, switched_by_nobody_else, *needs, noted)
-        order = replace(command or messages.set_mode(number), hears_first=mode.upper() not in self.holding_modes)
-        try:
-            with self.ordering(job):
-                if switch.is_ambiguous:
-                    await self.commands.send(replace(order, proven_by_ack=True), check, shown=switch.shown)
-                    switch.count_from(self.clock())
-                await self.commands.send_until_shown(order, check, switch.shown, f"show mode {mode.upper()}")
-        except Rejected:
-            self._mode_requests.forget(number)
-            raise
-        self.authority.shown(job)
+        check()
+        with permitted(Permit(check=check, system=self.state.system)):
+            await self._link.send(message, self.state.system)
 
     async def limits(self) -> time_limits.FlightLimits:
         """Its speeds and heights, for deadlines; unknown ones are requested from the vehicle."""
@@ -437,5 +374,5 @@ class BaseVehicle:
             return message if message.get_srcComponent() == self.state.component else None
 
         with self.waiting.expecting({name}, from_autopilot) as expected:
-            await self.commands.send(messages.request_message(messages.MESSAGE_IDS[name]))
+            await self.ask(messages.request_message(messages.MESSAGE_IDS[name]))
             return await expected.within(REPORT_TIMEOUT, f"report {name}")

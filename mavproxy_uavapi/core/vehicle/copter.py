@@ -14,7 +14,6 @@ from mavproxy_uavapi.core.errors import ModeChanged, Rejected, TimedOut
 from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.link.messages import NO_YAW
 from mavproxy_uavapi.core.telemetry.flight_modes import MISSION_MODES, flies_mission
-from mavproxy_uavapi.core.vehicle import setpoint_in_force
 from mavproxy_uavapi.core.vehicle.guided import ARRIVAL_SPEED, GUIDED
 from mavproxy_uavapi.core.vehicle.own_target import STANDSTILL
 from mavproxy_uavapi.core.vehicle.travelling import REST_PERIOD
@@ -51,6 +50,7 @@ class Copter(TurningVehicle):
 
         The tolerance is 5 % of `alt`, at least 0.3 m and at most 1 m. A copter ignores `vtol`.
         """
+        await self.command(job).resumed()
         self.require_armed()
         self.require_mode(GUIDED)
         self.require_ground(job)
@@ -89,10 +89,11 @@ class Copter(TurningVehicle):
 
         A vehicle whose next heartbeat shows it disarmed has landed; an `arm` that waits ends.
         """
-        await self.take(job, Rank.STOP)
+        await self.command(job).take(Rank.STOP)
         if await self.stays_disarmed(job):
             return
-        await self.switch_to(job, "LAND")
+        await self.command(job).switch_mode("LAND")
+        self.command(job).confirm()
         limits = await self.limits()
         expected = time_limits.landing_time(limits, self.height)
         await self.landed_in(job, "LAND", self.allowed(expected, timeout))
@@ -107,10 +108,11 @@ class Copter(TurningVehicle):
             NotFound: the vehicle is disarmed and has no home yet.
             ModeChanged: it was armed while we requested its home.
         """
-        await self.take(job, Rank.STOP)
+        await self.command(job).take(Rank.STOP)
         if await self.is_done_at_home(job):
             return
-        await self.switch_to(job, "RTL")
+        await self.command(job).switch_mode("RTL")
+        self.command(job).confirm()
         limits = await self.limits()
         expected = time_limits.return_time(limits, self.distance_home() or 0.0, self.height)
         await self.landed_in(job, "RTL", self.allowed(expected, timeout))
@@ -126,11 +128,9 @@ class Copter(TurningVehicle):
         """Whether `hold` stops it by setpoints, which do nothing in a pilot's mode."""
         return self.mode == GUIDED and self.is_settled
 
-    async def set_mode(self, job: Job, mode: str) -> None:
-        """Switch to any mode. GUIDED ends a `stop` too: the vehicle stays where it is, and takes movements again."""
-        was_paused = self.authority.paused
-        await super().set_mode(job, mode)
-        if was_paused and mode.upper() == GUIDED and self.authority.paused:
+    async def _finish_switch(self, job: Job, mode: str) -> None:
+        """GUIDED ends a `stop` too: the vehicle stays where it is, and takes movements again."""
+        if mode == GUIDED and self.authority.paused:
             if self.state.armed:
                 await self._drop_movement(job)
             await self.end_stop(job, GUIDED)
@@ -144,7 +144,7 @@ class Copter(TurningVehicle):
         deadline = self.clock() + DROP_TIMEOUT
         while self.clock() <= deadline:
             await self.send_setpoint(job, STANDSTILL)
-            if await setpoint_in_force.ask(self.state, self.waiting, self.link) == STANDSTILL:
+            if await self.ask_setpoint() == STANDSTILL:
                 return
             await asyncio.sleep(REST_PERIOD)
         raise TimedOut(
@@ -168,20 +168,20 @@ class Copter(TurningVehicle):
         if not any(one == GUIDED or flies_mission(one) for one in (mode, coming)):
             raise ModeChanged(f"the vehicle is in {mode}, which cannot be paused; `brake` stops it")
         if not self.is_settled:
-            await self.take(job, Rank.STOP)
-            await self.switch_to(job, self.holding_mode)
+            await self.command(job).take(Rank.STOP)
+            await self.command(job).switch_mode(self.holding_mode)
             await self.until_it_stands(job, self.holding_mode)
             return
         self.authority.admit(Rank.STOP)
         await pass_gate()
         self.authority.interrupt(job)
         try:
-            await self.commands.send(messages.pause(True), self.commanding(job, lambda: self.held_by(mode)))
+            await self.command(job).send(messages.pause(True), lambda: self.held_by(mode))
         except (Rejected, TimedOut) as error:
             if mode != GUIDED:  # a mission may stand at a waypoint, and go on
                 await self.hear_again()  # a pilot may have taken it meanwhile
                 self.held_by(mode)
-                await self.switch_to(job, self.holding_mode)
+                await self.command(job).switch_mode(self.holding_mode)
                 mode = self.holding_mode
             elif isinstance(error, Rejected):
                 self.authority.end_pause()
@@ -208,7 +208,8 @@ class Copter(TurningVehicle):
         """
         self.authority.take(job, Rank.STOP)
         if not self.stops_in_its_mode:
-            await self.switch_to(job, self.holding_mode)
+            await self.command(job).switch_mode(self.holding_mode)
+            self.command(job).confirm()
         elif self.state.landed and not self.authority.paused:
             await self._hold_down(job)
         else:
@@ -223,7 +224,7 @@ class Copter(TurningVehicle):
         self.authority.begin_pause()  # the next commander must end the pause
         try:
             with contextlib.suppress(TimedOut):  # the setpoints are sent anyway
-                await self.commands.send(messages.pause(True), self.commanding(job, self.flying))
+                await self.command(job).send(messages.pause(True), self.flying)
                 await asyncio.sleep(SLOWDOWN)
         except Rejected:
             self.authority.end_pause()

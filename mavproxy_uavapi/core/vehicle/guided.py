@@ -12,13 +12,13 @@ from mavproxy_uavapi.core.airspace import time_limits
 from mavproxy_uavapi.core.airspace.envelope_check import Spaces
 from mavproxy_uavapi.core.control.authority import Rank
 from mavproxy_uavapi.core.control.jobs import Ending, Job
-from mavproxy_uavapi.core.control.start_gate import pass_gate
 from mavproxy_uavapi.core.errors import Busy, Invalid, Stale, Superseded, TimedOut, UavApiError
 from mavproxy_uavapi.core.geodesy import moved, offset
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.link.link import Link
 from mavproxy_uavapi.core.link.messages import NO_YAW, GlobalTarget, NedTarget, Target, VelocityTarget, Yaw
+from mavproxy_uavapi.core.mainloop.permit import SETPOINT_LASTS
 from mavproxy_uavapi.core.telemetry.pending_waits import PendingWaits
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 from mavproxy_uavapi.core.vehicle import setpoint_in_force
@@ -101,7 +101,7 @@ class GuidedVehicle(Vehicle):
     def takeoff_is_done(self, job: Job) -> None:
         """Note that the takeoff of `job` has reached its altitude."""
         self._reported_after_its_end = self.state.mode_since if self.is_taking_off else None
-        self.authority.shown(job)
+        self.command(job).confirm()
 
     def flying(self) -> None:
         """The check before each message of a movement: the vehicle is armed and in GUIDED."""
@@ -119,8 +119,7 @@ class GuidedVehicle(Vehicle):
             self._lifts_off_for = job
 
         try:
-            with self.ordering(job):
-                await self.commands.send(messages.takeoff(alt), self.commanding(job, self.flying, noted))
+            await self.command(job).send(messages.takeoff(alt), self.flying, noted)
         except TimedOut:  # the ack may be lost: telemetry shows whether the takeoff began
             ratio = max(self.state.time_ratio.ratio, 0.1)
             await self.flown(
@@ -155,7 +154,7 @@ class GuidedVehicle(Vehicle):
         north, east, up = self.leg_to(target)
         if self.height + up < FLOOR - TOLERANCE:
             raise Invalid(f"the target lies {-(self.height + up):.1f} m below home")
-        await self.take(job, Rank.MOVEMENT, self.inside(target))
+        await self.command(job).take(Rank.MOVEMENT, self.inside(target))
         self.yaw = messages.facing(heading, look_at_target, north, east)
         await self.take_up(job, target, self.yaw)
         self._repeating = self._tasks.start(self._repeat(job, target), "the watch over a target")
@@ -230,10 +229,11 @@ class GuidedVehicle(Vehicle):
         Raises:
             Superseded, Paused, NotArmed, ModeChanged: the job no longer has the vehicle; nothing is sent.
         """
-        await pass_gate()
-        self.commanding(job, self.flying)()
+        command = self.command(job)
+        command.require()
+        self.flying()
         self.repeat_nothing()
-        await self.link.send(target.to(self.address, yaw), self.state.system)
+        await command.post(target.to(self.address, yaw), self.flying, lasts=SETPOINT_LASTS)
         self.own_target.sent(target, must_show=must_show)
 
     async def take_up(self, job: Job, target: Target, yaw: Yaw) -> None:
@@ -250,8 +250,12 @@ class GuidedVehicle(Vehicle):
     async def send_speeds(self, job: Job, *, new_kind: bool) -> None:
         """Send the speeds of a movement; `new_kind`: whether its setpoint is of another kind than the last one."""
         for kind, speed in self.speeds.to_send(new_kind).items():
-            await self.commands.send(messages.change_speed(kind, speed), self.commanding(job, self.flying))
+            await self.command(job).send(messages.change_speed(kind, speed), self.flying)
             self.speeds.take(kind, speed)
+
+    async def ask_setpoint(self) -> GlobalTarget | VelocityTarget | None:
+        """The setpoint in force, as the autopilot reports it now; None without an answer. Raises LinkLost."""
+        return await setpoint_in_force.ask(self.state, self.waiting, self.post)
 
     # -- targets that are lost on the way -----------------------------------------------------------------
 
@@ -271,7 +275,8 @@ class GuidedVehicle(Vehicle):
         def require_ours() -> None:
             if self.state.mode_since > began or not (job.running or job.ending is Ending.DONE):
                 raise Superseded(f"{job.verb} does not fly the vehicle any more")
-            self.commanding(job, self.require_guided_flight)()
+            self.command(job).require()
+            self.require_guided_flight()
 
         with contextlib.suppress(UavApiError):
             for _ in range(REPEATS):
@@ -280,12 +285,13 @@ class GuidedVehicle(Vehicle):
                 await self.waiting.message({"HEARTBEAT"}, lambda beat: beat, BEAT_TIMEOUT, "report its mode")
                 require_ours()
                 asked_at = self.clock()
-                await setpoint_in_force.ask(self.state, self.waiting, self.link)
+                await self.ask_setpoint()
                 if not self._is_lost(target, asked_at):
                     return
                 require_ours()
                 log.info("vehicle %d does not show its target: it is sent again", self.state.system)
-                await self.link.send(target.to(self.address, self.yaw), self.state.system)
+                message = target.to(self.address, self.yaw)
+                await self.command(job).post(message, require_ours, lasts=SETPOINT_LASTS)
                 self.own_target.sent_again()
                 await self.send_speeds(job, new_kind=True)
 

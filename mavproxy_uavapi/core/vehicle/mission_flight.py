@@ -57,7 +57,7 @@ async def fly(vehicle: Vehicle, job: Job, until_complete: bool = False, timeout:
     if not items:
         raise Busy("the vehicle has no mission; upload one first")
     _require_startable(vehicle)  # the pilot may have switched it meanwhile
-    await vehicle.take(job, Rank.ARM, lambda: vehicle.guard.require_mission(items, from_here=True))
+    await vehicle.command(job).take(Rank.ARM, lambda: vehicle.guard.require_mission(items, from_here=True))
     await begin(vehicle, job, lambda: _require_startable(vehicle))
     if until_complete:
         await _flown_to_its_end(vehicle, job, items, timeout or LONGEST)
@@ -72,17 +72,16 @@ async def begin(vehicle: Vehicle, job: Job, startable: Callable[[], None]) -> No
         startable: raises if the mission may not start; called until the vehicle is in AUTO.
     """
     vehicle.waypoints.changed_at = vehicle.clock()
-    with vehicle.ordering(job):
-        vehicle.note_mission(job)
-        await vehicle.commands.send(messages.set_mission_current(1), vehicle.commanding(job, startable))
+    command = vehicle.command(job)
+    await command.send(messages.set_mission_current(1), startable, command.note_mission)
     job.modes |= MISSION_MODES  # also where the vehicle is in AUTO already
     if vehicle.mode != AUTO:
         if job.is_late:
             await vehicle.hear_again()  # a pilot may have taken it since the last heartbeat
-        await vehicle.switch_to(job, AUTO, startable)
+        await command.switch_mode(AUTO, startable)
     if vehicle.authority.paused:
         await vehicle.end_stop(job, vehicle.mode)
-    await vehicle.commands.send(messages.start_mission(), vehicle.commanding(job, lambda: _held(vehicle)))
+    await vehicle.command(job).send(messages.start_mission(), lambda: _held(vehicle))
     started = vehicle.clock()
 
     def runs() -> bool | None:
@@ -91,7 +90,7 @@ async def begin(vehicle: Vehicle, job: Job, startable: Callable[[], None]) -> No
         return True if _is_active(vehicle, started) else None
 
     await vehicle.waiting.until({"HEARTBEAT", "MISSION_CURRENT"}, runs, START_TIMEOUT, "begin its mission")
-    vehicle.authority.shown(job)
+    vehicle.command(job).confirm()
 
 
 def _held(vehicle: Vehicle) -> None:

@@ -124,10 +124,11 @@ class Plane(GuidedVehicle):
         If item 1 is a landing, selecting it must not begin the landing, which would prevent arming, too. If the
         mission was cleared, only the older message ends the landing sequence.
         """
+        await self.command(job).resumed()
         if self.state.armed is False:
             self.authority.take(job, Rank.ARM)
             if flies_mission(self.mode):
-                await self.switch_to(job, GUIDED, self.require_disarmed)
+                await self.command(job).switch_mode(GUIDED, self.require_disarmed)
             await self._select_first_item(job)
         await super().arm(job, timeout)
 
@@ -139,13 +140,13 @@ class Plane(GuidedVehicle):
             if self.state.mode not in modes:
                 raise ModeChanged(f"the pilot or another client switched the vehicle to {self.mode} meanwhile")
 
-        check = self.commanding(job, check_unclaimed)
+        command = self.command(job)
         try:
-            await self.commands.send(messages.set_mission_current(1, reset=False), check)
+            await command.send(messages.set_mission_current(1, reset=False), check_unclaimed)
         except Rejected:
-            check()
-            await self.link.send(messages.select_item(self.address, 1), self.state.system)
-        check()
+            await command.post(messages.select_item(self.address, 1), check_unclaimed)
+        command.require()
+        check_unclaimed()
 
     # -- up and down --------------------------------------------------------------------------------------
 
@@ -154,6 +155,7 @@ class Plane(GuidedVehicle):
 
         It climbs in TAKEOFF, by its own parameters TKOFF_…; with `vtol` a QuadPlane climbs in GUIDED and hovers.
         """
+        await self.command(job).resumed()
         self.require_armed()
         self.require_mode(GUIDED)
         self.require_ground(job)
@@ -161,7 +163,7 @@ class Plane(GuidedVehicle):
         if vtol:
             await self.lift_off(job, alt)
         else:
-            await self.switch_to(job, TAKEOFF)
+            await self.command(job).switch_mode(TAKEOFF)
         # Read only now: a pilot may switch the mode while the vehicle is asked.
         allowed = self.allowed(CIRCLES + time_limits.leg_time(await self.limits(), 0.0, alt), timeout)
         if not vtol:
@@ -174,7 +176,7 @@ class Plane(GuidedVehicle):
             return True if level and self.state.landed is False else None
 
         await self.flown(GUIDED, {"GLOBAL_POSITION_INT"}, reached, allowed, f"reach {alt:g} m")
-        self.authority.shown(job)
+        self.command(job).confirm()
 
     async def _climb(self, job: Job, alt: float, allowed: float) -> None:
         """Climb in TAKEOFF, then circle at `alt` in GUIDED; `allowed`: s for the climb."""
@@ -189,7 +191,7 @@ class Plane(GuidedVehicle):
         await self.flown(TAKEOFF, names, has_climbed, allowed, f"climb in {TAKEOFF}")
         await self.hear_again()
         self.held_by(TAKEOFF)
-        await self.switch_to(job, GUIDED)
+        await self.command(job).switch_mode(GUIDED)
         here = self.fresh("GLOBAL_POSITION_INT")
         await self._reposition(job, GlobalTarget(here.lat / 1e7, here.lon / 1e7, alt))
 
@@ -201,23 +203,24 @@ class Plane(GuidedVehicle):
         Raises:
             Busy: the mission has no landing sequence; `land_at` makes one.
         """
-        await self.take(job, Rank.STOP)  # a waiting arm ends
+        await self.command(job).take(Rank.STOP)  # a waiting arm ends
         if await self.stays_disarmed(job):
             return
         vertical = await self.is_vtol()
         if vertical:
-            await self.switch_to(job, QLAND)
+            await self.command(job).switch_mode(QLAND)
         elif self.state.landed:
             await arming.disarm(self, job, force=False)
             return
         else:
             await self._begin_landing(job)
+        self.command(job).confirm()
         await self.landed_in(job, QLAND if vertical else AUTO, self.allowed(LANDING, timeout))
 
     async def _begin_landing(self, job: Job) -> None:
         """Jump to the mission's landing sequence. Its mission is looked at only after a refusal, to say why."""
         try:
-            await self.switch_to(job, AUTO, command=messages.start_landing())
+            await self.command(job).switch_mode(AUTO, order=messages.start_landing())
         except Rejected as refusal:
             if await self._may_have_landing():
                 raise
@@ -244,11 +247,11 @@ class Plane(GuidedVehicle):
         here = self.fresh("GLOBAL_POSITION_INT")
         place = GlobalTarget(lat, lon, alt)
         items = landing_pattern.pattern(place, (here.lat / 1e7, here.lon / 1e7), vtol=vtol)
-        await self.take(job, Rank.STOP, lambda: self.guard.require_mission(items, from_here=True))
+        await self.command(job).take(Rank.STOP, lambda: self.guard.require_mission(items, from_here=True))
         if self.mode == AUTO:  # a mission cannot change while it is flown
             await self.hold(job)
         mode = self.mode
-        await self.waypoints.upload(items, check=self.commanding(job, lambda: self.held_by(mode)))
+        await self.waypoints.upload(items, check=self.command(job).permit(lambda: self.held_by(mode)).check)
         self.guard.require_mission(items, from_here=True)  # again, because the upload has changed the mission
         await mission_flight.begin(self, job, lambda: self.held_by(mode) if self.mode != AUTO else None)
 
@@ -263,12 +266,13 @@ class Plane(GuidedVehicle):
 
     async def rtl(self, job: Job, timeout: float | None = None) -> None:
         """Return to launch; done when it circles there, or has landed if its parameters say so."""
-        await self.take(job, Rank.STOP)
+        await self.command(job).take(Rank.STOP)
         if await self.is_done_at_home(job):
             return
         lands = self.state.parameters.get("RTL_AUTOLAND") in LANDING_RETURNS
         returning = (RTL, AUTO) if lands else (RTL,)
-        await self.switch_to(job, RTL, onward=returning[1:])
+        await self.command(job).switch_mode(RTL, onward=returning[1:])
+        self.command(job).confirm()
         await self.know_home()
         near = CIRCLING * await self._radius("RTL_RADIUS")
         distance = self.distance_home() or 0.0
@@ -309,7 +313,7 @@ class Plane(GuidedVehicle):
 
         Where it cannot climb ahead (the envelope, another vehicle, no position) it circles at once.
         """
-        await self.take(job, Rank.STOP)
+        await self.command(job).take(Rank.STOP)
         if self._is_too_low_to_circle:
             since = self.state.mode_since
             with contextlib.suppress(Rejected, TimedOut, Stale, OutsideEnvelope, TooNear):
@@ -330,7 +334,7 @@ class Plane(GuidedVehicle):
             Rejected, TimedOut, OutsideEnvelope, TooNear: it does not climb, or must not go there.
         """
         away = messages.reposition(self._straight_on(), from_any_mode=True)
-        await self.switch_to(job, GUIDED, command=away)
+        await self.command(job).switch_mode(GUIDED, order=away)
 
         def has_climbed() -> bool | None:
             return True if self.height >= LOWEST_CIRCLE or self.state.landed else None
@@ -374,7 +378,7 @@ class Plane(GuidedVehicle):
         place = self._global(target)
         if place.alt < 0:
             raise Invalid(f"the target lies {-place.alt:.1f} m below home")
-        await self.take(job, Rank.MOVEMENT, self.inside(messages.reposition(place)))
+        await self.command(job).take(Rank.MOVEMENT, self.inside(messages.reposition(place)))
         await self._reposition(job, place)
         if not wait:
             return
@@ -404,7 +408,6 @@ class Plane(GuidedVehicle):
         return GlobalTarget(*moved(here.lat / 1e7, here.lon / 1e7, north, east), here.relative_alt / 1000.0 + up)
 
     async def _reposition(self, job: Job, place: GlobalTarget) -> None:
-        with self.ordering(job):
-            await self.commands.send(messages.reposition(place), self.commanding(job, self.flying))
+        await self.command(job).send(messages.reposition(place), self.flying)
         self.own_target.sent(place)
         await self.send_speeds(job, new_kind=False)

@@ -14,10 +14,9 @@ from pymavlink import mavutil
 
 from mavproxy_uavapi.core.control.authority import Rank
 from mavproxy_uavapi.core.control.jobs import Job
-from mavproxy_uavapi.core.control.start_gate import pass_gate
 from mavproxy_uavapi.core.errors import Invalid
 from mavproxy_uavapi.core.link.link import Address
-from mavproxy_uavapi.core.link.messages import Command
+from mavproxy_uavapi.core.link.messages import MavCommand
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 
 mavlink = mavutil.mavlink
@@ -30,7 +29,7 @@ LARGEST_FLOAT = 3.4028234e38  # in single precision
 
 
 @dataclass(frozen=True)
-class RawCommand(Command):
+class RawCommand(MavCommand):
     """A COMMAND_LONG or COMMAND_INT as its sender wrote it; it is sent once."""
 
     message: Any = None
@@ -91,16 +90,13 @@ async def send(vehicle: Vehicle, job: Job, message: Any) -> None:
             raise vehicle.anothers()
 
     require_not_the_pilots()
-    await vehicle.take(job, Rank.ARM)
-    check = vehicle.commanding(job, require_not_the_pilots)
+    command = vehicle.command(job)
+    await command.take(Rank.ARM)
     if message.get_type() in WITH_ACK:
-        with vehicle.ordering(job):
-            await vehicle.commands.send(RawCommand(message.command, message=message), check)
+        await command.send(RawCommand(message.command, message=message), require_not_the_pilots)
     else:
-        await pass_gate()
-        check()
-        await vehicle.link.send(message, vehicle.state.system)
-    vehicle.authority.shown(job)
+        await command.post(message, require_not_the_pilots)
+    command.confirm()
 
 
 @cache

@@ -25,10 +25,6 @@ async def reboot(vehicle: Vehicle, job: Job) -> None:
     require_disarmed()
     vehicle.authority.take(job, Rank.STOP)  # an arm that waits ends
     before = vehicle.state.reboots
-    await vehicle.commands.send(
-        messages.reboot(),
-        vehicle.commanding(job, require_disarmed),
-        shown=lambda: vehicle.state.reboots > before,
-    )
+    await vehicle.command(job).send(messages.reboot(), require_disarmed, shown=lambda: vehicle.state.reboots > before)
     names = {"HEARTBEAT", "SYSTEM_TIME", "ATTITUDE"}
     await vehicle.waiting.until(names, lambda: vehicle.state.reboots > before or None, TIMEOUT, "boot again")

@@ -92,10 +92,11 @@ class Rover(TravellingVehicle):
 
     async def rtl(self, job: Job, timeout: float | None = None) -> None:
         """Return to launch; done when it has stopped there. A disarmed rover at home has nothing to do."""
-        await self.take(job, Rank.STOP)
+        await self.command(job).take(Rank.STOP)
         if await self.is_done_at_home(job):
             return
-        await self.switch_to(job, "RTL")
+        await self.command(job).switch_mode("RTL")
+        self.command(job).confirm()
         await self.know_home()
         near = AT_HOME * await self._radius()
         expected = time_limits.leg_time(await self.limits(), self.distance_home() or 0.0, 0.0)
@@ -117,7 +118,12 @@ class Rover(TravellingVehicle):
         await self.end_waiting_arm(job)
         self.require_armed()
         await self.hold(job)
-        await self.until_it_stands(job, self.holding_mode)
+
+    async def hold(self, job: Job) -> None:
+        """Stop in HOLD; done when telemetry shows that it stands still."""
+        await self._switch_to_hold(job)
+        if self.state.armed:
+            await self.until_it_stands(job, self.holding_mode)
 
     async def come_down(self, job: Job) -> None:
         """Stop where it is."""
@@ -144,4 +150,4 @@ class Rover(TravellingVehicle):
             raise Busy(f"the vehicle is in {self.mode}, and forgets it with the next mode; `guided` first")
         self.authority.accompany(job, "reverse")
         mode = self.mode
-        await self.commands.send(messages.set_reverse(reverse), self.commanding(job, lambda: self.held_by(mode)))
+        await self.command(job).send(messages.set_reverse(reverse), lambda: self.held_by(mode))

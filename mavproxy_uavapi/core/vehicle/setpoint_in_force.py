@@ -8,12 +8,13 @@ after it, that position is outdated.
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Awaitable, Callable
 from typing import Any
 
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import TimedOut
-from mavproxy_uavapi.core.link.link import Address, Link, is_finite
+from mavproxy_uavapi.core.link.link import Address, is_finite
 from mavproxy_uavapi.core.link.message_waiter import MessageWaiter
 from mavproxy_uavapi.core.link.messages import (
     MESSAGE_IDS,
@@ -32,7 +33,9 @@ TIMEOUT = 1.0  # s for the first of the two
 LATER = 0.5  # s for the second
 
 
-async def ask(state: VehicleState, waiting: MessageWaiter, link: Link) -> GlobalTarget | VelocityTarget | None:
+async def ask(
+    state: VehicleState, waiting: MessageWaiter, post: Callable[[Any], Awaitable[None]]
+) -> GlobalTarget | VelocityTarget | None:
     """Ask for the setpoint in force; None without an answer, or if it is neither a position nor a velocity.
 
     Raises:
@@ -45,7 +48,7 @@ async def ask(state: VehicleState, waiting: MessageWaiter, link: Link) -> Global
     address = Address(state.system, state.component)
     with waiting.expecting({MOTION}, from_autopilot) as motion, waiting.expecting({PLACE}, from_autopilot) as place:
         for name in (PLACE, MOTION):
-            await link.send(request_message(MESSAGE_IDS[name]).to(address, 0), state.system)
+            await post(request_message(MESSAGE_IDS[name]).to(address, 0))
         with contextlib.suppress(TimedOut):
             velocity = velocity_of(await motion.within(TIMEOUT, f"report {MOTION}"))
             return velocity or place_of(await place.within(LATER, f"report {PLACE}"), state)

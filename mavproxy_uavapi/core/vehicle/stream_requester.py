@@ -62,7 +62,7 @@ async def request_rate(vehicle: Vehicle, name: str, rate: float) -> None:
     Raises:
         LinkLost: MAVProxy has no link.
     """
-    await vehicle.link.send(set_interval(MESSAGE_IDS[name], rate).to(vehicle.address, 0), vehicle.state.system)
+    await vehicle.post(set_interval(MESSAGE_IDS[name], rate).to(vehicle.address, 0))
 
 
 @dataclass

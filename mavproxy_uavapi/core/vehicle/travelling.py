@@ -45,7 +45,7 @@ class TravellingVehicle(GuidedVehicle):
         is busy, does not lengthen that time.
         """
         self.require_guided_flight()
-        await self.take(job, Rank.MOVEMENT, self.inside(velocity))
+        await self.command(job).take(Rank.MOVEMENT, self.inside(velocity))
         yaw = messages.facing(heading, look_at_target, velocity.vx, velocity.vy)
         job.steers = duration is not None
         await self.take_up(job, velocity, yaw)
@@ -89,16 +89,17 @@ class TravellingVehicle(GuidedVehicle):
             if self.clock() > deadline:
                 raise TimedOut(f"vehicle {self.state.system} does not stop within {REST_TIMEOUT:g} s")
             await self.send_setpoint(job, standstill)
-            self.authority.shown(job)  # from now on a newer movement may replace it
             await asyncio.sleep(REST_PERIOD)
-            if not self.stands_still:
+            if self.stands_still:
+                self.command(job).confirm()
+            else:
                 still_since = self.clock()
 
     async def until_it_stands(self, job: Job, mode: str) -> None:
         """Wait until telemetry shows that it stands still in `mode`, for the job that stops it."""
         names = {"LOCAL_POSITION_NED"}
         await self.flown(mode, names, lambda: self.stands_still or None, STOP_TIMEOUT, "stop")
-        self.authority.shown(job)
+        self.command(job).confirm()
 
     @property
     def stands_still(self) -> bool:

@@ -8,7 +8,6 @@ from mavproxy_uavapi.core.control.authority import YAW
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.link.messages import Yaw
-from mavproxy_uavapi.core.vehicle import setpoint_in_force
 from mavproxy_uavapi.core.vehicle.guided import GUIDED
 from mavproxy_uavapi.core.vehicle.travelling import TravellingVehicle
 
@@ -29,7 +28,7 @@ class TurningVehicle(TravellingVehicle):
         self.require_mode(GUIDED)
         self.require_no_takeoff()
         self.authority.accompany(job, YAW)
-        await self.commands.send(messages.yaw_to(heading), self.commanding(job, self.flying))
+        await self.command(job).send(messages.yaw_to(heading), self.flying)
         self.yaw = Yaw(heading=math.radians(heading))
 
         def turned() -> bool | None:
@@ -51,7 +50,7 @@ class TurningVehicle(TravellingVehicle):
         self.require_guided_flight()
         self.authority.accompany(job, YAW)
         asked_at = self.clock()
-        reported = await setpoint_in_force.ask(self.state, self.waiting, self.link)
+        reported = await self.ask_setpoint()
         is_outdated = self.own_target.sent_at >= asked_at  # by what has been sent meanwhile
         target = self.own_target.newest if is_outdated else self.own_target.due(reported)
         self.require_no_takeoff()

@@ -45,6 +45,7 @@ class Vehicle(Verbs):
         Raises:
             Rejected: it did not get ready, or refused; with the autopilot's reasons.
         """
+        await self.command(job).resumed()
         if self.state.armed and self.mode == "GUIDED":
             self.authority.admit(Rank.ARM)
             return
@@ -52,7 +53,7 @@ class Vehicle(Verbs):
             raise self.anothers()
         self.authority.take(job, Rank.ARM)
         await arming.arm(self, job, timeout)
-        self.authority.shown(job)
+        self.command(job).confirm()
 
     async def disarm(self, job: Job, force: bool = False) -> None:
         """Disarm and wait until a heartbeat shows it. In flight it is refused, unless `force`: then it falls.
@@ -62,9 +63,9 @@ class Vehicle(Verbs):
         """
         if self.state.armed is not False and not force and self.state.landed is False:
             raise Busy("the vehicle is flying; land it first (force=true stops its motors in the air)")
-        await self.take(job, Rank.FORCE if force else Rank.STOP)
+        await self.command(job).take(Rank.FORCE if force else Rank.STOP)
         await arming.disarm(self, job, force)
-        self.authority.shown(job)
+        self.command(job).confirm()
 
     async def stays_disarmed(self, job: Job) -> bool:
         """Whether it is disarmed, by a heartbeat that is newer than the call.
@@ -92,7 +93,7 @@ class Vehicle(Verbs):
     async def end_waiting_arm(self, job: Job) -> None:
         """End an `arm` of ours that has not shown its effect, for a verb that stops the vehicle."""
         if self.authority.on_its_way and not self.state.armed:
-            await self.take(job, Rank.STOP)
+            await self.command(job).take(Rank.STOP)
             if self.arm_is_on_its_way:
                 await arming.disarm(self, job, force=False)
 
@@ -110,10 +111,15 @@ class Vehicle(Verbs):
             self.guard.require_mission(await self.mission_to_fly(), from_here=True)
             await self.confirm_own_mode(job, since)
         stops = mode.upper() in STOPPING_MODES.union(self.holding_modes)
-        await self.take(job, Rank.STOP if stops else Rank.ARM, self.inside(switch))
+        await self.command(job).take(Rank.STOP if stops else Rank.ARM, self.inside(switch))
         if stops and self.arm_is_on_its_way:
             await arming.disarm(self, job, force=False)
-        await self.switch_to(job, mode)
+        await self.command(job).switch_mode(mode)
+        await self._finish_switch(job, mode.upper())
+        self.command(job).confirm()
+
+    async def _finish_switch(self, job: Job, mode: str) -> None:
+        """Do what a switch to that mode needs besides."""
 
     async def mission_to_fly(self) -> list[MissionItem]:
         """The stored mission, for a verb that then takes the vehicle.
@@ -144,7 +150,7 @@ class Vehicle(Verbs):
 
     async def end_stop(self, job: Job, mode: str) -> None:
         """Let a vehicle go on that `stop` holds in `mode`, unless it is stopped again meanwhile."""
-        await self.commands.send(messages.pause(False), self.commanding(job, lambda: self.require_mode(mode)))
+        await self.command(job).send(messages.pause(False), lambda: self.require_mode(mode))
         if job is not self.authority.interrupted:
             self.authority.end_pause()
 
@@ -155,9 +161,14 @@ class Vehicle(Verbs):
 
     async def hold(self, job: Job) -> None:
         """Stop and stay, whatever movement of ours it flies."""
-        await self.take(job, Rank.STOP)
+        await self._switch_to_hold(job)
+        self.command(job).confirm()
+
+    async def _switch_to_hold(self, job: Job) -> None:
+        """Switch to the holding mode; it may still move then."""
+        await self.command(job).take(Rank.STOP)
         if not self.mode == self.next_mode == self.holding_mode:
-            await self.switch_to(job, self.holding_mode)
+            await self.command(job).switch_mode(self.holding_mode)
 
     async def come_down(self, job: Job) -> None:
         """Land after the end of a flight, by the means of its type: RTL, or else its holding mode."""
@@ -238,7 +249,7 @@ class Vehicle(Verbs):
             self.speeds.remember(kind, speed)
             return False
         try:
-            await self.commands.send(change, self.commanding(job, self._require_speeds))
+            await self.command(job).send(change, self._require_speeds)
         except (ModeChanged, Rejected):
             if self.takes_speeds:
                 raise
@@ -260,7 +271,7 @@ class Vehicle(Verbs):
         """Make the current position home; the command is repeated while the estimator settles."""
         order = messages.set_home_here()
         self.authority.accompany(job, "home", Rank.ARM, allow=self.inside(order))
-        await self.commands.send(order, self.commanding(job))
+        await self.command(job).send(order)
         await self.home()
 
     async def know_home(self) -> None:
@@ -286,7 +297,7 @@ class Vehicle(Verbs):
 
     async def set_servo(self, channel: int, pwm: int) -> None:
         """Set servo output `channel` (from 1) to `pwm` microseconds."""
-        await self.commands.send(messages.set_servo(channel, pwm))
+        await self.ask(messages.set_servo(channel, pwm))
 
     async def set_sim_speedup(self, factor: float) -> None:
         """Set SIM_SPEEDUP and read it back.

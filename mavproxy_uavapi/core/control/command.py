@@ -1,0 +1,287 @@
+"""The right of one job to command one vehicle, for the job's whole life: a track or a mission has one for all its
+verbs. It is the only way to send a vehicle what moves it.
+
+    waiting -----> on its way -----> confirmed        `take` begins, `confirm` follows the whole effect
+                      |   ^             |
+                      v   |             v
+                   interrupted  (by `stop`, until `resume`)        ended: the job is over, or superseded
+
+Each message passes, in this order: the start gate; the authority: this command is in force, not interrupted; what its
+verb needs (armed, mode, the pilot); the airspace. The same checks come once more where MAVProxy's main loop writes
+the message, if anything has changed since (`Permit`).
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import replace
+from enum import Enum
+from typing import Any, Protocol
+
+from mavproxy_uavapi.core.control.authority import CommandAuthority, Rank, no_objection
+from mavproxy_uavapi.core.control.jobs import Job
+from mavproxy_uavapi.core.control.mode_switch import ModeRequests, ModeSwitch
+from mavproxy_uavapi.core.control.start_gate import pass_gate
+from mavproxy_uavapi.core.errors import ModeChanged, NotArmed, Rejected
+from mavproxy_uavapi.core.link.command_sender import CommandSender
+from mavproxy_uavapi.core.link.link import Address, Link
+from mavproxy_uavapi.core.link.message_waiter import MessageWaiter
+from mavproxy_uavapi.core.link.messages import MavCommand, set_mode
+from mavproxy_uavapi.core.mainloop.permit import ORDER_LASTS, STOP_LASTS, Permit, permitted
+from mavproxy_uavapi.core.telemetry.flight_modes import flies_mission, mode_name, mode_number
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
+
+LONGEST_PAUSE = 3600.0  # s that an interrupted job waits for `resume`
+
+Need = Callable[[], None]  # raises if the vehicle is not as a message needs it
+
+
+class CommandState(Enum):
+    """Where a command is in its life."""
+
+    WAITING = "waiting"  # it has not taken the vehicle
+    ON_ITS_WAY = "on its way"  # it has, and telemetry does not show its whole effect yet
+    CONFIRMED = "confirmed"
+    INTERRUPTED = "interrupted"  # by `stop`: it sends nothing until `resume`
+    ENDED = "ended"
+
+
+class Airspace(Protocol):
+    """Says where a vehicle may fly, and remembers what it was told."""
+
+    ordered: Any
+
+    def require(self, message: Any) -> None:
+        """Raise unless `message` keeps the vehicle in its envelope, and away from others."""
+
+    def take_up(self, ordered: Any) -> None:
+        """Set the present order."""
+
+
+class CommandedVehicle(Protocol):
+    """What a command needs of its vehicle."""
+
+    state: VehicleState
+    authority: CommandAuthority
+    mode_requests: ModeRequests
+    waiting: MessageWaiter
+    clock: Callable[[], float]
+    lands_by_mission: bool
+
+    @property
+    def airspace(self) -> Airspace:
+        """Where it may fly."""
+
+    @property
+    def address(self) -> Address:
+        """Its autopilot's MAVLink address."""
+
+    @property
+    def is_in_own_mode(self) -> bool:
+        """Whether it is in a mode that we chose or have commanded in."""
+
+    def require_own_mode(self, since: float) -> None:
+        """Raise ModeChanged if somebody else has switched its mode since."""
+
+
+class Command:
+    """See the module's text.
+
+    Args:
+        vehicle: the vehicle that it commands.
+        job: whose right it is.
+        sender, link: the ways out; nobody else has them.
+    """
+
+    def __init__(self, vehicle: CommandedVehicle, job: Job, sender: CommandSender, link: Link) -> None:
+        self._vehicle, self._job = vehicle, job
+        self._sender, self._link = sender, link
+
+    @property
+    def state(self) -> CommandState:
+        """Where it is in its life."""
+        authority = self._vehicle.authority
+        if not self._job.running:
+            return CommandState.ENDED
+        if self._job is authority.interrupted:
+            return CommandState.INTERRUPTED
+        if self._job is not authority.commander:
+            return CommandState.WAITING
+        return CommandState.ON_ITS_WAY if authority.on_its_way else CommandState.CONFIRMED
+
+    # -- the right ----------------------------------------------------------------------------------------
+
+    async def take(self, rank: Rank, allow: Need = no_objection) -> None:
+        """Make the job the commander, once all verbs that begin with it can begin, too.
+
+        Raises:
+            Aborted: one of these cannot; nothing has changed.
+            ModeChanged: its pilot has switched the mode meanwhile, and the job does not stop it.
+            Busy, Paused: as `CommandAuthority.take`. Also what `allow` raises.
+        """
+        await self.resumed()
+        vehicle = self._vehicle
+        if self._job is not vehicle.authority.commander:
+            vehicle.authority.admit(rank)
+        allow()
+        since = vehicle.state.mode_since
+        if await pass_gate():
+            if rank < Rank.STOP:
+                vehicle.require_own_mode(since)
+            allow()
+        vehicle.authority.take(self._job, rank)
+
+    async def resumed(self) -> None:
+        """Wait while `stop` interrupts the job. Each verb of a longer job begins with it.
+
+        Raises:
+            ModeChanged, NotArmed: the pilot or a failsafe took the stopped vehicle.
+            TimedOut, LinkLost.
+        """
+        authority, state = self._vehicle.authority, self._vehicle.state
+
+        def goes_on() -> bool | None:
+            if self._job is not authority.interrupted:
+                return True
+            if not state.armed:
+                raise NotArmed("the vehicle was disarmed while it was stopped")
+            if not authority.paused:
+                name = mode_name(state.vehicle_type, state.mode)
+                raise ModeChanged(f"the pilot or a failsafe switched the stopped vehicle to {name}")
+            return None
+
+        await self._vehicle.waiting.until((), goes_on, LONGEST_PAUSE, "go on")
+
+    def require(self) -> None:
+        """Raise Superseded or Paused unless the job commands."""
+        self._vehicle.authority.require(self._job)
+
+    def confirm(self) -> None:
+        """Telemetry shows the whole verb: from now on any rank supersedes it."""
+        self._vehicle.authority.confirm(self._job)
+
+    # -- sending ------------------------------------------------------------------------------------------
+
+    def permit(self, *needs: Need, message: Any = None, lasts: float | None = None) -> Permit:
+        """What a message of this command needs, until it is written.
+
+        Args:
+            needs: raise if the vehicle is not as the message needs it.
+            message: what is sent, for the airspace; it is asked anyway before the message is queued.
+            lasts: s; by default what stops the vehicle lasts longer.
+        """
+        vehicle = self._vehicle
+        stops = vehicle.authority.rank >= Rank.STOP and self._job is vehicle.authority.commander
+
+        def check() -> None:
+            self.require()
+            for need in needs:
+                need()
+
+        def check_airspace() -> None:
+            if message is not None:
+                vehicle.airspace.require(message)
+
+        return Permit(
+            lasts or (STOP_LASTS if stops else ORDER_LASTS),
+            check,
+            again=check_airspace,
+            system=vehicle.state.system,
+            basis=lambda: vehicle.authority.epoch,
+            stops=stops,
+        )
+
+    async def send(self, order: MavCommand, *needs: Need, shown: Callable[[], bool] = lambda: False) -> None:
+        """Send an order; done when the vehicle has accepted it. If it refuses, what it was told before still counts.
+
+        Args:
+            order: what to do.
+            needs: as for `permit`.
+            shown: as for `CommandSender.send`.
+
+        Raises:
+            Rejected, TimedOut, Expired, LinkLost: as `CommandSender.send`.
+            Superseded, Paused, OutsideEnvelope, TooNear, Stale: it may not be sent. Also the errors of `needs`.
+        """
+        permit = self.permit(*needs, message=order.to(self._vehicle.address, 0))
+        with self._ordering():
+            await self._sender.send(order, permit, gate=pass_gate, shown=shown)
+
+    async def send_until_shown(self, order: MavCommand, *needs: Need, shown: Callable[[], bool], action: str) -> None:
+        """As `send`, but done when a heartbeat shows it; `action` ends the sentence "vehicle 1 did not …"."""
+        permit = self.permit(*needs, message=order.to(self._vehicle.address, 0))
+        with self._ordering():
+            await self._sender.send_until_shown(order, permit, shown, action, gate=pass_gate)
+
+    async def post(self, message: Any, *needs: Need, lasts: float = ORDER_LASTS) -> None:
+        """Send a message that has no answer; done when it is written.
+
+        Raises:
+            Expired, LinkLost, Superseded, Paused, OutsideEnvelope, TooNear, Stale. Also the errors of `needs`.
+        """
+        await pass_gate()
+        permit = self.permit(*needs, message=message, lasts=lasts)
+        permit.check()
+        with permitted(permit):
+            await self._link.send(message, self._vehicle.state.system)
+
+    @contextlib.contextmanager
+    def _ordering(self) -> Iterator[None]:
+        vehicle = self._vehicle
+        before, lands = vehicle.airspace.ordered, vehicle.lands_by_mission
+        try:
+            yield
+        except Rejected:
+            if vehicle.authority.commander is self._job:
+                vehicle.airspace.take_up(before)
+                vehicle.lands_by_mission = lands
+            raise
+
+    async def switch_mode(
+        self, mode: str, *needs: Need, order: MavCommand | None = None, onward: Collection[str] = ()
+    ) -> None:
+        """Switch the flight mode, and wait until a heartbeat shows it. That alone confirms nothing.
+
+        Args:
+            mode: the mode's name.
+            needs: called before each sending; what one raises ends the switch.
+            order: what does more than switch it, such as to begin a landing; None for DO_SET_MODE.
+            onward: modes to which the autopilot may go on from that mode by itself, before a heartbeat.
+
+        Raises:
+            Invalid: no such mode.
+            ModeChanged: the pilot or a failsafe switched it meanwhile.
+            Rejected, TimedOut, Expired, LinkLost.
+        """
+        state, requests = self._vehicle.state, self._vehicle.mode_requests
+        number = mode_number(state.vehicle_type, mode)
+        goals = {number, *(mode_number(state.vehicle_type, name) for name in onward)}
+        does_more = order is not None or bool(onward)
+        switch = ModeSwitch(state, goals, requests.on_their_way(), does_more=does_more)
+
+        def switched_by_nobody_else() -> None:
+            switch.shown()
+
+        def noted() -> None:
+            requests.note(number)
+            modes = {mode_name(state.vehicle_type, goal) for goal in goals}
+            self._job.modes |= modes
+            if any(map(flies_mission, modes)):
+                self.note_mission()
+
+        checks = switched_by_nobody_else, *needs, noted
+        order = replace(order or set_mode(number), takes=True)
+        try:
+            if switch.is_ambiguous:
+                await self.send(replace(order, proven_by_ack=True), *checks, shown=switch.shown)
+                switch.count_from(self._vehicle.clock())
+            await self.send_until_shown(order, *checks, shown=switch.shown, action=f"show mode {mode.upper()}")
+        except Rejected:
+            requests.forget(number)
+            raise
+
+    def note_mission(self) -> None:
+        """Note whether the job lands the vehicle by its mission, as a plane does; before what begins it is sent."""
+        authority = self._vehicle.authority
+        self._vehicle.lands_by_mission = self._job is authority.commander and authority.rank is Rank.STOP
