@@ -21,6 +21,7 @@ from mavproxy_uavapi.core.errors import LinkLost, UavApiError
 from mavproxy_uavapi.core.link.link import Link, MavproxyLink
 from mavproxy_uavapi.core.mainloop.bridge import Bridge
 from mavproxy_uavapi.core.mainloop.link_keeper import LinkKeeper
+from mavproxy_uavapi.core.mainloop.link_loads import LinkLoads
 from mavproxy_uavapi.core.oversight.endings import FlightEndings
 from mavproxy_uavapi.core.oversight.envelope_watch import EnvelopeWatch
 from mavproxy_uavapi.core.oversight.holds import Holds
@@ -103,6 +104,7 @@ class Host:
         self._next_look = -math.inf
         self._unsent: deque[tuple[Any, int]] = deque()
         self._link_keeper = LinkKeeper(clock)
+        self._link_loads = LinkLoads()
         self._parameters = ParameterWatch()
         self._fences = FenceWatch()
 
@@ -149,6 +151,7 @@ class Host:
     def _look(self) -> None:
         self._link_keeper.turn(self._mpstate.mav_master)
         self._share_streamrate()
+        self._share_load()
         self._share_parameters()
         self._share_fences()
 
@@ -188,6 +191,12 @@ class Host:
         are_off = min(settings.streamrate, settings.streamrate2) <= 0
         if are_off != self.registry.streams_are_off:
             self.bridge.call_soon(setattr, self.registry, "streams_are_off", are_off)
+
+    def _share_load(self) -> None:
+        """Hand over whether a serial link is full, by the bytes that went over it since the last look."""
+        is_full = self._link_loads.any_is_full(self._mpstate.mav_master, self.clock())
+        if is_full != self.registry.link_is_full:
+            self.bridge.call_soon(setattr, self.registry, "link_is_full", is_full)
 
     def _share_parameters(self) -> None:
         """Hand over the parameters that MAVProxy has learnt, in order with the messages: a later PARAM_VALUE wins.

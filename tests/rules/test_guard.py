@@ -32,8 +32,8 @@ def test_every_way_to_the_link_passes_the_guard(host: Any, kind: str) -> None:
     from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 
     vehicle = CLASSES[kind](VehicleState(1, 1, 2, 0.0), host.link, host.pending, host.clock)
-    ways = vehicle.link, vehicle.commands._link, vehicle.waypoints._link, vehicle.parameters._link
-    assert all(way is vehicle.link for way in ways) and isinstance(vehicle.link, GuardedLink)
+    ways = vehicle._link, vehicle._sender._link, vehicle.waypoints._link, vehicle.parameters._link
+    assert all(way is vehicle._link for way in ways) and isinstance(vehicle._link._link, GuardedLink)
 
 
 def test_nobody_but_the_registry_is_given_the_bare_link() -> None:
@@ -94,7 +94,7 @@ def test_setpoint_of_a_kind_that_no_verb_uses_is_refused(host: Any, copter: Any,
     moded = mavlink.MAVLink_command_int_message(1, 1, 6, 192, 0, 0, -1, 1, 0, 0, 0, 0, 10)
     for message in (accelerating, offset, amsl, moded):
         with pytest.raises(OutsideEnvelope):
-            loop.run(copter.link.send(message, 1))
+            loop.run(copter.post(message))
     assert flying.setpoints() == []
 
 

@@ -336,7 +336,7 @@ class World:
     @staticmethod
     def orders_of(sent: list[Sent]) -> list[Any]:
         """The messages of these, but for the watch over the telemetry."""
-        return [m for _, m in sent if getattr(m, "command", None) not in HOUSEKEEPING]
+        return [m for _, m in sent if getattr(m, "command", None) not in HOUSEKEEPING and m.get_type() != "TIMESYNC"]
 
     def end_jobs(self) -> None:
         """End the jobs in flight, and leave the vehicle as it is."""

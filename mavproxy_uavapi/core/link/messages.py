@@ -221,6 +221,11 @@ def read_parameter(address: Address, name: str) -> Any:
     return mavlink.MAVLink_param_request_read_message(*address, name.encode(), -1)
 
 
+def time_question(address: Address, asked_at: int) -> Any:
+    """TIMESYNC: asks for the vehicle's clock; the answer repeats `asked_at` (ns of ours)."""
+    return mavlink.MAVLink_timesync_message(0, asked_at, *address)
+
+
 def set_parameter(address: Address, name: str, value: float) -> Any:
     """PARAM_SET as a REAL32; ArduPilot converts it to the parameter's own type."""
     return mavlink.MAVLink_param_set_message(*address, name.encode(), value, mavlink.MAV_PARAM_TYPE_REAL32)

@@ -25,6 +25,7 @@ class VehicleRegistry:
 
     Attributes:
         current: the system id that MAVProxy's own commands go to; 0 before it knows one.
+        link_is_full: whether a serial link of MAVProxy's has no room for what can wait.
         streams_are_off: whether the operator has MAVProxy request no streams (`streamrate` -1).
         traffic: keeps the vehicles apart.
         on_new_type: called with the former object and the new one, when a vehicle's type changes.
@@ -49,7 +50,7 @@ class VehicleRegistry:
         envelopes: Envelopes | None = None,
     ) -> None:
         self.current = 0
-        self.streams_are_off = False
+        self.link_is_full = self.streams_are_off = False
         self._fleet = fleet
         self._link = link
         self._link_watch = link_watch

@@ -5,17 +5,21 @@ first one up to 15 s late. A message that does not arrive (EXTENDED_SYS_STATE is
 SET_MESSAGE_INTERVAL. Many vehicles may share one radio. So a vehicle that nobody uses is asked once, for what the
 list of vehicles shows. If the operator has switched MAVProxy's streams off, only vehicles in use are asked, for what
 flight needs.
+
+It also asks for the vehicles' clocks (TIMESYNC), which measures the trip to each: see `Trip`.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from mavproxy_uavapi.core.errors import LinkLost
+from mavproxy_uavapi.core.errors import Expired, LinkLost
+from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.link.messages import MESSAGE_IDS, no_interval, set_interval
 from mavproxy_uavapi.core.vehicle.registry import VehicleRegistry
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
@@ -25,6 +29,8 @@ GAP = 0.05  # s from one request to the next, so that they do not fill a radio's
 MISSING_AFTER = 3.0  # s without a message until it is requested
 PAUSES = (2.0, 4.0, 8.0, 16.0)  # s from each request without effect to the next one; then there are no more
 STEADY = 30.0  # s after a request; if the message still arrives then, the request has helped
+
+COMPARE_EVERY, COMPARE_UNUSED_EVERY = 1.0, 10.0  # s between two questions for a vehicle's clock
 
 # Hz: enough for flight (positions) and for a status (the rest), and few enough for a telemetry radio.
 WANTED = {
@@ -92,11 +98,13 @@ class StreamRequester:
     def __init__(self, registry: VehicleRegistry) -> None:
         self._registry = registry
         self._watches: dict[int, StreamWatch] = {}  # by system id
+        self._compared_at: dict[int, float] = {}  # s, by system id
         self._requested: set[tuple[int, str]] = set()  # system id and name of each message that was ever requested
 
     async def run(self) -> None:
         """Watch, until cancelled."""
         while True:
+            await self._compare_clocks()
             request = next(self.due(), None)
             if request is None:
                 await asyncio.sleep(LOOK_EVERY)
@@ -111,8 +119,20 @@ class StreamRequester:
             requests[name] = RateRequests(rate)
         requests[name].at.append(vehicle.clock())
         self._requested.add((system, name))
-        with contextlib.suppress(LinkLost):
+        with contextlib.suppress(LinkLost, Expired):
             await request_rate(vehicle, name, rate)
+
+    async def _compare_clocks(self) -> None:
+        """Ask for the clocks of those whose turn it is; nothing on a serial link that is full."""
+        for vehicle in self._registry.all():
+            system, now = vehicle.state.system, vehicle.clock()
+            period = COMPARE_EVERY if self._registry.is_used(system) else COMPARE_UNUSED_EVERY
+            is_due = now - self._compared_at.get(system, -math.inf) >= period
+            if is_due and self._registry.is_alive(vehicle) and not self._registry.link_is_full:
+                self._compared_at[system] = now
+                message = messages.time_question(vehicle.address, vehicle.state.trip.ask(now))
+                with contextlib.suppress(LinkLost, Expired):
+                    await vehicle.post(message)
 
     def due(self) -> Iterator[tuple[Vehicle, str, float]]:
         """The requests that are due now, with their rate (Hz); those of vehicles that are used come first."""

@@ -38,7 +38,7 @@ class Tower:
         job = self.job(verb)
         self.authority.take(job, rank)
         if shown:
-            self.authority.shown(job)
+            self.authority.confirm(job)
         return job
 
     def switch(self, at: float) -> None:
@@ -135,7 +135,7 @@ def test_nothing_goes_beside_what_is_on_its_way(tower: Tower, rank: Rank) -> Non
 
 def test_somebody_elses_word_shows_nothing(tower: Tower) -> None:
     tower.commander(rank=Rank.STOP)
-    tower.authority.shown(tower.job("/other"))
+    tower.authority.confirm(tower.job("/other"))
     with pytest.raises(Busy):
         tower.authority.admit(Rank.MOVEMENT)
 
@@ -156,7 +156,7 @@ def test_stop_interrupts_a_movement_and_lets_none_begin(stopped: Any) -> None:
     assert authority.paused and authority.interrupted is stopped.moving and stopped.moving.running
     with pytest.raises(Paused, match="/moving ended"):
         authority.require(stopped.moving)
-    authority.shown(stopped.stopping)
+    authority.confirm(stopped.stopping)
     with pytest.raises(Paused, match="`resume`"):
         authority.admit(Rank.MOVEMENT)
     authority.admit(Rank.MOVEMENT, stopped_too=True)

@@ -12,6 +12,7 @@ from mavproxy_uavapi.core.link.command_sender import (
     IN_PROGRESS_TIMEOUT,
     LATE_ACK,
     SENDINGS,
+    CommandSender,
     result_name,
 )
 
@@ -25,12 +26,17 @@ COMMAND = messages.set_servo(1, 1500)
 
 
 @pytest.fixture
-def send(loop: Any, copter: Any) -> Any:
+def sender(host: Any, copter: Any) -> CommandSender:
+    return CommandSender(copter.state, host.link, copter.waiting)
+
+
+@pytest.fixture
+def send(loop: Any, sender: CommandSender) -> Any:
     """Send a command and wait for its end; the seconds that it took."""
 
     def send(command: Any = COMMAND, **kwargs: Any) -> float:
         started = loop.time()
-        loop.run(copter.commands.send(command, **kwargs))
+        loop.run(sender.send(command, **kwargs))
         return loop.time() - started
 
     return send
@@ -144,9 +150,11 @@ def test_ack_does_not_come_later_than_late(loop: Any, drone: Any, send: Any) -> 
     assert len(drone.commands(SERVO)) == SENDINGS + 1
 
 
-def test_command_given_up_in_flight_leaves_its_late_ack_behind(loop: Any, drone: Any, copter: Any, send: Any) -> None:
+def test_command_given_up_in_flight_leaves_its_late_ack_behind(
+    loop: Any, drone: Any, sender: CommandSender, send: Any
+) -> None:
     drone.answers[SERVO] = [None]
-    task = loop.create_task(copter.commands.send(COMMAND))
+    task = loop.create_task(sender.send(COMMAND))
     loop.pass_time(0.1)
     task.cancel()
     loop.call_later(0.2, drone.acknowledge, SERVO, DENIED)
@@ -252,11 +260,11 @@ def test_command_that_is_not_patient_is_not_repeated(drone: Any, send: Any) -> N
 
 
 def test_same_commands_go_one_after_the_other_and_different_ones_do_not_wait(
-    loop: Any, drone: Any, copter: Any
+    loop: Any, drone: Any, sender: CommandSender
 ) -> None:
     drone.answers[SERVO] = [None]
-    tasks = [loop.create_task(copter.commands.send(messages.set_servo(channel, 1500))) for channel in (1, 2)]
-    other = loop.create_task(copter.commands.send(messages.yaw_to(90)))
+    tasks = [loop.create_task(sender.send(messages.set_servo(channel, 1500))) for channel in (1, 2)]
+    other = loop.create_task(sender.send(messages.yaw_to(90)))
     loop.pass_time(1.0)
     assert [command.param1 for command in drone.commands(SERVO)] == [1]
     assert other.done()
@@ -269,10 +277,10 @@ def test_same_commands_go_one_after_the_other_and_different_ones_do_not_wait(
     assert tasks[1].result() is None
 
 
-def test_cancelled_command_lets_the_next_one_through(loop: Any, drone: Any, copter: Any) -> None:
+def test_cancelled_command_lets_the_next_one_through(loop: Any, drone: Any, sender: CommandSender) -> None:
     drone.answers[SERVO] = [None, OK]
-    first = loop.create_task(copter.commands.send(messages.set_servo(1, 1500)))
-    second = loop.create_task(copter.commands.send(messages.set_servo(2, 1500)))
+    first = loop.create_task(sender.send(messages.set_servo(1, 1500)))
+    second = loop.create_task(sender.send(messages.set_servo(2, 1500)))
     loop.pass_time(0.1)
     first.cancel()
     loop.run(second)

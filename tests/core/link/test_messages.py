@@ -10,8 +10,8 @@ from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.link.link import Address
 from mavproxy_uavapi.core.link.messages import (
     NO_YAW,
-    Command,
     GlobalTarget,
+    MavCommand,
     NedTarget,
     VelocityTarget,
     Yaw,
@@ -53,9 +53,9 @@ def params(message: Any) -> list[float]:
         (messages.request_message(242), mavlink.MAV_CMD_REQUEST_MESSAGE, [242]),
         (messages.set_interval(33, 4), mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, [33, 250_000]),
     ],
-    ids=lambda value: value.name if isinstance(value, Command) else "",
+    ids=lambda value: value.name if isinstance(value, MavCommand) else "",
 )
-def test_command_has_its_number_and_parameters(command: Command, number: int, first: list[float]) -> None:
+def test_command_has_its_number_and_parameters(command: MavCommand, number: int, first: list[float]) -> None:
     message = command.to(DRONE, 2)
     assert (message.target_system, message.target_component) == DRONE
     assert (message.command, message.confirmation) == (number, 2)
@@ -71,7 +71,7 @@ def test_only_what_is_harmless_twice_is_repeatable_and_only_set_home_is_patient(
 
 def test_command_is_named_as_in_mavlink() -> None:
     assert messages.takeoff(10).name == "NAV_TAKEOFF"
-    assert Command(65000).name == "65000"
+    assert MavCommand(65000).name == "65000"
 
 
 def test_ned_target_uses_the_position_only() -> None:

@@ -23,6 +23,25 @@ class Received(list[Any]):
         self.append((message, threading.current_thread().name))
 
 
+class Number(int):
+    """A message of no interest."""
+
+    def get_type(self) -> str:
+        return "NUMBER"
+
+
+class Word(str):
+    """Likewise."""
+
+    def get_type(self) -> str:
+        return "WORD"
+
+
+def fed(value: Any) -> Any:
+    """That value as a message."""
+    return Number(value) if isinstance(value, int) else Word(value) if isinstance(value, str) else value
+
+
 class BadMessage(Exception):
     def get_type(self) -> str:
         return "BAD"
@@ -52,7 +71,7 @@ def in_loop(bridge: Bridge) -> None:
 
 def test_fed_messages_arrive_in_order_in_the_asyncio_thread(bridge: Bridge, received: Received) -> None:
     for number in range(100):
-        bridge.feed(number)
+        bridge.feed(fed(number))
     bridge.turn()
     in_loop(bridge)
     assert received == [(number, "uavapi-loop") for number in range(100)]
@@ -62,7 +81,7 @@ def test_bad_message_does_not_stop_the_next(bridge: Bridge, received: Received) 
     defects: list[str] = []
     bridge.loop.set_exception_handler(lambda _, context: defects.append(context["message"]))
     for message in ("one", BadMessage(), "two"):
-        bridge.feed(message)
+        bridge.feed(fed(message))
     bridge.turn()
     in_loop(bridge)
     assert [message for message, _ in received] == ["one", "two"]
@@ -70,8 +89,8 @@ def test_bad_message_does_not_stop_the_next(bridge: Bridge, received: Received) 
 
 
 def test_nothing_is_handed_over_before_the_main_loops_turn_is_over(bridge: Bridge, received: Received) -> None:
-    bridge.feed("one")
-    bridge.feed("two")
+    bridge.feed(fed("one"))
+    bridge.feed(fed("two"))
     in_loop(bridge)
     assert received == []
     bridge.turn()
@@ -91,7 +110,7 @@ def test_feed_never_goes_deaf_when_the_loop_is_faster_than_the_main_loop(
 
     monkeypatch.setattr(bridge._thread, "call_soon", overtaken)
     for message in ("one", "two", "three"):
-        bridge.feed(message)
+        bridge.feed(fed(message))
         bridge.turn()
     assert [message for message, _ in received] == ["one", "two", "three"]
 
@@ -102,11 +121,11 @@ def test_messages_that_are_fed_while_others_are_delivered_come_with_the_next_tur
     hold = threading.Event()
     bridge.call_soon(hold.wait, 2.0)
     for message in ("one", "two"):  # both turns are over before the asyncio side comes to the first
-        bridge.feed(message)
+        bridge.feed(fed(message))
         bridge.turn()
     hold.set()
     in_loop(bridge)
-    bridge.feed("three")
+    bridge.feed(fed("three"))
     bridge.turn()
     in_loop(bridge)
     assert [message for message, _ in received] == ["one", "two", "three"]
@@ -114,16 +133,16 @@ def test_messages_that_are_fed_while_others_are_delivered_come_with_the_next_tur
 
 def test_what_is_to_be_sent_goes_out_between_two_messages_of_a_burst(bridge: Bridge) -> None:
     sent: list[str] = []
-    bridge.feed("one")
+    bridge.feed(fed("one"))
     bridge.post(lambda: sent.append("command"))
-    bridge.feed("two")
+    bridge.feed(fed("two"))
     assert sent == ["command"]
 
 
 def test_new_work_waits_while_the_main_loop_is_at_messages(bridge: Bridge, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("mavproxy_uavapi.core.mainloop.bridge.LONGEST_WAIT", 60.0)
     bridge.run(bridge.wait_for_main_loop())  # it is at none
-    bridge.feed("one")
+    bridge.feed(fed("one"))
     waiting = asyncio.run_coroutine_threadsafe(bridge.wait_for_main_loop(), bridge.loop)
     in_loop(bridge)
     assert not waiting.done()
@@ -132,7 +151,7 @@ def test_new_work_waits_while_the_main_loop_is_at_messages(bridge: Bridge, monke
 
 
 def test_new_work_does_not_wait_for_ever(bridge: Bridge) -> None:
-    bridge.feed("one")
+    bridge.feed(fed("one"))
     began = time.monotonic()
     bridge.run(bridge.wait_for_main_loop())
     assert time.monotonic() - began >= LONGEST_WAIT
@@ -143,7 +162,7 @@ def test_feed_after_the_end_is_dropped(mpstate: Any, received: Received) -> None
     bridge.start()
     bridge.stop()
     for number in range(3):
-        bridge.feed(number)
+        bridge.feed(fed(number))
     bridge.turn()
     assert received == []
     assert len(bridge._inbox) == 0
@@ -200,7 +219,7 @@ def test_fifty_starts_and_stops_leave_no_thread_and_no_descriptor(mpstate: Any, 
         bridge = Bridge(mpstate.select_extra, lambda message: None)
         if number % 2:
             bridge.start()
-            bridge.feed("hello")
+            bridge.feed(fed("hello"))
             bridge.turn()
         bridge.stop()
     assert threading.active_count() == threads
