@@ -101,6 +101,7 @@ class Host:
         self.closing_messages: list[Callable[[], list[tuple[Any, int]]]] = [self.endings.closing_messages]
         self._mpstate = mpstate
         self._announced_target = 0
+        self._doubled: set[int] = set()  # systems with two autopilots
         self._next_look = -math.inf
         self._unsent: deque[tuple[Any, int]] = deque()
         self._link_keeper = LinkKeeper(clock)
@@ -227,9 +228,24 @@ class Host:
             return
         self.pending.feed(state.system, message.get_type(), message)
         self.link_watch.watch(state)
+        if message.get_type() == "HEARTBEAT":
+            self._look_for_second(state, now)
         self.envelope_watch.listen(state, message)
         for listener in list(self.listeners):
             listener(state, message, now)
+
+    def _look_for_second(self, state: VehicleState, now: float) -> None:
+        """Say it once if a second autopilot with the same system id comes, or goes."""
+        if state.time_ratio.has_two_clocks(now) == (state.system in self._doubled):
+            return
+        self._doubled ^= {state.system}
+        are_two = state.system in self._doubled
+        self.warn(
+            f"two autopilots have the system id {state.system}: nothing is sent to them until there is one"
+            if are_two
+            else f"vehicle {state.system} is alone on its system id again"
+        )
+        self.tell("second_autopilot", state.system, {"present": are_two})
 
     def tell(self, name: str, system: int, info: Mapping[str, Any]) -> None:
         """Tell the observers that something has happened; the asyncio thread only."""

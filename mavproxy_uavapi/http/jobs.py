@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from typing import Any
 
+from mavproxy_uavapi.core.control.command import CommandState
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import Aborted, Busy, NotFound, UavApiError
 from mavproxy_uavapi.http.call import Call
@@ -40,6 +41,8 @@ async def abort_job(call: Call) -> dict[str, Any]:
     call.require_right(job.vehicle.state.system)
     if not job.running:
         raise Busy(f"job {job.id} ({job.verb}) has ended already")
+    if job.protects and job.vehicle.command(job).state is not CommandState.CONFIRMED:
+        raise Busy(f"job {job.id} ({job.verb}) protects the vehicle; it cannot be ended before it has done so")
     job.abort(Aborted(f"{job.verb} was aborted by DELETE /jobs/{job.id}"))
     closing = host.endings.closing(job)
     if closing is None:

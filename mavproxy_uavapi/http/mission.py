@@ -9,7 +9,6 @@ from mavproxy_uavapi.core.airspace import formats
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.errors import BadRequest, Busy, Stale
 from mavproxy_uavapi.core.mission import mission_files
-from mavproxy_uavapi.core.telemetry.flight_modes import flies_mission
 from mavproxy_uavapi.core.vehicle import mission_flight
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.http.bodies import in_time
@@ -95,7 +94,7 @@ async def progress(call: Call) -> Answer:
 
 def _require_no_flown_mission(vehicle: Vehicle) -> None:
     """Raise Busy while the vehicle flies the mission that would be changed."""
-    if vehicle.state.armed and flies_mission(vehicle.mode):
+    if vehicle.may_fly_mission:
         raise Busy("the vehicle flies its mission; /command/guided or /command/brake first")
 
 

@@ -6,6 +6,7 @@ effect, only its own rank or a higher one supersedes it; a lower one is refused.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from enum import IntEnum
 
@@ -50,6 +51,7 @@ class CommandAuthority:
         self._suspended: tuple[Job, Rank, bool] | None = None  # the commander that a pause interrupted
         self._companions: dict[str, Job] = {}  # jobs beside a movement, by kind: yaw, a speed, resume
         self._paused_at: float | None = None
+        self._knows_pause_since = state.heartbeat_at  # s; a pause from before that is nobody's knowledge
 
     # -- asking -------------------------------------------------------------------------------------------
 
@@ -57,6 +59,11 @@ class CommandAuthority:
     def paused(self) -> bool:
         """Whether `stop` holds the vehicle still."""
         return self._paused_at is not None and self._state.mode_since <= self._paused_at
+
+    @property
+    def pause_is_unknown(self) -> bool:
+        """Whether the vehicle has been in its mode since before we knew it: somebody may have paused it there."""
+        return self._state.mode_since <= self._knows_pause_since
 
     @property
     def on_its_way(self) -> bool:
@@ -188,11 +195,13 @@ class CommandAuthority:
     def begin_pause(self) -> None:
         """Note that the vehicle is held still, or is about to be."""
         self._paused_at = max(self._state.heartbeat_at, self._state.mode_since)
+        self._knows_pause_since = -math.inf
         self.epoch += 1
 
     def end_pause(self) -> None:
         """Note the end of the pause; the movement that it interrupted goes on."""
         self._paused_at = None
+        self._knows_pause_since = -math.inf
         self.epoch += 1
         if self._suspended is not None:
             self.commander, self._rank, self._shown = self._suspended

@@ -154,7 +154,8 @@ class Command:
         await self._vehicle.waiting.until((), goes_on, LONGEST_PAUSE, "go on")
 
     def require(self) -> None:
-        """Raise Superseded or Paused unless the job commands."""
+        """Raise Superseded or Paused unless the job commands; Busy if two autopilots have the vehicle's id."""
+        self._vehicle.state.require_one(self._vehicle.clock())
         self._vehicle.authority.require(self._job)
 
     def confirm(self) -> None:

@@ -47,6 +47,8 @@ class Job:
         began_at, ended_at: on the loop's clock (s); ended_at is None while it runs.
         ending: why it ended; None while it runs.
         steers: whether the job flies the vehicle by a stream of setpoints, without which the vehicle must stop.
+        protects: whether it protects its vehicle (an ending, the border, separation): nobody deletes it before
+            telemetry shows what it does.
         is_interrupted: whether it waits for the end of a `stop`.
         modes: names of the flight modes that it switched to; in any other mode the pilot has the vehicle.
         script: the session of a script that the job goes on for; None for no script.
@@ -80,7 +82,7 @@ class Job:
         self.began_at = self._loop.time()
         self.ended_at: float | None = None
         self.ending: Ending | None = None
-        self.steers = False
+        self.steers = self.protects = False
         self.is_interrupted = False
         self.modes: set[str] = set()
         self.script: str | None = None

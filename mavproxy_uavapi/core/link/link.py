@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple, Protocol
 
 from mavproxy_uavapi.core.errors import LinkLost, UavApiError
 from mavproxy_uavapi.core.mainloop.bridge import Bridge
 from mavproxy_uavapi.core.mainloop.permit import DEFAULT, Permit, permitted, present_permit
 from mavproxy_uavapi.core.sent_messages import note_sent
+from mavproxy_uavapi.core.telemetry.vehicle_state import is_finite
 
 
 class Address(NamedTuple):
@@ -16,13 +16,6 @@ class Address(NamedTuple):
 
     system: int
     component: int
-
-
-def is_finite(message: Any) -> bool:
-    """Whether every number in a message is finite."""
-    values = (getattr(message, name) for name in message.get_fieldnames())
-    numbers = (number for value in values for number in (value if isinstance(value, list | tuple) else (value,)))
-    return all(math.isfinite(number) for number in numbers if isinstance(number, float))
 
 
 def require_finite(message: Any) -> None:

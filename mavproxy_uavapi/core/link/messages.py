@@ -222,8 +222,12 @@ def read_parameter(address: Address, name: str) -> Any:
 
 
 def time_question(address: Address, asked_at: int) -> Any:
-    """TIMESYNC: asks for the vehicle's clock; the answer repeats `asked_at` (ns of ours)."""
-    return mavlink.MAVLink_timesync_message(0, asked_at, *address)
+    """TIMESYNC: asks for the vehicle's clock; the answer repeats `asked_at` (ns of ours).
+
+    MAVLink 1 has no address in it, so all vehicles answer: only that of the one that was asked counts.
+    """
+    target = address if "target_system" in mavlink.MAVLink_timesync_message.fieldnames else ()
+    return mavlink.MAVLink_timesync_message(0, asked_at, *target)
 
 
 def set_parameter(address: Address, name: str, value: float) -> Any:

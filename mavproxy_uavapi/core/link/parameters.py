@@ -13,7 +13,8 @@ from mavproxy_uavapi.core.link.link import Address, Link
 from mavproxy_uavapi.core.link.message_waiter import MessageWaiter
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
 
-MOST_REQUESTS = 2  # for a name in one boot
+MOST_REQUESTS = 2  # for a name, until it counts as absent
+ABSENT_FOR = 30.0  # s for which it does
 SET_TIMEOUT = 2.0  # s until a value is confirmed
 TIMEOUT = 1.0  # s; ArduPilot answers a known name at once and an unknown one not at all
 
@@ -27,13 +28,13 @@ class Parameters:
         self._state = state
         self._link = link
         self._waiting = waiting
-        self._requests: dict[tuple[int, str], int] = {}  # times, by boot and name
+        self._requests: dict[tuple[int, str], tuple[int, float]] = {}  # times, and the last one (s), by boot and name
 
     async def read(self, quantities: Iterable[ParameterNames]) -> dict[str, float]:
         """Values by name, of those that the vehicle has.
 
-        ArduPilot does not answer for an unknown name. A name is requested twice in a boot, because a message may be
-        lost, and then counts as absent.
+        ArduPilot does not answer for an unknown name. A name is requested twice, because a message may be lost, and
+        then counts as absent for ABSENT_FOR s: both may be lost.
 
         Args:
             quantities: the names of each quantity.
@@ -47,7 +48,7 @@ class Parameters:
                 {"PARAM_VALUE"}, lambda _: all(known.keys() & set(names) for names in missing) or None
             ) as answers:
                 for name in requested:
-                    self._requests[self._state.reboots, name] = self._count(name) + 1
+                    self._requests[self._state.reboots, name] = self._count(name) + 1, self._waiting.clock()
                     await self._link.send(messages.read_parameter(self._address, name), self._state.system)
                 with contextlib.suppress(TimedOut):
                     await answers.within(TIMEOUT, f"report {', '.join(requested)}")
@@ -98,7 +99,8 @@ class Parameters:
         return Address(self._state.system, self._state.component)
 
     def _count(self, name: str) -> int:
-        return self._requests.get((self._state.reboots, name), 0)
+        count, at = self._requests.get((self._state.reboots, name), (0, 0.0))
+        return 0 if self._waiting.clock() - at > ABSENT_FOR else count
 
 
 def _value_of(name: str) -> Callable[[Any], float | None]:

@@ -200,6 +200,7 @@ class FlightEndings:
             return f"{action} is done"
 
         job = self._jobs.begin(vehicle, f"{action} {why}", {}, body, client=client, outlives_client=True)
+        job.protects = True
         job.holder = job.operator = ""  # no client owns this flight, so no lease ends it
         vehicle.authority.take(job, Rank.STOP)  # at once, because a command that comes now is newer
         return job

@@ -19,7 +19,7 @@ from mavproxy_uavapi.core.airspace.space import TOUCH, Breach, Space, Spot, outs
 from mavproxy_uavapi.core.airspace.store import Envelopes
 from mavproxy_uavapi.core.control.authority import Rank
 from mavproxy_uavapi.core.control.jobs import Ending, Job, JobBook
-from mavproxy_uavapi.core.errors import OutsideEnvelope, Stale, TooNear, UavApiError
+from mavproxy_uavapi.core.errors import ModeChanged, OutsideEnvelope, Stale, TimedOut, TooNear, UavApiError
 from mavproxy_uavapi.core.geodesy import moved
 from mavproxy_uavapi.core.held_tasks import HeldTasks
 from mavproxy_uavapi.core.mission.mission_way import Stop
@@ -33,9 +33,11 @@ log = logging.getLogger("uavapi.copter")
 CLIENT = "envelope"  # the client of the jobs that stop vehicles
 INTERVAL = 0.25  # s between two positions, until two have arrived
 SLOWEST = 0.3  # m/s; slower than this nothing is stopped
-HOME_ASKED, HOME_PAUSE = 60, 2.0  # times that home is asked for, and s between them
+ASK_AGAIN = 30.0  # s until what a vehicle told once is asked for again: it may have changed, or been lost
+HOME_ASKED, HOME_PAUSE = 10, 2.0  # times that home is asked for, and s between them
 CORRIDOR, MISSION_CORRIDOR = 1.5, 3.0  # m beside a way that was allowed, in which the autopilot is trusted to stop
 STANDS_WITHIN = 5.0  # s more than a stop should need, until it counts as failed
+HEAR_FOR = 0.3  # s that a stop waits for a heartbeat, which it asks for; it begins so much earlier
 MARGIN = 1.0  # s more than it needs to stop, in which no vehicle comes too near to another
 
 
@@ -58,7 +60,7 @@ class EnvelopeWatch:
         self._say = say
         self._stops: dict[int, Job] = {}
         self._tasks = HeldTasks()
-        self._prepared: set[tuple[int, int]] = set()  # system ids and boots
+        self._prepared: dict[int, tuple[int, int, int]] = {}  # by system id: boots, armings and time of the questions
 
     def listen(self, state: VehicleState, message: Any) -> None:
         """A message from a vehicle."""
@@ -71,10 +73,10 @@ class EnvelopeWatch:
             self.look(vehicle)
 
     def _prepare(self, vehicle: Vehicle) -> None:
-        """Request once in each boot what the envelope needs: home, and how the vehicle stops."""
-        key = vehicle.state.system, vehicle.state.reboots
-        if key not in self._prepared:
-            self._prepared.add(key)
+        """Request what the envelope needs, home and how the vehicle stops: after each boot and arming, and again."""
+        key = vehicle.state.reboots, vehicle.state.armings, int(vehicle.clock() / ASK_AGAIN)
+        if self._prepared.get(vehicle.state.system) != key:
+            self._prepared[vehicle.state.system] = key
             self._tasks.start(self._ask(vehicle), "the questions for an envelope")
 
     @staticmethod
@@ -86,10 +88,9 @@ class EnvelopeWatch:
                 [*quantities, ("WP_LOITER_RAD",)] if vehicle.kind == "plane" else quantities
             )
         for _ in range(HOME_ASKED):
-            if "HOME_POSITION" in vehicle.state.messages:
-                return
             with contextlib.suppress(UavApiError):
                 await vehicle.home()
+                return
             await asyncio.sleep(HOME_PAUSE)
 
     async def close(self) -> None:
@@ -140,6 +141,7 @@ class EnvelopeWatch:
         async def body(job: Job) -> str:
             command = vehicle.command(job)
             await command.take(Rank.PROTECT)
+            await self._hear_pilot(vehicle)
             await command.switch_mode(mode)
             if not circles:
                 await _stand(vehicle, mode)
@@ -149,10 +151,33 @@ class EnvelopeWatch:
         job = self._jobs.begin(
             vehicle, f"brake at the {before}", {"why": deed}, body, client=CLIENT, outlives_client=True
         )
+        job.protects = True
         self._stops[system] = job
         if commander is not None:
             commander.abort(error_of(sentence), Ending.SUPERSEDED)
         job.when_ended(lambda: self._tell_failure(job, system))
+
+    async def _hear_pilot(self, vehicle: Vehicle) -> None:
+        """Ask for a heartbeat before the stop: the pilot may have taken the vehicle since the last one.
+
+        The stop begins HEAR_FOR s earlier for that. On a link that is slower nobody can wait for the answer.
+
+        Raises:
+            ModeChanged: he has it, or it does not fly for us any more.
+        """
+        asked_at, system = vehicle.clock(), vehicle.state.system
+        if hear_for(vehicle):
+            with contextlib.suppress(TimedOut):
+                await vehicle.ask_heartbeat(HEAR_FOR)
+        if not vehicle.flies_for_us:
+            raise ModeChanged(f"the pilot or a failsafe has vehicle {system}, in {vehicle.mode}")
+        if vehicle.state.heartbeat_at <= asked_at:
+            silent = asked_at - vehicle.state.heartbeat_at
+            sentence = (
+                f"vehicle {system}: the border did not leave the time to hear its pilot, silent for {silent:.1f} s"
+            )
+            log.critical("%s", sentence)
+            self._say(sentence)
 
     def _tell_failure(self, job: Job, system: int) -> None:
         if isinstance(job.error, UavApiError):
@@ -218,7 +243,13 @@ def _until_it_brakes(vehicle: Vehicle) -> float:
     """Seconds of the vehicle's clock from the newest position until a stop after the next one has an effect."""
     received = vehicle.state.messages["GLOBAL_POSITION_INT"]
     interval = INTERVAL if received.interval is None else received.interval
-    return (interval + braking.OURS) * max(vehicle.state.time_ratio.ratio, 0.1) + braking.ITS_OWN
+    ours = interval + braking.OURS + hear_for(vehicle)
+    return ours * max(vehicle.state.time_ratio.ratio, 0.1) + braking.ITS_OWN
+
+
+def hear_for(vehicle: Vehicle) -> float:
+    """Seconds for which a stop at the border waits for the pilot's heartbeat; 0 on a link that is too slow for it."""
+    return HEAR_FOR if vehicle.state.trip.deadline <= HEAR_FOR else 0.0
 
 
 def _stopping_place(vehicle: Vehicle, here: Stop, velocity: tuple[float, float, float], seconds: float) -> Stop:

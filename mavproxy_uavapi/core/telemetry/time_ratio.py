@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 REBOOT_STEP_BACK = 3000  # ms; more than any reordering between two links, less than any boot takes
 WRAP = 2**32  # ms; `time_boot_ms` wraps to 0 after 49.7 days
 WRAP_SLACK = 60_000  # ms by which the vehicle's clock may run ahead of ours over a wrap
+LATE = 3.0  # s by which a message may be overtaken
+TWO_CLOCKS_FOR = 10.0  # s after which a second clock that is silent counts as gone
 WINDOW = 5.0  # s of ours between two readings of the ratio
 # GLOBAL_POSITION_INT's time is that of the position fix, which may run behind the boot time of others.
 NOT_BOOT_TIME = {"GLOBAL_POSITION_INT"}
@@ -20,6 +24,9 @@ class TimeRatio:
         self.ratio = 1.0
         self._from: tuple[float, int] | None = None
         self._newest: tuple[float, int] | None = None  # arrival (s), ms since the boot including wraps
+        self._before: tuple[float, int] | None = None  # likewise, before the newest boot
+        self._returned_since: float | None = None  # s; since when messages of the clock before a boot come
+        self._two_clocks_at = -math.inf  # s; when the newest of them came
 
     def update(self, boot_ms: int | None, name: str, now: float) -> bool:
         """Take a message's `time_boot_ms`, arrived at `now` (s); whether it shows a reboot."""
@@ -28,11 +35,30 @@ class TimeRatio:
         uptime = self._uptime(boot_ms, now)
         rebooted = self._newest is not None and uptime + REBOOT_STEP_BACK < self._newest[1]
         if rebooted:
-            self._from = None
+            self._from, self._before, self._returned_since = None, self._newest, None
+        elif self._before is not None and self._goes_on(self._before, boot_ms, now):
+            self._before = now, boot_ms
+            self._returned_since = now if self._returned_since is None else self._returned_since
+            if now - self._returned_since >= LATE:  # what was sent before a boot comes no later
+                self._two_clocks_at = now
+            return False
         if rebooted or self._newest is None or uptime > self._newest[1]:
             self._newest = now, uptime
         self._measure(uptime, now)
         return rebooted
+
+    def has_two_clocks(self, now: float) -> bool:
+        """Whether messages of two clocks come: two autopilots have one system id."""
+        return now - self._two_clocks_at <= TWO_CLOCKS_FOR
+
+    def _goes_on(self, clock: tuple[float, int], boot_ms: int, now: float) -> bool:
+        """Whether a time goes on where that clock was, and not where the newer one is."""
+        at, before = clock
+        if self._newest is None or now - at > TWO_CLOCKS_FOR:
+            return False
+        expected = before + (now - at) * 1000 * self.ratio
+        ahead = boot_ms - self._newest[1]
+        return abs(boot_ms - expected) < REBOOT_STEP_BACK / 2 < ahead
 
     def _uptime(self, boot_ms: int, now: float) -> int:
         """The ms since the boot, including wraps.

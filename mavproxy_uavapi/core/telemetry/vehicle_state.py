@@ -10,6 +10,7 @@ from typing import Any
 
 from pymavlink import mavutil
 
+from mavproxy_uavapi.core.errors import Busy
 from mavproxy_uavapi.core.telemetry import autopilot
 from mavproxy_uavapi.core.telemetry.flight_modes import kind_of
 from mavproxy_uavapi.core.telemetry.time_ratio import NOT_BOOT_TIME, TimeRatio
@@ -27,6 +28,17 @@ CLOCKED_KEPT = 64  # messages with the vehicle's own time, of which the newest b
 CLOCKED_WITHIN = 3.0  # s before a heartbeat; an older one does not date it
 HEARTBEAT_PERIOD = 1.0  # s
 SEQUENCE_REORDER = 128  # a step back of less than this is a message out of order, not a loss
+# What flights are checked with: a message with a number that is not finite counts as not received.
+FLOWN_BY = {
+    "ATTITUDE",
+    "EKF_STATUS_REPORT",
+    "HOME_POSITION",
+    "LOCAL_POSITION_NED",
+    "PARAM_VALUE",
+    "POSITION_TARGET_GLOBAL_INT",
+    "POSITION_TARGET_LOCAL_NED",
+    "VFR_HUD",
+}
 FAILING = {mavlink.MAV_STATE_CRITICAL, mavlink.MAV_STATE_EMERGENCY}
 ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
 # What is outdated after a reboot; the rest is soon overwritten.
@@ -109,6 +121,7 @@ class VehicleState:
         mode_changes: the newest of those: arrival and mode, oldest first.
         messages: newest message by name, and by `NAME[instance]` for those that come for several devices.
         others: newest message by (component, name), of the system's other components.
+        armings: how often a heartbeat showed that it was armed; each moves home.
         parameters: values by name, from PARAM_VALUE or MAVProxy's own table. A reboot does not change them.
     """
 
@@ -126,6 +139,7 @@ class VehicleState:
     parameters: dict[str, float] = field(default_factory=dict)
     statustexts: deque[StatusText] = field(default_factory=lambda: deque(maxlen=STATUSTEXTS_KEPT))
     reboots: int = 0
+    armings: int = 0
     received: int = 0
     lost: int = 0
     time_ratio: TimeRatio = field(default_factory=TimeRatio)
@@ -169,6 +183,11 @@ class VehicleState:
     def statustexts_since(self, at: float) -> list[str]:
         """The autopilot's STATUSTEXTs since `at` (s), oldest first."""
         return [text.text for text in self.statustexts if text.at >= at]
+
+    def require_one(self, now: float) -> None:
+        """Raise Busy if two autopilots have this system id: what one of them shows is not what the other does."""
+        if self.time_ratio.has_two_clocks(now):
+            raise Busy(f"two autopilots have the system id {self.system}: change SYSID_THISMAV (MAV_SYSID) of one")
 
     def heard_since(self, at: float) -> bool:
         """Whether the newest heartbeat tells what a pilot has done until `at` (s): it arrived later.
@@ -242,6 +261,8 @@ class VehicleState:
             self._forget_what_a_reboot_changes()
         if boot_ms and name not in NOT_BOOT_TIME:
             self._clocked.append((message.get_seq(), boot_ms / 1000.0, now))
+        if name in FLOWN_BY and not is_finite(message):
+            return
         _keep(self.messages, name, message, now)
         instance = getattr(message, "_instance_field", None)
         if instance is not None:  # one message each for several batteries, compasses, servos …
@@ -253,7 +274,7 @@ class VehicleState:
         elif name == "STATUSTEXT":
             self._take_statustext(message, now)
         elif name == "PARAM_VALUE":
-            self.parameters[message.param_id] = message.param_value
+            self.parameters[message.param_id] = message.param_value  # it is finite, see `update`
         for number in [n for n, text in self._chunks.items() if now - text.heard_at > CHUNK_TIMEOUT]:
             self._say_chunked(number, now)
 
@@ -296,7 +317,10 @@ class VehicleState:
         if message.custom_mode != self.mode:
             self.mode, self.mode_since = message.custom_mode, now
             self.mode_changes.append((now, self.mode))
-        self.armed = bool(message.base_mode & ARMED)
+        was_armed, self.armed = self.armed, bool(message.base_mode & ARMED)
+        if self.armed and was_armed is False:  # ArduPilot moves home then: what it was before is unknown now
+            self.armings += 1
+            self.messages.pop("HOME_POSITION", None)
         self.system_status = message.system_status
 
     def _take_statustext(self, message: Any, now: float) -> None:
@@ -329,6 +353,13 @@ class VehicleState:
         self._chunks.clear()
         for name in FORGOTTEN_AT_REBOOT:
             self.messages.pop(name, None)
+
+
+def is_finite(message: Any) -> bool:
+    """Whether every number in a message is finite."""
+    values = (getattr(message, name) for name in message.get_fieldnames())
+    numbers = (number for value in values for number in (value if isinstance(value, list | tuple) else (value,)))
+    return all(math.isfinite(number) for number in numbers if isinstance(number, float))
 
 
 def _keep(store: dict[Any, Received], key: Any, message: Any, now: float) -> None:
@@ -364,7 +395,8 @@ class VehicleStates:
     def learn(self, parameters: Mapping[tuple[int, int], Mapping[str, float]]) -> None:
         """Take parameters by system and component, of vehicles that were heard or are yet to be."""
         for key, values in parameters.items():
-            self._parameters.setdefault(key, {}).update(values)
+            finite = {name: value for name, value in values.items() if math.isfinite(value)}
+            self._parameters.setdefault(key, {}).update(finite)
 
     def _take_candidate(self, heartbeat: Any, now: float) -> None:
         system, rank = heartbeat.get_srcSystem(), autopilot.rank(heartbeat)

@@ -16,12 +16,12 @@ from mavproxy_uavapi.core.control.authority import CommandAuthority
 from mavproxy_uavapi.core.control.command import Command
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.control.mode_switch import ModeRequests
-from mavproxy_uavapi.core.errors import ModeChanged, NotArmed, Stale
+from mavproxy_uavapi.core.errors import Busy, ModeChanged, NotArmed, Stale
 from mavproxy_uavapi.core.geodesy import offset
 from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.link.command_sender import CommandSender
 from mavproxy_uavapi.core.link.dataflash import DataflashLogs
-from mavproxy_uavapi.core.link.link import Address, BoundedLink, Link, is_finite
+from mavproxy_uavapi.core.link.link import Address, BoundedLink, Link
 from mavproxy_uavapi.core.link.message_waiter import HEARD_WITHIN, MessageWaiter
 from mavproxy_uavapi.core.link.parameters import Parameters
 from mavproxy_uavapi.core.mainloop.permit import Permit, no_check, permitted
@@ -37,7 +37,7 @@ from mavproxy_uavapi.core.telemetry.flight_modes import (
     mode_names,
 )
 from mavproxy_uavapi.core.telemetry.pending_waits import PendingWaits
-from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState, is_finite
 
 T = TypeVar("T")
 mavlink = mavutil.mavlink
@@ -195,6 +195,22 @@ class BaseVehicle:
         """
         await self.waiting.heartbeat_after(self.clock())
 
+    async def ask_heartbeat(self, seconds: float) -> None:
+        """Ask for a heartbeat, and wait for one for so many s.
+
+        Raises:
+            TimedOut, LinkLost: none comes.
+        """
+        asked_at = self.clock()
+        action = "answer with a heartbeat"
+        await self.post(messages.request_message(messages.MESSAGE_IDS["HEARTBEAT"]).to(self.address, 0))
+        await self.waiting.until({"HEARTBEAT"}, lambda: self.state.heard_since(asked_at) or None, seconds, action)
+
+    @property
+    def may_fly_mission(self) -> bool:
+        """Whether it flies its mission, or a mode in which it does has been requested and not been shown yet."""
+        return bool(self.state.armed) and (flies_mission(self.mode) or flies_mission(self.next_mode))
+
     def require_armed(self) -> None:
         """Raise NotArmed unless the vehicle is armed."""
         if not self.state.armed:
@@ -263,6 +279,8 @@ class BaseVehicle:
             self.guard.check.require_way([[self.guard.check.here(), *(Stop(p.lat, p.lon, p.alt) for p in places)]])
 
     def _allow_upload(self, items: Sequence[MissionItem]) -> None:
+        if self.may_fly_mission:
+            raise Busy("the vehicle flies its mission; /command/guided or /command/brake first")
         self.guard.require_mission(items, from_here=False)
 
     @property

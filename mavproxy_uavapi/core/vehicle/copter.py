@@ -43,6 +43,11 @@ class Copter(TurningVehicle):
         """Whether its autopilot takes a speed in the mode that it is in."""
         return self.mode in SPEED_MODES
 
+    @property
+    def pauses_in_guided(self) -> bool:
+        """See `GuidedVehicle.pauses_in_guided`."""
+        return True
+
     # -- up and down --------------------------------------------------------------------------------------
 
     async def takeoff(self, job: Job, alt: float, *, vtol: bool = False, timeout: float | None = None) -> None:
@@ -130,7 +135,8 @@ class Copter(TurningVehicle):
 
     async def _finish_switch(self, job: Job, mode: str) -> None:
         """GUIDED ends a `stop` too: the vehicle stays where it is, and takes movements again."""
-        if mode == GUIDED and self.authority.paused:
+        may_be_paused = self.authority.paused or (self.authority.pause_is_unknown and self.state.landed is False)
+        if mode == GUIDED and may_be_paused:
             if self.state.armed:
                 await self._drop_movement(job)
             await self.end_stop(job, GUIDED)

@@ -34,6 +34,7 @@ FLOOR = 0.0  # m above home: the lowest target, less TOLERANCE for the noise of 
 LIFT_OFF_TIMEOUT = 5.0  # s in which an unacknowledged takeoff must show
 ON_GROUND = messages.mavlink.MAV_LANDED_STATE_ON_GROUND
 REPEATS = 3  # times that a place is sent again if the autopilot does not report it
+MOVES_WITHIN = 2.0  # s of the vehicle's clock in which it begins to move to a target that it reports
 BEAT_TIMEOUT = 2.0  # s in which a heartbeat must come before that
 TAKING_OFF = messages.mavlink.MAV_LANDED_STATE_TAKEOFF
 
@@ -281,6 +282,7 @@ class GuidedVehicle(Vehicle):
         with contextlib.suppress(UavApiError):
             for _ in range(REPEATS):
                 if await self._is_shown_soon():
+                    await self._end_unknown_pause(job, target, require_ours)
                     return
                 await self.waiting.message({"HEARTBEAT"}, lambda beat: beat, BEAT_TIMEOUT, "report its mode")
                 require_ours()
@@ -294,6 +296,26 @@ class GuidedVehicle(Vehicle):
                 await self.command(job).post(message, require_ours, lasts=SETPOINT_LASTS)
                 self.own_target.sent_again()
                 await self.send_speeds(job, new_kind=True)
+
+    async def _end_unknown_pause(
+        self, job: Job, target: NedTarget | GlobalTarget, require_ours: Callable[[], None]
+    ) -> None:
+        """Let a vehicle go on that reports our target and does not fly there: it was paused before we knew it.
+
+        No message shows a pause in GUIDED. A restarted MAVProxy does not know of one.
+        """
+        if not self.authority.pause_is_unknown or not self.pauses_in_guided:
+            return
+        await asyncio.sleep(MOVES_WITHIN / max(self.state.time_ratio.ratio, 0.1))
+        require_ours()
+        if math.hypot(*self.leg_to(target)) > TOLERANCE and self.speed_by(target) <= ARRIVAL_SPEED:
+            log.info("vehicle %d reports its target and stands: a pause from before is ended", self.state.system)
+            await self.end_stop(job, GUIDED)
+
+    @property
+    def pauses_in_guided(self) -> bool:
+        """Whether its autopilot can be paused in GUIDED."""
+        return False
 
     async def _is_shown_soon(self) -> bool:
         names = {setpoint_in_force.PLACE}

@@ -115,8 +115,10 @@ class VehicleRegistry:
 
         Raises:
             NoVehicle, LinkLost.
+            Busy: two autopilots have its system id.
         """
         vehicle = self.find(system)
         self.use(vehicle.state.system)
         self._link_watch.require_alive(vehicle.state)
+        vehicle.state.require_one(self._clock())
         return vehicle

@@ -14,7 +14,7 @@ from typing import Any
 from pymavlink import mavutil
 
 from mavproxy_uavapi.core.errors import TimedOut
-from mavproxy_uavapi.core.link.link import Address, is_finite
+from mavproxy_uavapi.core.link.link import Address
 from mavproxy_uavapi.core.link.message_waiter import MessageWaiter
 from mavproxy_uavapi.core.link.messages import (
     MESSAGE_IDS,
@@ -24,7 +24,7 @@ from mavproxy_uavapi.core.link.messages import (
     VelocityTarget,
     request_message,
 )
-from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
+from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState, is_finite
 
 mavlink = mavutil.mavlink
 

@@ -9,7 +9,8 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavproxy_uavapi.core.errors import LinkLost, UavApiError
-from mavproxy_uavapi.core.link.link import Address, MavproxyLink, is_finite
+from mavproxy_uavapi.core.link.link import Address, MavproxyLink
+from mavproxy_uavapi.core.telemetry.vehicle_state import is_finite
 from tests.support.fake_link import FakeLink
 
 HELLO = mavlink.MAVLink_attitude_message(0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

@@ -10,6 +10,7 @@ from mavproxy_uavapi.core.airspace.guard import Ordered
 from mavproxy_uavapi.core.control.jobs import Ending
 from mavproxy_uavapi.core.errors import (
     Aborted,
+    Busy,
     LinkLost,
     ModeChanged,
     NotArmed,
