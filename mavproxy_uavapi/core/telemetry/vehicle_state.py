@@ -32,7 +32,6 @@ SEQUENCE_REORDER = 128  # a step back of less than this is a message out of orde
 FLOWN_BY = {
     "ATTITUDE",
     "EKF_STATUS_REPORT",
-    "HOME_POSITION",
     "LOCAL_POSITION_NED",
     "PARAM_VALUE",
     "POSITION_TARGET_GLOBAL_INT",
