@@ -81,6 +81,9 @@ class CommandedVehicle(Protocol):
     def is_in_own_mode(self) -> bool:
         """Whether it is in a mode that we chose or have commanded in."""
 
+    async def know_for_airspace(self) -> None:
+        """Ask for what its airspace is measured from, if it is not known."""
+
     def require_own_mode(self, since: float) -> None:
         """Raise ModeChanged if somebody else has switched its mode since."""
 
@@ -122,6 +125,8 @@ class Command:
         """
         await self.resumed()
         vehicle = self._vehicle
+        if rank < Rank.STOP:  # what stops it goes out before anything is asked
+            await vehicle.know_for_airspace()
         if self._job is not vehicle.authority.commander:
             vehicle.authority.admit(rank)
         allow()

@@ -143,13 +143,12 @@ class CommandSender:
         raise TimedOut(f"vehicle {self._state.system} did not {action} within {waited:.1f} s")
 
     async def _is_shown_since(self, sent_at: float, shown: Callable[[], bool]) -> bool:
-        """Whether the effect of a sending shows in a heartbeat that left after it arrived; waits for one.
+        """Whether the effect of a sending shows; False once a heartbeat that left after its arrival does not show it.
 
         Raises:
-            TimedOut, LinkLost: none comes; also the errors of `shown`.
+            TimedOut, LinkLost: no such heartbeat comes; also the errors of `shown`.
         """
-        await self._waiting.evidence_of(sent_at)
-        return shown()
+        return await self._waiting.evidence_of(sent_at, shown)
 
     @property
     def _trip(self) -> Trip:

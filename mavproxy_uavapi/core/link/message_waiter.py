@@ -76,14 +76,28 @@ class MessageWaiter:
         action = "send a heartbeat"
         await self.until({"HEARTBEAT"}, lambda: self.state.heard_since(since) or None, HEARD_WITHIN, action)
 
-    async def evidence_of(self, sent_at: float) -> None:
-        """Wait for a heartbeat that shows what has become of what we sent at `sent_at` (s); see `VehicleState.shows`.
+    async def evidence_of(self, sent_at: float, shown: Callable[[], bool]) -> bool:
+        """Whether `shown` holds; False once a heartbeat that left after our message's arrival does not show it.
+
+        Args:
+            sent_at: when the message was sent (s); see `VehicleState.shows`.
+            shown: looks at the state.
 
         Raises:
-            TimedOut, LinkLost: none comes.
+            TimedOut, LinkLost: no such heartbeat comes; also the errors of `shown`.
         """
-        longest = HEARD_WITHIN + self.state.trip.deadline
-        await self.until({"HEARTBEAT"}, lambda: self.state.shows(sent_at) or None, longest, "send a heartbeat")
+
+        def decided() -> bool | None:
+            return True if shown() else False if self.state.shows(sent_at) else None
+
+        while True:
+            longest = HEARD_WITHIN + self.state.trip.deadline  # it may be measured only now
+            remaining = sent_at + longest - self.clock()
+            try:
+                return await self.until({"HEARTBEAT"}, decided, max(remaining, 0.1), "send a heartbeat")
+            except TimedOut:
+                if self.state.trip.deadline + HEARD_WITHIN <= longest:
+                    raise
 
     async def until(
         self, names: Collection[str], condition: Callable[[], T | None], timeout: float, action: str

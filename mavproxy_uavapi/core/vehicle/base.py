@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import Any, TypeVar
@@ -16,7 +17,7 @@ from mavproxy_uavapi.core.control.authority import CommandAuthority
 from mavproxy_uavapi.core.control.command import Command
 from mavproxy_uavapi.core.control.jobs import Job
 from mavproxy_uavapi.core.control.mode_switch import ModeRequests
-from mavproxy_uavapi.core.errors import Busy, ModeChanged, NotArmed, Stale
+from mavproxy_uavapi.core.errors import Busy, ModeChanged, NotArmed, Stale, UavApiError
 from mavproxy_uavapi.core.geodesy import offset
 from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.link.command_sender import CommandSender
@@ -277,6 +278,12 @@ class BaseVehicle:
         """Raise OutsideEnvelope unless the straight ways from here through those places stay in the envelope."""
         if self.guard.in_force:
             self.guard.check.require_way([[self.guard.check.here(), *(Stop(p.lat, p.lon, p.alt) for p in places)]])
+
+    async def know_for_airspace(self) -> None:
+        """Ask for home if an envelope is in force and home is not known; who needs it is refused then."""
+        if self.guard.check.spaces and "HOME_POSITION" not in self.state.messages:
+            with contextlib.suppress(UavApiError):
+                await self.request("HOME_POSITION")
 
     def _allow_upload(self, items: Sequence[MissionItem]) -> None:
         if self.may_fly_mission:

@@ -56,6 +56,7 @@ class Copter(TurningVehicle):
         The tolerance is 5 % of `alt`, at least 0.3 m and at most 1 m. A copter ignores `vtol`.
         """
         await self.command(job).resumed()
+        await self.know_for_airspace()
         self.require_armed()
         self.require_mode(GUIDED)
         self.require_ground(job)

@@ -75,13 +75,12 @@ async def begin(vehicle: Vehicle, job: Job, startable: Callable[[], None]) -> No
     command = vehicle.command(job)
     await command.send(messages.set_mission_current(1), startable, command.note_mission)
     job.modes |= MISSION_MODES  # also where the vehicle is in AUTO already
-    if vehicle.mode != AUTO:
-        if job.is_late:
-            await vehicle.hear_again()  # a pilot may have taken it since the last heartbeat
-        await command.switch_mode(AUTO, startable)
+    if vehicle.mode != AUTO and job.is_late:
+        await vehicle.hear_again()  # a pilot may have taken it since the last heartbeat
+    # One order, which switches to AUTO and begins: a second one would take the vehicle from a pilot who has it by then.
+    await command.switch_mode(AUTO, startable, order=messages.start_mission())
     if vehicle.authority.paused:
         await vehicle.end_stop(job, vehicle.mode)
-    await vehicle.command(job).send(messages.start_mission(), lambda: _held(vehicle))
     started = vehicle.clock()
 
     def runs() -> bool | None:

@@ -156,6 +156,7 @@ class Plane(GuidedVehicle):
         It climbs in TAKEOFF, by its own parameters TKOFF_…; with `vtol` a QuadPlane climbs in GUIDED and hovers.
         """
         await self.command(job).resumed()
+        await self.know_for_airspace()
         self.require_armed()
         self.require_mode(GUIDED)
         self.require_ground(job)

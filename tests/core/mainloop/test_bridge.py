@@ -11,7 +11,9 @@ from typing import Any
 
 import pytest
 
-from mavproxy_uavapi.core.mainloop.bridge import LONGEST_WAIT, Bridge
+from mavproxy_uavapi.core.errors import Expired, ModeChanged
+from mavproxy_uavapi.core.mainloop.bridge import LONGEST_WAIT, READ_WITHIN, Bridge
+from mavproxy_uavapi.core.mainloop.permit import Permit, permitted
 
 
 class Received(list[Any]):
@@ -229,7 +231,9 @@ def test_fifty_starts_and_stops_leave_no_thread_and_no_descriptor(mpstate: Any, 
 FORK = """
 import os, socket, warnings
 warnings.simplefilter("ignore")
-from mavproxy_uavapi.core.mainloop.bridge import LONGEST_WAIT, Bridge
+from mavproxy_uavapi.core.errors import Expired, ModeChanged
+from mavproxy_uavapi.core.mainloop.bridge import LONGEST_WAIT, READ_WITHIN, Bridge
+from mavproxy_uavapi.core.mainloop.permit import Permit, permitted
 
 def is_open(fd):
     try:
@@ -275,3 +279,127 @@ def test_forked_child_closes_our_sockets_and_no_other() -> None:
         [sys.executable, "-c", FORK], env=environment, capture_output=True, text=True, timeout=20, check=False
     )
     assert (ended.returncode, ended.stderr) == (0, "")
+
+
+class Heartbeat:
+    """A vehicle's heartbeat."""
+
+    def get_type(self) -> str:
+        return "HEARTBEAT"
+
+    def get_srcSystem(self) -> int:
+        return 1
+
+
+class Main:
+    """A main loop turned by hand, and a message of vehicle 1 that waits for it."""
+
+    def __init__(self, loop: Any, mpstate: Any) -> None:
+        self.loop, self.written = loop, list[str]()
+        self.bridge = Bridge(mpstate.select_extra, lambda message: None, loop)
+        self.allowed, self.basis = True, 0
+
+    def check(self) -> None:
+        if not self.allowed:
+            raise ModeChanged("the pilot has it")
+
+    def send(self, name: str = "message", **fields: Any) -> asyncio.Task[None]:
+        async def send() -> None:
+            permit = Permit(check=self.check, system=1, basis=lambda: self.basis, **{"lasts": 2.0, **fields})
+            with permitted(permit):
+                await self.bridge.on_main(lambda: self.written.append(name))
+
+        task: asyncio.Task[None] = self.loop.create_task(send())
+        self.loop.settle()
+        return task
+
+    def turn(self) -> None:
+        self.bridge.turn()
+        self.loop.settle()
+
+
+@pytest.fixture
+def main(loop: Any, mpstate: Any) -> Iterator[Main]:
+    main = Main(loop, mpstate)
+    yield main
+    main.bridge._calls.close()
+
+
+def test_message_that_is_still_right_is_written_in_the_next_turn(main: Main) -> None:
+    task = main.send()
+    main.turn()
+    assert main.written == ["message"] and task.done()
+
+
+def test_heartbeat_that_came_since_the_check_has_it_checked_again_and_then_written(main: Main) -> None:
+    task = main.send()
+    main.bridge.feed(Heartbeat())
+    assert main.written == []
+    main.turn()
+    main.turn()
+    assert main.written == ["message"] and task.done()
+
+
+def test_message_that_a_heartbeat_makes_wrong_is_never_written(main: Main) -> None:
+    task = main.send()
+    main.allowed = False
+    main.bridge.feed(Heartbeat())
+    for _ in range(3):
+        main.turn()
+    assert main.written == [] and isinstance(task.exception(), ModeChanged)
+
+
+def test_message_whose_basis_changes_is_checked_again(main: Main) -> None:
+    task = main.send()
+    main.basis, main.allowed = 1, False
+    main.turn()
+    assert main.written == [] and isinstance(task.exception(), ModeChanged)
+
+
+def test_message_that_waited_is_checked_again_and_not_written_before_the_links_are_read(main: Main) -> None:
+    main.send(lasts=10.0)
+    main.loop.pass_time(4.0)
+    unread = True
+    main.bridge.links_have_unread = lambda: unread
+    for _ in range(3):
+        main.turn()
+    assert main.written == []
+    unread = False
+    main.turn()
+    assert main.written == ["message"]
+
+
+def test_link_that_is_never_empty_does_not_keep_a_late_message_for_ever(main: Main) -> None:
+    main.send(lasts=10.0)
+    main.loop.pass_time(4.0)
+    main.bridge.links_have_unread = lambda: True
+    main.turn()
+    main.loop.pass_time(READ_WITHIN)
+    main.turn()
+    assert main.written == ["message"]
+
+
+@pytest.mark.parametrize("seconds", [2.1, 60.0])
+def test_message_that_is_too_old_is_reported_while_the_main_loop_stands_and_never_written(
+    main: Main, seconds: float
+) -> None:
+    task = main.send()
+    main.loop.pass_time(seconds)
+    assert isinstance(task.exception(), Expired)
+    main.turn()
+    assert main.written == []
+
+
+def test_message_whose_sender_is_cancelled_is_never_written(main: Main) -> None:
+    task = main.send()
+    task.cancel()
+    main.loop.settle()
+    main.turn()
+    assert main.written == []
+
+
+def test_what_stops_a_vehicle_is_written_first(main: Main) -> None:
+    main.send("movement")
+    main.send("stop", stops=True)
+    main.turn()
+    assert main.written == ["stop", "movement"]

@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 from pymavlink import mavutil
 
+from mavproxy_uavapi.core.errors import Busy
 from mavproxy_uavapi.core.telemetry.vehicle_state import (
     CHUNK_TIMEOUT,
     STATUSTEXTS_KEPT,
@@ -382,3 +383,114 @@ def test_age_is_time_since_arrival(state: VehicleState, hear: Any) -> None:
     hear("attitude", at=3.0)
     assert state.age("ATTITUDE", 4.5) == 1.5
     assert state.age("VFR_HUD", 4.5) is None
+
+
+# -- what a heartbeat shows ---------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def clocked(hear: Any, state: VehicleState) -> VehicleState:
+    """A vehicle that booted at 0 s of ours, on a link of 0.5 s each way."""
+    for number in range(5):
+        asked_at = 10.0 + number
+        name = state.trip.ask(asked_at)
+        hear("timesync", at=asked_at + 1.0, tc1=int((asked_at + 0.5) * 1e9), ts1=name, sequence=number)
+    return state
+
+
+def beat(hear: Any, left: float, trip: float, number: int, **fields: Any) -> None:
+    """ATTITUDE and a heartbeat that left the vehicle at that time (s) and took `trip` s."""
+    hear("attitude", at=left + trip, time_boot_ms=int(left * 1000), sequence=number)
+    hear("heartbeat", at=left + trip, sequence=number + 1, **fields)
+
+
+def test_heartbeat_that_left_before_a_command_came_shows_nothing_of_it(hear: Any, clocked: VehicleState) -> None:
+    beat(hear, 20.0, 2.0, 10)
+    assert clocked.heartbeat_at > 21.0 and not clocked.shows(21.0)  # it arrived later, and had left before
+
+
+def test_heartbeat_that_left_after_the_command_came_shows_it(hear: Any, clocked: VehicleState) -> None:
+    beat(hear, 24.0, 0.5, 10)
+    assert clocked.shows(21.0)
+
+
+def test_without_the_vehicles_clock_two_heartbeats_after_the_longest_trip_show_it(
+    hear: Any, state: VehicleState
+) -> None:
+    state.trip.measured(1.0)
+    sent_at = 20.0
+    for at, shows in ((20.5, False), (21.5, False), (23.5, False), (24.5, True)):
+        hear("heartbeat", at=at)
+        assert state.shows(sent_at) is shows
+
+
+def test_heartbeat_that_waited_on_its_way_does_not_tell_what_the_pilot_did(hear: Any, clocked: VehicleState) -> None:
+    beat(hear, 20.0, 6.0, 10)
+    assert clocked.heartbeat_at > 25.0 and not clocked.heard_since(25.0)
+    beat(hear, 26.0, 0.5, 20)
+    assert clocked.heard_since(25.0)
+
+
+def test_heartbeat_that_was_overtaken_changes_nothing(hear: Any, clocked: VehicleState) -> None:
+    beat(hear, 20.0, 0.5, 10, mode="LOITER")
+    hear("attitude", at=20.8, time_boot_ms=19_000, sequence=6)
+    hear("heartbeat", at=20.9, sequence=7, mode="GUIDED")
+    assert clocked.mode == 5 and clocked.heartbeat_at == 20.5
+
+
+def test_arming_makes_home_unknown_until_it_is_told_again(hear: Any, state: VehicleState) -> None:
+    hear("home_position", at=2.0)
+    hear("heartbeat", at=3.0, armed=True)
+    assert "HOME_POSITION" not in state.messages and state.armings == 1
+    hear("home_position", at=3.5)
+    hear("heartbeat", at=4.0, armed=True)
+    assert "HOME_POSITION" in state.messages
+
+
+@pytest.mark.parametrize("number", [float("nan"), float("inf")])
+def test_number_that_is_not_finite_is_not_taken(hear: Any, state: VehicleState, number: float) -> None:
+    hear("attitude", at=2.0, yaw=0.5)
+    hear("attitude", at=3.0, yaw=number)
+    assert state.field("ATTITUDE", "yaw") == 0.5 and state.age("ATTITUDE", 3.0) == 1.0
+    hear("param_value", at=3.0, param_id="GUID_TIMEOUT", param_value=3.0)
+    hear("param_value", at=4.0, param_id="GUID_TIMEOUT", param_value=number)
+    assert state.parameters["GUID_TIMEOUT"] == 3.0
+
+
+def test_parameter_of_mavproxys_table_that_is_not_finite_is_not_taken(fleet: VehicleStates, hear: Any) -> None:
+    fleet.learn({(1, 1): {"GUID_TIMEOUT": float("nan"), "WPNAV_SPEED": 500.0}})
+    assert hear("heartbeat").parameters == {"WPNAV_SPEED": 500.0}
+
+
+def both(hear: Any, seconds: float, apart: float) -> None:
+    """Two autopilots with one id, whose clocks are so many s apart, talk in turns."""
+    for step in range(int(seconds / 0.25)):
+        at = 100.0 + step * 0.25
+        for clock in (at, at + apart):
+            hear("attitude", at=at, time_boot_ms=int(clock * 1000))
+
+
+@pytest.mark.parametrize("apart", [10.0, 400.0, -50.0])
+def test_two_autopilots_with_one_id_are_noticed_and_are_no_reboots(
+    hear: Any, state: VehicleState, apart: float
+) -> None:
+    both(hear, 10.0, apart)
+    assert state.reboots <= 1
+    with pytest.raises(Busy, match="two autopilots have the system id 1"):
+        state.require_one(110.0)
+
+
+def test_second_autopilot_that_falls_silent_is_forgotten(hear: Any, state: VehicleState) -> None:
+    both(hear, 10.0, 50.0)
+    for step in range(60):
+        hear("attitude", at=110.0 + step * 0.25, time_boot_ms=int((110.0 + step * 0.25) * 1000))
+    state.require_one(125.0)
+
+
+def test_reboot_with_messages_that_were_overtaken_is_one_autopilot(hear: Any, state: VehicleState) -> None:
+    hear("attitude", at=100.0, time_boot_ms=100_000)
+    for step in range(20):
+        hear("attitude", at=101.0 + step * 0.1, time_boot_ms=1000 + step * 100)
+        hear("attitude", at=101.0 + step * 0.1, time_boot_ms=100_500)
+    state.require_one(103.0)
+    assert state.reboots == 1

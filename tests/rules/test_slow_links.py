@@ -1,0 +1,91 @@
+"""The pilot wins on a slow link, too: what he has undone is not done again by a second sending."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from mavproxy_uavapi.sim.mission import Item
+from tests.support.slow_links import delay
+from tests.support.world import LEGS, PLACE, World, item_at
+
+LINKS = [(0.3, 0.3), (0.9, 0.0), (0.9, 0.9), (2.0, 2.0)]  # s each way, and s of chance
+TAKEN = [0.1, 0.8, 1.6]  # s from the effect of the command to the pilot's switch
+SWITCHES = {
+    "/command/guided": "LOITER",
+    "/command/rtl": "GUIDED",
+    "/command/land": "GUIDED",
+    "/command/brake": "GUIDED",
+    "/command/set_mode?mode=AUTO": "GUIDED",
+    "/mission/start": "GUIDED",
+}
+
+
+def items() -> list[Item]:
+    return [item_at(*PLACE), *(item_at(PLACE[0] + north, PLACE[1]) for north in LEGS)]
+
+
+@pytest.mark.parametrize("taken", TAKEN)
+@pytest.mark.parametrize("link", LINKS)
+@pytest.mark.parametrize("path", SWITCHES)
+def test_pilots_switch_after_the_effect_of_a_command_is_not_undone(
+    make_world: Any, path: str, link: tuple[float, float], taken: float
+) -> None:
+    def stage(world: World) -> None:
+        world.flying(mode=SWITCHES[path])
+        world.copter.mission.items[:] = items()
+
+    world = make_world(stage)
+    delay(world, *link)
+    world.loop.pass_time(6.0)  # the trip is measured
+    mode = SWITCHES[path]
+    wire = world.begin("POST" if "start" in path else "GET", path)
+    world.until(lambda: world.vehicle.mode.name != mode or wire.reply.done(), 0.02)
+    world.loop.pass_time(taken)
+    world.fault("pilot_mode", mode="ALT_HOLD")
+    world.loop.pass_time(5 * (sum(link) + 2.0))
+    assert world.vehicle.mode.name == "ALT_HOLD"
+    wire.hang_up()
+
+
+@pytest.mark.parametrize("taken", TAKEN)
+@pytest.mark.parametrize("link", LINKS)
+def test_vehicle_that_its_pilot_has_disarmed_is_not_armed_again(
+    make_world: Any, link: tuple[float, float], taken: float
+) -> None:
+    world = make_world(World.boot)
+    delay(world, *link)
+    world.loop.pass_time(6.0)
+    wire = world.begin("GET", "/command/arm?timeout=60")
+    world.until(lambda: world.copter.armed, 0.02)
+    world.loop.pass_time(taken)
+    world.by_hand(400, 0)
+    assert not world.copter.armed
+    world.loop.pass_time(5 * (sum(link) + 2.0))
+    assert not world.copter.armed
+    wire.hang_up()
+
+
+@pytest.mark.parametrize("link", LINKS)
+def test_lost_command_is_sent_again_and_does_its_work(make_world: Any, link: tuple[float, float]) -> None:
+    world = make_world()
+    delay(world, *link)
+    world.loop.pass_time(6.0)
+    world.fault("drop", message="COMMAND_LONG", command=176, count=1)
+    assert world.ask("GET", "/command/brake").outcome == "200"
+    assert world.vehicle.mode.name == "BRAKE"
+
+
+def test_speed_that_never_arrives_is_not_proven_by_the_second_copy_of_an_older_ack(world: Any) -> None:
+    feed = world.host.bridge.feed
+
+    def twice(message: Any) -> None:
+        feed(message)
+        if message.get_type() == "COMMAND_ACK" and message.command == 178:
+            world.loop.call_later(0.4, lambda: (feed(message), world.host.bridge.turn()))
+
+    world.host.bridge.feed = twice
+    assert world.ask("GET", "/command/set_ground_speed?new_v=3").outcome == "200"
+    world.fault("drop", message="COMMAND_LONG", command=178)
+    assert world.ask("GET", "/command/set_ground_speed?new_v=9").outcome == "504 timeout"

@@ -1,0 +1,71 @@
+"""Links that are slow, and a main loop of MAVProxy's that stands; for `World`."""
+
+from __future__ import annotations
+
+import asyncio
+import random
+from collections.abc import Callable
+from typing import Any
+
+from tests.support.world import TICK, Sent, World
+
+
+def delay(world: World, seconds: float, jitter: float = 0.0, seed: int = 1) -> None:
+    """Each message takes so many s, and up to `jitter` s more by chance: then some are overtaken."""
+    feed, chance = world.host.bridge.feed, random.Random(seed)
+
+    def lag() -> float:
+        return seconds + chance.uniform(0.0, jitter)
+
+    async def send(message: Any, _system: int) -> None:
+        await asyncio.sleep(0)
+        world.sent.append(Sent(world.loop.time(), world._as_on_the_wire(message)))
+        world.loop.call_later(lag(), lambda: world._arriving.append(message))
+
+    def arrive(message: Any) -> None:
+        feed(message)
+        world.host.bridge.turn()
+
+    world.send = send
+    world.host.bridge.feed = lambda message: world.loop.call_later(lag(), arrive, message)
+
+
+def standing(world: World) -> Callable[[bool], None]:
+    """Let what is sent go through the bridge, as MAVProxy's own link does; call it before `go_live`.
+
+    Returns:
+        Lets MAVProxy's main loop stand still (True) or go on. What the vehicle says meanwhile waits on the link.
+    """
+    stands = False
+
+    def stand(whether: bool) -> None:
+        nonlocal stands
+        stands = whether
+
+    def write(message: Any) -> None:
+        world.sent.append(Sent(world.loop.time(), world._as_on_the_wire(message)))
+        world._arriving.append(message)
+
+    async def send(message: Any, _system: int) -> None:
+        await world.host.bridge.on_main(lambda: write(message))
+
+    async def run() -> None:
+        unread: list[Any] = []
+        world.host.bridge.links_have_unread = lambda: bool(unread)
+        while True:
+            arriving, world._arriving = world._arriving, []
+            for message in arriving:
+                world._deliver(message)
+            for simulator in world.simulators:
+                simulator.step()
+            data = b"".join(cable.drain() for cable in world._cables)
+            unread += list(world._parser.parse_buffer(data) or []) if data else []
+            if not stands:
+                world.host.bridge.turn()  # the idle task comes before select()
+                while unread:
+                    world.host.bridge.feed(unread.pop(0))
+                world.host.bridge.turn()
+            await asyncio.sleep(TICK)
+
+    world.send, world._run = send, run
+    return stand
