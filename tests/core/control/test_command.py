@@ -1,0 +1,104 @@
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from mavproxy_uavapi.core.control.authority import Rank
+from mavproxy_uavapi.core.control.command import CommandState
+from mavproxy_uavapi.core.errors import Busy, ModeChanged, NotArmed, Paused, Superseded
+from mavproxy_uavapi.core.mainloop.permit import ORDER_LASTS, STOP_LASTS
+from tests.support.piloting import FAR
+
+
+@pytest.fixture
+def going(loop: Any, flying: Any, copter: Any, pilotage: Any) -> Any:
+    """A movement under way."""
+    job = pilotage.start(copter.go_to, FAR, wait=True)
+    loop.pass_time(1.0)
+    return job
+
+
+def test_command_has_the_states_of_its_jobs_life(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
+    async def body(job: Any) -> None:
+        command = copter.command(job)
+        assert command.state is CommandState.WAITING
+        await command.take(Rank.ARM)
+        assert command.state is CommandState.ON_ITS_WAY
+        command.confirm()
+        assert command.state is CommandState.CONFIRMED
+
+    job = pilotage.start(body)
+    loop.pass_time(0.1)
+    assert job.error is None and copter.command(job).state is CommandState.ENDED
+
+
+def test_command_that_stop_interrupts_goes_on_after_resume(loop: Any, copter: Any, going: Any, pilotage: Any) -> None:
+    pilotage.do(copter.stop)
+    assert copter.command(going).state is CommandState.INTERRUPTED
+    with pytest.raises(Paused):
+        copter.command(going).require()
+    pilotage.do(copter.resume)
+    assert copter.command(going).state is CommandState.ON_ITS_WAY
+
+
+@pytest.mark.parametrize("rank", Rank)
+def test_interrupted_command_takes_the_vehicle_with_no_rank_until_resume(
+    loop: Any, copter: Any, going: Any, pilotage: Any, rank: Rank
+) -> None:
+    pilotage.do(copter.stop)
+    with pytest.raises(Paused):
+        copter.authority.take(going, rank)
+    taking = loop.create_task(copter.command(going).take(rank))
+    loop.pass_time(60.0)
+    assert not taking.done()
+    pilotage.do(copter.resume)
+    loop.pass_time(2.0)
+    assert taking.done() and taking.exception() is None
+
+
+@pytest.mark.parametrize(("deed", "error"), [("pilot", ModeChanged), ("disarm", NotArmed)])
+def test_interrupted_command_ends_when_the_pilot_takes_the_stopped_vehicle(
+    loop: Any, drone: Any, copter: Any, going: Any, pilotage: Any, deed: str, error: type[Exception]
+) -> None:
+    pilotage.do(copter.stop)
+    taking = loop.create_task(copter.command(going).take(Rank.STOP))
+    loop.pass_time(1.0)
+    if deed == "pilot":
+        drone.pilot("LOITER")
+    else:
+        drone.armed = False
+    loop.pass_time(3.0)
+    assert isinstance(taking.exception(), error)
+
+
+def test_superseded_command_is_not_in_force(loop: Any, copter: Any, going: Any, pilotage: Any) -> None:
+    pilotage.start(copter.land)
+    with pytest.raises(Superseded):
+        copter.command(going).require()
+
+
+def test_nothing_is_in_force_while_two_autopilots_have_the_id(copter: Any, going: Any, monkeypatch: Any) -> None:
+    monkeypatch.setattr(copter.state.time_ratio, "has_two_clocks", lambda now: True)
+    with pytest.raises(Busy, match="two autopilots"):
+        copter.command(going).require()
+
+
+def test_permit_of_what_stops_the_vehicle_lasts_longer_and_goes_first(
+    loop: Any, copter: Any, going: Any, pilotage: Any
+) -> None:
+    movement = copter.command(going).permit()
+    stop = copter.command(pilotage.start(copter.land)).permit()
+    assert (movement.lasts, movement.stops) == (ORDER_LASTS, False)
+    assert (stop.lasts, stop.stops) == (STOP_LASTS, True)
+
+
+def test_basis_of_a_permit_changes_when_another_job_commands(
+    loop: Any, copter: Any, going: Any, pilotage: Any
+) -> None:
+    permit = copter.command(going).permit()
+    before = permit.basis()
+    pilotage.start(copter.land)
+    assert permit.basis() != before
+    with pytest.raises(Superseded):
+        permit.check()
