@@ -98,7 +98,10 @@ class Host:
         self.newest_frame: Callable[[], Awaitable[bytes]] | None = None
         self.api_address: tuple[str, int] | None = None
         self.members: list[Any] = []
-        self.closing_messages: list[Callable[[], list[tuple[Any, int]]]] = [self.endings.closing_messages]
+        self.closing_messages: list[Callable[[], list[tuple[Any, int]]]] = [
+            self.endings.closing_messages,
+            self.envelope_watch.closing_messages,
+        ]
         self._mpstate = mpstate
         self._announced_target = 0
         self._doubled: set[int] = set()  # systems with two autopilots

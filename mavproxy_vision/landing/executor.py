@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 from mavproxy_uavapi.core.control.authority import Rank
 from mavproxy_uavapi.core.control.jobs import Job
-from mavproxy_uavapi.core.errors import Conflict, LinkLost, Rejected, Stale, UavApiError
+from mavproxy_uavapi.core.errors import Conflict, Expired, LinkLost, Rejected, Stale, UavApiError
 from mavproxy_uavapi.core.mainloop.permit import SETPOINT_LASTS
 from mavproxy_uavapi.core.timeout import wait_with_timeout
 from mavproxy_uavapi.core.vehicle.copter import Copter
@@ -276,7 +276,9 @@ class TagFlight:
         """
         attitude = self.tracker.history.attitude(self.tracker.now())
         self._sent_at = self.tracker.host.clock()
-        await self.vehicle.send_setpoint(self.job, setpoint(velocity, None if attitude is None else attitude.yaw))
+        target = setpoint(velocity, None if attitude is None else attitude.yaw)
+        with contextlib.suppress(Expired):  # the next one is due soon; how old telemetry may be, the landing decides
+            await self.vehicle.send_setpoint(self.job, target)
 
     async def send_message(self, message: Any) -> None:
         """Send the vehicle a message; `pause` limits the rate.

@@ -269,12 +269,17 @@ class Drone:
         message.pack(mavlink.MAVLink(None, 255, 230))  # whatever is sent must fit into its fields
         if system != self.system:
             return
-        if message.get_type() == "TIMESYNC":  # it has no clock to tell
+        if message.get_type() == "TIMESYNC":
+            self._loop.call_later(LATENCY, self._tell_clock, message.ts1)
             return
         assert message.target_system == self.system
         self.received.append(message)
         self._arriving.append(message)
         self._loop.call_later(LATENCY, self._take_next)
+
+    def _tell_clock(self, asked_at: int) -> None:
+        if self._stream is not None and not self._stream.done():
+            self.send("timesync", tc1=round((self._loop.time() - self._booted_at) * 1e9) or 1, ts1=asked_at)
 
     def _take_next(self) -> None:
         """The messages arrive in their order, also those of one moment: a timer's is not."""
@@ -337,6 +342,9 @@ class Drone:
             return False
         if number == mavlink.MAV_CMD_DO_SET_MODE:
             self._switch(NAMES[int(message.param2)])
+            self.tell("HEARTBEAT")
+        elif number == mavlink.MAV_CMD_MISSION_START:
+            self._switch("AUTO")
             self.tell("HEARTBEAT")
         elif number == mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
             self._arm(bool(message.param1))

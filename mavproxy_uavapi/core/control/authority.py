@@ -95,10 +95,10 @@ class CommandAuthority:
             Paused: `stop` interrupts it.
             Superseded: another job commands.
         """
-        if job is self.commander or job in self._companions.values():
-            return
         if job is self.interrupted:
             raise Paused(f"{job.verb} ended: the vehicle is stopped")
+        if job is self.commander or job in self._companions.values():
+            return
         raise Superseded(f"{job.verb} was superseded")
 
     def admit(self, rank: Rank, *, stopped_too: bool = False) -> None:
@@ -179,6 +179,9 @@ class CommandAuthority:
         Raises:
             Busy, Paused: as `admit` and `Job.require_permit`. Also what `allow` raises.
         """
+        if job is self.commander:  # it commands already, and more
+            allow()
+            return
         self.admit(rank, stopped_too=stopped_too)
         job.require_permit()
         allow()

@@ -305,9 +305,9 @@ class JobBook:
         return list(self._running.values())
 
     def abort_remote(self, reason: str) -> None:
-        """End every running job that came over the network."""
+        """End every running job that came over the network; what protects a vehicle goes on."""
         for job in self.running():
-            if job.client != CONSOLE:
+            if job.client != CONSOLE and not job.protects:
                 job.abort(Aborted(f"{job.verb}: {reason}"), Ending.UNLOADED)
 
     def _forget_old(self) -> None:

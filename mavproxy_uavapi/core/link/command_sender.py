@@ -20,7 +20,7 @@ from pymavlink import mavutil
 from mavproxy_uavapi.core.errors import Rejected, TimedOut
 from mavproxy_uavapi.core.link.link import Address, Link
 from mavproxy_uavapi.core.link.message_waiter import MessageWaiter
-from mavproxy_uavapi.core.link.messages import MavCommand
+from mavproxy_uavapi.core.link.messages import MavCommand, time_question
 from mavproxy_uavapi.core.mainloop.permit import DEFAULT, Permit, permitted
 from mavproxy_uavapi.core.telemetry.trip import Trip
 from mavproxy_uavapi.core.telemetry.vehicle_state import VehicleState
@@ -117,8 +117,8 @@ class CommandSender:
     ) -> None:
         """Send `command` until a heartbeat shows that it was done.
 
-        The ack is not enough: MAVLink does not number commands, so it may belong to an earlier one. It is sent again
-        only if a heartbeat that left the vehicle later than the command could arrive does not show it.
+        The ack is not enough: MAVLink does not number commands, so it may belong to an earlier one. Only then it is
+        sent again, if a heartbeat that left the vehicle later than the command could arrive does not show it.
 
         Args:
             command: what to send.
@@ -130,6 +130,7 @@ class CommandSender:
         """
         began = self._waiting.clock()
         for number in range(len(SHOWN_WITHIN)):
+            others = len(self._outstanding(command.number))
             await self.send(command, permit, shown=shown, gate=gate)
             sent_at = self._waiting.clock()
             with contextlib.suppress(TimedOut):
@@ -137,8 +138,10 @@ class CommandSender:
                     {"HEARTBEAT"}, lambda: shown() or None, max(SHOWN_WITHIN[number], self._trip.deadline), action
                 )
                 return
-            if number < len(SHOWN_WITHIN) - 1 and await self._is_shown_since(sent_at, shown):
+            if await self._is_shown_since(sent_at, shown):
                 return
+            if not others:  # the ack was for this command: it was done, and somebody has undone it since
+                break
         waited = self._waiting.clock() - began
         raise TimedOut(f"vehicle {self._state.system} did not {action} within {waited:.1f} s")
 
@@ -148,7 +151,16 @@ class CommandSender:
         Raises:
             TimedOut, LinkLost: no such heartbeat comes; also the errors of `shown`.
         """
+        if not shown():
+            await self._ask_clock()
         return await self._waiting.evidence_of(sent_at, shown)
+
+    async def _ask_clock(self) -> None:
+        """Ask for the vehicle's clock: its answer shows that what was sent before has arrived, or is lost."""
+        address = Address(self._state.system, self._state.component)
+        question = time_question(address, self._trip.ask(self._waiting.clock()))
+        with permitted(DEFAULT):
+            await self._link.send(question, self._state.system)
 
     @property
     def _trip(self) -> Trip:

@@ -91,12 +91,12 @@ class MessageWaiter:
             return True if shown() else False if self.state.shows(sent_at) else None
 
         while True:
-            longest = HEARD_WITHIN + self.state.trip.deadline  # it may be measured only now
+            longest = HEARD_WITHIN + self.state.trip.longest  # it may be measured only now
             remaining = sent_at + longest - self.clock()
             try:
                 return await self.until({"HEARTBEAT"}, decided, max(remaining, 0.1), "send a heartbeat")
             except TimedOut:
-                if self.state.trip.deadline + HEARD_WITHIN <= longest:
+                if HEARD_WITHIN + self.state.trip.longest <= longest:
                     raise
 
     async def until(

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 import os
 import weakref
 from collections import defaultdict, deque
@@ -42,7 +43,11 @@ _bridges: weakref.WeakSet[Bridge] = weakref.WeakSet()
 
 
 class Outdated(Exception):
-    """A call was not run: its check is too old, or something has changed since."""
+    """A call was not run: something has changed since its check, or it is late, and the check too old."""
+
+    def __init__(self, *, is_late: bool, has_stood: bool) -> None:
+        super().__init__()
+        self.is_late, self.has_stood = is_late, has_stood
 
 
 class Bridge:
@@ -68,6 +73,8 @@ class Bridge:
         self._inbox: deque[Any] = deque()
         self._delivering = False  # whether `_deliver` is on its way
         self._busy = False  # whether the main loop handles messages
+        self._feeding = False  # whether it hands over one of several that it has read
+        self._turned_at = math.inf  # s; the end of its last turn
         self._waited_for = False
         self._turn_ended = asyncio.Event()
         self._calls = MainLoopQueue()
@@ -107,7 +114,9 @@ class Bridge:
         self._inbox.append(message)
         if message.get_type() == "HEARTBEAT":
             self._fed[message.get_srcSystem()] += 1
+        self._feeding = True
         self._calls.drain()
+        self._feeding = False
 
     def feed_call(self, call: Callable[[], None]) -> None:
         """Let the asyncio side run `call` between the messages fed before and after it. Main loop only."""
@@ -150,6 +159,7 @@ class Bridge:
         """Between two turns of the main loop: hand over what was fed, and run the calls of the asyncio side."""
         self._hand_over()
         self._calls.drain()
+        self._turned_at = self.loop.time()
 
     def post(self, call: Callable[[], None]) -> None:
         """Let the main loop run `call`, which must not raise, and do not wait for it. Any thread."""
@@ -165,17 +175,20 @@ class Bridge:
         """
         permit, asked_at = present_permit(), self.loop.time()
         late_since: float | None = None
+        fresh = FRESH
         while True:
             try:
-                return await self._run_on_main(call, permit, asked_at, late_since)
-            except Outdated:
-                if late_since is None and self.loop.time() - asked_at > FRESH:
+                return await self._run_on_main(call, permit, asked_at, late_since, fresh)
+            except Outdated as outdated:
+                if outdated.is_late:
+                    fresh *= 2  # a machine that is always slow sends, too
+                if outdated.has_stood or (outdated.is_late and late_since is None):
                     late_since = self.loop.time()
                 permit.check()
                 permit.again()
 
     async def _run_on_main(
-        self, call: Callable[[], T], permit: Permit, asked_at: float, late_since: float | None
+        self, call: Callable[[], T], permit: Permit, asked_at: float, late_since: float | None, fresh: float
     ) -> T:
         future: asyncio.Future[T] = self.loop.create_future()
         checked_at, basis = self.loop.time(), (self._delivered[permit.system], permit.basis())
@@ -189,9 +202,6 @@ class Bridge:
             else:
                 future.set_result(result)  # type: ignore[arg-type]
 
-        def is_outdated(now: float) -> bool:
-            is_late = late_since is None and now - checked_at > FRESH
-            return is_late or (self._fed[permit.system], permit.basis()) != basis
 
         def expire() -> None:
             if claim:
@@ -202,11 +212,13 @@ class Bridge:
             if not claim:
                 return
             now = self.loop.time()
-            if permit.system and is_outdated(now):
+            has_stood = now - max(self._turned_at, late_since or -math.inf) > fresh
+            is_late = has_stood or now - checked_at > fresh
+            if permit.system and (is_late or (self._fed[permit.system], permit.basis()) != basis):
                 self._hand_over()  # first: the check shall know all that was read
-                self._thread.call_soon(settle, None, Outdated())
+                self._thread.call_soon(settle, None, Outdated(is_late=is_late, has_stood=has_stood))
                 return
-            if late_since is not None and now - late_since < READ_WITHIN and self.links_have_unread():
+            if late_since is not None and now - late_since < READ_WITHIN and self._has_unread():
                 self._calls.put(run, urgent=permit.stops)
                 return
             try:
@@ -228,6 +240,10 @@ class Bridge:
         finally:
             claim.clear()
             timer.cancel()
+
+    def _has_unread(self) -> bool:
+        """Whether the main loop has not read all, or has not handed over all that it has read."""
+        return self._feeding or self.links_have_unread()
 
     def run(self, coroutine: Any, timeout: float = 4.0) -> Any:
         """Run a coroutine in the asyncio loop and wait for it. Any thread but the loop's own."""

@@ -93,6 +93,11 @@ class EnvelopeWatch:
                 return
             await asyncio.sleep(HOME_PAUSE)
 
+    def closing_messages(self) -> list[tuple[Any, int]]:
+        """The messages that stop the vehicles whose stop has not been shown, and the systems that they go to."""
+        running = [job.vehicle for job in self._stops.values() if job.running]
+        return [(vehicle.hold_message(), vehicle.state.system) for vehicle in running]
+
     async def close(self) -> None:
         """Cancel the requests that are not answered yet."""
         await self._tasks.end()

@@ -28,12 +28,16 @@ class TimeRatio:
         self._returned_since: float | None = None  # s; since when messages of the clock before a boot come
         self._two_clocks_at = -math.inf  # s; when the newest of them came
 
-    def update(self, boot_ms: int | None, name: str, now: float) -> bool:
-        """Take a message's `time_boot_ms`, arrived at `now` (s); whether it shows a reboot."""
+    def update(self, boot_ms: int | None, name: str, now: float, overtaken: float = 0.0) -> bool:
+        """Take a message's `time_boot_ms`, arrived at `now` (s); whether it shows a reboot.
+
+        `overtaken`: s by which a newer message may have come before it.
+        """
         if not boot_ms or name in NOT_BOOT_TIME:
             return False
         uptime = self._uptime(boot_ms, now)
-        rebooted = self._newest is not None and uptime + REBOOT_STEP_BACK < self._newest[1]
+        step_back = max(REBOOT_STEP_BACK, 1000 * overtaken)
+        rebooted = self._newest is not None and uptime + step_back < self._newest[1]
         if rebooted:
             self._from, self._before, self._returned_since = None, self._newest, None
         elif self._before is not None and self._goes_on(self._before, boot_ms, now):

@@ -16,6 +16,7 @@ from collections import deque
 from dataclasses import dataclass
 
 INITIAL = 1.0  # s; the deadline before the first measurement (RFC 6298, 2.1)
+UNMEASURED = 6.0  # s; what counts as the longest trip to a vehicle that never answers: more than a satellite's
 SHARE, DEVIATION_SHARE, DEVIATIONS = 1 / 8, 1 / 4, 4.0  # alpha, beta and K there
 GRAIN = 0.05  # s; the least that is added to the mean: a main loop's turn, and the vehicle's
 LONGEST = 30.0  # s; no link is slower
@@ -70,6 +71,11 @@ class Trip:
         self._deviation += DEVIATION_SHARE * (abs(self.mean - seconds) - self._deviation)
         self.mean += SHARE * (seconds - self.mean)
 
+    @property
+    def longest(self) -> float:
+        """s after which a message has arrived, or is lost, where no clock shows it."""
+        return max(self.deadline, UNMEASURED) if self.mean is None else self.deadline
+
     # -- clocks -------------------------------------------------------------------------------------------
 
     def ask(self, now: float) -> int:
@@ -107,12 +113,19 @@ class Trip:
     def arrived_by(self, sent_at: float, ratio: float = 1.0) -> float:
         """The vehicle's clock (s) by which a message that we sent at `sent_at` (s) has arrived, or is lost.
 
+        A question for the clock that was sent later, and was answered, arrived later, too, unless it has overtaken
+        the message. An older measurement does not tell how long the link takes now. Infinite before such an answer.
+
         Args:
             sent_at: s of ours.
             ratio: s of the vehicle's clock in a second of ours.
         """
-        best = self._best(ratio)
-        return best.vehicle_time + (sent_at - best.sent_at + max(self.deadline - best.trip, GRAIN)) * ratio
+        later = [one for one in self._comparisons if one.sent_at >= sent_at]
+        if not later:
+            return math.inf
+        first = min(later, key=lambda one: one.vehicle_time)
+        overtaking = max(self.deadline - min(one.trip for one in self._comparisons), GRAIN) - GRAIN
+        return first.vehicle_time + max(overtaking - (first.sent_at - sent_at), 0.0) * ratio
 
     def time_at(self, at: float, ratio: float = 1.0) -> float:
         """The vehicle's clock (s) at `at` (s of ours); it may be later by a trip, never earlier."""

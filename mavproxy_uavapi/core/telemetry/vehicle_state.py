@@ -216,7 +216,7 @@ class VehicleState:
             return False
         if self.heartbeat_left is not None and self.trip.knows_clock:
             return self.heartbeat_left >= self.trip.arrived_by(sent_at, self.time_ratio.ratio)
-        return self.heartbeat_before_at >= sent_at + self.trip.deadline
+        return self.heartbeat_before_at >= sent_at + self.trip.longest
 
     @property
     def landed(self) -> bool | None:
@@ -256,7 +256,7 @@ class VehicleState:
             return
         self._count_loss(message.get_seq())
         boot_ms = getattr(message, "time_boot_ms", None)
-        if self.time_ratio.update(boot_ms, name, now):
+        if self.time_ratio.update(boot_ms, name, now, self.trip.deadline):
             self._forget_what_a_reboot_changes()
         if boot_ms and name not in NOT_BOOT_TIME:
             self._clocked.append((message.get_seq(), boot_ms / 1000.0, now))

@@ -34,7 +34,7 @@ FLOOR = 0.0  # m above home: the lowest target, less TOLERANCE for the noise of 
 LIFT_OFF_TIMEOUT = 5.0  # s in which an unacknowledged takeoff must show
 ON_GROUND = messages.mavlink.MAV_LANDED_STATE_ON_GROUND
 REPEATS = 3  # times that a place is sent again if the autopilot does not report it
-MOVES_WITHIN = 2.0  # s of the vehicle's clock in which it begins to move to a target that it reports
+MOVES_WITHIN = 1.5  # s of the vehicle's clock in which it begins to move by a setpoint in force
 BEAT_TIMEOUT = 2.0  # s in which a heartbeat must come before that
 TAKING_OFF = messages.mavlink.MAV_LANDED_STATE_TAKEOFF
 
@@ -282,7 +282,9 @@ class GuidedVehicle(Vehicle):
         with contextlib.suppress(UavApiError):
             for _ in range(REPEATS):
                 if await self._is_shown_soon():
-                    await self._end_unknown_pause(job, target, require_ours)
+                    distance = math.hypot(*self.leg_to(target))
+                    if distance > TOLERANCE:
+                        await self.end_unknown_pause(job, require_ours)
                     return
                 await self.waiting.message({"HEARTBEAT"}, lambda beat: beat, BEAT_TIMEOUT, "report its mode")
                 require_ours()
@@ -297,10 +299,8 @@ class GuidedVehicle(Vehicle):
                 self.own_target.sent_again()
                 await self.send_speeds(job, new_kind=True)
 
-    async def _end_unknown_pause(
-        self, job: Job, target: NedTarget | GlobalTarget, require_ours: Callable[[], None]
-    ) -> None:
-        """Let a vehicle go on that reports our target and does not fly there: it was paused before we knew it.
+    async def end_unknown_pause(self, job: Job, require_ours: Callable[[], None]) -> None:
+        """Let a vehicle go on that should move by our setpoint and stands: it was paused before we knew it.
 
         No message shows a pause in GUIDED. A restarted MAVProxy does not know of one.
         """
@@ -308,8 +308,8 @@ class GuidedVehicle(Vehicle):
             return
         await asyncio.sleep(MOVES_WITHIN / max(self.state.time_ratio.ratio, 0.1))
         require_ours()
-        if math.hypot(*self.leg_to(target)) > TOLERANCE and self.speed_by(target) <= ARRIVAL_SPEED:
-            log.info("vehicle %d reports its target and stands: a pause from before is ended", self.state.system)
+        if self.speed_by(NedTarget(0, 0, 0)) <= ARRIVAL_SPEED:
+            log.info("vehicle %d should move and stands: a pause from before is ended", self.state.system)
             await self.end_stop(job, GUIDED)
 
     @property

@@ -77,7 +77,7 @@ async def begin(vehicle: Vehicle, job: Job, startable: Callable[[], None]) -> No
     job.modes |= MISSION_MODES  # also where the vehicle is in AUTO already
     if vehicle.mode != AUTO and job.is_late:
         await vehicle.hear_again()  # a pilot may have taken it since the last heartbeat
-    # One order, which switches to AUTO and begins: a second one would take the vehicle from a pilot who has it by then.
+    # One order, which switches to AUTO and begins: a second one would take the vehicle from a pilot who has it then.
     await command.switch_mode(AUTO, startable, order=messages.start_mission())
     if vehicle.authority.paused:
         await vehicle.end_stop(job, vehicle.mode)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
+from collections.abc import Callable
 
 from mavproxy_uavapi.core.control.authority import Rank
 from mavproxy_uavapi.core.control.jobs import Job
-from mavproxy_uavapi.core.errors import Stale, TimedOut
+from mavproxy_uavapi.core.errors import Expired, Stale, TimedOut, UavApiError
 from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.link.messages import NedTarget, Target, VelocityTarget
 from mavproxy_uavapi.core.vehicle.guided import ARRIVAL_SPEED, GuidedVehicle
@@ -49,6 +51,9 @@ class TravellingVehicle(GuidedVehicle):
         yaw = messages.facing(heading, look_at_target, velocity.vx, velocity.vy)
         job.steers = duration is not None
         await self.take_up(job, velocity, yaw)
+        if math.hypot(velocity.vx, velocity.vy, velocity.vz) > 2 * ARRIVAL_SPEED:
+            require_ours = self.command(job).require
+            self._tasks.start(self._let_go_on(job, require_ours), "the watch over a pause from before")
         if duration is None:
             return
         due = self._boot_time
@@ -59,7 +64,12 @@ class TravellingVehicle(GuidedVehicle):
             due = (self._boot_time if is_late else due) + period
             due = ends_at if due > ends_at - ROUNDING else due
             await self._travelled(due)
-            await self.send_setpoint(job, velocity if due < ends_at else self.standstill, yaw)
+            with contextlib.suppress(Expired):  # the autopilot drops the last one by itself
+                await self.send_setpoint(job, velocity if due < ends_at else self.standstill, yaw)
+
+    async def _let_go_on(self, job: Job, require_ours: Callable[[], None]) -> None:
+        with contextlib.suppress(UavApiError):
+            await self.end_unknown_pause(job, require_ours)
 
     @property
     def _boot_time(self) -> float:
@@ -88,7 +98,8 @@ class TravellingVehicle(GuidedVehicle):
         while self.clock() - still_since < REST_SHOWN:
             if self.clock() > deadline:
                 raise TimedOut(f"vehicle {self.state.system} does not stop within {REST_TIMEOUT:g} s")
-            await self.send_setpoint(job, standstill)
+            with contextlib.suppress(Expired):
+                await self.send_setpoint(job, standstill)
             await asyncio.sleep(REST_PERIOD)
             if self.stands_still:
                 self.command(job).confirm()

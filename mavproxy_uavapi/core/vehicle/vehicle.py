@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 from typing import Any
 
@@ -17,7 +16,6 @@ from mavproxy_uavapi.core.errors import (
     Rejected,
     Superseded,
     TimedOut,
-    UavApiError,
 )
 from mavproxy_uavapi.core.link import messages
 from mavproxy_uavapi.core.mission.mission_files import MissionItem
@@ -55,8 +53,7 @@ class Vehicle(Verbs):
             raise self.anothers()
         self.authority.take(job, Rank.ARM)
         await arming.arm(self, job, timeout)
-        with contextlib.suppress(UavApiError):  # who needs home, and does not know it, is refused and asks again
-            await self.know_home()
+        await self.know_for_airspace()  # arming has moved home
         self.command(job).confirm()
 
     async def disarm(self, job: Job, force: bool = False) -> None:

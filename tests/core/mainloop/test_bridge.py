@@ -373,10 +373,34 @@ def test_link_that_is_never_empty_does_not_keep_a_late_message_for_ever(main: Ma
     main.send(lasts=10.0)
     main.loop.pass_time(4.0)
     main.bridge.links_have_unread = lambda: True
-    main.turn()
-    main.loop.pass_time(READ_WITHIN)
-    main.turn()
+    for _ in range(int(READ_WITHIN / 0.05) + 2):
+        main.turn()
+        main.loop.pass_time(0.05)
     assert main.written == ["message"]
+
+
+def test_message_from_before_a_burst_is_not_written_between_its_messages(main: Main) -> None:
+    main.turn()
+    main.loop.pass_time(3.0)  # it stands
+    task = main.send(lasts=10.0)
+    for _ in range(5):
+        main.bridge.feed(Number(1))
+        main.loop.settle()
+    main.allowed = False
+    main.bridge.feed(Heartbeat())
+    for _ in range(3):
+        main.turn()
+    assert main.written == [] and isinstance(task.exception(), ModeChanged)
+
+
+def test_message_that_waits_while_the_loop_stands_a_second_time_is_checked_again(main: Main) -> None:
+    task = main.send(lasts=10.0)
+    main.loop.pass_time(3.0)
+    main.turn()
+    main.loop.pass_time(1.5)
+    main.allowed = False
+    main.turn()
+    assert main.written == [] and isinstance(task.exception(), ModeChanged)
 
 
 @pytest.mark.parametrize("seconds", [2.1, 60.0])

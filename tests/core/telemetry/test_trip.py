@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from mavproxy_uavapi.core.telemetry.trip import GRAIN, INITIAL, LONGEST, Trip
@@ -45,8 +47,10 @@ def test_arrival_is_never_dated_too_early_whichever_way_is_the_slow_one(there: f
     trip = Trip()
     for number in range(40):
         compare(trip, 100.0 + number, there, back, booted_at=40.0)
-    arrived = 200.0 + there - 40.0  # of a message that is sent at 200
-    assert arrived <= trip.arrived_by(200.0) <= arrived + 0.1
+    assert trip.arrived_by(200.0) == math.inf  # how long the link takes now nobody knows
+    compare(trip, 200.2, there, back, booted_at=40.0)
+    arrived = 200.0 + there - 40.0  # of a message that was sent at 200
+    assert arrived <= trip.arrived_by(200.0) <= arrived + 0.3
 
 
 def test_arrival_by_a_clock_that_jitters_is_never_dated_too_early() -> None:
@@ -54,7 +58,16 @@ def test_arrival_by_a_clock_that_jitters_is_never_dated_too_early() -> None:
     ways = [(0.5, 0.5), (1.0, 0.2), (0.2, 1.0), (1.0, 1.0), (0.6, 0.9)] * 3
     for number, (there, back) in enumerate(ways):
         compare(trip, 100.0 + 3 * number, there, back)
+    compare(trip, 200.1, 0.1, 0.1)  # it may have overtaken the message
     assert trip.arrived_by(200.0) >= 200.0 + 1.0
+
+
+def test_link_that_has_become_slow_is_not_judged_by_what_it_was() -> None:
+    trip = Trip()
+    for number in range(20):
+        compare(trip, 100.0 + number, 0.01, 0.01)
+    compare(trip, 121.0, 2.0, 2.0)
+    assert trip.arrived_by(120.9) >= 120.9 + 2.0
 
 
 def test_time_at_a_moment_is_never_later_than_the_vehicles() -> None:
@@ -68,7 +81,10 @@ def test_clock_of_a_simulator_at_twenty_times_counts_from_the_newest_comparison(
     for number in range(5):
         name = trip.ask(100.0 + number)
         trip.answer(name, 20 * (number + 0.1), 100.2 + number)
+    name = trip.ask(105.0)
+    trip.answer(name, 20 * 5.1, 105.2)
     assert 20 * 5.1 <= trip.arrived_by(105.0, ratio=20.0) <= 20 * 5.3
+    assert trip.time_at(106.0, ratio=20.0) == pytest.approx(20 * 5.9)
 
 
 def test_answer_to_nobodys_question_counts_for_nothing() -> None:
@@ -91,6 +107,6 @@ def test_reboot_forgets_the_clock_and_keeps_the_trip() -> None:
     trip = Trip()
     compare(trip, 1000.0, 0.1, 0.1)
     compare(trip, 1010.0, 0.1, 0.1, booted_at=1009.0)
-    assert trip.arrived_by(1010.0) < 10.0
+    assert trip.time_at(1010.0) < 10.0
     trip.forget_clock()
     assert not trip.knows_clock and trip.mean is not None

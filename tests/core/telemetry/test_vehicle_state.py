@@ -392,10 +392,14 @@ def test_age_is_time_since_arrival(state: VehicleState, hear: Any) -> None:
 def clocked(hear: Any, state: VehicleState) -> VehicleState:
     """A vehicle that booted at 0 s of ours, on a link of 0.5 s each way."""
     for number in range(5):
-        asked_at = 10.0 + number
-        name = state.trip.ask(asked_at)
-        hear("timesync", at=asked_at + 1.0, tc1=int((asked_at + 0.5) * 1e9), ts1=name, sequence=number)
+        ask_clock(hear, state, 10.0 + number, number)
     return state
+
+
+def ask_clock(hear: Any, state: VehicleState, at: float, number: int) -> None:
+    """A question for its clock, and the answer."""
+    name = state.trip.ask(at)
+    hear("timesync", at=at + 1.0, tc1=int((at + 0.5) * 1e9), ts1=name, sequence=number)
 
 
 def beat(hear: Any, left: float, trip: float, number: int, **fields: Any) -> None:
@@ -405,12 +409,15 @@ def beat(hear: Any, left: float, trip: float, number: int, **fields: Any) -> Non
 
 
 def test_heartbeat_that_left_before_a_command_came_shows_nothing_of_it(hear: Any, clocked: VehicleState) -> None:
+    ask_clock(hear, clocked, 21.1, 9)
     beat(hear, 20.0, 2.0, 10)
     assert clocked.heartbeat_at > 21.0 and not clocked.shows(21.0)  # it arrived later, and had left before
 
 
 def test_heartbeat_that_left_after_the_command_came_shows_it(hear: Any, clocked: VehicleState) -> None:
     beat(hear, 24.0, 0.5, 10)
+    assert not clocked.shows(21.0)  # as far as anybody knows
+    ask_clock(hear, clocked, 21.1, 9)
     assert clocked.shows(21.0)
 
 

@@ -48,7 +48,7 @@ def orders(drone: Any) -> list[int]:
 def test_start_is_from_the_first_item_in_auto(loop: Any, flying: Any, flight: Flight, pilotage: Any) -> None:
     job = flight.start()
     loop.pass_time(1.0)
-    expected = [mavlink.MAV_CMD_DO_SET_MISSION_CURRENT, mavlink.MAV_CMD_DO_SET_MODE, mavlink.MAV_CMD_MISSION_START]
+    expected = [mavlink.MAV_CMD_DO_SET_MISSION_CURRENT, mavlink.MAV_CMD_MISSION_START]  # which switches to AUTO
     assert orders(flying) == expected
     assert flying.commands(expected[0])[0].param1 == 1
     assert flying.mode == "AUTO"

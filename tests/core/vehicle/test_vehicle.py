@@ -82,13 +82,26 @@ def test_mode_that_somebody_elses_switch_came_before_is_not_on_its_way(
     assert copter.next_mode == "GUIDED"
 
 
-def test_mode_whose_ack_was_an_earlier_ones_is_sent_again(loop: Any, flying: Any, copter: Any, pilotage: Any) -> None:
-    flying.answers[MODE] = [(0,), (0,), None]  # acknowledged, and not obeyed: the command itself was lost
+def test_mode_that_was_accepted_and_does_not_show_is_not_sent_again(
+    loop: Any, flying: Any, copter: Any, pilotage: Any
+) -> None:
+    flying.answers[MODE] = [(0,), (0,), None]  # as if the pilot had switched back before a heartbeat
     job = pilotage.start(copter.land)
-    loop.pass_time(3.0)
-    assert len(flying.commands(MODE)) == 2 and job.running
+    loop.pass_time(30.0)
+    assert len(flying.commands(MODE)) == 1 and isinstance(job.error, TimedOut)
+
+
+def test_mode_whose_ack_may_be_an_earlier_ones_is_sent_again(
+    loop: Any, flying: Any, copter: Any, pilotage: Any
+) -> None:
+    flying.answers[MODE] = [None, (0,), (0,)]  # that of `rtl` comes when `land` has been sent, and was lost
+    pilotage.start(copter.rtl)
+    loop.pass_time(0.5)
+    job = pilotage.start(copter.land)
+    loop.pass_time(4.0)
+    assert len(flying.commands(MODE)) > 2 and job.running
     del flying.answers[MODE]
-    loop.pass_time(3.0)
+    loop.pass_time(5.0)
     assert flying.mode == "LAND"
 
 
