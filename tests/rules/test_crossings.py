@@ -87,12 +87,15 @@ def test_switch_is_not_repeated_over_the_pilots(make_world: Any, path: str) -> N
 
 
 @pytest.mark.parametrize("path", ["brake", "set_mode?mode=brake"])
-def test_what_stops_is_sent_again_though_nothing_is_heard(world: World, path: str) -> None:
+def test_what_stops_is_sent_again_as_soon_as_its_pilot_is_heard(world: World, path: str) -> None:
     world.ask("POST", "/movement/go_to_ned", FAR)
     world.loop.pass_time(3.0)
     world.hears = lambda message: message.get_type() not in MUTE
     world.uplink_until = world.loop.time() + 0.1  # the first packet is lost
     world.begin("GET", f"/command/{path}")
+    world.loop.pass_time(3.0)
+    assert world.copter.mode.name == "GUIDED"  # unheard, he may have it
+    world.hears = lambda message: True
     world.loop.pass_time(4.0)
     assert world.copter.mode.name == "BRAKE" and speed(world) < 0.3
 

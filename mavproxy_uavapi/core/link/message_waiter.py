@@ -90,9 +90,10 @@ class MessageWaiter:
         def decided() -> bool | None:
             return True if shown() else False if self.state.shows(sent_at) else None
 
+        began = self.clock()
         while True:
             longest = HEARD_WITHIN + self.state.trip.longest  # it may be measured only now
-            remaining = sent_at + longest - self.clock()
+            remaining = began + longest - self.clock()
             try:
                 return await self.until({"HEARTBEAT"}, decided, max(remaining, 0.1), "send a heartbeat")
             except TimedOut:
