@@ -212,7 +212,7 @@ class Tokens:
 
     def __init__(self, warn: Callable[[str], None]) -> None:
         self._warn = warn
-        self._file = WatchedFile()
+        self._file = WatchedFile(warn)
         self._tokens: list[Token] = []
         self._uses: dict[object, tuple[Token, Callable[[], None]]] = {}
 

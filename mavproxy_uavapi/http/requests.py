@@ -216,6 +216,12 @@ class ScriptLog(Request):
     follow: Annotated[bool, Field(description="as Server-Sent Events, until the run ends")] = False
 
 
+class PutEnvelope(Request):
+    """`preview`: read it and show it, but put nothing in force."""
+
+    preview: Annotated[bool, Field(description="read it and show it, but put nothing in force")] = False
+
+
 class UploadedFile(Request):
     """What the audit trail has of a file: its name, if it came with one, and the hash of its contents."""
 
