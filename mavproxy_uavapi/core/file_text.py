@@ -32,8 +32,8 @@ NARROW = re.compile(
 def text_of(data: bytes, what: str) -> str:
     """The text of a file or a body; `what` begins the errors: "the mission", or a path.
 
-    UTF-8, UTF-16 with a byte order mark or without, and what XML declares. A declaration that the bytes contradict does
-    not count: some programs declare utf-16 and write UTF-8.
+    UTF-8, UTF-16 with a byte order mark or without, and what XML declares. A declaration that the bytes contradict
+    does not count: some programs declare utf-16 and write UTF-8.
 
     Raises:
         BadRequest: it is not text, or of an encoding that is not known; it names the line and the column.
