@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections import Counter
 from typing import Any
@@ -41,6 +42,11 @@ def json_of(text: str, what: str) -> Any:
     if HALF.search(text):
         _require_characters(value, what)
     return value
+
+
+def is_finite_number(value: Any) -> bool:
+    """Whether it is a number that a float can hold; true and false are none."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def shown(value: Any) -> str:

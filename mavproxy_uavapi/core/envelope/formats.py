@@ -14,7 +14,7 @@ from mavproxy_uavapi.core.envelope.words import kind_of, require_no_limit
 from mavproxy_uavapi.core.errors import BadRequest, Invalid
 from mavproxy_uavapi.core.strict_json import json_of, shown
 
-__all__ = ["EMPTY", "HEIGHTS", "geojson", "of_fence", "of_geojson", "read"]
+__all__ = ["EMPTY", "HEIGHTS", "geojson", "fence_of_plan", "of_fence", "of_geojson", "read"]
 
 mavlink = mavutil.mavlink
 
@@ -51,7 +51,10 @@ def read(text: str, source: str) -> Envelope:
         raise BadRequest(f"{FORMATS}; this begins with {shown(text[:20])}")
     body = json_of(text, "the envelope")
     if body.get("fileType") == "Plan" or "geoFence" in body:
-        return _of_plan(body.get("geoFence"), source)
+        fence = fence_of_plan(body.get("geoFence", {}), source)
+        if fence is None:
+            raise Invalid("the .plan file draws no fence", "geoFence")
+        return fence
     if "type" not in body:
         raise BadRequest(FORMATS)
     return of_geojson(body, source)
@@ -93,10 +96,16 @@ def _kind_of_folders(folders: Sequence[str]) -> bool | None:
 # -- .plan ----------------------------------------------------------------------------------------------------
 
 
-def _of_plan(fence: Any, source: str) -> Envelope:
-    """Version 2 has inclusions and exclusions; version 1, of old QGroundControls, one polygon to be inside of."""
+def fence_of_plan(fence: Any, source: str) -> Envelope | None:
+    """The fence of a .plan file: the value of its `geoFence`; None where it draws none.
+
+    Version 2 has inclusions and exclusions; version 1, of old QGroundControls, one polygon to be inside of.
+
+    Raises:
+        Invalid: something in it makes no sense, or is nearly the name of a limit.
+    """
     if not isinstance(fence, dict):
-        raise Invalid("the .plan file has no geoFence", "geoFence")
+        raise Invalid("the .plan file's geoFence is no JSON object", "geoFence")
     require_no_limit(fence, FENCE_MEMBERS, "the geoFence", "geoFence")
     for name in fence:
         if name not in FENCE_MEMBERS:
@@ -104,17 +113,16 @@ def _of_plan(fence: Any, source: str) -> Envelope:
     version = fence.get("version", 2)
     if version not in (1, 2):
         raise Invalid(f"the geoFence has version {shown(version)}; 1 and 2 are known", "geoFence", "version")
-    if fence.get("polygon") is not None:
+    areas = [*_of_plan_list(fence, "polygons", _plan_polygon), *_of_plan_list(fence, "circles", _plan_circle)]
+    if fence.get("polygon"):
         ring = _plan_ring(fence["polygon"], "the geoFence's polygon", "geoFence", "polygon")
-        areas = [Area("polygon 1", inclusion=True, rings=(ring,))] if ring else []
-    else:
-        areas = [*_of_plan_list(fence, "polygons", _plan_polygon), *_of_plan_list(fence, "circles", _plan_circle)]
+        areas.insert(0, Area("polygon of version 1", inclusion=True, rings=(ring,)))
     remarks = (RETURN,) if fence.get("breachReturn") else ()
-    return Envelope(tuple(areas), source=source, every=True, remarks=remarks)
+    return Envelope(tuple(areas), source=source, every=True, remarks=remarks) if areas else None
 
 
 def _of_plan_list(fence: Mapping[str, Any], key: str, area_of: Callable[[Any, str, str], Area]) -> Iterator[Area]:
-    drawn = fence.get(key, [])
+    drawn = [] if fence.get(key) is None else fence[key]
     if not isinstance(drawn, list):
         raise Invalid(f"its {key} are no list", "geoFence", key)
     for number, one in enumerate(drawn, 1):

@@ -10,7 +10,7 @@ from typing import Any
 from mavproxy_uavapi.core.envelope.model import Area, Envelope, EnvelopeLimits, Place
 from mavproxy_uavapi.core.envelope.words import require_no_limit
 from mavproxy_uavapi.core.errors import BadRequest, Invalid
-from mavproxy_uavapi.core.strict_json import shown
+from mavproxy_uavapi.core.strict_json import is_finite_number, shown
 from mavproxy_uavapi.core.text import nearest
 
 KINDS = {"inclusion": True, "exclusion": False}
@@ -62,7 +62,7 @@ def number_in(value: Any, what: str, *loc: str) -> float:
     Raises:
         Invalid: it is none; `what` begins the error.
     """
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    if not is_finite_number(value):
         raise Invalid(f"{what}: {shown(value)} is not a number", *loc)
     return float(value)
 

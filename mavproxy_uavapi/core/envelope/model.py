@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from mavproxy_uavapi.core.errors import Invalid
-from mavproxy_uavapi.core.strict_json import shown
+from mavproxy_uavapi.core.strict_json import is_finite_number, shown
 from mavproxy_uavapi.core.text import nearest
 
 Place = tuple[float, float]  # latitude and longitude, degrees
@@ -74,7 +74,7 @@ class EnvelopeLimits:
         for name, value in values.items():
             if name not in names:
                 raise Invalid(f"there is no limit {shown(name)}; {nearest(name, names)}", "limits")
-            if value is not None and not (_is_number(value) and value > 0):
+            if value is not None and not (is_finite_number(value) and value > 0):
                 raise Invalid(f"{shown(value)} is not a positive number", "limits", name)
         if (values.get("reserve") or 0) > 100:
             raise Invalid(f"{values['reserve']} %; at most 100 % is possible", "limits", "reserve")
@@ -133,7 +133,7 @@ class Envelope:
 def _check(area: Area) -> None:
     """Raise Invalid unless the area makes sense; whether its outline crosses itself shows in `space.py`."""
     for lat, lon in area.corners:
-        if not (_is_number(lat) and _is_number(lon) and abs(lat) <= HIGHEST_LATITUDE and abs(lon) <= 180):
+        if not (is_finite_number(lat) and is_finite_number(lon) and abs(lat) <= HIGHEST_LATITUDE and abs(lon) <= 180):
             raise Invalid(f"{area.name}: {lat}, {lon} is not a latitude and longitude in degrees")
     if area.centre is not None and not 0 < area.radius <= LARGEST:
         raise Invalid(f"{area.name}: its radius is {area.radius:g} m, not between 0 and {LARGEST:g}")
@@ -143,7 +143,3 @@ def _check(area: Area) -> None:
         raise Invalid(f"{area.name}: a polygon has three corners at least")
     if math.isnan(area.floor) or math.isnan(area.ceiling) or area.floor >= area.ceiling:
         raise Invalid(f"{area.name}: its floor ({area.floor:g} m) is not below its ceiling ({area.ceiling:g} m)")
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
