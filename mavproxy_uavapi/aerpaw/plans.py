@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,11 @@ from mavproxy_uavapi.aerpaw.constants import (
     PLAN_CMD_WAYPOINT,
 )
 from mavproxy_uavapi.aerpaw.geometry import Coordinate, Waypoint
+from mavproxy_uavapi.core.errors import UavApiError
+from mavproxy_uavapi.core.file_text import read_text
+from mavproxy_uavapi.core.strict_json import json_of
 
+LARGEST = 4 * 1024 * 1024  # bytes
 PLACES = (PLAN_CMD_TAKEOFF, PLAN_CMD_WAYPOINT, PLAN_CMD_RTL)
 PARAMETERS = 7
 
@@ -26,12 +29,17 @@ def read_from_plan_complete(path: str, default_speed: float = DEFAULT_WAYPOINT_S
     Raises:
         ValueError: it is not a .plan file, or an item has too few parameters.
     """
-    with Path(path).open(encoding="utf-8") as file:
-        plan = json.load(file)
+    try:
+        plan = json_of(read_text(Path(path), LARGEST), path)
+    except UavApiError as error:
+        raise ValueError(str(error)) from error
     if not isinstance(plan, dict) or plan.get("fileType") != "Plan":
         raise ValueError("Wrong file type -- use a .plan file.")
+    mission = plan.get("mission")
+    if not isinstance(mission, dict) or not isinstance(mission.get("items"), list):
+        raise ValueError(f"{path} has no mission items")
     speed, places = default_speed, []
-    for item in _simple(plan["mission"]["items"]):
+    for item in _simple(mission["items"]):
         parameters = [0 if value is None else value for value in item.get("params", [])]
         if item["command"] == PLAN_CMD_SPEED:
             speed = parameters[1]

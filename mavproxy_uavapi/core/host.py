@@ -24,6 +24,7 @@ from mavproxy_uavapi.core.mavlink.link_watch import LinkWatch
 from mavproxy_uavapi.core.mavlink.parameter_watch import ParameterWatch
 from mavproxy_uavapi.core.mavlink.pending_waits import PendingWaits
 from mavproxy_uavapi.core.mavlink.vehicle_state import VehicleState, VehicleStates
+from mavproxy_uavapi.core.terminal import alarm
 from mavproxy_uavapi.core.vehicle.endings import FlightEndings
 from mavproxy_uavapi.core.vehicle.envelope_watch import EnvelopeWatch
 from mavproxy_uavapi.core.vehicle.holds import Holds
@@ -238,7 +239,7 @@ class Host:
 
     def warn(self, sentence: str) -> None:
         """Print a sentence at the prompt, loudly. Any thread."""
-        self.bridge.post(lambda: print(f"\a*** {sentence}"))
+        self.bridge.post(lambda: alarm(sentence))
 
     def _leave_trace(self, job: Job) -> None:
         """Write a job that ended to the trail, unless the HTTP call that began it does."""
