@@ -16,7 +16,7 @@ from mavproxy_uavapi.aerpaw.constants import (
 from mavproxy_uavapi.aerpaw.geometry import Coordinate, Waypoint
 from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.file_text import read_text
-from mavproxy_uavapi.core.strict_json import json_of
+from mavproxy_uavapi.core.strict_json import is_finite_number, json_of, shown
 
 LARGEST = 4 * 1024 * 1024  # bytes
 PLACES = (PLAN_CMD_TAKEOFF, PLAN_CMD_WAYPOINT, PLAN_CMD_RTL)
@@ -40,25 +40,35 @@ def read_from_plan_complete(path: str, default_speed: float = DEFAULT_WAYPOINT_S
         raise ValueError(f"{path} has no mission items")
     speed, places = default_speed, []
     for item in _simple(mission["items"]):
-        parameters = [0 if value is None else value for value in item.get("params", [])]
+        parameters = _parameters(item)
         if item["command"] == PLAN_CMD_SPEED:
-            speed = parameters[1]
+            speed = parameters[1] if len(parameters) > 1 else speed
         elif item["command"] in PLACES:
             if len(parameters) < PARAMETERS:
                 raise ValueError(f"Plan item has fewer than {PARAMETERS} params: {item}")
-            number, command = item["doJumpId"], item["command"]
+            number, command = item.get("doJumpId"), item["command"]
             place = {"id": number, "command": command, "pos": parameters[4:7], "wait_for": parameters[0]}
             places.append({**place, "speed": speed})
     return places
 
 
-def _simple(items: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+def _parameters(item: dict[str, Any]) -> list[float]:
+    params = item.get("params", [])
+    if not isinstance(params, list) or not all(value is None or is_finite_number(value) for value in params):
+        raise ValueError(f"the params of a plan item are {shown(params)}, not numbers")
+    return [value or 0 for value in params]
+
+
+def _simple(items: list[Any]) -> Iterator[dict[str, Any]]:
     """The simple items; a survey or a corridor gives the items that QGroundControl generated."""
     for item in items:
+        if not isinstance(item, dict):
+            raise ValueError(f"a plan item is {shown(item)}, not a JSON object")
+        transects = item.get("TransectStyleComplexItem")
         if "command" in item:
             yield item
-        else:
-            yield from _simple(item.get("TransectStyleComplexItem", {}).get("Items", []))
+        elif isinstance(transects, dict) and isinstance(transects.get("Items"), list):
+            yield from _simple(transects["Items"])
 
 
 def read_from_plan(path: str, default_speed: float = DEFAULT_WAYPOINT_SPEED) -> list[Waypoint]:

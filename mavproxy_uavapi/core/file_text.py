@@ -21,6 +21,7 @@ MARKS = (
     (codecs.BOM_UTF16_LE, "utf-16-le"),
     (codecs.BOM_UTF16_BE, "utf-16-be"),
 )
+ZIP = b"PK\x03\x04"
 DECLARATION = re.compile(rb"\s*<\?xml\b[^>]{0,200}?\bencoding\s*=\s*[\"']([^\"'>]{0,40})[\"']")
 WIDE = re.compile(r"utf[-_]?(?:16|32)|ucs|iso-10646", re.IGNORECASE)  # no text in it can hold a declaration in ASCII
 # Encodings in which ASCII is ASCII, by Python's names of them.
@@ -38,6 +39,8 @@ def text_of(data: bytes, what: str) -> str:
     Raises:
         BadRequest: it is not text, or of an encoding that is not known; it names the line and the column.
     """
+    if data.startswith(ZIP):
+        raise BadRequest(f"{what} is packed (a KMZ, a zip): unpack it, and send the file that is in it")
     encoding, data = _encoding(data, what)
     try:
         text = data.decode(encoding)

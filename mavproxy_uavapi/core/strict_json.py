@@ -13,6 +13,7 @@ from mavproxy_uavapi.core.text import escaped
 
 DEEPEST = 60  # lists and objects in each other
 LONGEST_WHOLE = 40  # digits; a longer number is a float, and infinite beyond 308
+LARGEST = 1 << 1023  # of whole numbers; a float cannot hold one much larger
 LONGEST_SHOWN = 30  # characters
 MARK = re.compile(r'\\.|["\[\]{}]', re.DOTALL)
 HALF = re.compile(r"\\u[dD][89a-fA-F]")  # a surrogate, which means a character only with another one
@@ -46,7 +47,9 @@ def json_of(text: str, what: str) -> Any:
 
 def is_finite_number(value: Any) -> bool:
     """Whether it is a number that a float can hold; true and false are none."""
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return math.isfinite(value) if isinstance(value, float) else abs(value) < LARGEST
 
 
 def shown(value: Any) -> str:

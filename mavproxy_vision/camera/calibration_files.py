@@ -16,7 +16,7 @@ from mavproxy_uavapi.core.values import NUMBER
 from mavproxy_vision.geometry.camera_model import CameraModel
 
 LARGEST = 1e6  # largest number in a calibration
-LARGEST_FILE = 256 * 1024  # bytes
+LARGEST_FILE = 64 * 1024  # bytes
 OPENCV_HEAD = re.compile(r"\A%YAML[: ]1\.[0-9]")  # a directive that YAML itself does not know
 # What programs call it, in lower case: the calibrators of ROS and OpenCV, a recorded camera_info, older samples.
 WIDTH, HEIGHT = ("image_width", "width"), ("image_height", "height")

@@ -53,6 +53,7 @@ def test_a_declared_encoding_counts_unless_the_bytes_are_of_another_width(declar
         (b"a\nb \xff", "it is not UTF-8 text: line 2, column 3 has byte 0xFF"),
         (b"a\nb\n\x00", "it is not text: line 3, column 1 has a zero byte"),
         (b"\xff\xfea", "it is not UTF-16 text: line 1, column 1 has byte 0x61"),
+        (b"PK\x03\x04\x14\x00", "it is packed (a KMZ, a zip): unpack it"),
         (KML.format("klingon").encode(), "it declares the encoding 'klingon', which is not known: save it as UTF-8"),
         (KML.format("rot13").encode(), "'rot13', which is not known"),
         (KML.format("unicode_escape").encode(), "'unicode_escape', which is not known"),

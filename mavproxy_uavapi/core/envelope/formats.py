@@ -19,7 +19,6 @@ __all__ = ["EMPTY", "HEIGHTS", "geojson", "fence_of_plan", "of_fence", "of_geojs
 mavlink = mavutil.mavlink
 
 FORMATS = "an envelope is a GeoJSON FeatureCollection, a KML or a .plan file"
-ZIP = "PK\x03\x04"
 FENCE_MEMBERS = ("version", "polygons", "circles", "polygon", "breachReturn")
 DRAWN_MEMBERS = ("version", "inclusion", "polygon", "circle", "fenceAction", "name")  # of a polygon or a circle
 RETURN = "the breach return point is not used"
@@ -43,8 +42,6 @@ def read(text: str, source: str) -> Envelope:
         Invalid: something in it makes no sense, or is nearly the name of a limit.
     """
     text = text.lstrip("\ufeff \t\r\n")
-    if text.startswith(ZIP):
-        raise BadRequest("this is a KMZ, a packed KML: unpack it and send the doc.kml in it")
     if text.startswith("<"):
         return _of_kml(text, source)
     if not text.startswith("{"):

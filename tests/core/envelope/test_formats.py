@@ -169,7 +169,6 @@ CORNERS = [[-35.36, 149.16], [-35.36, 149.17], [-35.35, 149.17]]
         (kml("<NetworkLink/>"), "links to another file"),
         ('<!DOCTYPE kml [<!ENTITY a "b">]><kml>&a;</kml>', "the KML has a DOCTYPE"),
         ("<a>" * 5000, "nested more than 60 levels deep"),
-        ("PK\x03\x04", "unpack it"),
         (
             fence(polygons=[{"inclusion": "false", "polygon": CORNERS}]),
             "polygon 1: its inclusion is 'false', not true",
