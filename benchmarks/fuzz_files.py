@@ -2,8 +2,9 @@
 
     python benchmarks/fuzz_files.py --minutes 10 [--seed N]
 
-The seeds are tests/corpus; tests/support/parsers.py lists the parsers, tests/support/damage.py the damage. It fails when
-a parser ends in an error that is not its own, when Python's words reach a user, or when a file takes longer than SLOW.
+The seeds are tests/corpus; tests/support/parsers.py lists the parsers, tests/support/damage.py the damage. It fails
+when a parser ends in an error that is not its own, when Python's words reach a user, or when a file takes longer than
+SLOW.
 """
 
 from __future__ import annotations
@@ -75,9 +76,8 @@ def main() -> int:
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     print(machine())
     print(table(head, rows))
-    print(
-        f"{sum(sum(map(int, row[1:4])) for row in rows)} files in {options.minutes:g} minutes; {memory:.0f} MB at most"
-    )
+    files = sum(int(cell) for row in rows for cell in row[1:4])
+    print(f"{files} files in {options.minutes:g} minutes; {memory:.0f} MB at most")
     for what, count in found.most_common():
         print(f"{count} times {what}")
     return int(bool(found))

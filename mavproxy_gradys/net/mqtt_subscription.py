@@ -13,6 +13,7 @@ from mavproxy_gradys.errors import NotDelivered
 from mavproxy_gradys.net.mqtt_client import disconnect, make_client
 from mavproxy_gradys.net.outage_log import Defects, Outage
 from mavproxy_gradys.net.schedule import Backoff
+from mavproxy_uavapi.core.text import reason_of
 
 LONGEST_PAUSE = 20.0  # s between attempts to connect
 Take = Callable[[str, object], None]
@@ -45,7 +46,7 @@ class MqttSubscription:
             try:
                 await self._listen(make_client(*self._broker, self._timeout, self._ca_file), take, backoff)
             except (aiomqtt.MqttError, NotDelivered) as error:
-                self._outage.update(str(error) or "no answer")
+                self._outage.update(reason_of(error) or "no answer")
             await asyncio.sleep(backoff.failed(clock()))
 
     def _pass_on(self, take: Take, topic: str, payload: object) -> None:

@@ -116,8 +116,10 @@ class Station:
         try:
             device = parse({name: str(value) for name, value in (await request.post()).items()})
             shown = list(newest_of_update(device, now))
-        except (ValueError, KeyError) as error:
-            return web.json_response({"detail": f"cannot read that: {error!r}"}, status=500)
+        except KeyError as missing:
+            return web.json_response({"detail": f"cannot read that: it has no {missing.args[0]}"}, status=500)
+        except ValueError:
+            return web.json_response({"detail": "cannot read that: a field is not a number"}, status=500)
         watched = self._watched or self._watchers > 0
         if watched:
             self._updates.put(device)

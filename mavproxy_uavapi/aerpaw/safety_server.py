@@ -148,13 +148,13 @@ def read_rules(file: Path) -> SafetyRules:
     try:
         config = yaml.safe_load(read_text(file, LARGEST))
         if not isinstance(config, dict):
-            raise ValueError("it has no settings")
+            raise ValueError(f"{file} has no settings")
         return SafetyRules.from_mapping(config, file.parent)
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, RecursionError) as error:
         mark = getattr(error, "problem_mark", None)
         raise ValueError(f"{file} is not YAML{'' if mark is None else f': line {mark.line + 1}'}") from error
-    except (ValueError, TypeError, UavApiError) as error:
-        raise ValueError(f"{file}: {error}") from error
+    except UavApiError as error:
+        raise ValueError(str(error)) from error
 
 
 def _coordinate(text: str) -> Coordinate:

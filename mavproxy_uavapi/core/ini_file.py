@@ -38,7 +38,8 @@ class IniFile:
         except BadRequest as error:
             raise SettingError(str(error)) from error
         except configparser.Error as error:
-            raise SettingError(f"{file}: {_sentence(error, text)}") from error
+            sentence = _sentence(error, text)
+            raise SettingError(f"{file}: {sentence}") from error
         self.sections = {name: dict(parser[name]) for name in parser.sections()}
         for name in self.sections:
             if name not in SECTIONS:

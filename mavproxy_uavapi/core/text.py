@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -28,6 +29,11 @@ def line_of(text: str) -> str:
 def joined(lines: Iterable[str]) -> str:
     """Several lines as one text; a line break within one of them may come from somebody else, and is spelled out."""
     return "\n".join(map(line_of, lines))
+
+
+def reason_of(error: BaseException) -> str:
+    """What the system or another program says of a failure, without Python's numbers; it may be empty."""
+    return re.sub(r"\[Errno -?\d+\] ", "", str(error))
 
 
 def nearest(word: str, known: Iterable[str]) -> str:

@@ -25,14 +25,8 @@ STARTERS = {f"{UAVAPI}.launcher.command_lines", "benchmarks.sim_pair"}
 CLIENT, AERPAW, LAUNCHER = f"{UAVAPI}.client", f"{UAVAPI}.aerpaw", f"{UAVAPI}.launcher."
 # What a program at the other end of HTTP shares with the server: no state, no thread, no link.
 PURE_NAMES = (
-    "errors",
-    "timeout",
-    "mavlink.flight_modes",
-    "geodesy",
-    "envelope.kml",
-    "file_text",
-    "strict_json",
-    "terminal",
+    *("errors", "timeout", "mavlink.flight_modes", "geodesy", "envelope.kml"),
+    *("file_text", "strict_json", "terminal", "text"),
 )
 PURE = [f"{CORE}.{name}" for name in PURE_NAMES]
 # The rooms of each package, from the one that stands on no other to the one on top.

@@ -14,6 +14,7 @@ WORDS = (
     b"[api]", b"=", b"sha256:", b"fly:1,2", b"QGC WPL 110\n", b'"type"', b'"kind"', b'"items"', b'"command"',
     b'"polygon"', b'"features"', b'"limits"', b"Exclusion",
 )  # fmt: skip
+LARGEST = 200_000  # bytes
 NUMBER = re.compile(rb"-?[0-9]+(?:\.[0-9]+)?")
 ENCODINGS = ("utf-16", "utf-16-le", "utf-8-sig", "utf-32", "cp1252", "utf-7")
 
@@ -21,8 +22,8 @@ ENCODINGS = ("utf-16", "utf-16-le", "utf-8-sig", "utf-32", "cp1252", "utf-7")
 def damaged(data: bytes, dice: random.Random) -> bytes:
     """The file with some damage."""
     for _ in range(dice.choice((1, 1, 2, 3, 8))):
-        data = dice.choice((_cut, _put, _number, _member, _repeat, _recoded, _flip, _nested))(data, dice)
-    return data[:200_000]
+        data = dice.choice((_cut, _put, _number, _member, _repeat, _recoded, _flip, _nested))(data, dice)[:LARGEST]
+    return data
 
 
 def _cut(data: bytes, dice: random.Random) -> bytes:

@@ -89,7 +89,7 @@ def _of_feature(feature: Any, number: int) -> Iterator[Area]:
             raise Invalid(f"{where} has a member {shown(name)}; what limits goes into its properties", *loc)
     require_no_limit(properties, PROPERTIES, where, *loc)
     name = _name(properties, number)
-    if properties.get("kind") not in KINDS:
+    if not isinstance(properties.get("kind"), str) or properties["kind"] not in KINDS:
         raise Invalid(f"{name}: its property kind is neither inclusion nor exclusion", *loc)
     common: dict[str, Any] = {
         "name": name,

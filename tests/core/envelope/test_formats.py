@@ -142,6 +142,7 @@ CORNERS = [[-35.36, 149.16], [-35.36, 149.17], [-35.35, 149.17]]
         (of({"max_alt": 60}), "has 'max_alt', which is no limit here; there are kind, floor, ceiling, radius"),
         (of({"maxHeight": 60}), "has 'maxHeight'"),
         (of({"inclusion": "false"}), "has 'inclusion'"),
+        (of({"kind": ["inclusion"]}), "its property kind is neither inclusion nor exclusion"),
         (of({"kind": "Exclusion"}), "its property kind is neither inclusion nor exclusion"),
         (of({}, ceiling=60), "has a member 'ceiling'; what limits goes into its properties"),
         (of({"radius": 60}), "has a radius and is a Polygon"),
