@@ -116,7 +116,7 @@ async def _values(call: Call) -> tuple[Any, dict[str, str]]:
     """
     text = text_of(await in_time(call.request.read()), "the body")
     if not text.lstrip().startswith("{"):
-        return parameter_files.read(text)
+        return await asyncio.to_thread(parameter_files.read, text)
     values = (await asyncio.to_thread(json_of, text, "the body")).get("parameters")
     if not isinstance(values, dict):
         return values, {}

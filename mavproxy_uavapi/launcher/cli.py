@@ -12,6 +12,7 @@ from contextlib import ExitStack, contextmanager
 
 from mavproxy_uavapi.core.state_directory import state_directory
 from mavproxy_uavapi.core.terminal import say_text
+from mavproxy_uavapi.core.text import reason_of
 from mavproxy_uavapi.launcher import command_lines, directories, instances
 from mavproxy_uavapi.launcher.errors import LaunchError, OptionError
 from mavproxy_uavapi.launcher.fleet import SimulatedVehicle, fleet, kinds
@@ -33,7 +34,7 @@ def run(argv: Sequence[str] | None = None) -> int:
         say_text(f"mavproxy-uavapi: {error}", file=sys.stderr)
         return error.status
     except OSError as error:
-        say_text(f"mavproxy-uavapi: {error}", file=sys.stderr)
+        say_text(f"mavproxy-uavapi: {reason_of(error)}", file=sys.stderr)
         return LaunchError.status
 
 

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from mavproxy_uavapi.core.envelope.model import Area, Envelope, EnvelopeLimits, Place
+from mavproxy_uavapi.core.envelope.model import MOST_AREAS, Area, Envelope, EnvelopeLimits, Place
 from mavproxy_uavapi.core.envelope.words import require_no_limit
 from mavproxy_uavapi.core.errors import BadRequest, Invalid
 from mavproxy_uavapi.core.strict_json import is_finite_number, shown
@@ -45,6 +45,8 @@ def of_geojson(body: Mapping[str, Any], source: str) -> Envelope:
     limits = body.get("limits")
     if not isinstance(limits, dict | None):
         raise Invalid("limits is a JSON object", "limits")
+    if len(body["features"]) > MOST_AREAS:
+        raise Invalid(f"it has more than {MOST_AREAS} areas", "features")
     areas = [area for number, feature in enumerate(body["features"], 1) for area in _of_feature(feature, number)]
     has_heights = any(_has_height(feature["geometry"]["coordinates"]) for feature in body["features"])
     return Envelope(tuple(areas), EnvelopeLimits.of(limits or {}), source, remarks=(HEIGHTS,) if has_heights else ())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import re
 from collections.abc import Iterator
+from itertools import islice
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
@@ -12,6 +13,8 @@ from mavproxy_uavapi.core.errors import BadRequest, Invalid
 from mavproxy_uavapi.core.strict_json import shown
 
 DEEPEST = 60  # elements in each other
+LONGEST_NAME = 500  # characters of a Placemark's or a folder's name
+MOST_DRAWN = 2000  # elements that are drawn
 NUMBER = re.compile(r"[-+]?(?:[0-9]{1,20}(?:\.[0-9]{0,30})?|\.[0-9]{1,30})(?:[eE][-+]?[0-9]{1,3})?")
 PATHS = ("LineString", "LinearRing")
 POINTS = ("Point", "Track", "MultiTrack", "Model", "GroundOverlay", "PhotoOverlay", "ScreenOverlay")
@@ -108,7 +111,10 @@ def read(text: str) -> KmlDrawing:
         line, column = error.position
         raise BadRequest(f"it is not KML: line {line}, column {column + 1} is not XML") from error
     drawing = KmlDrawing([], [], 0)
-    points = sum(_draw(element, names, drawing) for element, names in _drawn(root, _Names()))
+    drawn = list(islice(_drawn(root, _Names()), MOST_DRAWN + 1))
+    if len(drawn) > MOST_DRAWN:
+        raise Invalid(f"the KML draws more than {MOST_DRAWN} polygons, paths and points")
+    points = sum(_draw(element, names, drawing) for element, names in drawn)
     return drawing._replace(points=points)
 
 
@@ -159,7 +165,8 @@ def _polygon(element: ElementTree.Element, names: _Names, number: str) -> KmlPol
 def _corners(text: str, name: str) -> list[tuple[float, float, float]]:
     """Latitude, longitude and height of each corner of a ring."""
     corners = []
-    for number, corner in enumerate(re.sub(r"\s*,\s*", ",", text).split(), 1):
+    together = ",".join(part.strip() for part in text.split(","))  # by hand a comma may have a space after it
+    for number, corner in enumerate(together.split(), 1):
         parts = corner.split(",")
         if not 2 <= len(parts) <= 3 or not all(NUMBER.fullmatch(part) for part in parts):
             expected = "longitude,latitude or longitude,latitude,height with decimal points"
@@ -180,4 +187,6 @@ def _name(element: ElementTree.Element) -> str:
     """The text of its `name`, without markup, in one line."""
     name = element.find("{*}name")
     text = "" if name is None else "".join(name.itertext())
+    if len(text) > LONGEST_NAME:
+        raise Invalid(f"a name has more than {LONGEST_NAME} characters: {shown(text)}")
     return " ".join(re.sub(r"<[^<>]*>", "", html.unescape(text)).split())

@@ -11,6 +11,7 @@ from typing import Any
 from mavproxy_uavapi.core.errors import Invalid
 from mavproxy_uavapi.core.strict_json import shown
 
+MOST_MEMBERS = 200  # of an object whose names are looked at
 NEAR = 0.8  # difflib's ratio from which a member may be a slip of the pen …
 NEAR_KIND = 0.85  # … and a word of a name: `conclusion` is none
 # A word of a name that nobody gives to what limits nothing.
@@ -55,6 +56,8 @@ def require_no_limit(members: Mapping[str, Any], known: Iterable[str], where: st
         Invalid: there is one; it names it, and the nearest known name.
     """
     names = list(known)
+    if len(members) > MOST_MEMBERS:
+        raise Invalid(f"{where} has more than {MOST_MEMBERS} members", *loc)
     for name, value in members.items():
         if name in names or value is None or _letters(name) in HARMLESS:
             continue

@@ -18,7 +18,13 @@ from mavproxy_uavapi.core.errors import BadRequest, Invalid
 from mavproxy_uavapi.core.mavlink.link import Address
 from mavproxy_uavapi.core.strict_json import is_finite_number, shown
 from mavproxy_uavapi.core.vehicle import mission_formats
-from mavproxy_uavapi.core.vehicle.mission_formats import FRAMES, WrittenItem, command_name, has_location
+from mavproxy_uavapi.core.vehicle.mission_formats import (
+    FRAMES,
+    WrittenItem,
+    command_name,
+    has_location,
+    require_possible,
+)
 
 mavlink = mavutil.mavlink
 
@@ -28,7 +34,6 @@ SAME_FRAMES = {
     mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT: mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT,
 }
 LOWEST, HIGHEST = -1000.0, 10_000.0  # m, in whichever frame
-MOST_ITEMS = 5000  # more than any ArduPilot vehicle stores
 ALTITUDE_TOLERANCE = 0.02  # m; ArduPilot stores whole centimetres
 PLACE_TOLERANCE = 10  # 1e-7 degrees, about 0.1 m; an answer in floats is no better
 DEGREES = 1e7
@@ -185,8 +190,7 @@ def checked(items: Sequence[WrittenItem]) -> list[MissionItem]:
     Raises:
         Invalid: with one entry for each problem; each names the item's number and command.
     """
-    if not 0 < len(items) <= MOST_ITEMS:
-        raise Invalid(f"a mission has 1 to {MOST_ITEMS} items besides home, not {len(items)}", "items")
+    require_possible(len(items))
     numbered = [(seq, item, _problem(item)) for seq, item in enumerate(items, 1)]
     problems = [
         {

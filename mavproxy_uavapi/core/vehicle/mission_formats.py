@@ -24,6 +24,7 @@ FRAMES = {
     "terrain": mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT,
     "mission": mavlink.MAV_FRAME_MISSION,
 }
+MOST_ITEMS = 5000  # more than any ArduPilot vehicle stores
 WPL_110 = "QGC WPL 110"
 COLUMNS = (
     "number", "current", "frame", "command", "param1", "param2", "param3", "param4", "latitude", "longitude",
@@ -80,6 +81,12 @@ def command_name(command: int) -> str:
     """MAV_CMD's name without its prefix."""
     entry = mavlink.enums["MAV_CMD"].get(command)
     return entry.name.removeprefix("MAV_CMD_") if entry else str(command)
+
+
+def require_possible(count: int) -> None:
+    """Raise Invalid unless a mission can have so many items."""
+    if not 0 < count <= MOST_ITEMS:
+        raise Invalid(f"a mission has 1 to {MOST_ITEMS} items besides home, not {count}", "items")
 
 
 def read(text: str) -> WrittenMission:
@@ -165,8 +172,10 @@ def _require_home(row: Sequence[float], number: int) -> None:
 
 def _from_items(items: list[Any]) -> list[WrittenItem]:
     flat = list(_flattened(items))
+    require_possible(len(flat))
     written = [_from_json(item, number) for number, item in enumerate(flat, 1)]
-    return [_jumping(item, number, flat) for number, item in enumerate(written, 1)]
+    ids = {one["doJumpId"]: number for number, one in enumerate(flat, 1) if isinstance(one.get("doJumpId"), int)}
+    return [_jumping(item, number, ids) for number, item in enumerate(written, 1)]
 
 
 def _flattened(items: list[Any]) -> Iterator[Any]:
@@ -250,9 +259,8 @@ def _our_params(item: Mapping[str, Any], command: int, where: str) -> tuple[floa
     return (*values, *(_number(place[name], name, where) for name in PLACE))
 
 
-def _jumping(item: WrittenItem, number: int, flat: Sequence[Mapping[str, Any]]) -> WrittenItem:
+def _jumping(item: WrittenItem, number: int, ids: Mapping[float, int]) -> WrittenItem:
     """The item; if it is a jump of QGroundControl, to the number that its target has here."""
-    ids = {one["doJumpId"]: place for place, one in enumerate(flat, 1) if isinstance(one.get("doJumpId"), int)}
     if item.command != mavlink.MAV_CMD_DO_JUMP or not ids:
         return item
     target = ids.get(item.params[0])  # a float that equals a whole number finds it

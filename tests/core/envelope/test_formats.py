@@ -168,6 +168,10 @@ CORNERS = [[-35.36, 149.16], [-35.36, 149.17], [-35.35, 149.17]]
         (kml(placemark("field"), path("a", "1,1 1,2 2,2 1,1")), "the LineString 'a' is no area"),
         (kml(placemark("field"), name="No-fly zones"), "is called 'No-fly zones': name 'field'"),
         (kml("<NetworkLink/>"), "links to another file"),
+        (kml(placemark("a" * 501)), "a name has more than 500 characters"),
+        (kml(*[path("a")] * 2001), "draws more than 2000 polygons, paths and points"),
+        (of({f"p{n}": 1 for n in range(201)}), "feature 1 has more than 200 members"),
+        (json.dumps({**feature(), "features": feature()["features"] * 201}), "more than 200 areas"),
         ('<!DOCTYPE kml [<!ENTITY a "b">]><kml>&a;</kml>', "the KML has a DOCTYPE"),
         ("<a>" * 5000, "nested more than 60 levels deep"),
         (

@@ -11,6 +11,7 @@ from mavproxy_uavapi.core.errors import BadRequest, Invalid
 from mavproxy_uavapi.core.mavlink.link import Address
 from mavproxy_uavapi.core.vehicle import mission_files
 from mavproxy_uavapi.core.vehicle.mission_files import MissionItem, difference, read
+from mavproxy_uavapi.core.vehicle.mission_formats import MOST_ITEMS
 
 mavlink = mavutil.mavlink
 
@@ -148,7 +149,7 @@ def test_items_that_cannot_be_flown_are_invalid_and_say_which(item: Any) -> None
     assert [str(part) for part in caught.value.problems[0]["loc"][:2]] == ["items", "2"]
 
 
-@pytest.mark.parametrize("count", [0, mission_files.MOST_ITEMS + 1])
+@pytest.mark.parametrize("count", [0, MOST_ITEMS + 1])
 def test_too_few_and_too_many_items_are_invalid(count: int) -> None:
     with pytest.raises(Invalid, match="items besides home"):
         read(json.dumps({"items": [{"command": "NAV_TAKEOFF", "alt": 5}] * count}))
