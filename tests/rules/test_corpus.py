@@ -92,6 +92,7 @@ EXPECTED = {
         "uav_api.ini": "[api] 2, [logs] 1, [simulated] 1",
         "windows_editor.ini": "[api] 1",
     },
+    "image": {"tag.jpg": "40x40", "tag.png": "40x40", "text.jpg": "!the body is not an image, JPEG or PNG"},
     "relayed position": {
         "401_digits.json": "!its value is not a finite number",
         "acknowledged.json": "!not a reading: it has no value",

@@ -23,6 +23,7 @@ from mavproxy_uavapi.core.vehicle import mission_files, parameter_files
 from mavproxy_uavapi.files import tokens
 from mavproxy_uavapi.launcher.locations import read_locations
 from mavproxy_vision.camera import calibration, calibration_files
+from mavproxy_vision.camera.source import decode
 
 T = TypeVar("T")
 CORPUS = Path(__file__).parents[1] / "corpus"
@@ -117,6 +118,11 @@ def aerpaw_message(data: bytes) -> str:
     return ", ".join(map(str, wire.read(data, "none")))
 
 
+def image(data: bytes) -> str:
+    height, width = decode(data).shape[:2]
+    return f"{width}x{height}"
+
+
 def _of_file(data: bytes, read: Callable[[Path], T]) -> T:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, "file")
@@ -141,6 +147,7 @@ PARSERS = {
     "AERPAW's fence": ForeignParser(aerpaw_fence, (ValueError,), "envelopes"),
     "AERPAW's plan": ForeignParser(aerpaw_plan, (ValueError,), "missions"),
     "AERPAW's rules": ForeignParser(aerpaw_rules, (ValueError, OSError), "calibrations"),
+    "image": ForeignParser(image, OURS, "images"),
     "AERPAW's requests": ForeignParser(aerpaw_request, (ValueError,), "readings"),
     "AERPAW's messages": ForeignParser(aerpaw_message, (ValueError,), "readings"),
 }
