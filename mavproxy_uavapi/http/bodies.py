@@ -62,8 +62,8 @@ async def _body(request: web.BaseRequest, form: bool) -> Any:
     if form:
         return dict(await request.post())
     data = await request.read()
-    text = data.decode(request.charset) if request.charset else text_of(data, "the body")
-    return json_of(text, "the body")
+    is_utf_8 = request.charset is None or request.charset.lower().replace("-", "") == "utf8"
+    return json_of(text_of(data, "the body") if is_utf_8 else data.decode(str(request.charset)), "the body")
 
 
 async def parameters(request: web.BaseRequest, model: type[Request], body: bool) -> Request:
