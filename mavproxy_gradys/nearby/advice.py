@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from mavproxy_uavapi.core.envelope.space import LocalFrame
+from mavproxy_uavapi.core.airspace.space import LocalFrame
 from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.file_text import text_of
 from mavproxy_uavapi.core.strict_json import is_finite_number, json_of

@@ -13,8 +13,8 @@ from pydantic import Field
 
 from mavproxy_uavapi.core.errors import Invalid, NotFound, UavApiError
 from mavproxy_uavapi.core.file_text import text_of
+from mavproxy_uavapi.core.link import parameter_files
 from mavproxy_uavapi.core.strict_json import json_of
-from mavproxy_uavapi.core.vehicle import parameter_files
 from mavproxy_uavapi.core.vehicle.vehicle import Vehicle
 from mavproxy_uavapi.http.bodies import in_time
 from mavproxy_uavapi.http.call import Call

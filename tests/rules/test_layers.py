@@ -25,7 +25,7 @@ STARTERS = {f"{UAVAPI}.launcher.command_lines", "benchmarks.sim_pair"}
 CLIENT, AERPAW, LAUNCHER = f"{UAVAPI}.client", f"{UAVAPI}.aerpaw", f"{UAVAPI}.launcher."
 # What a program at the other end of HTTP shares with the server: no state, no thread, no link.
 PURE_NAMES = (
-    *("errors", "timeout", "mavlink.flight_modes", "geodesy", "envelope.kml"),
+    *("errors", "timeout", "telemetry.flight_modes", "geodesy", "airspace.kml"),
     *("file_text", "strict_json", "terminal", "text"),
 )
 PURE = [f"{CORE}.{name}" for name in PURE_NAMES]

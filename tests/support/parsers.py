@@ -13,13 +13,14 @@ from mavproxy_gradys.relay.positions import Positions
 from mavproxy_gradys.tracks import formats as tracks
 from mavproxy_uavapi.aerpaw import geofence, plans, safety_rules, safety_wire, wire
 from mavproxy_uavapi.aerpaw.safety_server import read_rules
-from mavproxy_uavapi.core.envelope import formats as envelopes
-from mavproxy_uavapi.core.envelope.space import Space
+from mavproxy_uavapi.core.airspace import formats as envelopes
+from mavproxy_uavapi.core.airspace.space import Space
 from mavproxy_uavapi.core.errors import UavApiError
 from mavproxy_uavapi.core.file_text import text_of
 from mavproxy_uavapi.core.ini_file import IniFile
+from mavproxy_uavapi.core.link import parameter_files
+from mavproxy_uavapi.core.mission import mission_files
 from mavproxy_uavapi.core.strict_json import json_of
-from mavproxy_uavapi.core.vehicle import mission_files, parameter_files
 from mavproxy_uavapi.files import tokens
 from mavproxy_uavapi.launcher.locations import read_locations
 from mavproxy_vision.camera import calibration, calibration_files
