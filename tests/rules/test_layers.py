@@ -31,7 +31,7 @@ PURE_NAMES = (
 PURE = [f"{CORE}.{name}" for name in PURE_NAMES]
 # The rooms of each package, from the one that stands on no other to the one on top.
 FLOORS = {
-    CORE: ("envelope", "mainloop", "mavlink", "vehicle"),
+    CORE: ("mainloop", "telemetry", "link", "control", "mission", "airspace", "vehicle", "oversight"),
     VISION: ("geometry", "apriltag", "camera", "tracking", "landing"),
 }
 
