@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, Protocol
 from mavproxy_uavapi.core.errors import LinkLost, UavApiError
 from mavproxy_uavapi.core.mainloop.bridge import Bridge
 from mavproxy_uavapi.core.sent_messages import note_sent
+from mavproxy_uavapi.core.text import reason_of
 
 
 class Address(NamedTuple):
@@ -82,4 +83,4 @@ class MavproxyLink:
         try:
             master.mav.send(message)
         except OSError as error:
-            raise LinkLost(f"MAVProxy could not write to its link: {error}") from error
+            raise LinkLost(f"MAVProxy could not write to its link: {reason_of(error)}") from error
